@@ -1,0 +1,76 @@
+//! From a node's result to what an output asks for: attributes picked, velocities added.
+
+use crate::error::{Error, Result};
+use crate::geometry::{Geometry, Name, Owner, P, V};
+use crate::graph::{GraphOutput, Scene};
+use crate::node::Node;
+use crate::time::Frame;
+
+/// Half a frame.
+const HALF: i64 = Frame::TICKS / 2;
+
+/// The two times whose difference is an output's velocity at `frame`; one-sided at the scene's ends.
+pub(super) fn velocity_samples(scene: &Scene, frame: Frame) -> [Frame; 2] {
+    let before = if frame == scene.start() { frame } else { frame.plus_ticks(-HALF) };
+    let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(HALF) };
+    [before, after]
+}
+
+/// Whether the velocities of `output` are differences, not the node's own.
+pub(super) fn differs(output: &GraphOutput, node: Option<&Node>, has_solver: bool) -> bool {
+    let own = node.is_some_and(|node| node.writes.iter().any(|attribute| attribute.spec().0 == V.name));
+    output.v && !own && !has_solver
+}
+
+/// What an output delivers of `geometry`; `around` are the results at [`velocity_samples`], with their distance in
+/// seconds, where velocities are differences.
+pub(super) fn finish(
+    output: &GraphOutput,
+    geometry: &Geometry,
+    around: Option<([&Geometry; 2], f64)>,
+) -> Result<Geometry> {
+    let mut result = geometry.clone();
+    if let Some((around, seconds)) = around {
+        add_velocity(&mut result, around, seconds)?;
+    }
+    let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
+    for kind in kinds {
+        let Some(part) = result.part_mut(kind) else { continue };
+        let unwanted: Vec<(Owner, Name)> = part
+            .columns()
+            .filter(|(_, name, _)| !wanted(output, name))
+            .map(|(owner, name, _)| (owner, name.clone()))
+            .collect();
+        for (owner, name) in unwanted {
+            part.remove(owner, &name);
+        }
+    }
+    Ok(result)
+}
+
+fn wanted(output: &GraphOutput, name: &Name) -> bool {
+    match &output.attributes {
+        _ if **name == *P.name => true,
+        _ if **name == *V.name && output.v => true,
+        Some(names) => names.contains(name),
+        None => true,
+    }
+}
+
+fn add_velocity(result: &mut Geometry, [before, after]: [&Geometry; 2], seconds: f64) -> Result<()> {
+    let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
+    for kind in kinds {
+        let Some(part) = result.part_mut(kind) else { continue };
+        let rows = |geometry: &'_ Geometry| geometry.part(kind).map(|part| part.positions().to_vec());
+        let (Some(a), Some(b)) = (rows(before), rows(after)) else { continue };
+        if a.len() != part.point_count() || b.len() != a.len() {
+            let fact = format!("the {kind} have {} points half a frame before and {} after", a.len(), b.len());
+            return Err(Error::refused(fact).hint("velocities need points that stay; leave out `v` of the output"));
+        }
+        let rate = 1.0 / seconds;
+        let v =
+            a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|k| ((f64::from(b[k]) - f64::from(a[k])) * rate) as f32));
+        part.set(V, v.collect())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,369 @@
+//! The cache on disk: checkpoints of solvers and finished frames of outputs, so that a killed cook resumes.
+//!
+//! Every file is written beside its name and renamed, carries its format and a checksum, and is ignored where either does
+//! not fit: whatever a cache holds, a cook's results are those of a cook without it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
+use crate::key::Key;
+
+/// Changes whenever files of an older convect can no longer be used.
+const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 1");
+
+/// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
+const EVERY: i64 = 8;
+
+/// A folder with checkpoints and finished frames.
+pub struct DiskCache {
+    folder: PathBuf,
+    limit: u64,
+    /// Recent checkpoints of each node, oldest first.
+    recent: BTreeMap<String, Vec<(i64, PathBuf)>>,
+    note: Option<String>,
+}
+
+impl DiskCache {
+    /// Opens a cache, making the folder where it is missing. One that another version made is emptied, with a note.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made, read or written.
+    pub fn open(folder: &Path, limit: u64) -> io::Result<Self> {
+        fs::create_dir_all(folder)?;
+        let mark = folder.join("version");
+        let mut note = None;
+        match fs::read_to_string(&mark) {
+            Ok(text) if text == FORMAT => {}
+            Ok(_) => {
+                note = Some(format!("the cache `{}` was made by another version and is not used", folder.display()));
+                for (path, _, _) in files(folder)? {
+                    fs::remove_file(path)?;
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+        write_whole(&mark, FORMAT.as_bytes())?;
+        let mut cache = Self { folder: folder.to_owned(), limit, recent: BTreeMap::new(), note };
+        cache.trim()?;
+        Ok(cache)
+    }
+
+    /// What is worth telling about the cache that was found.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    fn path(&self, kind: &str, key: Key) -> PathBuf {
+        self.folder.join(format!("{key}.{kind}"))
+    }
+
+    /// The state a solver was saved in under that key.
+    pub(crate) fn checkpoint(&self, key: Key) -> Option<Vec<u8>> {
+        read_whole(&self.path("checkpoint", key))
+    }
+
+    /// Saves a solver's state, and removes older ones that need not stay.
+    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: Key, state: &[u8]) -> io::Result<()> {
+        let path = self.path("checkpoint", key);
+        write_whole(&path, state)?;
+        let recent = self.recent.entry(node.to_owned()).or_default();
+        recent.push((frame, path));
+        if recent.len() > 2 {
+            let (frame, path) = recent.remove(0);
+            if frame % EVERY != 0 {
+                remove_if_there(&path)?;
+            }
+        }
+        self.trim()
+    }
+
+    /// A finished frame of an output.
+    pub(crate) fn frame(&self, key: Key) -> Option<Geometry> {
+        decode(&read_whole(&self.path("frame", key))?)
+    }
+
+    /// Keeps a finished frame of an output.
+    pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry) -> io::Result<()> {
+        write_whole(&self.path("frame", key), &encode(geometry))?;
+        self.trim()
+    }
+
+    /// Removes the oldest files while there are more bytes than the limit.
+    fn trim(&mut self) -> io::Result<()> {
+        if self.limit == u64::MAX {
+            return Ok(());
+        }
+        let mut files = files(&self.folder)?;
+        files.sort_by(|(a, _, s), (b, _, t)| s.cmp(t).then(a.cmp(b)));
+        let mut total: u64 = files.iter().map(|(_, bytes, _)| bytes).sum();
+        for (path, bytes, _) in files {
+            if total <= self.limit {
+                break;
+            }
+            remove_if_there(&path)?;
+            total -= bytes;
+        }
+        Ok(())
+    }
+}
+
+fn files(folder: &Path) -> io::Result<Vec<(PathBuf, u64, SystemTime)>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let ours = path.extension().is_some_and(|e| e == "checkpoint" || e == "frame" || e == "part");
+        if ours && let Ok(facts) = fs::metadata(&path) {
+            found.push((path, facts.len(), facts.modified().unwrap_or(SystemTime::UNIX_EPOCH)));
+        }
+    }
+    Ok(found)
+}
+
+fn remove_if_there(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Writes beside the name and renames, a checksum in front. Killed at any moment, the name holds nothing or all.
+fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(format!(".{}.part", std::process::id()));
+    let part = PathBuf::from(part);
+    let is_mark = path.file_name().is_some_and(|name| name == "version");
+    let sum = blake3::hash(bytes);
+    let whole = if is_mark { bytes.to_vec() } else { [sum.as_bytes().as_slice(), bytes].concat() };
+    fs::write(&part, whole).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
+}
+
+fn read_whole(path: &Path) -> Option<Vec<u8>> {
+    let mut bytes = fs::read(path).ok()?;
+    let rest = bytes.split_off_checked(32)?;
+    (blake3::hash(&rest).as_bytes().as_slice() == bytes).then_some(rest)
+}
+
+trait SplitOffChecked {
+    fn split_off_checked(&mut self, at: usize) -> Option<Vec<u8>>;
+}
+
+impl SplitOffChecked for Vec<u8> {
+    fn split_off_checked(&mut self, at: usize) -> Option<Vec<u8>> {
+        (self.len() >= at).then(|| self.split_off(at))
+    }
+}
+
+/// A geometry as bytes, every bit of it.
+fn encode(geometry: &Geometry) -> Vec<u8> {
+    let mut out = Vec::new();
+    let put = |out: &mut Vec<u8>, bytes: &[u8]| {
+        out.extend((bytes.len() as u64).to_le_bytes());
+        out.extend(bytes);
+    };
+    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
+    for part in geometry.parts() {
+        out.push(part.kind() as u8);
+        match part.topology() {
+            Topology::Curves(runs) => put(&mut out, &words(runs.starts())),
+            Topology::Mesh(faces) => {
+                put(&mut out, &words(faces.runs.starts()));
+                put(&mut out, &words(&faces.corners));
+            }
+            Topology::Points => {}
+            Topology::Tets(tets) => put(&mut out, &words(tets.as_flattened())),
+        }
+        for owner in Owner::ALL {
+            encode_table(&mut out, part.table(owner));
+        }
+    }
+    if let Some(volume) = geometry.volume() {
+        out.push(Kind::Volume as u8);
+        let grid = volume.grid();
+        for x in grid.origin.iter().chain([&grid.cell]) {
+            out.extend(x.to_le_bytes());
+        }
+        for n in grid.size {
+            out.extend(n.to_le_bytes());
+        }
+        for field in std::iter::once(volume.level_set()).chain(volume.velocity()) {
+            put(&mut out, &field.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
+        }
+        encode_table(&mut out, volume.once());
+    }
+    out
+}
+
+fn encode_table(out: &mut Vec<u8>, table: &Table) {
+    out.extend((table.rows() as u64).to_le_bytes());
+    out.extend((table.iter().count() as u64).to_le_bytes());
+    for (name, column) in table.iter() {
+        for bytes in [name.as_bytes(), &[column.kind() as u8], &column.to_bytes()] {
+            out.extend((bytes.len() as u64).to_le_bytes());
+            out.extend(bytes);
+        }
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+        let (head, rest) = self.0.split_at_checked(n)?;
+        self.0 = rest;
+        Some(head)
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
+    }
+
+    fn piece(&mut self) -> Option<&'a [u8]> {
+        let n = self.count()?;
+        self.take(n)
+    }
+
+    fn words(&mut self) -> Option<Vec<u32>> {
+        Some(self.piece()?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect())
+    }
+
+    fn word(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    fn floats(&mut self) -> Option<Vec<f32>> {
+        Some(self.words()?.into_iter().map(f32::from_bits).collect())
+    }
+
+    fn runs(&mut self) -> Option<Runs> {
+        let starts = self.words()?;
+        Runs::from_counts(starts.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]))).ok()
+    }
+
+    fn table(&mut self) -> Option<Table> {
+        const TYPES: [ColumnType; 6] =
+            [ColumnType::F1, ColumnType::F3, ColumnType::F4, ColumnType::I1, ColumnType::I3, ColumnType::I4];
+        let mut table = Table::new(self.count()?);
+        for _ in 0..self.count()? {
+            let name = std::str::from_utf8(self.piece()?).ok()?;
+            let kind = TYPES.into_iter().find(|kind| Some(&[*kind as u8][..]) == self.0.get(8..9))?;
+            self.piece()?;
+            table.set(name, Column::from_bytes(kind, self.piece()?)?).ok()?;
+        }
+        Some(table)
+    }
+}
+
+fn decode(bytes: &[u8]) -> Option<Geometry> {
+    let mut reader = Reader(bytes);
+    let mut geometry = Geometry::default();
+    while let Some(kind) = reader.take(1) {
+        let topology = match kind[0] {
+            k if k == Kind::Curves as u8 => Topology::Curves(Arc::new(reader.runs()?)),
+            k if k == Kind::Mesh as u8 => {
+                let runs = reader.runs()?;
+                Topology::Mesh(Arc::new(crate::geometry::Faces { runs, corners: reader.words()? }))
+            }
+            k if k == Kind::Points as u8 => Topology::Points,
+            k if k == Kind::Tets as u8 => Topology::Tets(Arc::new(reader.words()?.as_chunks::<4>().0.to_vec())),
+            k if k == Kind::Volume as u8 => {
+                let floats = [reader.word()?, reader.word()?, reader.word()?, reader.word()?].map(f32::from_bits);
+                let size = [reader.word()?, reader.word()?, reader.word()?];
+                let grid = Grid { origin: [floats[0], floats[1], floats[2]], cell: floats[3], size };
+                let level_set = reader.floats()?;
+                let velocity = [reader.floats()?, reader.floats()?, reader.floats()?];
+                let mut volume = Volume::new(grid, level_set, velocity).ok()?;
+                *volume.once_mut() = reader.table()?;
+                geometry.put_volume(volume);
+                continue;
+            }
+            _ => return None,
+        };
+        let tables = [reader.table()?, reader.table()?, reader.table()?];
+        geometry.put(Component::from_tables(topology, tables).ok()?);
+    }
+    Some(geometry)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{ENVELOPE, SHIELDED};
+
+    fn sample() -> Geometry {
+        let mut curves = Component::curves(vec![2, 1], vec![[0.1, -0.0, 1e-40], [1.0; 3], [2.0; 3]]).unwrap();
+        curves.set(ENVELOPE, vec![0.5, 1.0, 0.25]).unwrap();
+        curves.set(SHIELDED, vec![0.5, 0.0]).unwrap();
+        curves.set_column(Owner::Once, "step", Column::new(vec![[1, 2, 3]])).unwrap();
+        let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.0; 3]; 3]).unwrap();
+        let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[0.0; 3]; 4]).unwrap();
+        let grid = Grid { origin: [1.0, 2.0, 3.0], cell: 0.5, size: [1, 1, 2] };
+        let volume = Volume::new(grid, vec![0.5, -0.5], [vec![1.0; 4], vec![2.0; 4], vec![3.0; 3]]).unwrap();
+        let mut geometry = Geometry::from(curves).with(mesh).with(tets).with(Component::points(vec![[9.0; 3]]));
+        geometry.put_volume(volume);
+        geometry
+    }
+
+    #[test]
+    fn a_geometry_comes_back_bit_for_bit() {
+        let geometry = sample();
+        let bytes = encode(&geometry);
+        let back = decode(&bytes).unwrap();
+        assert_eq!(back, geometry);
+        assert_eq!(encode(&back), bytes);
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_ignored() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let key = Key::of(b"a");
+        cache.save_frame(key, &sample()).unwrap();
+        let path = cache.path("frame", key);
+        let whole = fs::read(&path).unwrap();
+        assert_eq!(cache.frame(key).unwrap(), sample());
+        for length in 0..whole.len() {
+            fs::write(&path, &whole[..length]).unwrap();
+            assert!(cache.frame(key).is_none(), "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn the_last_two_checkpoints_and_every_eighth_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let key = |frame: i64| Key::of(&frame.to_le_bytes());
+        for frame in 1..=20 {
+            cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]).unwrap();
+        }
+        let stay: Vec<i64> = (1..=20).filter(|frame| cache.checkpoint(key(*frame)).is_some()).collect();
+        assert_eq!(stay, [8, 16, 19, 20]);
+    }
+
+    #[test]
+    fn a_limit_removes_the_oldest() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), 3 * 132).unwrap();
+        for frame in 0..10_i64 {
+            cache.save_checkpoint("body", frame * 8, Key::of(&frame.to_le_bytes()), &[0; 100]).unwrap();
+        }
+        let left = files(folder.path()).unwrap();
+        assert!(left.len() <= 3 && !left.is_empty(), "{}", left.len());
+    }
+
+    #[test]
+    fn a_cache_of_another_version_is_not_used_and_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        cache.save_frame(Key::of(b"a"), &sample()).unwrap();
+        fs::write(folder.path().join("version"), "convect 0.0.1 cache 0").unwrap();
+        let cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        assert!(cache.note().unwrap().ends_with("was made by another version and is not used"));
+        assert!(cache.frame(Key::of(b"a")).is_none());
+    }
+}

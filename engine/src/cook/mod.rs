@@ -1,0 +1,181 @@
+//! Cooking: a sweep over the asked frames, oldest first, slice by slice.
+//!
+//! A slice is a handful of frames. For each slice the sweep asks, from the outputs upwards, what must be there; then
+//! cooks node by node, in the order of the graph, all frames of a node in parallel (and elements within a node). So
+//! there is nothing to lock or to wait for, a result is dropped once its last reader in the slice is done, and time spent
+//! between two nodes is that node's own. Windows and solvers are chains: states that move along with the sweep.
+
+mod between;
+mod call;
+mod deliver;
+mod disk;
+mod history;
+mod report;
+mod store;
+mod sweep;
+
+use std::collections::BTreeSet;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
+
+pub use disk::DiskCache;
+pub(crate) use history::gauss_points;
+pub use report::{NodeReport, Report};
+
+use crate::error::Error;
+use crate::files::Files;
+use crate::geometry::{Geometry, Name};
+use crate::graph::Graph;
+use crate::plan::{Plan, Request};
+use crate::time::Frame;
+use store::Store;
+
+/// Why a node could not cook.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{node}` ({type_name}) at frame {frame}: {error}")]
+pub struct CookError {
+    /// Which node.
+    pub node: Name,
+    /// Its type.
+    pub type_name: &'static str,
+    /// At which frame.
+    pub frame: Frame,
+    /// What went wrong.
+    pub error: Error,
+}
+
+/// A finished frame of an output.
+#[derive(Clone, Debug)]
+pub struct Delivered {
+    /// Place of the output in the graph.
+    pub output: usize,
+    /// The frame.
+    pub frame: Frame,
+    /// What came out.
+    pub geometry: Arc<Geometry>,
+}
+
+/// Takes finished frames, oldest first; what it returns as an error ends the cook.
+pub type Sink<'a, E> = dyn FnMut(&[Delivered]) -> Result<(), E> + Send + 'a;
+
+/// How an engine works. None of it changes a bit of any result.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Threads; 0: as many as the machine has.
+    pub threads: usize,
+    /// Bytes of results to hold.
+    pub memory: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { threads: 0, memory: 1 << 30 }
+    }
+}
+
+/// Why a cook ended early.
+#[derive(Debug)]
+pub enum Stopped<E> {
+    /// What was asked cannot be cooked at all.
+    Asked(Arc<CookError>),
+    /// The sink refused a frame.
+    Sink(E),
+    /// The cache on disk could not be written.
+    Cache(std::io::Error),
+}
+
+/// Cooks graphs, and remembers between cooks what stood still.
+pub struct Engine {
+    pool: rayon::ThreadPool,
+    memory: usize,
+    store: Mutex<Store>,
+    files: Arc<Files>,
+}
+
+impl Engine {
+    /// An engine with its own threads.
+    ///
+    /// # Errors
+    /// Where the system does not give the threads.
+    pub fn new(settings: &Settings) -> Result<Self, String> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(settings.threads)
+            .thread_name(|k| format!("convect {k}"))
+            .build()
+            .map_err(|error| format!("no threads to cook with: {error}"))?;
+        let store = Mutex::new(Store::new(settings.memory / 2));
+        Ok(Self { pool, memory: settings.memory, store, files: Arc::default() })
+    }
+
+    /// Plans a request on `graph`.
+    ///
+    /// # Errors
+    /// Where a sub-frame is asked of something that a solver is part of.
+    pub fn plan<'g>(&self, graph: &'g Graph, request: &Request) -> Result<Plan<'g>, Arc<CookError>> {
+        Plan::new(graph, request, self.files.clone())
+    }
+
+    /// Cooks what is asked, and hands finished frames to `sink`, oldest first. A node that fails spoils what depends on
+    /// it, and nothing else: [`Report::errors`] says what was lost. `cancel` ends the cook between two nodes.
+    ///
+    /// # Errors
+    /// Where the request cannot be cooked at all, or the sink or the cache on disk refuses.
+    pub fn cook<E: Send>(
+        &self,
+        graph: &Graph,
+        request: &Request,
+        disk: Option<&mut DiskCache>,
+        cancel: &AtomicBool,
+        sink: &mut Sink<'_, E>,
+    ) -> Result<Report, Stopped<E>> {
+        let plan = self.plan(graph, request).map_err(Stopped::Asked)?;
+        self.pool.install(|| sweep::Sweep::new(self, &plan, disk, cancel, false).run(sink))
+    }
+
+    /// What a cook would do, without cooking: how often each node would cook.
+    ///
+    /// # Errors
+    /// Where the request cannot be cooked at all.
+    pub fn rehearse(&self, graph: &Graph, request: &Request) -> Result<Report, Arc<CookError>> {
+        let plan = self.plan(graph, request)?;
+        let cancel = AtomicBool::new(false);
+        let fresh = Self {
+            pool: rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread"),
+            memory: self.memory,
+            store: Mutex::new(Store::new(usize::MAX)),
+            files: self.files.clone(),
+        };
+        let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
+        match sweep::Sweep::new(&fresh, &plan, None, &cancel, true).run(&mut nothing) {
+            Ok(report) => Ok(report),
+            Err(Stopped::Asked(error)) => Err(error),
+            Err(Stopped::Sink(_) | Stopped::Cache(_)) => unreachable!("a rehearsal delivers nothing"),
+        }
+    }
+
+    /// The files this engine has read.
+    pub fn files(&self) -> &Arc<Files> {
+        &self.files
+    }
+
+    fn store<T>(&self, work: impl FnOnce(&mut Store) -> T) -> T {
+        work(&mut self.store.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Names of what `frames` are, for messages: `1–48`, `3`, `1–4 and 10`.
+pub fn frames_text(frames: &BTreeSet<Frame>) -> String {
+    let mut runs: Vec<(Frame, Frame)> = Vec::new();
+    for frame in frames {
+        match runs.last_mut() {
+            Some((_, last)) if last.plus(1) == *frame => *last = *frame,
+            _ => runs.push((*frame, *frame)),
+        }
+    }
+    let text: Vec<String> = runs.iter().map(|(a, b)| if a == b { a.to_string() } else { format!("{a}–{b}") }).collect();
+    match text.as_slice() {
+        [] => "none".into(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

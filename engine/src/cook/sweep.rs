@@ -1,0 +1,921 @@
+//! The sweep: see the module above for the idea.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use rayon::prelude::*;
+
+use super::call::{Call, Returned};
+use super::history::Integral;
+use super::store::Cooked;
+use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, between, deliver};
+use crate::clock::Stopwatch;
+use crate::geometry::Geometry;
+use crate::graph::{Body, Link};
+use crate::key::{Hasher, Key};
+use crate::node::{ChainFns, Cook, FrameCx, History, InputData, Node, Outputs, SolverFns, StateBox};
+use crate::param::Params;
+use crate::plan::{Keys, Plan, Stretch};
+use crate::time::Frame;
+
+/// A result, or what spoiled it.
+type Outcome = Result<Cooked, Arc<CookError>>;
+
+/// Frames a chain moves in one slice at most, and frames a slice spans where there are chains.
+const LONGEST: i64 = 16;
+
+/// Frames of a slice at most.
+const MOST_FRAMES: usize = 16;
+
+/// Bytes of results a slice should hold: a few times a core's cache, so that a node finds its input there.
+const SLICE_BYTES: usize = 16 << 20;
+
+/// Work shorter than this is not worth handing to another thread.
+const WORTH_A_THREAD: Duration = Duration::from_micros(20);
+
+/// A chain's state, standing at a frame.
+struct Running {
+    at: i64,
+    state: Result<StateBox, Arc<CookError>>,
+}
+
+/// What a slice needs of a chain's stretch.
+#[derive(Default)]
+struct Advance {
+    /// Whole frames whose output is needed.
+    outputs: BTreeSet<i64>,
+    /// Last frame to move to.
+    goal: i64,
+    /// Frame the state stands at; `None`: it must start.
+    from: Option<i64>,
+}
+
+/// What a slice needs.
+struct Slice {
+    /// By node: frames, canonical, that nobody has yet.
+    need: Vec<BTreeSet<Frame>>,
+    /// By node: what its chain must do.
+    advance: Vec<BTreeMap<Stretch, Advance>>,
+}
+
+/// What a chain must reach for the sake of later slices.
+struct Silent {
+    node: usize,
+    stretch: Stretch,
+    goal: i64,
+}
+
+pub(super) struct Sweep<'p, 'g, 'e> {
+    engine: &'e Engine,
+    plan: &'p Plan<'g>,
+    disk: Option<&'e mut DiskCache>,
+    cancel: &'e AtomicBool,
+    /// Whether this is a rehearsal, in which no node is called.
+    dry: bool,
+    keys: Keys<'p, 'g>,
+    results: Vec<BTreeMap<Frame, Outcome>>,
+    running: Vec<BTreeMap<Stretch, Running>>,
+    /// By chain: its last whole frames' outputs, which samples between frames ask for again.
+    recent: Vec<BTreeMap<i64, Outcome>>,
+    integrals: Vec<Option<Integral<'p>>>,
+    /// By node: mean wall time of a call.
+    pace: Vec<Duration>,
+    /// By node: key of the result kept because it may hold.
+    held: Vec<Option<Key>>,
+    report: Report,
+    /// Bytes of the slice's results, by node and in all.
+    node_bytes: Vec<usize>,
+    live_bytes: usize,
+    /// Most bytes one frame of a slice took.
+    frame_bytes: usize,
+}
+
+impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
+    pub(super) fn new(
+        engine: &'e Engine,
+        plan: &'p Plan<'g>,
+        disk: Option<&'e mut DiskCache>,
+        cancel: &'e AtomicBool,
+        dry: bool,
+    ) -> Self {
+        let count = plan.graph.nodes.len();
+        let maps = || (0..count).map(|_| BTreeMap::new()).collect::<Vec<_>>();
+        let nodes = plan.graph.nodes.iter().zip(&plan.nodes).enumerate().map(|(place, (node, planned))| NodeReport {
+            id: Some(node.id.clone()),
+            type_name: node.type_name(),
+            time: node.node().map_or("given", |node| node.cook.word()),
+            needed: planned.needed,
+            varies: planned.varies,
+            left_out: if planned.needed { plan.left_out(place) } else { Vec::new() },
+            ..NodeReport::default()
+        });
+        let integrals = plan.graph.nodes.iter().zip(&plan.nodes).map(|(node, planned)| {
+            let integrand = node.node().and_then(|node| node.integrand);
+            integrand.map(|integrand| Integral::new(&planned.resolver, integrand, plan.graph.scene.fps))
+        });
+        let integrals = integrals.collect();
+        let mut report = Report { nodes: nodes.collect(), ..Report::default() };
+        report.notes.extend(disk.as_ref().and_then(|disk| disk.note()).map(str::to_owned));
+        Self {
+            engine,
+            plan,
+            disk,
+            cancel,
+            dry,
+            keys: Keys::new(plan),
+            results: (0..count).map(|_| BTreeMap::new()).collect(),
+            running: (0..count).map(|_| BTreeMap::new()).collect(),
+            recent: maps(),
+            integrals,
+            pace: vec![Duration::MAX; count],
+            held: vec![None; count],
+            report,
+            node_bytes: vec![0; count],
+            live_bytes: 0,
+            frame_bytes: 0,
+        }
+    }
+
+    pub(super) fn run<E: Send>(mut self, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
+        let watch = Stopwatch::start();
+        let frames = self.plan.request.frames.clone();
+        let chains = self.plan.graph.nodes.iter().zip(&self.plan.nodes).any(|(node, planned)| {
+            planned.needed && node.node().is_some_and(|node| matches!(node.cook, Cook::Window(..) | Cook::Solver(..)))
+        });
+        let mut rest = frames.as_slice();
+        while let Some(first) = rest.first() {
+            let most = self.slice_length();
+            let fits = |frame: &&Frame| !chains || frame.ticks() - first.ticks() < LONGEST * Frame::TICKS;
+            let count = rest.iter().take(most).take_while(fits).count();
+            let (slice, later) = rest.split_at(count);
+            rest = later;
+            let cooking = Stopwatch::start();
+            let finished = self.slice(slice);
+            self.report.cooking += cooking.wall();
+            if self.cancelled() {
+                self.report.cancelled = true;
+                break;
+            }
+            let finished = finished.map_err(Stopped::Cache)?;
+            sink(&finished).map_err(Stopped::Sink)?;
+            for delivered in &finished {
+                *self.report.delivered.entry(delivered.output).or_default() += 1;
+            }
+            self.keys.forget_before(slice[0].floor_number());
+        }
+        self.report.wall = watch.wall();
+        self.report.cpu = watch.cpu();
+        Ok(self.report)
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// As many frames as fit the cache, and the memory asked for.
+    fn slice_length(&self) -> usize {
+        if self.dry {
+            return MOST_FRAMES;
+        }
+        // The first frame shows how much one takes.
+        if self.frame_bytes == 0 && self.report.delivered.is_empty() {
+            return 1;
+        }
+        let threads = rayon::current_num_threads();
+        let bytes = self.frame_bytes.max(1);
+        let most = (self.engine.memory / 2 / bytes).clamp(1, MOST_FRAMES);
+        (SLICE_BYTES / bytes).clamp(threads.min(most), most)
+    }
+
+    /// Cooks some frames of all outputs.
+    fn slice(&mut self, frames: &[Frame]) -> std::io::Result<Vec<Delivered>> {
+        let mut finished = Vec::new();
+        let mut asked: Vec<(usize, Frame, Option<Key>)> = Vec::new();
+        let mut targets: Vec<(usize, Frame)> = Vec::new();
+        for frame in frames {
+            for place in &self.plan.request.outputs {
+                let key = self.disk.is_some().then(|| self.output_key(*place, *frame)).flatten();
+                let found = key.and_then(|key| self.disk.as_ref().and_then(|disk| disk.frame(key)));
+                match found {
+                    Some(geometry) => {
+                        self.report.from_disk += 1;
+                        finished.push(Delivered { output: *place, frame: *frame, geometry: Arc::new(geometry) });
+                    }
+                    None => {
+                        asked.push((*place, *frame, key));
+                        targets.extend(self.samples(*place, *frame).into_iter().map(|at| self.canonical(*place, at)));
+                    }
+                }
+            }
+        }
+        self.run_up(&targets)?;
+        let slice = self.close(&targets, &[]);
+        let peak = self.cook_slice(slice, &targets)?;
+        if self.cancelled() {
+            return Ok(finished);
+        }
+        self.frame_bytes = self.frame_bytes.max(peak / frames.len().max(1));
+        if !self.dry {
+            let made: Vec<_> = asked.par_iter().map(|(place, frame, _)| self.delivery(*place, *frame)).collect();
+            for ((place, frame, key), result) in asked.into_iter().zip(made) {
+                match result {
+                    Ok(geometry) => {
+                        if let (Some(disk), Some(key)) = (self.disk.as_mut(), key) {
+                            disk.save_frame(key, &geometry)?;
+                        }
+                        finished.push(Delivered { output: place, frame, geometry });
+                    }
+                    Err(error) => self.note_error(place, error),
+                }
+            }
+        }
+        finished.sort_by_key(|delivered| (delivered.frame, delivered.output));
+        self.end_slice();
+        Ok(finished)
+    }
+
+    fn note_error(&mut self, output: usize, error: Arc<CookError>) {
+        let known =
+            self.report.errors.iter_mut().find(|(place, known, _)| *place == output && known.node == error.node);
+        match known {
+            Some((_, _, frames)) => *frames += 1,
+            None => self.report.errors.push((output, error, 1)),
+        }
+    }
+
+    fn canonical(&self, output: usize, frame: Frame) -> (usize, Frame) {
+        let node = self.plan.graph.outputs[output].from.node;
+        (node, self.plan.canonical(node, frame))
+    }
+
+    /// The times at which an output's node must be known for a frame.
+    fn samples(&self, output: usize, frame: Frame) -> Vec<Frame> {
+        let mut samples = vec![frame];
+        if self.output_differs(output) {
+            samples.extend(deliver::velocity_samples(&self.plan.graph.scene, frame));
+        }
+        samples
+    }
+
+    fn output_differs(&self, output: usize) -> bool {
+        let output = &self.plan.graph.outputs[output];
+        let node = output.from.node;
+        deliver::differs(output, self.plan.graph.nodes[node].node(), self.plan.nodes[node].has_solver)
+    }
+
+    /// The key of a finished frame; `None` where a param is refused there, or the program gives geometry.
+    fn output_key(&mut self, output: usize, frame: Frame) -> Option<Key> {
+        let graph = self.plan.graph;
+        if graph.nodes.iter().any(|node| matches!(node.body, Body::Given { .. })) {
+            return None;
+        }
+        let asked = &graph.outputs[output];
+        let mut hasher = Hasher::default();
+        hasher.tag(20).i64(asked.from.port as i64).i64(i64::from(asked.v));
+        let names = asked.attributes.as_deref().unwrap_or_default();
+        hasher.i64(i64::from(asked.attributes.is_some())).i64(names.len() as i64);
+        names.iter().fold(&mut hasher, |hasher, name| hasher.text(name));
+        for at in self.samples(output, frame) {
+            let (node, at) = self.canonical(output, at);
+            hasher.key(self.keys.spot(node, at).ok()?.key).f64(graph.scene.fps);
+        }
+        Some(hasher.finish())
+    }
+
+    /// What an output delivers at a frame, from the results of the slice.
+    fn delivery(&self, place: usize, frame: Frame) -> Result<Arc<Geometry>, Arc<CookError>> {
+        let output = &self.plan.graph.outputs[place];
+        let at = |frame: Frame| -> Result<Arc<Geometry>, Arc<CookError>> {
+            let (node, frame) = self.canonical(place, frame);
+            let outcome = self.results[node].get(&frame).expect("the slice asked for every target");
+            outcome.as_ref().map(|cooked| cooked[output.from.port].clone()).map_err(Arc::clone)
+        };
+        let geometry = at(frame)?;
+        let around = match self.output_differs(place) {
+            false => None,
+            true => {
+                let [before, after] = deliver::velocity_samples(&self.plan.graph.scene, frame);
+                let fps = self.plan.graph.scene.fps;
+                Some(([at(before)?, at(after)?], after.seconds(fps) - before.seconds(fps)))
+            }
+        };
+        let around = around.as_ref().map(|([before, after], seconds)| ([&**before, &**after], *seconds));
+        let finished = deliver::finish(output, &geometry, around);
+        finished.map(Arc::new).map_err(|error| Arc::new(self.plan.error(output.from.node, frame, error)))
+    }
+
+    /// Moves chains that are far behind, a slice at a time, without keeping what they put out on the way.
+    fn run_up(&mut self, targets: &[(usize, Frame)]) -> std::io::Result<()> {
+        loop {
+            let slice = self.close(targets, &[]);
+            let mut behind: Vec<Silent> = Vec::new();
+            let mut begins = Vec::new();
+            for (node, stretches) in slice.advance.iter().enumerate() {
+                for (stretch, advance) in stretches {
+                    let from = advance.from.unwrap_or(stretch.start - 1);
+                    let silent = advance.outputs.first().map_or(advance.goal, |first| first - 1);
+                    let goal = silent.min(from + LONGEST);
+                    if advance.goal - from > LONGEST && goal > from && goal >= stretch.start {
+                        behind.push(Silent { node, stretch: *stretch, goal });
+                        begins.push(from);
+                    }
+                }
+            }
+            let Some(until) = behind.iter().map(|silent| silent.goal).min() else { return Ok(()) };
+            let silent: Vec<Silent> = behind
+                .into_iter()
+                .zip(begins)
+                .filter(|(_, from)| *from < until)
+                .map(|(silent, _)| Silent { goal: until.max(silent.stretch.start), ..silent })
+                .collect();
+            self.forget_results();
+            let slice = self.close(&[], &silent);
+            self.cook_slice(slice, &[])?;
+            self.end_slice();
+            if self.cancelled() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// From the targets upwards: everything the slice must have and has not.
+    fn close(&mut self, targets: &[(usize, Frame)], silent: &[Silent]) -> Slice {
+        let count = self.plan.graph.nodes.len();
+        let mut slice =
+            Slice { need: vec![BTreeSet::new(); count], advance: (0..count).map(|_| BTreeMap::new()).collect() };
+        for (node, frame) in targets {
+            slice.need[*node].insert(*frame);
+        }
+        for Silent { node, stretch, goal } in silent {
+            slice.advance[*node].insert(*stretch, Advance { goal: *goal, ..Advance::default() });
+        }
+        for node in (0..count).rev() {
+            let frames: Vec<Frame> = slice.need[node].iter().copied().collect();
+            for frame in frames {
+                if !self.is_missing(node, frame) {
+                    slice.need[node].remove(&frame);
+                    continue;
+                }
+                self.demand(&mut slice, node, frame);
+            }
+            self.demand_of_chain(&mut slice, node);
+        }
+        slice
+    }
+
+    /// Whether nobody has the result; takes it from memory where it is there.
+    fn is_missing(&mut self, node: usize, frame: Frame) -> bool {
+        if self.results[node].contains_key(&frame) {
+            return false;
+        }
+        let outcome = match self.keys.spot(node, frame) {
+            Err(error) => Err(error),
+            Ok(spot) => match self.engine.store(|store| store.get(spot.key)) {
+                None => return true,
+                Some(cooked) => {
+                    self.report.nodes[node].from_cache += 1;
+                    Ok(cooked)
+                }
+            },
+        };
+        self.results[node].insert(frame, outcome);
+        false
+    }
+
+    fn demand(&mut self, slice: &mut Slice, node: usize, frame: Frame) {
+        let Body::Node { node: declared, inputs, .. } = &self.plan.graph.nodes[node].body else { return };
+        match declared.cook {
+            Cook::Pure(_) | Cook::Frame { .. } => {
+                let Ok(spot) = self.keys.spot(node, frame) else { return };
+                for (times, links) in spot.times.iter().zip(inputs) {
+                    if times.now {
+                        self.need_all(slice, links, frame);
+                    }
+                    if times.start {
+                        self.need_all(slice, links, self.plan.graph.scene.start());
+                    }
+                }
+            }
+            Cook::Window(..) | Cook::Solver(..) => {
+                for whole in neighbours(frame) {
+                    // An error of the stretch came out as the error of the spot before.
+                    let Ok(stretch) = self.keys.stretch(node, whole) else { return };
+                    let whole = whole.max(stretch.start);
+                    if self.recent[node].contains_key(&whole) {
+                        continue;
+                    }
+                    let advance = slice.advance[node].entry(stretch).or_default();
+                    advance.outputs.insert(whole);
+                    advance.goal = if advance.outputs.len() == 1 { whole } else { advance.goal.max(whole) };
+                }
+            }
+        }
+    }
+
+    fn need_all(&self, slice: &mut Slice, links: &[Link], frame: Frame) {
+        for link in links {
+            slice.need[link.node].insert(self.plan.canonical(link.node, frame));
+        }
+    }
+
+    /// What a chain reads while it moves.
+    fn demand_of_chain(&mut self, slice: &mut Slice, node: usize) {
+        let mut advances = std::mem::take(&mut slice.advance[node]);
+        for (stretch, advance) in &mut advances {
+            let first = advance.outputs.first().copied().unwrap_or(advance.goal);
+            self.find_state(node, *stretch, first);
+            advance.from = self.running[node].get(stretch).map(|running| running.at);
+            let next = advance.from.map_or(stretch.start, |at| at + 1);
+            let steps = next..=advance.goal;
+            for frame in steps.clone() {
+                self.demand_of_step(slice, node, frame, frame == stretch.start);
+            }
+            // The frame it stands at is read again by an output there.
+            if let Some(at) = advance.from.filter(|at| advance.outputs.contains(at)) {
+                self.demand_of_step(slice, node, at, at == stretch.start);
+            }
+        }
+        slice.advance[node] = advances;
+    }
+
+    fn demand_of_step(&mut self, slice: &mut Slice, node: usize, frame: i64, starts: bool) {
+        let plan = self.plan;
+        let Body::Node { node: declared, inputs, .. } = &plan.graph.nodes[node].body else { return };
+        let at = Frame::whole(frame);
+        let Ok(params) = plan.nodes[node].resolver.at(at) else { return };
+        for (input, links) in declared.inputs.iter().zip(inputs) {
+            let times = (input.spec().times)(&params);
+            if times.now || (starts && (times.start || times.steps > 0)) {
+                self.need_all(slice, links, at);
+            }
+            if times.steps > 0 && !starts {
+                for sample in plan.step_samples(links, times.steps, at) {
+                    self.need_all(slice, links, sample);
+                }
+            }
+        }
+    }
+
+    /// Sees to it that a state that can reach `frame` is running, if there is one: the one at hand, or a checkpoint.
+    fn find_state(&mut self, node: usize, stretch: Stretch, frame: i64) {
+        if self.running[node].get(&stretch).is_some_and(|running| running.at <= frame) {
+            return;
+        }
+        self.running[node].remove(&stretch);
+        let Some(Cook::Solver(_, solver)) = self.plan.graph.nodes[node].node().map(|node| node.cook) else { return };
+        let Some(disk) = self.disk.as_ref().filter(|_| !self.dry) else { return };
+        for at in (stretch.start..=frame).rev() {
+            let Ok(key) = self.keys.state_key(node, stretch, at) else { continue };
+            let state = disk.checkpoint(key).and_then(|bytes| (solver.load)(&bytes));
+            if let Some(state) = state {
+                self.report.nodes[node].from_cache += 1;
+                self.running[node].insert(stretch, Running { at, state: Ok(state) });
+                return;
+            }
+        }
+    }
+
+    /// Cooks what a slice needs, node by node. Returns the greatest size of results held at once.
+    fn cook_slice(&mut self, slice: Slice, targets: &[(usize, Frame)]) -> std::io::Result<usize> {
+        let plan = self.plan;
+        let mut left: Vec<usize> = plan.nodes.iter().map(|planned| planned.readers.len()).collect();
+        for (node, _) in targets {
+            left[*node] += 1;
+        }
+        let mut peak = 0;
+        let Slice { need, advance } = slice;
+        for (node, (need, advance)) in need.into_iter().zip(advance).enumerate() {
+            if !plan.nodes[node].needed {
+                continue;
+            }
+            if self.cancelled() {
+                return Ok(peak);
+            }
+            if !need.is_empty() || !advance.is_empty() {
+                let watch = Stopwatch::start();
+                self.cook_node(node, need, advance)?;
+                let report = &mut self.report.nodes[node];
+                report.wall += watch.wall();
+                report.cpu += watch.cpu();
+            }
+            self.keep(node);
+            peak = peak.max(self.live_bytes);
+            self.report.peak_bytes =
+                self.report.peak_bytes.max(self.live_bytes + self.engine.store(|store| store.bytes()));
+            let mut sources: Vec<usize> =
+                plan.graph.nodes[node].inputs().iter().flatten().map(|link| link.node).collect();
+            sources.sort_unstable();
+            sources.dedup();
+            for source in sources {
+                left[source] -= 1;
+                if left[source] == 0 {
+                    self.forget(source);
+                }
+            }
+        }
+        Ok(peak)
+    }
+
+    fn cook_node(
+        &mut self,
+        node: usize,
+        need: BTreeSet<Frame>,
+        advance: BTreeMap<Stretch, Advance>,
+    ) -> std::io::Result<()> {
+        let declared = match &self.plan.graph.nodes[node].body {
+            Body::Given { at, .. } => {
+                for frame in need {
+                    self.results[node].insert(frame, Ok(Arc::from([Arc::new(at(frame))])));
+                    self.report.nodes[node].cooks += 1;
+                }
+                return Ok(());
+            }
+            Body::Node { node, .. } => *node,
+        };
+        match declared.cook {
+            Cook::Pure(cook) => self.cook_frames(node, declared, &need, |cx| cook(cx)),
+            Cook::Frame { cook, .. } => self.cook_frames(node, declared, &need, cook),
+            Cook::Window(chain, _) => {
+                self.move_chain(node, declared, chain, None, advance)?;
+                self.finish_chain(node, &need);
+            }
+            Cook::Solver(chain, solver) => {
+                self.move_chain(node, declared, chain, Some(solver), advance)?;
+                self.finish_chain(node, &need);
+            }
+        }
+        Ok(())
+    }
+
+    /// Cooks a pure or frame node: each key once, all in parallel.
+    fn cook_frames(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        need: &BTreeSet<Frame>,
+        cook: impl Fn(&FrameCx) -> crate::Result<Outputs> + Sync,
+    ) {
+        let mut jobs: Vec<(Key, Frame, Params)> = Vec::new();
+        let mut keys: Vec<(Frame, Key)> = Vec::new();
+        for frame in need {
+            let Ok(spot) = self.keys.spot(node, *frame) else { continue };
+            let params = spot.params.clone().expect("a declared node has params");
+            if !jobs.iter().any(|(key, _, _)| *key == spot.key) {
+                jobs.push((spot.key, *frame, params));
+            }
+            keys.push((*frame, spot.key));
+        }
+        let this = &*self;
+        let one = |(key, frame, params): &(Key, Frame, Params)| {
+            (*key, *frame, this.call(node, declared, *frame, params, &cook))
+        };
+        let watch = Stopwatch::start();
+        let worth = self.pace[node].saturating_mul(jobs.len() as u32) > WORTH_A_THREAD;
+        let mut cooked: Vec<_> = match jobs.len() > 1 && worth {
+            true => jobs.par_iter().map(one).collect(),
+            false => jobs.iter().map(one).collect(),
+        };
+        self.pace[node] = watch.wall() / (jobs.len().max(1) as u32);
+        let mut outcomes: Vec<(Key, Outcome)> = Vec::with_capacity(cooked.len());
+        for (key, frame, returned) in cooked.drain(..) {
+            outcomes.push((key, self.take(node, frame, returned)));
+        }
+        for (frame, key) in keys {
+            let outcome = outcomes.iter().find(|(known, _)| *known == key).map(|(_, outcome)| outcome.clone());
+            if let Some(outcome) = outcome {
+                self.results[node].insert(frame, outcome);
+            }
+        }
+    }
+
+    /// Books what a call returned.
+    fn take(&mut self, node: usize, frame: Frame, returned: Result<Returned, Arc<CookError>>) -> Outcome {
+        let report = &mut self.report.nodes[node];
+        report.cooks += 1;
+        let returned = returned?;
+        report.peak_bytes = report.peak_bytes.max(returned.new_bytes);
+        self.live_bytes += returned.new_bytes;
+        self.node_bytes[node] += returned.new_bytes;
+        for (name, value) in returned.metrics {
+            report.metrics.entry(name).or_default().insert(frame, value);
+        }
+        Ok(returned.cooked)
+    }
+
+    /// Calls a node for its outputs at a frame.
+    fn call(
+        &self,
+        node: usize,
+        declared: &'static Node,
+        frame: Frame,
+        params: &Params,
+        cook: &(impl Fn(&FrameCx) -> crate::Result<Outputs> + Sync),
+    ) -> Result<Returned, Arc<CookError>> {
+        if self.dry {
+            let cooked = declared.outputs.iter().map(|_| Arc::new(Geometry::default())).collect();
+            return Ok(Returned { cooked, metrics: Vec::new(), new_bytes: 0 });
+        }
+        let inputs = self.inputs(node, declared, frame, params, Reading::Frame)?;
+        let work = |cx: &FrameCx<'_>| cook(cx);
+        let called = self.context(node, declared, frame, params, inputs).run(work);
+        let checked = called.and_then(|(outputs, finished)| finished.check(outputs));
+        checked.map_err(|error| Arc::new(self.plan.error(node, frame, error)))
+    }
+
+    /// What comes in through each input of a node.
+    fn inputs(
+        &self,
+        node: usize,
+        declared: &'static Node,
+        frame: Frame,
+        params: &Params,
+        reading: Reading,
+    ) -> Result<Vec<(&'static str, InputData)>, Arc<CookError>> {
+        let start = if reading == Reading::Start { frame } else { self.plan.graph.scene.start() };
+        let mut inputs = Vec::with_capacity(declared.inputs.len());
+        for (place, input) in declared.inputs.iter().enumerate() {
+            let spec = input.spec();
+            let times = (spec.times)(params);
+            let links = self.plan.links(node, place);
+            let mut data = InputData::default();
+            if times.now {
+                data.now = self.wires(links, frame)?;
+            }
+            if times.start && matches!(reading, Reading::Start | Reading::Frame) && !self.is_chain(declared, reading) {
+                data.start = self.wires(links, start)?;
+            }
+            if times.steps > 0 {
+                let samples = match reading {
+                    Reading::Step => self.plan.step_samples(links, times.steps, frame),
+                    Reading::Start => vec![frame],
+                    Reading::Frame => Vec::new(),
+                };
+                for sample in samples {
+                    data.steps.push((sample, self.wires(links, sample)?));
+                }
+            }
+            inputs.push((spec.name, data));
+        }
+        Ok(inputs)
+    }
+
+    /// Whether this reads for the output of a chain, which has seen its start long ago.
+    fn is_chain(&self, declared: &Node, reading: Reading) -> bool {
+        reading == Reading::Frame && matches!(declared.cook, Cook::Window(..) | Cook::Solver(..))
+    }
+
+    fn wires(&self, links: &[Link], frame: Frame) -> Result<Vec<Arc<Geometry>>, Arc<CookError>> {
+        let wire = |link: &Link| {
+            let frame = self.plan.canonical(link.node, frame);
+            let outcome = self.results[link.node].get(&frame).expect("the slice asked for every input");
+            outcome.as_ref().map(|cooked| cooked[link.port].clone()).map_err(Arc::clone)
+        };
+        links.iter().map(wire).collect()
+    }
+
+    /// Moves a chain along its stretches, and takes its outputs on the way.
+    fn move_chain(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        chain: ChainFns,
+        solver: Option<SolverFns>,
+        advance: BTreeMap<Stretch, Advance>,
+    ) -> std::io::Result<()> {
+        for (stretch, advance) in advance {
+            let mut running = self.running[node].remove(&stretch);
+            if let Some(at) = running.as_ref().map(|running| running.at).filter(|at| advance.outputs.contains(at)) {
+                self.chain_output(node, declared, chain, running.as_ref(), at);
+            }
+            let next = running.as_ref().map_or(stretch.start, |running| running.at + 1);
+            for frame in next..=advance.goal {
+                if self.cancelled() {
+                    return Ok(());
+                }
+                let state = match running.take() {
+                    None => self.chain_start(node, declared, chain, frame),
+                    Some(Running { state: Ok(state), .. }) => self.chain_step(node, declared, chain, frame, state),
+                    Some(Running { state: Err(error), .. }) => Err(error),
+                };
+                self.report.nodes[node].cooks += 1;
+                self.save_state(node, stretch, frame, solver, state.as_ref().ok())?;
+                running = Some(Running { at: frame, state });
+                if advance.outputs.contains(&frame) {
+                    self.chain_output(node, declared, chain, running.as_ref(), frame);
+                }
+            }
+            if let Some(running) = running.filter(|running| running.at + 1 < stretch.until) {
+                self.running[node].insert(stretch, running);
+            }
+        }
+        Ok(())
+    }
+
+    fn save_state(
+        &mut self,
+        node: usize,
+        stretch: Stretch,
+        frame: i64,
+        solver: Option<SolverFns>,
+        state: Option<&StateBox>,
+    ) -> std::io::Result<()> {
+        let (Some(solver), Some(state), false) = (solver, state, self.dry) else { return Ok(()) };
+        let Some(disk) = self.disk.as_mut() else { return Ok(()) };
+        let Ok(key) = self.keys.state_key(node, stretch, frame) else { return Ok(()) };
+        match (solver.save)(state) {
+            Some(bytes) => disk.save_checkpoint(&self.plan.graph.nodes[node].id, frame, key, &bytes),
+            None => Ok(()),
+        }
+    }
+
+    fn chain_start(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        chain: ChainFns,
+        frame: i64,
+    ) -> Result<StateBox, Arc<CookError>> {
+        let at = Frame::whole(frame);
+        let fail = |error| Arc::new(self.plan.error(node, at, error));
+        let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
+        if self.dry {
+            return Ok(Box::new(()));
+        }
+        let inputs = self.inputs(node, declared, at, &params, Reading::Start)?;
+        let (state, finished) =
+            self.context(node, declared, at, &params, inputs).run(|cx| (chain.start)(cx)).map_err(fail)?;
+        let metrics = finished.metrics();
+        self.publish(node, at, metrics);
+        Ok(state)
+    }
+
+    fn chain_step(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        chain: ChainFns,
+        frame: i64,
+        mut state: StateBox,
+    ) -> Result<StateBox, Arc<CookError>> {
+        let at = Frame::whole(frame);
+        let fail = |error| Arc::new(self.plan.error(node, at, error));
+        let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
+        if self.dry {
+            return Ok(state);
+        }
+        let inputs = self.inputs(node, declared, at, &params, Reading::Step)?;
+        let call = self.context(node, declared, at, &params, inputs);
+        let stepped = call.step(at.plus(-1), |cx| (chain.step)(&mut state, cx));
+        let metrics = stepped.map_err(fail)?.metrics();
+        self.publish(node, at, metrics);
+        Ok(state)
+    }
+
+    fn publish(&mut self, node: usize, frame: Frame, metrics: Vec<(&'static str, f64)>) {
+        for (name, value) in metrics {
+            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, value);
+        }
+    }
+
+    fn chain_output(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        chain: ChainFns,
+        running: Option<&Running>,
+        frame: i64,
+    ) {
+        let at = Frame::whole(frame);
+        let state = running.expect("asked where a state stands").state.as_ref().map_err(Arc::clone);
+        let returned = state.and_then(|state| {
+            let fail = |error| Arc::new(self.plan.error(node, at, error));
+            let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
+            self.call(node, declared, at, &params, &|cx: &FrameCx| (chain.output)(state, cx))
+        });
+        let cooks = self.report.nodes[node].cooks;
+        let outcome = self.take(node, at, returned);
+        // A chain's cooks are its steps.
+        self.report.nodes[node].cooks = cooks;
+        self.recent[node].insert(frame, outcome);
+    }
+
+    /// A chain's results at the frames that were asked, between whole frames too.
+    fn finish_chain(&mut self, node: usize, need: &BTreeSet<Frame>) {
+        for frame in need {
+            let whole = |frame: i64, this: &mut Self| -> Outcome {
+                let stretch = this.keys.stretch(node, frame)?;
+                this.recent[node]
+                    .get(&frame.max(stretch.start))
+                    .expect("the chain was moved over every frame asked")
+                    .clone()
+            };
+            let floor = frame.floor_number();
+            let outcome = if frame.is_whole() {
+                whole(floor, self)
+            } else {
+                let near: Result<Vec<Cooked>, _> = (-1..=2).map(|k| whole(floor + k, self)).collect();
+                let share = (frame.ticks() - frame.floor().ticks()) as f32 / Frame::TICKS as f32;
+                near.map(|near| match self.dry {
+                    true => near[1].clone(),
+                    false => between::between([&near[0], &near[1], &near[2], &near[3]], share),
+                })
+            };
+            self.results[node].insert(*frame, outcome);
+        }
+    }
+
+    /// Keeps results that later slices will ask for again.
+    fn keep(&mut self, node: usize) {
+        let planned = &self.plan.nodes[node];
+        let start = self.plan.graph.scene.start();
+        let asked = || self.plan.request.outputs.iter().any(|place| self.plan.graph.outputs[*place].from.node == node);
+        let still =
+            !planned.varies && (asked() || planned.readers.iter().any(|reader| self.plan.nodes[*reader].varies));
+        if (still || planned.read_at_start)
+            && let Some(Ok(cooked)) = self.results[node].get(&start)
+            && let Ok(spot) = self.keys.spot(node, start)
+        {
+            self.engine.store(|store| {
+                if !store.contains(spot.key) {
+                    store.keep(spot.key, cooked)
+                }
+            });
+        }
+        if planned.varies
+            && planned.may_hold
+            && let Some((frame, Ok(cooked))) = self.results[node].last_key_value()
+            && let Ok(spot) = self.keys.spot(node, *frame)
+            && self.held[node] != Some(spot.key)
+        {
+            let before = self.held[node].replace(spot.key);
+            self.engine.store(|store| {
+                before.into_iter().for_each(|key| store.drop(key));
+                store.keep(spot.key, cooked);
+            });
+        }
+    }
+
+    fn forget(&mut self, node: usize) {
+        self.results[node].clear();
+        self.live_bytes -= std::mem::take(&mut self.node_bytes[node]);
+    }
+
+    fn forget_results(&mut self) {
+        (0..self.results.len()).for_each(|node| self.forget(node));
+    }
+
+    fn end_slice(&mut self) {
+        self.forget_results();
+        self.keys.end_slice();
+        self.plan.files.release();
+        for recent in &mut self.recent {
+            while recent.len() > KEPT_NEIGHBOURS {
+                recent.pop_first();
+            }
+        }
+    }
+
+    fn context<'a>(
+        &'a self,
+        node: usize,
+        declared: &'static Node,
+        frame: Frame,
+        params: &Params,
+        inputs: Vec<(&'static str, InputData)>,
+    ) -> Call<'a> {
+        let scene = &self.plan.graph.scene;
+        Call {
+            node: declared,
+            frame,
+            params: params.clone(),
+            inputs,
+            live: self.plan.nodes[node].live.as_deref(),
+            cancel: self.cancel,
+            clock: scene.clock(),
+            origin: scene.origin,
+            history: self.integrals[node].as_ref().map(|integral| integral as &dyn History),
+        }
+    }
+}
+
+/// Whole frames that a sample between frames may ask of a chain again.
+const KEPT_NEIGHBOURS: usize = 4;
+
+/// For which moment a node's inputs are gathered.
+#[derive(Clone, Copy, PartialEq)]
+enum Reading {
+    /// A pure or frame node's cook, or a chain's output.
+    Frame,
+    /// A chain's start.
+    Start,
+    /// A chain's step.
+    Step,
+}
+
+/// The whole frames a chain must know for `frame`: itself, or two neighbours each way.
+fn neighbours(frame: Frame) -> Vec<i64> {
+    let floor = frame.floor_number();
+    if frame.is_whole() { vec![floor] } else { vec![floor - 1, floor, floor + 1, floor + 2] }
+}

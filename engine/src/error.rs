@@ -1,0 +1,70 @@
+//! Errors of nodes: the fact alone. The engine adds node and frame, the program the rest.
+
+use crate::geometry::GeometryError;
+
+/// What kind of trouble a node met; the program's exit code follows from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A file could not be read.
+    File,
+    /// The node refuses its input or params.
+    Refused,
+    /// A result was NaN or infinite.
+    NotFinite,
+    /// The node panicked.
+    Panic,
+    /// The node broke its own declaration: a fault of convect, not of the graph.
+    Contract,
+    /// The cook was cancelled.
+    Cancelled,
+}
+
+/// A fact and perhaps a hint, both without place: `` `wind_dir` is [0, 0, 0], which has no direction ``.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{fact}{}", hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default())]
+pub struct Error {
+    /// What kind of trouble.
+    pub kind: ErrorKind,
+    /// What is so.
+    pub fact: String,
+    /// What to do about it.
+    pub hint: Option<String>,
+}
+
+impl Error {
+    /// An error of any kind.
+    pub fn new(kind: ErrorKind, fact: impl Into<String>) -> Self {
+        Self { kind, fact: fact.into(), hint: None }
+    }
+
+    /// The node refuses what it was given.
+    pub fn refused(fact: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Refused, fact)
+    }
+
+    /// A file could not be read.
+    pub fn file(fact: impl Into<String>) -> Self {
+        Self::new(ErrorKind::File, fact)
+    }
+
+    /// The node broke its declaration.
+    pub fn contract(fact: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Contract, fact)
+    }
+
+    /// With a hint.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+impl From<GeometryError> for Error {
+    fn from(error: GeometryError) -> Self {
+        Self::refused(error.to_string())
+    }
+}
+
+/// What a node returns.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,67 @@
+//! What went wrong in a text, and where.
+//!
+//! Promise: every fault of a text is one of these, with the place where it was noticed. Limit: this
+//! knows the text only; the engine adds node, param and file.
+
+use std::fmt;
+
+/// A place in a text; both count from 1, the column in characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Place {
+    pub(super) line: u32,
+    pub(super) column: u32,
+}
+
+impl Place {
+    pub(super) const START: Place = Place { line: 1, column: 1 };
+
+    pub(super) fn fault(self, fact: impl Into<String>) -> ExprError {
+        ExprError { line: self.line as usize, column: self.column as usize, fact: fact.into(), hint: None }
+    }
+}
+
+/// A fault in the text of an expression or a program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExprError {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// What is wrong, without its place.
+    pub fact: String,
+    /// What to do about it.
+    pub hint: Option<String>,
+}
+
+impl ExprError {
+    pub(super) fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Proposes the candidate that `name` was probably meant to be, or else what `otherwise` says.
+    pub(super) fn suggest<'a>(
+        self,
+        name: &str,
+        candidates: impl IntoIterator<Item = &'a str>,
+        otherwise: impl FnOnce() -> Option<String>,
+    ) -> Self {
+        let hint = match super::suggest::nearest(name, candidates) {
+            Some(near) => Some(format!("did you mean `{near}`?")),
+            None => otherwise(),
+        };
+        ExprError { hint, ..self }
+    }
+}
+
+impl fmt::Display for ExprError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}, column {}: {}", self.line, self.column, self.fact)?;
+        match &self.hint {
+            Some(hint) => write!(f, "; {hint}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for ExprError {}

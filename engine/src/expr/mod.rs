@@ -1,0 +1,244 @@
+//! The expression language: numbers of params that move, and attributes made of attributes.
+//!
+//! One language, two uses. An [`Expr`] is one number, of a param: `0.6 + 0.1*sin(2*pi*time)`. A
+//! [`Program`] is a list of assignments that runs over every point or element:
+//! `envelope = clamp(envelope*P.y, 0, 1)`. [`HELP`] is its reference for users; what it leaves open:
+//!
+//! * All arithmetic is f64. A line's value is rounded to what its attribute holds (f32; or the
+//!   nearest whole number, halves away from zero), and later lines read the rounded value: two lines
+//!   are the same as two nodes.
+//! * Names are looked up in this order: the language's own, `let`, controls, attributes. An attribute
+//!   that only the data knows can so never change what a control's name means.
+//! * NaN: arithmetic, `min`, `max` and `clamp` keep it, comparisons with it are 0 (`!=` is 1), and as
+//!   a condition it counts as true. Nothing here refuses NaN in a param; its reader does.
+//! * `noise(x)` is `noise(x, 0, 0)`; `rand(i)` is `rand(i, 0)`. Both hang on the scene's seed.
+//!
+//! Promise: the same text gives the same bits on every CPU and any number of threads; any string is
+//! answered by a value or by faults with line and column. Limit: a text has a greatest size and
+//! depth (`parser::MAX_TEXT`, `MAX_NODES`, `MAX_DEPTH`, `lower::MAX_CODE`), past which it is refused.
+//!
+//! Text becomes tokens (`lexer`), nodes (`parser`, `ast`), is checked for widths (`check`), becomes
+//! scalar instructions (`lower`, `builder`, `code`) and runs on one number or on batches of rows
+//! (`batch`).
+
+mod ast;
+mod batch;
+mod builder;
+mod check;
+mod code;
+mod error;
+mod functions;
+mod help;
+mod lexer;
+mod lower;
+mod parser;
+mod program;
+mod random;
+pub mod suggest;
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+pub use error::ExprError;
+pub use help::HELP;
+pub use program::{BadValue, Program, RunError};
+
+use crate::geometry::ColumnType;
+use code::{Code, Id, Input};
+
+/// How many numbers a value has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Width {
+    /// One.
+    Scalar,
+    /// Three: x, y, z.
+    Vec3,
+    /// Four: x, y, z, w.
+    Vec4,
+}
+
+impl Width {
+    /// Numbers a value.
+    pub fn count(self) -> usize {
+        match self {
+            Width::Scalar => 1,
+            Width::Vec3 => 3,
+            Width::Vec4 => 4,
+        }
+    }
+
+    /// Of a row of such a column.
+    pub fn of(kind: ColumnType) -> Width {
+        match kind {
+            ColumnType::F1 | ColumnType::I1 => Width::Scalar,
+            ColumnType::F3 | ColumnType::I3 => Width::Vec3,
+            ColumnType::F4 | ColumnType::I4 => Width::Vec4,
+        }
+    }
+
+    /// The f32 column of that width: what a new attribute becomes.
+    fn single(self) -> ColumnType {
+        match self {
+            Width::Scalar => ColumnType::F1,
+            Width::Vec3 => ColumnType::F3,
+            Width::Vec4 => ColumnType::F4,
+        }
+    }
+}
+
+impl fmt::Display for Width {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Width::Scalar => "a scalar",
+            Width::Vec3 => "a 3-vector",
+            Width::Vec4 => "a 4-vector",
+        })
+    }
+}
+
+/// What a text may name besides the language's own names and attributes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scope<'a> {
+    /// Controls, in the order in which [`Env::controls`] has their numbers. One whose name is not
+    /// `[A-Za-z_][A-Za-z0-9_]*`, or is the language's own, cannot be named.
+    pub controls: &'a [(&'a str, Width)],
+}
+
+impl Scope<'_> {
+    fn control(&self, name: &str) -> Option<usize> {
+        self.controls.iter().position(|(control, _)| *control == name)
+    }
+}
+
+/// What the names of a text stand for now.
+#[derive(Clone, Copy, Debug)]
+pub struct Env<'a> {
+    /// Frame number, with fraction.
+    pub frame: f64,
+    /// Seconds.
+    pub time: f64,
+    /// Frames a second.
+    pub fps: f64,
+    /// The scene's seed, a whole number.
+    pub seed: f64,
+    /// All numbers of all controls of the [`Scope`] in a row; one that is missing reads as NaN.
+    pub controls: &'a [f64],
+}
+
+impl Env<'_> {
+    /// What is the same for all elements; NaN for what is not.
+    fn input(&self, input: Input, count: f64) -> f64 {
+        match input {
+            Input::Frame => self.frame,
+            Input::Time => self.time,
+            Input::Fps => self.fps,
+            Input::Seed => self.seed,
+            Input::Count => count,
+            Input::Control { at, .. } => self.controls.get(at as usize).copied().unwrap_or(f64::NAN),
+            Input::Index | Input::Attribute { .. } => f64::NAN,
+        }
+    }
+}
+
+/// What a text reads besides attributes. For an [`Expr`] exactly what its value hangs on after
+/// constants are folded (`0 ? time : 1` reads nothing); for a [`Program`] all that it names.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Uses {
+    /// `frame` or `time`.
+    pub time: bool,
+    /// `fps`.
+    pub fps: bool,
+    /// `seed`, `noise` or `rand`.
+    pub seed: bool,
+    /// Positions in [`Scope::controls`], rising.
+    pub controls: Vec<usize>,
+}
+
+impl Uses {
+    fn note(&mut self, input: Input) {
+        match input {
+            Input::Frame | Input::Time => self.time = true,
+            Input::Fps => self.fps = true,
+            Input::Seed => self.seed = true,
+            Input::Control { control, .. } => self.note_control(control),
+            Input::Count | Input::Index | Input::Attribute { .. } => {}
+        }
+    }
+
+    fn note_control(&mut self, control: u32) {
+        if let Err(place) = self.controls.binary_search(&(control as usize)) {
+            self.controls.insert(place, control as usize);
+        }
+    }
+}
+
+/// An expression with one number as its value.
+#[derive(Clone, Debug)]
+pub struct Expr {
+    code: Code,
+    result: Id,
+    uses: Uses,
+}
+
+impl Expr {
+    /// Parses an expression and makes it ready to evaluate.
+    ///
+    /// # Errors
+    /// What is wrong with the text, and where.
+    ///
+    /// ```
+    /// use engine::expr::{Env, Expr, Scope};
+    ///
+    /// let sway = Expr::parse("0.6 + 0.1*sin(2*pi*time)", &Scope::default())?;
+    /// let quarter = Env { frame: 6.0, time: 0.25, fps: 24.0, seed: 0.0, controls: &[] };
+    /// assert_eq!(sway.eval(&quarter), 0.7);
+    ///
+    /// let fault = Expr::parse("0.6 + sin(tme)", &Scope::default()).unwrap_err();
+    /// assert_eq!(fault.column, 11);
+    /// assert_eq!(fault.hint.as_deref(), Some("did you mean `time`?"));
+    /// # Ok::<(), engine::expr::ExprError>(())
+    /// ```
+    pub fn parse(text: &str, scope: &Scope<'_>) -> Result<Expr, ExprError> {
+        let ast = parser::expression(text, scope)?;
+        let widths: Vec<Width> = scope.controls.iter().map(|(_, width)| *width).collect();
+        check::check(&ast, &widths, &[], &mut []).map_err(|mut faults| faults.swap_remove(0))?;
+        let lowered = lower::lower(&ast, &widths, &[])?;
+        let mut uses = Uses::default();
+        lowered.code.inputs().for_each(|input| uses.note(input));
+        let result = lowered.result.unwrap_or_default();
+        Ok(Expr { code: lowered.code, result, uses })
+    }
+
+    /// The value; NaN or infinite where the arithmetic is.
+    pub fn eval(&self, env: &Env<'_>) -> f64 {
+        /// Values that need no allocation: what people write has about ten.
+        const FEW: usize = 32;
+        let run = |values: &mut [[f64; 1]]| {
+            self.code.run(values, 0, env.seed, |input, out| *out = [env.input(input, 1.0)]);
+            values[self.result as usize][0]
+        };
+        let length = self.code.len();
+        if length <= FEW { run(&mut [[0.0]; FEW][..length]) } else { run(&mut vec![[0.0]; length]) }
+    }
+
+    /// The value where it hangs on nothing at all.
+    pub fn constant(&self) -> Option<f64> {
+        self.code.constant(self.result)
+    }
+
+    /// What the value hangs on.
+    pub fn uses(&self) -> &Uses {
+        &self.uses
+    }
+
+    /// Whether the value hangs on `frame` or `time` itself; a control that it reads may move too.
+    pub fn reads_time(&self) -> bool {
+        self.uses.time
+    }
+
+    /// The controls that the value hangs on, as positions in [`Scope::controls`], rising.
+    pub fn controls(&self) -> &[usize] {
+        &self.uses.controls
+    }
+}

@@ -1,0 +1,121 @@
+//! Names: what they mean, and what is said where they mean nothing.
+
+use super::super::ast::Node;
+use super::super::code::Input;
+use super::super::error::{ExprError, Place};
+use super::super::functions::{self, FOREIGN, FUNCTIONS, Function};
+use super::super::lexer::{Symbol, Token, TokenKind, shortened};
+use super::{Language, Parser};
+use crate::geometry::fixed_type;
+
+/// Names with a meaning of their own, which neither controls nor `let` nor plain attributes take.
+pub(super) const RESERVED: [&str; 8] = ["frame", "time", "fps", "seed", "pi", "i", "count", "let"];
+
+impl<'a> Parser<'a> {
+    /// What a bare name means: the language's own names before `let`, controls, attributes.
+    pub(super) fn named(&mut self, name: &'a str, place: Place) -> Result<Node, ExprError> {
+        let in_program = self.language == Language::Program;
+        Ok(match name {
+            "frame" => Node::Input(Input::Frame),
+            "time" => Node::Input(Input::Time),
+            "fps" => Node::Input(Input::Fps),
+            "seed" => Node::Input(Input::Seed),
+            "pi" => Node::Number(std::f64::consts::PI),
+            "i" if in_program => Node::Input(Input::Index),
+            "count" if in_program => Node::Input(Input::Count),
+            _ => {
+                if let Some(value) = self.locals.get(name) {
+                    Node::Local(*value)
+                } else if let Some(control) = self.scope.control(name) {
+                    Node::Control(control as u32)
+                } else if let Some(function) = functions::find(name) {
+                    let fault = place.fault(format!("`{name}` is a function"));
+                    return Err(fault.hint(format!("write `{}`", function.usage)));
+                } else if in_program && name != "let" {
+                    Node::Attribute(self.attribute(name))
+                } else {
+                    return Err(self.unknown_name(name, place));
+                }
+            }
+        })
+    }
+
+    pub(super) fn attribute_node(&mut self, name: &'a str, place: Place) -> Result<Node, ExprError> {
+        if self.language == Language::Program {
+            return Ok(Node::Attribute(self.attribute(name)));
+        }
+        let fault = place.fault(format!("the attribute `{name}` cannot be read here"));
+        Err(fault.hint("attributes are read by Attribute_Expr; a param may be masked by one"))
+    }
+
+    fn unknown_name(&self, name: &str, place: Place) -> ExprError {
+        let own = RESERVED[..5].iter().copied();
+        let controls = self.scope.controls.iter().map(|(name, _)| *name);
+        let candidates: Vec<&str> = own.chain(controls).collect();
+        let fault = place.fault(format!("the name `{}` is not known", shortened(name)));
+        if matches!(name, "i" | "count") || fixed_type(name).is_some() {
+            return fault.hint("attributes, `i` and `count` are known in Attribute_Expr only");
+        }
+        foreign(fault, name, candidates.iter().copied(), || Some(format!("known are `{}`", candidates.join("`, `"))))
+    }
+
+    pub(super) fn unknown_function(&self, name: &str, place: Place) -> ExprError {
+        let is_value = RESERVED.contains(&name)
+            || self.locals.contains_key(name)
+            || self.scope.control(name).is_some()
+            || self.attributes.contains_key(name);
+        if is_value {
+            let fault = place.fault(format!("`{name}` is a value, not a function"));
+            return fault.hint(format!("multiplication is written `{name}*(…)`"));
+        }
+        let fault = place.fault(format!("there is no function `{}`", shortened(name)));
+        foreign(fault, name, FUNCTIONS.iter().map(|function| function.name), || None)
+    }
+}
+
+/// Adds what a name of another language is called here, or the nearest name that is known.
+fn foreign<'n>(
+    fault: ExprError,
+    name: &str,
+    candidates: impl IntoIterator<Item = &'n str>,
+    otherwise: impl FnOnce() -> Option<String>,
+) -> ExprError {
+    match FOREIGN.iter().find(|(theirs, _)| *theirs == name) {
+        Some((_, ours)) => fault.hint(format!("it is written `{ours}`")),
+        None => fault.suggest(name, candidates, otherwise),
+    }
+}
+
+pub(super) fn check_count(function: &Function, given: usize, place: Place) -> Result<(), ExprError> {
+    let (fewest, most) = function.arguments;
+    if (fewest..=most).contains(&given) {
+        return Ok(());
+    }
+    let wanted = match (fewest, most) {
+        (1, 1) => "1 argument".to_owned(),
+        _ if fewest == most => format!("{fewest} arguments"),
+        _ => format!("{fewest} to {most} arguments"),
+    };
+    let fault = place.fault(format!("`{}` takes {wanted}, not {given}", function.name));
+    Err(fault.hint(format!("write `{}`", function.usage)))
+}
+
+pub(super) fn unexpected(token: &Token<'_>, expected: &str) -> ExprError {
+    let found = match token.kind {
+        TokenKind::End => "the end".to_owned(),
+        TokenKind::Newline => "the end of the line".to_owned(),
+        _ => format!("`{}`", shortened(token.text)),
+    };
+    let fault = token.place.fault(format!("expected {expected}, found {found}"));
+    let after_value = expected.starts_with("an operator");
+    match token.kind {
+        TokenKind::Symbol(Symbol::Assign) => fault.hint("`==` compares"),
+        TokenKind::Number(_) | TokenKind::Name(_) | TokenKind::Attribute(_) | TokenKind::Symbol(Symbol::Open)
+            if after_value =>
+        {
+            fault.hint("multiplication is written `*`")
+        }
+        TokenKind::Newline => fault.hint("an expression goes on over lines between `(` and `)`"),
+        _ => fault,
+    }
+}

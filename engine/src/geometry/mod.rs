@@ -1,0 +1,314 @@
+//! Geometry: what flows along a graph's wires.
+//!
+//! Five optional components. Everything is shared copy-on-write: a node that changes positions shares all else with
+//! its input, and equal addresses prove it. Positions are metres relative to the scene's origin, Y up, right-handed.
+
+mod attribute;
+mod column;
+mod component;
+mod topology;
+mod volume;
+
+use std::sync::Arc;
+
+pub use attribute::{Attr, ENVELOPE, ID, N, ORIENT, Owner, P, PREF, SHIELDED, THICKNESS, UVW, V, WIDTH, fixed_type};
+pub use column::{Column, ColumnType, Item, Name, Table};
+pub use component::Component;
+pub use topology::{Faces, Runs, Topology};
+pub use volume::{Grid, Volume};
+
+/// Which component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Polylines.
+    Curves,
+    /// Polygons.
+    Mesh,
+    /// Loose points.
+    Points,
+    /// Tets.
+    Tets,
+    /// Level set and velocity on a grid.
+    Volume,
+}
+
+impl Kind {
+    /// All kinds, in the order files list them.
+    pub const ALL: [Self; 5] = [Self::Curves, Self::Mesh, Self::Points, Self::Tets, Self::Volume];
+
+    /// The name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Curves => "curves",
+            Self::Mesh => "mesh",
+            Self::Points => "points",
+            Self::Tets => "tets",
+            Self::Volume => "volume",
+        }
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Up to one component of each kind. A clone shares everything.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Geometry {
+    parts: [Option<Arc<Component>>; 4],
+    volume: Option<Arc<Volume>>,
+}
+
+impl Geometry {
+    /// The component of that kind; `None` where it is absent, and for [`Kind::Volume`] (see [`Geometry::volume`]).
+    pub fn part(&self, kind: Kind) -> Option<&Component> {
+        self.parts.get(kind as usize)?.as_deref()
+    }
+
+    /// The component of that kind for writing; its tables are copied only where they are written and shared.
+    pub fn part_mut(&mut self, kind: Kind) -> Option<&mut Component> {
+        self.parts.get_mut(kind as usize)?.as_mut().map(Arc::make_mut)
+    }
+
+    /// The curves.
+    pub fn curves(&self) -> Option<&Component> {
+        self.part(Kind::Curves)
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> Option<&Component> {
+        self.part(Kind::Mesh)
+    }
+
+    /// The points.
+    pub fn points(&self) -> Option<&Component> {
+        self.part(Kind::Points)
+    }
+
+    /// The tets.
+    pub fn tets(&self) -> Option<&Component> {
+        self.part(Kind::Tets)
+    }
+
+    /// The volume.
+    pub fn volume(&self) -> Option<&Volume> {
+        self.volume.as_deref()
+    }
+
+    /// Puts a component in its place, replacing what was there.
+    pub fn put(&mut self, component: impl Into<Arc<Component>>) {
+        let component = component.into();
+        let place = component.kind() as usize;
+        self.parts[place] = Some(component);
+    }
+
+    /// Puts the volume in its place, replacing what was there.
+    pub fn put_volume(&mut self, volume: impl Into<Arc<Volume>>) {
+        self.volume = Some(volume.into());
+    }
+
+    /// This geometry with the component in its place.
+    #[must_use]
+    pub fn with(mut self, component: impl Into<Arc<Component>>) -> Self {
+        self.put(component);
+        self
+    }
+
+    /// Takes a component out.
+    pub fn remove(&mut self, kind: Kind) {
+        match self.parts.get_mut(kind as usize) {
+            Some(part) => *part = None,
+            None => self.volume = None,
+        }
+    }
+
+    /// The components that are there, without the volume.
+    pub fn parts(&self) -> impl Iterator<Item = &Component> {
+        self.parts.iter().filter_map(|part| part.as_deref())
+    }
+
+    /// The kinds that are there, the volume included.
+    pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
+        Kind::ALL.into_iter().filter(|kind| match kind {
+            Kind::Volume => self.volume.is_some(),
+            _ => self.part(*kind).is_some(),
+        })
+    }
+
+    /// Each array with its address and bytes; arrays that several geometries share have one address.
+    pub fn arrays(&self) -> Vec<(usize, usize)> {
+        let mut arrays = Vec::new();
+        for part in self.parts() {
+            arrays.push((part.topology().address(), part.topology().bytes()));
+            arrays.extend(part.columns().map(|(_, _, column)| (column.address(), column.bytes())));
+        }
+        if let Some(volume) = self.volume() {
+            let fields = std::iter::once(volume.level_set()).chain(volume.velocity());
+            arrays.extend(fields.map(|field| (Arc::as_ptr(field) as usize, field.len() * 4)));
+        }
+        arrays
+    }
+
+    /// Bytes of all arrays, shared ones included.
+    pub fn bytes(&self) -> usize {
+        self.arrays().iter().map(|(_, bytes)| bytes).sum()
+    }
+}
+
+impl From<Component> for Geometry {
+    fn from(component: Component) -> Self {
+        Self::default().with(component)
+    }
+}
+
+/// Why a geometry is not one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GeometryError {
+    /// A column of another length than its table.
+    #[error("`{name}` has {rows} row{s}, expected {expected}", s = if *rows == 1 { "" } else { "s" })]
+    Rows {
+        /// Attribute.
+        name: Name,
+        /// Rows it has.
+        rows: usize,
+        /// Rows it should have.
+        expected: usize,
+    },
+    /// A well-known attribute of the wrong type.
+    #[error("`{name}` is {found}, expected {expected}")]
+    Type {
+        /// Attribute.
+        name: Name,
+        /// Type it has.
+        found: ColumnType,
+        /// Type it should have.
+        expected: ColumnType,
+    },
+    /// A curve without a CV.
+    #[error("curve {curve} has no CV, expected at least 1")]
+    EmptyCurve {
+        /// Which curve, from 0.
+        curve: usize,
+    },
+    /// A face with fewer than three corners.
+    #[error("face {face} has {corners} corners, expected at least 3")]
+    SmallFace {
+        /// Which face, from 0.
+        face: usize,
+        /// Corners it has.
+        corners: u32,
+    },
+    /// CV counts that do not add up.
+    #[error("the counts add up to {sum} CVs, but there are {points} points")]
+    Counts {
+        /// Sum of the counts.
+        sum: usize,
+        /// Points there are.
+        points: usize,
+    },
+    /// Face sizes that do not add up.
+    #[error("the counts add up to {sum} corners, but there are {corners} indices")]
+    Corners {
+        /// Sum of the counts.
+        sum: usize,
+        /// Indices there are.
+        corners: usize,
+    },
+    /// An index beyond the points.
+    #[error("index {index} (corner {corner}) is out of range: there are {points} points, counted from 0")]
+    Index {
+        /// Which corner, from 0.
+        corner: usize,
+        /// The index.
+        index: u32,
+        /// Points there are.
+        points: usize,
+    },
+    /// More than 2³² rows.
+    #[error("more than 4,294,967,295 rows")]
+    TooMany,
+    /// Two components that cannot be joined.
+    #[error("{a} and {b} cannot be joined into one component")]
+    Kinds {
+        /// The first.
+        a: Kind,
+        /// The second.
+        b: Kind,
+    },
+    /// Tables that do not fit a topology.
+    #[error("the tables' rows do not fit the topology")]
+    Tables,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve() -> Geometry {
+        Component::curves(vec![2], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap().into()
+    }
+
+    #[test]
+    fn writing_positions_shares_everything_else() {
+        let mut a = curve();
+        a.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![1.0, 0.5]).unwrap();
+        let mut b = a.clone();
+        b.part_mut(Kind::Curves).unwrap().edit(P).unwrap()[1] = [1.0, 0.0, 0.0];
+        let (a, b) = (a.curves().unwrap(), b.curves().unwrap());
+        assert_eq!(a.positions()[1], [0.0, 1.0, 0.0]);
+        assert_eq!(b.positions()[1], [1.0, 0.0, 0.0]);
+        assert!(a.topology().same(b.topology()));
+        let column = |c: &Component| c.table(Owner::Point).column("envelope").unwrap().address();
+        assert_eq!(column(a), column(b));
+    }
+
+    #[test]
+    fn broken_topology_is_refused_with_its_place() {
+        let text = |e: GeometryError| e.to_string();
+        assert_eq!(
+            text(Component::curves(vec![2, 0], vec![[0.0; 3]; 2]).unwrap_err()),
+            "curve 1 has no CV, expected at least 1"
+        );
+        assert_eq!(
+            text(Component::curves(vec![3], vec![[0.0; 3]; 2]).unwrap_err()),
+            "the counts add up to 3 CVs, but there are 2 points"
+        );
+        assert_eq!(
+            text(Component::mesh(vec![3], vec![0, 1, 2], vec![[0.0; 3]; 2]).unwrap_err()),
+            "index 2 (corner 2) is out of range: there are 2 points, counted from 0"
+        );
+        assert_eq!(
+            text(Component::mesh(vec![2], vec![0, 1], vec![[0.0; 3]; 2]).unwrap_err()),
+            "face 0 has 2 corners, expected at least 3"
+        );
+    }
+
+    #[test]
+    fn a_well_known_name_keeps_its_type() {
+        let mut c = curve();
+        let error =
+            c.part_mut(Kind::Curves).unwrap().set_column(Owner::Point, "N", Column::new(vec![1.0_f32; 2])).unwrap_err();
+        assert_eq!(error.to_string(), "`N` is float, expected float3");
+    }
+
+    #[test]
+    fn joined_meshes_keep_their_faces() {
+        let tri = |x: f32| {
+            Component::mesh(vec![3], vec![0, 1, 2], vec![[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]]).unwrap()
+        };
+        let both = tri(0.0).concat(&tri(5.0)).unwrap();
+        assert_eq!(both.faces().unwrap().face(1), [3, 4, 5]);
+        assert_eq!(both.positions()[3], [5.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_volume_checks_its_faces() {
+        let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [2, 1, 1] };
+        assert!(Volume::new(grid, vec![0.0; 2], [vec![0.0; 3], vec![0.0; 4], vec![0.0; 4]]).is_ok());
+        let error = Volume::new(grid, vec![0.0; 2], [vec![0.0; 2], vec![0.0; 4], vec![0.0; 4]]).unwrap_err();
+        assert_eq!(error.to_string(), "`velocity_x` has 2 rows, expected 3");
+    }
+}

@@ -1,0 +1,229 @@
+//! Faults: what is wrong with a graph file, each with its place, its fact and what to do about it.
+//!
+//! Promise: [`Fault::code`] is one of [`code::ALL`] for every fault that a load gives, and stays what it is from
+//! version to version, so scripts may ask for it. Limit: the wording of facts and hints may change.
+
+use std::fmt;
+
+use serde_json::{Value, json};
+
+/// Whose fault it is; the program's exit code follows from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FaultClass {
+    /// A file that the graph names cannot be read.
+    File,
+    /// The graph itself is wrong.
+    Graph,
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Its kind, one of [`code::ALL`].
+    pub code: &'static str,
+    /// Line, from 1; 0 where the graph was not read from a text.
+    pub line: u32,
+    /// Column in characters, from 1; 0 where the graph was not read from a text.
+    pub column: u32,
+    /// JSON path: `nodes.wind.params.wind_dir`. Empty for the file as a whole.
+    pub path: String,
+    /// What is so.
+    pub fact: String,
+    /// What to do about it.
+    pub hint: Option<String>,
+    /// Whose fault it is.
+    pub class: FaultClass,
+    /// The key of the `--set` whose value is wrong; line and column are then places in that value.
+    pub set: Option<Box<str>>,
+}
+
+impl Fault {
+    /// With a hint.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// The fault of a file that cannot be read.
+    #[must_use]
+    pub(super) fn of_file(mut self) -> Self {
+        self.class = FaultClass::File;
+        self
+    }
+
+    /// The fault as a terminal shows it, `file` being the graph's name there:
+    /// `` graph.json:12:7: nodes.wind.params.amplitude: `amplitude` is -1; expected at least 0 ``
+    pub fn in_file(&self, file: &str) -> String {
+        match &self.set {
+            Some(key) => format!("--set {key}:{self}"),
+            None if self.line == 0 => format!("{file}: {self}"),
+            None => format!("{file}:{self}"),
+        }
+    }
+
+    /// The object that `--json` prints in a list. Faults of a `--set` have its key as `set` besides.
+    pub fn to_json(&self) -> Value {
+        let mut fault = json!({
+            "code": self.code, "line": self.line, "column": self.column,
+            "path": self.path, "fact": self.fact, "hint": self.hint,
+        });
+        if let Some(key) = &self.set {
+            fault["set"] = json!(key);
+        }
+        fault
+    }
+
+    /// What faults are sorted by: those of the file first, each by its place.
+    pub(super) fn order(&self) -> (bool, Option<&str>, u32, u32, &str) {
+        (self.set.is_some(), self.set.as_deref(), self.line, self.column, &self.path)
+    }
+}
+
+/// Shows place, path, fact and hint, without the file's name.
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.line > 0 {
+            write!(f, "{}:{}: ", self.line, self.column)?;
+        }
+        if !self.path.is_empty() {
+            write!(f, "{}: ", self.path)?;
+        }
+        write!(f, "{}", self.fact)?;
+        self.hint.as_ref().map_or(Ok(()), |hint| write!(f, "; {hint}"))
+    }
+}
+
+impl std::error::Error for Fault {}
+
+/// Kinds of faults.
+pub mod code {
+    macro_rules! codes {
+        ($($(#[$meta:meta])* $name:ident = $code:literal;)*) => {
+            $($(#[$meta])* pub const $name: &str = $code;)*
+            /// All kinds that a load can give.
+            pub const ALL: &[&str] = &[$($name),*];
+        };
+    }
+
+    codes! {
+        /// Bytes that are not UTF-8.
+        ENCODING = "encoding";
+        /// Nothing in the file.
+        EMPTY = "empty-file";
+        /// Not JSON with comments and trailing commas.
+        SYNTAX = "syntax";
+        /// The text ends too early.
+        TRUNCATED = "truncated";
+        /// Lists and objects deeper than any graph needs.
+        NESTING = "nesting";
+        /// A key that stands twice in an object.
+        DUPLICATE_KEY = "duplicate-key";
+        /// A key that means nothing there.
+        UNKNOWN_KEY = "unknown-key";
+        /// A required key that is not there.
+        MISSING_KEY = "missing-key";
+        /// A text where a number belongs, and the like.
+        WRONG_KIND = "wrong-kind";
+        /// A graph of another format number.
+        FORMAT = "format-number";
+        /// Frames, frame rate or seed that cannot be.
+        SCENE = "scene";
+        /// An id or name with other characters than ids have.
+        BAD_NAME = "bad-name";
+        /// No such type of node.
+        UNKNOWN_TYPE = "unknown-type";
+        /// The type has no such param.
+        UNKNOWN_PARAM = "unknown-param";
+        /// The type has no such input.
+        UNKNOWN_INPUT = "unknown-input";
+        /// No such node.
+        UNKNOWN_NODE = "unknown-node";
+        /// The node has no such output.
+        UNKNOWN_PORT = "unknown-port";
+        /// No such control.
+        UNKNOWN_CONTROL = "unknown-control";
+        /// A `--set` of what is not there.
+        UNKNOWN_SET = "unknown-set";
+        /// A number that is not finite, or too large for what holds it.
+        NUMBER_SIZE = "number-size";
+        /// A value outside the hard range, or never legal.
+        ILLEGAL_VALUE = "illegal-value";
+        /// A word that is none of the options.
+        UNKNOWN_WORD = "unknown-word";
+        /// An object that is no form of a param, or is two.
+        PARAM_FORM = "param-form";
+        /// A moving value where the param stands still.
+        NOT_ANIMATED = "not-animated";
+        /// No key at all.
+        KEYFRAMES_EMPTY = "keyframes-empty";
+        /// A key before the one above it.
+        KEYFRAMES_UNORDERED = "keyframes-unordered";
+        /// Two keys at one frame.
+        KEYFRAMES_DOUBLED = "keyframes-doubled";
+        /// Keys that make no ramp.
+        RAMP = "ramp";
+        /// A text that is no expression.
+        EXPRESSION = "expression";
+        /// A required input without a wire.
+        MISSING_INPUT = "missing-input";
+        /// More wires than the input takes.
+        TOO_MANY_WIRES = "too-many-wires";
+        /// Nodes that wait for each other.
+        CYCLE = "cycle";
+        /// A wire that lacks what the input needs.
+        WRONG_COMPONENT = "wrong-component";
+        /// Nothing to cook.
+        NO_OUTPUTS = "no-outputs";
+        /// Velocities asked for where points come and go.
+        NO_VELOCITY = "no-velocity";
+        /// A file that is not there.
+        FILE_MISSING = "file-missing";
+        /// A file that cannot be read.
+        FILE_UNREADABLE = "file-unreadable";
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault() -> Fault {
+        Fault {
+            code: code::ILLEGAL_VALUE,
+            line: 12,
+            column: 7,
+            path: "nodes.wind.params.amplitude".into(),
+            fact: "`amplitude` is -1".into(),
+            hint: Some("expected at least 0".into()),
+            class: FaultClass::Graph,
+            set: None,
+        }
+    }
+
+    #[test]
+    fn a_terminal_shows_file_place_path_fact_and_hint() {
+        let expected = "graph.json:12:7: nodes.wind.params.amplitude: `amplitude` is -1; expected at least 0";
+        assert_eq!(fault().in_file("graph.json"), expected);
+        let set = Fault { line: 1, column: 1, set: Some("wind.amplitude".into()), hint: None, ..fault() };
+        let expected = "--set wind.amplitude:1:1: nodes.wind.params.amplitude: `amplitude` is -1";
+        assert_eq!(set.in_file("graph.json"), expected);
+        let whole = Fault { line: 0, column: 0, path: String::new(), hint: None, ..fault() };
+        assert_eq!(whole.in_file("graph.json"), "graph.json: `amplitude` is -1");
+    }
+
+    #[test]
+    fn json_has_exactly_the_documented_keys() {
+        let expected = json!({"code": "illegal-value", "line": 12, "column": 7, "path": "nodes.wind.params.amplitude",
+            "fact": "`amplitude` is -1", "hint": "expected at least 0"});
+        assert_eq!(fault().to_json(), expected);
+    }
+
+    #[test]
+    fn codes_are_kebab_case_and_unique() {
+        for (place, code) in code::ALL.iter().enumerate() {
+            assert!(code.bytes().all(|b| b.is_ascii_lowercase() || b == b'-'), "{code}");
+            assert!(!code::ALL[..place].contains(code), "{code}");
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! JSON with its place: a value, the text it stands in and its path, and the readers that say what was found and what
+//! was expected.
+//!
+//! Promise: every number that is read is finite. Limit: whole numbers beyond ±2⁶³ are refused.
+
+use std::collections::BTreeMap;
+
+use jsonc_parser::ast::Value;
+use jsonc_parser::common::{Range, Ranged};
+
+use super::fault::{Fault, code};
+use super::text::Text;
+use crate::expr::suggest::nearest;
+
+/// A JSON value, where it stands, and its path.
+#[derive(Clone)]
+pub(super) struct Json<'a> {
+    pub(super) value: &'a Value<'a>,
+    pub(super) text: &'a Text<'a>,
+    pub(super) path: String,
+}
+
+/// A member of an object.
+#[derive(Clone)]
+pub(super) struct Entry<'a> {
+    pub(super) name: &'a str,
+    key: Range,
+    pub(super) json: Json<'a>,
+}
+
+/// The path of member `name` of what stands at `path`.
+pub(super) fn member_path(path: &str, name: &str) -> String {
+    match (is_name(name), path.is_empty()) {
+        (true, true) => name.to_owned(),
+        (true, false) => format!("{path}.{name}"),
+        (false, _) => format!("{path}[\"{}\"]", shown(name)),
+    }
+}
+
+/// Whether `name` is made as ids are: `[A-Za-z_][A-Za-z0-9_-]*`.
+pub(super) fn is_name(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+        && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
+}
+
+/// A user's text as messages show it: short, and without characters that a terminal obeys.
+pub(super) fn shown(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut short: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        short.push('…');
+    }
+    short
+}
+
+/// `did you mean …?` where a candidate is near, else the list of them where it is short, else nothing.
+pub(super) fn did_you_mean<'n>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'n str>,
+    what: &str,
+) -> Option<String> {
+    const LISTED: usize = 24;
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    match nearest(name, candidates.iter().copied()) {
+        Some(near) => Some(format!("did you mean `{near}`?")),
+        None if candidates.is_empty() => Some(format!("there are no {what}")),
+        None if candidates.len() <= LISTED => Some(format!("{what} are `{}`", candidates.join("`, `"))),
+        None => None,
+    }
+}
+
+impl<'a> Entry<'a> {
+    /// A fault of the key.
+    pub(super) fn fault(&self, code: &'static str, fact: impl Into<String>) -> Fault {
+        self.json.text.fault(self.key.start, &self.json.path, code, fact)
+    }
+
+    /// The entry that a `--set` makes, its place being the value.
+    pub(super) fn of_set(name: &'a str, json: Json<'a>) -> Self {
+        Self { name, key: json.value.range(), json }
+    }
+}
+
+impl<'a> Json<'a> {
+    /// The value that a whole text holds.
+    pub(super) fn root(value: &'a Value<'a>, text: &'a Text<'a>) -> Self {
+        Self { value, text, path: String::new() }
+    }
+
+    /// The same value read from elsewhere.
+    pub(super) fn at_path(&self, path: &str) -> Self {
+        Self { path: path.to_owned(), ..self.clone() }
+    }
+
+    /// Item `place` of this list.
+    pub(super) fn item(&self, value: &'a Value<'a>, place: usize) -> Self {
+        Self { value, text: self.text, path: format!("{}[{place}]", self.path) }
+    }
+
+    /// A fault of this value.
+    pub(super) fn fault(&self, code: &'static str, fact: impl Into<String>) -> Fault {
+        self.fault_at(self.value.start(), code, fact)
+    }
+
+    /// A fault of this value at byte `offset` of the text.
+    pub(super) fn fault_at(&self, offset: usize, code: &'static str, fact: impl Into<String>) -> Fault {
+        self.text.fault(offset, &self.path, code, fact)
+    }
+
+    /// The fault of a value of another kind than expected.
+    pub(super) fn unexpected(&self, expected: &str) -> Fault {
+        let fault = self.fault(code::WRONG_KIND, format!("found {}, expected {expected}", self.found()));
+        match self.value {
+            Value::NullKeyword(_) => fault.hint("leave the key out where nothing is to be set"),
+            _ => fault,
+        }
+    }
+
+    /// What this value is, in words.
+    fn found(&self) -> String {
+        match self.value {
+            Value::StringLit(text) => format!("the text \"{}\"", shown(&text.value)),
+            Value::NumberLit(number) => format!("the number {}", shown(number.value)),
+            Value::BooleanLit(word) => format!("`{}`", word.value),
+            Value::NullKeyword(_) => "`null`".into(),
+            Value::Object(_) => "an object".into(),
+            Value::Array(list) => match list.elements.len() {
+                0 => "an empty list".into(),
+                1 => "a list of 1 item".into(),
+                count => format!("a list of {count} items"),
+            },
+        }
+    }
+
+    /// The members of an object, each name once.
+    ///
+    /// # Errors
+    /// Where this is no object. A name that stands twice is put to `faults`, and the first counts.
+    pub(super) fn members(&self, expected: &str, faults: &mut Vec<Fault>) -> Result<Vec<Entry<'a>>, Fault> {
+        let Value::Object(object) = self.value else { return Err(self.unexpected(expected)) };
+        let mut firsts: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut entries = Vec::with_capacity(object.properties.len());
+        for member in &object.properties {
+            let (name, key) = (member.name.as_str(), member.name.range());
+            let json = Json { value: &member.value, text: self.text, path: member_path(&self.path, name) };
+            let entry = Entry { name, key, json };
+            match firsts.get(name) {
+                Some(first) => {
+                    let line = self.text.place(*first).line;
+                    let fact = format!("`{}` stands here a second time, the first is on line {line}", shown(name));
+                    faults.push(entry.fault(code::DUPLICATE_KEY, fact).hint("keep one of them"));
+                }
+                None => {
+                    firsts.insert(name, key.start);
+                    entries.push(entry);
+                }
+            }
+        }
+        Ok(entries)
+    }
+
+    /// The values of a list.
+    pub(super) fn elements(&self) -> Option<&'a [Value<'a>]> {
+        match self.value {
+            Value::Array(list) => Some(&list.elements),
+            _ => None,
+        }
+    }
+
+    /// The text of a string.
+    pub(super) fn string(&self) -> Option<&'a str> {
+        match self.value {
+            Value::StringLit(text) => Some(&text.value),
+            _ => None,
+        }
+    }
+
+    /// A finite number.
+    pub(super) fn number(&self, expected: &str) -> Result<f64, Fault> {
+        let Value::NumberLit(number) = self.value else { return Err(self.unexpected(expected)) };
+        match number.value.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => {
+                let fault = self.fault(code::NUMBER_SIZE, format!("{} is too large for a number", shown(number.value)));
+                Err(fault.hint("expected a number within ±1.7e308"))
+            }
+        }
+    }
+
+    /// A whole number; 3.0 is one.
+    pub(super) fn whole(&self, expected: &str) -> Result<i64, Fault> {
+        let x = self.number(expected)?;
+        let Value::NumberLit(number) = self.value else { return Err(self.unexpected(expected)) };
+        if let Ok(whole) = number.value.parse() {
+            return Ok(whole);
+        }
+        if x.fract() != 0.0 {
+            return Err(self.unexpected(expected).hint(format!("the nearest is {}", x.round())));
+        }
+        // Below 2⁵³ every whole number is exact, so 3e2 and 300.0 are what they look like.
+        match x.abs() < 9_007_199_254_740_992.0 {
+            true => Ok(x as i64),
+            false => Err(self
+                .fault(code::NUMBER_SIZE, format!("{} is too large for a whole number", shown(number.value)))
+                .hint("expected a whole number within ±9.2e18")),
+        }
+    }
+
+    /// `true` or `false`.
+    pub(super) fn bool(&self) -> Result<bool, Fault> {
+        match self.value {
+            Value::BooleanLit(word) => Ok(word.value),
+            _ => Err(self.unexpected("`true` or `false`")),
+        }
+    }
+
+    /// The byte of the text at which character `skip` of this string stands, escapes counted as what they stand for.
+    pub(super) fn offset_in_string(&self, skip: usize) -> usize {
+        let range = self.value.range();
+        let inner = &self.text.content[range.start + 1..range.end.saturating_sub(1).max(range.start + 1)];
+        let mut at = 0;
+        for _ in 0..skip {
+            at += match inner.as_bytes().get(at..) {
+                // A pair of surrogates is one character.
+                Some([b'\\', b'u', b'd' | b'D', b'8' | b'9' | b'a' | b'b' | b'A' | b'B', ..]) => 12,
+                Some([b'\\', b'u', ..]) => 6,
+                Some([b'\\', ..]) => 2,
+                _ => inner.get(at..).and_then(|rest| rest.chars().next()).map_or(0, char::len_utf8),
+            };
+        }
+        range.start + 1 + at
+    }
+}
+
+/// Puts a fault for every entry whose name is none of `known`; `what` names the known ones: `keys of a node`.
+pub(super) fn refuse_unknown(entries: &[Entry<'_>], known: &[&str], what: &str, faults: &mut Vec<Fault>) {
+    for entry in entries.iter().filter(|entry| !known.contains(&entry.name)) {
+        let fact = format!("the key `{}` means nothing here", shown(entry.name));
+        let hint = did_you_mean(entry.name, known.iter().copied(), what);
+        faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_KEY, fact) });
+    }
+}
+
+/// The value of the entry of that name.
+pub(super) fn find<'e, 'a>(entries: &'e [Entry<'a>], name: &str) -> Option<&'e Entry<'a>> {
+    entries.iter().find(|entry| entry.name == name)
+}
+
+/// Keeps what was read, puts away what was wrong.
+pub(super) fn keep<T>(read: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
+    read.map_err(|fault| faults.push(fault)).ok()
+}

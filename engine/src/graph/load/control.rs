@@ -1,0 +1,125 @@
+//! Controls: values with a name, read by params as if they stood there, and by expressions as numbers and vectors.
+
+use std::sync::Arc;
+
+use jsonc_parser::ast::Value as Ast;
+
+use super::keyframes::{Keys, keys};
+use crate::expr::Width;
+use crate::graph::fault::{Fault, code};
+use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
+use crate::param::{Keyframes, Shape, Source, Value};
+
+/// The controls of a graph.
+pub(super) struct Controls<'a> {
+    all: Vec<Control<'a>>,
+    /// Names and widths of those that expressions may name.
+    pub(super) scope: Vec<(&'a str, Width)>,
+    /// Their sources, in the same order.
+    pub(super) sources: Arc<Vec<Source>>,
+}
+
+struct Control<'a> {
+    name: &'a str,
+    json: Json<'a>,
+    sound: bool,
+}
+
+/// What a name finds among the controls.
+pub(super) enum Found<'c, 'a> {
+    /// Its value.
+    Value(&'c Json<'a>),
+    /// It is there and has a fault that is known.
+    Faulty,
+    /// It is not there.
+    Nothing,
+}
+
+impl<'a> Controls<'a> {
+    /// Reads the controls as far as that needs no reader: what a reader makes of a literal is its own to check.
+    pub(super) fn read(entries: &[Entry<'a>], faults: &mut Vec<Fault>) -> Self {
+        let (mut all, mut scope, mut sources) = (Vec::new(), Vec::new(), Vec::new());
+        for Entry { name, json, .. } in entries {
+            let before = faults.len();
+            if let Some((width, source)) = numeric(json, faults) {
+                scope.push((*name, width));
+                sources.push(source);
+            }
+            all.push(Control { name, json: json.clone(), sound: faults.len() == before });
+        }
+        Self { all, scope, sources: Arc::new(sources) }
+    }
+
+    /// Looks a name up.
+    pub(super) fn get(&self, name: &str) -> Found<'_, 'a> {
+        match self.all.iter().find(|control| control.name == name) {
+            Some(control) if control.sound => Found::Value(&control.json),
+            Some(_) => Found::Faulty,
+            None => Found::Nothing,
+        }
+    }
+
+    /// All names.
+    pub(super) fn names(&self) -> impl Iterator<Item = &'a str> {
+        self.all.iter().map(|control| control.name)
+    }
+
+    /// The control in a text's fact that is there and that expressions cannot name, because it is no number or vector.
+    pub(super) fn unreadable_in(&self, fact: &str) -> Option<&'a str> {
+        let unreadable = self.names().filter(|name| !self.scope.iter().any(|(known, _)| known == name));
+        unreadable.into_iter().find(|name| fact.contains(&format!("`{name}`")))
+    }
+}
+
+/// The control as expressions read it: a scalar or a vector. `None` where it is something else, or has a fault.
+fn numeric<'a>(json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<(Width, Source)> {
+    let Ast::Object(_) = json.value else {
+        if matches!(json.value, Ast::NullKeyword(_)) {
+            faults.push(json.unexpected("a value, or {\"keyframes\": [[frame, value], …]}"));
+        }
+        let value = number_or_vector(json, faults)?;
+        return Some((width(&value), Source::Constant(value)));
+    };
+    let members = json.members("", faults);
+    let entries = keep(members, faults)?;
+    if find(&entries, "ramp").is_some() {
+        return None;
+    }
+    let Some(list) = find(&entries, "keyframes") else {
+        let fault = json.fault(code::PARAM_FORM, "a control cannot be such an object");
+        faults.push(fault.hint("a control is a literal, a ramp or keyframes"));
+        return None;
+    };
+    refuse_unknown(&entries, &["keyframes", "interpolation"], "keys beside `keyframes`", faults);
+    let Keys { keys, interpolation } = keys(&list.json, find(&entries, "interpolation"), faults)?;
+    let values: Vec<Option<Value>> = keys.iter().map(|(_, json)| number_or_vector(json, faults)).collect();
+    let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
+    let width = width(values.first()?);
+    let shape = if width == Width::Vec3 { Shape::Vec3 } else { Shape::Float };
+    if values.iter().any(|value| matches!(value, Value::Vec3(_)) != (width == Width::Vec3)) {
+        return None;
+    }
+    let keys = keys.iter().zip(values).map(|((frame, _), value)| (*frame, value)).collect();
+    Some((width, Source::Keys(Arc::new(Keyframes { keys, interpolation }), shape)))
+}
+
+fn width(value: &Value) -> Width {
+    if matches!(value, Value::Vec3(_)) { Width::Vec3 } else { Width::Scalar }
+}
+
+/// A number, yes or no, or a vector of three numbers; `None` for anything else, which is no fault by itself.
+fn number_or_vector(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<Value> {
+    match json.value {
+        Ast::NumberLit(_) => Some(Value::Float(keep(json.number("a number"), faults)?)),
+        Ast::BooleanLit(word) => Some(Value::Bool(word.value)),
+        Ast::Array(list) if list.elements.len() == 3 => {
+            let mut vector = [0.0; 3];
+            for (place, item) in list.elements.iter().enumerate() {
+                let Ast::NumberLit(_) = item else { return None };
+                vector[place] = keep(json.item(item, place).number("a number"), faults)?;
+            }
+            Some(Value::Vec3(vector))
+        }
+        _ => None,
+    }
+}

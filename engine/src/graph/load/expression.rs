@@ -1,0 +1,83 @@
+//! `{"expr": …}`: as many expressions as a param has numbers. What hangs on no time becomes a constant at once.
+
+use std::sync::Arc;
+
+use super::control::Controls;
+use crate::expr::{Expr, ExprError, Scope};
+use crate::graph::Scene;
+use crate::graph::fault::{Fault, code};
+use crate::graph::json::{Json, keep};
+use crate::param::{ParamSpec, Shape, Source, Value};
+
+/// The source that a param's expressions make; constant where they hang on no time.
+pub(super) fn read(
+    spec: &ParamSpec,
+    json: &Json<'_>,
+    controls: &Controls<'_>,
+    scene: &Scene,
+    faults: &mut Vec<Fault>,
+) -> Option<Source> {
+    let Some(count) = spec.shape.expressions() else {
+        let fault = json.fault(code::PARAM_FORM, format!("no expression gives {}", spec.shape.describe()));
+        faults.push(fault.hint("write a literal or keyframes"));
+        return None;
+    };
+    let texts = texts(json, count, faults)?;
+    let parsed: Vec<Option<Expr>> = texts.iter().map(|text| parse(text, controls, faults)).collect();
+    let exprs: Vec<Expr> = parsed.into_iter().collect::<Option<_>>()?;
+
+    let frame = scene.first as f64;
+    let mut sound = true;
+    for (text, expr) in texts.iter().zip(&exprs) {
+        let number = Source::Exprs(Arc::new(vec![expr.clone()]), Shape::Float, controls.sources.clone());
+        if let (false, Value::Float(x)) = (number.is_animated(), number.at(frame, scene.clock()))
+            && !x.is_finite()
+        {
+            let fault = text.fault(code::ILLEGAL_VALUE, format!("the value of the expression is {x}"));
+            faults.push(fault.hint("expected a finite number"));
+            sound = false;
+        }
+    }
+    let source = Source::Exprs(Arc::new(exprs), spec.shape, controls.sources.clone());
+    let source = if source.is_animated() { source } else { Source::Constant(source.at(frame, scene.clock())) };
+    sound.then_some(source)
+}
+
+/// The expressions as they stand in the file.
+fn texts<'a>(json: &Json<'a>, count: usize, faults: &mut Vec<Fault>) -> Option<Vec<Json<'a>>> {
+    if count == 1 {
+        if json.string().is_none() {
+            faults.push(json.unexpected("an expression, a text"));
+        }
+        return json.string().map(|_| vec![json.clone()]);
+    }
+    let Some(items) = json.elements().filter(|items| items.len() == count) else {
+        let expressions = vec!["\"…\""; count].join(", ");
+        faults.push(json.unexpected(&format!("{count} expressions [{expressions}]")));
+        return None;
+    };
+    let texts: Vec<Json<'a>> = items.iter().enumerate().map(|(place, item)| json.item(item, place)).collect();
+    let no_text = |text: &&Json<'a>| text.string().is_none();
+    let before = faults.len();
+    faults.extend(texts.iter().filter(no_text).map(|text| text.unexpected("an expression, a text")));
+    (faults.len() == before).then_some(texts)
+}
+
+fn parse(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fault>) -> Option<Expr> {
+    let text = json.string()?;
+    let parsed = Expr::parse(text, &Scope { controls: &controls.scope });
+    keep(parsed.map_err(|error| explain(json, text, controls, error)), faults)
+}
+
+/// The fault of a text that is no expression, at the character where it goes wrong.
+fn explain(json: &Json<'_>, text: &str, controls: &Controls<'_>, error: ExprError) -> Fault {
+    let ExprError { line, column, fact, hint } = error;
+    let skipped: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(|line| line.chars().count()).sum();
+    let offset = json.offset_in_string(skipped + column.saturating_sub(1));
+    let place = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
+    let hint = match controls.unreadable_in(&fact) {
+        Some(name) => Some(format!("the control `{name}` is no number or vector, which is what expressions read")),
+        None => hint,
+    };
+    Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {place} of the expression")) }
+}

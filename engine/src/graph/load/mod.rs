@@ -1,0 +1,205 @@
+//! From a graph file to a checked [`Graph`], or to all its faults at once.
+//!
+//! The text becomes JSON, JSON a document of named parts (`document`), its controls are looked through (`control`),
+//! params become sources (`param`, `literal`, `keyframes`, `expression`), wires are followed (`wires`, `order`,
+//! `components`) and outputs checked (`outputs`). Each step goes on after a fault with what is still sound, and says
+//! nothing of what only follows from an earlier fault.
+//!
+//! Promise: a graph that loads holds what [`Graph`] promises; any bytes are answered by a graph or by faults in the order
+//! of the file. Limit: what files hold is not looked at, only that they can be read.
+
+mod components;
+mod control;
+mod document;
+mod expression;
+mod keyframes;
+mod literal;
+mod order;
+mod outputs;
+mod param;
+mod scene;
+mod wires;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use self::components::Components;
+use self::control::Controls;
+use self::document::{Document, NodeText};
+use self::order::{Order, order};
+use self::param::Reader;
+use self::wires::Wire;
+use super::fault::{Fault, code};
+use super::json::{Json, did_you_mean, shown};
+use super::places::Places;
+use super::syntax::parse;
+use super::text::{Text, decode};
+use super::{Body, Catalogue, Graph, GraphNode, GraphOutput, Link};
+use crate::node::{InputSpec, Node};
+use crate::param::{ParamSpec, Source};
+
+/// Asks whether the file at a path can be read: [`probe`], or a stand-in of a test.
+pub type FileProbe = dyn Fn(&Path) -> std::io::Result<()>;
+
+/// Whether the file at `path` can be read, without reading it.
+///
+/// # Errors
+/// Where it does not exist, is a folder or may not be read.
+pub fn probe(path: &Path) -> std::io::Result<()> {
+    let about = std::fs::metadata(path)?;
+    if about.is_dir() {
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
+    // A pipe would wait here for someone to write.
+    if about.is_file() { std::fs::File::open(path).map(drop) } else { Ok(()) }
+}
+
+impl Graph {
+    /// The graph that a file's text says. Paths in it start at `folder`; `set` replaces params (`node.param`) and controls
+    /// by JSON, as `--set` does.
+    ///
+    /// # Errors
+    /// All faults, in the order of the file, then those of `set`.
+    pub fn load(
+        text: &str,
+        folder: &Path,
+        catalogue: Catalogue,
+        set: &[(String, String)],
+        files: &FileProbe,
+    ) -> Result<Self, Vec<Fault>> {
+        let mut faults = Vec::new();
+        let graph = load(text, folder, catalogue, set, files, &mut faults);
+        match graph {
+            Some(graph) if faults.is_empty() => Ok(graph),
+            _ => {
+                faults.sort_by(|a, b| a.order().cmp(&b.order()));
+                Err(faults)
+            }
+        }
+    }
+
+    /// [`Graph::load`] of a file's bytes: UTF-8, with or without a byte order mark.
+    ///
+    /// # Errors
+    /// As [`Graph::load`], and where the bytes are no text.
+    pub fn load_bytes(
+        bytes: &[u8],
+        folder: &Path,
+        catalogue: Catalogue,
+        set: &[(String, String)],
+        files: &FileProbe,
+    ) -> Result<Self, Vec<Fault>> {
+        Self::load(decode(bytes).map_err(|fault| vec![fault])?, folder, catalogue, set, files)
+    }
+}
+
+/// A node as far as it could be read.
+struct Draft<'a> {
+    text: NodeText<'a>,
+    node: Option<&'static Node>,
+    specs: Arc<[ParamSpec]>,
+    inputs: Vec<InputSpec>,
+    params: Vec<Source>,
+    /// Wires of each input.
+    wires: Vec<Vec<Wire<'a>>>,
+}
+
+/// The graph, where enough of it is sound to go through to the end; sound at all only where there are no faults.
+fn load(
+    text: &str,
+    folder: &Path,
+    catalogue: Catalogue,
+    set: &[(String, String)],
+    files: &FileProbe,
+    faults: &mut Vec<Fault>,
+) -> Option<Graph> {
+    let text = Text::new(text.strip_prefix('\u{feff}').unwrap_or(text), None);
+    let set_texts: Vec<Text<'_>> = set.iter().map(|(key, value)| Text::new(value, Some(key))).collect();
+    let set_values: Vec<_> = set_texts.iter().map(|text| parse(text).map_err(|fault| faults.push(fault))).collect();
+    let value = parse(&text).map_err(|fault| faults.push(fault)).ok()?;
+
+    let mut document = Document::read(&Json::root(&value, &text), faults)?;
+    for (text, value) in set_texts.iter().zip(&set_values) {
+        if let Ok(value) = value {
+            document.set(Json::root(value, text), faults);
+        }
+    }
+
+    let scene = scene::read(document.scene.as_ref(), faults);
+    let controls = Controls::read(&document.controls, faults);
+    let mut reader = Reader { scene: &scene, controls: &controls, folder, files, faults };
+    let mut drafts: Vec<Draft<'_>> =
+        std::mem::take(&mut document.nodes).into_iter().map(|node| draft(node, catalogue, &mut reader)).collect();
+    wires::connect(&mut drafts, faults);
+
+    let order = order(&wires::sources(&drafts));
+    wires::refuse_cycles(&drafts, &order, faults);
+    let components = Components::along(&drafts, &order);
+    components.refuse_misfits(&drafts, catalogue, faults);
+    let outputs = outputs::read(document.outputs.as_ref(), &drafts, &order, faults)?;
+
+    let places = places(&drafts, document.outputs.as_ref());
+    let (nodes, outputs) = assemble(drafts, &order, outputs)?;
+    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), places })
+}
+
+/// Reads a node's type and params.
+fn draft<'a>(text: NodeText<'a>, catalogue: Catalogue, reader: &mut Reader<'a, '_>) -> Draft<'a> {
+    let node = text.kind.as_ref().and_then(|kind| {
+        let name = kind.string()?;
+        let node = catalogue.get(name);
+        if node.is_none() {
+            let hint =
+                did_you_mean(name, catalogue.names(), "types").or(Some("`convect nodes` lists the types".into()));
+            let fault = kind.fault(code::UNKNOWN_TYPE, format!("there is no node type `{}`", shown(name)));
+            reader.faults.push(Fault { hint, ..fault });
+        }
+        node
+    });
+    let specs: Arc<[ParamSpec]> = node.map(Node::param_specs).unwrap_or_default().into();
+    let inputs = node.map(Node::input_specs).unwrap_or_default();
+    let params = match node {
+        Some(node) => reader.params(node, &specs, &text.params),
+        None => Vec::new(),
+    };
+    Draft { text, node, specs, inputs, params, wires: Vec::new() }
+}
+
+/// Where nodes, what they set, and outputs stand.
+fn places(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Places {
+    let mut places = Places::default();
+    for draft in drafts {
+        places.note(draft.text.entry.fault("", ""));
+        for entry in draft.text.params.iter().chain(&draft.text.inputs) {
+            places.note(entry.json.fault("", ""));
+        }
+    }
+    let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok());
+    members.into_iter().flatten().for_each(|output| places.note(output.fault("", "")));
+    places
+}
+
+/// Puts the nodes in their order; `None` where one of them has a fault.
+fn assemble(
+    drafts: Vec<Draft<'_>>,
+    order: &Order,
+    outputs: Vec<outputs::Draft>,
+) -> Option<(Vec<GraphNode>, Vec<GraphOutput>)> {
+    if order.order.len() != drafts.len() {
+        return None;
+    }
+    let mut place = vec![0; drafts.len()];
+    order.order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+    let mut nodes: Vec<Option<GraphNode>> = drafts.iter().map(|_| None).collect();
+    for (old, draft) in drafts.into_iter().enumerate() {
+        let link = |wire: &Wire<'_>| Some(Link { node: place[wire.node], port: wire.port? });
+        let inputs: Option<Vec<Vec<Link>>> = draft.wires.iter().map(|wires| wires.iter().map(link).collect()).collect();
+        let body = Body::Node { node: draft.node?, specs: draft.specs, params: draft.params, inputs: inputs? };
+        nodes[place[old]] = Some(GraphNode { id: draft.text.entry.name.into(), body });
+    }
+    let outputs = outputs.into_iter().map(|output| {
+        let from = Link { node: place[output.node], port: output.port? };
+        Some(GraphOutput { name: output.name, from, attributes: output.attributes, v: output.v })
+    });
+    Some((nodes.into_iter().collect::<Option<_>>()?, outputs.collect::<Option<_>>()?))
+}

@@ -1,0 +1,329 @@
+//! Params: which form a value is written in, and the source it makes.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use jsonc_parser::ast::Value as Ast;
+use jsonc_parser::common::Ranged;
+use numerics::random::Key;
+
+use super::FileProbe;
+use super::control::{Controls, Found};
+use super::document::missing;
+use super::expression;
+use super::keyframes::{Keys, interpolation, keys};
+use super::literal::{literal, ramp};
+use crate::files::unreadable;
+use crate::graph::Scene;
+use crate::graph::fault::{Fault, code};
+use crate::graph::json::{Entry, Json, did_you_mean, find, keep, refuse_unknown, shown};
+use crate::node::Node;
+use crate::param::{Keyframes, ParamSpec, Shape, Source, Unset, Value, euler_to_turn};
+use numerics::ramp::Interpolation;
+
+/// Keys of which an object has one: the form it is written in.
+const FORMS: [&str; 5] = ["keyframes", "expr", "control", "ramp", "value"];
+
+/// Reads params.
+pub(super) struct Reader<'a, 'r> {
+    pub(super) scene: &'r Scene,
+    pub(super) controls: &'r Controls<'a>,
+    pub(super) folder: &'r Path,
+    pub(super) files: &'r FileProbe,
+    pub(super) faults: &'r mut Vec<Fault>,
+}
+
+/// Where a value stands: not every form may stand everywhere.
+#[derive(Clone, Copy, PartialEq)]
+enum Within {
+    /// In a param: any.
+    Param,
+    /// In a control: literals, keyframes and ramps.
+    Control,
+    /// In a mask's `value`: any but another mask.
+    Mask,
+}
+
+/// The place of a text among `words`, or the fault of one that is none of them; `what` names them.
+pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize, Fault> {
+    let listed = || words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
+    let Some(word) = json.string() else { return Err(json.unexpected(&format!("one of {}", listed()))) };
+    words.iter().position(|known| *known == word).ok_or_else(|| {
+        let fault = json.fault(code::UNKNOWN_WORD, format!("there is no {what} \"{}\"", shown(word)));
+        match crate::expr::suggest::nearest(word, words.iter().copied()) {
+            Some(near) => fault.hint(format!("did you mean \"{near}\"?")),
+            None => fault.hint(format!("expected one of {}", listed())),
+        }
+    })
+}
+
+impl<'a> Reader<'a, '_> {
+    /// The sources of a node's params, in the order of its declaration.
+    pub(super) fn params(&mut self, node: &Node, specs: &[ParamSpec], entries: &[Entry<'a>]) -> Vec<Source> {
+        for entry in entries.iter().filter(|entry| !specs.iter().any(|spec| spec.name == entry.name)) {
+            let fact = format!("`{}` has no param `{}`", node.name, shown(entry.name));
+            let hint = match node.inputs.iter().any(|input| input.spec().name == entry.name) {
+                true => Some("it is an input; write it under `inputs`".into()),
+                false => did_you_mean(entry.name, specs.iter().map(|spec| spec.name), "its params"),
+            };
+            self.faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_PARAM, fact) });
+        }
+        let source = |spec: &ParamSpec| match find(entries, spec.name) {
+            // After a fault the default stands in, so that the rest is looked through.
+            Some(entry) => self.source(spec, &entry.json).unwrap_or_else(|| self.unset(spec)),
+            None => self.unset(spec),
+        };
+        specs.iter().map(source).collect()
+    }
+
+    /// Where the graph says nothing.
+    fn unset(&self, spec: &ParamSpec) -> Source {
+        match (spec.facts.unset, spec.shape) {
+            (Unset::CurrentFrame, _) => Source::CurrentFrame,
+            (Unset::SceneStart, Shape::Float) => Source::Constant(Value::Float(self.scene.first as f64)),
+            (Unset::SceneStart, _) => Source::Constant(Value::Int(self.scene.first)),
+            (Unset::Default, _) => Source::Constant(self.finished(spec.shape, spec.default.clone())),
+        }
+    }
+
+    /// What the file says.
+    fn source(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Source> {
+        let source = self.written(spec, json, Within::Param)?;
+        if spec.facts.fixed && source.is_animated() {
+            let fault = json.fault(code::NOT_ANIMATED, format!("`{}` cannot be animated", spec.name));
+            self.faults.push(fault.hint(format!("expected {} that is the same at all frames", spec.shape.describe())));
+            return None;
+        }
+        Some(source)
+    }
+
+    fn written(&mut self, spec: &ParamSpec, json: &Json<'a>, within: Within) -> Option<Source> {
+        match (json.value, spec.shape) {
+            (_, Shape::Columns) => self.constant(spec, json),
+            (Ast::Object(_), _) => self.form(spec, json, within),
+            (_, Shape::File) => self.file(json),
+            (Ast::Array(_) | Ast::NumberLit(_), Shape::Ramp) => {
+                self.faults.push(bare_ramp(json));
+                None
+            }
+            _ => self.constant(spec, json),
+        }
+    }
+
+    /// A literal.
+    fn constant(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Source> {
+        let value = literal(spec.shape, json, self.faults)?;
+        let value = self.legal(spec, json, value)?;
+        Some(Source::Constant(self.finished(spec.shape, value)))
+    }
+
+    /// The value, unless the declaration refuses it.
+    fn legal(&mut self, spec: &ParamSpec, json: &Json<'a>, value: Value) -> Option<Value> {
+        match spec.refuses(&value) {
+            None => Some(value),
+            Some((fact, hint)) => {
+                self.faults.push(json.fault(code::ILLEGAL_VALUE, fact).hint(hint));
+                None
+            }
+        }
+    }
+
+    /// What a node gets for a value as it is written: rotations are turned from degrees, seeds mixed with the scene's.
+    fn finished(&self, shape: Shape, value: Value) -> Value {
+        match (shape, value) {
+            (Shape::Turn, Value::Vec3(degrees)) => euler_to_turn(degrees),
+            (Shape::Seed, Value::Int(seed)) => Value::Int(mixed(self.scene.seed, seed)),
+            (_, value) => value,
+        }
+    }
+
+    /// An object in one of its forms.
+    fn form(&mut self, spec: &ParamSpec, json: &Json<'a>, within: Within) -> Option<Source> {
+        let members = json.members("", self.faults);
+        let entries = keep(members, self.faults)?;
+        let forms: Vec<&Entry<'a>> = entries.iter().filter(|entry| FORMS.contains(&entry.name)).collect();
+        let form = match forms[..] {
+            [form] => form,
+            [] => {
+                let fault = json.fault(code::PARAM_FORM, "the object says no value");
+                let near = entries.iter().find_map(|entry| crate::expr::suggest::nearest(entry.name, FORMS));
+                self.faults.push(match near {
+                    Some(near) => fault.hint(format!("did you mean `{near}`?")),
+                    None => {
+                        fault.hint(format!("expected {}, or one of `{}`", spec.shape.describe(), FORMS.join("`, `")))
+                    }
+                });
+                return None;
+            }
+            [first, second, ..] => {
+                let fact = format!("`{}` stands beside `{}`, and both say the value", second.name, first.name);
+                self.faults.push(second.fault(code::PARAM_FORM, fact).hint("keep one of them"));
+                return None;
+            }
+        };
+        let masked = spec.shape == Shape::Masked && within != Within::Mask;
+        let (allowed, partner) = match form.name {
+            "keyframes" => (true, Some("interpolation")),
+            "ramp" => (spec.shape == Shape::Ramp, Some("interpolation")),
+            "value" => (masked && within == Within::Param, Some("attribute")),
+            _ => (within != Within::Control, None),
+        };
+        if !allowed {
+            let fault = form.fault(code::PARAM_FORM, format!("`{}` cannot be written as `{}`", spec.name, form.name));
+            self.faults.push(fault.hint(format!("expected {}", spec.shape.describe())));
+            return None;
+        }
+        if masked
+            && form.name != "value"
+            && let Some(attribute) = find(&entries, "attribute")
+        {
+            let fact = format!("`attribute` stands beside `{}`", form.name);
+            let hint = format!("a mask is written {{\"value\": {{\"{}\": …}}, \"attribute\": \"…\"}}", form.name);
+            self.faults.push(attribute.fault(code::PARAM_FORM, fact).hint(hint));
+            return None;
+        }
+        let known: Vec<&str> = std::iter::once(form.name).chain(partner).collect();
+        refuse_unknown(&entries, &known, "keys here", self.faults);
+
+        match form.name {
+            "keyframes" => self.keyed(spec, &form.json, find(&entries, "interpolation")),
+            "ramp" => {
+                let between = interpolation(find(&entries, "interpolation"), self.faults);
+                let ramp = ramp(&form.json, between?, self.faults)?;
+                Some(Source::Constant(self.legal(spec, &form.json, Value::Ramp(Arc::new(ramp)))?))
+            }
+            "value" => self.mask(spec, json, &form.json, find(&entries, "attribute")),
+            "control" => self.controlled(spec, &form.json, json, within),
+            _ => {
+                let source = expression::read(spec, &form.json, self.controls, self.scene, self.faults)?;
+                let Source::Constant(value) = source else { return Some(source) };
+                let value = self.legal(spec, &form.json, value)?;
+                Some(Source::Constant(self.finished(spec.shape, value)))
+            }
+        }
+    }
+
+    /// Keyframes. Where all have one value it is a constant.
+    fn keyed(&mut self, spec: &ParamSpec, json: &Json<'a>, between: Option<&Entry<'a>>) -> Option<Source> {
+        let Keys { keys, interpolation } = keys(json, between, self.faults)?;
+        let values: Vec<Option<(f64, Value)>> =
+            keys.iter().map(|(frame, json)| Some((*frame, self.key(spec, json)?))).collect();
+        let keys: Vec<(f64, Value)> = values.into_iter().collect::<Option<_>>()?;
+        // There is nothing between two seeds; a mixed one says nothing of its neighbours.
+        let interpolation = if spec.shape == Shape::Seed { Interpolation::Constant } else { interpolation };
+        let source = Source::Keys(Arc::new(Keyframes { keys, interpolation }), spec.shape);
+        match source.is_animated() {
+            true => Some(source),
+            false => Some(Source::Constant(source.at(self.scene.first as f64, self.scene.clock()))),
+        }
+    }
+
+    /// The value of one key. Rotations stay degrees, so that whole turns between keys are made.
+    fn key(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Value> {
+        let value = match (spec.shape, json.value) {
+            (Shape::Ramp, Ast::Object(_)) => {
+                let Source::Constant(value) = self.form(spec, json, Within::Control)? else {
+                    self.faults.push(json.unexpected("a ramp"));
+                    return None;
+                };
+                return Some(value);
+            }
+            (Shape::File, _) => {
+                self.faults.push(
+                    json.fault(code::NOT_ANIMATED, "a path cannot be animated")
+                        .hint("`####` in a path stands for the frame"),
+                );
+                return None;
+            }
+            _ => literal(spec.shape, json, self.faults)?,
+        };
+        let value = self.legal(spec, json, value)?;
+        Some(if spec.shape == Shape::Seed { self.finished(spec.shape, value) } else { value })
+    }
+
+    /// A number that an attribute scales.
+    fn mask(
+        &mut self,
+        spec: &ParamSpec,
+        json: &Json<'a>,
+        value: &Json<'a>,
+        attribute: Option<&Entry<'a>>,
+    ) -> Option<Source> {
+        let source = self.written(spec, value, Within::Mask);
+        let Some(attribute) = attribute else {
+            self.faults.push(missing(json, "attribute", "without a mask, write the value alone"));
+            return None;
+        };
+        let Some(name) = attribute.json.string().filter(|name| !name.is_empty()) else {
+            self.faults.push(attribute.json.unexpected("the name of a point attribute"));
+            return None;
+        };
+        Some(match source? {
+            Source::Constant(value) => Source::Constant(Value::Masked(value.number(), Some(name.into()))),
+            source => Source::Masked(Box::new(source), name.into()),
+        })
+    }
+
+    /// A control's value, read as if it stood here.
+    fn controlled(&mut self, spec: &ParamSpec, name: &Json<'a>, reader: &Json<'a>, within: Within) -> Option<Source> {
+        let Some(text) = name.string() else {
+            self.faults.push(name.unexpected("the name of a control"));
+            return None;
+        };
+        match self.controls.get(text) {
+            Found::Value(value) => {
+                let value = value.at_path(&reader.path);
+                let within = if within == Within::Mask { Within::Mask } else { Within::Control };
+                self.written(spec, &value, within)
+            }
+            Found::Faulty => None,
+            Found::Nothing => {
+                let fault = name.fault(code::UNKNOWN_CONTROL, format!("there is no control `{}`", shown(text)));
+                let hint = did_you_mean(text, self.controls.names(), "controls");
+                self.faults.push(Fault { hint, ..fault });
+                None
+            }
+        }
+    }
+
+    /// A path. One without `#` must be readable now; a numbered one is looked for frame by frame.
+    fn file(&mut self, json: &Json<'a>) -> Option<Source> {
+        let Some(text) = json.string() else {
+            self.faults.push(json.unexpected("a path, relative to the graph file"));
+            return None;
+        };
+        if text.is_empty() {
+            self.faults.push(
+                json.fault(code::ILLEGAL_VALUE, "the path is empty").hint("leave the key out where there is no file"),
+            );
+            return None;
+        }
+        let (path, numbered) = (self.folder.join(text), text.contains('#'));
+        if let (false, Err(error)) = (numbered, (self.files)(&path)) {
+            let missing = error.kind() == std::io::ErrorKind::NotFound;
+            let code = if missing { code::FILE_MISSING } else { code::FILE_UNREADABLE };
+            let error = unreadable(&path, &error);
+            self.faults.push(Fault { hint: error.hint, ..json.fault(code, error.fact).of_file() });
+            return None;
+        }
+        Some(Source::File { path: path.into(), numbered })
+    }
+}
+
+/// The fault of ramp keys without the object around them.
+fn bare_ramp(json: &Json<'_>) -> Fault {
+    let fault = json.unexpected(&Shape::Ramp.describe());
+    let range = json.value.range();
+    match &json.text.content[range.start..range.end] {
+        text if json.elements().is_none() => {
+            fault.hint(format!("a ramp of one value is written {{\"ramp\": [[0, {text}]]}}"))
+        }
+        text if text.len() <= 60 && !text.contains(['\n', '\r']) => fault.hint(format!("write {{\"ramp\": {text}}}")),
+        _ => fault.hint("write {\"ramp\": …} around it"),
+    }
+}
+
+/// The seed that a node gets: a param's own and the scene's, mixed. Always within u32.
+fn mixed(scene: i64, own: i64) -> i64 {
+    i64::from(Key::new(scene as u64).of(own as u64).u32())
+}

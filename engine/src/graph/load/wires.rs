@@ -1,0 +1,131 @@
+//! Wires: which output each input is wired to.
+
+use jsonc_parser::ast::Value as Ast;
+
+use super::Draft;
+use super::order::Order;
+use crate::graph::fault::{Fault, code};
+use crate::graph::json::{Json, did_you_mean, find, shown};
+use crate::node::{Arity, InputSpec};
+
+/// A wire as it stands in the file.
+pub(super) struct Wire<'a> {
+    pub(super) json: Json<'a>,
+    /// The node it comes from.
+    pub(super) node: usize,
+    /// That node's output; `None` where its type, and so its outputs, are not known.
+    pub(super) port: Option<usize>,
+}
+
+/// Follows the wires of all nodes.
+pub(super) fn connect<'a>(drafts: &mut [Draft<'a>], faults: &mut Vec<Fault>) {
+    let wires: Vec<Vec<Vec<Wire<'a>>>> = drafts.iter().map(|draft| wires_of(draft, drafts, faults)).collect();
+    drafts.iter_mut().zip(wires).for_each(|(draft, wires)| draft.wires = wires);
+}
+
+/// The nodes that each node is wired to.
+pub(super) fn sources(drafts: &[Draft<'_>]) -> Vec<Vec<usize>> {
+    drafts.iter().map(|draft| draft.wires.iter().flatten().map(|wire| wire.node).collect()).collect()
+}
+
+/// Puts a fault for each cycle, at the wire that closes it.
+pub(super) fn refuse_cycles(drafts: &[Draft<'_>], order: &Order, faults: &mut Vec<Fault>) {
+    for cycle in &order.cycles {
+        let (first, last) = (cycle[0], cycle[cycle.len() - 1]);
+        let closing = drafts[first].wires.iter().flatten().find(|wire| wire.node == last);
+        let Some(wire) = closing else { continue };
+        let id = |node: &usize| shown(drafts[*node].text.entry.name);
+        let fault = match cycle.len() {
+            1 => wire.json.fault(code::CYCLE, format!("`{}` is wired to itself", id(&first))),
+            _ => {
+                let ids: Vec<String> = cycle.iter().chain([&first]).map(id).collect();
+                wire.json.fault(code::CYCLE, format!("the wires go round: {}", ids.join(" → ")))
+            }
+        };
+        faults.push(fault.hint("geometry flows one way; take out a wire of the circle"));
+    }
+}
+
+/// The wires of each input of a node. Wires of inputs that are not known are followed too, for their faults.
+fn wires_of<'a>(draft: &Draft<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>) -> Vec<Vec<Wire<'a>>> {
+    let entries = &draft.text.inputs;
+    for entry in entries.iter().filter(|entry| !draft.inputs.iter().any(|input| input.name == entry.name)) {
+        if let Some(node) = draft.node {
+            let fact = format!("`{}` has no input `{}`", node.name, shown(entry.name));
+            let hint = match draft.specs.iter().any(|spec| spec.name == entry.name) {
+                true => Some("it is a param; write it under `params`".into()),
+                false => did_you_mean(entry.name, draft.inputs.iter().map(|input| input.name), "its inputs"),
+            };
+            faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_INPUT, fact) });
+        }
+        let links = entry.json.elements().map_or_else(
+            || vec![entry.json.clone()],
+            |items| items.iter().enumerate().map(|(place, item)| entry.json.item(item, place)).collect(),
+        );
+        // An input of no known kind may be anything; only a name can be looked up.
+        links.iter().filter(|link| link.string().is_some()).for_each(|json| drop(follow(json, drafts, faults)));
+    }
+    let wired = |input: &InputSpec| match find(entries, input.name) {
+        Some(entry) => wires_of_input(input, &entry.json, drafts, faults),
+        None => {
+            if matches!(input.arity, Arity::One | Arity::Many { least: 1.. }) {
+                let fault =
+                    draft.text.entry.fault(code::MISSING_INPUT, format!("the input `{}` has no wire", input.name));
+                faults.push(fault.hint(format!("{}: {}", input.name, input.help)));
+            }
+            Vec::new()
+        }
+    };
+    draft.inputs.iter().map(wired).collect()
+}
+
+fn wires_of_input<'a>(
+    input: &InputSpec,
+    json: &Json<'a>,
+    drafts: &[Draft<'a>],
+    faults: &mut Vec<Fault>,
+) -> Vec<Wire<'a>> {
+    let follow_one = |json: &Json<'a>, faults: &mut Vec<Fault>| follow(json, drafts, faults).into_iter().collect();
+    let Arity::Many { least } = input.arity else {
+        let fault = match json.value {
+            Ast::Array(list) if list.elements.len() > 1 => {
+                let fact = format!("the input `{}` takes one wire, not {}", input.name, list.elements.len());
+                json.fault(code::TOO_MANY_WIRES, fact).hint("a Merge node makes one of several")
+            }
+            Ast::Array(_) => json.unexpected("a node \"id\" or \"id.output\", without the list"),
+            _ => return follow_one(json, faults),
+        };
+        faults.push(fault);
+        return Vec::new();
+    };
+    let Some(items) = json.elements() else { return follow_one(json, faults) };
+    if items.len() < least {
+        let fact = format!("the input `{}` has {} wires", input.name, items.len());
+        faults.push(json.fault(code::MISSING_INPUT, fact).hint(format!("expected at least {least}")));
+    }
+    items.iter().enumerate().filter_map(|(place, item)| follow(&json.item(item, place), drafts, faults)).collect()
+}
+
+/// Follows `"id"` or `"id.output"`.
+pub(super) fn follow<'a>(json: &Json<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>) -> Option<Wire<'a>> {
+    let Some(text) = json.string() else {
+        faults.push(json.unexpected("a node \"id\" or \"id.output\""));
+        return None;
+    };
+    let (id, port) = text.split_once('.').map_or((text, None), |(id, port)| (id, Some(port)));
+    let Some(node) = drafts.iter().position(|draft| draft.text.entry.name == id) else {
+        let fault = json.fault(code::UNKNOWN_NODE, format!("there is no node `{}`", shown(id)));
+        let hint = did_you_mean(id, drafts.iter().map(|draft| draft.text.entry.name), "nodes");
+        faults.push(Fault { hint, ..fault });
+        return None;
+    };
+    let Some(declared) = drafts[node].node else { return Some(Wire { json: json.clone(), node, port: None }) };
+    let Some(port) = port else { return Some(Wire { json: json.clone(), node, port: Some(0) }) };
+    let found = declared.outputs.iter().position(|output| output.name == port);
+    if found.is_none() {
+        let fact = format!("`{}` is a `{}`, which has no output `{}`", shown(id), declared.name, shown(port));
+        let hint = did_you_mean(port, declared.outputs.iter().map(|output| output.name), "its outputs");
+        faults.push(Fault { hint, ..json.fault(code::UNKNOWN_PORT, fact) });
+    }
+    Some(Wire { json: json.clone(), node, port: found })
+}

@@ -1,0 +1,152 @@
+//! Graphs: nodes of a catalogue, wired and with their params set, and what is to come out.
+
+mod catalogue;
+pub mod fault;
+mod json;
+mod load;
+mod places;
+mod syntax;
+mod text;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::geometry::{Geometry, Name};
+use crate::node::Node;
+use crate::param::{Clock, ParamSpec, Source};
+use crate::time::Frame;
+
+pub use catalogue::Catalogue;
+pub use fault::{Fault, FaultClass};
+pub use load::{FileProbe, probe};
+pub use places::{Part, Places};
+
+/// What holds for the whole graph.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// First frame.
+    pub first: i64,
+    /// Last frame, itself included.
+    pub last: i64,
+    /// Frames a second.
+    pub fps: f64,
+    /// Mixed into every node's seed.
+    pub seed: i64,
+    /// Where positions are relative to, metres.
+    pub origin: [f64; 3],
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self { first: 1, last: 1, fps: 24.0, seed: 0, origin: [0.0; 3] }
+    }
+}
+
+impl Scene {
+    /// What expressions know of it.
+    pub fn clock(&self) -> Clock {
+        Clock { fps: self.fps, seed: self.seed }
+    }
+
+    /// The first frame.
+    pub fn start(&self) -> Frame {
+        Frame::whole(self.first)
+    }
+
+    /// The last frame.
+    pub fn end(&self) -> Frame {
+        Frame::whole(self.last)
+    }
+}
+
+/// One end of a wire: an output of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Link {
+    /// Place of the node in [`Graph::nodes`].
+    pub node: usize,
+    /// Place of the output in the node's declaration.
+    pub port: usize,
+}
+
+/// What a node of a graph does.
+#[derive(Clone)]
+pub enum Body {
+    /// A node of the catalogue: its params in the order of the declaration, wires in the order of its inputs.
+    Node {
+        /// The declaration.
+        node: &'static Node,
+        /// The declaration's params.
+        specs: Arc<[ParamSpec]>,
+        /// Where each param's value comes from.
+        params: Vec<Source>,
+        /// Wires of each input.
+        inputs: Vec<Vec<Link>>,
+    },
+    /// Geometry given by the program that holds the graph, a function of the frame. One output.
+    Given {
+        /// The function.
+        at: Arc<dyn Fn(Frame) -> Geometry + Send + Sync>,
+        /// Whether it changes with the frame.
+        moves: bool,
+    },
+}
+
+/// A node of a graph.
+#[derive(Clone)]
+pub struct GraphNode {
+    /// Its id.
+    pub id: Name,
+    /// What it does.
+    pub body: Body,
+}
+
+/// Something that is to come out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GraphOutput {
+    /// Its name, and its file's.
+    pub name: Name,
+    /// Where it comes from.
+    pub from: Link,
+    /// The attributes to write; all where `None`.
+    pub attributes: Option<Vec<Name>>,
+    /// Whether velocities are to be written.
+    pub v: bool,
+}
+
+/// A graph that was checked: ids and names are unique, wires fit and make no cycle, params are in range.
+#[derive(Clone)]
+pub struct Graph {
+    /// What holds for the whole.
+    pub scene: Scene,
+    /// The nodes, each after all it is wired to.
+    pub nodes: Vec<GraphNode>,
+    /// What is to come out, in the order of the file.
+    pub outputs: Vec<GraphOutput>,
+    /// The folder that relative paths start from.
+    pub folder: PathBuf,
+    /// Where its parts stand in the file.
+    pub places: Places,
+}
+
+impl GraphNode {
+    /// The declaration, where there is one.
+    pub fn node(&self) -> Option<&'static Node> {
+        match &self.body {
+            Body::Node { node, .. } => Some(node),
+            Body::Given { .. } => None,
+        }
+    }
+
+    /// Wires of each input.
+    pub fn inputs(&self) -> &[Vec<Link>] {
+        match &self.body {
+            Body::Node { inputs, .. } => inputs,
+            Body::Given { .. } => &[],
+        }
+    }
+
+    /// The type's name; `given` where the program gives the geometry.
+    pub fn type_name(&self) -> &'static str {
+        self.node().map_or("given", |node| node.name)
+    }
+}

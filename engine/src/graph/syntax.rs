@@ -1,0 +1,276 @@
+//! From a text to JSON: comments and trailing commas are read, nothing else of JSON5.
+//!
+//! Promise: any text gives a value or the first fault in it, with its place; no depth of nesting overflows the stack.
+//! Limit: lists and objects nest [`DEEPEST`] deep at most; after a fault of syntax nothing further is looked for.
+
+use jsonc_parser::ast::Value;
+use jsonc_parser::errors::{ParseError, ParseErrorKind};
+use jsonc_parser::{CollectOptions, ParseOptions, ParseStringErrorKind, parse_to_ast};
+
+use super::fault::{Fault, code};
+use super::text::Text;
+
+/// Deepest nesting of lists and objects. A graph needs eight.
+pub(super) const DEEPEST: usize = 64;
+
+const STRICT: ParseOptions = ParseOptions {
+    allow_comments: true,
+    allow_trailing_commas: true,
+    allow_loose_object_property_names: false,
+    allow_missing_commas: false,
+    allow_single_quoted_strings: false,
+    allow_hexadecimal_numbers: false,
+    allow_unary_plus_numbers: false,
+    allow_bare_decimal_point_numbers: false,
+    allow_non_finite_numbers: false,
+    allow_extended_string_escapes: false,
+};
+
+/// The value that a text holds.
+///
+/// # Errors
+/// The first fault of its syntax.
+pub(super) fn parse<'a>(text: &'a Text<'_>) -> Result<Value<'a>, Fault> {
+    let end = brackets(text)?;
+    let parsed = parse_to_ast(text.content, &CollectOptions::default(), &STRICT);
+    match parsed.map_err(|error| explain(text, &error)) {
+        // What the parser stumbles over before the end is the cause; an open bracket at the end may only follow from it.
+        Err((offset, fault)) if offset < text.content.trim_end().len() || end.is_none() => Err(fault),
+        Err((_, fault)) => Err(end.unwrap_or(fault)),
+        Ok(parsed) => parsed.value.ok_or_else(|| nothing(text)),
+    }
+}
+
+fn nothing(text: &Text<'_>) -> Fault {
+    let fault = text.fault(0, "", code::EMPTY, format!("{} is empty", text.noun()));
+    match text.set {
+        Some(key) => fault.hint(format!("write `{key}=` and the value, such as `{key}=1`")),
+        None => fault.hint(r#"a graph starts with {"convect": 1, "nodes": {…}, "outputs": {…}}"#),
+    }
+}
+
+/// Walks brackets, texts and comments without a stack of calls: the fault of what nests too deep or never ends, or, as
+/// the value, the fault of brackets that are still open at the end.
+fn brackets(text: &Text<'_>) -> Result<Option<Fault>, Fault> {
+    let bytes = text.content.as_bytes();
+    let syntax = |at: usize, fact: &str| text.fault(at, "", code::SYNTAX, fact);
+    let mut open: Vec<usize> = Vec::new();
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        match (byte, bytes.get(at + 1)) {
+            (b'{' | b'[', _) if open.len() == DEEPEST => {
+                let fact = format!("lists and objects are more than {DEEPEST} deep");
+                return Err(text.fault(at, "", code::NESTING, fact).hint("a graph needs fewer than ten levels"));
+            }
+            (b'{' | b'[', _) => open.push(at),
+            (b'}' | b']', _) => match open.pop() {
+                // `]` is `[` + 2, `}` is `{` + 2.
+                Some(start) if bytes[start] + 2 != byte => {
+                    let place = text.place(start);
+                    let fact = format!(
+                        "`{}` closes the `{}` of line {}, column {}",
+                        byte as char, bytes[start] as char, place.line, place.column
+                    );
+                    return Err(syntax(at, &fact).hint(format!("expected `{}`", (bytes[start] + 2) as char)));
+                }
+                _ => {}
+            },
+            (b'"', _) => match string_end(bytes, at) {
+                Ok(end) => at = end,
+                Err(Unclosed::Line) => {
+                    let fault = syntax(at, "the text that opens here does not close on its line");
+                    return Err(fault.hint(r#"close it with `"`; a line break in a text is written `\n`"#));
+                }
+                Err(Unclosed::File) => return Err(truncated(text, "text", at)),
+                Err(Unclosed::Control(place)) => {
+                    let fault = syntax(place, &format!("a text holds the control character {:#04x}", bytes[place]));
+                    return Err(fault.hint(r"a tab is written `\t`, others `\u0000` with their number"));
+                }
+            },
+            (b'/', Some(b'/')) => {
+                at += bytes[at..].iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len() - at);
+            }
+            (b'/', Some(b'*')) => match bytes[at + 2..].windows(2).position(|pair| pair == b"*/") {
+                Some(length) => at += length + 3,
+                None => return Err(truncated(text, "comment", at)),
+            },
+            _ => {}
+        }
+        at += 1;
+    }
+    Ok(open.last().map(|start| truncated(text, if bytes[*start] == b'{' { "object" } else { "list" }, *start)))
+}
+
+enum Unclosed {
+    Line,
+    File,
+    Control(usize),
+}
+
+/// The byte of the quote that ends the text whose opening quote is at `start`.
+fn string_end(bytes: &[u8], start: usize) -> Result<usize, Unclosed> {
+    let mut at = start + 1;
+    loop {
+        match bytes.get(at) {
+            None => return Err(Unclosed::File),
+            Some(b'"') => return Ok(at),
+            // A quote after a backslash does not end the text; what else may follow is the parser's to judge.
+            Some(b'\\') if matches!(bytes.get(at + 1), Some(b'"' | b'\\')) => at += 2,
+            Some(b'\n' | b'\r') => return Err(Unclosed::Line),
+            Some(0..0x20) => return Err(Unclosed::Control(at)),
+            Some(_) => at += 1,
+        }
+    }
+}
+
+/// The fault of a text that ends inside what opened at `start`.
+fn truncated(text: &Text<'_>, what: &str, start: usize) -> Fault {
+    let place = text.place(start);
+    let fact =
+        format!("{} ends inside the {what} that opens on line {}, column {}", text.noun(), place.line, place.column);
+    text.fault(text.content.trim_end().len(), "", code::TRUNCATED, fact).hint("is the rest missing?")
+}
+
+/// What the parser stumbled over, in our words, and at which byte.
+fn explain(text: &Text<'_>, error: &ParseError) -> (usize, Fault) {
+    use ParseErrorKind as K;
+    let start = error.range().start;
+    let rest = &text.content[start..];
+    let word = word(rest);
+    let (fact, hint): (String, Option<&str>) = match error.kind() {
+        K::UnexpectedWord | K::NonFiniteNumbersNotAllowed
+            if matches!(word.trim_start_matches('-'), "NaN" | "Infinity" | "inf" | "nan") =>
+        {
+            (format!("`{word}` is not a number that a graph can hold"), Some("expected a finite number"))
+        }
+        K::UnexpectedWord => (format!("found `{word}`, expected a value"), Some(r#"a text stands between `"`"#)),
+        K::SingleQuotedStringsNotAllowed => {
+            ("found `'`, expected a value or a key".into(), Some(r#"a text stands between `"`"#))
+        }
+        K::ExpectedStringObjectProperty => {
+            (format!("the key `{word}` has no quotes"), Some(r#"keys stand between `"`"#))
+        }
+        K::ExpectedColonAfterObjectKey => ("expected `:` after the key".into(), None),
+        K::ExpectedObjectValue => ("expected a value after `:`".into(), None),
+        K::ExpectedComma if rest.starts_with(|c: char| c.is_ascii_digit()) => {
+            ("a number has a leading zero".into(), Some("write it without the zero"))
+        }
+        K::ExpectedComma => ("expected `,`".into(), None),
+        K::UnexpectedTokenInObject => match rest.chars().next() {
+            Some(c @ ('{' | '[' | ']' | ',' | ':')) => (format!("found `{c}`, expected `,`, a key or `}}`"), None),
+            _ => ("expected `,`, a key or `}`".into(), None),
+        },
+        K::MultipleRootJsonValues => {
+            (format!("{} goes on after its value has ended", text.noun()), Some("is there a bracket too many?"))
+        }
+        K::HexadecimalNumbersNotAllowed => (format!("`{word}` is hexadecimal"), Some("numbers are decimal")),
+        K::UnaryPlusNumbersNotAllowed => ("a number starts with `+`".into(), Some("write it without")),
+        K::BareDecimalPointNumbersNotAllowed => {
+            ("a number has no digit on one side of its point".into(), Some("write 0.5 and 5.0, not .5 and 5."))
+        }
+        K::ExpectedDigit | K::ExpectedDigitFollowingNegativeSign | K::ExpectedPlusMinusOrDigitInNumberLiteral => {
+            ("a number is not complete, expected a digit".into(), None)
+        }
+        K::String(kind) => (string_fact(kind).into(), Some(r#"`\` itself is written `\\`"#)),
+        K::UnexpectedCloseBrace => ("found `}`, expected a value".into(), None),
+        K::UnexpectedCloseBracket => ("found `]`, expected a value".into(), None),
+        K::UnexpectedColon => ("found `:`, expected a value".into(), None),
+        K::UnexpectedComma => ("found `,`, expected a value".into(), None),
+        _ => (format!("found `{}`, which is not JSON", rest.chars().next().unwrap_or(' ').escape_debug()), None),
+    };
+    let fault = text.fault(start, "", code::SYNTAX, fact);
+    let fault = match (text.set, error.kind()) {
+        (Some(key), K::UnexpectedWord) => {
+            fault.hint(format!(r#"a text needs quotes that the shell leaves: '{key}="{word}"'"#))
+        }
+        _ => Fault { hint: hint.map(Into::into), ..fault },
+    };
+    (start, fault)
+}
+
+fn string_fact(kind: &ParseStringErrorKind) -> &'static str {
+    match kind {
+        ParseStringErrorKind::ExpectedFourHexDigits => r"expected four hexadecimal digits after `\u`",
+        ParseStringErrorKind::InvalidUnicodeEscapeSequence(_) => r"a `\u` is half of a surrogate pair",
+        ParseStringErrorKind::UnterminatedStringLiteral => "a text is not closed",
+        _ => r#"a text has a `\` that starts nothing known"#,
+    }
+}
+
+/// The word at the start of `rest`, as far as it is worth showing.
+fn word(rest: &str) -> String {
+    rest.chars().take_while(|c| !c.is_whitespace() && !r#"{}[],:"'/"#.contains(*c)).take(40).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(content: &str) -> String {
+        parse(&Text::new(content, None)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn comments_and_trailing_commas_are_read() {
+        assert!(parse(&Text::new("/* a */ {\"a\": [1, 2,], // b\n}", None)).is_ok());
+    }
+
+    #[test]
+    fn nothing_else_of_json5_is_read() {
+        for (content, expected) in [
+            ("{a: 1}", "1:2: the key `a` has no quotes; keys stand between `\"`"),
+            ("['a']", "1:2: found `'`, expected a value or a key; a text stands between `\"`"),
+            ("[0x10]", "1:2: `0x10` is hexadecimal; numbers are decimal"),
+            ("[+1]", "1:2: a number starts with `+`; write it without"),
+            ("[.5]", "1:2: a number has no digit on one side of its point; write 0.5 and 5.0, not .5 and 5."),
+            ("[5.]", "1:2: a number has no digit on one side of its point; write 0.5 and 5.0, not .5 and 5."),
+            ("[01]", "1:3: a number has a leading zero; write it without the zero"),
+            ("[1 2]", "1:3: expected `,`"),
+            ("[NaN]", "1:2: `NaN` is not a number that a graph can hold; expected a finite number"),
+            ("[-Infinity]", "1:2: `-Infinity` is not a number that a graph can hold; expected a finite number"),
+            (r#"["\x41"]"#, r"1:3: a text has a `\` that starts nothing known; `\` itself is written `\\`"),
+            (r#"["\ud800"]"#, r"1:3: a `\u` is half of a surrogate pair; `\` itself is written `\\`"),
+            (
+                "[\"a\nb\"]",
+                r#"1:2: the text that opens here does not close on its line; close it with `"`; a line break in a text is written `\n`"#,
+            ),
+            (
+                "[\"a\tb\"]",
+                r"1:4: a text holds the control character 0x09; a tab is written `\t`, others `\u0000` with their number",
+            ),
+        ] {
+            assert_eq!(fault(content), expected);
+        }
+    }
+
+    #[test]
+    fn what_ends_too_early_says_what_was_open() {
+        let ends = |what: &str| format!("the file ends inside the {what}; is the rest missing?");
+        assert_eq!(fault("{\n  \"a\": [1,\n"), format!("2:11: {}", ends("list that opens on line 2, column 8")));
+        assert_eq!(fault("{\"a\""), format!("1:5: {}", ends("object that opens on line 1, column 1")));
+        assert_eq!(fault("{\"a"), format!("1:4: {}", ends("text that opens on line 1, column 2")));
+        assert_eq!(fault("{ /* "), format!("1:5: {}", ends("comment that opens on line 1, column 3")));
+        assert_eq!(fault("{\"a\": 1]"), "1:8: `]` closes the `{` of line 1, column 1; expected `}`");
+        assert_eq!(fault("{}}"), "1:3: the file goes on after its value has ended; is there a bracket too many?");
+    }
+
+    #[test]
+    fn any_depth_is_answered_without_a_stack() {
+        let deep = |depth: usize| "[".repeat(depth) + &"]".repeat(depth);
+        assert!(parse(&Text::new(&deep(DEEPEST), None)).is_ok());
+        let expected = "1:65: lists and objects are more than 64 deep; a graph needs fewer than ten levels";
+        assert_eq!(fault(&deep(DEEPEST + 1)), expected);
+        assert_eq!(fault(&deep(100_000)), expected);
+        assert_eq!(
+            fault(&"{\"a\":".repeat(100_000)),
+            "1:321: lists and objects are more than 64 deep; a graph needs fewer than ten levels"
+        );
+    }
+
+    #[test]
+    fn an_empty_text_is_said_to_be_empty() {
+        for content in ["", " \n", "// nothing\n"] {
+            assert!(fault(content).contains("the file is empty"), "{content:?}");
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Texts that JSON is read from, and the places in them.
+//!
+//! Promise: a place costs about the same wherever it is, in a file of one line too. Lines end at `\n`, `\r\n` or `\r`.
+
+use super::fault::{Fault, FaultClass, code};
+
+/// A place in a text: line and column in characters, both from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) line: u32,
+    pub(super) column: u32,
+}
+
+/// A text that JSON is read from: a graph file, or the value of a `--set`.
+pub(super) struct Text<'a> {
+    pub(super) content: &'a str,
+    /// The key of the `--set`.
+    pub(super) set: Option<&'a str>,
+    /// Places of known bytes, rising.
+    marks: Vec<(usize, Place)>,
+}
+
+/// Bytes between marks: few enough to walk, many enough to keep the table small.
+const STRIDE: usize = 512;
+
+impl<'a> Text<'a> {
+    pub(super) fn new(content: &'a str, set: Option<&'a str>) -> Self {
+        let mut marks = Vec::with_capacity(content.len() / STRIDE + 1);
+        let mut next = 0;
+        for (offset, place) in places(content, Place { line: 1, column: 1 }) {
+            if offset >= next {
+                marks.push((offset, place));
+                next = offset + STRIDE;
+            }
+        }
+        Self { content, set, marks }
+    }
+
+    /// The place of the character that starts at byte `offset`, or of the end.
+    pub(super) fn place(&self, offset: usize) -> Place {
+        let mark = self.marks.partition_point(|(at, _)| *at <= offset).saturating_sub(1);
+        let (start, place) = self.marks[mark];
+        let walked = places(&self.content[start..], place);
+        walked.take_while(|(at, _)| start + at <= offset).last().map_or(place, |(_, place)| place)
+    }
+
+    /// What this text is called in messages.
+    pub(super) fn noun(&self) -> &'static str {
+        if self.set.is_some() { "the value" } else { "the file" }
+    }
+
+    /// A fault at byte `offset`.
+    pub(super) fn fault(&self, offset: usize, path: &str, code: &'static str, fact: impl Into<String>) -> Fault {
+        let Place { line, column } = self.place(offset);
+        Fault {
+            code,
+            line,
+            column,
+            path: path.to_owned(),
+            fact: fact.into(),
+            hint: None,
+            class: FaultClass::Graph,
+            set: self.set.map(Into::into),
+        }
+    }
+}
+
+/// Byte and place of every character, and of the end.
+fn places(content: &str, start: Place) -> impl Iterator<Item = (usize, Place)> {
+    let mut place = start;
+    let end = std::iter::once((content.len(), '\0'));
+    content.char_indices().chain(end).map(move |(offset, c)| {
+        let here = place;
+        let ends_line = c == '\n' || c == '\r' && content.as_bytes().get(offset + 1) != Some(&b'\n');
+        place = match ends_line {
+            true => Place { line: place.line + 1, column: 1 },
+            false => Place { line: place.line, column: place.column + 1 },
+        };
+        (offset, here)
+    })
+}
+
+/// The text of a file's bytes: UTF-8, a byte order mark before it is left out.
+///
+/// # Errors
+/// Where the bytes are something else.
+pub(super) fn decode(bytes: &[u8]) -> Result<&str, Fault> {
+    let whole = |fact: &str| Text::new("", None).fault(0, "", code::ENCODING, fact).hint("save it as UTF-8");
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    // In UTF-16, either way round, one of the first two bytes of `{` or a blank is zero.
+    if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, _, ..] | [_, 0, ..]) {
+        return Err(whole("the file is UTF-16 or binary, expected UTF-8"));
+    }
+    std::str::from_utf8(bytes).map_err(|error| {
+        let good = error.valid_up_to();
+        let before = std::str::from_utf8(&bytes[..good]).unwrap_or_default();
+        let fact = format!("the byte {:#04x} is not UTF-8", bytes[good]);
+        Text::new(before, None).fault(good, "", code::ENCODING, fact).hint("save it as UTF-8")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_count_lines_and_characters_whatever_ends_a_line() {
+        let text = Text::new("aé\nb\r\nc\rd", None);
+        let at = |offset| (text.place(offset).line, text.place(offset).column);
+        assert_eq!((at(0), at(1), at(3), at(4)), ((1, 1), (1, 2), (1, 3), (2, 1)));
+        assert_eq!((at(7), at(9), at(10)), ((3, 1), (4, 1), (4, 2)));
+    }
+
+    #[test]
+    fn places_far_into_a_long_line_agree_with_counting() {
+        let content = "é".repeat(5_000) + "\n" + &"x".repeat(3_000);
+        let text = Text::new(&content, None);
+        assert_eq!(text.place(9_000), Place { line: 1, column: 4_501 });
+        assert_eq!(text.place(10_001 + 2_999), Place { line: 2, column: 3_000 });
+        assert_eq!(text.place(content.len()), Place { line: 2, column: 3_001 });
+    }
+
+    #[test]
+    fn bytes_that_are_not_utf_8_are_placed() {
+        assert_eq!(decode("\u{feff}{}".as_bytes()), Ok("{}"));
+        let fault = decode(b"{\n \xff}").unwrap_err();
+        assert_eq!((fault.line, fault.column), (2, 2));
+        assert_eq!(fault.fact, "the byte 0xff is not UTF-8");
+        for utf_16 in [&b"\xff\xfe{\0}\0"[..], b"\xfe\xff\0{\0}", b"{\0}\0"] {
+            assert_eq!(decode(utf_16).unwrap_err().fact, "the file is UTF-16 or binary, expected UTF-8");
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! Typed handles of params. A handle is the one place where a param's name, default, ranges, unit and help stand;
+//! help, schema, validation and conformance derive from it.
+
+use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
+use super::unit::Unit;
+use super::value::{Masked, Seed, Span, Turn, Value};
+use super::{Params, choice::Choice};
+use crate::files::File;
+use crate::geometry::{Column, Name};
+use numerics::ramp::{Interpolation, Ramp};
+use std::sync::Arc;
+
+/// A type a param can have.
+pub trait ParamType: Clone + 'static {
+    /// How a default is written in a constant.
+    type Default: Copy + Send + Sync + 'static;
+    /// Which JSON it is read from.
+    fn shape() -> Shape;
+    /// The default as a value.
+    fn erase(default: Self::Default) -> Value;
+    /// The typed value; `None` where the value is of another type.
+    fn typed(value: &Value) -> Option<Self>;
+}
+
+/// A typed handle: written once, as a constant, through [`crate::params!`].
+pub struct Param<T: ParamType> {
+    name: &'static str,
+    help: &'static str,
+    default: T::Default,
+    facts: Facts,
+}
+
+/// A param whatever its type.
+pub trait ParamDecl: Sync {
+    /// Its name, kind, default, ranges, unit and help.
+    fn spec(&self) -> ParamSpec;
+}
+
+impl<T: ParamType> ParamDecl for Param<T> {
+    fn spec(&self) -> ParamSpec {
+        ParamSpec {
+            name: self.name,
+            help: self.help,
+            shape: T::shape(),
+            default: T::erase(self.default),
+            facts: self.facts,
+        }
+    }
+}
+
+impl<T: ParamType> Param<T> {
+    const fn new(name: &'static str, default: T::Default, help: &'static str) -> Self {
+        Self { name, help, default, facts: Facts::NONE }
+    }
+
+    /// The name in graph files.
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Refuses values below `low`.
+    pub const fn at_least(mut self, low: f64) -> Self {
+        self.facts.hard = Bounds { low, open: false, high: self.facts.hard.high };
+        self
+    }
+
+    /// Refuses `low` and below.
+    pub const fn above(mut self, low: f64) -> Self {
+        self.facts.hard = Bounds { low, open: true, high: self.facts.hard.high };
+        self
+    }
+
+    /// Refuses values outside `low…high`.
+    pub const fn within(mut self, low: f64, high: f64) -> Self {
+        self.facts.hard = Bounds { low, open: false, high };
+        self
+    }
+
+    /// The range that is usual; it guides help and viewers and refuses nothing.
+    pub const fn soft(mut self, low: f64, high: f64) -> Self {
+        self.facts.soft = Some([low, high]);
+        self
+    }
+
+    /// The unit of the number.
+    pub const fn unit(mut self, unit: Unit) -> Self {
+        self.facts.unit = unit;
+        self
+    }
+
+    /// May not be animated.
+    pub const fn fixed(mut self) -> Self {
+        self.facts.fixed = true;
+        self
+    }
+
+    /// Read over all times since frame 0, through [`crate::node::FrameCx::integral`].
+    pub const fn history(mut self) -> Self {
+        self.facts.history = true;
+        self
+    }
+
+    /// Read only where `when` holds of the other params; elsewhere the node sees the default, and neither keys nor
+    /// plans depend on what was set.
+    pub const fn when(mut self, when: fn(&Params) -> bool) -> Self {
+        self.facts.when = Some(when);
+        self
+    }
+
+    /// Where the graph says nothing, the value is the current frame, rounded down.
+    pub const fn default_current_frame(mut self) -> Self {
+        self.facts.unset = Unset::CurrentFrame;
+        self
+    }
+
+    /// Where the graph says nothing, the value is the scene's first frame.
+    pub const fn default_scene_start(mut self) -> Self {
+        self.facts.unset = Unset::SceneStart;
+        self
+    }
+}
+
+macro_rules! types {
+    ($($t:ty, $default:ty, $shape:expr, $erase:expr, $value:pat => $typed:expr;)*) => {$(
+        impl ParamType for $t {
+            type Default = $default;
+            fn shape() -> Shape { $shape }
+            fn erase(default: $default) -> Value { ($erase)(default) }
+            fn typed(value: &Value) -> Option<Self> {
+                match value { $value => Some($typed), _ => None }
+            }
+        }
+    )*};
+}
+
+types! {
+    f64, f64, Shape::Float, Value::Float, Value::Float(x) => *x;
+    f32, f32, Shape::Float, |x: f32| Value::Float(shortest(x)), Value::Float(x) => *x as f32;
+    i64, i64, Shape::Int, Value::Int, Value::Int(i) => *i;
+    bool, bool, Shape::Bool, Value::Bool, Value::Bool(b) => *b;
+    [f32; 2], [f32; 2], Shape::Vec2, |v: [f32; 2]| Value::Vec2(v.map(shortest)), Value::Vec2(v) => v.map(|x| x as f32);
+    [f32; 3], [f32; 3], Shape::Vec3, |v: [f32; 3]| Value::Vec3(v.map(shortest)), Value::Vec3(v) => v.map(|x| x as f32);
+    [f64; 3], [f64; 3], Shape::Vec3, Value::Vec3, Value::Vec3(v) => *v;
+    [i64; 3], [i64; 3], Shape::Int3, Value::Int3, Value::Int3(v) => *v;
+    Span, [f32; 2], Shape::Span, |v: [f32; 2]| Value::Span(v.map(shortest)),
+        Value::Span(v) => Span { low: v[0] as f32, high: v[1] as f32 };
+    Turn, (), Shape::Turn, |()| Value::Turn([0.0, 0.0, 0.0, 1.0]), Value::Turn(q) => Turn(*q);
+    Seed, i64, Shape::Seed, Value::Int, Value::Int(seed) => Seed(*seed as u32);
+    Name, &'static str, Shape::Text, |text: &str| Value::Text(text.into()), Value::Text(text) => text.clone();
+    Arc<Vec<Name>>, &'static [&'static str], Shape::Texts,
+        |texts: &[&str]| Value::Texts(Arc::new(texts.iter().map(|text| (*text).into()).collect())),
+        Value::Texts(texts) => texts.clone();
+    Option<File>, (), Shape::File, |()| Value::File(None), Value::File(file) => file.clone();
+    Masked, f32, Shape::Masked, |x: f32| Value::Masked(shortest(x), None),
+        Value::Masked(x, attribute) => Masked { value: *x as f32, attribute: attribute.clone() };
+    Arc<Ramp>, RampDefault, Shape::Ramp, |ramp: RampDefault| Value::Ramp(Arc::new(ramp.build())),
+        Value::Ramp(ramp) => ramp.clone();
+    Arc<Vec<[f32; 3]>>, (), Shape::Vec3s, |()| Value::Vec3s(Arc::default()), Value::Vec3s(rows) => rows.clone();
+    Arc<Vec<i32>>, (), Shape::Ints, |()| Value::Ints(Arc::default()), Value::Ints(rows) => rows.clone();
+    Arc<Vec<[u32; 4]>>, (), Shape::Tets, |()| Value::Tets(Arc::default()), Value::Tets(rows) => rows.clone();
+    Arc<Vec<(Name, Column)>>, (), Shape::Columns, |()| Value::Columns(Arc::default()), Value::Columns(c) => c.clone();
+}
+
+impl<T: Choice> ParamType for T {
+    type Default = T;
+    fn shape() -> Shape {
+        Shape::Choice(T::OPTIONS)
+    }
+    fn erase(default: T) -> Value {
+        Value::Choice(default.place())
+    }
+    fn typed(value: &Value) -> Option<Self> {
+        match value {
+            Value::Choice(place) => T::at(*place),
+            _ => None,
+        }
+    }
+}
+
+/// The f64 that prints as the f32 does: a default of 0.3 shows as 0.3, and is the f32 0.3 again when read.
+fn shortest(x: f32) -> f64 {
+    x.to_string().parse().unwrap_or(f64::from(x))
+}
+
+/// A ramp's default, writable in a constant.
+#[derive(Clone, Copy)]
+pub struct RampDefault {
+    keys: &'static [[f32; 2]],
+    interpolation: Interpolation,
+}
+
+impl RampDefault {
+    fn build(self) -> Ramp {
+        Ramp::new(self.keys.to_vec(), self.interpolation).expect("a ramp's default is checked by the conformance suite")
+    }
+}
+
+impl Param<f32> {
+    /// A number.
+    pub const fn float(name: &'static str, default: f32, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<f64> {
+    /// A number in double precision.
+    pub const fn double(name: &'static str, default: f64, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<i64> {
+    /// A whole number.
+    pub const fn int(name: &'static str, default: i64, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<bool> {
+    /// Yes or no.
+    pub const fn bool(name: &'static str, default: bool, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<[f32; 2]> {
+    /// Two numbers.
+    pub const fn vec2(name: &'static str, default: [f32; 2], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<[f32; 3]> {
+    /// A vector.
+    pub const fn vec3(name: &'static str, default: [f32; 3], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<[f64; 3]> {
+    /// A direction: a vector that is not zero. Its length does not matter.
+    pub const fn direction(name: &'static str, default: [f64; 3], help: &'static str) -> Self {
+        let mut param = Self::new(name, default, help);
+        param.facts.direction = true;
+        param
+    }
+
+    /// A vector in double precision.
+    pub const fn dvec3(name: &'static str, default: [f64; 3], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<[i64; 3]> {
+    /// Three whole numbers.
+    pub const fn int3(name: &'static str, default: [i64; 3], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<Span> {
+    /// A range a…b to draw from; a must not exceed b.
+    pub const fn span(name: &'static str, default: [f32; 2], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<Turn> {
+    /// A rotation: degrees about x, then y, then z. Keys interpolate as rotations.
+    pub const fn rotation(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help).unit(Unit::Degrees)
+    }
+}
+
+impl Param<Seed> {
+    /// A seed, mixed with the scene's.
+    pub const fn seed(help: &'static str) -> Self {
+        Self::new("seed", 0, help)
+    }
+}
+
+impl Param<Name> {
+    /// A text.
+    pub const fn text(name: &'static str, default: &'static str, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<Arc<Vec<Name>>> {
+    /// A list of texts.
+    pub const fn texts(name: &'static str, default: &'static [&'static str], help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<Option<File>> {
+    /// A file, relative to the graph file; `####` stands for the frame number. None by default.
+    pub const fn file(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help).fixed()
+    }
+}
+
+impl Param<Masked> {
+    /// A number that a point attribute may scale (⊗).
+    pub const fn masked(name: &'static str, default: f32, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl Param<Arc<Ramp>> {
+    /// A curve over 0…1, straight between its keys.
+    pub const fn ramp(name: &'static str, keys: &'static [[f32; 2]], help: &'static str) -> Self {
+        Self::new(name, RampDefault { keys, interpolation: Interpolation::Linear }, help)
+    }
+
+    /// A curve over 0…1, a smoothstep between its keys.
+    pub const fn smooth_ramp(name: &'static str, keys: &'static [[f32; 2]], help: &'static str) -> Self {
+        Self::new(name, RampDefault { keys, interpolation: Interpolation::Smooth }, help)
+    }
+}
+
+impl<T: Choice> Param<T> {
+    /// One of a few words.
+    pub const fn choice(name: &'static str, default: T, help: &'static str) -> Self {
+        Self::new(name, default, help)
+    }
+}
+
+impl<T: ParamType<Default = ()>> Param<T> {
+    /// Data written into the graph file itself, empty by default.
+    pub const fn inline(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help).fixed()
+    }
+}

@@ -1,0 +1,64 @@
+//! Params: what an artist sets on a node.
+//!
+//! A node writes typed handles ([`Param`]) through [`crate::params!`]; the engine keeps erased [`Value`]s, resolved
+//! from a [`Source`] (a literal, keyframes, an expression) at each time they are read.
+
+mod choice;
+mod handle;
+mod source;
+mod spec;
+mod turn;
+mod unit;
+mod value;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+pub use choice::{Choice, ChoiceOption};
+pub use handle::{Param, ParamDecl, ParamType, RampDefault};
+pub use source::{Clock, Keyframe, Keyframes, Source};
+pub use spec::{Bounds, Facts, ParamSpec, Shape, Unset};
+pub use turn::euler_to_turn;
+pub use unit::Unit;
+pub use value::{Masked, Seed, Span, Turn, Value};
+
+/// Which params of a node were ever read; the conformance suite asks.
+#[derive(Debug, Default)]
+pub struct ReadLog(Box<[AtomicBool]>);
+
+impl ReadLog {
+    pub(crate) fn new(params: usize) -> Self {
+        Self((0..params).map(|_| AtomicBool::new(false)).collect())
+    }
+
+    /// Whether the param at `place` was read.
+    pub fn was_read(&self, place: usize) -> bool {
+        self.0.get(place).is_some_and(|read| read.load(Ordering::Relaxed))
+    }
+}
+
+/// A node's params at one time.
+#[derive(Clone, Debug)]
+pub struct Params {
+    pub(crate) specs: Arc<[ParamSpec]>,
+    pub(crate) values: Arc<[Value]>,
+    pub(crate) log: Arc<ReadLog>,
+}
+
+impl Params {
+    /// The value of a param.
+    ///
+    /// # Panics
+    /// Where the node does not declare the handle. `params!` makes that hard; the engine turns it into an error that
+    /// names node and frame, and the conformance suite fails.
+    pub fn get<T: ParamType>(&self, param: Param<T>) -> T {
+        let place =
+            self.specs.iter().position(|spec| std::ptr::eq(spec.name, param.name()) || spec.name == param.name());
+        let place = place.unwrap_or_else(|| panic!("it reads the param `{}`, which it does not declare", param.name()));
+        if let Some(read) = self.log.0.get(place) {
+            read.store(true, Ordering::Relaxed);
+        }
+        T::typed(&self.values[place])
+            .unwrap_or_else(|| panic!("it reads the param `{}` as another type than it declares", param.name()))
+    }
+}

@@ -1,0 +1,218 @@
+//! Where a param's value comes from: a literal, keyframes, or expressions; evaluated at any time.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use numerics::ramp::{Interpolation, Ramp};
+
+use super::spec::Shape;
+use super::turn::{self, euler_to_turn};
+use super::value::Value;
+use crate::expr::{Env, Expr};
+use crate::geometry::Name;
+
+/// What expressions know of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    /// Frames a second.
+    pub fps: f64,
+    /// The scene's seed.
+    pub seed: i64,
+}
+
+/// One key: its frame and its value. Rotations are kept as degrees, so that whole turns are not lost.
+pub type Keyframe = (f64, Value);
+
+/// Values at frames, held before the first and after the last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyframes {
+    /// At least one, frames strictly increasing.
+    pub keys: Vec<Keyframe>,
+    /// How a value runs from one key to the next. Words, yes-or-no and texts hold whatever it is.
+    pub interpolation: Interpolation,
+}
+
+/// Where a value comes from.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// The same at all times.
+    Constant(Value),
+    /// Keyed.
+    Keys(Arc<Keyframes>, Shape),
+    /// As many expressions as the shape has numbers, and the controls (numbers and vectors) they may name.
+    Exprs(Arc<Vec<Expr>>, Shape, Arc<Vec<Source>>),
+    /// The current frame, rounded down.
+    CurrentFrame,
+    /// A file; `####` in its path stands for the frame number when `numbered`. Opened when the params are resolved.
+    File {
+        /// Where it lies.
+        path: Arc<Path>,
+        /// Whether the path holds `#`s that stand for the frame.
+        numbered: bool,
+    },
+    /// A number from a source, scaled point by point by an attribute.
+    Masked(Box<Source>, Name),
+}
+
+impl Source {
+    /// Whether the value may change with time.
+    pub fn is_animated(&self) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Keys(keys, _) => keys.keys.windows(2).any(|pair| pair[0].1 != pair[1].1),
+            Self::Exprs(exprs, _, controls) => exprs.iter().any(|expr| {
+                let uses = expr.uses();
+                uses.time || uses.controls.iter().any(|control| controls[*control].is_animated())
+            }),
+            Self::CurrentFrame => true,
+            // A numbered path follows the node's `frame`, which is animated or not by itself.
+            Self::File { .. } => false,
+            Self::Masked(value, _) => value.is_animated(),
+        }
+    }
+
+    /// The value at `frame`, a frame number with fraction.
+    pub fn at(&self, frame: f64, clock: Clock) -> Value {
+        match self {
+            Self::Constant(value) => value.clone(),
+            Self::Keys(keys, shape) => keys.at(frame, *shape),
+            Self::Exprs(exprs, shape, controls) => {
+                let mut numbers = Vec::new();
+                for control in controls.iter() {
+                    match control.at(frame, clock) {
+                        Value::Vec3(v) => numbers.extend(v),
+                        value => numbers.push(value.number()),
+                    }
+                }
+                let env =
+                    Env { frame, time: frame / clock.fps, fps: clock.fps, seed: clock.seed as f64, controls: &numbers };
+                let x = |k: usize| exprs[k].eval(&env);
+                match shape {
+                    Shape::Int | Shape::Seed => Value::Int(whole(x(0))),
+                    Shape::Bool => Value::Bool(x(0) != 0.0),
+                    Shape::Vec2 => Value::Vec2([x(0), x(1)]),
+                    Shape::Span => Value::Span([x(0), x(1)]),
+                    Shape::Vec3 => Value::Vec3([x(0), x(1), x(2)]),
+                    Shape::Int3 => Value::Int3([x(0), x(1), x(2)].map(whole)),
+                    Shape::Turn => euler_to_turn([x(0), x(1), x(2)]),
+                    Shape::Masked => Value::Masked(x(0), None),
+                    _ => Value::Float(x(0)),
+                }
+            }
+            Self::CurrentFrame => Value::Int(frame.floor() as i64),
+            Self::File { .. } => Value::File(None),
+            Self::Masked(value, attribute) => Value::Masked(value.at(frame, clock).number(), Some(attribute.clone())),
+        }
+    }
+}
+
+/// The nearest whole number; saturates where it does not fit, and NaN becomes the least, which every range refuses.
+fn whole(x: f64) -> i64 {
+    if x.is_nan() { i64::MIN } else { x.round() as i64 }
+}
+
+impl Value {
+    /// The number of a scalar; 0 of anything else.
+    pub fn number(&self) -> f64 {
+        match self {
+            Self::Float(x) | Self::Masked(x, _) => *x,
+            Self::Int(i) => *i as f64,
+            Self::Bool(b) => f64::from(u8::from(*b)),
+            _ => 0.0,
+        }
+    }
+}
+
+impl Keyframes {
+    fn at(&self, frame: f64, shape: Shape) -> Value {
+        let next = self.keys.partition_point(|(at, _)| *at <= frame);
+        let finished = |value: &Value| match (shape, value) {
+            (Shape::Turn, Value::Vec3(degrees)) => euler_to_turn(*degrees),
+            _ => value.clone(),
+        };
+        if next == 0 {
+            return finished(&self.keys[0].1);
+        }
+        let (at, value) = &self.keys[next - 1];
+        let Some((until, goal)) = self.keys.get(next).filter(|_| self.interpolation != Interpolation::Constant) else {
+            return finished(value);
+        };
+        let share = (frame - at) / (until - at);
+        let share = match self.interpolation {
+            Interpolation::Smooth => share * share * (3.0 - 2.0 * share),
+            _ => share,
+        };
+        match (shape, value, goal) {
+            (Shape::Turn, Value::Vec3(from), Value::Vec3(to)) => turn::between(*from, *to, share),
+            _ => blend(value, goal, share),
+        }
+    }
+}
+
+/// `share` of the way from `a` to `b`, number by number; what has no between holds `a`.
+fn blend(a: &Value, b: &Value, share: f64) -> Value {
+    let mix = |a: f64, b: f64| a + (b - a) * share;
+    fn each<const N: usize>(a: [f64; N], b: [f64; N], mix: impl Fn(f64, f64) -> f64) -> [f64; N] {
+        std::array::from_fn(|k| mix(a[k], b[k]))
+    }
+    let ints = |a: i64, b: i64| mix(a as f64, b as f64).round() as i64;
+    match (a, b) {
+        (Value::Float(a), Value::Float(b)) => Value::Float(mix(*a, *b)),
+        (Value::Masked(a, mask), Value::Masked(b, _)) => Value::Masked(mix(*a, *b), mask.clone()),
+        (Value::Int(a), Value::Int(b)) => Value::Int(ints(*a, *b)),
+        (Value::Int3(a), Value::Int3(b)) => Value::Int3(std::array::from_fn(|k| ints(a[k], b[k]))),
+        (Value::Vec2(a), Value::Vec2(b)) => Value::Vec2(each(*a, *b, mix)),
+        (Value::Span(a), Value::Span(b)) => Value::Span(each(*a, *b, mix)),
+        (Value::Vec3(a), Value::Vec3(b)) => Value::Vec3(each(*a, *b, mix)),
+        (Value::Vec3s(a), Value::Vec3s(b)) if a.len() == b.len() => Value::Vec3s(Arc::new(
+            a.iter()
+                .zip(b.iter())
+                .map(|(a, b)| each(a.map(f64::from), b.map(f64::from), mix).map(|x| x as f32))
+                .collect(),
+        )),
+        (Value::Ramp(a), Value::Ramp(b)) if a.keys().len() == b.keys().len() => {
+            let keys = a
+                .keys()
+                .iter()
+                .zip(b.keys())
+                .map(|(a, b)| each(a.map(f64::from), b.map(f64::from), mix).map(|x| x as f32));
+            // Keys that rounding puts on one spot leave the ramp as it was.
+            Ramp::new(keys.collect(), a.interpolation())
+                .map_or_else(|_| Value::Ramp(a.clone()), |ramp| Value::Ramp(Arc::new(ramp)))
+        }
+        _ => a.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CLOCK: Clock = Clock { fps: 24.0, seed: 0 };
+
+    fn keyed(keys: &[(f64, f64)], interpolation: Interpolation) -> Source {
+        let keys = keys.iter().map(|(frame, x)| (*frame, Value::Float(*x))).collect();
+        Source::Keys(Arc::new(Keyframes { keys, interpolation }), Shape::Float)
+    }
+
+    #[test]
+    fn keyframes_hold_beyond_their_ends_and_run_straight_between() {
+        let source = keyed(&[(1.0, 0.0), (25.0, 1.0)], Interpolation::Linear);
+        let at = |frame: f64| source.at(frame, CLOCK).number();
+        assert_eq!((at(-5.0), at(1.0), at(13.0), at(25.0), at(99.0)), (0.0, 0.0, 0.5, 1.0, 1.0));
+    }
+
+    #[test]
+    fn smooth_is_a_smoothstep_and_constant_holds() {
+        let keys = [(0.0, 0.0), (4.0, 1.0)];
+        let at = |interpolation| keyed(&keys, interpolation).at(1.0, CLOCK).number();
+        assert_eq!(at(Interpolation::Smooth), 0.15625); // 3/16 − 2/64
+        assert_eq!(at(Interpolation::Constant), 0.0);
+    }
+
+    #[test]
+    fn keys_of_one_value_are_not_an_animation() {
+        assert!(!keyed(&[(1.0, 2.0), (9.0, 2.0)], Interpolation::Linear).is_animated());
+        assert!(keyed(&[(1.0, 2.0), (9.0, 3.0)], Interpolation::Linear).is_animated());
+    }
+}

@@ -1,0 +1,239 @@
+//! What a declaration says of a param, whatever its type: what help, schema and validation read.
+
+use super::Params;
+use super::choice::ChoiceOption;
+use super::unit::Unit;
+use super::value::Value;
+
+/// Which JSON a param is read from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A number.
+    Float,
+    /// A whole number.
+    Int,
+    /// `true` or `false`.
+    Bool,
+    /// `[x, y]`
+    Vec2,
+    /// `[x, y, z]`
+    Vec3,
+    /// Three whole numbers.
+    Int3,
+    /// `[a, b]` with a ≤ b.
+    Span,
+    /// Degrees about x, y, z.
+    Turn,
+    /// A whole number that the scene's seed is mixed into.
+    Seed,
+    /// One of a few words.
+    Choice(&'static [ChoiceOption]),
+    /// `{"ramp": [[x, y], …]}`
+    Ramp,
+    /// A text.
+    Text,
+    /// Texts.
+    Texts,
+    /// A path.
+    File,
+    /// A number, or `{"value": …, "attribute": "…"}`.
+    Masked,
+    /// `[[x, y, z], …]`
+    Vec3s,
+    /// Whole numbers.
+    Ints,
+    /// `[[a, b, c, d], …]`
+    Tets,
+    /// `{"name": [numbers], …}`
+    Columns,
+}
+
+impl Shape {
+    /// What a value of this shape looks like, for help and faults.
+    pub fn describe(self) -> String {
+        match self {
+            Self::Float => "a number".into(),
+            Self::Int | Self::Seed => "a whole number".into(),
+            Self::Bool => "`true` or `false`".into(),
+            Self::Vec2 => "two numbers [x, y]".into(),
+            Self::Vec3 => "a vector [x, y, z]".into(),
+            Self::Int3 => "three whole numbers [x, y, z]".into(),
+            Self::Span => "a range [a, b]".into(),
+            Self::Turn => "degrees [x, y, z]".into(),
+            Self::Choice(options) => {
+                let words: Vec<String> = options.iter().map(|option| format!("\"{}\"", option.word)).collect();
+                format!("one of {}", words.join(", "))
+            }
+            Self::Ramp => "a ramp {\"ramp\": [[x, y], …]}".into(),
+            Self::Text => "a text".into(),
+            Self::Texts => "a list of texts".into(),
+            Self::File => "a path".into(),
+            Self::Masked => "a number, or {\"value\": …, \"attribute\": \"…\"}".into(),
+            Self::Vec3s => "a list of vectors [[x, y, z], …]".into(),
+            Self::Ints => "a list of whole numbers".into(),
+            Self::Tets => "a list of tets [[a, b, c, d], …]".into(),
+            Self::Columns => "attributes {\"name\": [numbers], …}".into(),
+        }
+    }
+
+    /// How many expressions `{"expr": …}` takes for it; `None` where no expression gives such a value.
+    pub fn expressions(self) -> Option<usize> {
+        match self {
+            Self::Float | Self::Int | Self::Bool | Self::Masked | Self::Seed => Some(1),
+            Self::Vec2 | Self::Span => Some(2),
+            Self::Vec3 | Self::Int3 | Self::Turn => Some(3),
+            _ => None,
+        }
+    }
+}
+
+/// A hard range: what is outside is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The least value.
+    pub low: f64,
+    /// Whether `low` itself is refused.
+    pub open: bool,
+    /// The greatest value.
+    pub high: f64,
+}
+
+impl Bounds {
+    /// Everything finite.
+    pub const ALL: Self = Self { low: f64::NEG_INFINITY, open: false, high: f64::INFINITY };
+
+    /// Whether `x` is finite and inside.
+    pub fn hold(self, x: f64) -> bool {
+        x.is_finite() && x <= self.high && if self.open { x > self.low } else { x >= self.low }
+    }
+}
+
+impl std::fmt::Display for Bounds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.low.is_finite(), self.open, self.high.is_finite()) {
+            (false, _, false) => write!(f, "any finite number"),
+            (false, _, true) => write!(f, "at most {}", self.high),
+            (true, true, false) => write!(f, "more than {}", self.low),
+            (true, false, false) => write!(f, "at least {}", self.low),
+            (true, true, true) => write!(f, "more than {}, at most {}", self.low, self.high),
+            (true, false, true) => write!(f, "{}…{}", self.low, self.high),
+        }
+    }
+}
+
+/// What a handle says besides name, default and help.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// Unit of the number.
+    pub unit: Unit,
+    /// What is outside is refused.
+    pub hard: Bounds,
+    /// What is usual.
+    pub soft: Option<[f64; 2]>,
+    /// May not be animated.
+    pub fixed: bool,
+    /// Read over all times since frame 0.
+    pub history: bool,
+    /// May not be the zero vector.
+    pub direction: bool,
+    /// Whether it is read at all, given the other params.
+    pub when: Option<fn(&Params) -> bool>,
+    /// What it is where the graph says nothing, if not the default.
+    pub unset: Unset,
+}
+
+/// What a param is where the graph says nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unset {
+    /// The declared default.
+    Default,
+    /// The current frame, rounded down.
+    CurrentFrame,
+    /// The scene's first frame.
+    SceneStart,
+}
+
+impl Facts {
+    pub(super) const NONE: Self = Self {
+        unit: Unit::None,
+        hard: Bounds::ALL,
+        soft: None,
+        fixed: false,
+        history: false,
+        direction: false,
+        when: None,
+        unset: Unset::Default,
+    };
+}
+
+/// All that is known of a param.
+#[derive(Clone, Debug)]
+pub struct ParamSpec {
+    /// Name in graph files.
+    pub name: &'static str,
+    /// What it does to the picture.
+    pub help: &'static str,
+    /// Which JSON it is read from.
+    pub shape: Shape,
+    /// Value where the graph says nothing.
+    pub default: Value,
+    /// Unit, ranges, times.
+    pub facts: Facts,
+}
+
+impl ParamSpec {
+    /// Why `value` may not be, or `None`. Expects a value of this shape.
+    pub fn refuses(&self, value: &Value) -> Option<(String, String)> {
+        let (name, hard) = (self.name, self.facts.hard);
+        let range = || format!("expected {hard}{}", self.unit_text());
+        let outside = |shown: String| Some((format!("`{name}` is {shown}"), range()));
+        let numbers: &[f64] = match value {
+            Value::Float(x) | Value::Masked(x, _) => std::slice::from_ref(x),
+            Value::Vec2(v) => v,
+            Value::Vec3(v) => v,
+            Value::Span(v) => v,
+            Value::Turn(v) => v,
+            Value::Int(i) => return (!hard.hold(*i as f64)).then(|| outside(i.to_string()))?,
+            Value::Int3(v) => return (!v.iter().all(|i| hard.hold(*i as f64))).then(|| outside(value.to_string()))?,
+            _ => return None,
+        };
+        // A rotation's numbers are a quaternion's by now: finite is all one can ask.
+        let hard = if matches!(value, Value::Turn(_)) { Bounds::ALL } else { hard };
+        if !numbers.iter().all(|x| hard.hold(*x)) {
+            return outside(value.to_string());
+        }
+        match value {
+            Value::Span([a, b]) if a > b => {
+                Some((format!("`{name}` is [{a}, {b}], which runs backwards"), "write the smaller number first".into()))
+            }
+            Value::Vec3(v) if self.facts.direction && v.iter().all(|x| x.abs() < f64::MIN_POSITIVE) => Some((
+                format!("`{name}` is {value}, which has no direction"),
+                "give a vector that is not zero, such as [1, 0, 0]".into(),
+            )),
+            _ => None,
+        }
+    }
+
+    /// ` m/s`, or nothing for a plain number.
+    pub fn unit_text(&self) -> String {
+        match self.facts.unit {
+            Unit::None => String::new(),
+            unit => format!(" {}", unit.sign()),
+        }
+    }
+
+    /// The default as help shows it.
+    pub fn default_text(&self) -> String {
+        match self.facts.unset {
+            Unset::CurrentFrame => return "the current frame".into(),
+            Unset::SceneStart => return "the scene's first frame".into(),
+            Unset::Default => {}
+        }
+        match (&self.default, self.shape) {
+            (Value::Choice(place), Shape::Choice(options)) => options[*place].word.into(),
+            (Value::Turn(_), _) => "[0, 0, 0]".into(),
+            (Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => "none".into(),
+            (default, _) => default.to_string(),
+        }
+    }
+}

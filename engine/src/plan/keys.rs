@@ -1,0 +1,331 @@
+//! Keys of results: a hash of exactly what a node reads, at the times at which it reads it.
+//!
+//! A chain's key at a frame hangs on its key at the frame before, so editing anything upstream invalidates its
+//! checkpoints by itself, and editing a key frame invalidates only what comes after it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::Plan;
+use crate::cook::CookError;
+use crate::error::Result;
+use crate::graph::{Body, Link};
+use crate::key::{Hasher, Key};
+use crate::node::{Cook, Node, Times};
+use crate::param::Params;
+use crate::time::Frame;
+
+/// What is known of a node at one frame before it cooks.
+pub(crate) struct Spot {
+    pub(crate) params: Option<Params>,
+    /// When each input is read.
+    pub(crate) times: Vec<Times>,
+    pub(crate) key: Key,
+}
+
+type Known = std::result::Result<Arc<Spot>, Arc<CookError>>;
+
+/// Frames from an anchor to the next. At least as long as the window, so that two states at most run side by side and a
+/// frame costs two updates whatever the window's length.
+pub(crate) const LEAST_BLOCK: i64 = 8;
+
+/// One stretch of a chain: from where its state starts to the last frame it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Stretch {
+    /// Where the state starts.
+    pub(crate) start: i64,
+    /// First frame it answers for.
+    pub(crate) from: i64,
+    /// First frame it does not answer for; `i64::MAX` for a solver.
+    pub(crate) until: i64,
+}
+
+/// Finds keys, and remembers those of the slice at hand.
+pub(crate) struct Keys<'p, 'g> {
+    plan: &'p Plan<'g>,
+    spots: Vec<BTreeMap<Frame, Known>>,
+    /// Keys of a chain's states: by stretch, from its start on.
+    chains: Vec<BTreeMap<Stretch, Vec<std::result::Result<Key, Arc<CookError>>>>>,
+    histories: Vec<Vec<Key>>,
+    windows: Vec<Option<i64>>,
+    hasher: Hasher,
+}
+
+impl<'p, 'g> Keys<'p, 'g> {
+    pub(crate) fn new(plan: &'p Plan<'g>) -> Self {
+        let nodes = plan.graph.nodes.len();
+        Self {
+            plan,
+            spots: (0..nodes).map(|_| BTreeMap::new()).collect(),
+            chains: (0..nodes).map(|_| BTreeMap::new()).collect(),
+            histories: vec![Vec::new(); nodes],
+            windows: vec![None; nodes],
+            hasher: Hasher::default(),
+        }
+    }
+
+    /// Forgets what belongs to the slice; keys of chains and of nodes that stand still stay.
+    pub(crate) fn end_slice(&mut self) {
+        for (spots, planned) in self.spots.iter_mut().zip(&self.plan.nodes) {
+            if planned.varies {
+                spots.clear();
+            }
+        }
+    }
+
+    /// Forgets the stretches of windows that end before `frame`, which nothing asks for any more.
+    pub(crate) fn forget_before(&mut self, frame: i64) {
+        for chains in &mut self.chains {
+            chains.retain(|stretch, _| stretch.until > frame - 4 * LEAST_BLOCK);
+        }
+    }
+
+    /// What is known of `node` at `frame` (canonical); for a chain at a whole frame, the key of its output.
+    pub(crate) fn spot(&mut self, node: usize, frame: Frame) -> Known {
+        if let Some(known) = self.spots[node].get(&frame) {
+            return known.clone();
+        }
+        let known = self.find(node, frame);
+        self.spots[node].insert(frame, known.clone());
+        known
+    }
+
+    fn find(&mut self, node: usize, frame: Frame) -> Known {
+        let plan = self.plan;
+        let live = &plan.nodes[node].live;
+        let hash_live = |hasher: &mut Hasher| {
+            let names = live.as_deref().unwrap_or_default();
+            let hasher = hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
+            names.iter().fold(hasher, |hasher, name| hasher.text(name));
+        };
+        let (declared, links) = match &plan.graph.nodes[node].body {
+            Body::Given { at, moves } => {
+                let address = Arc::as_ptr(at).cast::<()>() as usize;
+                let hasher = self.hasher.tag(1).text(&plan.graph.nodes[node].id).i64(address as i64);
+                hasher.i64(if *moves { frame.ticks() } else { 0 });
+                hash_live(&mut self.hasher);
+                return Ok(Arc::new(Spot { params: None, times: Vec::new(), key: self.hasher.finish() }));
+            }
+            Body::Node { node, inputs, .. } => (*node, inputs),
+        };
+        let fail = |error| Arc::new(plan.error(node, frame, error));
+        let params = plan.nodes[node].resolver.at(frame).map_err(fail)?;
+        let times: Vec<Times> = declared.inputs.iter().map(|input| (input.spec().times)(&params)).collect();
+        let key = if matches!(declared.cook, Cook::Pure(_) | Cook::Frame { .. }) {
+            let mut wires = Vec::new();
+            for (times, links) in times.iter().zip(links) {
+                for link in links {
+                    if times.now {
+                        wires.push((link.port, self.key_of(link.node, frame)?));
+                    }
+                    if times.start {
+                        wires.push((link.port, self.key_of(link.node, plan.graph.scene.start())?));
+                    }
+                }
+                // Marks the end of a list, so that wires do not move from one input to the next unseen.
+                wires.push((usize::MAX, Key::default()));
+            }
+            let clock = match declared.cook {
+                Cook::Frame { reads_clock, .. } => {
+                    reads_clock(&params).then(|| self.clock_key(node, declared, frame)).transpose().map_err(fail)?
+                }
+                _ => None,
+            };
+            let hasher = self.hasher.tag(2);
+            hash_recipe(hasher, declared, &params);
+            if let Some(clock) = clock {
+                hasher.key(clock);
+            }
+            for (port, key) in wires {
+                hasher.i64(port as i64).key(key);
+            }
+            hash_live(&mut self.hasher);
+            self.hasher.finish()
+        } else {
+            let stretch = self.stretch(node, frame.floor_number())?;
+            let state = self.state_key(node, stretch, frame.floor_number().max(stretch.start))?;
+            self.hasher.tag(3).key(state).i64(frame.ticks());
+            if !frame.is_whole() {
+                // Between frames a window's output hangs on its two neighbours each way.
+                for k in [-1, 1, 2] {
+                    let near = frame.floor_number() + k;
+                    let stretch = self.stretch(node, near)?;
+                    let key = self.state_key(node, stretch, near.max(stretch.start))?;
+                    self.hasher.key(key);
+                }
+            }
+            hash_live(&mut self.hasher);
+            self.hasher.finish()
+        };
+        Ok(Arc::new(Spot { params: Some(params), times, key }))
+    }
+
+    fn key_of(&mut self, node: usize, frame: Frame) -> std::result::Result<Key, Arc<CookError>> {
+        self.spot(node, self.plan.canonical(node, frame)).map(|spot| spot.key)
+    }
+
+    /// The frame, the scene's clock and origin, and what the integrand has seen since time 0.
+    fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
+        let scene = &self.plan.graph.scene;
+        let resolver = &self.plan.nodes[node].resolver;
+        let animated = declared.integrand.is_some() && resolver.history_is_animated();
+        let seen = match animated {
+            true => Some(self.history_key(node, declared, frame)?),
+            false => None,
+        };
+        let hasher = self.hasher.tag(4).i64(frame.ticks()).f64(scene.fps);
+        scene.origin.iter().fold(hasher, |hasher, x| hasher.f64(*x));
+        if let Some(seen) = seen {
+            self.hasher.key(seen);
+        }
+        Ok(self.hasher.finish())
+    }
+
+    /// A key of the integrand's values at all Gauss points from time 0 to `frame`, chained frame by frame.
+    fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
+        let integrand = declared.integrand.expect("asked for nodes with an integrand");
+        let resolver = &self.plan.nodes[node].resolver;
+        let value = |at: f64| resolver.evaluate(at).map(|params| integrand(&params));
+        let whole = frame.floor_number().unsigned_abs() as usize;
+        let sign = if frame.ticks() < 0 { -1.0 } else { 1.0 };
+        let known = &mut self.histories[node];
+        while known.len() <= whole {
+            let k = known.len();
+            let hasher = self.hasher.tag(5);
+            if let Some(before) = k.checked_sub(1) {
+                hasher.key(known[before]);
+                for x in crate::cook::gauss_points(before as f64 * sign, k as f64 * sign) {
+                    value(x)?.iter().fold(&mut self.hasher, |hasher, x| hasher.f64(*x));
+                }
+            }
+            known.push(self.hasher.finish());
+        }
+        let last = known[whole];
+        self.hasher.tag(6).key(last);
+        if !frame.is_whole() {
+            for x in crate::cook::gauss_points(frame.floor().number(), frame.number()) {
+                value(x)?.iter().fold(&mut self.hasher, |hasher, x| hasher.f64(*x));
+            }
+        }
+        Ok(self.hasher.finish())
+    }
+
+    /// The stretch that answers for `frame` of a window or solver.
+    pub(crate) fn stretch(&mut self, node: usize, frame: i64) -> std::result::Result<Stretch, Arc<CookError>> {
+        let plan = self.plan;
+        let first = plan.graph.scene.first;
+        let resolver = &plan.nodes[node].resolver;
+        let at = |frame: i64| {
+            let frame = Frame::whole(frame);
+            resolver.at(frame).map_err(|error| Arc::new(plan.error(node, frame, error)))
+        };
+        match plan.graph.nodes[node].node().map(|declared| declared.cook) {
+            Some(Cook::Window(_, frames)) => {
+                let block = match self.windows[node] {
+                    Some(block) => block,
+                    None => i64::from(frames(&at(first)?)).max(LEAST_BLOCK),
+                };
+                self.windows[node] = Some(block);
+                let from = first + (frame - first).max(0) / block * block;
+                let back = i64::from(frames(&at(from)?));
+                let answers_from = if from == first { i64::MIN } else { from };
+                Ok(Stretch { start: (from - back).max(first), from: answers_from, until: from + block })
+            }
+            Some(Cook::Solver(_, solver)) => {
+                let start = (solver.start_frame)(&at(first)?).unwrap_or(first);
+                Ok(Stretch { start, from: i64::MIN, until: i64::MAX })
+            }
+            _ => unreachable!("only windows and solvers have stretches"),
+        }
+    }
+
+    /// The key of a chain's state at `frame`, which lies in the stretch.
+    pub(crate) fn state_key(
+        &mut self,
+        node: usize,
+        stretch: Stretch,
+        frame: i64,
+    ) -> std::result::Result<Key, Arc<CookError>> {
+        let index = (frame - stretch.start) as usize;
+        loop {
+            let known = self.chains[node].entry(stretch).or_default();
+            if let Some(key) = known.get(index) {
+                return key.clone();
+            }
+            let before = known.last().cloned();
+            let at = stretch.start + known.len() as i64;
+            let key = match before {
+                Some(Err(error)) => Err(error),
+                Some(Ok(before)) => self.advance_key(node, at, Some(before)),
+                None => self.advance_key(node, at, None),
+            };
+            self.chains[node].entry(stretch).or_default().push(key);
+        }
+    }
+
+    fn advance_key(
+        &mut self,
+        node: usize,
+        frame: i64,
+        before: Option<Key>,
+    ) -> std::result::Result<Key, Arc<CookError>> {
+        let plan = self.plan;
+        let at = Frame::whole(frame);
+        let Body::Node { node: declared, inputs, .. } = &plan.graph.nodes[node].body else {
+            unreachable!("given geometry is no chain")
+        };
+        let fail = |error| Arc::new(plan.error(node, at, error));
+        let params = plan.nodes[node].resolver.at(at).map_err(fail)?;
+        let mut wires = Vec::new();
+        for (input, links) in declared.inputs.iter().zip(inputs) {
+            let times = (input.spec().times)(&params);
+            for link in links {
+                if times.now {
+                    wires.push((link.port, self.key_of(link.node, at)?));
+                }
+                if times.start && before.is_none() {
+                    wires.push((link.port, self.key_of(link.node, at)?));
+                }
+                if times.steps > 0 {
+                    let samples = match before {
+                        Some(_) => plan.step_samples(links, times.steps, at),
+                        None => vec![at],
+                    };
+                    for sample in samples {
+                        wires.push((link.port, self.key_of(link.node, sample)?));
+                    }
+                }
+            }
+            wires.push((usize::MAX, Key::default()));
+        }
+        let clock = self.clock_key(node, declared, at).map_err(fail)?;
+        let hasher = self.hasher.tag(7);
+        if let Some(before) = before {
+            hasher.key(before);
+        }
+        hash_recipe(hasher, declared, &params);
+        hasher.key(clock);
+        for (port, key) in wires {
+            hasher.i64(port as i64).key(key);
+        }
+        Ok(self.hasher.finish())
+    }
+}
+
+impl Plan<'_> {
+    /// The times at which a solver's step to `frame` samples an input, the frame before first. What a solver is part of
+    /// is known at whole frames only.
+    pub(crate) fn step_samples(&self, links: &[Link], steps: u8, frame: Frame) -> Vec<Frame> {
+        let whole = links.iter().any(|link| self.nodes[link.node].has_solver);
+        let steps = if whole { 1 } else { i64::from(steps) };
+        let before = frame.plus(-1);
+        (0..=steps).map(|k| before.plus_ticks(Frame::TICKS * k / steps)).collect()
+    }
+}
+
+fn hash_recipe(hasher: &mut Hasher, declared: &Node, params: &Params) {
+    hasher.text(declared.name).i64(i64::from(declared.version));
+    for value in params.values.iter() {
+        value.hash(hasher);
+    }
+}

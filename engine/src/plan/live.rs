@@ -1,0 +1,66 @@
+//! Attribute liveness: which attributes of each node's result anything downstream, or a file, takes.
+
+use std::collections::BTreeSet;
+
+use super::{Planned, Request};
+use crate::geometry::{Name, P, V};
+use crate::graph::{Body, Graph};
+use crate::node::AttrNames;
+use crate::param::{Source, Value};
+
+/// What is taken of a result: `None` is everything.
+type Taken = Option<BTreeSet<Name>>;
+
+/// Fills in `live` of every planned node, from the outputs upwards.
+pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [Planned]) {
+    let mut taken: Vec<Taken> = vec![Some(BTreeSet::new()); graph.nodes.len()];
+    for output in request.outputs.iter().map(|place| &graph.outputs[*place]) {
+        let asked = output.attributes.as_ref().map(|names| {
+            let own = [P.name, V.name].map(Name::from);
+            names.iter().cloned().chain(own).collect()
+        });
+        add(&mut taken[output.from.node], asked);
+    }
+    for place in (0..graph.nodes.len()).rev().filter(|place| nodes[*place].needed).collect::<Vec<_>>() {
+        nodes[place].live = taken[place].clone().map(|names| names.into_iter().collect());
+        let wanted = reads(graph, place, &nodes[place], &taken[place]);
+        for link in graph.nodes[place].inputs().iter().flatten() {
+            add(&mut taken[link.node], wanted.clone());
+        }
+    }
+}
+
+fn add(taken: &mut Taken, more: Taken) {
+    match (taken.as_mut(), more) {
+        (Some(taken), Some(more)) => taken.extend(more),
+        _ => *taken = None,
+    }
+}
+
+/// What a node takes of its inputs, where `taken` is taken of its own result.
+fn reads(graph: &Graph, place: usize, planned: &Planned, taken: &Taken) -> Taken {
+    let Body::Node { node, params, .. } = &graph.nodes[place].body else { return Some(BTreeSet::new()) };
+    let mut reads: BTreeSet<Name> = node.reads.iter().map(|attribute| attribute.spec().0.into()).collect();
+    let mut writes: BTreeSet<Name> = node.writes.iter().map(|attribute| attribute.spec().0.into()).collect();
+    if let Some(attributes) = node.attributes {
+        let Ok(params) = planned.resolver.at(graph.scene.start()) else { return None };
+        let [more_reads, more_writes] = attributes(&params);
+        match more_reads {
+            AttrNames::These(names) => reads.extend(names),
+            AttrNames::All => return None,
+        }
+        if let AttrNames::These(names) = more_writes {
+            writes.extend(names);
+        }
+    }
+    reads.insert(P.name.into());
+    for source in params {
+        match source {
+            Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => {
+                reads.insert(attribute.clone());
+            }
+            _ => {}
+        }
+    }
+    taken.as_ref().map(|taken| taken.difference(&writes).cloned().chain(reads).collect())
+}

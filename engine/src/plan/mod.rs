@@ -1,0 +1,197 @@
+//! Plans: what must be cooked for what is asked, found from declarations alone.
+//!
+//! A plan looks at a graph once: which nodes anything asked depends on, which of them stand still, which attributes
+//! anything downstream takes. What it finds is per node; frames are planned slice by slice while cooking, so a plan's
+//! memory does not grow with the number of frames.
+
+mod keys;
+mod live;
+mod resolve;
+
+use std::sync::Arc;
+
+pub(crate) use keys::{Keys, Stretch};
+pub(crate) use resolve::Resolver;
+
+use crate::cook::CookError;
+use crate::error::Error;
+use crate::files::Files;
+use crate::geometry::Name;
+use crate::graph::{Body, Graph, Link};
+use crate::node::{Cook, LeftOut, Times, Wires};
+use crate::param::Params;
+use crate::time::Frame;
+
+/// What is asked of a graph.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// Places in [`Graph::outputs`].
+    pub outputs: Vec<usize>,
+    /// Frames, in any order; each is cooked once.
+    pub frames: Vec<Frame>,
+}
+
+impl Request {
+    /// All outputs at all frames of the scene.
+    pub fn everything(graph: &Graph) -> Self {
+        let frames = (graph.scene.first..=graph.scene.last).map(Frame::whole).collect();
+        Self { outputs: (0..graph.outputs.len()).collect(), frames }
+    }
+}
+
+/// What a plan knows of one node.
+pub(crate) struct Planned {
+    /// Whether anything asked depends on it.
+    pub(crate) needed: bool,
+    /// Whether its result may change with the frame.
+    pub(crate) varies: bool,
+    /// Whether it is a solver or anything above it is: whole frames only, in order.
+    pub(crate) has_solver: bool,
+    /// Whether equal keys may come again at a later frame: it varies by params and files alone.
+    pub(crate) may_hold: bool,
+    /// Whether a reader asks for its result at the scene's start.
+    pub(crate) read_at_start: bool,
+    /// Attributes of its result that anything takes; `None`: all.
+    pub(crate) live: Option<Vec<Name>>,
+    /// Nodes that read it, each once.
+    pub(crate) readers: Vec<usize>,
+    pub(crate) resolver: Resolver,
+}
+
+/// What must be cooked for a request.
+pub struct Plan<'g> {
+    pub(crate) graph: &'g Graph,
+    pub(crate) request: Request,
+    pub(crate) nodes: Vec<Planned>,
+    pub(crate) files: Arc<Files>,
+}
+
+impl<'g> Plan<'g> {
+    /// Plans a request.
+    ///
+    /// # Errors
+    /// Where a sub-frame is asked of something that a solver is part of.
+    pub fn new(graph: &'g Graph, request: &Request, files: Arc<Files>) -> Result<Self, Arc<CookError>> {
+        let mut request = request.clone();
+        request.frames.sort_unstable();
+        request.frames.dedup();
+        let needed = needed(graph, &request);
+        let mut nodes: Vec<Planned> = Vec::with_capacity(graph.nodes.len());
+        for (place, node) in graph.nodes.iter().enumerate() {
+            let above =
+                |test: &dyn Fn(&Planned) -> bool| node.inputs().iter().flatten().any(|link| test(&nodes[link.node]));
+            let resolver = Resolver::new(node, graph, &files);
+            let (varies, may_hold, has_solver) = match &node.body {
+                Body::Given { moves, .. } => (*moves, false, false),
+                Body::Node { node: declared, inputs, .. } => {
+                    let solver = matches!(declared.cook, Cook::Solver(..));
+                    let start = resolver.at(graph.scene.start());
+                    // Where params are refused at the start, the error comes out when that frame is cooked.
+                    let clock = match (&declared.cook, &start) {
+                        (Cook::Pure(_) | Cook::Window(..), _) => false,
+                        (Cook::Frame { reads_clock, .. }, Ok(params)) => reads_clock(params),
+                        (Cook::Frame { .. }, Err(_)) => true,
+                        (Cook::Solver(..), _) => true,
+                    };
+                    let moving_input = declared.inputs.iter().zip(inputs).any(|(input, links)| {
+                        let times = start.as_ref().map_or(Times::NOW, |params| (input.spec().times)(params));
+                        (times.now || times.steps > 0) && links.iter().any(|link| nodes[link.node].varies)
+                    });
+                    let plain = matches!(declared.cook, Cook::Pure(_));
+                    let hold = plain && !above(&|up| up.varies && !up.may_hold);
+                    (clock || resolver.is_animated() || moving_input, hold, solver || above(&|up| up.has_solver))
+                }
+            };
+            nodes.push(Planned {
+                needed: needed[place],
+                varies,
+                has_solver,
+                may_hold,
+                read_at_start: false,
+                live: None,
+                readers: Vec::new(),
+                resolver,
+            });
+        }
+        for (place, node) in graph.nodes.iter().enumerate().filter(|(place, _)| needed[*place]) {
+            for link in node.inputs().iter().flatten() {
+                let readers = &mut nodes[link.node].readers;
+                if readers.last() != Some(&place) {
+                    readers.push(place);
+                }
+            }
+        }
+        for (place, node) in graph.nodes.iter().enumerate().filter(|(place, _)| needed[*place]) {
+            let (Some(declared), Ok(params)) = (node.node(), nodes[place].resolver.at(graph.scene.start())) else {
+                continue;
+            };
+            for (input, links) in declared.inputs.iter().zip(node.inputs()) {
+                if (input.spec().times)(&params).start {
+                    links.iter().for_each(|link| nodes[link.node].read_at_start = true);
+                }
+            }
+        }
+        live::find(graph, &request, &mut nodes);
+        let plan = Self { graph, request, nodes, files };
+        plan.check_sub_frames()?;
+        Ok(plan)
+    }
+
+    fn check_sub_frames(&self) -> Result<(), Arc<CookError>> {
+        let Some(frame) = self.request.frames.iter().find(|frame| !frame.is_whole()) else { return Ok(()) };
+        for output in self.request.outputs.iter().map(|place| &self.graph.outputs[*place]) {
+            if self.nodes[output.from.node].has_solver {
+                let fact = format!("output `{}` comes from a solver, which knows whole frames only", output.name);
+                let error = Error::refused(fact).hint("ask for whole frames");
+                return Err(Arc::new(self.error(output.from.node, *frame, error)));
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn error(&self, node: usize, frame: Frame, error: Error) -> CookError {
+        let node = &self.graph.nodes[node];
+        CookError { node: node.id.clone(), type_name: node.type_name(), frame, error }
+    }
+
+    /// Stages of `node` that are left out, given its params at the scene's start.
+    pub fn left_out(&self, node: usize) -> Vec<LeftOut> {
+        let params = self.nodes[node].resolver.at(self.graph.scene.start());
+        params.map(|params| self.left_out_with(node, &params)).unwrap_or_default()
+    }
+
+    pub(crate) fn left_out_with(&self, node: usize, params: &Params) -> Vec<LeftOut> {
+        let Body::Node { node: declared, inputs, .. } = &self.graph.nodes[node].body else { return Vec::new() };
+        let wires = |name: &str| {
+            let place = declared.inputs.iter().position(|input| input.spec().name == name);
+            place.map_or(0, |place| inputs[place].len())
+        };
+        declared.leaves_out.map(|leaves_out| leaves_out(params, &Wires(&wires))).unwrap_or_default()
+    }
+
+    /// The frame that stands for `frame` where `node` does not vary.
+    pub(crate) fn canonical(&self, node: usize, frame: Frame) -> Frame {
+        if self.nodes[node].varies { frame } else { self.graph.scene.start() }
+    }
+
+    /// The wires of an input.
+    pub(crate) fn links(&self, node: usize, input: usize) -> &[Link] {
+        &self.graph.nodes[node].inputs()[input]
+    }
+}
+
+/// Which nodes anything asked depends on.
+fn needed(graph: &Graph, request: &Request) -> Vec<bool> {
+    let mut needed = vec![false; graph.nodes.len()];
+    for output in &request.outputs {
+        needed[graph.outputs[*output].from.node] = true;
+    }
+    for place in (0..graph.nodes.len()).rev() {
+        if needed[place] {
+            for link in graph.nodes[place].inputs().iter().flatten() {
+                needed[link.node] = true;
+            }
+        }
+    }
+    needed
+}

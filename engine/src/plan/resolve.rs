@@ -1,0 +1,168 @@
+//! A node's params at any time: sources evaluated, ranges checked, files opened, what is not read put to its default.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::files::Files;
+use crate::graph::{Body, Graph, GraphNode};
+use crate::param::{Clock, ParamSpec, Params, ReadLog, Source, Unset, Value};
+use crate::time::Frame;
+
+/// Evaluates the params of one node.
+pub(crate) struct Resolver {
+    specs: Arc<[ParamSpec]>,
+    sources: Vec<Source>,
+    log: Arc<ReadLog>,
+    files: Arc<Files>,
+    clock: Clock,
+    animated: bool,
+    /// The params, where they are the same at all times.
+    constant: Option<Result<Params>>,
+}
+
+impl Resolver {
+    pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+        let (specs, sources) = match &node.body {
+            Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
+            Body::Given { .. } => (Arc::from([]), Vec::new()),
+        };
+        let mut resolver = Self {
+            log: Arc::new(ReadLog::new(specs.len())),
+            specs,
+            sources,
+            files: files.clone(),
+            clock: graph.scene.clock(),
+            animated: false,
+            constant: None,
+        };
+        let start = graph.scene.start();
+        // A param that is not read does not make a node move, whatever it does.
+        resolver.animated = match resolver.evaluate(start.number()) {
+            Ok(params) => (0..resolver.sources.len()).any(|place| resolver.moves(place, &params)),
+            Err(_) => resolver.sources.iter().any(Source::is_animated),
+        };
+        if !resolver.animated {
+            resolver.constant = Some(resolver.evaluate(start.number()));
+        }
+        resolver
+    }
+
+    fn moves(&self, place: usize, params: &Params) -> bool {
+        self.sources[place].is_animated() && self.is_read(place, params)
+    }
+
+    /// Whether the node reads the param, given the others. A param that is the current frame unless set says which file
+    /// of a sequence is meant: without a sequence it means nothing.
+    fn is_read(&self, place: usize, params: &Params) -> bool {
+        let facts = &self.specs[place].facts;
+        let sequence = || self.sources.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
+        facts.when.is_none_or(|when| when(params)) && (facts.unset != Unset::CurrentFrame || sequence())
+    }
+
+    /// Whether any param that is read changes with time.
+    pub(crate) fn is_animated(&self) -> bool {
+        self.animated
+    }
+
+    /// Whether any param read over all times changes with time.
+    pub(crate) fn history_is_animated(&self) -> bool {
+        self.specs.iter().zip(&self.sources).any(|(spec, source)| spec.facts.history && source.is_animated())
+    }
+
+    /// Which params were ever read.
+    pub(crate) fn log(&self) -> &Arc<ReadLog> {
+        &self.log
+    }
+
+    /// The params at `frame`.
+    pub(crate) fn at(&self, frame: Frame) -> Result<Params> {
+        match &self.constant {
+            Some(params) => params.clone(),
+            None => self.evaluate(frame.number()),
+        }
+    }
+
+    /// The params at a frame number with any fraction, as integrals over time need them.
+    pub(crate) fn evaluate(&self, frame: f64) -> Result<Params> {
+        let mut values = Vec::with_capacity(self.sources.len());
+        for (spec, source) in self.specs.iter().zip(&self.sources) {
+            let value = source.at(frame, self.clock);
+            if let Some((fact, hint)) = spec.refuses(&value) {
+                return Err(Error::refused(fact).hint(hint));
+            }
+            values.push(value);
+        }
+        let params = Params { specs: self.specs.clone(), values: values.into(), log: self.log.clone() };
+        let params = self.without_unread(params);
+        self.with_files(params)
+    }
+
+    fn without_unread(&self, mut params: Params) -> Params {
+        let unread: Vec<usize> = (0..self.specs.len()).filter(|place| !self.is_read(*place, &params)).collect();
+        if !unread.is_empty() {
+            let mut values = params.values.to_vec();
+            for place in unread {
+                values[place] = self.specs[place].default.clone();
+            }
+            params.values = values.into();
+        }
+        params
+    }
+
+    fn with_files(&self, mut params: Params) -> Result<Params> {
+        let paths = self.sources.iter().enumerate().filter_map(|(place, source)| match source {
+            Source::File { path, numbered } => Some((place, path, *numbered)),
+            _ => None,
+        });
+        let mut values: Option<Vec<Value>> = None;
+        for (place, path, numbered) in paths {
+            let file = match numbered {
+                false => self.files.open(path)?,
+                true => self.files.open(&numbered_path(path, self.file_frame(&params)))?,
+            };
+            values.get_or_insert_with(|| params.values.to_vec())[place] = Value::File(Some(file));
+        }
+        if let Some(values) = values {
+            params.values = values.into();
+        }
+        Ok(params)
+    }
+
+    /// The number that `####` stands for: the node's own `frame`.
+    fn file_frame(&self, params: &Params) -> i64 {
+        let place = self.specs.iter().position(|spec| spec.name == "frame");
+        match place.map(|place| &params.values[place]) {
+            Some(Value::Int(frame)) => *frame,
+            _ => 0,
+        }
+    }
+}
+
+/// `path` with each run of `#` in its file name replaced by the frame number, as many digits at least.
+fn numbered_path(path: &Path, frame: i64) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut numbered = String::new();
+    let mut rest = name.as_str();
+    while let Some(at) = rest.find('#') {
+        let width = rest[at..].bytes().take_while(|byte| *byte == b'#').count();
+        let sign = if frame < 0 { "-" } else { "" };
+        numbered.push_str(&rest[..at]);
+        numbered.push_str(&format!("{sign}{:0width$}", frame.unsigned_abs()));
+        rest = &rest[at + width..];
+    }
+    path.with_file_name(numbered + rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_run_of_hashes_becomes_the_frame_number() {
+        let path = |text: &str, frame| numbered_path(Path::new(text), frame).display().to_string();
+        assert_eq!(path("in/fur.####.obj", 7), "in/fur.0007.obj");
+        assert_eq!(path("fur_##.obj", 123), "fur_123.obj");
+        assert_eq!(path("fur.####.obj", -3), "fur.-0003.obj");
+    }
+}

@@ -1,0 +1,352 @@
+//! Files that appear whole or not at all.
+//!
+//! An [`AtomicFile`] is written hidden beside its final name and takes that name only once it is complete and on disk,
+//! so a killed program leaves nothing half-written that looks finished. What it does leave, [`sweep`] removes: a
+//! temporary belongs to a live process as long as that process holds its lock or has its number. The limit is the file
+//! system's: rename must replace a file in one step, as every local one does.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Between the final name and the process number in a temporary's name.
+const MARK: &str = ".tmp-";
+
+/// A file that takes its final name when it is committed; dropped without that, it is removed.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    // Before `temporary`, so that it is closed when that is removed.
+    file: BufWriter<File>,
+    temporary: Temporary,
+}
+
+impl AtomicFile {
+    /// Starts a file that will be `path`, in a folder that is there. A file of that name stays as it is until the commit.
+    ///
+    /// # Errors
+    /// Where `path` is something other than a file, or its folder cannot be written to.
+    pub fn create(path: impl Into<PathBuf>) -> Result<Self, FileError> {
+        let path = path.into();
+        match Self::beside(&path) {
+            Ok((file, temporary)) => Ok(Self { path, file: BufWriter::with_capacity(1 << 16, file), temporary }),
+            Err(source) => Err(FileError { path, action: "created", source }),
+        }
+    }
+
+    fn beside(path: &Path) -> io::Result<(File, Temporary)> {
+        let name = path.file_name().ok_or(ErrorKind::IsADirectory)?;
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+            Ok(found) if !found.is_file() => return Err(io::Error::other("it is a device or a pipe, not a file")),
+            _ => {}
+        }
+        loop {
+            let path = path.with_file_name(temporary_name(name));
+            match File::options().read(true).write(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    // The lock only protects from other processes' sweeps; some file systems have none.
+                    let _ = file.try_lock();
+                    return Ok((file, Temporary { path, kept: false }));
+                }
+                // Left by an earlier process of our number: the next name is free sooner or later.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// The final name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// An error met while writing to this file, with the file's final name.
+    pub fn failed(&self, source: io::Error) -> FileError {
+        FileError { path: self.path.clone(), action: "written", source }
+    }
+
+    /// Brings the file to disk and gives it its final name.
+    ///
+    /// # Errors
+    /// Where the last bytes cannot be written or the name cannot be taken; nothing is left behind then.
+    pub fn commit(self) -> Result<(), FileError> {
+        let Self { path, mut file, mut temporary } = self;
+        let mut finish = || {
+            file.flush()?;
+            file.get_ref().sync_all()?;
+            fs::rename(&temporary.path, &path)?;
+            temporary.kept = true;
+            sync_folder_of(&path)
+        };
+        finish().map_err(|source| FileError { path, action: "written", source })
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.file.seek(position)
+    }
+}
+
+/// A file that is removed when this is dropped, unless it was kept.
+#[derive(Debug)]
+struct Temporary {
+    path: PathBuf,
+    kept: bool,
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.kept {
+            // Nothing can be done about a failure here; a later sweep tries again.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// `.NAME.tmp-PID-COUNT`, another one at each call.
+fn temporary_name(name: &OsStr) -> OsString {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let mut hidden = OsString::from(".");
+    hidden.push(name);
+    hidden.push(format!("{MARK}{}-{count}", std::process::id()));
+    hidden
+}
+
+/// The process number in a temporary's name; `None` for any other name.
+fn owner_of(name: &str) -> Option<u32> {
+    let (name, numbers) = name.strip_prefix('.')?.rsplit_once(MARK)?;
+    let (owner, count) = numbers.split_once('-')?;
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    (!name.is_empty() && digits(owner) && digits(count)).then(|| owner.parse().ok()).flatten()
+}
+
+/// The rename itself is durable only once its folder is; folders cannot be opened everywhere, and then the system
+/// sees to it.
+fn sync_folder_of(path: &Path) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match File::open(folder).and_then(|folder| folder.sync_all()) {
+        Err(error) if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::NotFound) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Removes the temporaries that dead processes left in `folder` and says how many.
+///
+/// # Errors
+/// Where the folder cannot be listed or a stale temporary cannot be removed.
+pub fn sweep(folder: &Path) -> Result<usize, FileError> {
+    let failed = |source| FileError { path: folder.to_path_buf(), action: "swept", source };
+    let mut swept = 0;
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let Some(owner) = entry.file_name().to_str().and_then(owner_of) else { continue };
+        let path = entry.path();
+        if !entry.file_type().map_err(failed)?.is_file() || !is_stale(&path, owner) {
+            continue;
+        }
+        match fs::remove_file(&path) {
+            Ok(()) => swept += 1,
+            // Another process sweeps too.
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(source) => return Err(FileError { path, action: "removed", source }),
+        }
+    }
+    Ok(swept)
+}
+
+/// Whether no live process owns a temporary. Its lock tells where there are locks, also across containers; its number
+/// tells between creation and lock, and where there are none. Our own number is no proof of life: it may be that of an
+/// earlier process.
+fn is_stale(path: &Path, owner: u32) -> bool {
+    let locks = match File::open(path).map(|file| file.try_lock()) {
+        Ok(Ok(())) => true,
+        Ok(Err(TryLockError::Error(_))) => false,
+        Ok(Err(TryLockError::WouldBlock)) | Err(_) => return false,
+    };
+    if owner == std::process::id() {
+        return locks;
+    }
+    let numbers = Path::new("/proc/self").exists();
+    let alive = numbers && Path::new("/proc").join(owner.to_string()).exists();
+    !alive && (locks || numbers)
+}
+
+/// A file or folder that something could not be done to.
+#[derive(Debug, thiserror::Error)]
+#[error("`{}` could not be {action}: {}", path.display(), cause(source))]
+pub struct FileError {
+    path: PathBuf,
+    action: &'static str,
+    source: io::Error,
+}
+
+impl FileError {
+    /// `path` could not be `action` (a participle: "read", "created").
+    pub fn new(path: impl Into<PathBuf>, action: &'static str, source: io::Error) -> Self {
+        Self { path: path.into(), action, source }
+    }
+
+    /// The file or folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What kind of fault it is.
+    pub fn kind(&self) -> ErrorKind {
+        self.source.kind()
+    }
+
+    /// What to do about it, where that is known.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self.source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Some("free some space, or write to another disk"),
+            ErrorKind::NotFound | ErrorKind::NotADirectory => Some("check the path, or make the folder first"),
+            ErrorKind::IsADirectory => Some("give the path of a file"),
+            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+                Some("choose a place you may write to, or change its permissions")
+            }
+            _ => None,
+        }
+    }
+}
+
+fn cause(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::StorageFull => "the disk is full".into(),
+        ErrorKind::QuotaExceeded => "the disk quota is used up".into(),
+        ErrorKind::PermissionDenied => "permission denied".into(),
+        ErrorKind::ReadOnlyFilesystem => "the file system is read-only".into(),
+        ErrorKind::IsADirectory => "it is a folder".into(),
+        ErrorKind::NotADirectory => "a part of the path is not a folder".into(),
+        ErrorKind::NotFound => "no such file or folder".into(),
+        ErrorKind::InvalidFilename => "the name is too long or not allowed".into(),
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_committed_file_is_alone_under_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fur.0001.obj");
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"v 0 0 1\n").unwrap();
+        file.seek(SeekFrom::Start(2)).unwrap();
+        file.write_all(b"7").unwrap();
+        assert!(!path.exists(), "not before the commit");
+        assert!(names(folder.path())[0].starts_with(".fur.0001.obj.tmp-"));
+        file.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"v 7 0 1\n");
+        assert_eq!(names(folder.path()), ["fur.0001.obj"]);
+    }
+
+    #[test]
+    fn a_dropped_file_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fur.usda");
+        fs::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"half").unwrap();
+        drop(file);
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["fur.usda"]);
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"new").unwrap();
+        file.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn a_failed_commit_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fur.usda");
+        let file = AtomicFile::create(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        let error = file.commit().unwrap_err();
+        assert_eq!(error.to_string(), format!("`{}` could not be written: it is a folder", path.display()));
+        assert_eq!(names(folder.path()), ["fur.usda"], "the folder in the way, no temporary");
+    }
+
+    #[test]
+    fn what_cannot_be_a_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = |path: &Path| AtomicFile::create(path).unwrap_err().to_string();
+        let here = folder.path().display().to_string();
+        assert_eq!(text(folder.path()), format!("`{here}` could not be created: it is a folder"));
+        let missing = folder.path().join("no/fur.obj");
+        assert_eq!(text(&missing), format!("`{}` could not be created: no such file or folder", missing.display()));
+        assert_eq!(AtomicFile::create(&missing).unwrap_err().hint(), Some("check the path, or make the folder first"));
+        fs::write(folder.path().join("file"), "").unwrap();
+        let inside = folder.path().join("file/fur.obj");
+        assert!(text(&inside).ends_with("could not be created: a part of the path is not a folder"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_not_replaced_and_a_full_disk_is_named() {
+        let error = AtomicFile::create("/dev/full").unwrap_err();
+        assert_eq!(error.to_string(), "`/dev/full` could not be created: it is a device or a pipe, not a file");
+        let source = File::create("/dev/full").unwrap().write(b"x").unwrap_err();
+        let error = FileError::new("out/fur.obj", "written", source);
+        assert_eq!(error.to_string(), "`out/fur.obj` could not be written: the disk is full");
+        assert_eq!(error.hint(), Some("free some space, or write to another disk"));
+    }
+
+    #[test]
+    fn a_sweep_takes_only_what_the_dead_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let mine = AtomicFile::create(folder.path().join("mine.obj")).unwrap();
+        let own = std::process::id();
+        let stale = [".a.obj.tmp-4294967294-0".to_owned(), format!(".b.obj.tmp-{own}-18446744073709551615")];
+        let kept = ["a.obj.tmp-4294967294-0", ".a.obj.tmp-x-0", ".a.obj.tmp-1", ".tmp-4294967294-0", "a.obj"];
+        for name in stale.iter().map(String::as_str).chain(kept) {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(sweep(folder.path()).unwrap(), 2);
+        for name in kept {
+            assert!(folder.path().join(name).exists(), "{name} is nobody's temporary");
+        }
+        mine.commit().unwrap();
+        assert_eq!(names(folder.path()).len(), kept.len() + 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_live_process_keeps_its_temporaries() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(".a.obj.tmp-1-0");
+        fs::write(&path, "").unwrap();
+        assert_eq!(sweep(folder.path()).unwrap(), 0, "process 1 lives");
+        let path = folder.path().join(".a.obj.tmp-4294967294-0");
+        let file = File::create(&path).unwrap();
+        file.try_lock().unwrap();
+        assert_eq!(sweep(folder.path()).unwrap(), 0, "somebody holds its lock");
+        drop(file);
+        assert_eq!(sweep(folder.path()).unwrap(), 1);
+    }
+}

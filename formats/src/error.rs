@@ -1,0 +1,138 @@
+//! Why a geometry could not be read or written: where, the fact, what to do.
+
+use std::io;
+
+use engine::geometry::{GeometryError, Kind, Name};
+
+use crate::Format;
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line, counted from 1.
+    Line(usize),
+    /// A line and a column, counted from 1.
+    Column(usize, usize),
+    /// A byte, counted from 0.
+    Byte(usize),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File => Ok(()),
+            Self::Line(line) => write!(f, "line {line}: "),
+            Self::Column(line, column) => write!(f, "line {line}, column {column}: "),
+            Self::Byte(byte) => write!(f, "byte {byte}: "),
+        }
+    }
+}
+
+/// Why a geometry could not be read or written. The caller knows the path and says it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FormatError {
+    /// The file holds something that is not geometry in this format.
+    #[error("{place}{fact}")]
+    Content {
+        /// Where.
+        place: Place,
+        /// What is there, and what was expected.
+        fact: String,
+        /// What to do about it, as a sentence of its own.
+        hint: Option<&'static str>,
+    },
+    /// No format has this name or ending.
+    #[error("`{name}` is not a geometry format, expected one of {}", names(&Format::ALL))]
+    Unknown {
+        /// The name or ending.
+        name: String,
+    },
+    /// USD is written, not read.
+    #[error("convect does not read USD yet")]
+    UsdIsOnlyWritten,
+    /// The format keeps all frames in one file, which [`write`](crate::write) does not make.
+    #[error("{format} holds all frames in one file, expected a format with a file a frame")]
+    OneFile {
+        /// The format.
+        format: Format,
+    },
+    /// The format has no place for a component.
+    #[error("{format} cannot hold {kind}")]
+    CannotHold {
+        /// The format.
+        format: Format,
+        /// The component.
+        kind: Kind,
+    },
+    /// A NaN or infinity, which the format cannot hold or its reader refuses.
+    #[error("`{name}` of {kind} is not finite in row {row}")]
+    NotFinite {
+        /// The component.
+        kind: Kind,
+        /// The attribute.
+        name: Name,
+        /// The first such row, from 0.
+        row: usize,
+    },
+    /// Two components of a file share a table and disagree on a type.
+    #[error("`{name}` has another type on {second} than on {first}, and ply has one table for both")]
+    TypesDiffer {
+        /// The attribute.
+        name: Name,
+        /// A component.
+        first: Kind,
+        /// The other.
+        second: Kind,
+    },
+    /// A frame or time that is no number.
+    #[error("the frame is {frame} and its time {seconds} s, expected finite numbers")]
+    Stamp {
+        /// The frame.
+        frame: f64,
+        /// Its time, seconds.
+        seconds: f64,
+    },
+    /// The bytes could not be written.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+impl FormatError {
+    /// A fault of the content at `place`.
+    pub(crate) fn at(place: Place, fact: impl Into<String>) -> Self {
+        Self::Content { place, fact: fact.into(), hint: None }
+    }
+
+    /// The same, with what to do about it.
+    pub(crate) fn with_hint(place: Place, fact: impl Into<String>, hint: &'static str) -> Self {
+        Self::Content { place, fact: fact.into(), hint: Some(hint) }
+    }
+
+    /// What to do about it, where that is known: a sentence of its own.
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Content { hint, .. } => hint.map(str::to_owned),
+            Self::UsdIsOnlyWritten => {
+                Some("convert the file to obj, ply or json, with Blender or Houdini for example".into())
+            }
+            Self::CannotHold { kind, .. } => Some(format!("formats that can: {}", names(&Format::holding([*kind])))),
+            Self::NotFinite { .. } => Some("a NaN or infinity comes from the node that made this attribute".into()),
+            Self::TypesDiffer { .. } => Some("use json, write the components to files of their own, or rename one".into()),
+            _ => None,
+        }
+    }
+}
+
+/// A geometry that does not fit together, found when the whole file is read.
+impl From<GeometryError> for FormatError {
+    fn from(error: GeometryError) -> Self {
+        Self::at(Place::File, error.to_string())
+    }
+}
+
+fn names(formats: &[Format]) -> String {
+    formats.iter().map(|format| format.name()).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,39 @@
+//! convect's json form: everything a geometry holds, read by scripts and tests.
+//!
+//! ```json
+//! {"frame": 1, "time": 0.041666666666666664,
+//!  "curves": {"counts": [2], "points": [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+//!   "point_attributes": {"envelope": [1.0, 1.0]}, "element_attributes": {"shielded": [0.5]}, "attributes": {}}}
+//! ```
+//!
+//! Absent components are left out. Every table is a list of rows: a number, or three or four in a list; `attributes`
+//! has one row. A number with a `.` or an `e` is an f32 and any other an i32, so types survive; f32 are in their
+//! shortest form and read back bit for bit. A column becomes f32 as soon as one of its numbers is, or where its name
+//! wants it (`"envelope": [1, 1]`). A column without a row does not show its type: it becomes what its name wants, else
+//! float. `frame` and `time` may be missing. Any other key is a fault, and so is a key that is there twice.
+
+mod numbers;
+mod part;
+mod read;
+mod write;
+
+use engine::geometry::{Kind, Owner, Volume};
+
+pub(crate) use read::read;
+pub(crate) use write::write;
+
+/// The key of an owner's table; `None` where a component of that kind has none.
+fn table_key(kind: Kind, owner: Owner) -> Option<&'static str> {
+    match owner {
+        Owner::Point => (kind != Kind::Volume).then_some("point_attributes"),
+        Owner::Element => (!matches!(kind, Kind::Points | Kind::Volume)).then_some("element_attributes"),
+        Owner::Once => Some("attributes"),
+    }
+}
+
+/// The arrays of a volume by the names they have in files.
+pub(crate) fn volume_fields(volume: &Volume) -> [(&'static str, &[f32]); 4] {
+    let [x, y, z] = volume.velocity();
+    let [a, b, c, d] = part::FIELDS;
+    [(a, volume.level_set()), (b, x), (c, y), (d, z)]
+}

@@ -1,0 +1,158 @@
+//! A list of numbers, or of rows of numbers, whose type shows only as it is read.
+//!
+//! Each item is taken as its raw text, which serde has checked to be json, and turned into an f32 or i32 in one step:
+//! by way of an f64 some f32 would come back one bit off.
+
+use std::fmt;
+
+use engine::geometry::{Column, ColumnType};
+use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
+use serde_json::value::RawValue;
+
+use crate::text::{counted, shown};
+
+/// The numbers of a column, row after row.
+#[derive(Default)]
+pub(super) struct Numbers {
+    /// Numbers a row; 0 as long as there is no row.
+    width: usize,
+    /// All numbers as long as they are whole, none from the first float on.
+    wholes: Vec<i32>,
+    /// All numbers from the first float on.
+    floats: Option<Vec<f32>>,
+}
+
+impl Numbers {
+    /// A column of these rows; `wanted` is the type its name has, where that is fixed. Without a row the type is
+    /// `wanted` or float.
+    pub(super) fn column(self, wanted: Option<ColumnType>) -> Column {
+        if self.width == 0 {
+            return Column::zeros(wanted.unwrap_or(ColumnType::F1), 0);
+        }
+        let whole = self.floats.is_none() && !wanted.is_some_and(ColumnType::is_float);
+        match (self.width, whole) {
+            (3, true) => Column::new(self.wholes.as_chunks::<3>().0.to_vec()),
+            (4, true) => Column::new(self.wholes.as_chunks::<4>().0.to_vec()),
+            (_, true) => Column::new(self.wholes),
+            (3, false) => Column::new(self.flat().as_chunks::<3>().0.to_vec()),
+            (4, false) => Column::new(self.flat().as_chunks::<4>().0.to_vec()),
+            (_, false) => Column::new(self.flat()),
+        }
+    }
+
+    /// The rows of three floats.
+    ///
+    /// # Errors
+    /// Says the width that was found.
+    pub(super) fn triples(self) -> Result<Vec<[f32; 3]>, String> {
+        match self.width {
+            0 | 3 => Ok(self.flat().as_chunks::<3>().0.to_vec()),
+            width => Err(format!("rows of {}, expected 3", counted(width, "number"))),
+        }
+    }
+
+    /// Bare floats.
+    ///
+    /// # Errors
+    /// Says the width that was found.
+    pub(super) fn singles(self) -> Result<Vec<f32>, String> {
+        match self.width {
+            0 | 1 => Ok(self.flat()),
+            width => Err(format!("rows of {}, expected bare numbers", counted(width, "number"))),
+        }
+    }
+
+    fn flat(self) -> Vec<f32> {
+        self.floats.unwrap_or_else(|| as_floats(self.wholes))
+    }
+
+    fn push_row(&mut self, text: &str) -> Result<(), String> {
+        let width = match text.strip_prefix('[').and_then(|row| row.strip_suffix(']')) {
+            Some(row) => {
+                let mut width = 0;
+                for number in row.split(',').filter(|number| !number.trim_ascii().is_empty()) {
+                    self.push(number.trim_ascii())?;
+                    width += 1;
+                }
+                if width != 3 && width != 4 {
+                    return Err(format!("{} in a list, expected 3 or 4, or a bare number", counted(width, "number")));
+                }
+                width
+            }
+            None => {
+                self.push(text)?;
+                1
+            }
+        };
+        if self.width == 0 {
+            self.width = width;
+        }
+        if width != self.width {
+            return Err(format!("{}, where the rows before have {}", counted(width, "number"), self.width));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, text: &str) -> Result<(), String> {
+        let is_float = text.contains(['.', 'e', 'E']);
+        if is_float || self.floats.is_some() {
+            let number = float(text)?;
+            self.floats.get_or_insert_with(|| as_floats(std::mem::take(&mut self.wholes))).push(number);
+            return Ok(());
+        }
+        self.wholes.push(text.parse().map_err(|_| {
+            if text.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit()) {
+                format!("{text} does not fit a 32-bit whole number; a float is written {text}.0")
+            } else {
+                not_a_number(text)
+            }
+        })?);
+        Ok(())
+    }
+}
+
+fn as_floats(wholes: Vec<i32>) -> Vec<f32> {
+    wholes.into_iter().map(|n| n as f32).collect()
+}
+
+/// The nearest f32 of the text of a json value.
+///
+/// # Errors
+/// Where the value is no number, or beyond what an f32 holds.
+pub(super) fn float(text: &str) -> Result<f32, String> {
+    let number: f32 = text.parse().map_err(|_| not_a_number(text))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("{text} is out of range, expected at most 3.4e38")) }
+}
+
+fn not_a_number(text: &str) -> String {
+    format!("{} is not a number", shown(text.as_bytes()))
+}
+
+/// Reads a list of numbers or of rows; the text is its name in messages.
+pub(super) struct NumbersOf<'a>(pub(super) &'a str);
+
+impl<'de> DeserializeSeed<'de> for NumbersOf<'_> {
+    type Value = Numbers;
+
+    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<Numbers, D::Error> {
+        json.deserialize_seq(self)
+    }
+}
+
+impl<'de> Visitor<'de> for NumbersOf<'_> {
+    type Value = Numbers;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a list of numbers for `{}`", self.0)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Numbers, A::Error> {
+        let mut numbers = Numbers::default();
+        let mut row = 0;
+        while let Some(item) = items.next_element::<&RawValue>()? {
+            numbers.push_row(item.get()).map_err(|fact| A::Error::custom(format!("`{}`, row {row}: {fact}", self.0)))?;
+            row += 1;
+        }
+        Ok(numbers)
+    }
+}

@@ -1,0 +1,92 @@
+//! Geometry files: obj, ply and json in and out, USD out.
+//!
+//! [`read`] takes the bytes of a file and gives a geometry with every component the file has; [`write()`] gives them
+//! back bit for bit, as far as the format holds them (each format's module says what it drops). Readers never panic,
+//! their memory is a small multiple of the file's size, whatever counts it declares, and their time is linear in it.
+//!
+//! Readers take coordinates as they stand: none of these formats says its unit or its axes.
+
+pub mod atomic;
+mod error;
+mod format;
+mod json;
+mod obj;
+mod out;
+mod ply;
+mod text;
+pub mod usd;
+
+use std::io::Write;
+
+use engine::geometry::{Geometry, Kind};
+
+pub use error::{FormatError, Place};
+pub use format::Format;
+
+/// Which frame a file shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameStamp {
+    /// The frame, whole or not.
+    pub frame: f64,
+    /// Its time, seconds.
+    pub seconds: f64,
+}
+
+/// The geometry in the bytes of a file, with every component the file has.
+///
+/// # Errors
+/// Where the bytes are not a file of that format, and for USD, which is only written.
+pub fn read(format: Format, bytes: &[u8]) -> Result<Geometry, FormatError> {
+    match format {
+        Format::Obj => obj::read(text::opened(format, bytes)?),
+        Format::Ply => ply::read(text::opened(format, bytes)?),
+        Format::Json => json::read(text::opened(format, bytes)?),
+        Format::Usdc | Format::Usda => Err(FormatError::UsdIsOnlyWritten),
+    }
+}
+
+/// Writes one frame of a geometry as a file of that format. The same geometry gives the same bytes.
+///
+/// # Errors
+/// Where the format cannot hold a component or keeps all frames in one file (see [`usd`]), where a number is not
+/// finite, or where the bytes cannot be written.
+pub fn write(
+    format: Format,
+    geometry: &Geometry,
+    stamp: &FrameStamp,
+    sink: &mut dyn Write,
+) -> Result<(), FormatError> {
+    let FrameStamp { frame, seconds } = *stamp;
+    if !(frame.is_finite() && seconds.is_finite()) {
+        return Err(FormatError::Stamp { frame, seconds });
+    }
+    if let Some(kind) = geometry.kinds().find(|kind| !format.holds(*kind)) {
+        return Err(FormatError::CannotHold { format, kind });
+    }
+    all_finite(geometry)?;
+    match format {
+        Format::Obj => obj::write(geometry, stamp, sink),
+        Format::Ply => ply::write(geometry, stamp, sink),
+        Format::Json => json::write(geometry, stamp, sink),
+        Format::Usdc | Format::Usda => Err(FormatError::OneFile { format }),
+    }
+}
+
+fn all_finite(geometry: &Geometry) -> Result<(), FormatError> {
+    for part in geometry.parts() {
+        for (_, name, column) in part.columns() {
+            if let Some(row) = column.first_not_finite() {
+                return Err(FormatError::NotFinite { kind: part.kind(), name: name.clone(), row });
+            }
+        }
+    }
+    if let Some(volume) = geometry.volume() {
+        let once = volume.once().iter().map(|(name, column)| (name.clone(), column.first_not_finite()));
+        let fields = json::volume_fields(volume)
+            .map(|(name, field)| (name.into(), field.iter().position(|x| !x.is_finite())));
+        if let Some((name, Some(row))) = fields.into_iter().chain(once).find(|(_, row)| row.is_some()) {
+            return Err(FormatError::NotFinite { kind: Kind::Volume, name, row });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,95 @@
+//! Loose edges joined into polylines.
+
+/// No edge, no vertex.
+const NONE: u32 = u32::MAX;
+
+/// The polylines that `edges` make: how many CVs each has, and their vertices one after the other.
+///
+/// A polyline goes on through every vertex with exactly two edges and ends at any other. It stands in the order of its
+/// first edge in the list, and that edge gives its direction. A ring starts with its first edge and ends on its first vertex
+/// again. An edge from a vertex to itself has no length and is left out. Time and memory are linear.
+pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut degree = vec![0_u32; vertices];
+    // At a vertex with two edges the xor of their numbers and one of them is the other.
+    let mut both = vec![0_u32; vertices];
+    for (number, [a, b]) in (0_u32..).zip(edges).filter(|(_, [a, b])| a != b) {
+        for vertex in [*a as usize, *b as usize] {
+            degree[vertex] += 1;
+            both[vertex] ^= number;
+        }
+    }
+    let mut used = vec![false; edges.len()];
+    // The vertex after `vertex`, which edge `from` led to, and the edge that leads there.
+    let onward = |vertex: u32, from: u32, used: &mut [bool]| {
+        if degree[vertex as usize] != 2 {
+            return None;
+        }
+        let edge = both[vertex as usize] ^ from;
+        if std::mem::replace(&mut used[edge as usize], true) {
+            return None;
+        }
+        let [a, b] = edges[edge as usize];
+        Some((if a == vertex { b } else { a }, edge))
+    };
+    let (mut counts, mut chain) = (Vec::new(), Vec::new());
+    for (number, [a, b]) in (0_u32..).zip(edges) {
+        if a == b || std::mem::replace(&mut used[number as usize], true) {
+            continue;
+        }
+        let start = chain.len();
+        let mut back = (*a, number);
+        while let Some(next) = onward(back.0, back.1, &mut used) {
+            chain.push(back.0);
+            back = next;
+        }
+        chain.push(back.0);
+        chain[start..].reverse();
+        let mut forth = (*b, number);
+        chain.push(forth.0);
+        while let Some(next) = onward(forth.0, forth.1, &mut used) {
+            chain.push(next.0);
+            forth = next;
+        }
+        counts.push(u32::try_from(chain.len() - start).unwrap_or(NONE));
+    }
+    (counts, chain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polylines(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+        let vertices = edges.iter().flatten().max().map_or(0, |last| *last as usize + 1);
+        let (counts, chain) = join(edges, vertices);
+        let mut rest = chain.as_slice();
+        let take = |count: &u32| rest.split_off(..*count as usize).unwrap().to_vec();
+        counts.iter().map(take).collect()
+    }
+
+    #[test]
+    fn edges_in_any_order_join_along_the_first() {
+        assert_eq!(polylines(&[[0, 1], [1, 2], [2, 3]]), [[0, 1, 2, 3]]);
+        assert_eq!(polylines(&[[2, 1], [3, 2], [0, 1]]), [[3, 2, 1, 0]]);
+        assert_eq!(polylines(&[[4, 5], [0, 1], [6, 5]]), [vec![4, 5, 6], vec![0, 1]]);
+    }
+
+    #[test]
+    fn a_fork_ends_the_polylines_that_meet_there() {
+        assert_eq!(polylines(&[[0, 1], [1, 2], [1, 3], [3, 4]]), [vec![0, 1], vec![1, 2], vec![1, 3, 4]]);
+    }
+
+    #[test]
+    fn a_ring_closes_on_its_first_vertex() {
+        assert_eq!(polylines(&[[0, 1], [1, 2], [2, 0]]), [[0, 1, 2, 0]]);
+        assert_eq!(polylines(&[[0, 1], [0, 1]]), [[0, 1, 0]], "two edges between the same vertices are a ring too");
+        assert_eq!(polylines(&[[0, 1], [1, 2], [2, 0], [0, 3]]), [vec![0, 1, 2, 0], vec![0, 3]], "a ring on a stem");
+    }
+
+    #[test]
+    fn an_edge_without_length_is_left_out() {
+        assert_eq!(polylines(&[[0, 0], [0, 1], [1, 1], [1, 2]]), [[0, 1, 2]]);
+        assert!(polylines(&[[3, 3]]).is_empty());
+        assert!(polylines(&[]).is_empty());
+    }
+}

@@ -1,0 +1,86 @@
+//! Attribute names as PLY properties.
+//!
+//! A property's name has no white space, `name.0` is the first number of a wide attribute, and some names mean something
+//! of their own. A name that would break one of these is written with `%` and two hexadecimal digits for a byte, as in a
+//! web address, and comes back as it was.
+
+/// Property names that are read as something other than a scalar attribute of that name.
+const TAKEN: [&str; 20] = [
+    "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "s", "t", "u", "v", "texture_u", "texture_v", "vertex1",
+    "vertex2", "vertex_index", "count", super::COMPONENT,
+];
+
+/// The property for number `part` of an attribute `width` wide.
+pub(super) fn property(attribute: &str, part: usize, width: usize) -> String {
+    use std::fmt::Write;
+    let mut name = String::with_capacity(attribute.len() + 2);
+    let is_taken = width == 1 && TAKEN.contains(&attribute);
+    for (k, byte) in attribute.bytes().enumerate() {
+        let plain = byte.is_ascii_graphic() && byte != b'%' && byte != b'.';
+        if plain && !(is_taken && k == 0) {
+            name.push(char::from(byte));
+        } else {
+            // Writing to a string cannot fail.
+            let _ = write!(name, "%{byte:02X}");
+        }
+    }
+    if attribute.is_empty() {
+        name.push('%');
+    }
+    if width > 1 {
+        let _ = write!(name, ".{part}");
+    }
+    name
+}
+
+/// The attribute that a property, without its number, stands for; as it is where it cannot be one of ours.
+pub(super) fn attribute(property: &str) -> String {
+    decoded(property).unwrap_or_else(|| property.to_owned())
+}
+
+fn decoded(property: &str) -> Option<String> {
+    if property == "%" {
+        return Some(String::new());
+    }
+    let mut bytes = Vec::with_capacity(property.len());
+    let mut rest = property.as_bytes();
+    while let Some((first, tail)) = rest.split_first() {
+        if *first == b'%' {
+            let ([high, low], tail) = tail.split_first_chunk::<2>()?;
+            let digit = |byte: &u8| char::from(*byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
+            bytes.push(digit(high)? * 16 + digit(low)?);
+            rest = tail;
+        } else {
+            bytes.push(*first);
+            rest = tail;
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
+/// The name and number of a property such as `Pref.2`.
+pub(super) fn numbered(property: &str) -> Option<(&str, usize)> {
+    let (name, part) = property.rsplit_once('.')?;
+    let part = ["0", "1", "2", "3"].iter().position(|digit| *digit == part)?;
+    Some((name, part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_comes_back() {
+        for name in ["mask", "x", "v", "", "a b", "wind.0", "50%", "größe", "\n", "primvars:mask", "%41", "%"] {
+            let scalar = property(name, 0, 1);
+            assert_eq!(attribute(&scalar), name);
+            assert!(!TAKEN.contains(&scalar.as_str()) && numbered(&scalar).is_none(), "{scalar}");
+            assert!(scalar.bytes().all(|byte| byte.is_ascii_graphic()) && !scalar.is_empty());
+            let wide = property(name, 2, 3);
+            assert_eq!(numbered(&wide).map(|(name, part)| (attribute(name), part)), Some((name.to_owned(), 2)));
+        }
+        assert_eq!(property("x", 0, 1), "%78");
+        assert_eq!(property("v", 1, 3), "v.1");
+        assert_eq!(attribute("100%"), "100%", "not one of ours");
+    }
+}

@@ -1,0 +1,278 @@
+//! Which prim and attribute an array of a geometry becomes: the one place both flavours get it from.
+//!
+//! | of a component | becomes |
+//! |---|---|
+//! | `P`, `v`, `N` a point | `points`, `velocities` (m/s), `normals` |
+//! | `width` a point | `widths` on curves and points |
+//! | `id` a point | `ids` (int64) on points |
+//! | `id` of curves | `primvars:curve_id`: curves have no `ids`, and Blender drops a primvar called `id` there |
+//! | any other NAME | `primvars:NAME`; a row a point is `vertex`, an element `uniform`, once `constant` |
+//! | topology | counts and indices, of tets also their surface |
+//!
+//! Types follow what readers make of them. `uvw` is a plain `float3[]`, as Blender cuts `texCoord3f[]` to two numbers on
+//! curves and skips it on meshes. `orient` is a `quatf[]`: Blender and Houdini know it, and USD turns it between samples.
+//! Any other four floats are a `color4f[]`, which Blender reads where it warns of `float4[]`. `Pref` is a `point3f[]`.
+
+use engine::geometry::{Column, ColumnType, Component, ID, Kind, N, Name, ORIENT, Owner, P, PREF, Topology, V, WIDTH};
+
+use super::extent::{EMPTY, extent};
+use super::stage::{Interpolation, UsdType};
+use super::surface::surface;
+
+/// What an attribute is filled from. Their order is that in files.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Source {
+    /// Counts or indices.
+    Topology(TopologyArray),
+    /// The box around the points.
+    Extent,
+    /// An attribute of the geometry.
+    Attribute(Owner, Name),
+}
+
+/// Arrays that say how points hang together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum TopologyArray {
+    CurveCounts,
+    FaceCounts,
+    FaceIndices,
+    TetIndices,
+    SurfaceIndices,
+}
+
+/// The name an attribute asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted<'a> {
+    /// A schema's: it has it.
+    Schema(&'static str),
+    /// A primvar's, without the prefix, to be made an identifier that no other primvar has; `own` is the attribute's.
+    Primvar { name: &'a str, own: &'a str },
+}
+
+/// How a source is declared in USD.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Declaration<'a> {
+    pub(super) wanted: Wanted<'a>,
+    pub(super) kind: UsdType,
+    pub(super) interpolation: Option<Interpolation>,
+}
+
+/// Prim schema and its uniform tokens for a component.
+pub(super) fn prim(kind: Kind) -> (&'static str, &'static [(&'static str, &'static str)]) {
+    match kind {
+        Kind::Curves => ("BasisCurves", &[("type", "linear"), ("wrap", "nonperiodic")]),
+        // Else readers subdivide it and drop its normals.
+        Kind::Mesh => ("Mesh", &[("subdivisionScheme", "none")]),
+        Kind::Points => ("Points", &[]),
+        Kind::Tets => ("TetMesh", &[]),
+        Kind::Volume => ("Volume", &[]),
+    }
+}
+
+/// How `source` of a component of kind `kind`, with rows of type `rows`, is declared.
+pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declaration<'_> {
+    let schema = |name, kind| Declaration { wanted: Wanted::Schema(name), kind, interpolation: None };
+    let (owner, name) = match source {
+        Source::Topology(TopologyArray::CurveCounts) => return schema("curveVertexCounts", UsdType::Int),
+        Source::Topology(TopologyArray::FaceCounts) => return schema("faceVertexCounts", UsdType::Int),
+        Source::Topology(TopologyArray::FaceIndices) => return schema("faceVertexIndices", UsdType::Int),
+        Source::Topology(TopologyArray::TetIndices) => return schema("tetVertexIndices", UsdType::Int4),
+        Source::Topology(TopologyArray::SurfaceIndices) => return schema("surfaceFaceVertexIndices", UsdType::Int3),
+        Source::Extent => return schema("extent", UsdType::Float3),
+        Source::Attribute(owner, name) => (*owner, &**name),
+    };
+    let interpolation = Some(match owner {
+        Owner::Point => Interpolation::Vertex,
+        Owner::Element => Interpolation::Uniform,
+        Owner::Once => Interpolation::Constant,
+    });
+    if owner == Owner::Point {
+        match kind {
+            _ if name == P.name => return schema("points", UsdType::Point3),
+            _ if name == V.name => return schema("velocities", UsdType::Vector3),
+            _ if name == N.name => {
+                return Declaration { interpolation, ..schema("normals", UsdType::Normal3) };
+            }
+            Kind::Curves | Kind::Points if name == WIDTH.name => {
+                return Declaration { interpolation, ..schema("widths", UsdType::Float) };
+            }
+            Kind::Points if name == ID.name => return schema("ids", UsdType::Int64),
+            _ => {}
+        }
+    }
+    let wanted = Wanted::Primvar { name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name }, own: name };
+    Declaration { wanted, kind: primvar_type(name, rows), interpolation }
+}
+
+fn primvar_type(name: &str, rows: ColumnType) -> UsdType {
+    match rows {
+        ColumnType::F1 => UsdType::Float,
+        ColumnType::F3 if name == P.name || name == PREF.name => UsdType::Point3,
+        ColumnType::F3 if name == V.name => UsdType::Vector3,
+        ColumnType::F3 if name == N.name => UsdType::Normal3,
+        ColumnType::F3 => UsdType::Float3,
+        ColumnType::F4 if name == ORIENT.name => UsdType::Quat,
+        ColumnType::F4 => UsdType::Color4,
+        ColumnType::I1 => UsdType::Int,
+        ColumnType::I3 => UsdType::Int3,
+        ColumnType::I4 => UsdType::Int4,
+    }
+}
+
+/// Whether `source` is sampled wherever the other of these is: USD moves points along velocities only where both have
+/// the same sample times.
+pub(super) fn moves(source: &Source) -> bool {
+    matches!(source, Source::Attribute(Owner::Point, name) if **name == *P.name || **name == *V.name)
+}
+
+/// What `source` holds in a frame without its component: no rows, or an inside-out box. `None` for what holds once:
+/// there is no such thing as no rows of it.
+pub(super) fn absent(source: &Source, rows: ColumnType) -> Option<Column> {
+    match source {
+        Source::Attribute(Owner::Once, _) => None,
+        Source::Extent => Some(Column::new(EMPTY.to_vec())),
+        Source::Topology(_) | Source::Attribute(..) => Some(Column::zeros(rows, 0)),
+    }
+}
+
+/// Arrays a component does not hold as such, kept while what they came from is shared.
+#[derive(Debug, Default)]
+pub(super) struct Derived {
+    topology: Option<(Topology, Vec<(Source, Column)>)>,
+    extent: Option<(Column, Option<Column>, Column)>,
+}
+
+impl Derived {
+    /// All arrays that go to the file for `component`.
+    pub(super) fn arrays(&mut self, component: &Component) -> Vec<(Source, Column)> {
+        let mut arrays = self.topology(component.topology()).to_vec();
+        arrays.push((Source::Extent, self.extent(component)));
+        let owned = component.columns().map(|(owner, name, column)| (attribute(owner, name), column.clone()));
+        arrays.extend(owned);
+        arrays
+    }
+
+    fn topology(&mut self, topology: &Topology) -> &[(Source, Column)] {
+        if self.topology.as_ref().is_some_and(|(known, _)| !known.same(topology)) {
+            self.topology = None;
+        }
+        let (_, arrays) = self.topology.get_or_insert_with(|| (topology.clone(), topology_arrays(topology)));
+        arrays
+    }
+
+    fn extent(&mut self, component: &Component) -> Column {
+        let points = component.table(Owner::Point);
+        let widths = points.column(WIDTH.name);
+        let Some(positions) = points.column(P.name) else { return Column::new(EMPTY.to_vec()) };
+        if let Some((known, known_widths, extent)) = &self.extent
+            && known.same(positions)
+            && match (known_widths, widths) {
+                (Some(known), Some(widths)) => known.same(widths),
+                (known, widths) => known.is_none() && widths.is_none(),
+            }
+        {
+            return extent.clone();
+        }
+        let bounds = extent(component.kind(), component.positions(), component.get(WIDTH));
+        let column = Column::new(bounds.to_vec());
+        self.extent = Some((positions.clone(), widths.cloned(), column.clone()));
+        column
+    }
+}
+
+fn attribute(owner: Owner, name: &Name) -> Source {
+    Source::Attribute(owner, name.clone())
+}
+
+fn topology_arrays(topology: &Topology) -> Vec<(Source, Column)> {
+    // Below 2³¹: the recorder has looked.
+    let ints = |numbers: &mut dyn Iterator<Item = u32>| Column::new(numbers.map(u32::cast_signed).collect());
+    let arrays = match topology {
+        Topology::Curves(runs) => vec![(TopologyArray::CurveCounts, ints(&mut runs.counts()))],
+        Topology::Mesh(faces) => vec![
+            (TopologyArray::FaceCounts, ints(&mut faces.runs.counts())),
+            (TopologyArray::FaceIndices, ints(&mut faces.corners.iter().copied())),
+        ],
+        Topology::Points => vec![],
+        Topology::Tets(tets) => vec![
+            (TopologyArray::TetIndices, Column::new(tets.iter().map(|tet| tet.map(u32::cast_signed)).collect())),
+            (
+                TopologyArray::SurfaceIndices,
+                Column::new(surface(tets).into_iter().map(|face| face.map(u32::cast_signed)).collect()),
+            ),
+        ],
+    };
+    arrays.into_iter().map(|(array, column)| (Source::Topology(array), column)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn declared(kind: Kind, owner: Owner, name: &str, rows: ColumnType) -> String {
+        let source = attribute(owner, &name.into());
+        let Declaration { wanted, kind, interpolation } = declare(kind, &source, rows);
+        let name = match wanted {
+            Wanted::Schema(name) => name.to_owned(),
+            Wanted::Primvar { name, .. } => format!("primvars:{name}"),
+        };
+        format!("{} {name} {}", kind.name(), interpolation.map_or("-", Interpolation::token))
+    }
+
+    #[test]
+    fn a_schema_has_its_own_names() {
+        use ColumnType::{F1, F3, I1};
+        for (kind, name, rows, expected) in [
+            (Kind::Curves, "P", F3, "point3f[] points -"),
+            (Kind::Tets, "v", F3, "vector3f[] velocities -"),
+            (Kind::Mesh, "N", F3, "normal3f[] normals vertex"),
+            (Kind::Curves, "width", F1, "float[] widths vertex"),
+            (Kind::Points, "width", F1, "float[] widths vertex"),
+            (Kind::Mesh, "width", F1, "float[] primvars:width vertex"),
+            (Kind::Points, "id", I1, "int64[] ids -"),
+            (Kind::Curves, "id", I1, "int[] primvars:curve_id vertex"),
+            (Kind::Mesh, "id", I1, "int[] primvars:id vertex"),
+        ] {
+            assert_eq!(declared(kind, Owner::Point, name, rows), expected);
+        }
+    }
+
+    #[test]
+    fn everything_else_is_a_primvar_of_its_owner() {
+        use ColumnType::{F1, F3, F4, I1, I3, I4};
+        for (owner, name, rows, expected) in [
+            (Owner::Element, "shielded", F1, "float[] primvars:shielded uniform"),
+            (Owner::Once, "mass", F1, "float[] primvars:mass constant"),
+            (Owner::Element, "id", I1, "int[] primvars:curve_id uniform"),
+            (Owner::Element, "N", F3, "normal3f[] primvars:N uniform"),
+            (Owner::Once, "width", F1, "float[] primvars:width constant"),
+            (Owner::Point, "uvw", F3, "float3[] primvars:uvw vertex"),
+            (Owner::Point, "Pref", F3, "point3f[] primvars:Pref vertex"),
+            (Owner::Point, "orient", F4, "quatf[] primvars:orient vertex"),
+            (Owner::Point, "tint", F4, "color4f[] primvars:tint vertex"),
+            (Owner::Point, "face", I3, "int3[] primvars:face vertex"),
+            (Owner::Point, "tet", I4, "int4[] primvars:tet vertex"),
+        ] {
+            assert_eq!(declared(Kind::Curves, owner, name, rows), expected);
+        }
+    }
+
+    #[test]
+    fn derived_arrays_are_made_once_while_their_sources_are_shared() {
+        let first = Component::curves(vec![2, 1], vec![[0.0; 3]; 3]).unwrap();
+        let mut moved = first.clone();
+        moved.edit(P).unwrap()[2] = [1.0, 2.0, 3.0];
+        let mut derived = Derived::default();
+        let mut find = |component: &Component, wanted: Source| {
+            let arrays = derived.arrays(component);
+            arrays.into_iter().find(|(source, _)| *source == wanted).unwrap().1
+        };
+        let counts = || Source::Topology(TopologyArray::CurveCounts);
+        let known = find(&first, counts());
+        assert_eq!(known, Column::new(vec![2, 1]));
+        let box_of_first = find(&first, Source::Extent);
+        assert!(find(&first, Source::Extent).same(&box_of_first));
+        assert!(find(&moved, counts()).same(&known));
+        assert_eq!(find(&moved, Source::Extent), Column::new(vec![[0.0; 3], [1.0, 2.0, 3.0]]));
+    }
+}

@@ -1,0 +1,253 @@
+//! From frames to tracks: each attribute's values through time, stored once while they stay the same.
+//!
+//! Memory: the arrays of the last frame (shared with whoever holds them), a handle of 8 bytes an attribute and frame.
+//! A refused frame changes nothing; after a failed write every further call fails.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Topology};
+
+use super::UsdFault;
+use super::layout::{self, Derived, Source, Wanted};
+use super::names;
+use super::stage::{Attribute, Encoder, Handle, Prim, Stage, Values, same_bits};
+
+/// What a stage is given at the start.
+#[derive(Clone, Debug)]
+pub(super) struct Header {
+    /// The output's name, not yet an identifier.
+    pub(super) name: String,
+    /// Frames a second.
+    pub(super) fps: f64,
+    /// The scene's origin, metres.
+    pub(super) origin: [f64; 3],
+}
+
+/// Why a call failed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Fault {
+    #[error(transparent)]
+    Write(#[from] io::Error),
+    #[error(transparent)]
+    Refused(#[from] UsdFault),
+}
+
+/// What was recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Counts {
+    pub(super) frames: usize,
+    pub(super) stored: u64,
+    pub(super) shared: u64,
+}
+
+/// Collects frames for an encoder.
+pub(super) struct Recorder<W> {
+    header: Header,
+    times: Vec<f64>,
+    /// Which of the four components each frame had, in the order of [`Kind::ALL`].
+    present: Vec<[bool; 4]>,
+    derived: [Derived; 4],
+    tracks: BTreeMap<(Kind, Source), Track>,
+    store: Store<W>,
+    failed: bool,
+}
+
+/// The encoder, and how often it was asked or not.
+struct Store<W> {
+    encoder: Box<dyn Encoder<W>>,
+    stored: u64,
+    shared: u64,
+}
+
+/// One attribute's values, one a frame.
+struct Track {
+    rows: ColumnType,
+    last: Option<(Column, Handle)>,
+    samples: Vec<Handle>,
+}
+
+impl<W> Recorder<W> {
+    /// A recorder without frames.
+    pub(super) fn new(encoder: Box<dyn Encoder<W>>, header: Header) -> Self {
+        Self {
+            header,
+            times: Vec::new(),
+            present: Vec::new(),
+            derived: Default::default(),
+            tracks: BTreeMap::new(),
+            store: Store { encoder, stored: 0, shared: 0 },
+            failed: false,
+        }
+    }
+
+    /// Adds a frame.
+    pub(super) fn frame(&mut self, time: f64, geometry: &Geometry) -> Result<(), Fault> {
+        self.refuse_after_failure()?;
+        self.check(time, geometry)?;
+        self.failed = true;
+        let mut present = [false; 4];
+        for part in geometry.parts() {
+            let kind = part.kind();
+            present[kind as usize] = true;
+            for (source, column) in self.derived[kind as usize].arrays(part) {
+                self.record((kind, source), column)?;
+            }
+        }
+        for ((kind, source), track) in &mut self.tracks {
+            if track.samples.len() == self.times.len() {
+                track.record_absence(*kind, source, present[*kind as usize], &mut self.store)?;
+            }
+        }
+        self.times.push(time);
+        self.present.push(present);
+        self.failed = false;
+        Ok(())
+    }
+
+    /// Writes the structure and hands the file back.
+    pub(super) fn finish(self) -> Result<(W, Counts), Fault> {
+        self.refuse_after_failure()?;
+        let Self { header, times, tracks, store, .. } = self;
+        let counts = Counts { frames: times.len(), stored: store.stored, shared: store.shared };
+        let mut by_kind: BTreeMap<Kind, Vec<(Source, Track)>> = BTreeMap::new();
+        for ((kind, source), track) in tracks {
+            by_kind.entry(kind).or_default().push((source, track));
+        }
+        let name = names::identifier(&header.name);
+        let stage = Stage {
+            display_name: (name != header.name).then_some(header.name),
+            name,
+            fps: header.fps,
+            origin: header.origin,
+            times,
+            prims: by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks)).collect(),
+        };
+        Ok((store.encoder.finish(&stage)?, counts))
+    }
+
+    fn refuse_after_failure(&self) -> io::Result<()> {
+        if self.failed { Err(io::Error::other("an earlier frame could not be written")) } else { Ok(()) }
+    }
+
+    fn check(&self, time: f64, geometry: &Geometry) -> Result<(), UsdFault> {
+        if !time.is_finite() {
+            return Err(UsdFault::Time { time });
+        }
+        if let Some(last) = self.times.last().copied().filter(|last| *last >= time) {
+            return Err(UsdFault::Order { time, last });
+        }
+        if geometry.volume().is_some() {
+            return Err(UsdFault::Volume { time });
+        }
+        for part in geometry.parts() {
+            let (kind, rows) = (part.kind(), rows_to_index(part));
+            if i32::try_from(rows).is_err() {
+                return Err(UsdFault::TooMany { kind, rows, time });
+            }
+            for (owner, name, column) in part.columns() {
+                let key = (kind, Source::Attribute(owner, name.clone()));
+                let known = self.tracks.get(&key).map(|track| track.rows);
+                if let Some(expected) = known.filter(|known| *known != column.kind()) {
+                    return Err(UsdFault::Type { name: name.clone(), kind, found: column.kind(), expected, time });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, key: (Kind, Source), column: Column) -> io::Result<()> {
+        let (kind, source) = key.clone();
+        if let Some(track) = self.tracks.get_mut(&key) {
+            return track.record(kind, &source, column, &mut self.store);
+        }
+        let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
+        for present in &self.present {
+            track.record_absence(kind, &source, present[kind as usize], &mut self.store)?;
+        }
+        track.record(kind, &source, column, &mut self.store)?;
+        self.tracks.insert(key, track);
+        Ok(())
+    }
+}
+
+/// The greatest number of points or corners that an `int` array counts.
+fn rows_to_index(part: &Component) -> usize {
+    match part.topology() {
+        Topology::Mesh(faces) => faces.corners.len().max(part.point_count()),
+        _ => part.point_count(),
+    }
+}
+
+impl Track {
+    /// The next frame's value.
+    fn record<W>(&mut self, kind: Kind, source: &Source, column: Column, store: &mut Store<W>) -> io::Result<()> {
+        let handle = match &self.last {
+            Some((last, handle)) if same_bits(last, &column) => {
+                store.shared += 1;
+                *handle
+            }
+            _ => {
+                store.stored += 1;
+                store.encoder.store(layout::declare(kind, source, self.rows).kind, &column)?
+            }
+        };
+        self.last = Some((column, handle));
+        self.samples.push(handle);
+        Ok(())
+    }
+
+    /// The next frame has no such value; `present` says whether it has the component.
+    fn record_absence<W>(&mut self, kind: Kind, source: &Source, present: bool, store: &mut Store<W>) -> io::Result<()> {
+        match layout::absent(source, self.rows).filter(|_| !present) {
+            Some(nothing) => self.record(kind, source, nothing, store),
+            None => {
+                self.samples.push(Handle::BLOCK);
+                Ok(())
+            }
+        }
+    }
+
+    fn changes(&self) -> bool {
+        self.samples.windows(2).any(|pair| pair[0] != pair[1])
+    }
+}
+
+/// A component's tracks as a prim.
+fn prim(kind: Kind, tracks: Vec<(Source, Track)>) -> Prim {
+    let moving = tracks.iter().any(|(source, track)| layout::moves(source) && track.changes());
+    let names = attribute_names(kind, &tracks);
+    let attribute = |((source, track), (name, display_name)): ((Source, Track), (String, Option<String>))| {
+        let declaration = layout::declare(kind, &source, track.rows);
+        let sampled = track.changes() || (moving && layout::moves(&source));
+        let values = match track.samples.first() {
+            Some(first) if !sampled => Values::Default(*first),
+            _ => Values::Samples(track.samples),
+        };
+        Attribute { name, display_name, kind: declaration.kind, interpolation: declaration.interpolation, values }
+    };
+    let (schema, tokens) = layout::prim(kind);
+    Prim { name: kind.name(), schema, tokens, attributes: tracks.into_iter().zip(names).map(attribute).collect() }
+}
+
+/// For each track the attribute's name, and its own where that is another.
+fn attribute_names(kind: Kind, tracks: &[(Source, Track)]) -> Vec<(String, Option<String>)> {
+    let wanted = || tracks.iter().map(|(source, track)| layout::declare(kind, source, track.rows).wanted);
+    let primvars: Vec<&str> = wanted()
+        .filter_map(|wanted| match wanted {
+            Wanted::Primvar { name, .. } => Some(name),
+            Wanted::Schema(_) => None,
+        })
+        .collect();
+    let mut identifiers = names::distinct(&primvars).into_iter();
+    wanted()
+        .map(|wanted| match wanted {
+            Wanted::Schema(name) => (name.to_owned(), None),
+            Wanted::Primvar { name, own } => {
+                let name = identifiers.next().unwrap_or_else(|| names::identifier(name));
+                (format!("primvars:{name}"), (name != own).then(|| own.to_owned()))
+            }
+        })
+        .collect()
+}
+

@@ -1,0 +1,49 @@
+//! The surface of tets: faces that only one tet has.
+
+/// Corners of each face of a positively oriented tet, counter-clockwise from outside.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// Faces that belong to one tet only, in the order of the tets, counter-clockwise from outside.
+pub(super) fn surface(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let face = |place: usize| FACES[place % 4].map(|corner| tets[place / 4][corner]);
+    let mut shared: Vec<([u32; 3], usize)> = (0..tets.len() * 4)
+        .map(|place| {
+            let mut corners = face(place);
+            corners.sort_unstable();
+            (corners, place)
+        })
+        .collect();
+    shared.sort_unstable();
+    let alone = shared.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
+    let mut places: Vec<usize> = alone.map(|same| same[0].1).collect();
+    places.sort_unstable();
+    places.into_iter().map(face).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_faces_of_one_tet_look_outwards() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0_f32]];
+        let faces = surface(&[[0, 1, 2, 3]]);
+        assert_eq!(faces, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]);
+        for face in faces {
+            let [a, b, c] = face.map(|corner| corners[corner as usize]);
+            let edge = |p: [f32; 3], q: [f32; 3]| [0, 1, 2].map(|k| q[k] - p[k]);
+            let (u, v) = (edge(a, b), edge(a, c));
+            let normal = [0, 1, 2].map(|k| u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3]);
+            let out = edge([0.25; 3], a);
+            assert!((0..3).map(|k| normal[k] * out[k]).sum::<f32>() > 0.0, "{face:?}");
+        }
+    }
+
+    #[test]
+    fn a_face_between_two_tets_is_no_surface() {
+        let faces = surface(&[[0, 1, 2, 3], [1, 2, 3, 4]]);
+        assert_eq!(faces.len(), 6);
+        assert!(!faces.iter().any(|face| face.iter().all(|corner| [1, 2, 3].contains(corner))));
+        assert!(surface(&[]).is_empty());
+    }
+}

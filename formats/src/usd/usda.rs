@@ -1,0 +1,247 @@
+//! `.usda`: USD as text.
+//!
+//! An attribute's samples stand together in the file, but come frame by frame: their text waits in a spool and is copied
+//! once at the end, so memory stays at one array. Every number is the shortest text that reads back as the same bits;
+//! only a NaN loses its payload.
+
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+
+use engine::geometry::Column;
+
+use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, Stage, UsdType, Values, numbers};
+
+/// Of the buffers before the file and the spool, bytes.
+const BUFFER: usize = 1 << 18;
+
+/// Writes text to `W`; `S` is the spool.
+pub(super) struct Writer<W: Write, S: Write> {
+    file: BufWriter<W>,
+    spool: BufWriter<S>,
+    spooled: u64,
+    text: Vec<u8>,
+}
+
+impl<W: Write, S: Write> Writer<W, S> {
+    /// A writer to `file` with an empty `spool`.
+    pub(super) fn new(file: W, spool: S) -> Self {
+        let buffered = BufWriter::with_capacity(BUFFER, spool);
+        Self { file: BufWriter::with_capacity(BUFFER, file), spool: buffered, spooled: 0, text: Vec::new() }
+    }
+}
+
+impl<W: Write + Send, S: Read + Write + Seek + Send> Encoder<W> for Writer<W, S> {
+    /// The handle is the place in the spool: u64 length, text.
+    fn store(&mut self, kind: UsdType, rows: &Column) -> io::Result<Handle> {
+        self.text.clear();
+        put_array(&mut self.text, kind, rows);
+        let handle = Handle(self.spooled);
+        self.spool.write_all(&(self.text.len() as u64).to_le_bytes())?;
+        self.spool.write_all(&self.text)?;
+        self.spooled += 8 + self.text.len() as u64;
+        Ok(handle)
+    }
+
+    fn finish(self: Box<Self>, stage: &Stage) -> io::Result<W> {
+        let Self { mut file, spool, .. } = *self;
+        let mut spool = spool.into_inner().map_err(io::IntoInnerError::into_error)?;
+        put_header(&mut file, stage)?;
+        let display_name = stage.display_name.iter().map(|name| format!("displayName = {}", quoted(name))).collect();
+        writeln!(file, "\ndef Xform \"{}\"{}\n{{", stage.name, metadata(0, display_name))?;
+        if stage.is_moved() {
+            let [x, y, z] = stage.origin.map(decimal);
+            writeln!(file, "    double3 xformOp:translate = ({x}, {y}, {z})")?;
+            writeln!(file, "    uniform token[] xformOpOrder = [\"xformOp:translate\"]")?;
+        }
+        for (i, prim) in stage.prims.iter().enumerate() {
+            if i > 0 || stage.is_moved() {
+                writeln!(file)?;
+            }
+            put_prim(&mut file, &mut spool, prim, &stage.times)?;
+        }
+        writeln!(file, "}}")?;
+        file.into_inner().map_err(io::IntoInnerError::into_error)
+    }
+}
+
+fn put_header(file: &mut impl Write, stage: &Stage) -> io::Result<()> {
+    writeln!(file, "#usda 1.0\n(\n    defaultPrim = \"{}\"", stage.name)?;
+    for (name, value) in stage.numbers() {
+        writeln!(file, "    {name} = {}", decimal(value))?;
+    }
+    writeln!(file, "    upAxis = \"Y\"\n)")
+}
+
+fn put_prim(file: &mut impl Write, spool: &mut (impl Read + Seek), prim: &Prim, times: &[f64]) -> io::Result<()> {
+    writeln!(file, "    def {} \"{}\"\n    {{", prim.schema, prim.name)?;
+    for (name, value) in prim.tokens {
+        writeln!(file, "        uniform token {name} = \"{value}\"")?;
+    }
+    for attribute in &prim.attributes {
+        put_attribute(file, spool, attribute, times)?;
+    }
+    writeln!(file, "    }}")
+}
+
+/// Metadata of a sampled attribute stands on a declaration of its own.
+fn put_attribute(
+    file: &mut impl Write,
+    spool: &mut (impl Read + Seek),
+    attribute: &Attribute,
+    times: &[f64],
+) -> io::Result<()> {
+    let Attribute { name, display_name, kind, interpolation, values } = attribute;
+    let display_name = display_name.iter().map(|name| format!("displayName = {}", quoted(name)));
+    let interpolation = interpolation.iter().map(|known| format!("interpolation = \"{}\"", known.token()));
+    let lines: Vec<String> = display_name.chain(interpolation).collect();
+    let declared = format!("        {} {name}", kind.name());
+    match values {
+        Values::Default(handle) => {
+            write!(file, "{declared} = ")?;
+            copy_value(file, spool, *handle)?;
+            writeln!(file, "{}", metadata(2, lines))
+        }
+        Values::Samples(handles) => {
+            if !lines.is_empty() {
+                writeln!(file, "{declared}{}", metadata(2, lines))?;
+            }
+            writeln!(file, "{declared}.timeSamples = {{")?;
+            for (time, handle) in times.iter().zip(handles) {
+                write!(file, "            {}: ", decimal(*time))?;
+                copy_value(file, spool, *handle)?;
+                writeln!(file, ",")?;
+            }
+            writeln!(file, "        }}")
+        }
+    }
+}
+
+/// ` (…)` with a line each at `depth`; nothing for no lines.
+fn metadata(depth: usize, lines: Vec<String>) -> String {
+    let indent = "    ".repeat(depth);
+    let body: String = lines.iter().map(|line| format!("{indent}    {line}\n")).collect();
+    if lines.is_empty() { body } else { format!(" (\n{body}{indent})") }
+}
+
+fn copy_value(file: &mut impl Write, spool: &mut (impl Read + Seek), handle: Handle) -> io::Result<()> {
+    if handle == Handle::BLOCK {
+        return file.write_all(b"None");
+    }
+    spool.seek(SeekFrom::Start(handle.0))?;
+    let mut length = [0; 8];
+    spool.read_exact(&mut length)?;
+    let length = u64::from_le_bytes(length);
+    match io::copy(&mut spool.take(length), file)? {
+        copied if copied == length => Ok(()),
+        _ => Err(io::ErrorKind::UnexpectedEof.into()),
+    }
+}
+
+/// A string literal on one line.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            '\n' => quoted.push_str("\\n"),
+            '\r' => quoted.push_str("\\r"),
+            '\t' => quoted.push_str("\\t"),
+            c if c.is_ascii_control() => quoted.push_str(&format!("\\x{:02x}", c as u32)),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+fn put_array(text: &mut Vec<u8>, kind: UsdType, rows: &Column) {
+    let width = rows.kind().width();
+    text.push(b'[');
+    match numbers(rows) {
+        Numbers::Floats(floats) if kind == UsdType::Quat => {
+            // Text has the real part first.
+            let real_first: Vec<f32> = floats.as_chunks().0.iter().flat_map(|&[x, y, z, w]| [w, x, y, z]).collect();
+            put_rows(text, width, &real_first, put_float);
+        }
+        Numbers::Floats(floats) => put_rows(text, width, floats, put_float),
+        Numbers::Ints(ints) => {
+            let mut buffer = itoa::Buffer::new();
+            put_rows(text, width, ints, |text, x| text.extend_from_slice(buffer.format(x).as_bytes()));
+        }
+    }
+    text.push(b']');
+}
+
+fn put_rows<T: Copy>(text: &mut Vec<u8>, width: usize, numbers: &[T], mut put: impl FnMut(&mut Vec<u8>, T)) {
+    let (open, close): (&[u8], &[u8]) = if width > 1 { (b"(", b")") } else { (b"", b"") };
+    for (i, row) in numbers.chunks_exact(width).enumerate() {
+        text.extend_from_slice(if i == 0 { b"" } else { b", " });
+        text.extend_from_slice(open);
+        for (k, x) in row.iter().enumerate() {
+            text.extend_from_slice(if k == 0 { b"" } else { b", " });
+            put(text, *x);
+        }
+        text.extend_from_slice(close);
+    }
+}
+
+fn put_float(text: &mut Vec<u8>, x: f32) {
+    text.extend_from_slice(usd_spelling(zmij::Buffer::new().format(x)).as_bytes());
+}
+
+fn decimal(x: f64) -> String {
+    usd_spelling(zmij::Buffer::new().format(x)).to_owned()
+}
+
+/// USD knows `nan`, and needs no `.0`.
+fn usd_spelling(number: &str) -> &str {
+    if number == "NaN" { "nan" } else { number.strip_suffix(".0").unwrap_or(number) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(kind: UsdType, rows: Column) -> String {
+        let mut text = Vec::new();
+        put_array(&mut text, kind, &rows);
+        String::from_utf8(text).unwrap()
+    }
+
+    #[test]
+    fn numbers_are_the_shortest_text_of_their_bits() {
+        let odd = vec![0.0, -0.0, 1.0, 0.1, -2.5, 1e-42, f32::MAX, 1e16, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+        let expected = "[0, -0, 1, 0.1, -2.5, 1e-42, 3.4028235e38, 1e16, inf, -inf, nan]";
+        assert_eq!(text(UsdType::Float, Column::new(odd)).replace("e+", "e"), expected);
+        assert_eq!(decimal(1001.5), "1001.5");
+        assert_eq!(decimal(-3.0), "-3");
+    }
+
+    #[test]
+    fn any_float_reads_back_with_its_bits() {
+        let mut bits = 1_u32;
+        for _ in 0..200_000 {
+            bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let x = f32::from_bits(bits);
+            let mut text = Vec::new();
+            put_float(&mut text, x);
+            // By way of f64, as USD reads it.
+            let read = std::str::from_utf8(&text).unwrap().parse::<f64>().unwrap() as f32;
+            assert!(read.to_bits() == bits || (read.is_nan() && x.is_nan()), "{x:e}");
+        }
+    }
+
+    #[test]
+    fn rows_stand_in_brackets_and_a_quaternion_starts_with_its_real_part() {
+        assert_eq!(text(UsdType::Int, Column::new(vec![3, -1])), "[3, -1]");
+        assert_eq!(text(UsdType::Int64, Column::new(vec![i32::MIN])), "[-2147483648]");
+        assert_eq!(text(UsdType::Point3, Column::new(vec![[0.0, 1.5, 2.0], [3.0, 4.0, 5.0_f32]])), "[(0, 1.5, 2), (3, 4, 5)]");
+        assert_eq!(text(UsdType::Quat, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(4, 1, 2, 3)]");
+        assert_eq!(text(UsdType::Color4, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(1, 2, 3, 4)]");
+        assert_eq!(text(UsdType::Float3, Column::new(Vec::<[f32; 3]>::new())), "[]");
+    }
+
+    #[test]
+    fn a_string_stays_on_its_line() {
+        assert_eq!(quoted("a\"b\\c\nö\u{1}"), r#""a\"b\\c\nö\x01""#);
+    }
+}

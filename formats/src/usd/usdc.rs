@@ -1,0 +1,318 @@
+//! `.usdc`: USD as a crate file, version 0.8.0.
+//!
+//! Header, values, sections, table of contents. Values are written as they come and known by 8-byte reps from then on;
+//! the sections, which make a tree of prims and attributes out of them, follow at the end, and last the header. Until
+//! then no reader takes the file. 0.8.0 is what USD itself writes and all versions read in silence.
+
+use std::io::{self, Seek, SeekFrom, Write};
+
+use engine::geometry::Column;
+
+use super::coding::ints;
+use super::stage::{Attribute, Encoder, Handle, Numbers, Stage, UsdType, Values, numbers};
+use super::structure::{Spec, SpecType, Structure};
+
+/// Bytes before the first value.
+const HEADER: usize = 88;
+
+const ARRAY: u64 = 1 << 63;
+const INLINED: u64 = 1 << 62;
+const COMPRESSED: u64 = 1 << 61;
+
+/// Value types by their number in a rep.
+mod id {
+    pub(super) const BOOL: u64 = 1;
+    pub(super) const INT: u64 = 3;
+    pub(super) const INT64: u64 = 5;
+    pub(super) const FLOAT: u64 = 8;
+    pub(super) const DOUBLE: u64 = 9;
+    pub(super) const STRING: u64 = 10;
+    pub(super) const TOKEN: u64 = 11;
+    pub(super) const QUATF: u64 = 17;
+    pub(super) const DOUBLE3: u64 = 23;
+    pub(super) const FLOAT3: u64 = 24;
+    pub(super) const INT3: u64 = 26;
+    pub(super) const FLOAT4: u64 = 28;
+    pub(super) const INT4: u64 = 30;
+    pub(super) const TOKEN_VECTOR: u64 = 41;
+    pub(super) const SPECIFIER: u64 = 42;
+    pub(super) const VARIABILITY: u64 = 44;
+    pub(super) const TIME_SAMPLES: u64 = 46;
+    pub(super) const DOUBLE_VECTOR: u64 = 48;
+    pub(super) const VALUE_BLOCK: u64 = 51;
+}
+
+/// An int array is coded from this length on; readers take shorter ones as raw whatever their rep says.
+const CODED_FROM: usize = 16;
+
+/// And up to this one: a chunk holds less than 2 GB.
+const CODED_TO: usize = 1 << 28;
+
+/// A block of numbers on their way to the file, bytes.
+const BLOCK: usize = 1 << 16;
+
+/// Writes a crate file to `W`.
+pub(super) struct Writer<W> {
+    file: W,
+    at: u64,
+    block: Vec<u8>,
+    structure: Structure,
+}
+
+impl<W: Write> Writer<W> {
+    /// A writer to `file`, which is empty.
+    pub(super) fn new(mut file: W) -> io::Result<Self> {
+        file.write_all(&[0; HEADER])?;
+        Ok(Self { file, at: HEADER as u64, block: Vec::with_capacity(BLOCK), structure: Structure::default() })
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.at += bytes.len() as u64;
+        self.file.write_all(bytes)
+    }
+
+    /// Fills up to a multiple of 8, where readers use an array without copying it, and says where that is.
+    fn align(&mut self) -> io::Result<u64> {
+        let gap = self.at.next_multiple_of(8) - self.at;
+        self.put(&[0; 8][..gap as usize])?;
+        Ok(self.at)
+    }
+
+    fn put_numbers<T: Copy, const N: usize>(&mut self, numbers: &[T], bytes: impl Fn(T) -> [u8; N]) -> io::Result<()> {
+        let mut block = std::mem::take(&mut self.block);
+        for numbers in numbers.chunks(BLOCK / N) {
+            block.resize(numbers.len() * N, 0);
+            for (place, x) in block.as_chunks_mut().0.iter_mut().zip(numbers) {
+                *place = bytes(*x);
+            }
+            self.put(&block)?;
+        }
+        self.block = block;
+        Ok(())
+    }
+
+    fn double(&mut self, x: f64) -> io::Result<u64> {
+        let single = x as f32;
+        if f64::from(single).to_bits() == x.to_bits() {
+            return Ok(rep(id::DOUBLE) | INLINED | u64::from(single.to_bits()));
+        }
+        let at = self.align()?;
+        self.put(&x.to_le_bytes())?;
+        Ok(rep(id::DOUBLE) | at)
+    }
+
+    fn double3(&mut self, xs: [f64; 3]) -> io::Result<u64> {
+        let at = self.align()?;
+        self.put_numbers(&xs, f64::to_le_bytes)?;
+        Ok(rep(id::DOUBLE3) | at)
+    }
+
+    fn token(&mut self, text: &str) -> u64 {
+        rep(id::TOKEN) | INLINED | u64::from(self.structure.token(text))
+    }
+
+    fn string(&mut self, text: &str) -> u64 {
+        rep(id::STRING) | INLINED | u64::from(self.structure.string(text))
+    }
+
+    fn tokens(&mut self, kind: u64, texts: &[&str]) -> io::Result<u64> {
+        let indices: Vec<u32> = texts.iter().map(|text| self.structure.token(text)).collect();
+        let at = self.align()?;
+        self.put(&(indices.len() as u64).to_le_bytes())?;
+        self.put_numbers(&indices, u32::to_le_bytes)?;
+        Ok(kind | at)
+    }
+
+    fn times(&mut self, times: &[f64]) -> io::Result<u64> {
+        let at = self.align()?;
+        self.put(&(times.len() as u64).to_le_bytes())?;
+        self.put_numbers(times, f64::to_le_bytes)?;
+        Ok(rep(id::DOUBLE_VECTOR) | at)
+    }
+
+    /// The two 8s say that what follows, times and values, comes 8 bytes on: it does, as a rep each.
+    fn samples(&mut self, times: u64, values: &[Handle]) -> io::Result<u64> {
+        let at = self.align()?;
+        self.put_numbers(&[8, times, 8, values.len() as u64], u64::to_le_bytes)?;
+        let value = |handle: Handle| if handle == Handle::BLOCK { rep(id::VALUE_BLOCK) } else { handle.0 };
+        self.put_numbers(values, |handle| value(handle).to_le_bytes())?;
+        Ok(rep(id::TIME_SAMPLES) | at)
+    }
+
+    fn array(&mut self, kind: UsdType, rows: &Column) -> io::Result<u64> {
+        let array = rep(array_id(kind)) | ARRAY;
+        if rows.is_empty() {
+            return Ok(array);
+        }
+        let count = (rows.len() as u64).to_le_bytes();
+        match numbers(rows) {
+            Numbers::Ints(values) if kind == UsdType::Int && (CODED_FROM..=CODED_TO).contains(&values.len()) => {
+                let coded = ints(values.iter().copied());
+                if coded.len() < values.len() * 4 {
+                    let at = self.align()?;
+                    self.put(&count)?;
+                    self.put(&coded)?;
+                    return Ok(array | COMPRESSED | at);
+                }
+            }
+            _ => {}
+        }
+        let at = self.align()?;
+        self.put(&count)?;
+        match numbers(rows) {
+            Numbers::Ints(values) if kind == UsdType::Int64 => {
+                self.put_numbers(values, |x| i64::from(x).to_le_bytes())?;
+            }
+            Numbers::Ints(values) => self.put_numbers(values, i32::to_le_bytes)?,
+            Numbers::Floats(values) => self.put_numbers(values, f32::to_le_bytes)?,
+        }
+        Ok(array | at)
+    }
+}
+
+impl<W: Write + Seek + Send> Encoder<W> for Writer<W> {
+    /// The handle is the value's rep.
+    fn store(&mut self, kind: UsdType, rows: &Column) -> io::Result<Handle> {
+        self.array(kind, rows).map(Handle)
+    }
+
+    fn finish(mut self: Box<Self>, stage: &Stage) -> io::Result<W> {
+        let root = self.stage(stage)?;
+        self.close(&root)?;
+        Ok(self.file)
+    }
+}
+
+impl<W: Write + Seek> Writer<W> {
+    fn stage(&mut self, stage: &Stage) -> io::Result<Spec> {
+        let times = self.times(&stage.times)?;
+        let mut xform = self.prim(&stage.name, "Xform");
+        if let Some(name) = &stage.display_name {
+            xform.field("displayName", self.string(name));
+        }
+        if stage.is_moved() {
+            let translate = self.double3(stage.origin)?;
+            xform.children.push(self.attribute("xformOp:translate", "double3", false, translate));
+            let order = self.tokens(rep(id::TOKEN) | ARRAY, &["xformOp:translate"])?;
+            xform.children.push(self.attribute("xformOpOrder", "token[]", true, order));
+        }
+        for prim in &stage.prims {
+            let mut spec = self.prim(prim.name, prim.schema);
+            for (name, value) in prim.tokens {
+                let value = self.token(value);
+                spec.children.push(self.attribute(name, "token", true, value));
+            }
+            for attribute in &prim.attributes {
+                let attribute = self.array_attribute(attribute, times)?;
+                spec.children.push(attribute);
+            }
+            xform.children.push(spec);
+        }
+        let mut root = Spec::new("", SpecType::PseudoRoot);
+        root.field("defaultPrim", self.token(&stage.name));
+        root.field("upAxis", self.token("Y"));
+        for (name, value) in stage.numbers() {
+            root.field(name, self.double(value)?);
+        }
+        root.children.push(xform);
+        self.list_children(&mut root)?;
+        Ok(root)
+    }
+
+    fn prim(&mut self, name: &str, schema: &str) -> Spec {
+        let mut prim = Spec::new(name, SpecType::Prim);
+        prim.field("specifier", rep(id::SPECIFIER) | INLINED);
+        prim.field("typeName", self.token(schema));
+        prim
+    }
+
+    fn attribute(&mut self, name: &str, kind: &str, uniform: bool, value: u64) -> Spec {
+        let mut attribute = self.declaration(name, kind, uniform);
+        attribute.field("default", value);
+        attribute
+    }
+
+    fn declaration(&mut self, name: &str, kind: &str, uniform: bool) -> Spec {
+        let mut attribute = Spec::new(name, SpecType::Attribute);
+        attribute.field("custom", rep(id::BOOL) | INLINED);
+        attribute.field("typeName", self.token(kind));
+        attribute.field("variability", rep(id::VARIABILITY) | INLINED | u64::from(uniform));
+        attribute
+    }
+
+    fn array_attribute(&mut self, attribute: &Attribute, times: u64) -> io::Result<Spec> {
+        let Attribute { name, display_name, kind, interpolation, values } = attribute;
+        let mut spec = self.declaration(name, kind.name(), false);
+        if let Some(name) = display_name {
+            spec.field("displayName", self.string(name));
+        }
+        if let Some(interpolation) = interpolation {
+            // A token: as a string it would print alike and not be found.
+            spec.field("interpolation", self.token(interpolation.token()));
+        }
+        match values {
+            Values::Default(handle) => spec.field("default", handle.0),
+            Values::Samples(handles) => spec.field("timeSamples", self.samples(times, handles)?),
+        }
+        Ok(spec)
+    }
+
+    /// Adds what readers list a spec's properties and prims by.
+    fn list_children(&mut self, spec: &mut Spec) -> io::Result<()> {
+        for child in &mut spec.children {
+            self.list_children(child)?;
+        }
+        let named = |kind: SpecType| -> Vec<&str> {
+            spec.children.iter().filter(|child| child.kind == kind).map(|child| &*child.name).collect()
+        };
+        let (properties, prims) = (named(SpecType::Attribute), named(SpecType::Prim));
+        if !properties.is_empty() {
+            let list = self.tokens(rep(id::TOKEN_VECTOR), &properties)?;
+            spec.fields.push(("properties", list));
+        }
+        if !prims.is_empty() {
+            let list = self.tokens(rep(id::TOKEN_VECTOR), &prims)?;
+            spec.fields.push(("primChildren", list));
+        }
+        Ok(())
+    }
+
+    /// Sections, table of contents, header.
+    fn close(&mut self, root: &Spec) -> io::Result<()> {
+        let mut table = Vec::new();
+        for (name, bytes) in std::mem::take(&mut self.structure).sections(root) {
+            let start = self.align()?;
+            self.put(&bytes)?;
+            let mut entry = [0; 32];
+            entry[..name.len()].copy_from_slice(name.as_bytes());
+            entry[16..24].copy_from_slice(&start.to_le_bytes());
+            entry[24..].copy_from_slice(&(bytes.len() as u64).to_le_bytes());
+            table.push(entry);
+        }
+        let contents = self.align()?;
+        self.put(&(table.len() as u64).to_le_bytes())?;
+        self.put(table.as_flattened())?;
+        self.file.seek(SeekFrom::Start(0))?;
+        self.file.write_all(b"PXR-USDC\0\x08\0\0\0\0\0\0")?;
+        self.file.write_all(&contents.to_le_bytes())?;
+        self.file.flush()
+    }
+}
+
+/// A rep of type `id`, all else 0.
+fn rep(id: u64) -> u64 {
+    id << 48
+}
+
+fn array_id(kind: UsdType) -> u64 {
+    match kind {
+        UsdType::Float => id::FLOAT,
+        UsdType::Float3 | UsdType::Point3 | UsdType::Vector3 | UsdType::Normal3 => id::FLOAT3,
+        UsdType::Color4 => id::FLOAT4,
+        UsdType::Quat => id::QUATF,
+        UsdType::Int => id::INT,
+        UsdType::Int3 => id::INT3,
+        UsdType::Int4 => id::INT4,
+        UsdType::Int64 => id::INT64,
+    }
+}

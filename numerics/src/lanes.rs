@@ -1,0 +1,52 @@
+//! Sixteen numbers side by side: the data of one step of a kernel, an element a lane.
+//!
+//! A kernel is written as scalar, branch-free functions, and as loops over [`LANES`] that call
+//! them; inside a function of [`crate::simd`] the compiler turns such a loop into vectors of the
+//! path's width. So the code of one value is the code of sixteen, and their bits are the same.
+
+/// Elements handled side by side, on every path.
+pub const LANES: usize = 16;
+
+/// Sixteen `f32`, aligned as the widest vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct F32x16(pub [f32; LANES]);
+
+impl F32x16 {
+    /// The same value on every lane.
+    #[inline(always)]
+    pub fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+
+    /// The value that `of` gives for each lane.
+    #[inline(always)]
+    pub fn from_fn(of: impl Fn(usize) -> f32) -> Self {
+        let mut out = Self::splat(0.0);
+        for lane in 0..LANES {
+            out.0[lane] = of(lane);
+        }
+        out
+    }
+}
+
+/// A vector or a quaternion a lane, a component an array.
+pub type Lanes<const N: usize> = [F32x16; N];
+
+/// The vector of one lane.
+#[inline(always)]
+pub fn get<const N: usize>(lanes: &Lanes<N>, lane: usize) -> [f32; N] {
+    let mut out = [0.0; N];
+    for component in 0..N {
+        out[component] = lanes[component].0[lane];
+    }
+    out
+}
+
+/// Replaces the vector of one lane.
+#[inline(always)]
+pub fn set<const N: usize>(lanes: &mut Lanes<N>, lane: usize, value: [f32; N]) {
+    for component in 0..N {
+        lanes[component].0[lane] = value[component];
+    }
+}

@@ -1,0 +1,132 @@
+//! Noise fields: three decorrelated smooth random components at every point of space.
+//!
+//! Octaves of gradient noise, its billowed form or wavelet noise; each of mean 0. The sum of octaves
+//! is divided by the root of its weights' squares, so its rms (0.27) does not depend on
+//! how many there are. Coordinates are f64, counted in cells of the first octave. Octave n has 2ⁿ
+//! cells a cell and no offset: gradient noise of any number of octaves is 0 on the first's lattice.
+//! The same bits one point or sixteen at a time.
+
+mod lattice;
+mod perlin;
+mod wavelet;
+
+use crate::lanes::{F32x16, LANES, Lanes, get, set};
+use crate::random::Key;
+use lattice::{Point, Points};
+
+/// What a field is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Gradient noise: 0 on the lattice, C².
+    Perlin,
+    /// The magnitude of gradient noise, less its mean: rounded lumps with creases between them.
+    Billow,
+    /// Wavelet noise: each octave keeps to its own band; C¹.
+    Wavelet,
+}
+
+/// Most octaves of a field.
+pub const MAX_OCTAVES: usize = 16;
+
+/// A noise field: kind, octaves, seed.
+#[derive(Clone, Debug)]
+pub struct Field {
+    kind: Kind,
+    octaves: Vec<Octave>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Octave {
+    salt: u32,
+    /// Cells a cell of the first octave.
+    scale: f64,
+    weight: f32,
+}
+
+/// Billow's mean before recentring: E|gradient noise|.
+const BILLOW_MEAN: f32 = 0.22;
+
+/// Brings billow's rms to 0.27 as well.
+const BILLOW_SCALE: f32 = 1.725;
+
+impl Field {
+    /// A field of 1…16 `octaves` (held to that), each `roughness` times the one before (a negative or
+    /// NaN one counts as 0, one above 1 as 1).
+    pub fn new(kind: Kind, octaves: u32, roughness: f32, seed: u64) -> Self {
+        let roughness = f64::from(if roughness > 0.0 { roughness.min(1.0) } else { 0.0 });
+        let wanted = (octaves as usize).clamp(1, MAX_OCTAVES);
+        let weights: Vec<f64> = std::iter::successors(Some(1.0), |weight| Some(weight * roughness))
+            .take(wanted)
+            .take_while(|weight| *weight > 0.0)
+            .collect();
+        let norm = weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
+        let octave = |(n, weight): (usize, &f64)| Octave {
+            salt: Key::new(seed).of(n as u64).u32(),
+            scale: (1u64 << n) as f64,
+            weight: (weight / norm) as f32,
+        };
+        Self { kind, octaves: weights.iter().enumerate().map(octave).collect() }
+    }
+
+    /// The three components at `point`, counted in cells of the first octave. Finite for any point.
+    pub fn at(&self, point: [f64; 3]) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for octave in &self.octaves {
+            let point = Point::at(point.map(|x| x * octave.scale));
+            octave.add(octave.noise(self.kind, point), &mut sum);
+        }
+        sum
+    }
+
+    /// [`Field::at`] on every lane; an axis an array.
+    #[inline(always)]
+    pub(crate) fn at_lanes(&self, points: &[[f64; LANES]; 3]) -> Lanes<3> {
+        let mut sum = [F32x16::splat(0.0); 3];
+        for octave in &self.octaves {
+            let points = Points::at(points, octave.scale);
+            // A loop a kind: a choice inside of one would keep it from becoming vectors.
+            match self.kind {
+                Kind::Perlin => octave.add_lanes(Kind::Perlin, &points, &mut sum),
+                Kind::Billow => octave.add_lanes(Kind::Billow, &points, &mut sum),
+                Kind::Wavelet => octave.add_lanes(Kind::Wavelet, &points, &mut sum),
+            }
+        }
+        sum
+    }
+}
+
+impl Octave {
+    #[inline(always)]
+    fn noise(&self, kind: Kind, point: Point) -> [f32; 3] {
+        match kind {
+            Kind::Perlin => perlin::noise(point, self.salt),
+            Kind::Billow => perlin::noise(point, self.salt).map(|value| BILLOW_SCALE * (value.abs() - BILLOW_MEAN)),
+            Kind::Wavelet => wavelet::noise(point, self.salt),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&self, noise: [f32; 3], sum: &mut [f32; 3]) {
+        for axis in 0..3 {
+            sum[axis] += self.weight * noise[axis];
+        }
+    }
+
+    #[inline(always)]
+    fn add_lanes(&self, kind: Kind, points: &Points, sum: &mut Lanes<3>) {
+        for lane in 0..LANES {
+            let mut value = get(sum, lane);
+            self.add(self.noise(kind, points.lane(lane)), &mut value);
+            set(sum, lane, value);
+        }
+    }
+}
+
+/// One octave of scalar gradient noise, −1.04..1.04, at `point` counted in cells; 0 on the lattice.
+/// The `noise` of expressions.
+pub fn noise3(seed: u32, point: [f64; 3]) -> f32 {
+    perlin::noise(Point::at(point), Key::new(u64::from(seed)).u32())[0]
+}
+
+#[cfg(test)]
+mod tests;

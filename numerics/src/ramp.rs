@@ -1,0 +1,264 @@
+//! Ramps: a value along 0..1 given by keys, held beyond the first and the last.
+//!
+//! Exact at every key, on one lane or sixteen with the same bits. `Smooth` is a smoothstep an
+//! interval (slope 0 at every key), never an overshoot. Limit: keys within ±1e30, so that no
+//! difference of two overflows.
+
+use crate::lanes::{F32x16, LANES, get, set};
+use std::{error, fmt};
+
+/// How a ramp runs from one key to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Straight.
+    #[default]
+    Linear,
+    /// By 3t² − 2t³ of each interval.
+    Smooth,
+    /// Keeps a key's value until the next key.
+    Constant,
+}
+
+/// Checked keys and what joins them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ramp {
+    keys: Vec<[f32; 2]>,
+    interpolation: Interpolation,
+}
+
+/// Largest magnitude of a key's x and y.
+const LARGEST: f32 = 1e30;
+
+/// Up to here the keys are tried one by one on all lanes at once; above, lane by lane in halves.
+const FEW_KEYS: usize = 24;
+
+/// Intervals tried in one pass over the lanes: most ramps have no more keys.
+const AT_ONCE: usize = 4;
+
+/// What is wrong with the keys of a ramp; `key` counts from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RampError {
+    /// No key at all.
+    Empty,
+    /// NaN, infinite, or beyond ±1e30.
+    OutOfRange {
+        /// Which.
+        key: usize,
+        /// Its first such number.
+        value: f32,
+    },
+    /// Not right of the key before it.
+    Unordered {
+        /// Which.
+        key: usize,
+        /// Its x.
+        x: f32,
+        /// The x of the key before.
+        before: f32,
+    },
+}
+
+impl fmt::Display for RampError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Empty => write!(f, "a ramp has no key; expected at least one `[x, y]`"),
+            Self::OutOfRange { key, value } => {
+                write!(f, "ramp key {key} has {value}; expected a number within ±{LARGEST:e}")
+            }
+            Self::Unordered { key, x, before } => {
+                write!(f, "ramp key {key} has x {x}; expected more than {before} of the key before")
+            }
+        }
+    }
+}
+
+impl error::Error for RampError {}
+
+impl Ramp {
+    /// A ramp through `keys` (`[x, y]`, x strictly increasing), or the first thing wrong with them.
+    pub fn new(keys: Vec<[f32; 2]>, interpolation: Interpolation) -> Result<Self, RampError> {
+        if keys.is_empty() {
+            return Err(RampError::Empty);
+        }
+        for (key, pair) in keys.iter().enumerate() {
+            // A NaN is not within anything.
+            if let Some(&value) = pair.iter().find(|value| !(-LARGEST..=LARGEST).contains(*value)) {
+                return Err(RampError::OutOfRange { key, value });
+            }
+        }
+        for (before, pair) in keys.windows(2).enumerate() {
+            if pair[1][0] <= pair[0][0] {
+                let [before_x, x] = [pair[0][0], pair[1][0]];
+                return Err(RampError::Unordered { key: before + 1, x, before: before_x });
+            }
+        }
+        Ok(Self { keys, interpolation })
+    }
+
+    /// `value` everywhere; a value that is no number within ±1e30 counts as 0.
+    pub fn constant(value: f32) -> Self {
+        let y = if (-LARGEST..=LARGEST).contains(&value) { value } else { 0.0 };
+        Self { keys: vec![[0.0, y]], interpolation: Interpolation::Constant }
+    }
+
+    /// The keys, `[x, y]`, by x.
+    pub fn keys(&self) -> &[[f32; 2]] {
+        &self.keys
+    }
+
+    /// What joins the keys.
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// The largest value: one of the keys', because no interpolation overshoots.
+    pub fn max(&self) -> f32 {
+        self.keys.iter().map(|key| key[1]).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// The one value, where all keys have the same.
+    pub fn is_constant(&self) -> Option<f32> {
+        let first = self.keys[0][1];
+        self.keys.iter().all(|key| key[1] == first).then_some(first)
+    }
+
+    /// The value at `x`; a NaN reads the first key.
+    pub fn eval(&self, x: f32) -> f32 {
+        let right = self.keys.partition_point(|key| key[0] <= x);
+        let left = self.keys[right.saturating_sub(1)];
+        // Left of the first key and right of the last, an interval of one key holds its value.
+        let next = if right == 0 { left } else { *self.keys.get(right).unwrap_or(&left) };
+        between(left, next, x, self.interpolation)
+    }
+
+    /// [`Ramp::eval`] on every lane.
+    #[inline(always)]
+    pub(crate) fn eval_lanes(&self, at: &F32x16) -> F32x16 {
+        if self.keys.len() > FEW_KEYS {
+            return F32x16::from_fn(|lane| self.eval(at.0[lane]));
+        }
+        // Left of the first key, an interval of one key holds its value.
+        let [x, y] = self.keys[0].map(F32x16::splat);
+        let mut found = [x, y, x, y];
+        for start in (0..self.keys.len()).step_by(AT_ONCE) {
+            let intervals = self.intervals(start);
+            for lane in 0..LANES {
+                let mut interval = get(&found, lane);
+                for candidate in intervals {
+                    interval = if candidate[0] <= at.0[lane] { candidate } else { interval };
+                }
+                set(&mut found, lane, interval);
+            }
+        }
+        F32x16::from_fn(|lane| {
+            let [x0, y0, x1, y1] = get(&found, lane);
+            between([x0, y0], [x1, y1], at.0[lane], self.interpolation)
+        })
+    }
+
+    /// The intervals that begin at key `start` and after it, each its two keys; the last key's, and
+    /// those beyond it that nothing reaches, hold their value.
+    #[inline(always)]
+    fn intervals(&self, start: usize) -> [[f32; 4]; AT_ONCE] {
+        std::array::from_fn(|i| match (self.keys.get(start + i), self.keys.get(start + i + 1)) {
+            (Some(&[x0, y0]), Some(&[x1, y1])) => [x0, y0, x1, y1],
+            (Some(&[x, y]), None) => [x, y, x, y],
+            (None, _) => [f32::NAN; 4],
+        })
+    }
+}
+
+/// The value at `x` of the interval from key `left` to key `right`, which may be the same key.
+#[inline(always)]
+fn between(left: [f32; 2], right: [f32; 2], x: f32, interpolation: Interpolation) -> f32 {
+    let width = right[0] - left[0];
+    let share = if width > 0.0 { (x - left[0]) / width } else { 0.0 };
+    let share = match interpolation {
+        Interpolation::Linear => share,
+        Interpolation::Smooth => share * share * (3.0 - 2.0 * share),
+        Interpolation::Constant => 0.0,
+    };
+    left[1] + (right[1] - left[1]) * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Key;
+
+    const KINDS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant];
+
+    #[test]
+    fn values_between_two_keys_are_those_worked_by_hand() {
+        let at = |kind| Ramp::new(vec![[1.0, 10.0], [3.0, 20.0]], kind).unwrap();
+        assert_eq!(at(Interpolation::Linear).eval(1.5), 12.5);
+        // 3/16 − 2/64 = 0.15625 of the rise.
+        assert_eq!(at(Interpolation::Smooth).eval(1.5), 11.5625);
+        assert_eq!(at(Interpolation::Smooth).eval(2.0), 15.0);
+        assert_eq!(at(Interpolation::Constant).eval(2.99), 10.0);
+    }
+
+    #[test]
+    fn keys_are_met_exactly_and_ends_are_held() {
+        let keys = vec![[-0.3, 0.7], [0.1, -0.2], [0.35, 1.1], [0.9, 1.1]];
+        for kind in KINDS {
+            let ramp = Ramp::new(keys.clone(), kind).unwrap();
+            assert!(keys.iter().all(|&[x, y]| ramp.eval(x) == y), "{kind:?}");
+            for (x, y) in [(-9.0, 0.7), (f32::NEG_INFINITY, 0.7), (9.0, 1.1), (f32::INFINITY, 1.1)] {
+                assert_eq!(ramp.eval(x), y, "{kind:?} at {x}");
+            }
+            assert_eq!(ramp.eval(f32::NAN), 0.7);
+        }
+    }
+
+    #[test]
+    fn lanes_give_the_bits_of_one_value_for_few_keys_and_many() {
+        for count in [1, 2, 5, FEW_KEYS, FEW_KEYS + 1, 200] {
+            let keys: Vec<_> = (0..count).map(|i| [i as f32 * 0.01, Key::new(1).of(i as u64).f32()]).collect();
+            for kind in KINDS {
+                let ramp = Ramp::new(keys.clone(), kind).unwrap();
+                for round in 0..64u64 {
+                    let mut x = F32x16::from_fn(|lane| Key::new(2).of(round).of(lane as u64).between([-0.2, 2.2]));
+                    x.0[3] = keys[count / 2][0];
+                    x.0[4] = f32::NAN;
+                    let lanes = ramp.eval_lanes(&x);
+                    for lane in 0..LANES {
+                        assert_eq!(lanes.0[lane].to_bits(), ramp.eval(x.0[lane]).to_bits());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn faults_name_the_key_and_what_was_expected() {
+        let fault = |keys: &[[f32; 2]]| Ramp::new(keys.to_vec(), Interpolation::Linear).unwrap_err().to_string();
+        assert_eq!(fault(&[]), "a ramp has no key; expected at least one `[x, y]`");
+        assert_eq!(fault(&[[0.0, 1.0], [0.5, f32::NAN]]), "ramp key 1 has NaN; expected a number within ±1e30");
+        assert_eq!(
+            fault(&[[0.0, 1.0], [1.0, 0.0], [1.0, 2.0]]),
+            "ramp key 2 has x 1; expected more than 1 of the key before"
+        );
+        assert!(fault(&[[f32::INFINITY, 0.0]]).starts_with("ramp key 0 has inf"));
+    }
+
+    #[test]
+    fn extremes_stay_finite() {
+        let keys = vec![[-1e30, -1e30], [0.0, 1e30], [f32::MIN_POSITIVE / 8.0, -1e30]];
+        for kind in KINDS {
+            let ramp = Ramp::new(keys.clone(), kind).unwrap();
+            for x in [-1e30, -1.0, 0.0, f32::MIN_POSITIVE / 16.0, 1e-38, f32::MAX] {
+                assert!(ramp.eval(x).is_finite());
+            }
+        }
+    }
+
+    #[test]
+    fn largest_value_and_constancy_are_told() {
+        let ramp = Ramp::new(vec![[0.0, 0.2], [0.5, 3.0], [1.0, 1.0]], Interpolation::Smooth).unwrap();
+        assert_eq!((ramp.max(), ramp.is_constant()), (3.0, None));
+        let flat = Ramp::new(vec![[0.0, 0.3], [1.0, 0.3]], Interpolation::Smooth).unwrap();
+        assert_eq!((flat.is_constant(), flat.eval(0.37)), (Some(0.3), 0.3));
+        assert_eq!(Ramp::constant(f32::NAN).is_constant(), Some(0.0));
+    }
+}

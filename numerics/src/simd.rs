@@ -1,0 +1,172 @@
+//! Which vector instructions the kernels use: chosen once at run time, never changing a bit.
+//!
+//! A kernel is compiled once a path, from the same source, by `kernel!`; it runs the widest the CPU
+//! has. Multiplications and additions are never fused and kernels work lane by lane, so every path
+//! gives the same bits. Limit: other architectures than x86-64 have the baseline path alone (on
+//! aarch64 that is NEON).
+
+use std::sync::OnceLock;
+use std::{env, error, fmt};
+
+/// The environment variable that forces a path: `baseline`, `avx2` or `widest`.
+pub const VARIABLE: &str = "CONVECT_SIMD";
+
+/// A path that this CPU can run; there is no way to hold another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Path(Level);
+
+/// Which of the copies of a kernel a path runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[doc(hidden)]
+pub enum Level {
+    /// What every CPU of the build's target has: SSE2, or NEON.
+    Baseline,
+    /// Eight lanes: AVX2.
+    Avx2,
+    /// Sixteen lanes: AVX-512 F, BW, CD, DQ and VL.
+    Avx512,
+}
+
+/// `CONVECT_SIMD` holds a word that names no path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownPath(String);
+
+impl fmt::Display for UnknownPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{VARIABLE}` is `{}`; expected `baseline`, `avx2` or `widest`", self.0)
+    }
+}
+
+impl error::Error for UnknownPath {}
+
+impl Path {
+    /// The path every CPU has.
+    pub const BASELINE: Self = Self(Level::Baseline);
+
+    /// The widest this CPU has.
+    pub fn widest() -> Self {
+        Self(widest_level())
+    }
+
+    /// All this CPU has, narrowest first.
+    pub fn all() -> Vec<Self> {
+        let levels = [Level::Baseline, Level::Avx2, Level::Avx512];
+        levels.into_iter().filter(|level| *level <= widest_level()).map(Self).collect()
+    }
+
+    /// The path that `word` asks for, or the widest below it that this CPU has; none is the widest.
+    pub fn asked(word: Option<&str>) -> Result<Self, UnknownPath> {
+        let level = match word {
+            None | Some("" | "widest") => Level::Avx512,
+            Some("avx2") => Level::Avx2,
+            Some("baseline") => Level::Baseline,
+            Some(other) => return Err(UnknownPath(other.to_owned())),
+        };
+        Ok(Self(level.min(widest_level())))
+    }
+
+    /// The path that the environment asks for; the program asks once at its start, to report a word
+    /// that names none.
+    pub fn from_environment() -> Result<Self, UnknownPath> {
+        let word = env::var_os(VARIABLE).map(|word| word.to_string_lossy().into_owned());
+        Self::asked(word.as_deref())
+    }
+
+    /// The path that kernels run where the caller names none: the environment's, read once; the
+    /// widest where that is no path.
+    pub fn chosen() -> Self {
+        static CHOSEN: OnceLock<Path> = OnceLock::new();
+        *CHOSEN.get_or_init(|| Self::from_environment().unwrap_or_else(|_| Self::widest()))
+    }
+
+    /// `baseline`, `avx2` or `avx512`.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Level::Baseline => "baseline",
+            Level::Avx2 => "avx2",
+            Level::Avx512 => "avx512",
+        }
+    }
+
+    #[doc(hidden)]
+    pub fn level(self) -> Level {
+        self.0
+    }
+}
+
+/// What the CPU has. `kernel!` is sound because every `Path` is at most this.
+fn widest_level() -> Level {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::is_x86_feature_detected as has;
+        if has!("avx512f")
+            && has!("avx512bw")
+            && has!("avx512cd")
+            && has!("avx512dq")
+            && has!("avx512vl")
+            && has!("avx2")
+        {
+            return Level::Avx512;
+        }
+        if has!("avx2") {
+            return Level::Avx2;
+        }
+    }
+    Level::Baseline
+}
+
+/// A function that runs `body`, an `#[inline(always)]` function of the same arguments, compiled for
+/// the path that is its first argument:
+/// `kernel! { pub fn bend_group(group: &Group<'_>) -> Reached = group_body; }`
+macro_rules! kernel {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path;) => {
+        $(#[$meta])*
+        #[allow(unsafe_code)]
+        $vis fn $name(path: $crate::simd::Path, $($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2")]
+                fn avx2($($arg: $type),*) $(-> $out)? {
+                    $body($($arg),*)
+                }
+                #[target_feature(enable = "avx2,avx512f,avx512bw,avx512cd,avx512dq,avx512vl")]
+                fn avx512($($arg: $type),*) $(-> $out)? {
+                    $body($($arg),*)
+                }
+                match path.level() {
+                    // SAFETY: a `Path` of this level exists only on a CPU with these features.
+                    $crate::simd::Level::Avx512 => return unsafe { avx512($($arg),*) },
+                    // SAFETY: likewise.
+                    $crate::simd::Level::Avx2 => return unsafe { avx2($($arg),*) },
+                    $crate::simd::Level::Baseline => {}
+                }
+            }
+            let _ = path;
+            $body($($arg),*)
+        }
+    };
+}
+pub(crate) use kernel;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_names_a_path_or_a_narrower_one() {
+        assert_eq!(Path::asked(None), Ok(Path::widest()));
+        assert_eq!(Path::asked(Some("widest")), Ok(Path::widest()));
+        assert_eq!(Path::asked(Some("baseline")), Ok(Path::BASELINE));
+        assert!(Path::asked(Some("avx2")).unwrap().level() <= Level::Avx2);
+        assert_eq!(
+            Path::asked(Some("AVX9")).unwrap_err().to_string(),
+            "`CONVECT_SIMD` is `AVX9`; expected `baseline`, `avx2` or `widest`"
+        );
+    }
+
+    #[test]
+    fn paths_run_from_baseline_to_widest() {
+        let all = Path::all();
+        assert_eq!((all[0], all[all.len() - 1]), (Path::BASELINE, Path::widest()));
+    }
+}

@@ -1,0 +1,272 @@
+//! Colour: light as numbers and as bytes, the colour map of attributes, and what a component is painted with.
+//!
+//! Colours are linear light with the primaries of sRGB; a picture's bytes are sRGB. Promise: the colour map's lightness
+//! rises evenly, so that a printed or colour-blind reading keeps the order of values. Limit: a colour attribute is
+//! taken as linear and cut to 0…1.
+
+use std::collections::BTreeSet;
+use std::sync::LazyLock;
+
+use engine::geometry::{Column, Component, Geometry, Owner};
+
+use crate::Layer;
+use crate::shape::level_set;
+use crate::vector::{V3, length, mix};
+
+/// Attributes that are a colour by their name, where they are three or four wide; the first there is drawn.
+const COLOR_NAMES: [&str; 3] = ["Cd", "color", "displayColor"];
+/// What shows that a value is no number: no colour map and no default has it.
+const NOT_A_NUMBER: V3 = [1.0, 0.0, 0.6];
+/// What has not the attribute that others are coloured by.
+const WITHOUT: V3 = [0.30, 0.30, 0.31];
+
+/// Viridis (Nathaniel Smith and Stéfan van der Walt, CC0) at tenths, sRGB.
+const MAP: [[u8; 3]; 11] = [
+    [68, 1, 84],
+    [72, 36, 117],
+    [65, 68, 135],
+    [53, 95, 141],
+    [42, 120, 142],
+    [33, 145, 140],
+    [34, 168, 132],
+    [68, 191, 112],
+    [122, 209, 81],
+    [189, 223, 38],
+    [253, 231, 37],
+];
+
+/// The colour of `share` (0…1, cut) of the range, sRGB: from dark violet over green to yellow, evenly lighter.
+pub fn color_map(share: f32) -> [u8; 3] {
+    encode(mapped(share))
+}
+
+fn mapped(share: f32) -> V3 {
+    if share.is_nan() {
+        return NOT_A_NUMBER;
+    }
+    let at = share.clamp(0.0, 1.0) * (MAP.len() - 1) as f32;
+    let low = (at as usize).min(MAP.len() - 2);
+    // Between neighbours of sRGB bytes, where steps look even.
+    let [a, b] = [low, low + 1].map(|k| MAP[k].map(f32::from));
+    mix(a, b, at - low as f32).map(|byte| decode(byte / 255.0))
+}
+
+/// Least and greatest finite value of an attribute over all layers: of a vector its length, of `v` in a volume the
+/// speed of its liquid cells. `None` where no layer has a value, which a caller should say where it is a name's fault.
+///
+/// A sequence keeps one range by the union over its frames.
+pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
+    let mut range = None::<[f32; 2]>;
+    let mut take = |value: f32| {
+        if value.is_finite() {
+            range = Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]));
+        }
+    };
+    for layer in layers {
+        for part in layer.geometry.parts() {
+            if let Some((_, column)) = find(part, name) {
+                (0..column.len()).for_each(|row| take(scalar(column, row)));
+            }
+        }
+        if let Some(volume) = layer.geometry.volume().filter(|_| name == SPEED) {
+            for (cell, _) in volume.level_set().iter().enumerate().filter(|(_, phi)| **phi <= 0.0) {
+                let [nx, ny, _] = volume.grid().size.map(|n| n as usize);
+                take(level_set::speed(volume, [cell % nx, cell / nx % ny, cell / nx / ny].map(|i| i as u32)));
+            }
+        }
+    }
+    range
+}
+
+/// Names that `color_by` can take, for a message: every attribute of every layer but `P`, in order.
+pub fn attribute_names<'a>(layers: &[Layer<'a>]) -> BTreeSet<&'a str> {
+    let of = |geometry: &'a Geometry| {
+        let columns = geometry.parts().flat_map(|part| part.columns().map(|(_, name, _)| &**name));
+        columns.chain(geometry.volume().map(|_| SPEED))
+    };
+    layers.iter().flat_map(|layer| of(layer.geometry)).filter(|name| *name != "P").collect()
+}
+
+/// The one attribute a volume can show.
+pub(crate) const SPEED: &str = "v";
+
+/// The colour of each point or element.
+#[derive(Debug)]
+pub(crate) enum Paint {
+    /// All the same: nothing was measured, so light may play with it.
+    Plain(V3),
+    /// A row a point.
+    Points(Vec<V3>),
+    /// A row an element.
+    Elements(Vec<V3>),
+}
+
+impl Paint {
+    /// What `part` is painted with: by the attribute asked for, else a colour attribute, else `plain`.
+    pub(crate) fn of(part: &Component, color_by: Option<(&str, [f32; 2])>, plain: V3) -> Self {
+        let painted = match color_by {
+            Some((name, range)) => find(part, name).map(|(owner, column)| {
+                let rows = 0..column.len();
+                let is_color = COLOR_NAMES.contains(&name);
+                let own = |row| color_row(column, row).filter(|_| is_color);
+                let color = |row| own(row).unwrap_or_else(|| mapped(share(scalar(column, row), range)));
+                (owner, rows.map(color).collect::<Vec<_>>())
+            }),
+            None => COLOR_NAMES.iter().find_map(|name| {
+                let (owner, column) = find(part, name)?;
+                let colors = (0..column.len()).map(|row| color_row(column, row)).collect::<Option<Vec<_>>>()?;
+                Some((owner, colors))
+            }),
+        };
+        match painted {
+            Some((Owner::Point, colors)) => Self::Points(colors),
+            Some((Owner::Element, colors)) => Self::Elements(colors),
+            Some((Owner::Once, colors)) => Self::Points(vec![colors.first().copied().unwrap_or(plain); part.point_count()]),
+            None => Self::Plain(if color_by.is_some() { WITHOUT } else { plain }),
+        }
+    }
+
+    /// What a volume's surface with a row a point is painted with.
+    pub(crate) fn of_speeds(speeds: Option<Vec<f32>>, color_by: Option<(&str, [f32; 2])>, plain: V3) -> Self {
+        match (speeds, color_by) {
+            (Some(speeds), Some((_, range))) => {
+                Self::Points(speeds.into_iter().map(|speed| mapped(share(speed, range))).collect())
+            }
+            (_, Some(_)) => Self::Plain(WITHOUT),
+            (_, None) => Self::Plain(plain),
+        }
+    }
+
+    pub(crate) fn at(&self, point: usize, element: usize) -> V3 {
+        match self {
+            Self::Plain(color) => *color,
+            Self::Points(colors) => colors[point],
+            Self::Elements(colors) => colors[element],
+        }
+    }
+}
+
+/// Where `value` lies in the range, 0…1 within; the middle of a range without extent.
+fn share(value: f32, [low, high]: [f32; 2]) -> f32 {
+    // Halves, as the difference of two great numbers may overflow.
+    let extent = 0.5 * high - 0.5 * low;
+    if !value.is_finite() {
+        f32::NAN
+    } else if extent > 0.0 {
+        (0.5 * value - 0.5 * low) / extent
+    } else {
+        0.5
+    }
+}
+
+fn find<'a>(part: &'a Component, name: &str) -> Option<(Owner, &'a Column)> {
+    Owner::ALL.into_iter().find_map(|owner| part.table(owner).column(name).map(|column| (owner, column)))
+}
+
+/// A row as one number: a vector by its length.
+fn scalar(column: &Column, row: usize) -> f32 {
+    let size = |squares: f64| squares.sqrt() as f32;
+    match column {
+        Column::F1(rows) => rows[row],
+        Column::F3(rows) => size(rows[row].iter().map(|x| f64::from(*x) * f64::from(*x)).sum()),
+        Column::F4(rows) => size(rows[row].iter().map(|x| f64::from(*x) * f64::from(*x)).sum()),
+        Column::I1(rows) => rows[row] as f32,
+        Column::I3(rows) => length(rows[row].map(|x| x as f32)),
+        Column::I4(rows) => size(rows[row].iter().map(|x| f64::from(*x) * f64::from(*x)).sum()),
+    }
+}
+
+fn color_row(column: &Column, row: usize) -> Option<V3> {
+    let cut = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) };
+    match column {
+        Column::F3(rows) => Some(rows[row].map(cut)),
+        Column::F4(rows) => Some([rows[row][0], rows[row][1], rows[row][2]].map(cut)),
+        _ => None,
+    }
+}
+
+/// Linear light of an sRGB value, 0…1 (IEC 61966-2-1).
+pub(crate) fn decode(value: f32) -> f32 {
+    let value = f64::from(value);
+    (if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }) as f32
+}
+
+/// sRGB bytes of linear light, cut to 0…1.
+pub(crate) fn encode(linear: V3) -> [u8; 3] {
+    /// Steps of linear light: the finest byte step, near black, is 1.2 of them.
+    const STEPS: usize = 4096;
+    static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let byte = |step: usize| {
+            let x = step as f64 / STEPS as f64;
+            let value = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
+            (value * 255.0 + 0.5) as u8
+        };
+        (0..=STEPS).map(byte).collect()
+    });
+    linear.map(|x| BYTES[(x.clamp(0.0, 1.0) * STEPS as f32 + 0.5) as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// CIE lightness, 0…100.
+    fn lightness(color: [u8; 3]) -> f64 {
+        let [r, g, b] = color.map(|byte| f64::from(decode(f32::from(byte) / 255.0)));
+        116.0 * libm::cbrt(0.2126 * r + 0.7152 * g + 0.0722 * b) - 16.0
+    }
+
+    #[test]
+    fn the_color_map_gets_lighter_all_the_way() {
+        let steps: Vec<f64> = (0..=100).map(|k| lightness(color_map(k as f32 / 100.0))).collect();
+        assert!(steps.windows(2).all(|pair| pair[1] > pair[0]), "{steps:?}");
+        // Evenly: no tenth of the range has less than half or more than twice its share.
+        for pair in steps.iter().step_by(10).collect::<Vec<_>>().windows(2) {
+            let share = (pair[1] - pair[0]) / (steps[100] - steps[0]) * 10.0;
+            assert!((0.5..2.0).contains(&share), "{share}");
+        }
+    }
+
+    #[test]
+    fn bytes_survive_decoding_and_encoding() {
+        for byte in 0..=255_u8 {
+            let back = encode([decode(f32::from(byte) / 255.0); 3]);
+            assert!(back[0].abs_diff(byte) <= 1, "{byte} {back:?}");
+        }
+        assert_eq!(encode([-1.0, 2.0, f32::NAN]), [0, 255, 0]);
+    }
+
+    #[test]
+    fn a_range_is_over_all_layers_and_skips_what_is_no_number() {
+        let points = |values: Vec<f32>| {
+            let mut part = Component::points(vec![[0.0; 3]; values.len()]);
+            part.set_column(Owner::Point, "heat", Column::new(values)).unwrap();
+            Geometry::from(part)
+        };
+        let (a, b) = (points(vec![1.0, f32::NAN]), points(vec![-2.0, 0.0]));
+        let layers = [Layer::new("a", &a), Layer::new("b", &b)];
+        assert_eq!(attribute_range(&layers, "heat"), Some([-2.0, 1.0]));
+        assert_eq!(attribute_range(&layers, "cold"), None);
+        assert_eq!(attribute_names(&layers).into_iter().collect::<Vec<_>>(), ["heat"]);
+    }
+
+    #[test]
+    fn the_ends_of_the_range_are_the_ends_of_the_map() {
+        let mut part = Component::points(vec![[0.0; 3]; 4]);
+        part.set_column(Owner::Point, "v", Column::new(vec![[3.0, 4.0, 0.0], [0.0; 3], [f32::NAN; 3], [9e9, 0.0, 0.0]])).unwrap();
+        let Paint::Points(colors) = Paint::of(&part, Some(("v", [0.0, 5.0])), [0.5; 3]) else { panic!() };
+        assert_eq!(colors[0], mapped(1.0));
+        assert_eq!(colors[1], mapped(0.0));
+        assert_eq!(colors[2], NOT_A_NUMBER);
+        assert_eq!(colors[3], mapped(1.0));
+        assert_eq!(share(3.0e38, [-3.4e38, 3.4e38]) , (1.5e38_f32 + 1.7e38) / 3.4e38);
+    }
+
+    #[test]
+    fn a_color_attribute_is_drawn_as_it_is() {
+        let mut part = Component::points(vec![[0.0; 3]]);
+        part.set_column(Owner::Once, "Cd", Column::new(vec![[0.1_f32, 2.0, 0.3]])).unwrap();
+        assert_eq!(Paint::of(&part, None, [0.5; 3]).at(0, 0), [0.1, 1.0, 0.3]);
+        assert_eq!(Paint::of(&part, Some(("w", [0.0, 1.0])), [0.5; 3]).at(0, 0), WITHOUT);
+    }
+}

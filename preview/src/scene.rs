@@ -1,0 +1,324 @@
+//! What is drawn: the layers' components as triangles, strands and dots on the stage, painted but not yet lit.
+//!
+//! Promise: every component of every layer is there, in the order of the layers, then mesh, tets, volume, curves, points.
+//! Limit: what is not finite is left out, a triangle or CV alone and not its whole component.
+
+use engine::geometry::{Component, Kind, Owner, Volume, WIDTH};
+use rayon::prelude::*;
+
+use crate::camera::Bounds;
+use crate::color::{Paint, SPEED};
+use crate::shape::{boundary, level_set, smooth, triangulate};
+use crate::vector::{V3, finite, scale, sub, unit};
+use crate::view::Stage;
+use crate::{Layer, Settings};
+
+/// A corner of a triangle, with the normal there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corner {
+    pub(crate) at: V3,
+    pub(crate) normal: V3,
+    pub(crate) color: V3,
+}
+
+/// A CV of a strand.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Knot {
+    pub(crate) at: V3,
+    /// Unit, root to tip.
+    pub(crate) tangent: V3,
+    pub(crate) radius: f32,
+    pub(crate) color: V3,
+}
+
+/// Consecutive knots, two or more.
+#[derive(Clone, Debug)]
+pub(crate) struct Strand {
+    pub(crate) knots: std::ops::Range<usize>,
+    pub(crate) seed: u32,
+}
+
+/// A ball.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Dot {
+    pub(crate) at: V3,
+    pub(crate) radius: f32,
+    pub(crate) color: V3,
+    /// Share of the key light that reaches it.
+    pub(crate) lit: f32,
+    pub(crate) seed: u32,
+}
+
+/// All that is drawn.
+#[derive(Debug, Default)]
+pub(crate) struct Scene {
+    pub(crate) triangles: Vec<[Corner; 3]>,
+    pub(crate) knots: Vec<Knot>,
+    pub(crate) strands: Vec<Strand>,
+    pub(crate) dots: Vec<Dot>,
+}
+
+/// Colours of what nothing else paints, linear light: clay, putty, honey, brown hair, water.
+const MESH: V3 = [0.50, 0.45, 0.39];
+const TETS: V3 = [0.62, 0.46, 0.28];
+const VOLUME: V3 = [0.72, 0.34, 0.06];
+const CURVES: V3 = [0.43, 0.215, 0.085];
+const POINTS: V3 = [0.12, 0.32, 0.60];
+
+/// Width of a curve that has none, as a share of half the scene's diagonal: hair on an animal that fills the picture.
+const CURVE_WIDTH: f32 = 0.004;
+/// Width of such a curve at its tip, as a share of its width at the root.
+const TIP: f32 = 0.3;
+/// Diameter of a point that has none, as a share of the distance points of that number have in half the scene's
+/// diagonal; and the least and greatest, so that one point is no moon and a million are more than dust.
+const POINT_WIDTH: f32 = 1.4;
+const POINT_WIDTHS: [f32; 2] = [0.004, 0.06];
+/// Light at the root of a strand, as a share of the light at its tip: neighbours shade it there.
+const ROOT: f32 = 0.5;
+/// How far a strand's colour may lie from the next one's.
+const STRAND_TINT: f32 = 0.22;
+
+/// Least and greatest coordinates of all that is drawn, metres; `None` where nothing is.
+///
+/// Give the union over all frames and outputs as [`Settings::bounds`], and every picture is framed the same.
+pub fn bounds(layers: &[Layer<'_>]) -> Option<Bounds> {
+    let mut bounds = None::<Bounds>;
+    for layer in layers {
+        for part in layer.geometry.parts() {
+            let points = part.positions().iter().filter(|p| finite(**p));
+            bounds = points.fold(bounds, |bounds, p| union(bounds, Some([*p; 2])));
+        }
+        if let Some(volume) = layer.geometry.volume() {
+            let (grid, [nx, ny, _]) = (volume.grid(), volume.grid().size.map(|n| n as usize));
+            for (cell, _) in volume.level_set().iter().enumerate().filter(|(_, phi)| **phi < 0.0) {
+                let low = [cell % nx, cell / nx % ny, cell / nx / ny];
+                let at = |k: usize, i: usize| grid.origin[k] + grid.cell * i as f32;
+                let corner = |step: usize| std::array::from_fn(|k| at(k, low[k] + step));
+                bounds = union(bounds, Some([corner(0), corner(1)]).filter(|[a, b]| finite(*a) && finite(*b)));
+            }
+        }
+    }
+    bounds
+}
+
+/// The least box around both.
+pub fn union(a: Option<Bounds>, b: Option<Bounds>) -> Option<Bounds> {
+    match (a, b) {
+        (Some([a, b]), Some([c, d])) => {
+            Some([[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))])
+        }
+        (one, other) => one.or(other),
+    }
+}
+
+impl Scene {
+    /// The layers' components on the stage.
+    pub(crate) fn of(layers: &[Layer<'_>], settings: &Settings, range: [f32; 2], stage: &Stage) -> Self {
+        let color_by = settings.color_by.as_deref().map(|name| (name, range));
+        let mut scene = Self::default();
+        for layer in layers {
+            let plain = |default: V3| layer.color.unwrap_or(default);
+            let paint = |part: &Component, default| Paint::of(part, color_by, plain(default));
+            if let Some(part) = layer.geometry.mesh() {
+                scene.mesh(part, &paint(part, MESH), stage);
+            }
+            if let Some(part) = layer.geometry.tets() {
+                let (skin, tets): (Vec<_>, Vec<_>) = boundary::boundary(part.tet_corners()).into_iter().unzip();
+                scene.surface(&place(part.positions(), stage), &skin, &tets, &paint(part, TETS));
+            }
+            if let Some(volume) = layer.geometry.volume() {
+                scene.volume(volume, color_by, plain(VOLUME), stage);
+            }
+            if let Some(part) = layer.geometry.curves() {
+                scene.curves(part, &paint(part, CURVES), settings.curve_width, stage);
+            }
+            if let Some(part) = layer.geometry.part(Kind::Points) {
+                scene.points(part, &paint(part, POINTS), settings.point_width, stage);
+            }
+        }
+        scene
+    }
+
+    fn mesh(&mut self, part: &Component, paint: &Paint, stage: &Stage) {
+        let Some(faces) = part.faces() else { return };
+        let (triangles, elements): (Vec<_>, Vec<_>) = (0..faces.runs.len())
+            .into_par_iter()
+            .flat_map_iter(|face| {
+                let corners = faces.face(face);
+                let at: Vec<V3> = corners.iter().map(|k| part.positions()[*k as usize]).collect();
+                triangulate::triangulate(&at).into_iter().map(move |ear| (ear.map(|k| corners[k as usize]), face as u32))
+            })
+            .unzip();
+        self.surface(&place(part.positions(), stage), &triangles, &elements, paint);
+    }
+
+    fn volume(&mut self, volume: &Volume, color_by: Option<(&str, [f32; 2])>, plain: V3, stage: &Stage) {
+        let surface = level_set::zero_level(volume);
+        let by_speed = color_by.is_some_and(|(name, _)| name == SPEED);
+        let speeds = by_speed.then(|| surface.cells.iter().map(|cell| level_set::speed(volume, *cell)).collect());
+        let triangles: Vec<_> = surface.quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+        let paint = Paint::of_speeds(speeds, color_by, plain);
+        self.surface(&place(&surface.points, stage), &triangles, &vec![0; triangles.len()], &paint);
+    }
+
+    fn surface(&mut self, points: &[V3], triangles: &[[u32; 3]], elements: &[u32], paint: &Paint) {
+        let normals = smooth::corner_normals(points, triangles);
+        let drawn = triangles.par_iter().zip(elements).zip(&normals).filter_map(|((corners, element), normals)| {
+            let corner = |k: usize| {
+                let point = corners[k] as usize;
+                Corner { at: points[point], normal: normals[k], color: paint.at(point, *element as usize) }
+            };
+            let triangle = [corner(0), corner(1), corner(2)];
+            triangle.iter().all(|corner| finite(corner.at)).then_some(triangle)
+        });
+        self.triangles.par_extend(drawn);
+    }
+
+    fn curves(&mut self, part: &Component, paint: &Paint, width: Option<f32>, stage: &Stage) {
+        let widths = Widths::of(part, width, stage, CURVE_WIDTH);
+        let points = place(part.positions(), stage);
+        let is_plain = matches!(paint, Paint::Plain(_));
+        for (curve, range) in part.runs().ranges().enumerate() {
+            let seed = scramble(self.strands.len() as u32);
+            let tint = if is_plain { 1.0 + STRAND_TINT * (fraction(seed) - 0.5) } else { 1.0 };
+            let first = range.start;
+            let last = range.len().max(2) as f32 - 1.0;
+            let knot = |point: usize| {
+                let along = (point - first) as f32 / last;
+                let taper = if widths.is_default { 1.0 + (TIP - 1.0) * along } else { 1.0 };
+                let shade = if is_plain { tint * (ROOT + (1.0 - ROOT) * along) } else { 1.0 };
+                let ends = [point.max(first + 1) - 1, (point + 1).min(range.end - 1)];
+                let chord = sub(points[ends[1]], points[ends[0]]);
+                Knot {
+                    at: points[point],
+                    tangent: unit(chord).unwrap_or([0.0, 1.0, 0.0]),
+                    radius: 0.5 * taper * widths.at(point, curve),
+                    color: scale(paint.at(point, curve), shade),
+                }
+            };
+            if range.len() == 1 {
+                let Knot { at, radius, color, .. } = knot(first);
+                self.dot(at, radius, color);
+                continue;
+            }
+            let start = self.knots.len();
+            self.knots.extend(range.clone().map(knot));
+            self.strands.push(Strand { knots: start..self.knots.len(), seed });
+        }
+    }
+
+    fn points(&mut self, part: &Component, paint: &Paint, width: Option<f32>, stage: &Stage) {
+        let [least, most] = POINT_WIDTHS;
+        let apart = libm::cbrtf(part.point_count().max(1) as f32);
+        let widths = Widths::of(part, width, stage, (POINT_WIDTH / apart).clamp(least, most));
+        for (point, at) in place(part.positions(), stage).into_iter().enumerate() {
+            self.dot(at, 0.5 * widths.at(point, 0), paint.at(point, 0));
+        }
+    }
+
+    fn dot(&mut self, at: V3, radius: f32, color: V3) {
+        if finite(at) {
+            let seed = scramble(!(self.dots.len() as u32));
+            self.dots.push(Dot { at, radius, color, lit: 1.0, seed });
+        }
+    }
+}
+
+/// Widths on the stage: as asked for, else the attribute, else a default.
+struct Widths<'a> {
+    asked: Option<f32>,
+    rows: Option<(Owner, &'a [f32])>,
+    default: f32,
+    is_default: bool,
+    stage: Stage,
+}
+
+impl<'a> Widths<'a> {
+    fn of(part: &'a Component, asked: Option<f32>, stage: &Stage, default: f32) -> Self {
+        let rows = Owner::ALL.into_iter().find_map(|owner| Some((owner, part.table(owner).get(WIDTH.name)?)));
+        let asked = asked.map(|width| stage.length(width));
+        Self { asked, rows, default, is_default: asked.is_none() && rows.is_none(), stage: *stage }
+    }
+
+    fn at(&self, point: usize, element: usize) -> f32 {
+        match (self.asked, self.rows) {
+            (Some(width), _) => width,
+            (None, Some((Owner::Point, rows))) => self.stage.length(rows[point]),
+            (None, Some((Owner::Element, rows))) => self.stage.length(rows[element]),
+            (None, Some((Owner::Once, rows))) => self.stage.length(rows[0]),
+            (None, None) => self.default,
+        }
+    }
+}
+
+fn place(points: &[V3], stage: &Stage) -> Vec<V3> {
+    points.par_iter().map(|p| stage.place(*p)).collect()
+}
+
+/// Bits that look drawn at random (Wellons' lowbias32).
+pub(crate) fn scramble(x: u32) -> u32 {
+    let x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
+    let x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
+    x ^ x >> 16
+}
+
+/// 0…1 from bits.
+fn fraction(bits: u32) -> f32 {
+    (bits >> 8) as f32 / (1 << 24) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::geometry::{Geometry, Grid};
+
+    fn scene(geometry: &Geometry) -> Scene {
+        let stage = Stage::of([[-1.0; 3], [1.0; 3]]);
+        Scene::of(&[Layer::new("one", geometry)], &Settings::default(), [0.0, 1.0], &stage)
+    }
+
+    #[test]
+    fn every_kind_of_component_is_there() {
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [1; 3] };
+        let mut geometry = Geometry::from(Component::curves(vec![3, 1], corners.clone()).unwrap())
+            .with(Component::mesh(vec![4], vec![0, 1, 2, 3], corners.clone()).unwrap())
+            .with(Component::points(corners.clone()))
+            .with(Component::tets(vec![[0, 1, 2, 3]], corners).unwrap());
+        geometry.put_volume(Volume::new(grid, vec![-0.1], [vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]).unwrap());
+        let scene = scene(&geometry);
+        assert_eq!(scene.triangles.len(), 2 + 4 + 12);
+        assert_eq!((scene.strands.len(), scene.knots.len()), (1, 3));
+        assert_eq!(scene.dots.len(), 1 + 4);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_left_out_alone() {
+        let at = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN, 0.0, 0.0]];
+        let mesh: Geometry = Component::mesh(vec![3, 3], vec![0, 1, 2, 1, 2, 3], at.clone()).unwrap().into();
+        assert_eq!(scene(&mesh).triangles.len(), 1);
+        let points: Geometry = Component::points(at).into();
+        assert_eq!(scene(&points).dots.len(), 3);
+        assert_eq!(bounds(&[Layer::new("one", &points)]), Some([[0.0; 3], [1.0, 1.0, 0.0]]));
+    }
+
+    #[test]
+    fn bounds_of_a_volume_are_those_of_its_liquid() {
+        let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [2, 1, 1] };
+        let mut geometry = Geometry::default();
+        geometry.put_volume(Volume::new(grid, vec![0.1, -0.1], [vec![0.0; 3], vec![0.0; 4], vec![0.0; 4]]).unwrap());
+        assert_eq!(bounds(&[Layer::new("one", &geometry)]), Some([[0.5, 0.0, 0.0], [1.0, 0.5, 0.5]]));
+        assert_eq!(bounds(&[]), None);
+    }
+
+    #[test]
+    fn a_width_is_the_one_asked_for_else_the_attribute_else_the_default() {
+        let mut part = Component::curves(vec![2], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap();
+        let stage = Stage::of([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+        assert_eq!(Widths::of(&part, None, &stage, 0.25).at(0, 0), 0.25);
+        part.set(WIDTH, vec![0.5, f32::NAN]).unwrap();
+        assert_eq!(Widths::of(&part, None, &stage, 0.25).at(0, 0), 0.5);
+        assert_eq!(Widths::of(&part, None, &stage, 0.25).at(1, 0), 0.0);
+        assert_eq!(Widths::of(&part, Some(0.75), &stage, 0.25).at(1, 0), 0.75);
+    }
+}

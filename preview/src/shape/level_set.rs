@@ -1,0 +1,186 @@
+//! The zero level of a volume as a mesh, by naive surface nets: a point in every cube of eight cell centres that the
+//! level crosses, at the mean of its edges' crossings, and a quad across every crossed edge.
+//!
+//! Promise: closed for any level set, as all beyond the grid counts as outside; faces wind counter-clockwise seen from
+//! outside (φ > 0); points in the order of the grid. Limit: first order in the cell, sharp edges are rounded, and where
+//! two sheets meet in one cube they share its point. A value that is no number counts as outside.
+
+use engine::geometry::{Grid, Volume};
+use rayon::prelude::*;
+
+/// Points (metres), the cell each lies nearest to, and quads.
+pub(crate) struct Surface {
+    pub(crate) points: Vec<[f32; 3]>,
+    pub(crate) cells: Vec<[u32; 3]>,
+    pub(crate) quads: Vec<[u32; 4]>,
+}
+
+/// The zero level of `volume`.
+pub(crate) fn zero_level(volume: &Volume) -> Surface {
+    let grid = volume.grid();
+    if grid.cells() == 0 {
+        return Surface { points: Vec::new(), cells: Vec::new(), quads: Vec::new() };
+    }
+    let field = Field { grid, phi: volume.level_set() };
+    // Cube (i, j, k) has cell centres i−1…i, j−1…j, k−1…k at its corners; a layer around the grid is outside.
+    let cubes = grid.size.map(|n| i64::from(n) + 1);
+    let number = |[i, j, k]: [i64; 3]| i + cubes[0] * (j + cubes[1] * k);
+    let layer = |k: i64| (0..cubes[1]).flat_map(move |j| (0..cubes[0]).map(move |i| [i, j, k]));
+
+    let crossed: Vec<([i64; 3], [f32; 3])> = (0..cubes[2])
+        .into_par_iter()
+        .flat_map_iter(|k| layer(k).filter_map(|cube| field.point(cube).map(|point| (cube, point))))
+        .collect();
+    let numbers: Vec<i64> = crossed.iter().map(|(cube, _)| number(*cube)).collect();
+    let row = |cube| numbers.binary_search(&number(cube)).ok().map(|row| row as u32);
+    let quads = crossed.par_iter().flat_map_iter(|(cube, _)| field.quads(*cube, row)).collect();
+    let last = grid.size.map(|n| i64::from(n) - 1);
+    let cell = |cube: [i64; 3]| std::array::from_fn(|axis| cube[axis].min(last[axis]) as u32);
+    Surface {
+        points: crossed.iter().map(|(_, point)| *point).collect(),
+        cells: crossed.iter().map(|(cube, _)| cell(*cube)).collect(),
+        quads,
+    }
+}
+
+/// Speed in the middle of a cell, m/s.
+pub(crate) fn speed(volume: &Volume, cell: [u32; 3]) -> f32 {
+    let size = volume.grid().size.map(|n| n as usize);
+    let mut squares = 0.0;
+    for axis in 0..3 {
+        let row = |at: [usize; 3]| {
+            let faces: [usize; 3] = std::array::from_fn(|k| size[k] + usize::from(k == axis));
+            at[0] + faces[0] * (at[1] + faces[1] * at[2])
+        };
+        let low = cell.map(|i| i as usize);
+        let mut high = low;
+        high[axis] += 1;
+        let through = &volume.velocity()[axis];
+        let mean = 0.5 * (through[row(low)] + through[row(high)]);
+        squares += mean * mean;
+    }
+    squares.sqrt()
+}
+
+struct Field<'a> {
+    grid: Grid,
+    phi: &'a [f32],
+}
+
+impl Field<'_> {
+    /// φ at a cell centre; half a cell outside beyond the grid, which puts the wall of a full grid on its border.
+    fn at(&self, at: [i64; 3]) -> f32 {
+        let outside = 0.5 * self.grid.cell;
+        let size = self.grid.size.map(i64::from);
+        if (0..3).any(|axis| at[axis] < 0 || at[axis] >= size[axis]) {
+            return outside;
+        }
+        let value = self.phi[(at[0] + size[0] * (at[1] + size[1] * at[2])) as usize];
+        if value.is_finite() { value } else { outside }
+    }
+
+    /// The point of a cube, metres; `None` where the level does not cross it.
+    fn point(&self, cube: [i64; 3]) -> Option<[f32; 3]> {
+        let corner = |bits: usize| -> [i64; 3] { std::array::from_fn(|axis| cube[axis] - 1 + (bits >> axis & 1) as i64) };
+        let values: [f32; 8] = std::array::from_fn(|bits| self.at(corner(bits)));
+        if values.iter().all(|value| (*value < 0.0) == (values[0] < 0.0)) {
+            return None;
+        }
+        let (mut sum, mut count) = ([0.0_f32; 3], 0.0);
+        for low in 0..8_usize {
+            for axis in (0..3).filter(|axis| low >> axis & 1 == 0) {
+                let (a, b) = (values[low], values[low | 1 << axis]);
+                if (a < 0.0) != (b < 0.0) {
+                    let along = a / (a - b);
+                    for k in 0..3 {
+                        sum[k] += if k == axis { along } else { (low >> k & 1) as f32 };
+                    }
+                    count += 1.0;
+                }
+            }
+        }
+        // Cell centre (i, j, k) is half a cell into its cell.
+        Some(std::array::from_fn(|k| {
+            self.grid.origin[k] + self.grid.cell * (cube[k] as f32 - 0.5 + sum[k] / count)
+        }))
+    }
+
+    /// The quads across the crossed edges that begin at the lowest corner of `cube`; each is shared by four cubes.
+    fn quads(&self, cube: [i64; 3], row: impl Fn([i64; 3]) -> Option<u32>) -> impl Iterator<Item = [u32; 4]> {
+        let corner = cube.map(|i| i - 1);
+        let inside = self.at(corner) < 0.0;
+        (0..3).filter_map(move |axis| {
+            let mut beyond = corner;
+            beyond[axis] += 1;
+            if inside == (self.at(beyond) < 0.0) {
+                return None;
+            }
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let neighbour = |du, dv| {
+                let mut at = cube;
+                at[u] -= du;
+                at[v] -= dv;
+                row(at)
+            };
+            let [a, b, c, d] = [neighbour(0, 0)?, neighbour(1, 0)?, neighbour(1, 1)?, neighbour(0, 1)?];
+            Some(if inside { [a, b, c, d] } else { [d, c, b, a] })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{cross, dot, length, sub};
+
+    fn volume(size: u32, phi: impl Fn([f32; 3]) -> f32) -> Volume {
+        let grid = Grid { origin: [-1.0; 3], cell: 2.0 / size as f32, size: [size; 3] };
+        let centre = |i: u32| -1.0 + grid.cell * (i as f32 + 0.5);
+        let level_set = (0..size.pow(3))
+            .map(|n| phi([centre(n % size), centre(n / size % size), centre(n / size / size)]))
+            .collect();
+        Volume::new(grid, level_set, [0, 1, 2].map(|axis| vec![0.0; grid.faces(axis)])).unwrap()
+    }
+
+    /// Every edge is in as many quads one way as the other.
+    fn assert_closed(surface: &Surface) {
+        let mut edges: Vec<[u32; 2]> =
+            surface.quads.iter().flat_map(|q| (0..4).map(move |k| [q[k], q[(k + 1) % 4]])).collect();
+        let mut reversed: Vec<[u32; 2]> = edges.iter().map(|[a, b]| [*b, *a]).collect();
+        edges.sort_unstable();
+        reversed.sort_unstable();
+        assert_eq!(edges, reversed);
+    }
+
+    #[test]
+    fn a_ball_is_closed_round_and_faces_outwards() {
+        let surface = zero_level(&volume(24, |p| length(p) - 0.6));
+        assert_closed(&surface);
+        assert!(surface.points.iter().all(|p| (length(*p) - 0.6).abs() < 0.02));
+        for [a, b, c, _] in &surface.quads {
+            let [a, b, c] = [a, b, c].map(|k| surface.points[*k as usize]);
+            assert!(dot(cross(sub(b, a), sub(c, a)), a) > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_full_grid_is_closed_at_its_border() {
+        let surface = zero_level(&volume(2, |_| -0.5));
+        assert_closed(&surface);
+        assert_eq!(surface.quads.len(), 24);
+        assert!(surface.points.iter().flatten().all(|x| x.abs() <= 1.0 + 1e-6));
+    }
+
+    #[test]
+    fn air_has_no_surface_and_nan_is_air() {
+        assert!(zero_level(&volume(4, |_| 1.0)).quads.is_empty());
+        assert!(zero_level(&volume(4, |_| f32::NAN)).quads.is_empty());
+    }
+
+    #[test]
+    fn speed_is_the_mean_of_a_cells_faces() {
+        let grid = Grid { origin: [0.0; 3], cell: 1.0, size: [1; 3] };
+        let volume = Volume::new(grid, vec![-1.0], [vec![2.0, 4.0], vec![4.0, 4.0], vec![0.0, 0.0]]).unwrap();
+        assert_eq!(speed(&volume, [0; 3]), 5.0);
+    }
+}

@@ -1,0 +1,178 @@
+//! From the stage to the screen and back: a camera's perspective, or the parallel view of a light.
+//!
+//! The stage is the scene moved and scaled so that its bounds have their centre at 0 and half a diagonal of 1: all that
+//! follows works with numbers near 1, whatever the scene's own scale. The screen is pixels, x right, y down, and a
+//! *nearness* that is linear on the screen and greater for what is nearer: 1/z in perspective, −z in parallel.
+
+use crate::camera::{Bounds, Camera, proper};
+use crate::vector::{V3, add, dot, length, scale, sub};
+
+/// Nothing nearer to a perspective eye than this is drawn, stage units: a thousandth of half the scene's diagonal.
+pub(crate) const NEAR: f32 = 1e-3;
+
+/// How the scene lies on the stage.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stage {
+    centre: [f64; 3],
+    /// Metres a stage unit.
+    size: f64,
+}
+
+impl Stage {
+    pub(crate) fn of(bounds: Bounds) -> Self {
+        let [low, high] = proper(bounds);
+        Self { centre: scale(add(low, high), 0.5), size: length(sub(high, low)) * 0.5 }
+    }
+
+    /// A position in metres, on the stage; not finite where it was not.
+    pub(crate) fn place(&self, p: V3) -> V3 {
+        scale(sub(p.map(f64::from), self.centre), 1.0 / self.size).map(|x| x as f32)
+    }
+
+    /// A length in metres, on the stage; 0 where it is negative or not finite.
+    pub(crate) fn length(&self, metres: f32) -> f32 {
+        let length = (f64::from(metres) / self.size) as f32;
+        if length.is_finite() { length.max(0.0) } else { 0.0 }
+    }
+}
+
+/// How lengths shrink with distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Lens {
+    Perspective,
+    Parallel,
+}
+
+/// Where the stage is seen from.
+#[derive(Clone, Debug)]
+pub(crate) struct View {
+    eye: V3,
+    /// Right, up, forward.
+    axes: [V3; 3],
+    /// Pixel of the view's axis.
+    middle: [f32; 2],
+    /// Pixels a stage unit, at distance 1 in perspective.
+    zoom: f32,
+    lens: Lens,
+}
+
+impl View {
+    /// What `camera` sees of the stage in a picture of `width` × `height` pixels.
+    pub(crate) fn perspective(camera: &Camera, stage: &Stage, width: usize, height: usize) -> Self {
+        Self {
+            eye: scale(sub(camera.eye(), stage.centre), 1.0 / stage.size).map(|x| x as f32),
+            axes: camera.axes().map(|axis| axis.map(|x| x as f32)),
+            middle: [width as f32 / 2.0, height as f32 / 2.0],
+            zoom: (height as f64 / 2.0 / camera.half_tangent()) as f32,
+            lens: Lens::Perspective,
+        }
+    }
+
+    /// What lies within `half` of `eye` sideways, on `size` × `size` pixels, seen along `axes[2]`.
+    pub(crate) fn parallel(eye: V3, axes: [V3; 3], half: f32, size: usize) -> Self {
+        let middle = size as f32 / 2.0;
+        Self { eye, axes, middle: [middle; 2], zoom: middle / half, lens: Lens::Parallel }
+    }
+
+    pub(crate) fn eye(&self) -> V3 {
+        self.eye
+    }
+
+    /// Right, up, forward.
+    pub(crate) fn axes(&self) -> [V3; 3] {
+        self.axes
+    }
+
+    /// Along the view, stage units.
+    pub(crate) fn distance(&self, p: V3) -> f32 {
+        dot(self.axes[2], sub(p, self.eye))
+    }
+
+    /// Whether a perspective eye is too near to `p`, or past it.
+    pub(crate) fn is_behind(&self, p: V3) -> bool {
+        self.lens == Lens::Perspective && self.distance(p) < NEAR
+    }
+
+    /// x, y in pixels and nearness; of no meaning where [`View::is_behind`].
+    pub(crate) fn project(&self, p: V3) -> V3 {
+        let [x, y, z] = self.axes.map(|axis| dot(axis, sub(p, self.eye)));
+        let (shrink, nearness) = match self.lens {
+            Lens::Perspective => (1.0 / z, 1.0 / z),
+            Lens::Parallel => (1.0, -z),
+        };
+        [self.middle[0] + self.zoom * shrink * x, self.middle[1] - self.zoom * shrink * y, nearness]
+    }
+
+    /// Where on the stage a point of the screen is: the inverse of [`View::project`].
+    pub(crate) fn unproject(&self, [x, y, nearness]: V3) -> V3 {
+        let z = match self.lens {
+            Lens::Perspective => 1.0 / nearness,
+            Lens::Parallel => -nearness,
+        };
+        let side = match self.lens {
+            Lens::Perspective => z / self.zoom,
+            Lens::Parallel => 1.0 / self.zoom,
+        };
+        let at = [(x - self.middle[0]) * side, (self.middle[1] - y) * side, z];
+        (0..3).fold(self.eye, |p, k| add(p, scale(self.axes[k], at[k])))
+    }
+
+    /// Pixels of a stage length at `p`.
+    pub(crate) fn pixels(&self, p: V3, length: f32) -> f32 {
+        match self.lens {
+            Lens::Perspective => length * self.zoom / self.distance(p).max(NEAR),
+            Lens::Parallel => length * self.zoom,
+        }
+    }
+
+    /// How much nearer than `p` a point `length` before it is.
+    pub(crate) fn nearer(&self, p: V3, length: f32) -> f32 {
+        match self.lens {
+            Lens::Perspective => {
+                let z = self.distance(p).max(NEAR);
+                1.0 / (z - length).max(z * 0.5) - 1.0 / z
+            }
+            Lens::Parallel => length,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn head_on() -> (Stage, View) {
+        let stage = Stage::of([[-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]);
+        let camera = Camera::new([0.0, 0.0, 10.0], [0.0; 3], [0.0, 1.0, 0.0], 90.0).unwrap();
+        (stage, View::perspective(&camera, &stage, 200, 100))
+    }
+
+    #[test]
+    fn at_ninety_degrees_half_the_height_is_seen_at_its_own_distance() {
+        let (stage, view) = head_on();
+        let [x, y, _] = view.project(stage.place([5.0, 10.0, 0.0]));
+        assert!((x - 125.0).abs() < 1e-3 && y.abs() < 1e-3, "{x} {y}");
+        assert!(view.project(stage.place([0.0, 0.0, 1.0]))[2] > view.project(stage.place([0.0; 3]))[2]);
+        assert!(view.is_behind(stage.place([0.0, 0.0, 11.0])));
+    }
+
+    #[test]
+    fn unprojecting_undoes_projecting() {
+        let (stage, view) = head_on();
+        let lamp = View::parallel([0.0, 1.0, 0.0], view.axes(), 2.0, 64);
+        for view in [view, lamp] {
+            let p = stage.place([1.0, 2.0, -3.0]);
+            let back = view.unproject(view.project(p));
+            assert!(length(sub(p, back)) < 1e-4, "{p:?} {back:?}");
+        }
+    }
+
+    #[test]
+    fn the_stage_is_the_same_at_any_scale() {
+        for scale in [1e-3_f32, 1.0, 1e3] {
+            let stage = Stage::of([[0.0; 3], [2.0 * scale, 0.0, 0.0]]);
+            assert_eq!(stage.place([2.0 * scale, scale, 0.0]), [1.0, 1.0, 0.0]);
+            assert_eq!(stage.length(f32::NAN), 0.0);
+        }
+    }
+}

@@ -1,0 +1,286 @@
+#!/usr/bin/env python3
+"""Checks .usda and .usdc files against the json frames of the same cook, with USD's own library.
+
+    usd_check.py [--frames DIR] FILE...      needs usd-core and numpy
+    usd_check.py --bpy FILE...               needs bpy: opens each file in Blender
+
+A file NAME.usdc is compared with DIR/NAME.*.json (beside it by default), as `convect cook --format json` writes them;
+there a float may also be a string of its eight hexadecimal digits. What is checked: the file opens; every validator of
+UsdValidation is silent; stage, prims, types, interpolations and sample times are as the layout says; every value comes
+back bit for bit (from text a NaN only as a NaN); extents are those that USD computes; nothing is printed to stderr.
+Each file is read in a process of its own. Exit code 0 means that all of it holds.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+KINDS = {"curves": "BasisCurves", "mesh": "Mesh", "points": "Points", "tets": "TetMesh"}
+TOKENS = {
+    "curves": {"type": "linear", "wrap": "nonperiodic"},
+    "mesh": {"subdivisionScheme": "none"},
+    "points": {},
+    "tets": {},
+}
+TABLES = {"point_attributes": "vertex", "element_attributes": "uniform", "attributes": "constant"}
+TYPES = {
+    "points": "point3f[]",
+    "velocities": "vector3f[]",
+    "normals": "normal3f[]",
+    "widths": "float[]",
+    "ids": "int64[]",
+    "extent": "float3[]",
+    "curveVertexCounts": "int[]",
+    "faceVertexCounts": "int[]",
+    "faceVertexIndices": "int[]",
+    "tetVertexIndices": "int4[]",
+    "surfaceFaceVertexIndices": "int3[]",
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=Path, help="where the json frames lie")
+    parser.add_argument("--bpy", action="store_true", help="open in Blender instead")
+    parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    args = parser.parse_args()
+    if args.here:
+        check = open_in_blender if args.bpy else check_file
+        faults = check(args.files[0], args.frames or args.files[0].parent)
+        print("\n".join(faults))
+        return bool(faults)
+    return any([report(file, args) for file in args.files])
+
+
+def report(file, args):
+    """Checks one file in a process of its own and prints the verdict; whether it failed."""
+    command = [sys.executable, __file__, "--here", file] + (["--bpy"] if args.bpy else [])
+    command += ["--frames", args.frames] if args.frames else []
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    faults = [line for line in done.stdout.splitlines() if line]
+    faults += [f"stderr: {line}" for line in done.stderr.splitlines()]
+    if args.bpy:
+        faults = [line for line in faults if re.search("warn|error|fault:|traceback|cannot", line, re.I)]
+    if done.returncode and not faults:
+        faults = [f"ended with {done.returncode}"]
+    print(f"{file}: {'ok' if not faults else f'{len(faults)} faults'}")
+    print("".join(f"  {fault}\n" for fault in faults[:20]), end="")
+    return bool(faults)
+
+
+def open_in_blender(file, _):
+    """Imports the file and evaluates three of its frames; Blender prints what it does not like."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.usd_import(filepath=str(file.resolve()))
+    first, last = bpy.context.scene.frame_start, bpy.context.scene.frame_end
+    graph = bpy.context.evaluated_depsgraph_get()
+    for frame in sorted({first, (first + last) // 2, last}):
+        bpy.context.scene.frame_set(frame)
+        for thing in bpy.data.objects:
+            if thing.type != "EMPTY":
+                len(thing.evaluated_get(graph).data.attributes)
+    return []
+
+
+def check_file(file, folder):
+    """Every fault of the file as a line."""
+    from pxr import Usd, UsdGeom, UsdValidation
+
+    frames = [json.loads(path.read_text()) for path in sorted(folder.glob(f"{file.stem}.*.json"))]
+    frames.sort(key=lambda frame: frame["frame"])
+    stage = Usd.Stage.Open(str(file))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    faults = [
+        f"{error.GetName()}: {error.GetMessage()}"
+        for error in UsdValidation.ValidationContext(validators).Validate(stage)
+    ]
+    root = stage.GetDefaultPrim()
+    name = re.sub("^(?=[0-9]|$)", "_", re.sub("[^A-Za-z0-9_]", "_", file.stem))
+    kinds = [kind for kind in KINDS if any(kind in frame for frame in frames)]
+    times = [float(frame["frame"]) for frame in frames]
+    layer = stage.GetRootLayer()
+    facts = {
+        "default prim": (root.GetName(), name),
+        "root type": (root.GetTypeName(), "Xform"),
+        "metersPerUnit": (UsdGeom.GetStageMetersPerUnit(stage), 1.0),
+        "upAxis": (UsdGeom.GetStageUpAxis(stage), "Y"),
+        "framesPerSecond": (stage.GetFramesPerSecond(), stage.GetTimeCodesPerSecond()),
+        "startTimeCode": (layer.startTimeCode if times else 0, times[0] if times else 0),
+        "endTimeCode": (layer.endTimeCode if times else 0, times[-1] if times else 0),
+        "prims": ([prim.GetName() for prim in root.GetChildren()], kinds),
+    }
+    for frame in frames:
+        if frame.get("time") and frame["frame"]:
+            fps = frame["frame"] / frame["time"]
+            facts["timeCodesPerSecond"] = (round(stage.GetTimeCodesPerSecond(), 3), round(fps, 3))
+    faults += [f"{fact} is {found}, expected {expected}" for fact, (found, expected) in facts.items() if found != expected]
+    lossy_nan = file.suffix == ".usda"
+    for kind in kinds:
+        faults += check_prim(root.GetChild(kind), kind, [frame.get(kind) for frame in frames], times, lossy_nan)
+    return faults
+
+
+def check_prim(prim, kind, parts, times, lossy_nan):
+    """Every fault of a prim; `parts` are its component in each frame, or None."""
+    from pxr import UsdGeom
+
+    where = prim.GetPath()
+    if prim.GetTypeName() != KINDS[kind]:
+        yield f"{where} is a {prim.GetTypeName()}, expected {KINDS[kind]}"
+    attributes = {attribute.GetName(): attribute for attribute in prim.GetAuthoredAttributes()}
+    for name, value in TOKENS[kind].items():
+        if attributes[name].Get() != value:
+            yield f"{where}.{name} is {attributes[name].Get()}, expected {value}"
+    wanted = {}
+    for place, part in enumerate(parts):
+        for key, values in expected_values(kind, part or {}):
+            wanted.setdefault(key, [None] * len(parts))[place] = values
+    found = {}
+    for name, attribute in attributes.items():
+        if name not in TOKENS[kind]:
+            found[source_of(kind, attribute)] = attribute
+    derived = {("extent", None)} | ({("surfaceFaceVertexIndices", None)} if kind == "tets" else set())
+    if set(wanted) | derived != set(found):
+        yield f"{where} has {sorted(map(str, found))}, expected {sorted(map(str, set(wanted) | derived))}"
+        return
+    for key, attribute in found.items():
+        samples = attribute.GetTimeSamples()
+        if samples and samples != times:
+            yield f"{attribute.GetPath()} has samples at {samples}, expected {times}"
+        if key not in derived:
+            yield from check_values(attribute, key, wanted[key], parts, times, lossy_nan)
+    moving = {bool(found[key].GetTimeSamples()) for key in [("P", "vertex"), ("v", "vertex")] if key in found}
+    if len(moving) > 1:
+        yield f"{where}: of points and velocities only one is sampled"
+    for time, part in zip(times, parts):
+        computed = UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), time)
+        if not same(found["extent", None].Get(time), computed, True):
+            yield f"{where}.extent at {time} is {found['extent', None].Get(time)}, expected {computed}"
+        if kind == "tets" and part and part["indices"]:
+            tets = UsdGeom.TetMesh(prim)
+            surface = rotated(found["surfaceFaceVertexIndices", None].Get(time))
+            computed = rotated(UsdGeom.TetMesh.ComputeSurfaceFaces(tets, time))
+            if surface != computed:
+                yield f"{where}: the surface at {time} is {surface}, expected {computed}"
+
+
+def expected_values(kind, part):
+    """(name, interpolation) and values of everything a component has."""
+    for array in ("counts", "indices"):
+        if array in part:
+            yield (array, None), part[array]
+    if "points" in part:
+        yield ("P", "vertex"), part["points"]
+    for table, interpolation in TABLES.items():
+        for name, values in part.get(table, {}).items():
+            yield (name, interpolation), values
+
+
+def source_of(kind, attribute):
+    """Name and interpolation in the json form of what became this attribute."""
+    from pxr import UsdGeom
+
+    schema = {"points": "P", "velocities": "v", "normals": "N", "widths": "width", "ids": "id"}
+    counts = {
+        "curveVertexCounts": "counts",
+        "faceVertexCounts": "counts",
+        "faceVertexIndices": "indices",
+        "tetVertexIndices": "indices",
+    }
+    name = attribute.GetName()
+    if not name.startswith("primvars:"):
+        return (schema[name], "vertex") if name in schema else (counts.get(name, name), None)
+    own = attribute.GetDisplayName() or name.removeprefix("primvars:")
+    if own == name.removeprefix("primvars:") and kind == "curves" and own == "id":
+        raise SystemExit("fault: Blender drops a primvar called id on curves")
+    return own, UsdGeom.Primvar(attribute).GetInterpolation()
+
+
+def check_values(attribute, key, wanted, parts, times, lossy_nan):
+    """Every fault of an attribute's type, interpolation and values."""
+    from pxr import UsdGeom
+
+    where, (name, interpolation) = attribute.GetPath(), key
+    kind = attribute.GetTypeName()
+    example = next((values for values in wanted if values), None)
+    schema = TYPES.get(attribute.GetName())
+    expected = schema or (type_of(name, example) if example else str(kind))
+    if kind != expected:
+        yield f"{where} is {kind}, expected {expected}"
+    is_primvar = attribute.GetName().startswith("primvars:") or attribute.GetName() in ("widths", "normals")
+    if is_primvar and attribute.GetMetadata("interpolation") != interpolation:
+        yield f"{where} is {attribute.GetMetadata('interpolation')}, expected {interpolation}"
+    primvar = UsdGeom.Primvar(attribute)
+    if primvar and primvar.IsIndexed():
+        yield f"{where} is indexed"
+    for time, values, part in zip(times, wanted, parts):
+        value = attribute.Get(time)
+        if values is None and (part is not None or interpolation == "constant"):
+            if value is not None:
+                yield f"{where} at {time} is {short(value)}, expected no value"
+        elif value is None or not same(value, array_of(values or [], kind), lossy_nan):
+            yield f"{where} at {time} is {short(value)}, expected {short(values or [])}"
+
+
+def type_of(name, values):
+    """USD type of a primvar with such values."""
+    row = values[0]
+    width = len(row) if isinstance(row, list) else 1
+    number = row[0] if isinstance(row, list) else row
+    if isinstance(number, int):
+        return {1: "int[]", 3: "int3[]", 4: "int4[]"}[width]
+    named = {"Pref": "point3f[]", "P": "point3f[]", "v": "vector3f[]", "N": "normal3f[]", "orient": "quatf[]"}
+    return named.get(name) or {1: "float[]", 3: "float3[]", 4: "color4f[]"}[width]
+
+
+def array_of(values, kind):
+    """Json values as numpy sees an array of that USD type."""
+    import numpy as np
+
+    if str(kind).startswith("int"):
+        return np.array(values, dtype=np.int64 if kind == "int64[]" else np.int32)
+    flat = values if not values or not isinstance(values[0], list) else [x for row in values for x in row]
+    if flat and isinstance(flat[0], str):
+        array = np.array([int(bits, 16) for bits in flat], dtype=np.uint32).view(np.float32)
+    else:
+        array = np.array(flat, dtype=np.float64).astype(np.float32)
+    return array.reshape(len(values), -1) if flat is not values else array
+
+
+def same(value, expected, any_nan):
+    """Whether both have the same type and bits; with `any_nan` one NaN is as good as another."""
+    import numpy as np
+
+    value, expected = np.array(value), np.array(expected)
+    if value.size == 0 and expected.size == 0:
+        return value.dtype == expected.dtype
+    if value.dtype != expected.dtype or value.shape != expected.shape:
+        return False
+    if any_nan and value.dtype == np.float32:
+        value, expected = (np.where(np.isnan(x), np.float32(np.nan), x) for x in (value, expected))
+    return value.tobytes() == expected.tobytes()
+
+
+def rotated(faces):
+    """Faces as a set, each from its least corner on."""
+    def least_first(face):
+        face = list(face)
+        start = face.index(min(face))
+        return tuple(face[start:] + face[:start])
+
+    return {least_first(face) for face in faces}
+
+
+def short(value):
+    text = str(value)
+    return text if len(text) < 200 else text[:200] + "…"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
