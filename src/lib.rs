@@ -1,1 +1,28 @@
-//! 
+//! convect: evaluates node graphs that make geometry move, and writes geometry that any other program opens.
+//!
+//! This crate is the program: the catalogue of all nodes, and a file a verb. The engine knows no node; the nodes know no
+//! file but those they read; what writes files is here and in `formats`.
+
+pub mod args;
+pub mod check;
+pub mod completions;
+pub mod cook;
+pub mod explain;
+pub mod failure;
+pub mod load;
+pub mod nodes;
+pub mod output;
+pub mod pictures;
+pub mod report;
+
+use engine::graph::Catalogue;
+use engine::node::Node;
+
+/// All nodes: the families' lists, joined.
+pub static CATALOGUE: Catalogue = Catalogue(FAMILIES);
+
+static FAMILIES: &[&[&Node]] = &[
+    geometry::NODES,
+    #[cfg(feature = "wind")]
+    wind::NODES,
+];

@@ -1,1 +1,63 @@
-fn main(){}
+//! The command line: its verbs, and how it ends.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use convect::failure::{Exit, Failure};
+use convect::{check, completions, cook, explain, nodes};
+
+/// Cooks node graphs that make geometry move: wind on fur and grass, soft dough, viscous sauces.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true, max_term_width = 100)]
+enum Verb {
+    /// Cook a graph and write its outputs
+    Cook(cook::Args),
+    /// Find all that is wrong with a graph, without cooking it
+    Check(check::Args),
+    /// Show what a cook would do: which nodes, how often, and what is left out and why
+    Explain(explain::Args),
+    /// List the nodes, or show the help of one
+    Nodes(nodes::Args),
+    /// Print completions for a shell
+    Completions(completions::Args),
+}
+
+fn main() -> ExitCode {
+    quiet_panics();
+    let verb = match Verb::try_parse() {
+        Ok(verb) => verb,
+        Err(error) => {
+            // Help and version are answers, all else is a wrong command line.
+            let exit = if error.use_stderr() { Exit::CommandLine } else { Exit::Done };
+            let _ = error.print();
+            return exit.into();
+        }
+    };
+    let result = std::panic::catch_unwind(|| run(&verb)).unwrap_or_else(|_| {
+        Err(Failure::new(Exit::Cook, "convect failed unexpectedly; this is a fault of convect, please report it"))
+    });
+    match result {
+        Ok(()) => Exit::Done.into(),
+        Err(failure) => {
+            failure.lines.iter().for_each(|line| eprintln!("{line}"));
+            failure.exit.into()
+        }
+    }
+}
+
+fn run(verb: &Verb) -> Result<(), Failure> {
+    match verb {
+        Verb::Cook(args) => cook::run(args),
+        Verb::Check(args) => check::run(args),
+        Verb::Explain(args) => explain::run(args),
+        Verb::Nodes(args) => nodes::run(args),
+        Verb::Completions(args) => completions::run::<Verb>(args),
+    }
+}
+
+/// A node's panic becomes an error that names node and frame; where in the code it was is told only to who asks.
+fn quiet_panics() {
+    if std::env::var_os("RUST_BACKTRACE").is_none() {
+        std::panic::set_hook(Box::new(|_| {}));
+    }
+}

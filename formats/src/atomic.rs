@@ -24,7 +24,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Starts a file that will be `path`, in a folder that is there. A file of that name stays as it is until the commit.
+    /// Starts a file that will be `path`, in a folder that is there. A file of that name stays until the commit.
     ///
     /// # Errors
     /// Where `path` is something other than a file, or its folder cannot be written to.

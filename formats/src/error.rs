@@ -120,7 +120,9 @@ impl FormatError {
             }
             Self::CannotHold { kind, .. } => Some(format!("formats that can: {}", names(&Format::holding([*kind])))),
             Self::NotFinite { .. } => Some("a NaN or infinity comes from the node that made this attribute".into()),
-            Self::TypesDiffer { .. } => Some("use json, write the components to files of their own, or rename one".into()),
+            Self::TypesDiffer { .. } => {
+                Some("use json, write the components to files of their own, or rename one".into())
+            }
             _ => None,
         }
     }

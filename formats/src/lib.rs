@@ -50,12 +50,7 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<Geometry, FormatError> {
 /// # Errors
 /// Where the format cannot hold a component or keeps all frames in one file (see [`usd`]), where a number is not
 /// finite, or where the bytes cannot be written.
-pub fn write(
-    format: Format,
-    geometry: &Geometry,
-    stamp: &FrameStamp,
-    sink: &mut dyn Write,
-) -> Result<(), FormatError> {
+pub fn write(format: Format, geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let FrameStamp { frame, seconds } = *stamp;
     if !(frame.is_finite() && seconds.is_finite()) {
         return Err(FormatError::Stamp { frame, seconds });
@@ -82,9 +77,11 @@ fn all_finite(geometry: &Geometry) -> Result<(), FormatError> {
     }
     if let Some(volume) = geometry.volume() {
         let once = volume.once().iter().map(|(name, column)| (name.clone(), column.first_not_finite()));
-        let fields = json::volume_fields(volume)
-            .map(|(name, field)| (name.into(), field.iter().position(|x| !x.is_finite())));
-        if let Some((name, Some(row))) = fields.into_iter().chain(once).find(|(_, row)| row.is_some()) {
+        let grid = volume.grid();
+        let numbers: [(&str, &[f32]); 2] = [("origin", &grid.origin), ("cell", &[grid.cell])];
+        let fields = numbers.into_iter().chain(json::volume_fields(volume));
+        let fields = fields.map(|(name, field)| (name.into(), field.iter().position(|x| !x.is_finite())));
+        if let Some((name, Some(row))) = fields.chain(once).find(|(_, row)| row.is_some()) {
             return Err(FormatError::NotFinite { kind: Kind::Volume, name, row });
         }
     }

@@ -71,7 +71,9 @@ mod tests {
             out.finish().unwrap();
             String::from_utf8(bytes).unwrap()
         };
-        for (x, expected) in [(0.1, "0.1"), (1.0, "1.0"), (-0.0, "-0.0"), (16_777_216.0, "16777216.0"), (1e-45, "1e-45")] {
+        for (x, expected) in
+            [(0.1, "0.1"), (1.0, "1.0"), (-0.0, "-0.0"), (16_777_216.0, "16777216.0"), (1e-45, "1e-45")]
+        {
             assert_eq!(text(x), expected);
         }
         assert_eq!(text(f32::MAX), "3.4028235e+38");

@@ -37,7 +37,11 @@ pub(crate) fn opened(format: Format, bytes: &[u8]) -> Result<&[u8], FormatError>
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let fact = |what: &str| format!("this is {what}, expected {format}");
     if bytes.is_empty() {
-        return Err(FormatError::with_hint(Place::File, "the file is empty", "write it again: nothing reached the disk"));
+        return Err(FormatError::with_hint(
+            Place::File,
+            "the file is empty",
+            "write it again: nothing reached the disk",
+        ));
     }
     if let Some((_, what, hint)) = FOREIGN.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
         return Err(FormatError::with_hint(Place::File, fact(what), hint));

@@ -15,10 +15,9 @@ pub const VARIABLE: &str = "CONVECT_SIMD";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path(Level);
 
-/// Which of the copies of a kernel a path runs.
+/// Which of the copies of a kernel a path runs, narrowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[doc(hidden)]
-pub enum Level {
+pub(crate) enum Level {
     /// What every CPU of the build's target has: SSE2, or NEON.
     Baseline,
     /// Eight lanes: AVX2.
@@ -88,8 +87,8 @@ impl Path {
         }
     }
 
-    #[doc(hidden)]
-    pub fn level(self) -> Level {
+    /// Which copy of a kernel it runs.
+    pub(crate) fn level(self) -> Level {
         self.0
     }
 }

@@ -60,7 +60,7 @@ fn reduce(x: f32) -> (f32, u32) {
     let quarters = rounded - ROUND;
     let r = (x - quarters * HIGH) - quarters * LOW;
     // Far out the difference is noise; a NaN or an infinity stays one.
-    let r = if x > FARTHEST || x < -FARTHEST { x - x } else { r };
+    let r = if x.abs() > FARTHEST { x * 0.0 } else { r };
     let r = if r > 1.0 { 1.0 } else { r };
     let r = if r < -1.0 { -1.0 } else { r };
     (r as f32, rounded.to_bits() as u32)
@@ -82,7 +82,7 @@ fn quadrant(r: f32, quarters: u32) -> (f32, f32) {
 #[inline(always)]
 fn small_sin_cos(r: f32) -> (f32, f32) {
     let z = r * r;
-    let sine = ((-1.951_528_3e-4 * z + 8.332_160_8e-3) * z - 1.666_665_5e-1) * z;
+    let sine = ((-1.951_528_3e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z;
     let cosine = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z;
     (r + r * sine, 1.0 - (0.5 * z - cosine))
 }

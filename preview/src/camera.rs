@@ -12,7 +12,7 @@ use crate::vector::{add, cross, dot, length, scale, sub, unit};
 /// Vertical angle of view where none is given, degrees: near what the eye takes in at a glance, so without distortion.
 const FOV: f64 = 30.0;
 /// What [`Camera::fit`] leaves free around the box, as a share of half the picture.
-const MARGIN: f64 = 0.12;
+const MARGIN: f64 = 0.08;
 /// From the target to the eye in [`Camera::fit`]: three-quarter view from the front right, a little from above.
 const THREE_QUARTER: [f64; 3] = [0.52, 0.30, 0.80];
 
@@ -255,10 +255,7 @@ mod tests {
             error("eye=0,0,1 target=0,0,1"),
             "`eye` and `target` are both [0.0, 0.0, 1.0], which gives no direction to look in"
         );
-        assert_eq!(
-            error("eye=inf,0,1 target=0,0,1"),
-            "`eye` is `inf,0,1`, expected three finite numbers like `1,2,3`"
-        );
+        assert_eq!(error("eye=inf,0,1 target=0,0,1"), "`eye` is `inf,0,1`, expected three finite numbers like `1,2,3`");
     }
 
     #[test]

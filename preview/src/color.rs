@@ -121,7 +121,9 @@ impl Paint {
         match painted {
             Some((Owner::Point, colors)) => Self::Points(colors),
             Some((Owner::Element, colors)) => Self::Elements(colors),
-            Some((Owner::Once, colors)) => Self::Points(vec![colors.first().copied().unwrap_or(plain); part.point_count()]),
+            Some((Owner::Once, colors)) => {
+                Self::Points(vec![colors.first().copied().unwrap_or(plain); part.point_count()])
+            }
             None => Self::Plain(if color_by.is_some() { WITHOUT } else { plain }),
         }
     }
@@ -253,13 +255,18 @@ mod tests {
     #[test]
     fn the_ends_of_the_range_are_the_ends_of_the_map() {
         let mut part = Component::points(vec![[0.0; 3]; 4]);
-        part.set_column(Owner::Point, "v", Column::new(vec![[3.0, 4.0, 0.0], [0.0; 3], [f32::NAN; 3], [9e9, 0.0, 0.0]])).unwrap();
+        part.set_column(
+            Owner::Point,
+            "v",
+            Column::new(vec![[3.0, 4.0, 0.0], [0.0; 3], [f32::NAN; 3], [9e9, 0.0, 0.0]]),
+        )
+        .unwrap();
         let Paint::Points(colors) = Paint::of(&part, Some(("v", [0.0, 5.0])), [0.5; 3]) else { panic!() };
         assert_eq!(colors[0], mapped(1.0));
         assert_eq!(colors[1], mapped(0.0));
         assert_eq!(colors[2], NOT_A_NUMBER);
         assert_eq!(colors[3], mapped(1.0));
-        assert_eq!(share(3.0e38, [-3.4e38, 3.4e38]) , (1.5e38_f32 + 1.7e38) / 3.4e38);
+        assert_eq!(share(3.0e38, [-3.4e38, 3.4e38]), (1.5e38_f32 + 1.7e38) / 3.4e38);
     }
 
     #[test]

@@ -1,1 +1,129 @@
-//! Previews.
+//! Pictures of geometry, drawn by a small z-buffer rasteriser of our own: no GPU, no window.
+//!
+//! Curves have width and are shaded along their tangent, meshes and the skins of tets are lit, points are balls, volumes
+//! show their zero level; an attribute can be the colour. [`render`] draws one panel; [`side_by_side`] and
+//! [`contact_sheet`] join panels; [`Image::write_png`] writes. For a sequence give every frame the same
+//! [`Settings::bounds`] (the [`union`] of [`bounds`]) and [`Settings::range`].
+//!
+//! Promise: the same bits on any number of threads and any CPU; no panic and no endless work on any geometry. Limit: a
+//! preview, not a renderer: no textures, no transparency but of what is thinner than a pixel.
+
+mod camera;
+mod color;
+mod ground;
+mod image;
+mod light;
+mod picture;
+mod raster;
+mod scene;
+mod shape;
+mod text;
+mod vector;
+mod view;
+
+use engine::geometry::Geometry;
+
+pub use camera::{Bounds, Camera, CameraError};
+pub use color::{attribute_names, attribute_range, color_map};
+pub use image::{Image, contact_sheet, side_by_side};
+pub use picture::render;
+pub use scene::{bounds, union};
+pub use shape::triangulate::triangulate;
+
+/// A geometry in a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer<'a> {
+    /// What the label calls it: an output's name.
+    pub name: &'a str,
+    /// What is drawn.
+    pub geometry: &'a Geometry,
+    /// Linear light 0…1, where no attribute colours it; each kind of component has its own default.
+    pub color: Option<[f32; 3]>,
+}
+
+impl<'a> Layer<'a> {
+    /// A layer in default colours.
+    pub fn new(name: &'a str, geometry: &'a Geometry) -> Self {
+        Self { name, geometry, color: None }
+    }
+}
+
+/// How a panel is drawn. Lengths in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Where from; [`Camera::fit`] around the bounds else.
+    pub camera: Option<Camera>,
+    /// What the camera frames, the floor lies under and the light reaches; the layers' own bounds else.
+    pub bounds: Option<Bounds>,
+    /// Attribute that gives the colour: a number, a vector by its length, or a colour by its name (`Cd`, `color`,
+    /// `displayColor`). What has it not is grey. Without it such a colour attribute is drawn where there is one.
+    pub color_by: Option<String>,
+    /// Values at the ends of the colour map; the layers' [`attribute_range`] else.
+    pub range: Option<[f32; 2]>,
+    /// Width of all curves, whatever their `width` says.
+    pub curve_width: Option<f32>,
+    /// Diameter of all points, whatever their `width` says.
+    pub point_width: Option<f32>,
+    /// The backdrop where it is brightest, sRGB.
+    pub background: [u8; 3],
+    /// Whether a floor under the bounds takes shadows.
+    pub ground: bool,
+    /// Text in the upper left: the output's name, the frame.
+    pub label: Option<String>,
+    /// Whether a bar explains the colours of `color_by`.
+    pub legend: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 960,
+            height: 720,
+            camera: None,
+            bounds: None,
+            color_by: None,
+            range: None,
+            curve_width: None,
+            point_width: None,
+            background: [232, 230, 226],
+            ground: true,
+            label: None,
+            legend: true,
+        }
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No pixel, or too many.
+    #[error("the picture is {width} × {height} pixels, expected 1 to {most} in all", most = Image::MOST_PIXELS)]
+    Size {
+        /// Pixels across.
+        width: usize,
+        /// Pixels down.
+        height: usize,
+    },
+    /// A sheet without a picture or a column.
+    #[error("a sheet of {panels} pictures in {columns} columns, expected at least 1 of each")]
+    EmptySheet {
+        /// Pictures given.
+        panels: usize,
+        /// Columns asked for.
+        columns: usize,
+    },
+    /// The file could not be written.
+    #[error("the picture could not be written: {0}")]
+    Write(#[source] std::io::Error),
+}
+
+impl From<png::EncodingError> for Error {
+    fn from(error: png::EncodingError) -> Self {
+        Self::Write(error.into())
+    }
+}

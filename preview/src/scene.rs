@@ -58,20 +58,22 @@ pub(crate) struct Scene {
     pub(crate) dots: Vec<Dot>,
 }
 
-/// Colours of what nothing else paints, linear light: clay, putty, honey, brown hair, water.
+/// Colours of what nothing else paints, linear light: clay, dark skin where curves may grow on it, putty, honey, brown
+/// hair, water.
 const MESH: V3 = [0.50, 0.45, 0.39];
+const SKIN: V3 = [0.21, 0.135, 0.09];
 const TETS: V3 = [0.62, 0.46, 0.28];
-const VOLUME: V3 = [0.72, 0.34, 0.06];
-const CURVES: V3 = [0.43, 0.215, 0.085];
+const VOLUME: V3 = [0.58, 0.24, 0.035];
+const CURVES: V3 = [0.50, 0.26, 0.105];
 const POINTS: V3 = [0.12, 0.32, 0.60];
 
 /// Width of a curve that has none, as a share of half the scene's diagonal: hair on an animal that fills the picture.
-const CURVE_WIDTH: f32 = 0.004;
+const CURVE_WIDTH: f32 = 0.0035;
 /// Width of such a curve at its tip, as a share of its width at the root.
 const TIP: f32 = 0.3;
 /// Diameter of a point that has none, as a share of the distance points of that number have in half the scene's
 /// diagonal; and the least and greatest, so that one point is no moon and a million are more than dust.
-const POINT_WIDTH: f32 = 1.4;
+const POINT_WIDTH: f32 = 1.1;
 const POINT_WIDTHS: [f32; 2] = [0.004, 0.06];
 /// Light at the root of a strand, as a share of the light at its tip: neighbours shade it there.
 const ROOT: f32 = 0.5;
@@ -104,9 +106,7 @@ pub fn bounds(layers: &[Layer<'_>]) -> Option<Bounds> {
 /// The least box around both.
 pub fn union(a: Option<Bounds>, b: Option<Bounds>) -> Option<Bounds> {
     match (a, b) {
-        (Some([a, b]), Some([c, d])) => {
-            Some([[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))])
-        }
+        (Some([a, b]), Some([c, d])) => Some([[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))]),
         (one, other) => one.or(other),
     }
 }
@@ -116,11 +116,12 @@ impl Scene {
     pub(crate) fn of(layers: &[Layer<'_>], settings: &Settings, range: [f32; 2], stage: &Stage) -> Self {
         let color_by = settings.color_by.as_deref().map(|name| (name, range));
         let mut scene = Self::default();
+        let mesh_color = if layers.iter().any(|layer| layer.geometry.curves().is_some()) { SKIN } else { MESH };
         for layer in layers {
             let plain = |default: V3| layer.color.unwrap_or(default);
             let paint = |part: &Component, default| Paint::of(part, color_by, plain(default));
             if let Some(part) = layer.geometry.mesh() {
-                scene.mesh(part, &paint(part, MESH), stage);
+                scene.mesh(part, &paint(part, mesh_color), stage);
             }
             if let Some(part) = layer.geometry.tets() {
                 let (skin, tets): (Vec<_>, Vec<_>) = boundary::boundary(part.tet_corners()).into_iter().unzip();
@@ -146,7 +147,9 @@ impl Scene {
             .flat_map_iter(|face| {
                 let corners = faces.face(face);
                 let at: Vec<V3> = corners.iter().map(|k| part.positions()[*k as usize]).collect();
-                triangulate::triangulate(&at).into_iter().map(move |ear| (ear.map(|k| corners[k as usize]), face as u32))
+                triangulate::triangulate(&at)
+                    .into_iter()
+                    .map(move |ear| (ear.map(|k| corners[k as usize]), face as u32))
             })
             .unzip();
         self.surface(&place(part.positions(), stage), &triangles, &elements, paint);

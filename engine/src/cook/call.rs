@@ -136,7 +136,7 @@ fn check_kinds(output: &str, kinds: &[Kind], geometry: &Geometry) -> Result<()> 
 }
 
 /// Refuses NaN and infinity in arrays that no input holds: those were checked where they were made.
-fn check_finite(geometry: &Geometry, known: &[usize]) -> Result<()> {
+pub(super) fn check_finite(geometry: &Geometry, known: &[usize]) -> Result<()> {
     for part in geometry.parts() {
         for (owner, name, column) in part.columns() {
             if known.binary_search(&column.address()).is_ok() {

@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use crate::graph::Scene;
 use crate::node::History;
 use crate::param::Params;
 use crate::plan::Resolver;
@@ -20,18 +21,26 @@ pub(crate) fn gauss_points(a: f64, b: f64) -> [f64; 4] {
     GAUSS.map(|(x, _)| 0.5 * (a + b) + 0.5 * (b - a) * x)
 }
 
+/// The first frame whose params integrals see: time 0, or the scene's start where that is earlier. Before it they are
+/// taken to have held, so that what started earlier moves too, and no key hangs on a past without end.
+pub(crate) fn history_start(scene: &Scene) -> i64 {
+    scene.first.min(0)
+}
+
 /// One node's integral.
 pub(crate) struct Integral<'a> {
     resolver: &'a Resolver,
     integrand: fn(&Params) -> [f64; 3],
     fps: f64,
+    since: Frame,
     /// Sums over whole frames from frame 0, forwards and backwards, grown on demand in frame order.
     sums: [Mutex<Vec<[f64; 3]>>; 2],
 }
 
 impl<'a> Integral<'a> {
-    pub(crate) fn new(resolver: &'a Resolver, integrand: fn(&Params) -> [f64; 3], fps: f64) -> Self {
-        Self { resolver, integrand, fps, sums: Default::default() }
+    pub(crate) fn new(resolver: &'a Resolver, integrand: fn(&Params) -> [f64; 3], scene: &Scene) -> Self {
+        let since = Frame::whole(history_start(scene));
+        Self { resolver, integrand, fps: scene.fps, since, sums: Default::default() }
     }
 
     /// ∫ from frame `a` to frame `b`, in the integrand's unit × frames.
@@ -55,6 +64,11 @@ impl History for Integral<'_> {
     fn integral(&self, upto: Frame) -> [f64; 3] {
         if !self.resolver.history_is_animated() {
             return self.value(upto.number()).map(|x| x * upto.seconds(self.fps));
+        }
+        if upto < self.since {
+            let (seen, held) = (self.integral(self.since), self.value(self.since.number()));
+            let before = upto.seconds(self.fps) - self.since.seconds(self.fps);
+            return std::array::from_fn(|axis| seen[axis] + held[axis] * before);
         }
         let backwards = upto.ticks() < 0;
         let sign = if backwards { -1.0 } else { 1.0 };

@@ -13,13 +13,14 @@ mod history;
 mod report;
 mod store;
 mod sweep;
+mod verify;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use disk::DiskCache;
-pub(crate) use history::gauss_points;
+pub(crate) use history::{gauss_points, history_start};
 pub use report::{NodeReport, Report};
 
 use crate::error::Error;
@@ -151,6 +152,11 @@ impl Engine {
             Err(Stopped::Asked(error)) => Err(error),
             Err(Stopped::Sink(_) | Stopped::Cache(_)) => unreachable!("a rehearsal delivers nothing"),
         }
+    }
+
+    /// Threads that cook.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
     }
 
     /// The files this engine has read.

@@ -101,6 +101,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         dry: bool,
     ) -> Self {
         let count = plan.graph.nodes.len();
+        // Geometry that a program gives has a key in this plan alone, so nothing of it may outlive the cook.
+        let given = plan.graph.nodes.iter().any(|node| matches!(node.body, Body::Given { .. }));
+        let disk = disk.filter(|_| !given && !dry);
         let maps = || (0..count).map(|_| BTreeMap::new()).collect::<Vec<_>>();
         let nodes = plan.graph.nodes.iter().zip(&plan.nodes).enumerate().map(|(place, (node, planned))| NodeReport {
             id: Some(node.id.clone()),
@@ -113,7 +116,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         });
         let integrals = plan.graph.nodes.iter().zip(&plan.nodes).map(|(node, planned)| {
             let integrand = node.node().and_then(|node| node.integrand);
-            integrand.map(|integrand| Integral::new(&planned.resolver, integrand, plan.graph.scene.fps))
+            integrand.map(|integrand| Integral::new(&planned.resolver, integrand, &plan.graph.scene))
         });
         let integrals = integrals.collect();
         let mut report = Report { nodes: nodes.collect(), ..Report::default() };
@@ -142,7 +145,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let watch = Stopwatch::start();
         let frames = self.plan.request.frames.clone();
         let chains = self.plan.graph.nodes.iter().zip(&self.plan.nodes).any(|(node, planned)| {
-            planned.needed && node.node().is_some_and(|node| matches!(node.cook, Cook::Window(..) | Cook::Solver(..)))
+            planned.needed && node.node().is_some_and(|node| node.cook.is_chain())
         });
         let mut rest = frames.as_slice();
         while let Some(first) = rest.first() {
@@ -265,12 +268,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         deliver::differs(output, self.plan.graph.nodes[node].node(), self.plan.nodes[node].has_solver)
     }
 
-    /// The key of a finished frame; `None` where a param is refused there, or the program gives geometry.
+    /// The key of a finished frame; `None` where a param is refused there.
     fn output_key(&mut self, output: usize, frame: Frame) -> Option<Key> {
         let graph = self.plan.graph;
-        if graph.nodes.iter().any(|node| matches!(node.body, Body::Given { .. })) {
-            return None;
-        }
         let asked = &graph.outputs[output];
         let mut hasher = Hasher::default();
         hasher.tag(20).i64(asked.from.port as i64).i64(i64::from(asked.v));
@@ -399,7 +399,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 }
             }
             Cook::Window(..) | Cook::Solver(..) => {
-                for whole in neighbours(frame) {
+                for whole in self.plan.neighbours(frame) {
                     // An error of the stretch came out as the error of the spot before.
                     let Ok(stretch) = self.keys.stretch(node, whole) else { return };
                     let whole = whole.max(stretch.start);
@@ -447,8 +447,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let Ok(params) = plan.nodes[node].resolver.at(at) else { return };
         for (input, links) in declared.inputs.iter().zip(inputs) {
             let times = (input.spec().times)(&params);
-            if times.now || (starts && (times.start || times.steps > 0)) {
+            if times.now || (starts && times.steps > 0) {
                 self.need_all(slice, links, at);
+            }
+            if times.start && starts {
+                self.need_all(slice, links, plan.start_of(declared, at));
             }
             if times.steps > 0 && !starts {
                 for sample in plan.step_samples(links, times.steps, at) {
@@ -465,7 +468,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         }
         self.running[node].remove(&stretch);
         let Some(Cook::Solver(_, solver)) = self.plan.graph.nodes[node].node().map(|node| node.cook) else { return };
-        let Some(disk) = self.disk.as_ref().filter(|_| !self.dry) else { return };
+        let Some(disk) = self.disk.as_ref() else { return };
         for at in (stretch.start..=frame).rev() {
             let Ok(key) = self.keys.state_key(node, stretch, at) else { continue };
             let state = disk.checkpoint(key).and_then(|bytes| (solver.load)(&bytes));
@@ -527,7 +530,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let declared = match &self.plan.graph.nodes[node].body {
             Body::Given { at, .. } => {
                 for frame in need {
-                    self.results[node].insert(frame, Ok(Arc::from([Arc::new(at(frame))])));
+                    let outcome = match self.dry {
+                        true => Ok(Arc::from([Arc::default()])),
+                        false => self.given(node, frame, at(frame)),
+                    };
+                    self.results[node].insert(frame, outcome);
                     self.report.nodes[node].cooks += 1;
                 }
                 return Ok(());
@@ -537,16 +544,22 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         match declared.cook {
             Cook::Pure(cook) => self.cook_frames(node, declared, &need, |cx| cook(cx)),
             Cook::Frame { cook, .. } => self.cook_frames(node, declared, &need, cook),
-            Cook::Window(chain, _) => {
-                self.move_chain(node, declared, chain, None, advance)?;
-                self.finish_chain(node, &need);
-            }
-            Cook::Solver(chain, solver) => {
-                self.move_chain(node, declared, chain, Some(solver), advance)?;
-                self.finish_chain(node, &need);
-            }
+            Cook::Window(chain, _) => self.move_chain(node, declared, chain, None, advance)?,
+            Cook::Solver(chain, solver) => self.move_chain(node, declared, chain, Some(solver), advance)?,
+        }
+        // Cancelled on its way, a chain has not been everywhere.
+        if declared.cook.is_chain() && !self.cancelled() {
+            self.finish_chain(node, &need);
         }
         Ok(())
+    }
+
+    /// What a program gave, refused where it is not finite: no node need ask.
+    fn given(&self, node: usize, frame: Frame, geometry: Geometry) -> Outcome {
+        match super::call::check_finite(&geometry, &[]) {
+            Ok(()) => Ok(Arc::from([Arc::new(geometry)])),
+            Err(error) => Err(Arc::new(self.plan.error(node, frame, error))),
+        }
     }
 
     /// Cooks a pure or frame node: each key once, all in parallel.
@@ -633,7 +646,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         params: &Params,
         reading: Reading,
     ) -> Result<Vec<(&'static str, InputData)>, Arc<CookError>> {
-        let start = if reading == Reading::Start { frame } else { self.plan.graph.scene.start() };
+        let start = match reading {
+            Reading::Start => self.plan.start_of(declared, frame),
+            Reading::Step | Reading::Frame => self.plan.graph.scene.start(),
+        };
         let mut inputs = Vec::with_capacity(declared.inputs.len());
         for (place, input) in declared.inputs.iter().enumerate() {
             let spec = input.spec();
@@ -663,7 +679,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
 
     /// Whether this reads for the output of a chain, which has seen its start long ago.
     fn is_chain(&self, declared: &Node, reading: Reading) -> bool {
-        reading == Reading::Frame && matches!(declared.cook, Cook::Window(..) | Cook::Solver(..))
+        reading == Reading::Frame && declared.cook.is_chain()
     }
 
     fn wires(&self, links: &[Link], frame: Frame) -> Result<Vec<Arc<Geometry>>, Arc<CookError>> {
@@ -721,7 +737,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         solver: Option<SolverFns>,
         state: Option<&StateBox>,
     ) -> std::io::Result<()> {
-        let (Some(solver), Some(state), false) = (solver, state, self.dry) else { return Ok(()) };
+        let (Some(solver), Some(state)) = (solver, state) else { return Ok(()) };
         let Some(disk) = self.disk.as_mut() else { return Ok(()) };
         let Ok(key) = self.keys.state_key(node, stretch, frame) else { return Ok(()) };
         match (solver.save)(state) {
@@ -815,7 +831,8 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             let outcome = if frame.is_whole() {
                 whole(floor, self)
             } else {
-                let near: Result<Vec<Cooked>, _> = (-1..=2).map(|k| whole(floor + k, self)).collect();
+                let near = self.plan.neighbours(*frame).into_iter();
+                let near: Result<Vec<Cooked>, _> = near.map(|frame| whole(frame, self)).collect();
                 let share = (frame.ticks() - frame.floor().ticks()) as f32 / Frame::TICKS as f32;
                 near.map(|near| match self.dry {
                     true => near[1].clone(),
@@ -912,10 +929,4 @@ enum Reading {
     Start,
     /// A chain's step.
     Step,
-}
-
-/// The whole frames a chain must know for `frame`: itself, or two neighbours each way.
-fn neighbours(frame: Frame) -> Vec<i64> {
-    let floor = frame.floor_number();
-    if frame.is_whole() { vec![floor] } else { vec![floor - 1, floor, floor + 1, floor + 2] }
 }

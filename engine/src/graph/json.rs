@@ -28,9 +28,15 @@ pub(super) struct Entry<'a> {
     pub(super) json: Json<'a>,
 }
 
+/// `1 number`, `2 numbers`.
+pub(super) fn counted(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
 /// The path of member `name` of what stands at `path`.
 pub(super) fn member_path(path: &str, name: &str) -> String {
-    match (is_name(name), path.is_empty()) {
+    // A dollar sign starts `$schema` and reads well as it is.
+    match (is_name(name.strip_prefix('$').unwrap_or(name)), path.is_empty()) {
         (true, true) => name.to_owned(),
         (true, false) => format!("{path}.{name}"),
         (false, _) => format!("{path}[\"{}\"]", shown(name)),
@@ -111,7 +117,9 @@ impl<'a> Json<'a> {
     pub(super) fn unexpected(&self, expected: &str) -> Fault {
         let fault = self.fault(code::WRONG_KIND, format!("found {}, expected {expected}", self.found()));
         match self.value {
-            Value::NullKeyword(_) => fault.hint("leave the key out where nothing is to be set"),
+            Value::NullKeyword(_) if !self.path.ends_with(']') => {
+                fault.hint("leave the key out where nothing is to be set")
+            }
             _ => fault,
         }
     }
@@ -124,11 +132,8 @@ impl<'a> Json<'a> {
             Value::BooleanLit(word) => format!("`{}`", word.value),
             Value::NullKeyword(_) => "`null`".into(),
             Value::Object(_) => "an object".into(),
-            Value::Array(list) => match list.elements.len() {
-                0 => "an empty list".into(),
-                1 => "a list of 1 item".into(),
-                count => format!("a list of {count} items"),
-            },
+            Value::Array(list) if list.elements.is_empty() => "an empty list".into(),
+            Value::Array(list) => format!("a list of {}", counted(list.elements.len(), "item")),
         }
     }
 
@@ -157,6 +162,11 @@ impl<'a> Json<'a> {
             }
         }
         Ok(entries)
+    }
+
+    /// Whether it is an object.
+    pub(super) fn is_object(&self) -> bool {
+        matches!(self.value, Value::Object(_))
     }
 
     /// The values of a list.
@@ -239,6 +249,12 @@ pub(super) fn refuse_unknown(entries: &[Entry<'_>], known: &[&str], what: &str, 
         let hint = did_you_mean(entry.name, known.iter().copied(), what);
         faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_KEY, fact) });
     }
+}
+
+/// Whether a key that is not known is most likely meant to be `key`, so that there is no need to say that it is missing.
+pub(super) fn is_misspelt<'k>(entries: &[Entry<'_>], known: impl Iterator<Item = &'k str> + Clone, key: &str) -> bool {
+    let unknown = entries.iter().filter(|entry| !known.clone().any(|known| known == entry.name));
+    unknown.into_iter().any(|entry| nearest(entry.name, known.clone()) == Some(key))
 }
 
 /// The value of the entry of that name.

@@ -5,14 +5,15 @@ pub mod fault;
 mod json;
 mod load;
 mod places;
+mod schema;
 mod syntax;
 mod text;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::geometry::{Geometry, Name};
-use crate::node::Node;
+use crate::geometry::{Geometry, Kind, Name};
+use crate::node::{Carries, Node, Output};
 use crate::param::{Clock, ParamSpec, Source};
 use crate::time::Frame;
 
@@ -20,6 +21,7 @@ pub use catalogue::Catalogue;
 pub use fault::{Fault, FaultClass};
 pub use load::{FileProbe, probe};
 pub use places::{Part, Places};
+pub use schema::schema;
 
 /// What holds for the whole graph.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +116,7 @@ pub struct GraphOutput {
 }
 
 /// A graph that was checked: ids and names are unique, wires fit and make no cycle, params are in range.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Graph {
     /// What holds for the whole.
     pub scene: Scene,
@@ -126,6 +128,36 @@ pub struct Graph {
     pub folder: PathBuf,
     /// Where its parts stand in the file.
     pub places: Places,
+}
+
+impl Graph {
+    /// The components that come out at an output of a node, as its declaration says; nothing of given geometry.
+    pub fn carries(&self, link: Link) -> Vec<Kind> {
+        let mut carried: Vec<Vec<Vec<Kind>>> = Vec::with_capacity(link.node + 1);
+        for node in &self.nodes[..=link.node] {
+            let outputs = node.node().map_or(&[][..], |declared| declared.outputs);
+            let of_input = |name: &str| {
+                let inputs = node.node().map_or(&[][..], |declared| declared.inputs);
+                let place = inputs.iter().position(|input| input.spec().name == name);
+                let links = place.map_or(&[][..], |place| &node.inputs()[place]);
+                let mut kinds: Vec<Kind> =
+                    links.iter().flat_map(|link| carried[link.node][link.port].clone()).collect();
+                kinds.sort_unstable();
+                kinds.dedup();
+                kinds
+            };
+            carried.push(if node.node().is_none() {
+                vec![Vec::new()]
+            } else {
+                let carries = |output: &&Output| match output.carries {
+                    Carries::Kinds(kinds) => kinds.to_vec(),
+                    Carries::Like(input) | Carries::Union(input) => of_input(input),
+                };
+                outputs.iter().map(carries).collect()
+            });
+        }
+        carried.swap_remove(link.node).swap_remove(link.port)
+    }
 }
 
 impl GraphNode {
@@ -150,3 +182,6 @@ impl GraphNode {
         self.node().map_or("given", |node| node.name)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,6 +13,9 @@ use super::text::Text;
 /// Deepest nesting of lists and objects. A graph needs eight.
 pub(super) const DEEPEST: usize = 64;
 
+/// What other languages call numbers that are not finite.
+const NOT_FINITE: [&str; 5] = ["NaN", "nan", "Infinity", "inf", "Inf"];
+
 const STRICT: ParseOptions = ParseOptions {
     allow_comments: true,
     allow_trailing_commas: true,
@@ -33,12 +36,17 @@ const STRICT: ParseOptions = ParseOptions {
 pub(super) fn parse<'a>(text: &'a Text<'_>) -> Result<Value<'a>, Fault> {
     let end = brackets(text)?;
     let parsed = parse_to_ast(text.content, &CollectOptions::default(), &STRICT);
-    match parsed.map_err(|error| explain(text, &error)) {
-        // What the parser stumbles over before the end is the cause; an open bracket at the end may only follow from it.
-        Err((offset, fault)) if offset < text.content.trim_end().len() || end.is_none() => Err(fault),
-        Err((_, fault)) => Err(end.unwrap_or(fault)),
-        Ok(parsed) => parsed.value.ok_or_else(|| nothing(text)),
+    match (parsed, end) {
+        (Ok(parsed), _) => parsed.value.ok_or_else(|| nothing(text)),
+        (Err(error), Some(end)) if ends_early(text, &error) => Err(end),
+        (Err(error), _) => Err(explain(text, &error)),
     }
+}
+
+/// Whether the parser missed only the rest of the text: what it stumbles over before the end is a cause of its own.
+fn ends_early(text: &Text<'_>, error: &ParseError) -> bool {
+    matches!(error.kind(), ParseErrorKind::UnterminatedArray | ParseErrorKind::UnterminatedObject)
+        || error.range().start >= text.content.trim_end().len()
 }
 
 fn nothing(text: &Text<'_>) -> Fault {
@@ -131,19 +139,18 @@ fn truncated(text: &Text<'_>, what: &str, start: usize) -> Fault {
     text.fault(text.content.trim_end().len(), "", code::TRUNCATED, fact).hint("is the rest missing?")
 }
 
-/// What the parser stumbled over, in our words, and at which byte.
-fn explain(text: &Text<'_>, error: &ParseError) -> (usize, Fault) {
+/// What the parser stumbled over, in our words.
+fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
     use ParseErrorKind as K;
     let start = error.range().start;
     let rest = &text.content[start..];
     let word = word(rest);
+    let is_word = matches!(error.kind(), K::UnexpectedWord | K::UnexpectedToken) && !word.is_empty();
     let (fact, hint): (String, Option<&str>) = match error.kind() {
-        K::UnexpectedWord | K::NonFiniteNumbersNotAllowed
-            if matches!(word.trim_start_matches('-'), "NaN" | "Infinity" | "inf" | "nan") =>
-        {
-            (format!("`{word}` is not a number that a graph can hold"), Some("expected a finite number"))
+        _ if NOT_FINITE.contains(&word.trim_start_matches(['-', '+'])) => {
+            (format!("`{word}` is no number that a graph can hold"), Some("expected a finite number"))
         }
-        K::UnexpectedWord => (format!("found `{word}`, expected a value"), Some(r#"a text stands between `"`"#)),
+        _ if is_word => (format!("found `{word}`, expected a value"), Some(r#"a text stands between `"`"#)),
         K::SingleQuotedStringsNotAllowed => {
             ("found `'`, expected a value or a key".into(), Some(r#"a text stands between `"`"#))
         }
@@ -179,13 +186,10 @@ fn explain(text: &Text<'_>, error: &ParseError) -> (usize, Fault) {
         _ => (format!("found `{}`, which is not JSON", rest.chars().next().unwrap_or(' ').escape_debug()), None),
     };
     let fault = text.fault(start, "", code::SYNTAX, fact);
-    let fault = match (text.set, error.kind()) {
-        (Some(key), K::UnexpectedWord) => {
-            fault.hint(format!(r#"a text needs quotes that the shell leaves: '{key}="{word}"'"#))
-        }
+    match text.set {
+        Some(key) if is_word => fault.hint(format!(r#"a text needs quotes that the shell leaves: '{key}="{word}"'"#)),
         _ => Fault { hint: hint.map(Into::into), ..fault },
-    };
-    (start, fault)
+    }
 }
 
 fn string_fact(kind: &ParseStringErrorKind) -> &'static str {
@@ -226,8 +230,8 @@ mod tests {
             ("[5.]", "1:2: a number has no digit on one side of its point; write 0.5 and 5.0, not .5 and 5."),
             ("[01]", "1:3: a number has a leading zero; write it without the zero"),
             ("[1 2]", "1:3: expected `,`"),
-            ("[NaN]", "1:2: `NaN` is not a number that a graph can hold; expected a finite number"),
-            ("[-Infinity]", "1:2: `-Infinity` is not a number that a graph can hold; expected a finite number"),
+            ("[NaN]", "1:2: `NaN` is no number that a graph can hold; expected a finite number"),
+            ("[-Infinity]", "1:2: `-Infinity` is no number that a graph can hold; expected a finite number"),
             (r#"["\x41"]"#, r"1:3: a text has a `\` that starts nothing known; `\` itself is written `\\`"),
             (r#"["\ud800"]"#, r"1:3: a `\u` is half of a surrogate pair; `\` itself is written `\\`"),
             (

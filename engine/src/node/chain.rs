@@ -35,7 +35,7 @@ pub trait Solver: Chain + Serialize + DeserializeOwned {}
 impl<S: Chain + Serialize + DeserializeOwned> Solver for S {}
 
 /// A state of any type.
-pub type StateBox = Box<dyn Any + Send + Sync>;
+pub(crate) type StateBox = Box<dyn Any + Send + Sync>;
 
 /// A chain's functions, its state's type erased.
 #[derive(Clone, Copy)]

@@ -148,12 +148,16 @@ impl FrameCx<'_> {
         self.origin
     }
 
-    /// ∫ of the node's integrand from time 0 to `upto`, in its unit × seconds. Exact where the params it reads are
-    /// constant, else 4-point Gauss a whole frame plus the fraction, summed in frame order; so any frame cooks alone.
+    /// ∫ of the node's integrand from time 0 to `upto`, in its unit × seconds; `upto` lies in the past of the frame that
+    /// is cooked, or is that frame. Exact where the params it reads are constant, else 4-point Gauss a whole frame plus
+    /// the fraction, summed in frame order; so any frame cooks alone. Before the scene's start (or time 0, where that is
+    /// earlier) the params are taken to have held.
     ///
     /// # Panics
-    /// Where the node declares no integrand.
+    /// Where the node declares no integrand, or asks for the future, which its key does not know.
     pub fn integral(&self, upto: Frame) -> [f64; 3] {
+        let now = self.frame.max(Frame::whole(0));
+        assert!(upto <= now, "it asks for an integral up to frame {upto}, which is after frame {now}");
         self.history.unwrap_or_else(|| panic!("it asks for an integral and declares no integrand")).integral(upto)
     }
 }

@@ -43,6 +43,11 @@ impl Cook {
             Self::Solver(..) => "solver",
         }
     }
+
+    /// Whether it has a state that moves from frame to frame.
+    pub(crate) fn is_chain(&self) -> bool {
+        matches!(self, Self::Window(..) | Self::Solver(..))
+    }
 }
 
 /// An attribute whatever its type.
@@ -138,6 +143,8 @@ pub struct Node {
     pub metrics: &'static [&'static Metric],
     /// Stages that cannot matter, given params and wires.
     pub leaves_out: Option<fn(&Params, &Wires) -> Vec<LeftOut>>,
+    /// What is wrong with the params together, beyond their ranges; asked before anything cooks.
+    pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integral`] integrates over time; reads only params declared [`crate::param::Param::history`].
     pub integrand: Option<fn(&Params) -> [f64; 3]>,
 }
@@ -159,6 +166,7 @@ impl Node {
             changes_topology: false,
             metrics: &[],
             leaves_out: None,
+            checks: None,
             integrand: None,
         }
     }
@@ -223,6 +231,13 @@ impl Node {
     #[must_use]
     pub const fn leaves_out(mut self, leaves_out: fn(&Params, &Wires) -> Vec<LeftOut>) -> Self {
         self.leaves_out = Some(leaves_out);
+        self
+    }
+
+    /// What is wrong with the params together.
+    #[must_use]
+    pub const fn checks(mut self, checks: fn(&Params) -> crate::Result<()>) -> Self {
+        self.checks = Some(checks);
         self
     }
 

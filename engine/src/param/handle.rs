@@ -20,6 +20,8 @@ pub trait ParamType: Clone + 'static {
     fn erase(default: Self::Default) -> Value;
     /// The typed value; `None` where the value is of another type.
     fn typed(value: &Value) -> Option<Self>;
+    /// The value of a typed value.
+    fn value(self) -> Value;
 }
 
 /// A typed handle: written once, as a constant, through [`crate::params!`].
@@ -121,7 +123,7 @@ impl<T: ParamType> Param<T> {
 }
 
 macro_rules! types {
-    ($($t:ty, $default:ty, $shape:expr, $erase:expr, $value:pat => $typed:expr;)*) => {$(
+    ($($t:ty, $default:ty, $shape:expr, $erase:expr, $value:pat => $typed:expr, $back:expr;)*) => {$(
         impl ParamType for $t {
             type Default = $default;
             fn shape() -> Shape { $shape }
@@ -129,36 +131,69 @@ macro_rules! types {
             fn typed(value: &Value) -> Option<Self> {
                 match value { $value => Some($typed), _ => None }
             }
+            fn value(self) -> Value { ($back)(self) }
         }
     )*};
 }
 
 types! {
-    f64, f64, Shape::Float, Value::Float, Value::Float(x) => *x;
-    f32, f32, Shape::Float, |x: f32| Value::Float(shortest(x)), Value::Float(x) => *x as f32;
-    i64, i64, Shape::Int, Value::Int, Value::Int(i) => *i;
-    bool, bool, Shape::Bool, Value::Bool, Value::Bool(b) => *b;
-    [f32; 2], [f32; 2], Shape::Vec2, |v: [f32; 2]| Value::Vec2(v.map(shortest)), Value::Vec2(v) => v.map(|x| x as f32);
-    [f32; 3], [f32; 3], Shape::Vec3, |v: [f32; 3]| Value::Vec3(v.map(shortest)), Value::Vec3(v) => v.map(|x| x as f32);
-    [f64; 3], [f64; 3], Shape::Vec3, Value::Vec3, Value::Vec3(v) => *v;
-    [i64; 3], [i64; 3], Shape::Int3, Value::Int3, Value::Int3(v) => *v;
+    f64, f64, Shape::Float, Value::Float, Value::Float(x) => *x, Value::Float;
+    f32, f32, Shape::Float, |x: f32| Value::Float(shortest(x)), Value::Float(x) => *x as f32,
+        |x: f32| Value::Float(shortest(x));
+    i64, i64, Shape::Int, Value::Int, Value::Int(i) => *i, Value::Int;
+    bool, bool, Shape::Bool, Value::Bool, Value::Bool(b) => *b, Value::Bool;
+    [f32; 2], [f32; 2], Shape::Vec2, |v: [f32; 2]| Value::Vec2(v.map(shortest)), Value::Vec2(v) => v.map(|x| x as f32),
+        |v: [f32; 2]| Value::Vec2(v.map(shortest));
+    [f32; 3], [f32; 3], Shape::Vec3, |v: [f32; 3]| Value::Vec3(v.map(shortest)), Value::Vec3(v) => v.map(|x| x as f32),
+        |v: [f32; 3]| Value::Vec3(v.map(shortest));
+    [f64; 3], [f64; 3], Shape::Vec3, Value::Vec3, Value::Vec3(v) => *v, Value::Vec3;
+    [i64; 3], [i64; 3], Shape::Int3, Value::Int3, Value::Int3(v) => *v, Value::Int3;
     Span, [f32; 2], Shape::Span, |v: [f32; 2]| Value::Span(v.map(shortest)),
-        Value::Span(v) => Span { low: v[0] as f32, high: v[1] as f32 };
-    Turn, (), Shape::Turn, |()| Value::Turn([0.0, 0.0, 0.0, 1.0]), Value::Turn(q) => Turn(*q);
-    Seed, i64, Shape::Seed, Value::Int, Value::Int(seed) => Seed(*seed as u32);
-    Name, &'static str, Shape::Text, |text: &str| Value::Text(text.into()), Value::Text(text) => text.clone();
+        Value::Span(v) => Span { low: v[0] as f32, high: v[1] as f32 },
+        |span: Self| Value::Span([span.low, span.high].map(shortest));
+    Turn, (), Shape::Turn, |()| Value::Turn([0.0, 0.0, 0.0, 1.0]), Value::Turn(q) => Turn(*q),
+        |turn: Self| Value::Turn(turn.0);
+    Seed, i64, Shape::Seed, Value::Int, Value::Int(seed) => Seed(*seed as u32),
+        |seed: Self| Value::Int(i64::from(seed.0));
+    Name, &'static str, Shape::Text, |text: &str| Value::Text(text.into()), Value::Text(text) => text.clone(),
+        Value::Text;
     Arc<Vec<Name>>, &'static [&'static str], Shape::Texts,
         |texts: &[&str]| Value::Texts(Arc::new(texts.iter().map(|text| (*text).into()).collect())),
-        Value::Texts(texts) => texts.clone();
-    Option<File>, (), Shape::File, |()| Value::File(None), Value::File(file) => file.clone();
+        Value::Texts(texts) => texts.clone(), Value::Texts;
+    Option<File>, (), Shape::File, |()| Value::File(None), Value::File(file) => file.clone(), Value::File;
     Masked, f32, Shape::Masked, |x: f32| Value::Masked(shortest(x), None),
-        Value::Masked(x, attribute) => Masked { value: *x as f32, attribute: attribute.clone() };
+        Value::Masked(x, attribute) => Masked { value: *x as f32, attribute: attribute.clone() },
+        |masked: Self| Value::Masked(shortest(masked.value), masked.attribute);
     Arc<Ramp>, RampDefault, Shape::Ramp, |ramp: RampDefault| Value::Ramp(Arc::new(ramp.build())),
-        Value::Ramp(ramp) => ramp.clone();
-    Arc<Vec<[f32; 3]>>, (), Shape::Vec3s, |()| Value::Vec3s(Arc::default()), Value::Vec3s(rows) => rows.clone();
-    Arc<Vec<i32>>, (), Shape::Ints, |()| Value::Ints(Arc::default()), Value::Ints(rows) => rows.clone();
-    Arc<Vec<[u32; 4]>>, (), Shape::Tets, |()| Value::Tets(Arc::default()), Value::Tets(rows) => rows.clone();
-    Arc<Vec<(Name, Column)>>, (), Shape::Columns, |()| Value::Columns(Arc::default()), Value::Columns(c) => c.clone();
+        Value::Ramp(ramp) => ramp.clone(), Value::Ramp;
+    Arc<Vec<[f32; 3]>>, (), Shape::Vec3s, |()| Value::Vec3s(Arc::default()), Value::Vec3s(rows) => rows.clone(),
+        Value::Vec3s;
+    Arc<Vec<i32>>, (), Shape::Ints, |()| Value::Ints(Arc::default()), Value::Ints(rows) => rows.clone(), Value::Ints;
+    Arc<Vec<[u32; 4]>>, (), Shape::Tets, |()| Value::Tets(Arc::default()), Value::Tets(rows) => rows.clone(),
+        Value::Tets;
+    Arc<Vec<(Name, Column)>>, (), Shape::Columns, |()| Value::Columns(Arc::default()), Value::Columns(c) => c.clone(),
+        Value::Columns;
+}
+
+/// Vectors that may be left unwritten, which is not the same as an empty list.
+impl ParamType for Option<Arc<Vec<[f32; 3]>>> {
+    type Default = ();
+    fn shape() -> Shape {
+        Shape::Vec3s
+    }
+    fn erase((): ()) -> Value {
+        Value::Nothing
+    }
+    fn typed(value: &Value) -> Option<Self> {
+        match value {
+            Value::Nothing => Some(None),
+            Value::Vec3s(rows) => Some(Some(rows.clone())),
+            _ => None,
+        }
+    }
+    fn value(self) -> Value {
+        self.map_or(Value::Nothing, Value::Vec3s)
+    }
 }
 
 impl<T: Choice> ParamType for T {
@@ -174,6 +209,9 @@ impl<T: Choice> ParamType for T {
             Value::Choice(place) => T::at(*place),
             _ => None,
         }
+    }
+    fn value(self) -> Value {
+        Value::Choice(self.place())
     }
 }
 

@@ -232,7 +232,7 @@ impl ParamSpec {
         match (&self.default, self.shape) {
             (Value::Choice(place), Shape::Choice(options)) => options[*place].word.into(),
             (Value::Turn(_), _) => "[0, 0, 0]".into(),
-            (Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => "none".into(),
+            (Value::Nothing | Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => "none".into(),
             (default, _) => default.to_string(),
         }
     }

@@ -44,6 +44,8 @@ pub struct Seed(pub u32);
 /// The erased value of a param at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
+    /// Nothing was written.
+    Nothing,
     /// A number.
     Float(f64),
     /// A whole number.
@@ -86,6 +88,7 @@ impl Value {
     /// Adds this value to a key.
     pub fn hash(&self, key: &mut Hasher) {
         match self {
+            Self::Nothing => key.tag(20),
             Self::Float(x) => key.tag(1).f64(*x),
             Self::Int(i) => key.tag(2).i64(*i),
             Self::Bool(b) => key.tag(3).i64(i64::from(*b)),
@@ -131,6 +134,7 @@ impl std::fmt::Display for Value {
             write!(f, "[{}]", text.join(", "))
         }
         match self {
+            Self::Nothing => write!(f, "none"),
             Self::Float(x) => write!(f, "{x}"),
             Self::Masked(x, None) => write!(f, "{x}"),
             Self::Masked(x, Some(attribute)) => write!(f, r#"{{"value": {x}, "attribute": "{attribute}"}}"#),

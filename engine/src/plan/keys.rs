@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::Plan;
-use crate::cook::CookError;
+use crate::cook::{CookError, gauss_points, history_start};
 use crate::error::Result;
 use crate::graph::{Body, Link};
 use crate::key::{Hasher, Key};
@@ -46,7 +46,9 @@ pub(crate) struct Keys<'p, 'g> {
     spots: Vec<BTreeMap<Frame, Known>>,
     /// Keys of a chain's states: by stretch, from its start on.
     chains: Vec<BTreeMap<Stretch, Vec<std::result::Result<Key, Arc<CookError>>>>>,
+    /// Keys of what integrands were: from time 0 on, frame by frame, and before it as a whole.
     histories: Vec<Vec<Key>>,
+    before: Vec<Option<Key>>,
     windows: Vec<Option<i64>>,
     hasher: Hasher,
 }
@@ -59,6 +61,7 @@ impl<'p, 'g> Keys<'p, 'g> {
             spots: (0..nodes).map(|_| BTreeMap::new()).collect(),
             chains: (0..nodes).map(|_| BTreeMap::new()).collect(),
             histories: vec![Vec::new(); nodes],
+            before: vec![None; nodes],
             windows: vec![None; nodes],
             hasher: Hasher::default(),
         }
@@ -99,9 +102,8 @@ impl<'p, 'g> Keys<'p, 'g> {
             names.iter().fold(hasher, |hasher, name| hasher.text(name));
         };
         let (declared, links) = match &plan.graph.nodes[node].body {
-            Body::Given { at, moves } => {
-                let address = Arc::as_ptr(at).cast::<()>() as usize;
-                let hasher = self.hasher.tag(1).text(&plan.graph.nodes[node].id).i64(address as i64);
+            Body::Given { moves, .. } => {
+                let hasher = self.hasher.tag(1).i64(plan.number as i64).i64(node as i64);
                 hasher.i64(if *moves { frame.ticks() } else { 0 });
                 hash_live(&mut self.hasher);
                 return Ok(Arc::new(Spot { params: None, times: Vec::new(), key: self.hasher.finish() }));
@@ -142,18 +144,14 @@ impl<'p, 'g> Keys<'p, 'g> {
             hash_live(&mut self.hasher);
             self.hasher.finish()
         } else {
-            let stretch = self.stretch(node, frame.floor_number())?;
-            let state = self.state_key(node, stretch, frame.floor_number().max(stretch.start))?;
-            self.hasher.tag(3).key(state).i64(frame.ticks());
-            if !frame.is_whole() {
-                // Between frames a window's output hangs on its two neighbours each way.
-                for k in [-1, 1, 2] {
-                    let near = frame.floor_number() + k;
-                    let stretch = self.stretch(node, near)?;
-                    let key = self.state_key(node, stretch, near.max(stretch.start))?;
-                    self.hasher.key(key);
-                }
+            // Between frames a window's output hangs on its neighbours each way.
+            let mut states = Vec::new();
+            for near in plan.neighbours(frame) {
+                let stretch = self.stretch(node, near)?;
+                states.push(self.state_key(node, stretch, near.max(stretch.start))?);
             }
+            let hasher = self.hasher.tag(3).i64(frame.ticks());
+            states.into_iter().fold(hasher, Hasher::key);
             hash_live(&mut self.hasher);
             self.hasher.finish()
         };
@@ -181,33 +179,48 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(self.hasher.finish())
     }
 
-    /// A key of the integrand's values at all Gauss points from time 0 to `frame`, chained frame by frame.
+    /// A key of the integrand's values at the Gauss points of all that [`crate::node::FrameCx::integral`] may be asked at
+    /// `frame`: from the scene's start or time 0, whichever is earlier, to `frame`. Chained frame by frame.
     fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let integrand = declared.integrand.expect("asked for nodes with an integrand");
         let resolver = &self.plan.nodes[node].resolver;
         let value = |at: f64| resolver.evaluate(at).map(|params| integrand(&params));
-        let whole = frame.floor_number().unsigned_abs() as usize;
-        let sign = if frame.ticks() < 0 { -1.0 } else { 1.0 };
+        let over = |hasher: &mut Hasher, from: f64, to: f64| -> Result<()> {
+            for x in gauss_points(from, to) {
+                value(x)?.iter().fold(&mut *hasher, |hasher, x| hasher.f64(*x));
+            }
+            Ok(())
+        };
+        // Of its own: an integrand that is refused midway must not leave half a recipe behind.
+        let mut hasher = Hasher::default();
+        let before = match self.before[node] {
+            Some(before) => before,
+            None => {
+                let since = history_start(&self.plan.graph.scene);
+                value(since as f64)?.iter().fold(hasher.tag(5), |hasher, x| hasher.f64(*x));
+                for k in since..0 {
+                    over(&mut hasher, (k + 1) as f64, k as f64)?;
+                }
+                *self.before[node].insert(hasher.finish())
+            }
+        };
+        let whole = frame.floor_number().max(0) as usize;
         let known = &mut self.histories[node];
+        if known.is_empty() {
+            known.push(before);
+        }
         while known.len() <= whole {
             let k = known.len();
-            let hasher = self.hasher.tag(5);
-            if let Some(before) = k.checked_sub(1) {
-                hasher.key(known[before]);
-                for x in crate::cook::gauss_points(before as f64 * sign, k as f64 * sign) {
-                    value(x)?.iter().fold(&mut self.hasher, |hasher, x| hasher.f64(*x));
-                }
-            }
-            known.push(self.hasher.finish());
+            hasher.tag(6).key(known[k - 1]);
+            over(&mut hasher, (k - 1) as f64, k as f64)?;
+            known.push(hasher.finish());
         }
-        let last = known[whole];
-        self.hasher.tag(6).key(last);
+        hasher.tag(8).key(known[whole]);
         if !frame.is_whole() {
-            for x in crate::cook::gauss_points(frame.floor().number(), frame.number()) {
-                value(x)?.iter().fold(&mut self.hasher, |hasher, x| hasher.f64(*x));
-            }
+            let from = if frame.ticks() < 0 { frame.ceil() } else { frame.floor() };
+            over(&mut hasher, from.number(), frame.number())?;
         }
-        Ok(self.hasher.finish())
+        Ok(hasher.finish())
     }
 
     /// The stretch that answers for `frame` of a window or solver.
@@ -284,7 +297,7 @@ impl<'p, 'g> Keys<'p, 'g> {
                     wires.push((link.port, self.key_of(link.node, at)?));
                 }
                 if times.start && before.is_none() {
-                    wires.push((link.port, self.key_of(link.node, at)?));
+                    wires.push((link.port, self.key_of(link.node, plan.start_of(declared, at))?));
                 }
                 if times.steps > 0 {
                     let samples = match before {

@@ -59,6 +59,10 @@ fn reads(graph: &Graph, place: usize, planned: &Planned, taken: &Taken) -> Taken
             Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => {
                 reads.insert(attribute.clone());
             }
+            Source::Keys(keys, _) => reads.extend(keys.keys.iter().filter_map(|(_, value)| match value {
+                Value::Masked(_, attribute) => attribute.clone(),
+                _ => None,
+            })),
             _ => {}
         }
     }

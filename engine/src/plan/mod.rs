@@ -9,6 +9,7 @@ mod live;
 mod resolve;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 pub(crate) use keys::{Keys, Stretch};
 pub(crate) use resolve::Resolver;
@@ -18,7 +19,7 @@ use crate::error::Error;
 use crate::files::Files;
 use crate::geometry::Name;
 use crate::graph::{Body, Graph, Link};
-use crate::node::{Cook, LeftOut, Times, Wires};
+use crate::node::{Cook, LeftOut, Node, Times, Wires};
 use crate::param::Params;
 use crate::time::Frame;
 
@@ -55,6 +56,8 @@ pub(crate) struct Planned {
     pub(crate) live: Option<Vec<Name>>,
     /// Nodes that read it, each once.
     pub(crate) readers: Vec<usize>,
+    /// Whether a window or solver depends on it, so that it is asked for frame after frame.
+    pub(crate) feeds_chain: bool,
     pub(crate) resolver: Resolver,
 }
 
@@ -64,6 +67,8 @@ pub struct Plan<'g> {
     pub(crate) request: Request,
     pub(crate) nodes: Vec<Planned>,
     pub(crate) files: Arc<Files>,
+    /// Tells plans of one process apart: geometry that a program gives is known by its place in one plan alone.
+    pub(crate) number: u64,
 }
 
 impl<'g> Plan<'g> {
@@ -80,8 +85,10 @@ impl<'g> Plan<'g> {
         for (place, node) in graph.nodes.iter().enumerate() {
             let above =
                 |test: &dyn Fn(&Planned) -> bool| node.inputs().iter().flatten().any(|link| test(&nodes[link.node]));
-            let resolver = Resolver::new(node, graph, &files);
+            // What is not needed is not looked at: neither its params nor its files are anyone's business.
+            let resolver = if needed[place] { Resolver::new(node, graph, &files) } else { Resolver::idle(graph, &files) };
             let (varies, may_hold, has_solver) = match &node.body {
+                _ if !needed[place] => (false, false, false),
                 Body::Given { moves, .. } => (*moves, false, false),
                 Body::Node { node: declared, inputs, .. } => {
                     let solver = matches!(declared.cook, Cook::Solver(..));
@@ -110,6 +117,7 @@ impl<'g> Plan<'g> {
                 read_at_start: false,
                 live: None,
                 readers: Vec::new(),
+                feeds_chain: false,
                 resolver,
             });
         }
@@ -131,8 +139,15 @@ impl<'g> Plan<'g> {
                 }
             }
         }
+        for place in (0..nodes.len()).rev() {
+            let chain = |reader: usize| {
+                nodes[reader].feeds_chain || graph.nodes[reader].node().is_some_and(|node| node.cook.is_chain())
+            };
+            nodes[place].feeds_chain = nodes[place].readers.iter().any(|reader| chain(*reader));
+        }
         live::find(graph, &request, &mut nodes);
-        let plan = Self { graph, request, nodes, files };
+        static PLANS: AtomicU64 = AtomicU64::new(0);
+        let plan = Self { graph, request, nodes, files, number: PLANS.fetch_add(1, Ordering::Relaxed) };
         plan.check_sub_frames()?;
         Ok(plan)
     }
@@ -172,6 +187,24 @@ impl<'g> Plan<'g> {
     /// The frame that stands for `frame` where `node` does not vary.
     pub(crate) fn canonical(&self, node: usize, frame: Frame) -> Frame {
         if self.nodes[node].varies { frame } else { self.graph.scene.start() }
+    }
+
+    /// The frame at which a chain whose state starts at `frame` reads what it reads at the start: a solver where its
+    /// state starts, a window at the scene's start, wherever its anchors are.
+    pub(crate) fn start_of(&self, declared: &Node, frame: Frame) -> Frame {
+        if matches!(declared.cook, Cook::Window(..)) { self.graph.scene.start() } else { frame }
+    }
+
+    /// The whole frames at which a window must be known for `frame`: itself, or two neighbours each way. Inside the
+    /// scene none lies past its end, where inputs may have nothing more to give.
+    pub(crate) fn neighbours(&self, frame: Frame) -> Vec<i64> {
+        let floor = frame.floor_number();
+        if frame.is_whole() {
+            return vec![floor];
+        }
+        let last = self.graph.scene.last;
+        let after = if floor < last { last.min(floor + 2) } else { floor + 2 };
+        vec![floor - 1, floor, floor + 1, after]
     }
 
     /// The wires of an input.

@@ -23,14 +23,11 @@ pub(crate) struct Resolver {
 
 impl Resolver {
     pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
-        let (specs, sources) = match &node.body {
-            Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
-            Body::Given { .. } => (Arc::from([]), Vec::new()),
-        };
+        let Body::Node { specs, params, .. } = &node.body else { return Self::idle(graph, files) };
         let mut resolver = Self {
             log: Arc::new(ReadLog::new(specs.len())),
-            specs,
-            sources,
+            specs: specs.clone(),
+            sources: params.clone(),
             files: files.clone(),
             clock: graph.scene.clock(),
             animated: false,
@@ -46,6 +43,19 @@ impl Resolver {
             resolver.constant = Some(resolver.evaluate(start.number()));
         }
         resolver
+    }
+
+    /// The resolver of a node without params.
+    pub(crate) fn idle(graph: &Graph, files: &Arc<Files>) -> Self {
+        Self {
+            specs: Arc::from([]),
+            sources: Vec::new(),
+            log: Arc::default(),
+            files: files.clone(),
+            clock: graph.scene.clock(),
+            animated: false,
+            constant: None,
+        }
     }
 
     fn moves(&self, place: usize, params: &Params) -> bool {

@@ -15,6 +15,8 @@
 mod numbers;
 mod part;
 mod read;
+#[cfg(test)]
+mod tests;
 mod write;
 
 use engine::geometry::{Kind, Owner, Volume};

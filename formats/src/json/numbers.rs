@@ -150,7 +150,9 @@ impl<'de> Visitor<'de> for NumbersOf<'_> {
         let mut numbers = Numbers::default();
         let mut row = 0;
         while let Some(item) = items.next_element::<&RawValue>()? {
-            numbers.push_row(item.get()).map_err(|fact| A::Error::custom(format!("`{}`, row {row}: {fact}", self.0)))?;
+            numbers
+                .push_row(item.get())
+                .map_err(|fact| A::Error::custom(format!("`{}`, row {row}: {fact}", self.0)))?;
             row += 1;
         }
         Ok(numbers)

@@ -117,11 +117,7 @@ fn rows(column: &Column, out: &mut Out) -> Result<(), FormatError> {
 }
 
 /// `[a, b, …]`, as long as there are items.
-fn list<T>(
-    items: impl IntoIterator<Item = T>,
-    put: impl Fn(T, &mut Out),
-    out: &mut Out,
-) -> Result<(), FormatError> {
+fn list<T>(items: impl IntoIterator<Item = T>, put: impl Fn(T, &mut Out), out: &mut Out) -> Result<(), FormatError> {
     out.text("[");
     for (k, item) in items.into_iter().enumerate() {
         out.text(if k > 0 { ", " } else { "" });

@@ -13,6 +13,8 @@
 //! mesh without a face comes back as points.
 
 mod read;
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub(crate) use read::read;

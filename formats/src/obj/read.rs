@@ -11,9 +11,40 @@ const NONE: u32 = u32::MAX;
 
 /// Statements whose lines hold no curve, face or point.
 const IGNORED: [&[u8]; 34] = [
-    b"g", b"s", b"o", b"mg", b"usemtl", b"mtllib", b"usemap", b"maplib", b"vp", b"cstype", b"deg", b"bmat", b"step",
-    b"curv", b"curv2", b"surf", b"parm", b"trim", b"hole", b"scrv", b"sp", b"end", b"con", b"bevel", b"c_interp",
-    b"d_interp", b"lod", b"shadow_obj", b"trace_obj", b"ctech", b"stech", b"call", b"csh", b"bzp",
+    b"g",
+    b"s",
+    b"o",
+    b"mg",
+    b"usemtl",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"vp",
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"curv",
+    b"curv2",
+    b"surf",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
+    b"call",
+    b"csh",
+    b"bzp",
 ];
 
 /// The geometry of an OBJ file.
@@ -116,9 +147,9 @@ impl Statements {
                 self.normals.push(row(fields, "vn", 3)?);
                 Ok(())
             }
-            Some(b"f") => self.element(fields, |file| &mut file.faces, "a face", 3),
-            Some(b"l") => self.element(fields, |file| &mut file.curves, "a polyline", 1),
-            Some(b"p") => self.element(fields, |file| &mut file.points, "a point statement", 1),
+            Some(b"f") => self.element(fields, |file| &mut file.faces, "corner", 3),
+            Some(b"l") => self.element(fields, |file| &mut file.curves, "CV", 1),
+            Some(b"p") => self.element(fields, |file| &mut file.points, "point", 1),
             Some(word) if word.contains(&0) => Err("a NUL byte, expected text: the file is damaged or binary".into()),
             Some(word) if !IGNORED.contains(&word) => {
                 self.unknown.get_or_insert_with(|| (self.line, shown(word)));
@@ -171,7 +202,7 @@ impl Statements {
             count += 1;
         }
         if count < least {
-            return Err(format!("{what} has {}, expected at least {least}", counted(count as usize, "vertex index")));
+            return Err(format!("{}, expected at least {least}", counted(count as usize, what)));
         }
         elements(self).counts.push(count);
         Ok(())
@@ -196,7 +227,8 @@ impl Statements {
                 // Saturates at the far end of what is refused anyway.
                 _ => index.saturating_add(i64::try_from(counts[k]).unwrap_or(i64::MAX)),
             };
-            rows[k] = u32::try_from(row).ok().filter(|row| *row != NONE).ok_or_else(|| out_of_range(k, index, counts[k]))?;
+            rows[k] =
+                u32::try_from(row).ok().filter(|row| *row != NONE).ok_or_else(|| out_of_range(k, index, counts[k]))?;
             if rows[k] >= self.highest[k].0 {
                 self.highest[k] = (rows[k], self.line);
             }
@@ -217,7 +249,8 @@ impl Statements {
             let fact = format!("{word} is no statement of obj, and the file has no vertex");
             return Err(FormatError::at(Place::Line(*line), fact));
         }
-        let kinds = [&self.curves, &self.faces, &self.points].into_iter().filter(|elements| !elements.is_empty()).count();
+        let kinds =
+            [&self.curves, &self.faces, &self.points].into_iter().filter(|elements| !elements.is_empty()).count();
         let picked = |elements: &Elements| match kinds {
             0 | 1 => (0..vertices).collect(),
             _ => self.named(elements),

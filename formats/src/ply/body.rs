@@ -12,8 +12,10 @@ use crate::{FormatError, Place};
 pub(super) enum Keep {
     Nothing,
     Values,
-    /// Rows of a table with this many; anything beyond is a fault. With `with_counts` a list's lengths too.
-    Indices { rows: usize },
+    /// Rows of a table with this many; anything beyond is a fault.
+    Indices {
+        rows: usize,
+    },
 }
 
 /// What was kept of a property.
@@ -22,8 +24,12 @@ pub(super) enum Cells {
     Nothing,
     Floats(Vec<f32>),
     Wholes(Vec<i32>),
-    /// The items of all lists, and how many each has; one a row where it is no list.
-    Indices { counts: Vec<u32>, items: Vec<u32> },
+    /// The items of all lists, all below `rows`, and how many each list has; one where it is no list.
+    Indices {
+        counts: Vec<u32>,
+        items: Vec<u32>,
+        rows: usize,
+    },
 }
 
 /// The data behind a header.
@@ -109,9 +115,8 @@ fn rows<S: Source>(
     for row in 0..element.rows {
         let fail = |source: &S, fact| FormatError::at(source.place(), format!("`{}` {row}: {fact}", element.name));
         source.start_row().map_err(|fact| fail(source, fact))?;
-        for ((property, keep), cells) in element.properties.iter().zip(keep).zip(&mut cells) {
-            take(source, property, *keep, cells)
-                .map_err(|fact| fail(source, format!("`{}`: {fact}", property.name)))?;
+        for (property, cells) in element.properties.iter().zip(&mut cells) {
+            take(source, property, cells).map_err(|fact| fail(source, format!("`{}`: {fact}", property.name)))?;
         }
         source.end_row().map_err(|fact| fail(source, fact))?;
     }
@@ -123,12 +128,14 @@ fn empty(property: &Property, keep: Keep, rows: usize) -> Cells {
     match (keep, property.shape) {
         (Keep::Values, Shape::One(scalar)) if scalar.is_float() => Cells::Floats(Vec::with_capacity(rows)),
         (Keep::Values, Shape::One(_)) => Cells::Wholes(Vec::with_capacity(rows)),
-        (Keep::Indices { .. }, _) => Cells::Indices { counts: Vec::with_capacity(rows), items: Vec::new() },
+        (Keep::Indices { rows: below }, _) => {
+            Cells::Indices { counts: Vec::with_capacity(rows), items: Vec::new(), rows: below }
+        }
         (Keep::Nothing, _) | (Keep::Values, Shape::List { .. }) => Cells::Nothing,
     }
 }
 
-fn take<S: Source>(source: &mut S, property: &Property, keep: Keep, cells: &mut Cells) -> Result<(), String> {
+fn take<S: Source>(source: &mut S, property: &Property, cells: &mut Cells) -> Result<(), String> {
     let (length, scalar) = match property.shape {
         Shape::One(scalar) => (1, scalar),
         Shape::List { count, item } => match source.number(count)? {
@@ -144,27 +151,21 @@ fn take<S: Source>(source: &mut S, property: &Property, keep: Keep, cells: &mut 
         match (&mut *cells, number) {
             (Cells::Floats(values), Number::Float(x)) if x.is_finite() => values.push(x),
             (Cells::Floats(_), Number::Float(x)) => return Err(format!("{x} is not a finite number")),
-            // What a text holds in a float column is read as a float, so this is a number of a whole type.
             (Cells::Floats(values), Number::Whole(n)) => values.push(n as f32),
             // Bits are kept: packed colours are a common use of the upper half.
             (Cells::Wholes(values), Number::Whole(n)) => values.push(n as i32),
             (Cells::Wholes(_), Number::Float(x)) => return Err(format!("{x} is not a whole number")),
-            (Cells::Indices { items, .. }, number) => items.push(index(number, keep)?),
+            (Cells::Indices { items, rows, .. }, number) => items.push(index(number, *rows)?),
             (Cells::Nothing, _) => {}
         }
     }
     Ok(())
 }
 
-fn index(number: Number, keep: Keep) -> Result<u32, String> {
-    let Keep::Indices { rows } = keep else { return Ok(0) };
-    let in_range = |n: i64| u32::try_from(n).ok().filter(|index| (*index as usize) < rows);
-    match number {
-        Number::Whole(n) => {
-            in_range(n).ok_or_else(|| format!("index {n} is out of range: there are {}", counted(rows, "vertex row")))
-        }
-        Number::Float(x) => Err(format!("{x} is not an index")),
-    }
+fn index(number: Number, rows: usize) -> Result<u32, String> {
+    let Number::Whole(n) = number else { return Err("an index of a floating type, expected a whole one".into()) };
+    let index = u32::try_from(n).ok().filter(|index| (*index as usize) < rows);
+    index.ok_or_else(|| format!("index {n} is out of range: `vertex` has {}, counted from 0", counted(rows, "row")))
 }
 
 /// A text: a line a row.

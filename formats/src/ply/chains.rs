@@ -1,13 +1,10 @@
 //! Loose edges joined into polylines.
 
-/// No edge, no vertex.
-const NONE: u32 = u32::MAX;
-
 /// The polylines that `edges` make: how many CVs each has, and their vertices one after the other.
 ///
 /// A polyline goes on through every vertex with exactly two edges and ends at any other. It stands in the order of its
-/// first edge in the list, and that edge gives its direction. A ring starts with its first edge and ends on its first vertex
-/// again. An edge from a vertex to itself has no length and is left out. Time and memory are linear.
+/// first edge in the list, and that edge gives its direction. A ring starts with its first edge and ends on its first
+/// vertex again. An edge from a vertex to itself has no length and is left out. Time and memory are linear.
 pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) {
     let mut degree = vec![0_u32; vertices];
     // At a vertex with two edges the xor of their numbers and one of them is the other.
@@ -37,20 +34,22 @@ pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) 
             continue;
         }
         let start = chain.len();
-        let mut back = (*a, number);
-        while let Some(next) = onward(back.0, back.1, &mut used) {
-            chain.push(back.0);
-            back = next;
+        chain.push(*a);
+        let mut end = Some((*b, number));
+        while let Some((vertex, edge)) = end {
+            chain.push(vertex);
+            end = onward(vertex, edge, &mut used);
         }
-        chain.push(back.0);
-        chain[start..].reverse();
-        let mut forth = (*b, number);
-        chain.push(forth.0);
-        while let Some(next) = onward(forth.0, forth.1, &mut used) {
-            chain.push(next.0);
-            forth = next;
+        let forth = chain.len();
+        let mut end = onward(*a, number, &mut used);
+        while let Some((vertex, edge)) = end {
+            chain.push(vertex);
+            end = onward(vertex, edge, &mut used);
         }
-        counts.push(u32::try_from(chain.len() - start).unwrap_or(NONE));
+        let back = chain.len() - forth;
+        chain[forth..].reverse();
+        chain[start..].rotate_right(back);
+        counts.push((chain.len() - start) as u32);
     }
     (counts, chain)
 }

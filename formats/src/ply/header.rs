@@ -146,7 +146,13 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
             }
             [b"end_header"] => {
                 let Some(encoding) = encoding else { return fail("a header without a `format` line".into()) };
-                return Ok(Header { encoding, elements, bytes: file.len() - lines.rest().len(), lines: number, line_end });
+                return Ok(Header {
+                    encoding,
+                    elements,
+                    bytes: file.len() - lines.rest().len(),
+                    lines: number,
+                    line_end,
+                });
             }
             [word, ..] => return fail(format!("{} is no line of a PLY header", shown(word))),
         }

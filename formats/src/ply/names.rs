@@ -1,41 +1,61 @@
 //! Attribute names as PLY properties.
 //!
-//! A property's name has no white space, `name.0` is the first number of a wide attribute, and some names mean something
-//! of their own. A name that would break one of these is written with `%` and two hexadecimal digits for a byte, as in a
-//! web address, and comes back as it was.
+//! A property's name has no white space, `name.0` is the first number of a wide attribute, and some names mean
+//! something of their own. A name that would break one of these is written with `%` and two hexadecimal digits for a
+//! byte, as in a web address, and comes back as it was.
 
 /// Property names that are read as something other than a scalar attribute of that name.
-const TAKEN: [&str; 20] = [
-    "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "s", "t", "u", "v", "texture_u", "texture_v", "vertex1",
-    "vertex2", "vertex_index", "count", super::COMPONENT,
+const TAKEN: [&str; 21] = [
+    "x",
+    "y",
+    "z",
+    "nx",
+    "ny",
+    "nz",
+    "red",
+    "green",
+    "blue",
+    "s",
+    "t",
+    "u",
+    "v",
+    "texture_u",
+    "texture_v",
+    "vertex1",
+    "vertex2",
+    "vertex_index",
+    "vertex_indices",
+    "count",
+    super::COMPONENT,
 ];
 
 /// The property for number `part` of an attribute `width` wide.
 pub(super) fn property(attribute: &str, part: usize, width: usize) -> String {
-    use std::fmt::Write;
-    let mut name = String::with_capacity(attribute.len() + 2);
-    let is_taken = width == 1 && TAKEN.contains(&attribute);
-    for (k, byte) in attribute.bytes().enumerate() {
-        let plain = byte.is_ascii_graphic() && byte != b'%' && byte != b'.';
-        if plain && !(is_taken && k == 0) {
-            name.push(char::from(byte));
-        } else {
-            // Writing to a string cannot fail.
-            let _ = write!(name, "%{byte:02X}");
-        }
-    }
-    if attribute.is_empty() {
-        name.push('%');
-    }
-    if width > 1 {
-        let _ = write!(name, ".{part}");
-    }
-    name
+    let name = encoded(attribute, width);
+    if width > 1 { format!("{name}.{part}") } else { name }
 }
 
-/// The attribute that a property, without its number, stands for; as it is where it cannot be one of ours.
-pub(super) fn attribute(property: &str) -> String {
-    decoded(property).unwrap_or_else(|| property.to_owned())
+/// The attribute `width` wide that a property, without its number, stands for; as it is where it cannot be one of ours.
+pub(super) fn attribute(property: &str, width: usize) -> String {
+    // Only the one way we write a name is taken back, so two properties never stand for the same.
+    decoded(property).filter(|name| encoded(name, width) == property).unwrap_or_else(|| property.to_owned())
+}
+
+fn encoded(attribute: &str, width: usize) -> String {
+    if attribute.is_empty() {
+        return "%".to_owned();
+    }
+    let is_taken = width == 1 && TAKEN.contains(&attribute);
+    let mut name = String::with_capacity(attribute.len() + 2);
+    for (k, byte) in attribute.bytes().enumerate() {
+        let is_plain = byte.is_ascii_graphic() && byte != b'%' && byte != b'.';
+        if is_plain && !(is_taken && k == 0) {
+            name.push(char::from(byte));
+        } else {
+            name.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    name
 }
 
 fn decoded(property: &str) -> Option<String> {
@@ -73,14 +93,16 @@ mod tests {
     fn every_name_comes_back() {
         for name in ["mask", "x", "v", "", "a b", "wind.0", "50%", "größe", "\n", "primvars:mask", "%41", "%"] {
             let scalar = property(name, 0, 1);
-            assert_eq!(attribute(&scalar), name);
+            assert_eq!(attribute(&scalar, 1), name);
             assert!(!TAKEN.contains(&scalar.as_str()) && numbered(&scalar).is_none(), "{scalar}");
             assert!(scalar.bytes().all(|byte| byte.is_ascii_graphic()) && !scalar.is_empty());
             let wide = property(name, 2, 3);
-            assert_eq!(numbered(&wide).map(|(name, part)| (attribute(name), part)), Some((name.to_owned(), 2)));
+            assert_eq!(numbered(&wide).map(|(name, part)| (attribute(name, 3), part)), Some((name.to_owned(), 2)));
         }
         assert_eq!(property("x", 0, 1), "%78");
         assert_eq!(property("v", 1, 3), "v.1");
-        assert_eq!(attribute("100%"), "100%", "not one of ours");
+        for foreign in ["100%", "%41", "%2e", "%GG"] {
+            assert_eq!(attribute(foreign, 1), foreign, "not one of ours");
+        }
     }
 }

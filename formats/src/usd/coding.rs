@@ -168,7 +168,8 @@ pub(super) mod tests {
     #[test]
     fn the_ends_of_the_range_and_a_long_array_come_back() {
         let ends = vec![i32::MIN, i32::MAX, i32::MIN, 0, -1, i32::MAX, 127, -128, 128, 32_767, -32_768, 32_768];
-        let long: Vec<i32> = (0..70_000_u32).map(|i| i.wrapping_mul(2_654_435_761).cast_signed()).collect();
+        let long: Vec<i32> =
+            (0..70_000_u32).map(|i| i.wrapping_mul(i).wrapping_mul(2_654_435_761).cast_signed()).collect();
         for values in [ends, long] {
             let coded = ints(values.iter().copied());
             assert_eq!(unints(&coded, values.len()), (values, coded.len()));

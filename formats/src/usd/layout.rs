@@ -65,6 +65,7 @@ pub(super) fn prim(kind: Kind) -> (&'static str, &'static [(&'static str, &'stat
         Kind::Mesh => ("Mesh", &[("subdivisionScheme", "none")]),
         Kind::Points => ("Points", &[]),
         Kind::Tets => ("TetMesh", &[]),
+        // Refused before it gets here.
         Kind::Volume => ("Volume", &[]),
     }
 }
@@ -100,7 +101,8 @@ pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declarat
             _ => {}
         }
     }
-    let wanted = Wanted::Primvar { name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name }, own: name };
+    let wanted =
+        Wanted::Primvar { name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name }, own: name };
     Declaration { wanted, kind: primvar_type(name, rows), interpolation }
 }
 

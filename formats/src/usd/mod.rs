@@ -16,7 +16,8 @@
 //! * `velocities` have samples wherever `points` have, even if they never change: USD uses them only then.
 //! * An attribute or output whose name is no ASCII identifier gets one (`names`), and its own as `displayName`.
 //!
-//! Blender 4.5 reads all of it without a warning, but for `int3` and `int4` attributes of a mesh: it has no such type.
+//! Blender 4.5 reads all of it without a warning, but for `int3` and `int4` attributes of curves and meshes: it has no
+//! such types, and says so.
 
 mod coding;
 mod extent;
@@ -209,3 +210,5 @@ pub enum UsdFault {
     },
 }
 
+#[cfg(test)]
+mod tests;

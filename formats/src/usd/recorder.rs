@@ -198,7 +198,13 @@ impl Track {
     }
 
     /// The next frame has no such value; `present` says whether it has the component.
-    fn record_absence<W>(&mut self, kind: Kind, source: &Source, present: bool, store: &mut Store<W>) -> io::Result<()> {
+    fn record_absence<W>(
+        &mut self,
+        kind: Kind,
+        source: &Source,
+        present: bool,
+        store: &mut Store<W>,
+    ) -> io::Result<()> {
         match layout::absent(source, self.rows).filter(|_| !present) {
             Some(nothing) => self.record(kind, source, nothing, store),
             None => {
@@ -251,3 +257,5 @@ fn attribute_names(kind: Kind, tracks: &[(Source, Track)]) -> Vec<(String, Optio
         .collect()
 }
 
+#[cfg(test)]
+mod tests;

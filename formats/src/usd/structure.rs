@@ -201,3 +201,124 @@ fn count(n: usize) -> [u8; 8] {
 fn sized(bytes: &[u8]) -> Vec<u8> {
     [&count(bytes.len())[..], bytes].concat()
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::usd::coding::tests::{unchunk, unints};
+
+    fn spec(name: &str, kind: SpecType, children: Vec<Spec>) -> Spec {
+        Spec { name: name.into(), kind, fields: vec![("specifier", 7)], children }
+    }
+
+    /// Reads a section's coded integer lists, after `counts` plain u64.
+    fn lists(bytes: &[u8], counts: usize, lists: usize) -> Vec<Vec<i32>> {
+        let count = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        let mut at = counts * 8;
+        let read = (0..lists).map(|_| {
+            let (values, length) = unints(&bytes[at..], count);
+            at += length;
+            values
+        });
+        let read = read.collect();
+        assert_eq!(at, bytes.len());
+        read
+    }
+
+    fn tokens(section: &[u8]) -> Vec<String> {
+        let [count, length, _] =
+            [0, 8, 16].map(|at| u64::from_le_bytes(section[at..at + 8].try_into().unwrap()) as usize);
+        let text = String::from_utf8(unchunk(&section[24..])).unwrap();
+        assert_eq!(text.len(), length);
+        let tokens: Vec<String> = text.split_terminator('\0').map(str::to_owned).collect();
+        assert_eq!(tokens.len(), count);
+        tokens
+    }
+
+    #[test]
+    fn paths_are_as_worked_by_hand() {
+        let attribute = |name| spec(name, SpecType::Attribute, vec![]);
+        let b = spec("b", SpecType::Prim, vec![]);
+        let a = spec("a", SpecType::Prim, vec![attribute("x"), attribute("y"), b]);
+        let root = spec("", SpecType::PseudoRoot, vec![a, spec("c", SpecType::Prim, vec![])]);
+        let mut structure = Structure::default();
+        let [a, x, y, b, c] = ["a", "x", "y", "b", "c"].map(|name| structure.token(name).cast_signed());
+        let sections = structure.sections(&root);
+        assert_eq!(
+            sections.each_ref().map(|(name, _)| *name),
+            ["TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"]
+        );
+        assert_eq!(tokens(&sections[0].1)[0], "", "token 0 names nothing but the root");
+        let paths = lists(&sections[4].1, 2, 3);
+        assert_eq!(paths[0], [0, 1, 2, 3, 4, 5]);
+        assert_eq!(paths[1], [0, a, -x, -y, b, c]);
+        assert_eq!(paths[2], [-1, 4, 0, 0, -2, -2]);
+        let specs = lists(&sections[5].1, 1, 3);
+        assert_eq!(specs[1], [0; 6], "equal field sets are one");
+        assert_eq!(specs[2], [7, 6, 1, 1, 6, 6]);
+    }
+
+    #[test]
+    fn strings_are_numbered_apart_from_tokens() {
+        let mut structure = Structure::default();
+        assert_eq!(structure.token("x"), 1);
+        assert_eq!((structure.string("a-b"), structure.string("x"), structure.string("a-b")), (0, 1, 0));
+        let sections = structure.sections(&spec("", SpecType::PseudoRoot, vec![]));
+        assert_eq!(sections[1].1, [2, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0]);
+    }
+
+    /// Every path from the jumps, as a reader builds them.
+    fn rebuilt(tokens: &[String], elements: &[i32], jumps: &[i32]) -> Vec<String> {
+        fn walk(mut at: usize, parent: &str, file: (&[String], &[i32], &[i32]), paths: &mut Vec<String>) {
+            let (tokens, elements, jumps) = file;
+            loop {
+                let name = &tokens[elements[at].unsigned_abs() as usize];
+                let path = format!("{parent}{}{name}", if elements[at] < 0 { "." } else { "/" });
+                paths.push(path.clone());
+                let jump = jumps[at];
+                if jump > 0 || jump == -1 {
+                    walk(at + 1, &path, file, paths);
+                }
+                match jump {
+                    0 => at += 1,
+                    jump if jump > 0 => at += jump as usize,
+                    _ => return,
+                }
+            }
+        }
+        let mut paths = Vec::new();
+        walk(0, "", (tokens, elements, jumps), &mut paths);
+        paths
+    }
+
+    fn depth_first(spec: &Spec, parent: &str, paths: &mut Vec<String>) {
+        let path = format!("{parent}{}{}", if spec.kind == SpecType::Attribute { "." } else { "/" }, spec.name);
+        paths.push(path.clone());
+        spec.children.iter().for_each(|child| depth_first(child, &path, paths));
+    }
+
+    fn trees() -> impl Strategy<Value = Spec> {
+        let attributes = |n: usize| (0..n).map(|i| spec(&format!("x{i}"), SpecType::Attribute, vec![]));
+        let leaf = (0..4_usize).prop_map(move |n| attributes(n).collect::<Vec<_>>());
+        let below = leaf.prop_recursive(5, 60, 5, move |inner| {
+            (0..4_usize, prop::collection::vec(inner, 0..5)).prop_map(move |(n, prims)| {
+                let named = (0..).zip(prims).map(|(i, children)| spec(&format!("p{i}"), SpecType::Prim, children));
+                attributes(n).chain(named).collect()
+            })
+        });
+        below.prop_map(|children| spec("", SpecType::PseudoRoot, children))
+    }
+
+    proptest! {
+        #[test]
+        fn any_tree_is_found_again_by_its_jumps(tree in trees()) {
+            let sections = Structure::default().sections(&tree);
+            let paths = lists(&sections[4].1, 2, 3);
+            let mut expected = Vec::new();
+            depth_first(&tree, "", &mut expected);
+            prop_assert_eq!(rebuilt(&tokens(&sections[0].1), &paths[1], &paths[2]), expected);
+        }
+    }
+}

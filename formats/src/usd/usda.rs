@@ -210,8 +210,8 @@ mod tests {
     #[test]
     fn numbers_are_the_shortest_text_of_their_bits() {
         let odd = vec![0.0, -0.0, 1.0, 0.1, -2.5, 1e-42, f32::MAX, 1e16, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
-        let expected = "[0, -0, 1, 0.1, -2.5, 1e-42, 3.4028235e38, 1e16, inf, -inf, nan]";
-        assert_eq!(text(UsdType::Float, Column::new(odd)).replace("e+", "e"), expected);
+        let expected = "[0, -0, 1, 0.1, -2.5, 1e-42, 3.4028235e+38, 1e+16, inf, -inf, nan]";
+        assert_eq!(text(UsdType::Float, Column::new(odd)), expected);
         assert_eq!(decimal(1001.5), "1001.5");
         assert_eq!(decimal(-3.0), "-3");
     }
@@ -234,7 +234,10 @@ mod tests {
     fn rows_stand_in_brackets_and_a_quaternion_starts_with_its_real_part() {
         assert_eq!(text(UsdType::Int, Column::new(vec![3, -1])), "[3, -1]");
         assert_eq!(text(UsdType::Int64, Column::new(vec![i32::MIN])), "[-2147483648]");
-        assert_eq!(text(UsdType::Point3, Column::new(vec![[0.0, 1.5, 2.0], [3.0, 4.0, 5.0_f32]])), "[(0, 1.5, 2), (3, 4, 5)]");
+        assert_eq!(
+            text(UsdType::Point3, Column::new(vec![[0.0, 1.5, 2.0], [3.0, 4.0, 5.0_f32]])),
+            "[(0, 1.5, 2), (3, 4, 5)]"
+        );
         assert_eq!(text(UsdType::Quat, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(4, 1, 2, 3)]");
         assert_eq!(text(UsdType::Color4, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(1, 2, 3, 4)]");
         assert_eq!(text(UsdType::Float3, Column::new(Vec::<[f32; 3]>::new())), "[]");

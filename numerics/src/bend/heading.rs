@@ -21,7 +21,7 @@ pub(super) struct Heading<'a> {
 impl<'a> Heading<'a> {
     #[inline(always)]
     pub(super) fn new(bend: &'a Bend<'a>, group: &Group<'_>, curves: &Curves, unit: &'a Unit) -> Self {
-        let noise = bend.noise.as_ref().filter(|noise| noise.amplitude != 0.0);
+        let noise = bend.noise.as_ref().filter(|noise| noise.amplitude.abs() > 0.0);
         let mut roots = [[0.0; LANES]; 3];
         if let Some(noise) = noise {
             let at = curves.at(0);

@@ -104,8 +104,8 @@ impl Reached {
     }
 }
 
-/// CVs a task has at least: some 50 µs of work, against a few for handing it to a thread.
-const TASK_CVS: usize = 4096;
+/// CVs a task has at least: some 30 µs of work, against a few for handing it to a thread.
+const TASK_CVS: usize = 2048;
 
 /// Bends curves `points[starts[i]..starts[i + 1]]` as `bend` says; curves of one CV pass through.
 ///

@@ -39,7 +39,9 @@ impl<'a> Share<'a> {
         let envelope = gather(self.bend.envelope, at);
         for lane in 0..LANES {
             let envelope = if envelope.0[lane] > 0.0 { envelope.0[lane] } else { 0.0 };
-            share.0[lane] = self.bend.rotate * share.0[lane] * mask.0[lane] * envelope;
+            let product = self.bend.rotate * share.0[lane] * mask.0[lane] * envelope;
+            // An infinity times a 0 is no number: nothing was asked for.
+            share.0[lane] = if product.is_nan() { 0.0 } else { product };
         }
         if let Mode::ResolutionFree { reference_segments } = self.bend.mode {
             self.free_of_resolution(&mut share, arcs, segment, reference_segments);
@@ -47,8 +49,7 @@ impl<'a> Share<'a> {
         for lane in 0..LANES {
             let value = share.0[lane];
             let still = vec3::largest(get(segment, lane)) == 0.0;
-            // A product of an infinity and a 0 is no number: nothing was asked for.
-            let value = if still || value.is_nan() { 0.0 } else { value };
+            let value = if still { 0.0 } else { value };
             let value = if value < LARGEST { value } else { LARGEST };
             share.0[lane] = if value > -LARGEST { value } else { -LARGEST };
         }

@@ -44,14 +44,16 @@ impl Tally {
 
     /// The largest of the lanes, whose curves are this long.
     pub(super) fn reached(&self, length: &F32x16) -> Reached {
-        let lane = |lane: usize| {
+        let (mut difference, mut sum, mut length_error) = (0.0, 1.0, 0.0f32);
+        for lane in 0..LANES {
             let change = self.largest.0[lane].max(self.total.0[lane].abs());
-            let long = length.0[lane] > 0.0;
-            Reached {
-                max_angle: 2.0 * trig::atan2(self.difference.0[lane].sqrt(), self.sum.0[lane].sqrt()),
-                length_error: if long { change / length.0[lane] } else { 0.0 },
+            if length.0[lane] > 0.0 {
+                length_error = length_error.max(change / length.0[lane]);
             }
-        };
-        (0..LANES).map(lane).fold(Reached::default(), Reached::max)
+            if self.difference.0[lane] * sum > difference * self.sum.0[lane] {
+                (difference, sum) = (self.difference.0[lane], self.sum.0[lane]);
+            }
+        }
+        Reached { max_angle: 2.0 * trig::atan2(difference.sqrt(), sum.sqrt()), length_error }
     }
 }

@@ -87,7 +87,7 @@ type Line = [f64; TILE];
 /// Changes every line of `values` that runs along the axis of this stride.
 fn along(stride: usize, values: &mut [f64], change: impl Fn(&mut Line)) {
     for start in 0..values.len() {
-        if start / stride % TILE != 0 {
+        if !(start / stride).is_multiple_of(TILE) {
             continue;
         }
         let mut line = [0.0; TILE];

@@ -66,29 +66,26 @@ impl Plane {
     }
 }
 
-pub(super) fn triangle<S: Shader>(
-    tile: &mut Tile<S::Color>,
-    triangle: &ScreenTriangle,
-    pixels: PixelBox,
-    shader: &S,
-) {
+pub(super) fn triangle<S: Shader>(tile: &mut Tile<S::Color>, triangle: &ScreenTriangle, pixels: PixelBox, shader: &S) {
     let [p, q, r] = triangle.at;
     let area = Plane::edge(p, q).at(f64::from(r[0]), f64::from(r[1]));
     if !(area.abs() > 0.0 && area.is_finite()) {
         return;
     }
-    // Each plane is 1 at its corner and 0 on the opposite edge: positive inside, whichever way the triangle turns.
-    let planes = [Plane::edge(q, r), Plane::edge(r, p), Plane::edge(p, q)].map(|edge| edge.scaled(1.0 / area));
+    // Positive inside, whichever way the triangle turns; a change of sign keeps the bits two neighbours agree on.
+    let edges = [Plane::edge(q, r), Plane::edge(r, p), Plane::edge(p, q)].map(|edge| edge.scaled(area.signum()));
+    // Each is 1 at its corner and 0 on the opposite edge.
+    let planes = edges.map(|edge| edge.scaled(1.0 / area.abs()));
     let nearness = [0, 1, 2].map(|k| f64::from(triangle.at[k][2]));
     let sum = |part: fn(&Plane) -> f64| (0..3).map(|k| nearness[k] * part(&planes[k])).sum::<f64>();
     let depth_plane = Plane { a: sum(|p| p.a), b: sum(|p| p.b), c: sum(|p| p.c) };
 
-    let offsets = planes.map(|plane| plane.offsets());
+    let offsets = edges.map(|edge| edge.offsets());
     let most = offsets.map(|lanes| lanes.iter().fold(f32::NEG_INFINITY, |most, x| most.max(*x)));
     let depth_offsets = depth_plane.offsets();
     for y in pixels.low[1]..=pixels.high[1] {
         for x in pixels.low[0]..=pixels.high[0] {
-            let base = planes.map(|plane| plane.at(x as f64, y as f64) as f32);
+            let base = edges.map(|edge| edge.at(x as f64, y as f64) as f32);
             if (0..3).any(|k| base[k] + most[k] < 0.0) {
                 continue;
             }
@@ -104,7 +101,7 @@ pub(super) fn triangle<S: Shader>(
                 // Shares on the screen times nearness are shares in space.
                 let weights: V3 = std::array::from_fn(|k| {
                     let share = planes[k].at(f64::from(at[0]), f64::from(at[1]));
-                    (share.max(0.0) * nearness[k].abs()) as f32
+                    (share.max(0.0) * nearness[k]) as f32
                 });
                 let total = weights[0] + weights[1] + weights[2];
                 let blend = |value: [V3; 3]| {
@@ -112,7 +109,10 @@ pub(super) fn triangle<S: Shader>(
                     scale(sum, 1.0 / total)
                 };
                 let corners = &triangle.corners;
-                shader.surface(at, blend([0, 1, 2].map(|k| corners[k].normal)), blend([0, 1, 2].map(|k| corners[k].color)))
+                let normal = blend([0, 1, 2].map(|k| corners[k].normal));
+                // The winding, not the normal, says which side is seen: at a silhouette a smooth normal looks away.
+                let seen = scale(normal, if area > 0.0 { -1.0 } else { 1.0 });
+                shader.surface(at, seen, blend([0, 1, 2].map(|k| corners[k].color)))
             });
         }
     }
@@ -148,14 +148,25 @@ pub(super) fn segment<S: Shader>(tile: &mut Tile<S::Color>, segment: &ScreenSegm
             let mut depth = [UNCOVERED; SAMPLES];
             for k in 0..SAMPLES {
                 let (u, v) = (u + along_offsets[k], v + aside_offsets[k]);
-                let on_axis = if u < 0.0 { 0.0 } else if u > length { length } else { u };
+                let on_axis = if u < 0.0 {
+                    0.0
+                } else if u > length {
+                    length
+                } else {
+                    u
+                };
                 let beyond = u - on_axis;
                 let radius = wide + widen * on_axis;
                 let inside = (beyond * beyond + v * v <= radius * radius) & (u >= -start) & (u <= length + end);
                 depth[k] = if inside { p[2] + nearer * on_axis } else { UNCOVERED };
             }
             let share = (middle_u * per_pixel).clamp(0.0, 1.0);
-            thin_out(&mut depth, segment.cover[0] + (segment.cover[1] - segment.cover[0]) * share, [x, y], segment.seed);
+            thin_out(
+                &mut depth,
+                segment.cover[0] + (segment.cover[1] - segment.cover[0]) * share,
+                [x, y],
+                segment.seed,
+            );
             tile.put([x, y], &depth, |at| {
                 let aside = aside.at(f64::from(at[0]), f64::from(at[1])) as f32;
                 let radius = wide + widen * share * length;

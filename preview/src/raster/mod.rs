@@ -45,7 +45,7 @@ const fn sample_axis(is_x: bool) -> Lanes {
 pub(crate) trait Shader: Sync {
     /// Of a sample.
     type Color: Copy + Default + Send;
-    /// A point of a triangle.
+    /// A point of a triangle; `normal` is on the side that is seen.
     fn surface(&self, at: V3, normal: V3, color: V3) -> Self::Color;
     /// A point of a strand, lit already, `across` of its radius from its axis and `radius` pixels wide to each side.
     fn strand(&self, color: V3, across: f32, radius: f32) -> Self::Color;

@@ -81,7 +81,8 @@ impl Field<'_> {
 
     /// The point of a cube, metres; `None` where the level does not cross it.
     fn point(&self, cube: [i64; 3]) -> Option<[f32; 3]> {
-        let corner = |bits: usize| -> [i64; 3] { std::array::from_fn(|axis| cube[axis] - 1 + (bits >> axis & 1) as i64) };
+        let corner =
+            |bits: usize| -> [i64; 3] { std::array::from_fn(|axis| cube[axis] - 1 + (bits >> axis & 1) as i64) };
         let values: [f32; 8] = std::array::from_fn(|bits| self.at(corner(bits)));
         if values.iter().all(|value| (*value < 0.0) == (values[0] < 0.0)) {
             return None;
@@ -100,9 +101,7 @@ impl Field<'_> {
             }
         }
         // Cell centre (i, j, k) is half a cell into its cell.
-        Some(std::array::from_fn(|k| {
-            self.grid.origin[k] + self.grid.cell * (cube[k] as f32 - 0.5 + sum[k] / count)
-        }))
+        Some(std::array::from_fn(|k| self.grid.origin[k] + self.grid.cell * (cube[k] as f32 - 0.5 + sum[k] / count)))
     }
 
     /// The quads across the crossed edges that begin at the lowest corner of `cube`; each is shared by four cubes.

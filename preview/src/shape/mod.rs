@@ -3,4 +3,4 @@
 pub(crate) mod boundary;
 pub(crate) mod level_set;
 pub(crate) mod smooth;
-pub mod triangulate;
+pub(crate) mod triangulate;

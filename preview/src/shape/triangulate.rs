@@ -2,11 +2,11 @@
 //!
 //! Promise: a polygon of n corners gives exactly n − 2 triangles, in its own winding, whatever its shape; a simple flat
 //! one is covered exactly once. At most `TESTS_PER_PAIR`·n² point-in-triangle tests, and a polygon of more than
-//! [`MOST_CORNERS`] corners is fanned, so no polygon hangs. Limit: a polygon that crosses itself or is not flat is cut
+//! `MOST_CORNERS` corners is fanned, so no polygon hangs. Limit: a polygon that crosses itself or is not flat is cut
 //! somehow; holes need a bridge, two corners at one place.
 
 /// Above this a polygon becomes a fan around its first corner: n² tests of one face would be felt.
-pub const MOST_CORNERS: usize = 4096;
+const MOST_CORNERS: usize = 4096;
 /// Point-in-triangle tests a pair of corners may cost. A star needs about 1, a spiral about 2.
 const TESTS_PER_PAIR: usize = 8;
 
@@ -28,8 +28,7 @@ fn fan(count: usize) -> Vec<[u32; 3]> {
 /// The polygon along the axis its normal (Newell's) is nearest to, counter-clockwise; `None` where it has no area.
 fn flatten(corners: &[[f32; 3]]) -> Option<Vec<[f64; 2]>> {
     let first = corners[0].map(f64::from);
-    let local: Vec<[f64; 3]> =
-        corners.iter().map(|p| std::array::from_fn(|k| f64::from(p[k]) - first[k])).collect();
+    let local: Vec<[f64; 3]> = corners.iter().map(|p| std::array::from_fn(|k| f64::from(p[k]) - first[k])).collect();
     let mut normal = [0.0_f64; 3];
     for (k, a) in local.iter().enumerate() {
         let b = local[(k + 1) % local.len()];
@@ -138,8 +137,22 @@ mod tests {
     fn concave_polygons_are_covered_once() {
         let arrow = [[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [1.0, 1.0]];
         let comb = [
-            [0.0, 0.0], [7.0, 0.0], [7.0, 3.0], [6.0, 3.0], [6.0, 1.0], [5.0, 1.0], [5.0, 3.0], [4.0, 3.0], [4.0, 1.0],
-            [3.0, 1.0], [3.0, 3.0], [2.0, 3.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0],
+            [0.0, 0.0],
+            [7.0, 0.0],
+            [7.0, 3.0],
+            [6.0, 3.0],
+            [6.0, 1.0],
+            [5.0, 1.0],
+            [5.0, 3.0],
+            [4.0, 3.0],
+            [4.0, 1.0],
+            [3.0, 1.0],
+            [3.0, 3.0],
+            [2.0, 3.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [0.0, 3.0],
         ];
         for polygon in [&arrow[..], &comb] {
             covers_once(polygon);
@@ -167,8 +180,16 @@ mod tests {
     #[test]
     fn a_hole_with_a_bridge_stays_open() {
         covers_once(&[
-            [0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0],
-            [1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0], [1.0, 1.0],
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [4.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [3.0, 3.0],
+            [3.0, 1.0],
+            [1.0, 1.0],
         ]);
     }
 

@@ -16,7 +16,7 @@ impl Components {
     /// Follows components from node to node.
     pub(super) fn along(drafts: &[Draft<'_>], order: &Order) -> Self {
         let mut components = Self(vec![Vec::new(); drafts.len()]);
-        for node in &order.order {
+        for node in &order.nodes {
             let draft = &drafts[*node];
             let outputs = draft.node.map(|declared| declared.outputs).unwrap_or_default();
             let carried = outputs.iter().map(|output| match output.carries {

@@ -1,7 +1,7 @@
 //! The parts of a graph file: which keys there are, and which there must be. What the parts say is read elsewhere.
 
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, did_you_mean, find, is_name, keep, refuse_unknown, shown};
+use crate::graph::json::{Entry, Json, did_you_mean, find, is_misspelt, is_name, keep, refuse_unknown, shown};
 
 /// The number of the format that is read.
 const FORMAT: i64 = 1;
@@ -11,6 +11,8 @@ pub(super) struct Document<'a> {
     pub(super) scene: Option<Json<'a>>,
     pub(super) controls: Vec<Entry<'a>>,
     pub(super) nodes: Vec<NodeText<'a>>,
+    /// Whether `nodes` holds all nodes that the file means: not where the key is missing or no object.
+    pub(super) nodes_are_known: bool,
     pub(super) outputs: Option<Json<'a>>,
 }
 
@@ -18,7 +20,7 @@ pub(super) struct Document<'a> {
 pub(super) struct NodeText<'a> {
     /// Its id and the whole of it.
     pub(super) entry: Entry<'a>,
-    /// The value of its `type`, a text.
+    /// The value of its `type`, which may be no text.
     pub(super) kind: Option<Json<'a>>,
     pub(super) inputs: Vec<Entry<'a>>,
     pub(super) params: Vec<Entry<'a>>,
@@ -29,10 +31,26 @@ pub(super) fn missing(json: &Json<'_>, key: &str, hint: &str) -> Fault {
     json.fault(code::MISSING_KEY, format!("the key `{key}` is missing")).hint(hint)
 }
 
+/// Looks a required key up, among `known` ones; puts a fault where it is neither there nor misspelt.
+fn required<'a>(
+    json: &Json<'a>,
+    entries: &[Entry<'a>],
+    known: &[&str],
+    key: &str,
+    hint: &str,
+    faults: &mut Vec<Fault>,
+) -> Option<Json<'a>> {
+    let found = find(entries, key).map(|entry| entry.json.clone());
+    if found.is_none() && !is_misspelt(entries, known.iter().copied(), key) {
+        faults.push(missing(json, key, hint));
+    }
+    found
+}
+
 /// Puts a fault for a name that is not made as names are.
 pub(super) fn check_name(entry: &Entry<'_>, what: &str, faults: &mut Vec<Fault>) {
     if !is_name(entry.name) {
-        let fault = entry.fault(code::BAD_NAME, format!("`{}` cannot be the name of {what}", shown(entry.name)));
+        let fault = entry.fault(code::BAD_NAME, format!("\"{}\" cannot be the name of {what}", shown(entry.name)));
         faults.push(fault.hint("names are made of letters, digits, `_` and `-`, and start with a letter or `_`"));
     }
 }
@@ -43,23 +61,19 @@ impl<'a> Document<'a> {
         const KEYS: [&str; 6] = ["convect", "scene", "controls", "nodes", "outputs", "$schema"];
         let members = root.members("an object {\"convect\": 1, \"nodes\": {…}, \"outputs\": {…}}", faults);
         let entries = keep(members, faults)?;
-        match find(&entries, "convect") {
-            None => faults.push(missing(root, "convect", "a graph starts with \"convect\": 1")),
-            Some(entry) => match entry.json.whole("the format number 1") {
-                Ok(FORMAT) => {}
-                Ok(number) => {
-                    let fact = format!("the file has format {number}, this convect reads format {FORMAT}");
-                    let fault = entry.json.fault(code::FORMAT, fact);
-                    // Whatever else such a file says may mean something else.
-                    faults.clear();
-                    faults.push(match number > FORMAT {
-                        true => fault.hint("a newer convect wrote it"),
-                        false => fault.hint("write \"convect\": 1"),
-                    });
-                    return None;
-                }
-                Err(fault) => faults.push(fault),
-            },
+        let mut required = |key, hint, faults: &mut _| required(root, &entries, &KEYS, key, hint, faults);
+        let number = required("convect", "a graph starts with \"convect\": 1", faults)
+            .and_then(|json| Some((keep(json.whole("the format number 1"), faults)?, json)));
+        if let Some((number, json)) = number
+            && number != FORMAT
+        {
+            let fault =
+                json.fault(code::FORMAT, format!("the file has format {number}, this convect reads format {FORMAT}"));
+            // Whatever else such a file says may mean something else.
+            faults.clear();
+            let hint = if number > FORMAT { "a newer convect wrote it" } else { "write \"convect\": 1" };
+            faults.push(fault.hint(hint));
+            return None;
         }
         refuse_unknown(&entries, &KEYS, "keys of a graph", faults);
 
@@ -70,17 +84,12 @@ impl<'a> Document<'a> {
             faults.push(schema.unexpected("a text"));
         }
         let controls = named(part("controls").as_ref(), "controls {\"name\": value, …}", "a control", faults);
-        let nodes = part("nodes");
-        if nodes.is_none() {
-            faults.push(missing(root, "nodes", "nodes are written \"nodes\": {\"id\": {\"type\": \"…\"}, …}"));
-        }
+        let nodes = required("nodes", "nodes are written \"nodes\": {\"id\": {\"type\": \"…\"}, …}", faults);
+        let nodes_are_known = nodes.as_ref().is_some_and(Json::is_object);
         let nodes = named(nodes.as_ref(), "nodes {\"id\": {\"type\": \"…\"}, …}", "a node", faults);
-        let outputs = part("outputs");
-        if outputs.is_none() {
-            faults.push(missing(root, "outputs", "name what is to come out: \"outputs\": {\"name\": \"node\"}"));
-        }
+        let outputs = required("outputs", "name what is to come out: \"outputs\": {\"name\": \"node\"}", faults);
         let nodes = nodes.into_iter().map(|entry| NodeText::read(entry, faults)).collect();
-        Some(Self { scene: part("scene"), controls, nodes, outputs })
+        Some(Self { scene: part("scene"), controls, nodes, nodes_are_known, outputs })
     }
 
     /// Replaces or adds what a `--set` sets, whose key is its text's.
@@ -128,19 +137,12 @@ impl<'a> NodeText<'a> {
         let Some(entries) = keep(members, faults) else {
             return Self { entry, kind: None, inputs: Vec::new(), params: Vec::new() };
         };
-        refuse_unknown(&entries, &["type", "inputs", "params"], "keys of a node", faults);
+        const KEYS: [&str; 3] = ["type", "inputs", "params"];
+        refuse_unknown(&entries, &KEYS, "keys of a node", faults);
         let part = |name: &str| find(&entries, name).map(|entry| entry.json.clone());
-        let kind = match part("type") {
-            None => {
-                faults.push(missing(&entry.json, "type", "`convect nodes` lists the types"));
-                None
-            }
-            Some(kind) if kind.string().is_none() => {
-                faults.push(kind.unexpected("the name of a node type"));
-                None
-            }
-            kind => kind,
-        };
+        let kind = required(&entry.json, &entries, &KEYS, "type", "`convect nodes` lists the types", faults);
+        let no_text = kind.as_ref().filter(|kind| kind.string().is_none());
+        faults.extend(no_text.map(|kind| kind.unexpected("the name of a node type")));
         let mut members = |name: &str, expected: &str| {
             let members = part(name).map(|json| json.members(expected, faults));
             members.and_then(|members| keep(members, faults)).unwrap_or_default()

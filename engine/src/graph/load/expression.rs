@@ -9,7 +9,8 @@ use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, keep};
 use crate::param::{ParamSpec, Shape, Source, Value};
 
-/// The source that a param's expressions make; constant where they hang on no time.
+/// The source that a param's expressions make; constant where they hang on no time. `None` after a fault, and for a shape
+/// that no expression gives.
 pub(super) fn read(
     spec: &ParamSpec,
     json: &Json<'_>,
@@ -17,12 +18,7 @@ pub(super) fn read(
     scene: &Scene,
     faults: &mut Vec<Fault>,
 ) -> Option<Source> {
-    let Some(count) = spec.shape.expressions() else {
-        let fault = json.fault(code::PARAM_FORM, format!("no expression gives {}", spec.shape.describe()));
-        faults.push(fault.hint("write a literal or keyframes"));
-        return None;
-    };
-    let texts = texts(json, count, faults)?;
+    let texts = texts(json, spec.shape.expressions()?, faults)?;
     let parsed: Vec<Option<Expr>> = texts.iter().map(|text| parse(text, controls, faults)).collect();
     let exprs: Vec<Expr> = parsed.into_iter().collect::<Option<_>>()?;
 
@@ -74,6 +70,9 @@ fn explain(json: &Json<'_>, text: &str, controls: &Controls<'_>, error: ExprErro
     let ExprError { line, column, fact, hint } = error;
     let skipped: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(|line| line.chars().count()).sum();
     let offset = json.offset_in_string(skipped + column.saturating_sub(1));
+    if text.trim().is_empty() {
+        return Fault { hint, ..json.fault(code::EXPRESSION, fact) };
+    }
     let place = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
     let hint = match controls.unreadable_in(&fact) {
         Some(name) => Some(format!("the control `{name}` is no number or vector, which is what expressions read")),

@@ -1,5 +1,6 @@
 //! Keys at frames: `[[frame, value], …]` and how a value runs between them. What the values are is read elsewhere.
 
+use jsonc_parser::common::Ranged;
 use numerics::ramp::Interpolation;
 
 use super::param::word;
@@ -63,7 +64,7 @@ fn key_of<'a>(key: &Json<'a>) -> Result<(f64, Json<'a>), Fault> {
 fn follows(frame: f64, key: &Json<'_>, before: &[(f64, Json<'_>)]) -> Result<(), Fault> {
     match before.last() {
         Some((last, value)) if frame == *last => {
-            let line = value.text.place(value.start()).line;
+            let line = value.text.place(value.value.start()).line;
             let fault = key.fault(code::KEYFRAMES_DOUBLED, format!("there are two keys at frame {frame}"));
             Err(fault.hint(format!("the first is on line {line}; keep one of them")))
         }

@@ -10,7 +10,7 @@ use numerics::ramp::{Interpolation, Ramp, RampError};
 use super::param::word;
 use crate::geometry::{Column, ColumnType, Name, fixed_type};
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Json, keep, shown};
+use crate::graph::json::{Json, counted, keep, shown};
 use crate::param::{Shape, Value};
 
 /// The value of that shape; `None` where it has a fault. Files are not literals: see [`super::param`].
@@ -170,8 +170,8 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
     let kind = match fixed_type(name) {
         Some(kind) if rows.is_empty() || kind.width() == width => kind,
         Some(kind) => {
-            let fault = json.fault(code::WRONG_KIND, format!("the rows of `{name}` have {width} numbers"));
-            return Err(fault.hint(format!("`{name}` is {kind}: {} numbers a row", kind.width())));
+            let fault = json.fault(code::WRONG_KIND, format!("`{name}` has {} a row", counted(width, "number")));
+            return Err(fault.hint(format!("expected {}", counted(kind.width(), "number"))));
         }
         None => match (width, rows.iter().all(is_whole)) {
             (1, false) => ColumnType::F1,
@@ -181,8 +181,8 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
             (3, true) => ColumnType::I3,
             (4, true) => ColumnType::I4,
             _ => {
-                let fault = json.fault(code::WRONG_KIND, format!("the rows of `{}` have {width} numbers", shown(name)));
-                return Err(fault.hint("expected 1, 3 or 4 numbers a row"));
+                let fact = format!("`{}` has {} a row", shown(name), counted(width, "number"));
+                return Err(json.fault(code::WRONG_KIND, fact).hint("expected 1, 3 or 4"));
             }
         },
     };

@@ -136,7 +136,11 @@ fn load(
     wires::refuse_cycles(&drafts, &order, faults);
     let components = Components::along(&drafts, &order);
     components.refuse_misfits(&drafts, catalogue, faults);
-    let outputs = outputs::read(document.outputs.as_ref(), &drafts, &order, faults)?;
+    let outputs = outputs::read(document.outputs.as_ref(), &drafts, &order, faults);
+    if !document.nodes_are_known {
+        faults.retain(|fault| fault.code != code::UNKNOWN_NODE);
+    }
+    let outputs = outputs?;
 
     let places = places(&drafts, document.outputs.as_ref());
     let (nodes, outputs) = assemble(drafts, &order, outputs)?;
@@ -185,11 +189,11 @@ fn assemble(
     order: &Order,
     outputs: Vec<outputs::Draft>,
 ) -> Option<(Vec<GraphNode>, Vec<GraphOutput>)> {
-    if order.order.len() != drafts.len() {
+    if order.nodes.len() != drafts.len() {
         return None;
     }
     let mut place = vec![0; drafts.len()];
-    order.order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+    order.nodes.iter().enumerate().for_each(|(new, old)| place[*old] = new);
     let mut nodes: Vec<Option<GraphNode>> = drafts.iter().map(|_| None).collect();
     for (old, draft) in drafts.into_iter().enumerate() {
         let link = |wire: &Wire<'_>| Some(Link { node: place[wire.node], port: wire.port? });

@@ -10,7 +10,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 #[derive(Debug, PartialEq)]
 pub(super) struct Order {
     /// The lowest number first where several could be next. Nodes of cycles, and those behind them, are missing.
-    pub(super) order: Vec<usize>,
+    pub(super) nodes: Vec<usize>,
     /// One shortest cycle of each knot of cycles, from its lowest node, each node a source of the next and the last of
     /// the first; knots in the order of their lowest nodes.
     pub(super) cycles: Vec<Vec<usize>>,
@@ -35,7 +35,7 @@ pub(super) fn order(sources: &[Vec<usize>]) -> Order {
         }
     }
     let cycles = if order.len() == sources.len() { Vec::new() } else { cycles(&targets) };
-    Order { order, cycles }
+    Order { nodes: order, cycles }
 }
 
 fn cycles(targets: &[Vec<usize>]) -> Vec<Vec<usize>> {
@@ -91,19 +91,19 @@ mod tests {
 
     #[test]
     fn nodes_come_after_their_sources_and_else_in_the_order_of_the_file() {
-        assert_eq!(ordered(&[&[], &[], &[1, 0], &[]]).order, [0, 1, 2, 3]);
-        assert_eq!(ordered(&[&[2], &[], &[1, 1], &[]]).order, [1, 2, 0, 3]);
+        assert_eq!(ordered(&[&[], &[], &[1, 0], &[]]).nodes, [0, 1, 2, 3]);
+        assert_eq!(ordered(&[&[2], &[], &[1, 1], &[]]).nodes, [1, 2, 0, 3]);
     }
 
     #[test]
     fn each_knot_gives_its_shortest_cycle_from_its_first_node() {
         assert_eq!(ordered(&[&[0]]).cycles, [[0]]);
-        assert_eq!(ordered(&[&[1], &[0], &[1]]), Order { order: vec![], cycles: vec![vec![0, 1]] });
+        assert_eq!(ordered(&[&[1], &[0], &[1]]), Order { nodes: vec![], cycles: vec![vec![0, 1]] });
         // 4 → 0 → 1 → 2 → 3 → 4, with a short cut 1 → 3.
         assert_eq!(ordered(&[&[4], &[0], &[1], &[2, 1], &[3]]).cycles, [[0, 1, 3, 4]]);
         assert_eq!(
             ordered(&[&[1], &[0], &[3], &[2], &[]]),
-            Order { order: vec![4], cycles: vec![vec![0, 1], vec![2, 3]] }
+            Order { nodes: vec![4], cycles: vec![vec![0, 1], vec![2, 3]] }
         );
     }
 
@@ -111,7 +111,7 @@ mod tests {
     fn a_long_chain_needs_no_deep_stack() {
         let mut chain: Vec<Vec<usize>> =
             (0..200_000).map(|node: usize| node.checked_sub(1).into_iter().collect()).collect();
-        assert_eq!(order(&chain).order.len(), chain.len());
+        assert_eq!(order(&chain).nodes.len(), chain.len());
         chain[0].push(199_999);
         assert_eq!(order(&chain).cycles[0].len(), chain.len());
     }

@@ -8,7 +8,7 @@ use crate::geometry::{Name, V};
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Entry, Json, find, keep, refuse_unknown, shown};
 use crate::node::Cook;
-use crate::param::Source;
+use crate::param::{Source, Unset};
 
 /// An output as far as it could be read.
 pub(super) struct Draft {
@@ -91,12 +91,12 @@ struct Motion {
 impl Motion {
     fn along(drafts: &[NodeDraft<'_>], order: &Order) -> Self {
         let mut motion = Self { moves: vec![false; drafts.len()], comes_and_goes: vec![None; drafts.len()] };
-        for node in &order.order {
+        for node in &order.nodes {
             let draft = &drafts[*node];
             let Some(declared) = draft.node else { continue };
             let sources = || draft.wires.iter().flatten().map(|wire| wire.node);
             let moves = !matches!(declared.cook, Cook::Pure(_))
-                || draft.params.iter().any(|source| follows_time(source, &draft.params))
+                || params_move(draft)
                 || sources().any(|source| motion.moves[source]);
             let upstream = sources().find_map(|source| motion.comes_and_goes[source]);
             motion.comes_and_goes[*node] = if declared.changes_topology && moves { Some(*node) } else { upstream };
@@ -115,14 +115,10 @@ impl Motion {
     }
 }
 
-/// Whether a param moves. A reader's current frame counts only where its file is numbered: other files are still, or
-/// hold samples of one topology.
-fn follows_time(source: &Source, params: &[Source]) -> bool {
-    let reads_file = params.iter().any(|param| matches!(param, Source::File { .. }));
-    match source {
-        Source::CurrentFrame if reads_file => {
-            params.iter().any(|param| matches!(param, Source::File { numbered: true, .. }))
-        }
-        source => source.is_animated(),
-    }
+/// Whether any param that is read moves. One that is the current frame unless set says which file of a sequence is
+/// meant: without a sequence it means nothing.
+fn params_move(draft: &NodeDraft<'_>) -> bool {
+    let sequence = draft.params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
+    let mut params = draft.specs.iter().zip(&draft.params);
+    params.any(|(spec, source)| source.is_animated() && (sequence || spec.facts.unset != Unset::CurrentFrame))
 }

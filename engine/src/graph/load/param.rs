@@ -13,6 +13,7 @@ use super::document::missing;
 use super::expression;
 use super::keyframes::{Keys, interpolation, keys};
 use super::literal::{literal, ramp};
+use crate::expr::suggest::nearest;
 use crate::files::unreadable;
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
@@ -42,6 +43,8 @@ enum Within {
     Control,
     /// In a mask's `value`: any but another mask.
     Mask,
+    /// In a key: literals and ramps.
+    Key,
 }
 
 /// The place of a text among `words`, or the fault of one that is none of them; `what` names them.
@@ -50,7 +53,7 @@ pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize,
     let Some(word) = json.string() else { return Err(json.unexpected(&format!("one of {}", listed()))) };
     words.iter().position(|known| *known == word).ok_or_else(|| {
         let fault = json.fault(code::UNKNOWN_WORD, format!("there is no {what} \"{}\"", shown(word)));
-        match crate::expr::suggest::nearest(word, words.iter().copied()) {
+        match nearest(word, words.iter().copied()) {
             Some(near) => fault.hint(format!("did you mean \"{near}\"?")),
             None => fault.hint(format!("expected one of {}", listed())),
         }
@@ -146,11 +149,13 @@ impl<'a> Reader<'a, '_> {
             [form] => form,
             [] => {
                 let fault = json.fault(code::PARAM_FORM, "the object says no value");
-                let near = entries.iter().find_map(|entry| crate::expr::suggest::nearest(entry.name, FORMS));
+                let forms: Vec<&str> = FORMS.into_iter().filter(|form| may_be(spec.shape, form, within)).collect();
+                let near = entries.iter().find_map(|entry| nearest(entry.name, forms.iter().copied()));
                 self.faults.push(match near {
                     Some(near) => fault.hint(format!("did you mean `{near}`?")),
                     None => {
-                        fault.hint(format!("expected {}, or one of `{}`", spec.shape.describe(), FORMS.join("`, `")))
+                        let (shape, forms) = (spec.shape.describe(), forms.join("`, `"));
+                        fault.hint(format!("expected {shape}, or an object with one of `{forms}`"))
                     }
                 });
                 return None;
@@ -161,19 +166,15 @@ impl<'a> Reader<'a, '_> {
                 return None;
             }
         };
-        let masked = spec.shape == Shape::Masked && within != Within::Mask;
-        let (allowed, partner) = match form.name {
-            "keyframes" => (true, Some("interpolation")),
-            "ramp" => (spec.shape == Shape::Ramp, Some("interpolation")),
-            "value" => (masked && within == Within::Param, Some("attribute")),
-            _ => (within != Within::Control, None),
-        };
-        if !allowed {
+        if !may_be(spec.shape, form.name, within) {
             let fault = form.fault(code::PARAM_FORM, format!("`{}` cannot be written as `{}`", spec.name, form.name));
-            self.faults.push(fault.hint(format!("expected {}", spec.shape.describe())));
+            self.faults.push(match spec.shape {
+                Shape::File => fault.hint("expected a path; `####` in it stands for the frame"),
+                shape => fault.hint(format!("expected {}", shape.describe())),
+            });
             return None;
         }
-        if masked
+        if may_be(spec.shape, "value", within)
             && form.name != "value"
             && let Some(attribute) = find(&entries, "attribute")
         {
@@ -182,6 +183,11 @@ impl<'a> Reader<'a, '_> {
             self.faults.push(attribute.fault(code::PARAM_FORM, fact).hint(hint));
             return None;
         }
+        let partner = match form.name {
+            "keyframes" | "ramp" => Some("interpolation"),
+            "value" => Some("attribute"),
+            _ => None,
+        };
         let known: Vec<&str> = std::iter::once(form.name).chain(partner).collect();
         refuse_unknown(&entries, &known, "keys here", self.faults);
 
@@ -189,11 +195,12 @@ impl<'a> Reader<'a, '_> {
             "keyframes" => self.keyed(spec, &form.json, find(&entries, "interpolation")),
             "ramp" => {
                 let between = interpolation(find(&entries, "interpolation"), self.faults);
-                let ramp = ramp(&form.json, between?, self.faults)?;
-                Some(Source::Constant(self.legal(spec, &form.json, Value::Ramp(Arc::new(ramp)))?))
+                let ramp = ramp(&form.json, between.unwrap_or_default(), self.faults)?;
+                let value = self.legal(spec, &form.json, Value::Ramp(Arc::new(ramp)))?;
+                between.map(|_| Source::Constant(value))
             }
             "value" => self.mask(spec, json, &form.json, find(&entries, "attribute")),
-            "control" => self.controlled(spec, &form.json, json, within),
+            "control" => self.controlled(spec, &form.json, json),
             _ => {
                 let source = expression::read(spec, &form.json, self.controls, self.scene, self.faults)?;
                 let Source::Constant(value) = source else { return Some(source) };
@@ -220,23 +227,13 @@ impl<'a> Reader<'a, '_> {
 
     /// The value of one key. Rotations stay degrees, so that whole turns between keys are made.
     fn key(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Value> {
-        let value = match (spec.shape, json.value) {
-            (Shape::Ramp, Ast::Object(_)) => {
-                let Source::Constant(value) = self.form(spec, json, Within::Control)? else {
-                    self.faults.push(json.unexpected("a ramp"));
-                    return None;
-                };
-                return Some(value);
-            }
-            (Shape::File, _) => {
-                self.faults.push(
-                    json.fault(code::NOT_ANIMATED, "a path cannot be animated")
-                        .hint("`####` in a path stands for the frame"),
-                );
-                return None;
-            }
-            _ => literal(spec.shape, json, self.faults)?,
-        };
+        if spec.shape == Shape::Ramp && json.is_object() {
+            return match self.form(spec, json, Within::Key)? {
+                Source::Constant(value) => Some(value),
+                _ => None,
+            };
+        }
+        let value = literal(spec.shape, json, self.faults)?;
         let value = self.legal(spec, json, value)?;
         Some(if spec.shape == Shape::Seed { self.finished(spec.shape, value) } else { value })
     }
@@ -265,7 +262,7 @@ impl<'a> Reader<'a, '_> {
     }
 
     /// A control's value, read as if it stood here.
-    fn controlled(&mut self, spec: &ParamSpec, name: &Json<'a>, reader: &Json<'a>, within: Within) -> Option<Source> {
+    fn controlled(&mut self, spec: &ParamSpec, name: &Json<'a>, reader: &Json<'a>) -> Option<Source> {
         let Some(text) = name.string() else {
             self.faults.push(name.unexpected("the name of a control"));
             return None;
@@ -273,8 +270,10 @@ impl<'a> Reader<'a, '_> {
         match self.controls.get(text) {
             Found::Value(value) => {
                 let value = value.at_path(&reader.path);
-                let within = if within == Within::Mask { Within::Mask } else { Within::Control };
-                self.written(spec, &value, within)
+                let before = self.faults.len();
+                let source = self.written(spec, &value, Within::Control);
+                self.faults[before..].iter_mut().for_each(|fault| fault.fact += &format!(", in the control `{text}`"));
+                source
             }
             Found::Faulty => None,
             Found::Nothing => {
@@ -307,6 +306,17 @@ impl<'a> Reader<'a, '_> {
             return None;
         }
         Some(Source::File { path: path.into(), numbered })
+    }
+}
+
+/// Whether a param of that shape may be written in a form there.
+fn may_be(shape: Shape, form: &str, within: Within) -> bool {
+    match form {
+        "keyframes" => shape != Shape::File && within != Within::Key,
+        "ramp" => shape == Shape::Ramp,
+        "value" => shape == Shape::Masked && within == Within::Param,
+        "expr" => shape.expressions().is_some() && matches!(within, Within::Param | Within::Mask),
+        _ => matches!(within, Within::Param | Within::Mask),
     }
 }
 

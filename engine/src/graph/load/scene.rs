@@ -2,7 +2,7 @@
 
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Json, find, keep, refuse_unknown};
+use crate::graph::json::{Json, keep, refuse_unknown};
 use crate::time::Frame;
 
 /// Reads `scene`; what it leaves out or has wrong is as [`Scene::default`] says.
@@ -65,7 +65,7 @@ fn fps(json: &Json<'_>) -> Result<f64, Fault> {
         true => Ok(fps),
         false => {
             let fault = json.fault(code::SCENE, format!("`fps` is {fps}"));
-            Err(fault.hint("expected frames a second, more than 0, such as 24"))
+            Err(fault.hint(format!("expected {LEAST}…{MOST} frames a second, such as 24")))
         }
     }
 }

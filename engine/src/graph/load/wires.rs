@@ -5,7 +5,7 @@ use jsonc_parser::ast::Value as Ast;
 use super::Draft;
 use super::order::Order;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Json, did_you_mean, find, shown};
+use crate::graph::json::{Json, counted, did_you_mean, find, is_misspelt, shown};
 use crate::node::{Arity, InputSpec};
 
 /// A wire as it stands in the file.
@@ -68,10 +68,15 @@ fn wires_of<'a>(draft: &Draft<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>
     let wired = |input: &InputSpec| match find(entries, input.name) {
         Some(entry) => wires_of_input(input, &entry.json, drafts, faults),
         None => {
-            if matches!(input.arity, Arity::One | Arity::Many { least: 1.. }) {
-                let fault =
-                    draft.text.entry.fault(code::MISSING_INPUT, format!("the input `{}` has no wire", input.name));
-                faults.push(fault.hint(format!("{}: {}", input.name, input.help)));
+            let link = match input.arity {
+                Arity::One => "\"id\"",
+                Arity::Many { least: 1.. } => "[\"id\", …]",
+                Arity::Optional | Arity::Many { .. } => return Vec::new(),
+            };
+            if !is_misspelt(entries, draft.inputs.iter().map(|input| input.name), input.name) {
+                let fact = format!("the input `{}` has no wire", input.name);
+                let fault = draft.text.entry.fault(code::MISSING_INPUT, fact);
+                faults.push(fault.hint(format!("write \"inputs\": {{\"{}\": {link}}}", input.name)));
             }
             Vec::new()
         }
@@ -100,7 +105,7 @@ fn wires_of_input<'a>(
     };
     let Some(items) = json.elements() else { return follow_one(json, faults) };
     if items.len() < least {
-        let fact = format!("the input `{}` has {} wires", input.name, items.len());
+        let fact = format!("the input `{}` has {}", input.name, counted(items.len(), "wire"));
         faults.push(json.fault(code::MISSING_INPUT, fact).hint(format!("expected at least {least}")));
     }
     items.iter().enumerate().filter_map(|(place, item)| follow(&json.item(item, place), drafts, faults)).collect()

@@ -1,0 +1,105 @@
+//! Texts that nobody means: none may panic, overflow the stack or take long.
+
+use std::path::Path;
+
+use proptest::prelude::*;
+
+use super::super::Graph;
+use super::super::fault::code;
+use super::{CATALOGUE, load, probe};
+
+/// Something of everything, for mutations to start from.
+pub(super) const WHOLE: &str = r#"{ // every form
+  "convect": 1, "$schema": "graph.schema.json",
+  "scene": { "frames": [1, 48], "fps": 24, "seed": 7, "origin": [1e6, 0, 0] },
+  "controls": { "dir": [1, 0, 0], "up": {"keyframes": [[1, 0], [24, 1]], "interpolation": "smooth"}, "word": "perlin", },
+  "nodes": {
+    "fur": { "type": "Curve_In", "params": { "file": "assets/fur.####.obj", "scale": 0.01 } },
+    "inline": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0]], "counts": [2],
+                "attributes": { "width": [0.1, 0.2], "tag": [1, 2], "Cd": [[1, 0, 0.5], [0, 1, 0]] } } },
+    "skin": { "type": "Mesh_In", "params": { "file": "bear.obj" } },
+    "both": { "type": "Merge", "inputs": { "geometry": ["fur", "inline.curves"] } },
+    "wind": { "type": "Curve_Wind", "inputs": { "curves": "both" },
+              "params": { "wind_dir": { "control": "dir" }, "noise": { "control": "word" }, "amplitude": { "expr": "up*2 + dir.x" },
+                          "global_rotate": { "value": { "expr": "0.6 + 0.1*sin(2*pi*time)" }, "attribute": "mask" },
+                          "ramp_rotate": { "ramp": [[0, 0.2], [1, 1]], "interpolation": "smooth" },
+                          "blend": 0.5, "seed": 3, "frequency": { "keyframes": [[1, 1], [9.5, 2]] } } },
+    "free": { "type": "Curve_Wind_Collision", "inputs": { "curves": "wind", "rest": "both", "colliders": ["skin"] } },
+    "all": { "type": "Every_Shape", "params": { "vec3": { "expr": ["0", "time", "\u00e9" ] }, "rotate": [0, 90, 0],
+             "span": [0.1, 0.2], "int3": [1, 2, 3], "bool": true, "text": "é\n", "texts": ["a", "b"], "tets": [[0, 1, 2, 3]] } }
+  },
+  "outputs": { "fur": "free", "lit": { "from": "free.curves", "attributes": ["P", "shielded"], "v": true } }
+}"#;
+
+#[test]
+fn a_file_of_nothing_but_one_bracket_is_answered() {
+    for text in
+        ["[", "{", "]", "}", "\"", "/*", "//", "-", ",", ":", "\\", "\u{0}", "null", "{}", "[]", "1e999", "\u{feff}"]
+    {
+        assert!(load(text).is_err(), "{text:?}");
+    }
+}
+
+#[test]
+fn a_depth_of_100_000_is_one_fault() {
+    for (open, close) in [("[", "]"), ("{\"a\":", "}"), ("{\"convect\":1,\"nodes\":{\"a\":{\"params\":", "")] {
+        let faults = load(&(open.repeat(100_000) + &close.repeat(100_000))).err().unwrap_or_default();
+        assert_eq!(faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [code::NESTING]);
+    }
+}
+
+#[test]
+fn every_beginning_of_a_graph_is_answered() {
+    for (end, _) in WHOLE.char_indices() {
+        assert!(load(&WHOLE[..end]).is_err(), "{end}");
+    }
+}
+
+#[test]
+fn a_graph_of_ten_thousand_nodes_loads() {
+    let mut text = String::from(r#"{"convect": 1, "outputs": {"end": "n9999"}, "nodes": {"n0": {"type": "Curve_In"}"#);
+    for n in 1..10_000 {
+        text += &format!(r#", "n{n}": {{"type": "Curve_Wind", "inputs": {{"curves": "n{}"}}}}"#, n - 1);
+    }
+    assert_eq!(super::good(&(text + "}}")).nodes.len(), 10_000);
+}
+
+#[test]
+fn bytes_that_are_no_text_are_said_to_be() {
+    for bytes in [&b"\xff\xfe{\0}\0"[..], b"{\"a\": \"\xc3\x28\"}", b"\x1f\x8b\x08\x00", b"\0\0\0\0"] {
+        let faults = Graph::load_bytes(bytes, Path::new(""), CATALOGUE, &[], &probe).err().unwrap_or_default();
+        assert_eq!(faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [code::ENCODING], "{bytes:?}");
+    }
+    let with_mark = [b"\xef\xbb\xbf", WHOLE.replace("\\u00e9", "1").as_bytes()].concat();
+    assert!(Graph::load_bytes(&with_mark, Path::new(""), CATALOGUE, &[], &probe).is_ok());
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_answered(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let _ = Graph::load_bytes(&bytes, Path::new(""), CATALOGUE, &[], &probe);
+    }
+
+    #[test]
+    fn any_json_like_text_is_answered(text in r#"[\[\]{}:,"\\ \n/*a-z0-9.eE+-]{0,80}"#, key in "[a-z.]{0,6}") {
+        let _ = load(&text);
+        let set = [(key, text.clone()), ("wind.amplitude".into(), text)];
+        let _ = Graph::load(WHOLE, Path::new(""), CATALOGUE, &set, &probe);
+    }
+
+    #[test]
+    fn any_change_of_a_graph_is_answered(changes in proptest::collection::vec((0..WHOLE.len(), 0..40_usize, any::<u8>()), 1..4)) {
+        // What is put in its place: a piece of the graph itself, or any byte.
+        let mut bytes = WHOLE.as_bytes().to_vec();
+        for (at, length, byte) in changes {
+            let at = at.min(bytes.len());
+            let end = (at + length % 8).min(bytes.len());
+            let from = usize::from(byte) * WHOLE.len() / 256;
+            let piece = &WHOLE.as_bytes()[from..(from + length).min(WHOLE.len())];
+            bytes.splice(at..end, if length % 2 == 0 { piece.to_vec() } else { vec![byte] });
+        }
+        if let Ok(text) = std::str::from_utf8(&bytes) {
+            let _ = load(text);
+        }
+    }
+}

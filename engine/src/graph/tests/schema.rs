@@ -1,0 +1,109 @@
+//! The schema against graphs: it accepts what loads and refuses what a schema can refuse.
+
+use std::sync::LazyLock;
+
+use jsonc_parser::ast::Value as Ast;
+use jsonschema::Validator;
+use serde_json::{Value, json};
+
+use super::super::fault::code;
+use super::super::schema;
+use super::super::syntax::parse;
+use super::super::text::Text;
+use super::CATALOGUE;
+use super::faults::cases;
+
+static VALIDATOR: LazyLock<Validator> =
+    LazyLock::new(|| jsonschema::draft202012::new(&schema(CATALOGUE)).expect("the schema is a schema"));
+
+/// The plain JSON of a text with comments; the first of doubled keys counts.
+fn plain(value: &Ast<'_>) -> Value {
+    match value {
+        Ast::StringLit(text) => json!(text.value),
+        Ast::NumberLit(number) => number.value.parse().map_or(Value::Null, Value::Number),
+        Ast::BooleanLit(word) => json!(word.value),
+        Ast::NullKeyword(_) => Value::Null,
+        Ast::Array(list) => list.elements.iter().map(plain).collect(),
+        Ast::Object(object) => {
+            let members = object.properties.iter().rev();
+            Value::Object(members.map(|member| (member.name.as_str().to_owned(), plain(&member.value))).collect())
+        }
+    }
+}
+
+/// What the schema finds wrong with a text of JSON.
+pub(super) fn refused(text: &str) -> Vec<String> {
+    let text = Text::new(text, None);
+    let value = plain(&parse(&text).expect("JSON with comments"));
+    VALIDATOR.iter_errors(&value).map(|error| format!("{}: {error}", error.instance_path())).collect()
+}
+
+#[test]
+fn the_schema_is_a_schema() {
+    assert!(jsonschema::draft202012::meta::is_valid(&schema(CATALOGUE)));
+}
+
+#[test]
+fn the_schema_refuses_what_a_schema_can() {
+    let seen = [
+        code::UNKNOWN_KEY,
+        code::MISSING_KEY,
+        code::FORMAT,
+        code::BAD_NAME,
+        code::UNKNOWN_TYPE,
+        code::UNKNOWN_PARAM,
+        code::UNKNOWN_INPUT,
+        code::MISSING_INPUT,
+        code::TOO_MANY_WIRES,
+        code::UNKNOWN_WORD,
+        code::PARAM_FORM,
+        code::KEYFRAMES_EMPTY,
+        code::NO_OUTPUTS,
+        code::WRONG_KIND,
+        code::ILLEGAL_VALUE,
+    ];
+    // Values of expressions, what reads a control, and the order of a range's ends are beyond it.
+    let beyond = [
+        "a range that runs backwards",
+        "expressions of constant illegal values",
+        "a control that does not fit its readers",
+    ];
+    for case in cases().iter().filter(|case| case.set.is_empty() && !beyond.contains(&case.name)) {
+        let codes = case.expected.lines().filter_map(|line| Some(line.split_once(": ")?.0));
+        if codes.into_iter().any(|code| seen.contains(&code)) {
+            assert!(!refused(case.graph).is_empty(), "{}", case.name);
+        }
+    }
+}
+
+#[test]
+fn a_param_says_help_unit_range_and_default() {
+    let schema = schema(CATALOGUE);
+    let wind = &schema["$defs"]["Curve_Wind"]["properties"]["params"]["properties"];
+    assert_eq!(wind["frequency"]["description"], "How fine the noise is. In 1/m.");
+    assert_eq!(wind["frequency"]["default"], 2);
+    assert_eq!(wind["frequency"]["anyOf"][0], json!({"type": "number", "exclusiveMinimum": 0}));
+    assert_eq!(wind["octaves"]["anyOf"][0], json!({"type": "integer", "minimum": 1, "maximum": 16}));
+    assert_eq!(wind["noise"]["anyOf"][0]["oneOf"][1], json!({"const": "perlin", "description": "gradient noise"}));
+    assert_eq!(wind["noise"]["default"], "perlin");
+    assert_eq!(wind["ramp_rotate"]["default"], json!({"ramp": [[0, 1]], "interpolation": "linear"}));
+    let reader = &schema["$defs"]["Curve_In"]["properties"]["params"]["properties"];
+    assert_eq!(reader["frame"]["description"], "Which frame of the files. Unless set: the current frame.");
+    assert_eq!(reader["frame"]["default"], Value::Null);
+    let shapes = &schema["$defs"]["Every_Shape"]["properties"]["params"]["properties"];
+    assert_eq!(shapes["float"]["description"], "A number. Usually 0…1.");
+    assert_eq!(shapes["float"]["default"], 0.1);
+}
+
+#[test]
+fn every_default_is_valid_under_its_own_schema() {
+    let schema = schema(CATALOGUE);
+    for node in CATALOGUE.nodes() {
+        let params = &schema["$defs"][node.name]["properties"]["params"]["properties"];
+        for (name, param) in params.as_object().expect("params are an object") {
+            let Some(default) = param.get("default") else { continue };
+            let alone = json!({"$defs": schema["$defs"], "anyOf": [param]});
+            assert!(jsonschema::draft202012::is_valid(&alone, default), "{}.{name} = {default}", node.name);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! What becomes of graphs without a fault: order, wires, and the sources of params.
+
+use super::super::{Body, Graph, Link, Scene};
+use super::{good, load_with};
+use crate::geometry::Column;
+use crate::param::{Source, Value, euler_to_turn};
+
+/// A graph of one node of every shape, with these params; `controls` are its controls.
+fn shapes(controls: &str, params: &str) -> Graph {
+    good(&format!(
+        r#"{{"convect": 1, "scene": {{"frames": [10, 20], "seed": 7}}, "controls": {{{controls}}},
+            "nodes": {{"all": {{"type": "Every_Shape", "params": {{{params}}}}}}}, "outputs": {{"a": "all"}}}}"#
+    ))
+}
+
+fn source<'g>(graph: &'g Graph, id: &str, param: &str) -> &'g Source {
+    let node = graph.nodes.iter().find(|node| &*node.id == id).expect("the node is there");
+    let Body::Node { specs, params, .. } = &node.body else { panic!("not a node of the catalogue") };
+    &params[specs.iter().position(|spec| spec.name == param).expect("the param is declared")]
+}
+
+/// The constant value of a param.
+fn constant(graph: &Graph, param: &str) -> Value {
+    match source(graph, "all", param) {
+        Source::Constant(value) => value.clone(),
+        other => panic!("{param} is {other:?}"),
+    }
+}
+
+/// The param's value at a frame.
+fn at(graph: &Graph, param: &str, frame: f64) -> Value {
+    source(graph, "all", param).at(frame, graph.scene.clock())
+}
+
+#[test]
+fn the_least_graph_has_the_documented_defaults() {
+    let graph = good(r#"{"convect": 1, "nodes": {"a": {"type": "Mesh_In"}}, "outputs": {"a": "a"}}"#);
+    assert_eq!(graph.scene, Scene { first: 1, last: 1, fps: 24.0, seed: 0, origin: [0.0; 3] });
+    assert!(matches!(source(&graph, "a", "frame"), Source::CurrentFrame));
+    assert!(matches!(source(&graph, "a", "file"), Source::Constant(Value::File(None))));
+}
+
+#[test]
+fn nodes_stand_after_what_they_are_wired_to_and_links_follow() {
+    let graph = good(
+        r#"{"convect": 1, "outputs": {"o": {"from": "soft.tets", "attributes": ["P"], "v": true}}, "nodes": {
+            "soft": {"type": "Softbody", "inputs": {"bodies": ["b", "a.mesh"]}},
+            "b": {"type": "Mesh_In"}, "a": {"type": "Mesh_In"}}}"#,
+    );
+    let ids: Vec<&str> = graph.nodes.iter().map(|node| &*node.id).collect();
+    assert_eq!(ids, ["b", "a", "soft"]);
+    assert_eq!(graph.nodes[2].inputs(), [[Link { node: 0, port: 0 }, Link { node: 1, port: 0 }]]);
+    let output = &graph.outputs[0];
+    assert_eq!((output.from, output.v), (Link { node: 2, port: 1 }, true));
+    assert_eq!(output.attributes.as_deref(), Some(&["P".into()][..]));
+}
+
+#[test]
+fn a_list_input_takes_a_single_wire_without_the_list() {
+    let graph = good(
+        r#"{"convect": 1, "nodes": {"a": {"type": "Mesh_In"}, "m": {"type": "Merge", "inputs": {"geometry": "a"}}},
+            "outputs": {"o": "m"}}"#,
+    );
+    assert_eq!(graph.nodes[1].inputs(), [[Link { node: 0, port: 0 }]]);
+}
+
+#[test]
+fn literals_of_every_shape_are_read() {
+    let graph = shapes(
+        "",
+        r#""float": -2.5e-1, "int": 3.0, "bool": false, "vec2": [1, 2], "vec3": [1, 2, 3], "int3": [1, 2, 3e0],
+           "span": [0.5, 0.5], "rotate": [0, 90, 0], "choice": "wavelet", "falloff": {"ramp": [[0, 1], [0.5, 0]]},
+           "text": "a\n", "texts": ["P", "v"], "offsets": [[0, 0, 0.5]], "tets": [[0, 1, 2, 3]], "masked": 2,
+           "columns": {"mask": [1, 0.5], "id2": [1, 2], "width": [1], "Cd": [[1, 0, 0]], "q": [[0, 0, 0, 1.0]]}"#,
+    );
+    for (param, expected) in [
+        ("float", Value::Float(-0.25)),
+        ("int", Value::Int(3)),
+        ("bool", Value::Bool(false)),
+        ("vec2", Value::Vec2([1.0, 2.0])),
+        ("vec3", Value::Vec3([1.0, 2.0, 3.0])),
+        ("int3", Value::Int3([1, 2, 3])),
+        ("span", Value::Span([0.5, 0.5])),
+        ("rotate", euler_to_turn([0.0, 90.0, 0.0])),
+        ("choice", Value::Choice(2)),
+        ("text", Value::Text("a\n".into())),
+        ("masked", Value::Masked(2.0, None)),
+    ] {
+        assert_eq!(constant(&graph, param), expected, "{param}");
+    }
+    let Value::Columns(columns) = constant(&graph, "columns") else { panic!() };
+    assert_eq!(columns[0], ("mask".into(), Column::new(vec![1.0_f32, 0.5])));
+    assert_eq!(columns[1], ("id2".into(), Column::new(vec![1, 2])), "written whole, it is whole");
+    assert_eq!(columns[2], ("width".into(), Column::new(vec![1.0_f32])), "a well-known name has its type");
+    assert_eq!(columns[3], ("Cd".into(), Column::new(vec![[1, 0, 0]])));
+    assert_eq!(columns[4], ("q".into(), Column::new(vec![[0.0_f32, 0.0, 0.0, 1.0]])));
+}
+
+#[test]
+fn keyframes_of_every_kind_of_value_are_read() {
+    let graph = shapes(
+        "",
+        r#""float": {"keyframes": [[0, 0], [10, 1]]}, "vec3": {"keyframes": [[0, [0, 0, 0]], [10, [0, 2, 0]]], "interpolation": "constant"},
+           "rotate": {"keyframes": [[0, [0, 0, 0]], [10, [0, 720, 0]]]}, "choice": {"keyframes": [[0, "none"], [10, "perlin"]]},
+           "falloff": {"keyframes": [[0, [[0, 0]]], [10, {"ramp": [[0, 1]]}]]}"#,
+    );
+    assert_eq!(at(&graph, "float", 5.0), Value::Float(0.5));
+    assert_eq!(at(&graph, "vec3", 9.0), Value::Vec3([0.0; 3]));
+    assert_eq!(at(&graph, "rotate", 2.5), euler_to_turn([0.0, 180.0, 0.0]), "whole turns are made");
+    assert_eq!((at(&graph, "choice", 9.9), at(&graph, "choice", 10.0)), (Value::Choice(0), Value::Choice(1)));
+    let Value::Ramp(ramp) = at(&graph, "falloff", 5.0) else { panic!() };
+    assert_eq!(ramp.keys(), [[0.0, 0.5]]);
+}
+
+#[test]
+fn keys_of_one_value_do_not_move() {
+    let text = r#"{"convect": 1, "nodes": {"all": {"type": "Every_Shape", "params": {
+        "fixed": {"keyframes": [[0, 2], [10, 2]]}}}}, "outputs": {"a": "all"}}"#;
+    let graph = load_with(text, &[]).unwrap_or_else(|faults| panic!("{faults:#?}"));
+    assert_eq!(constant(&graph, "fixed"), Value::Float(2.0));
+}
+
+#[test]
+fn expressions_that_hang_on_no_time_are_constants() {
+    let graph = shapes(
+        r#""gain": 2, "dir": [1, 2, 3], "on": true, "moving": {"keyframes": [[10, 0], [20, 10]]}"#,
+        r#""float": {"expr": "gain*dir.y + on"}, "int": {"expr": "7/2"}, "vec3": {"expr": ["dir.x", "fps", "0"]},
+           "rotate": {"expr": ["0", "45*gain", "0"]}, "double": {"expr": "moving + time"}, "fixed": {"expr": "1 + 1"}"#,
+    );
+    assert_eq!(constant(&graph, "float"), Value::Float(5.0));
+    assert_eq!(constant(&graph, "int"), Value::Int(4), "rounded, halves away from zero");
+    assert_eq!(constant(&graph, "vec3"), Value::Vec3([1.0, 24.0, 0.0]));
+    assert_eq!(constant(&graph, "rotate"), euler_to_turn([0.0, 90.0, 0.0]));
+    assert_eq!(constant(&graph, "fixed"), Value::Float(2.0));
+    assert_eq!(at(&graph, "double", 12.0), Value::Float(2.5), "2 keyed, and 12 frames are half a second");
+}
+
+#[test]
+fn controls_are_read_as_if_they_stood_in_the_param() {
+    let graph = shapes(
+        r#""x": 3, "word": "perlin", "turn": {"keyframes": [[0, [0, 0, 0]], [10, [90, 0, 0]]]}, "soft": {"ramp": [[0, 0], [1, 1]]}"#,
+        r#""float": {"control": "x"}, "int": {"control": "x"}, "choice": {"control": "word"}, "rotate": {"control": "turn"},
+           "falloff": {"control": "soft"}, "masked": {"value": {"control": "x"}, "attribute": "mask"}"#,
+    );
+    assert_eq!((constant(&graph, "float"), constant(&graph, "int")), (Value::Float(3.0), Value::Int(3)));
+    assert_eq!(constant(&graph, "choice"), Value::Choice(1));
+    assert_eq!(at(&graph, "rotate", 10.0), euler_to_turn([90.0, 0.0, 0.0]));
+    assert_eq!(constant(&graph, "masked"), Value::Masked(3.0, Some("mask".into())));
+}
+
+#[test]
+fn masks_keep_a_moving_value_moving() {
+    let graph = shapes("", r#""masked": {"value": {"keyframes": [[0, 0], [10, 1]]}, "attribute": "mask"}"#);
+    assert_eq!(at(&graph, "masked", 5.0), Value::Masked(0.5, Some("mask".into())));
+}
+
+#[test]
+fn seeds_are_mixed_with_the_scenes_and_keyed_ones_hold() {
+    let Value::Int(three) = constant(&shapes("", r#""seed": 3"#), "seed") else { panic!() };
+    let Value::Int(unset) = constant(&shapes("", ""), "seed") else { panic!() };
+    let Value::Int(zero) = constant(&shapes("", r#""seed": 0"#), "seed") else { panic!() };
+    assert_eq!(three, i64::from(numerics::random::Key::new(7).of(3).u32()));
+    assert_eq!(unset, zero);
+    assert_ne!(three, zero);
+    let graph = shapes("", r#""seed": {"keyframes": [[0, 3], [10, 0]]}"#);
+    assert_eq!((at(&graph, "seed", 9.0), at(&graph, "seed", 10.0)), (Value::Int(three), Value::Int(zero)));
+}
+
+#[test]
+fn paths_start_at_the_folder_and_numbered_ones_are_looked_for_later() {
+    let text = r#"{"convect": 1, "outputs": {"o": "a"}, "nodes": {
+        "a": {"type": "Mesh_In", "params": {"file": "sub/a.obj"}}, "b": {"type": "Mesh_In", "params": {"file": "missing.####.obj"}}}}"#;
+    let graph = good(text);
+    let file = |id| match source(&graph, id, "file") {
+        Source::File { path, numbered } => (path.to_string_lossy().replace('\\', "/"), *numbered),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(file("a"), ("scene/sub/a.obj".into(), false));
+    assert_eq!(file("b"), ("scene/missing.####.obj".into(), true));
+}
+
+#[test]
+fn unset_starts_are_the_scenes_first_frame() {
+    let graph = good(
+        r#"{"convect": 1, "scene": {"frames": [-5, 9]}, "outputs": {"o": "s"}, "nodes": {"s": {"type": "Softbody", "inputs": {"bodies": []}}}}"#,
+    );
+    assert!(matches!(source(&graph, "s", "start_frame"), Source::Constant(Value::Int(-5))));
+    assert!(matches!(source(&graph, "s", "from"), Source::Constant(Value::Float(x)) if *x == -5.0));
+}
+
+#[test]
+fn sets_replace_add_and_mend() {
+    let text = r#"{"convect": 1, "controls": {"x": 1}, "outputs": {"o": "all"}, "nodes": {
+        "all": {"type": "Every_Shape", "params": {"float": {"control": "x"}, "span": [2, 1]}}}}"#;
+    let graph = load_with(text, &[("x", "4"), ("all.span", "[1, 2]"), ("all.int", "{\"expr\": \"x\"}")]);
+    let graph = graph.unwrap_or_else(|faults| panic!("{faults:#?}"));
+    assert_eq!((constant(&graph, "float"), constant(&graph, "int")), (Value::Float(4.0), Value::Int(4)));
+    assert_eq!(constant(&graph, "span"), Value::Span([1.0, 2.0]));
+}
+
+#[test]
+fn velocities_are_refused_only_where_points_come_and_go() {
+    let v = |nodes: &str| {
+        let text = format!(r#"{{"convect": 1, "nodes": {{{nodes}}}, "outputs": {{"o": {{"from": "o", "v": true}}}}}}"#);
+        load_with(&text, &[]).is_ok()
+    };
+    let scatter = |skin: &str, count: &str| {
+        format!(r#""s": {skin}, "o": {{"type": "Scatter", "inputs": {{"skin": "s"}}, "params": {{"count": {count}}}}}"#)
+    };
+    let still = r#"{"type": "Mesh_In", "params": {"file": "a.obj"}}"#;
+    let numbered = r#"{"type": "Mesh_In", "params": {"file": "a.####.obj"}}"#;
+    assert!(v(&scatter(still, "10")));
+    assert!(!v(&scatter(still, r#"{"expr": "frame"}"#)));
+    assert!(!v(&scatter(numbered, "10")));
+    assert!(v(&format!(r#""o": {numbered}"#)), "a sequence may have one topology");
+    assert!(v(&format!(r#""m": {still}, "o": {{"type": "Softbody", "inputs": {{"bodies": "m"}}}}"#)), "it writes `v`");
+}

@@ -1,0 +1,261 @@
+//! A bench: one node with given inputs and params, cooked as a graph would cook it.
+//!
+//! ```ignore
+//! let out = bench(&NODE).input(CURVES, curves).set(SHIELD, 0.5).cook();
+//! assert_eq!(out.curves().get(SHIELDED), Some(&[0.5][..]));
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use numerics::ramp::Interpolation;
+
+use crate::cook::{CookError, Delivered, Engine, Report, Settings};
+use crate::error::Error;
+use crate::geometry::{Component, Geometry, Kind};
+use crate::graph::{Body, Graph, GraphNode, GraphOutput, Link, Places, Scene};
+use crate::node::{Input, Node};
+use crate::param::{Keyframes, Param, ParamType, Shape, Source, Unset, Value};
+use crate::plan::Request;
+use crate::time::Frame;
+
+/// Puts a node on the bench.
+pub fn bench(node: &'static Node) -> Bench {
+    let specs: Arc<[_]> = node.param_specs().into();
+    let scene = Scene { last: 48, ..Scene::default() };
+    let params = specs.iter().map(|spec| match spec.facts.unset {
+        Unset::Default => Source::Constant(spec.default.clone()),
+        Unset::CurrentFrame => Source::CurrentFrame,
+        Unset::SceneStart => Source::Constant(Value::Int(scene.first)),
+    });
+    Bench {
+        node,
+        params: params.collect(),
+        inputs: node.inputs.iter().map(|_| Vec::new()).collect(),
+        scene,
+        frame: Frame::whole(1),
+        threads: 2,
+    }
+}
+
+type Moving = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
+
+/// A node with given inputs and params.
+#[derive(Clone)]
+pub struct Bench {
+    node: &'static Node,
+    params: Vec<Source>,
+    inputs: Vec<Vec<(Moving, bool)>>,
+    scene: Scene,
+    frame: Frame,
+    threads: usize,
+}
+
+impl Bench {
+    /// Adds a wire to an input.
+    ///
+    /// # Panics
+    /// Where the node has no such input.
+    #[must_use]
+    pub fn input<A>(self, input: Input<A>, geometry: impl Into<Geometry>) -> Self {
+        let geometry = geometry.into();
+        self.wire(input.name(), Arc::new(move |_| geometry.clone()), false)
+    }
+
+    /// Adds a wire whose geometry moves.
+    ///
+    /// # Panics
+    /// Where the node has no such input.
+    #[must_use]
+    pub fn moving<A>(self, input: Input<A>, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
+        self.wire(input.name(), Arc::new(at), true)
+    }
+
+    pub(super) fn wire(mut self, input: &str, at: Moving, moves: bool) -> Self {
+        let place = self.node.inputs.iter().position(|declared| declared.spec().name == input);
+        let place = place.unwrap_or_else(|| panic!("{} has no input `{input}`", self.node.name));
+        self.inputs[place].push((at, moves));
+        self
+    }
+
+    /// Sets a param.
+    ///
+    /// # Panics
+    /// Where the node has no such param.
+    #[must_use]
+    pub fn set<T: ParamType>(self, param: Param<T>, value: T) -> Self {
+        self.source(param.name(), Source::Constant(value.value()))
+    }
+
+    /// Keys a param, straight from key to key.
+    ///
+    /// # Panics
+    /// Where the node has no such param.
+    #[must_use]
+    pub fn keyed<T: ParamType>(self, param: Param<T>, keys: &[(f64, T)]) -> Self {
+        let keys = keys.iter().map(|(frame, value)| (*frame, value.clone().value())).collect();
+        let keys = Keyframes { keys, interpolation: Interpolation::Linear };
+        self.source(param.name(), Source::Keys(Arc::new(keys), T::shape()))
+    }
+
+    /// Sets where a param's value comes from.
+    ///
+    /// # Panics
+    /// Where the node has no such param.
+    #[must_use]
+    pub fn source(mut self, param: &str, source: Source) -> Self {
+        let place = self.node.params.iter().position(|declared| declared.spec().name == param);
+        let place = place.unwrap_or_else(|| panic!("{} has no param `{param}`", self.node.name));
+        debug_assert!(!matches!(&source, Source::Keys(_, Shape::File)), "a file is not keyed");
+        self.params[place] = source;
+        self
+    }
+
+    /// The scene the node stands in; 48 frames at 24 frames a second unless said.
+    #[must_use]
+    pub fn scene(mut self, scene: Scene) -> Self {
+        self.scene = scene;
+        self
+    }
+
+    /// The frame [`Bench::cook`] cooks; 1 unless said.
+    #[must_use]
+    pub fn at(mut self, frame: f64) -> Self {
+        self.frame = Frame::exactly(frame).expect("a frame");
+        self
+    }
+
+    /// How many threads cook; 2 unless said.
+    #[must_use]
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = threads;
+        self
+    }
+
+    /// Cooks one frame of the first output.
+    ///
+    /// # Panics
+    /// Where the node refuses.
+    pub fn cook(&self) -> Tasted {
+        self.try_cook().unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Cooks one frame of the first output.
+    ///
+    /// # Errors
+    /// Where the node refuses.
+    pub fn try_cook(&self) -> Result<Tasted, Error> {
+        let mut frames = self.try_frames(&[self.frame]).map_err(|error| error.error.clone())?;
+        Ok(frames.remove(0))
+    }
+
+    /// Cooks whole frames of the first output, in the order given.
+    ///
+    /// # Panics
+    /// Where the node refuses.
+    pub fn frames(&self, frames: impl IntoIterator<Item = i64>) -> Vec<Tasted> {
+        let frames: Vec<Frame> = frames.into_iter().map(Frame::whole).collect();
+        self.try_frames(&frames).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Cooks frames of the first output, in the order given.
+    ///
+    /// # Errors
+    /// Where the node refuses any of them.
+    pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<Tasted>, Arc<CookError>> {
+        let graph = self.graph();
+        let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
+        let (found, report) = cook_all(&engine, &graph, frames);
+        if let Some((_, error, _)) = report.errors.into_iter().next() {
+            return Err(error);
+        }
+        let metrics = |frame: Frame| {
+            let of_node = report.nodes.last().map(|node| &node.metrics);
+            let at = |(name, values): (&&'static str, &BTreeMap<Frame, f64>)| values.get(&frame).map(|value| (*name, *value));
+            of_node.into_iter().flatten().filter_map(at).collect()
+        };
+        let tasted = |frame: &Frame| Tasted {
+            geometry: found.get(&(0, *frame)).expect("every frame was delivered").clone(),
+            metrics: metrics(*frame),
+        };
+        Ok(frames.iter().map(tasted).collect())
+    }
+
+    /// The graph: the given inputs, then the node; an output for each of the node's.
+    pub fn graph(&self) -> Graph {
+        let mut nodes = Vec::new();
+        let mut inputs = Vec::new();
+        for (declared, wires) in self.node.inputs.iter().zip(&self.inputs) {
+            let mut links = Vec::new();
+            for (at, moves) in wires {
+                links.push(Link { node: nodes.len(), port: 0 });
+                let id = format!("{}{}", declared.spec().name, links.len()).into();
+                nodes.push(GraphNode { id, body: Body::Given { at: at.clone(), moves: *moves } });
+            }
+            inputs.push(links);
+        }
+        let outputs = self.node.outputs.iter().enumerate().map(|(port, output)| GraphOutput {
+            name: output.name.into(),
+            from: Link { node: nodes.len(), port },
+            attributes: None,
+            v: false,
+        });
+        let outputs = outputs.collect();
+        let specs = self.node.param_specs().into();
+        let body = Body::Node { node: self.node, specs, params: self.params.clone(), inputs };
+        nodes.push(GraphNode { id: "node".into(), body });
+        Graph { scene: self.scene.clone(), nodes, outputs, folder: PathBuf::new(), places: Places::default() }
+    }
+}
+
+/// Cooks all outputs of a graph at some frames: results by output and frame, and the report.
+///
+/// # Panics
+/// Where the request cannot be cooked at all.
+pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(usize, Frame), Arc<Geometry>>, Report) {
+    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
+    let mut found = BTreeMap::new();
+    let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
+        found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));
+        Ok(())
+    };
+    let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut sink).unwrap_or_else(|stopped| panic!("{stopped:?}"));
+    (found, report)
+}
+
+/// What a node made at one frame.
+#[derive(Clone, Debug)]
+pub struct Tasted {
+    /// Its first output.
+    pub geometry: Arc<Geometry>,
+    /// What it published.
+    pub metrics: BTreeMap<&'static str, f64>,
+}
+
+impl Tasted {
+    /// The component of a kind.
+    ///
+    /// # Panics
+    /// Where it is absent.
+    pub fn part(&self, kind: Kind) -> &Component {
+        self.geometry.part(kind).unwrap_or_else(|| panic!("the result has no {kind}"))
+    }
+
+    /// The curves.
+    ///
+    /// # Panics
+    /// Where there are none.
+    pub fn curves(&self) -> &Component {
+        self.part(Kind::Curves)
+    }
+
+    /// The mesh.
+    ///
+    /// # Panics
+    /// Where there is none.
+    pub fn mesh(&self) -> &Component {
+        self.part(Kind::Mesh)
+    }
+}

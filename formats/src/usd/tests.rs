@@ -1,0 +1,182 @@
+//! Whole files, without USD at hand: text compared, sizes, what is left on disk.
+
+use std::fs;
+use std::io::Cursor;
+
+use engine::geometry::{Column, Component, Grid, Kind, Owner, P, SHIELDED, V, Volume, WIDTH};
+
+use super::*;
+
+fn fur() -> Component {
+    let mut part =
+        Component::curves(vec![3, 2], vec![[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.5], [1.0, 0.0, 0.0], [1.0; 3]])
+            .unwrap();
+    part.set(WIDTH, vec![0.1, 0.1, 0.01, 0.2, 0.02]).unwrap();
+    part.set(SHIELDED, vec![0.0, 1.0]).unwrap();
+    part.set_column(Owner::Once, "a-b", Column::new(vec![[1.0, -0.0, 1e-42_f32]])).unwrap();
+    part
+}
+
+fn write_to(flavour: Flavour, name: &str, origin: [f64; 3], frames: &[(f64, Geometry)]) -> Vec<u8> {
+    let file = Cursor::new(Vec::new());
+    let encoder: Box<dyn Encoder<Cursor<Vec<u8>>>> = match flavour {
+        Flavour::Usda => Box::new(usda::Writer::new(file, Cursor::new(Vec::new()))),
+        Flavour::Usdc => Box::new(usdc::Writer::new(file).unwrap()),
+    };
+    let mut recorder = Recorder::new(encoder, Header { name: name.into(), fps: 24.0, origin });
+    for (time, geometry) in frames {
+        recorder.frame(*time, geometry).unwrap();
+    }
+    recorder.finish().unwrap().0.into_inner()
+}
+
+fn text_of(name: &str, origin: [f64; 3], frames: &[(f64, Geometry)]) -> String {
+    String::from_utf8(write_to(Flavour::Usda, name, origin, frames)).unwrap()
+}
+
+#[test]
+fn a_small_scene_is_this_text() {
+    let mut moved = fur();
+    moved.edit(P).unwrap()[4] = [f32::NAN, 2.0, 1.0];
+    moved.remove(Owner::Element, "shielded");
+    let frames = [(1001.0, fur().into()), (1001.5, moved.into())];
+    let expected = r#"#usda 1.0
+(
+    defaultPrim = "fur_2"
+    metersPerUnit = 1
+    timeCodesPerSecond = 24
+    framesPerSecond = 24
+    startTimeCode = 1001
+    endTimeCode = 1001.5
+    upAxis = "Y"
+)
+
+def Xform "fur_2" (
+    displayName = "fur-2"
+)
+{
+    double3 xformOp:translate = (1000000.5, 0, -2)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+
+    def BasisCurves "curves"
+    {
+        uniform token type = "linear"
+        uniform token wrap = "nonperiodic"
+        int[] curveVertexCounts = [3, 2]
+        float3[] extent = [(-0.1, -0.1, -0.1), (1.1, 2.1, 1.1)]
+        point3f[] points.timeSamples = {
+            1001: [(0, 0, 0), (0, 1, 0), (0, 2, 0.5), (1, 0, 0), (1, 1, 1)],
+            1001.5: [(0, 0, 0), (0, 1, 0), (0, 2, 0.5), (1, 0, 0), (nan, 2, 1)],
+        }
+        float[] widths = [0.1, 0.1, 0.01, 0.2, 0.02] (
+            interpolation = "vertex"
+        )
+        float[] primvars:shielded (
+            interpolation = "uniform"
+        )
+        float[] primvars:shielded.timeSamples = {
+            1001: [0, 1],
+            1001.5: None,
+        }
+        float3[] primvars:a_b = [(1, -0, 1e-42)] (
+            displayName = "a-b"
+            interpolation = "constant"
+        )
+    }
+}
+"#;
+    assert_eq!(text_of("fur-2", [1_000_000.5, 0.0, -2.0], &frames), expected);
+}
+
+#[test]
+fn no_frame_and_no_component_are_files_too() {
+    let expected = "#usda 1.0\n(\n    defaultPrim = \"fur\"\n    metersPerUnit = 1\n    timeCodesPerSecond = 24\n    \
+        framesPerSecond = 24\n    upAxis = \"Y\"\n)\n\ndef Xform \"fur\"\n{\n}\n";
+    assert_eq!(text_of("fur", [0.0; 3], &[]), expected);
+    let span = "    startTimeCode = 3\n    endTimeCode = 3\n    upAxis";
+    assert_eq!(text_of("fur", [0.0; 3], &[(3.0, Geometry::default())]), expected.replace("    upAxis", span));
+    assert!(write_to(Flavour::Usdc, "fur", [0.0; 3], &[]).starts_with(b"PXR-USDC\0\x08\0"));
+}
+
+#[test]
+fn a_frame_costs_its_changing_arrays_and_a_handle_an_attribute() {
+    let points = 1000;
+    let frame = |x: f32| {
+        let mut part = Component::curves(vec![5; 200], vec![[x, 0.0, 0.0]; points]).unwrap();
+        part.set(V, vec![[1.0, 0.0, 0.0]; points]).unwrap();
+        part.set_column(Owner::Point, "Pref", Column::new(vec![[0.5_f32; 3]; points])).unwrap();
+        Geometry::from(part)
+    };
+    let frames: Vec<(f64, Geometry)> = (0..50_u8).map(|f| (f64::from(f), frame(f.into()))).collect();
+    let size = |n: usize| write_to(Flavour::Usdc, "fur", [0.0; 3], &frames[..n]).len();
+    let points_and_extent = points * 12 + 8 + 24 + 8;
+    let time_and_three_handles = 8 + 3 * 8;
+    assert_eq!(size(50) - size(49), points_and_extent + time_and_three_handles);
+}
+
+#[test]
+fn both_flavours_give_the_same_bytes_again() {
+    let frames = [(1.0, fur().into()), (2.0, Geometry::default()), (2.25, fur().into())];
+    for flavour in [Flavour::Usda, Flavour::Usdc] {
+        let bytes = write_to(flavour, "fur", [0.0; 3], &frames);
+        assert_eq!(bytes, write_to(flavour, "fur", [0.0; 3], &frames));
+    }
+}
+
+#[test]
+fn a_file_appears_when_it_is_finished_and_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let visible = || -> Vec<String> {
+        let names = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| !name.starts_with('.')).collect()
+    };
+    for flavour in [Flavour::Usda, Flavour::Usdc] {
+        let path = folder.path().join("fur.usd");
+        let mut writer = UsdWriter::create(&path, flavour, "fur", 24.0, [0.0; 3]).unwrap();
+        writer.frame(1.0, &fur().into()).unwrap();
+        assert!(visible().is_empty());
+        let summary = writer.finish().unwrap();
+        assert_eq!((summary.frames, summary.stored, summary.shared), (1, 6, 0));
+        assert_eq!(fs::read(&path).unwrap(), write_to(flavour, "fur", [0.0; 3], &[(1.0, fur().into())]));
+        assert_eq!(fs::metadata(&path).unwrap().len(), summary.bytes);
+        fs::remove_file(&path).unwrap();
+        let mut dropped = UsdWriter::create(&path, flavour, "fur", 24.0, [0.0; 3]).unwrap();
+        dropped.frame(1.0, &fur().into()).unwrap();
+        drop(dropped);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fur.usdc");
+    let shown = path.display();
+    let create = |path: &Path, fps: f64| UsdWriter::create(path, Flavour::Usdc, "fur", fps, [0.0; 3]);
+    for fps in [0.0, -24.0, f64::NAN, f64::INFINITY] {
+        let text = create(&path, fps).err().unwrap().to_string();
+        assert_eq!(text, format!("`{shown}` could not be written: `fps` is {fps}, expected a positive number"));
+    }
+    let missing = folder.path().join("no").join("fur.usdc");
+    assert!(
+        create(&missing, 24.0)
+            .err()
+            .unwrap()
+            .to_string()
+            .starts_with(&format!("`{}` could not be created", missing.display()))
+    );
+    let mut writer = create(&path, 24.0).unwrap();
+    let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [0; 3] };
+    let mut geometry = Geometry::default();
+    geometry.put_volume(Volume::new(grid, vec![], [vec![], vec![], vec![]]).unwrap());
+    let text = writer.frame(1.0, &geometry).unwrap_err().to_string();
+    assert_eq!(
+        text,
+        format!(
+            "`{shown}` could not be written: frame 1 has a `volume`, which usda and usdc cannot hold here; json can"
+        )
+    );
+    assert_eq!(geometry.kinds().collect::<Vec<_>>(), [Kind::Volume]);
+    writer.frame(1.0, &fur().into()).unwrap();
+    assert!(writer.finish().is_ok(), "a refused frame spoils nothing");
+}

@@ -1,0 +1,60 @@
+//! Point_In: loose points from a file, or written into the graph.
+
+use crate::shared::source::{self, Inline};
+use engine::files::File;
+use engine::prelude::*;
+use std::sync::Arc;
+
+params! { PARAMS:
+    FILE: Param<Option<File>> = Param::file("file",
+        "An obj, ply or json file with points. A run of `#` in its name stands for the frame number: `drops.####.ply`.");
+    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read.")
+        .unit(Unit::Frame).default_current_frame();
+    POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
+        "Points written into the graph instead of a file.").unit(Unit::Metres);
+    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added, a row a point.");
+    SCALE: Param<f64> = Param::double("scale", 1.0,
+        "Multiplies positions, widths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+}
+
+const OUT: Output = Output::new("points", &[Kind::Points], "The points.");
+
+/// See the module.
+pub static NODE: Node = Node::new(
+    "Point_In",
+    1,
+    "Loose points from a file, or written into the graph: particles, pins. Other geometry in the file is left.",
+    Cook::Pure(cook),
+)
+.params(PARAMS)
+.outputs(&[&OUT])
+.writes(&[&P])
+.attributes(|_| [AttrNames::These(Vec::new()), AttrNames::All])
+.checks(|params| source::file_or_inline(params.get(FILE).as_ref(), params.get(POINTS).is_some()));
+
+fn cook(cx: &Cx) -> Result<Outputs> {
+    let mut points = match cx.get(FILE) {
+        Some(file) => source::from_file(&file, Kind::Points)?,
+        None => Component::points(cx.get(POINTS).unwrap_or_default().to_vec()),
+    };
+    Inline { points: cx.get(ATTRIBUTES), elements: Arc::default() }.add_to(&mut points)?;
+    source::scale(&mut points, cx.get(SCALE));
+    Ok(OUT.with(Geometry::from(points)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::testing::bench;
+
+    #[test]
+    fn inline_points_carry_their_attributes() {
+        let out = bench(&NODE)
+            .set(POINTS, Some(Arc::new(vec![[1.0; 3], [2.0; 3]])))
+            .set(ATTRIBUTES, Arc::new(vec![("id".into(), Column::new(vec![5, 6]))]))
+            .set(SCALE, 2.0)
+            .cook();
+        assert_eq!(out.part(Kind::Points).positions(), [[2.0; 3], [4.0; 3]]);
+        assert_eq!(out.part(Kind::Points).get(ID), Some(&[5, 6][..]));
+    }
+}

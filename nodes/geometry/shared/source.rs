@@ -1,0 +1,79 @@
+//! What the file sources share: one component of a file, or written into the graph itself, scaled.
+
+use engine::files::File;
+use engine::prelude::*;
+use formats::{Format, FormatError};
+use std::sync::Arc;
+
+/// The component of `kind` in a file; what else the file has is left.
+///
+/// # Errors
+/// Where the file cannot be read as what its ending says, or has no such component.
+pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
+    let path = file.path().display();
+    let refused = |error: FormatError| {
+        let fact = Error::file(format!("`{path}`: {error}"));
+        match error.hint() {
+            Some(hint) => fact.hint(hint),
+            None => fact,
+        }
+    };
+    let format = Format::of_path(file.path()).map_err(refused)?;
+    let geometry = formats::read(format, &file.bytes()?).map_err(refused)?;
+    geometry.part(kind).cloned().ok_or_else(|| {
+        let there: Vec<&str> = geometry.kinds().map(Kind::name).collect();
+        let there = if there.is_empty() { "nothing".to_owned() } else { there.join(", ") };
+        Error::file(format!("`{path}` has no {kind}; it has {there}"))
+    })
+}
+
+/// Attributes written into the graph: a row a point, a row an element.
+pub(crate) struct Inline {
+    pub(crate) points: Arc<Vec<(Name, Column)>>,
+    pub(crate) elements: Arc<Vec<(Name, Column)>>,
+}
+
+impl Inline {
+    /// Adds the attributes to a component.
+    ///
+    /// # Errors
+    /// Where one has the wrong number of rows or type.
+    pub(crate) fn add_to(self, component: &mut Component) -> Result<()> {
+        for (owner, columns) in [(Owner::Point, &self.points), (Owner::Element, &self.elements)] {
+            for (name, column) in columns.iter() {
+                component.set_column(owner, name.clone(), column.clone())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Multiplies positions, rest positions, velocities and widths by `scale`; 1 touches nothing.
+pub(crate) fn scale(component: &mut Component, scale: f64) {
+    if scale.to_bits() == 1.0_f64.to_bits() {
+        return;
+    }
+    let scaled = |x: f32| (f64::from(x) * scale) as f32;
+    for attribute in [P, PREF, V] {
+        for row in component.edit(attribute).into_iter().flatten() {
+            *row = row.map(scaled);
+        }
+    }
+    for row in component.edit(WIDTH).into_iter().flatten() {
+        *row = scaled(*row);
+    }
+}
+
+/// Which of the two ways to give a source its geometry is used.
+///
+/// # Errors
+/// Where both are, or neither.
+pub(crate) fn file_or_inline(file: Option<&File>, has_inline: bool) -> Result<()> {
+    match (file, has_inline) {
+        (Some(_), true) => Err(Error::refused("it has both a `file` and `points`").hint("remove one of them")),
+        (None, false) => {
+            Err(Error::refused("it has neither a `file` nor `points`").hint("name a file, or write `points`"))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,108 @@
+//! The floor the scene stands on: nothing but shadow on the backdrop, so that it has no horizon and hides nothing.
+//!
+//! Promise: the floor lies at the lowest point of the bounds and darkens only, softly: where the key light is blocked,
+//! and close under what nearly touches it. Limit: no shadow farther than `HALF` from the middle of the scene, none
+//! for an eye below the floor.
+
+use rayon::prelude::*;
+
+use crate::light::{DepthMap, Light};
+use crate::scene::Scene;
+use crate::vector::{V3, add, scale, sub};
+use crate::view::View;
+
+/// Half the side of the floor, stage units, and texels a side.
+const HALF: f32 = 2.6;
+const TEXELS: usize = 320;
+/// Height at which something over the floor darkens it half as much as touching it, stage units.
+const CONTACT_HEIGHT: f32 = 0.05;
+/// Share of the backdrop's light that full shadow, and full contact, take.
+const SHADOW: f32 = 0.38;
+const CONTACT: f32 = 0.45;
+/// Texels that box filters reach to each side; three of them in a row are near a Gaussian.
+const SHADOW_BLUR: usize = 4;
+const CONTACT_BLUR: usize = 3;
+
+/// How dark the floor is.
+pub(crate) struct Ground {
+    height: f32,
+    light: Vec<f32>,
+}
+
+impl Ground {
+    /// The floor at `height` under a scene in `light`.
+    pub(crate) fn of(scene: &Scene, light: &Light, height: f32) -> Self {
+        let up = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+        let from_below = DepthMap::from(scene, [0.0, height, 0.0], up);
+        let near = |way: f32| {
+            let heights = way.max(0.0) / CONTACT_HEIGHT;
+            1.0 / (1.0 + heights * heights)
+        };
+        let texels = |value: &(dyn Fn(V3) -> f32 + Sync)| -> Vec<f32> {
+            let middle = |k: usize| ((k as f32 + 0.5) / TEXELS as f32 * 2.0 - 1.0) * HALF;
+            let texel = |k: usize| value([middle(k % TEXELS), height, middle(k / TEXELS)]);
+            (0..TEXELS * TEXELS).into_par_iter().map(texel).collect()
+        };
+        let shadow = blur(texels(&|at| 1.0 - light.reaching(at)), SHADOW_BLUR);
+        let contact = blur(texels(&|at| from_below.seen(at, near)), CONTACT_BLUR);
+        let both = shadow.iter().zip(&contact);
+        Self {
+            height,
+            light: both.map(|(shadow, contact)| (1.0 - SHADOW * shadow) * (1.0 - CONTACT * contact)).collect(),
+        }
+    }
+
+    /// Share of the backdrop's light at the pixel x, y.
+    pub(crate) fn light(&self, view: &View, x: f32, y: f32) -> f32 {
+        let eye = view.eye();
+        let ray = sub(view.unproject([x, y, 1.0]), eye);
+        let way = (self.height - eye[1]) / ray[1];
+        // Written so that a level ray and NaN see no floor.
+        if !(way > 0.0 && ray[1] < 0.0) {
+            return 1.0;
+        }
+        let [u, _, v] = add(eye, scale(ray, way)).map(|x| (x / HALF + 1.0) * 0.5 * TEXELS as f32 - 0.5);
+        let inside = |x: f32| x >= 0.0 && x < (TEXELS - 1) as f32;
+        if !(inside(u) && inside(v)) {
+            return 1.0;
+        }
+        let (column, row) = (u as usize, v as usize);
+        let (u, v) = (u - column as f32, v - row as f32);
+        let at = |dx: usize, dy: usize| self.light[(row + dy) * TEXELS + column + dx];
+        (1.0 - v) * ((1.0 - u) * at(0, 0) + u * at(1, 0)) + v * ((1.0 - u) * at(0, 1) + u * at(1, 1))
+    }
+}
+
+/// Three box filters along rows and columns; what lies beyond the border is 0.
+fn blur(mut texels: Vec<f32>, reach: usize) -> Vec<f32> {
+    for _ in 0..6 {
+        // Along the rows, written as columns: after two rounds both are done and all lies as before.
+        let blurred: Vec<Vec<f32>> = texels.par_chunks(TEXELS).map(|row| box_filter(row, reach)).collect();
+        texels = (0..TEXELS * TEXELS).map(|k| blurred[k % TEXELS][k / TEXELS]).collect();
+    }
+    texels
+}
+
+fn box_filter(row: &[f32], reach: usize) -> Vec<f32> {
+    let share = 1.0 / (2 * reach + 1) as f32;
+    let window = |k: usize| &row[k.saturating_sub(reach)..(k + reach + 1).min(row.len())];
+    (0..row.len()).map(|k| window(k).iter().sum::<f32>() * share).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blurring_keeps_the_sum_and_spreads_it_evenly() {
+        let mut texels = vec![0.0; TEXELS * TEXELS];
+        let (row, column) = (100, 150);
+        texels[row * TEXELS + column] = 1.0;
+        let blurred = blur(texels, 2);
+        assert!((blurred.iter().sum::<f32>() - 1.0).abs() < 1e-4);
+        let at =
+            |dx: isize, dy: isize| blurred[(row as isize + dy) as usize * TEXELS + (column as isize + dx) as usize];
+        assert!(at(0, 0) > at(3, 0) && at(3, 0) > 0.0 && at(7, 0) == 0.0);
+        assert!((at(3, 0) - at(0, -3)).abs() < 1e-7);
+    }
+}

@@ -1,0 +1,141 @@
+use super::*;
+use crate::{attribute_range, bounds};
+use engine::geometry::{Column, Component, Geometry, Grid, Owner, Volume};
+
+/// Something of every kind, all within a few metres: a bent sheet, a tuft, balls, tets, a drop.
+fn still_life(scale: f32) -> Geometry {
+    let at = |x: f32, y: f32, z: f32| [x * scale, y * scale, z * scale];
+    let sheet = (0..81).map(|k| {
+        let (x, z) = ((k % 9) as f32 * 0.25, (k / 9) as f32 * 0.25);
+        at(x, 0.25 * x * z, z)
+    });
+    let cell = |k: u32| [k, k + 9, k + 10, k + 1];
+    let quads: Vec<u32> = (0..72).filter(|k| k % 9 < 8).flat_map(cell).collect();
+    let tuft = (0..300).map(|k| at((k / 5) as f32 * 0.03125, 0.5 + (k % 5) as f32 * 0.25, (k % 7) as f32 * 0.0625));
+    let balls: Vec<_> = (0..30).map(|k| at(1.0 + (k % 5) as f32 * 0.125, 1.5, (k / 5) as f32 * 0.125)).collect();
+    let tet = vec![at(-1.0, 0.0, 0.0), at(-0.5, 0.0, 0.0), at(-1.0, 1.0, 0.0), at(-1.0, 0.0, 0.5)];
+    let mut tuft = Component::curves(vec![5; 60], tuft.collect()).unwrap();
+    tuft.set_column(Owner::Element, "heat", Column::new((0..60).collect::<Vec<i32>>())).unwrap();
+    let mut all = Geometry::from(tuft)
+        .with(Component::mesh(vec![4; 64], quads, sheet.collect()).unwrap())
+        .with(Component::points(balls))
+        .with(Component::tets(vec![[0, 1, 2, 3]], tet).unwrap());
+    let grid = Grid { origin: at(0.0, 2.0, 0.0), cell: 0.125 * scale, size: [6; 3] };
+    let from_middle = |k: usize| {
+        let [x, y, z] = [k % 6, k / 6 % 6, k / 36].map(|i| i as f32 - 2.5);
+        ((x * x + y * y + z * z).sqrt() - 2.0) * grid.cell
+    };
+    let drop =
+        Volume::new(grid, (0..216).map(from_middle).collect(), [0, 1, 2].map(|axis| vec![1.0; grid.faces(axis)]));
+    all.put_volume(drop.unwrap());
+    all
+}
+
+fn small() -> Settings {
+    Settings { width: 160, height: 120, ..Settings::default() }
+}
+
+fn picture(geometry: &Geometry, settings: &Settings) -> Image {
+    render(&[Layer::new("one", geometry)], settings).unwrap()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let geometry = still_life(1.0);
+    let settings = Settings { color_by: Some("heat".into()), label: Some("still life".into()), ..small() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| [picture(&geometry, &small()), picture(&geometry, &settings)])
+    };
+    let one = on(1);
+    assert_eq!(one, on(2));
+    assert_eq!(one, on(7));
+}
+
+#[test]
+fn a_scene_at_any_scale_is_the_same_picture() {
+    let there = picture(&still_life(1.0), &small());
+    assert_eq!(there, picture(&still_life(1024.0), &small()));
+    assert_eq!(there, picture(&still_life(1.0 / 1024.0), &small()));
+}
+
+#[test]
+fn nothing_is_the_backdrop_alone() {
+    let empty = render(&[], &small()).unwrap();
+    assert_eq!(empty, picture(&Geometry::default(), &small()));
+    assert_eq!(empty, picture(&Component::points(vec![]).into(), &small()));
+    assert!(empty.pixels().iter().flatten().all(|byte| *byte > 140));
+}
+
+#[test]
+fn something_is_seen_in_the_middle_and_its_shadow_beside_it() {
+    let geometry = Geometry::from(Component::points(vec![[0.0, 0.5, 0.0]]));
+    let settings = Settings { point_width: Some(1.0), bounds: Some([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]]), ..small() };
+    let (empty, ball) = (render(&[], &settings).unwrap(), picture(&geometry, &settings));
+    let at = |image: &Image, x: usize, y: usize| image.pixels()[y * 160 + x];
+    assert!(at(&ball, 80, 60)[2] > at(&ball, 80, 60)[0]);
+    assert_eq!(at(&ball, 2, 2), at(&empty, 2, 2));
+    let darker = |x: usize, y: usize| at(&ball, x, y)[1] + 20 < at(&empty, x, y)[1];
+    assert!((0..160).any(|x| darker(x, 95)));
+    let bare = picture(&geometry, &Settings { ground: false, ..settings });
+    assert!((120..160).all(|x| at(&bare, x, 95) == at(&empty, x, 95)));
+}
+
+#[test]
+fn hostile_geometry_is_a_picture_too() {
+    let values = [0.0, 1.0, -1.0, 1e-30, 1e30, -3e38, f32::NAN, f32::INFINITY];
+    let points: Vec<[f32; 3]> = (0..512).map(|k| [values[k % 8], values[k / 8 % 8], values[k / 64]]).collect();
+    let corners: Vec<u32> = (0..510).chain((0..510).map(|k| k * 37 % 512)).collect();
+    let mut curves = Component::curves(vec![4; 128], points.clone()).unwrap();
+    curves
+        .set_column(Owner::Point, "width", Column::new((0..512).map(|k| values[k % 8]).collect::<Vec<f32>>()))
+        .unwrap();
+    let geometry = Geometry::from(curves)
+        .with(Component::mesh([vec![3; 170], vec![255; 2]].concat(), corners, points.clone()).unwrap())
+        .with(Component::tets((0..128).map(|k| [k, k * 2, k * 3, k * 4 % 512]).collect(), points.clone()).unwrap())
+        .with(Component::points(points));
+    let camera = |text: &str| Some(text.parse().unwrap());
+    for settings in [
+        small(),
+        Settings { bounds: Some([[0.0; 3], [1.0; 3]]), ..small() },
+        Settings { bounds: Some([[f32::NAN; 3]; 2]), ..small() },
+        Settings { bounds: Some([[1.0; 3], [-1.0; 3]]), camera: camera("eye=0,0,0 target=1e-20,0,0"), ..small() },
+        Settings { bounds: Some([[0.0; 3], [1.0; 3]]), camera: camera("eye=1e300,0,0 target=-1e300,0,0"), ..small() },
+        Settings { color_by: Some("P".into()), curve_width: Some(f32::INFINITY), point_width: Some(-1.0), ..small() },
+        Settings { color_by: Some("width".into()), range: Some([f32::NAN, f32::INFINITY]), ..small() },
+        Settings { width: 1, height: 1, ..small() },
+        Settings { width: 1000, height: 1, ..small() },
+    ] {
+        picture(&geometry, &settings);
+    }
+}
+
+#[test]
+fn a_picture_without_pixels_is_an_error() {
+    let error = render(&[], &Settings { width: 0, ..small() }).unwrap_err();
+    assert_eq!(error.to_string(), "the picture is 0 × 120 pixels, expected 1 to 268435456 in all");
+}
+
+#[test]
+fn a_wider_range_moves_the_colors_and_keeps_them_between_frames() {
+    let geometry = still_life(1.0);
+    let layers = [Layer::new("one", &geometry)];
+    let range = attribute_range(&layers, "heat");
+    assert_eq!(range, Some([0.0, 59.0]));
+    let by_heat = Settings { color_by: Some("heat".into()), ..small() };
+    let own = picture(&geometry, &by_heat);
+    assert_eq!(own, picture(&geometry, &Settings { range, ..by_heat.clone() }));
+    assert_ne!(own, picture(&geometry, &Settings { range: Some([0.0, 600.0]), ..by_heat.clone() }));
+    // The bounds that render takes by itself are those a caller would give for one frame.
+    assert_eq!(own, picture(&geometry, &Settings { bounds: bounds(&layers), ..by_heat }));
+}
+
+#[test]
+fn an_attribute_that_nobody_has_is_grey_without_a_legend() {
+    let geometry = still_life(1.0);
+    let image = picture(&geometry, &Settings { color_by: Some("cold".into()), ..small() });
+    let quiet = picture(&geometry, &Settings { color_by: Some("cold".into()), legend: false, ..small() });
+    assert_eq!(image, quiet);
+    let color = |pixel: &[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap();
+    assert!(image.pixels().iter().all(|pixel| color(pixel) < 30));
+}

@@ -1,0 +1,49 @@
+//! `convect check`: finds all that is wrong with a graph without cooking it.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use engine::graph::Fault;
+use formats::Format;
+use serde_json::Value;
+
+use crate::args::Setting;
+use crate::failure::{Failure, exit_of_faults};
+use crate::load;
+
+/// What `check` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The graph file
+    graph: PathBuf,
+    /// Set a param or control anew: node.param=JSON or control=JSON
+    #[arg(long, value_name = "KEY=JSON")]
+    set: Vec<Setting>,
+    /// Also hold the outputs against this format: usdc, usda, obj, ply, json
+    #[arg(long, value_name = "FORMAT", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
+    format: Option<String>,
+    /// Print the faults as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Checks. Faults go to stderr, as JSON to stdout.
+///
+/// # Errors
+/// Where there is a fault.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let engine = load::engine(0, 1 << 30)?;
+    let format: Option<Format> = args.format.as_deref().and_then(|name| name.parse().ok());
+    let found = load::sound_graph(&args.graph, &args.set, &engine, format)?;
+    let faults = found.err().unwrap_or_default();
+    if args.json {
+        let list: Vec<Value> = faults.iter().map(Fault::to_json).collect();
+        let text = serde_json::to_string_pretty(&list).unwrap_or_default();
+        writeln!(std::io::stdout(), "{text}")?;
+    }
+    match faults.is_empty() {
+        true => Ok(()),
+        false if args.json => Err(Failure::told(exit_of_faults(&faults))),
+        false => Err(load::faulty(&args.graph, &faults)),
+    }
+}

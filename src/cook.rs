@@ -1,0 +1,243 @@
+//! `convect cook`: cooks a graph and writes its outputs.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use engine::clock::Stopwatch;
+use engine::cook::{Delivered, DiskCache, Engine, Report, Stopped};
+use engine::graph::Graph;
+use engine::plan::Request;
+use engine::time::Frame;
+use formats::Format;
+use formats::atomic::FileError;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::args::{Frames, Setting, Size, half_of_memory};
+use crate::failure::{Exit, Failure, exit_of_error};
+use crate::output::{Writers, Written, failed, write_whole};
+use crate::pictures::{self, Pictures};
+use crate::{load, report};
+
+/// What `cook` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The graph file
+    graph: PathBuf,
+    /// Frames: 1-48, 1-48x2, 10, 10.5; all of the scene's by default
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    frames: Option<Frames>,
+    /// Cook only this output; may be given several times
+    #[arg(long = "output", value_name = "NAME")]
+    outputs: Vec<String>,
+    /// Folder to write to, made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// usdc and usda: one file with all frames; obj, ply and json: a file a frame
+    #[arg(long, value_name = "FORMAT", default_value = "usdc", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
+    format: String,
+    /// Set a param or control anew: node.param=JSON or control=JSON; may be given several times
+    #[arg(long, value_name = "KEY=JSON")]
+    set: Vec<Setting>,
+    /// Threads; as many as the machine has by default
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    threads: usize,
+    /// Memory for results; half of the machine's by default. It never changes a result
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Size>,
+    /// Keep finished frames and solvers' checkpoints here; a killed cook resumes from them
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// Bytes the cache may take; the oldest go first
+    #[arg(long, value_name = "SIZE", requires = "cache")]
+    cache_limit: Option<Size>,
+    /// Write what each node cost and published, as JSON
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: pictures::Args,
+    /// Say more
+    #[arg(short, long, conflicts_with = "quiet")]
+    verbose: bool,
+    /// Say only what went wrong
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Cooks.
+///
+/// # Errors
+/// Where the graph is wrong, a file cannot be written, a node cannot cook, or someone pressed Ctrl-C.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
+    let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
+    let engine = load::engine(args.threads, usize::try_from(memory).unwrap_or(usize::MAX))?;
+    let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let request = Request {
+        outputs: load::outputs(&graph, &args.outputs)?,
+        frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
+    };
+    let mut faults = engine.verify(&graph, Some(&request));
+    faults.extend(load::misfits(&graph, &request.outputs, format));
+    if !faults.is_empty() {
+        return Err(load::faulty(&args.graph, &faults));
+    }
+    let pictures = Pictures::new(&args.pictures, &graph, &request, &args.out)?;
+    cook(args, &engine, &graph, &request, format, pictures)
+}
+
+fn cook(
+    args: &Args,
+    engine: &Engine,
+    graph: &Graph,
+    request: &Request,
+    format: Format,
+    mut pictures: Option<Pictures>,
+) -> Result<(), Failure> {
+    let mut disk = match &args.cache {
+        None => None,
+        Some(folder) => {
+            let limit = args.cache_limit.map_or(u64::MAX, |size| size.0);
+            Some(
+                DiskCache::open(folder, limit)
+                    .map_err(|error| failed(&FileError::new(folder, "used as a cache", error)))?,
+            )
+        }
+    };
+    let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
+    let cancel = cancelled_by_ctrl_c();
+    let progress = progress(args, request);
+    let mut writing = Duration::ZERO;
+    let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
+        let watch = Stopwatch::start();
+        writers.take(finished)?;
+        if let Some(pictures) = &mut pictures {
+            pictures.take(finished);
+        }
+        progress.inc(finished.len() as u64);
+        writing += watch.wall();
+        Ok(())
+    };
+    let cooked = engine.cook(graph, request, disk.as_mut(), &cancel, &mut sink);
+    progress.finish_and_clear();
+    let report = cooked.map_err(|stopped| match stopped {
+        Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
+        Stopped::Sink(failure) => failure,
+        Stopped::Cache(error) => {
+            let folder = args.cache.clone().unwrap_or_default();
+            failed(&FileError::new(folder, "written as a cache", error))
+        }
+    })?;
+    let watch = Stopwatch::start();
+    let spoiled: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
+    let written = writers.finish(&spoiled)?;
+    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write())?;
+    writing += watch.wall();
+    if let Some(path) = &args.report {
+        let cooked = report::Cooked {
+            graph_path: args.graph.display().to_string(),
+            graph,
+            frames: &request.frames,
+            written: &written,
+            threads: engine.threads(),
+            writing,
+        };
+        let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
+        write_whole(path, format!("{text}\n").as_bytes())?;
+    }
+    if !args.quiet {
+        report.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        tell(&report, &written, &drawn, args.verbose);
+    }
+    ended(graph, &report, &written)
+}
+
+/// What was written and how fast, on stderr.
+fn tell(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbose: bool) {
+    for (_, written) in written {
+        if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
+            let files = match written.files.len() {
+                1 => first.display().to_string(),
+                n => format!("{} … {} ({n} files)", first.display(), last.display()),
+            };
+            let frames = written.frames.len();
+            let s = if frames == 1 { "" } else { "s" };
+            eprintln!("wrote {files}: {frames} frame{s}, {}", indicatif::HumanBytes(written.bytes));
+        }
+    }
+    drawn.iter().for_each(|path| eprintln!("wrote {}", path.display()));
+    let frames: BTreeSet<Frame> = written.iter().flat_map(|(_, written)| written.frames.iter().copied()).collect();
+    let seconds = report.cooking.as_secs_f64();
+    if !frames.is_empty() && seconds > 0.0 {
+        let rate = frames.len() as f64 / seconds;
+        eprintln!(
+            "cooked {} frame{} in {seconds:.2} s ({rate:.0} a second)",
+            frames.len(),
+            if frames.len() == 1 { "" } else { "s" }
+        );
+    }
+    if verbose {
+        for node in report.nodes.iter().filter(|node| node.needed) {
+            let id = node.id.as_deref().unwrap_or_default();
+            eprintln!("  {id} ({}): {} cooked, {:.1} ms", node.type_name, node.cooks, node.wall.as_secs_f64() * 1e3);
+            node.left_out.iter().for_each(|stage| eprintln!("    left out {}: {}", stage.stage, stage.why));
+        }
+    }
+}
+
+/// The errors of nodes, and the exit code they mean.
+fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
+    let mut lines = Vec::new();
+    let mut exit = None;
+    let mut told: Vec<String> = Vec::new();
+    for (output, error, frames) in &report.errors {
+        let text = error.to_string();
+        if !told.contains(&text) {
+            let more = if *frames > 1 { format!(" (and at {} more frames)", frames - 1) } else { String::new() };
+            lines.push(format!("{text}{more}"));
+            told.push(text);
+        }
+        let code = exit_of_error(error);
+        exit = Some(exit.map_or(code, |exit: Exit| exit.min(code)));
+        let kept = written.iter().any(|(place, written)| place == output && !written.files.is_empty());
+        let name = &graph.outputs[*output].name;
+        lines.push(match kept {
+            true => format!("output `{name}` is without the frames that failed"),
+            false => format!("output `{name}` was not written"),
+        });
+    }
+    if report.cancelled {
+        let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
+        lines.push(format!("interrupted; {frames} whole frames were written"));
+        exit = Some(exit.map_or(Exit::Interrupted, |exit| exit.min(Exit::Interrupted)));
+    }
+    match exit {
+        Some(exit) => Err(Failure { exit, lines }),
+        None => Ok(()),
+    }
+}
+
+/// A flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
+fn cancelled_by_ctrl_c() -> Arc<AtomicBool> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let flag = cancel.clone();
+    // Without a handler Ctrl-C still ends the program, only less politely.
+    let _ = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    });
+    cancel
+}
+
+fn progress(args: &Args, request: &Request) -> ProgressBar {
+    let steps = (request.frames.len() * request.outputs.len()) as u64;
+    let target = if args.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let bar = ProgressBar::with_draw_target(Some(steps), target);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,91 @@
+//! `convect explain`: the plan of a cook, without cooking.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use engine::cook::NodeReport;
+use engine::plan::Request;
+use serde_json::{Value, json};
+
+use crate::args::{Frames, Setting};
+use crate::failure::{Failure, exit_of_error};
+use crate::load;
+use crate::report::NOT_NEEDED;
+
+/// What `explain` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The graph file
+    graph: PathBuf,
+    /// Frames: 1-48, 1-48x2, 10, 10.5; all of the scene's by default
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    frames: Option<Frames>,
+    /// Only this output; may be given several times
+    #[arg(long = "output", value_name = "NAME")]
+    outputs: Vec<String>,
+    /// Set a param or control anew: node.param=JSON or control=JSON
+    #[arg(long, value_name = "KEY=JSON")]
+    set: Vec<Setting>,
+    /// Print the plan as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the plan.
+///
+/// # Errors
+/// Where the graph is wrong.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let engine = load::engine(0, 1 << 30)?;
+    let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let request = Request {
+        outputs: load::outputs(&graph, &args.outputs)?,
+        frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
+    };
+    let rehearsed = engine.rehearse(&graph, &request);
+    let report = rehearsed.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
+    let text = match args.json {
+        true => {
+            let nodes: Vec<Value> = report.nodes.iter().map(to_json).collect();
+            let plan = json!({"frames": request.frames.len(), "nodes": nodes});
+            serde_json::to_string_pretty(&plan).unwrap_or_default() + "\n"
+        }
+        false => {
+            let mut text = format!("{} frames\n", request.frames.len());
+            report.nodes.iter().for_each(|node| describe(node, request.frames.len(), &mut text));
+            text
+        }
+    };
+    std::io::stdout().write_all(text.as_bytes())?;
+    Ok(())
+}
+
+fn describe(node: &NodeReport, frames: usize, text: &mut String) {
+    let id = node.id.as_deref().unwrap_or_default();
+    let _ = write!(text, "{id:<16} {:<22} {:<7}", node.type_name, node.time);
+    if !node.needed {
+        let _ = writeln!(text, "left out: {NOT_NEEDED}");
+        return;
+    }
+    let _ = match (node.varies, node.cooks) {
+        (false, 1) if frames > 1 => writeln!(text, "cooked once: it stands still"),
+        (_, 1) => writeln!(text, "cooked once"),
+        (_, n) if node.time == "window" || node.time == "solver" => writeln!(text, "{n} steps"),
+        (_, n) => writeln!(text, "cooked {n} times"),
+    };
+    for stage in &node.left_out {
+        let _ = writeln!(text, "{:<16} left out {}: {}", "", stage.stage, stage.why);
+    }
+}
+
+fn to_json(node: &NodeReport) -> Value {
+    let left_out: Vec<Value> = match node.needed {
+        true => node.left_out.iter().map(|stage| json!({"stage": stage.stage, "why": stage.why})).collect(),
+        false => vec![json!({"stage": "all", "why": NOT_NEEDED})],
+    };
+    json!({
+        "id": node.id.as_deref(), "type": node.type_name, "time": node.time, "needed": node.needed,
+        "varies": node.varies, "cooks": node.cooks, "left_out": left_out,
+    })
+}

@@ -1,0 +1,86 @@
+//! How the program ends: exit codes, and the messages that go with them.
+
+use std::io;
+use std::process::ExitCode;
+
+use engine::cook::CookError;
+use engine::error::ErrorKind;
+use engine::graph::{Fault, FaultClass};
+
+/// Exit codes, as documented for scripts. Of two that fit, the lowest is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Exit {
+    /// Done; for `diff`: the same.
+    Done = 0,
+    /// A file could not be read or written; for `diff`: they differ.
+    File = 1,
+    /// The command line is wrong; for `diff`: trouble.
+    CommandLine = 2,
+    /// The graph is wrong.
+    Graph = 3,
+    /// A node could not cook.
+    Cook = 4,
+    /// Ctrl-C.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// Why the program ends early: a code, and lines for stderr.
+#[derive(Debug)]
+pub struct Failure {
+    /// The exit code.
+    pub exit: Exit,
+    /// What to say, a line each; nothing where it was said already.
+    pub lines: Vec<String>,
+}
+
+impl Failure {
+    /// A failure with one line.
+    pub fn new(exit: Exit, line: impl Into<String>) -> Self {
+        Self { exit, lines: vec![line.into()] }
+    }
+
+    /// A failure that was told already.
+    pub fn told(exit: Exit) -> Self {
+        Self { exit, lines: Vec::new() }
+    }
+
+    /// A file that could not be read or written.
+    pub fn file(line: impl Into<String>) -> Self {
+        Self::new(Exit::File, line)
+    }
+}
+
+impl From<io::Error> for Failure {
+    /// Of writing to stdout: a reader that has seen enough is no trouble.
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::told(Exit::Done),
+            _ => Self::file(format!("stdout could not be written: {error}")),
+        }
+    }
+}
+
+/// The exit code of some faults.
+pub fn exit_of_faults(faults: &[Fault]) -> Exit {
+    let code = |fault: &Fault| match fault.class {
+        FaultClass::File => Exit::File,
+        FaultClass::Graph => Exit::Graph,
+    };
+    faults.iter().map(code).min().unwrap_or(Exit::Done)
+}
+
+/// The exit code of a node's error.
+pub fn exit_of_error(error: &CookError) -> Exit {
+    match error.error.kind {
+        ErrorKind::File => Exit::File,
+        ErrorKind::Cancelled => Exit::Interrupted,
+        ErrorKind::Refused | ErrorKind::NotFinite | ErrorKind::Panic | ErrorKind::Contract => Exit::Cook,
+    }
+}

@@ -1,0 +1,106 @@
+//! Loading a graph file, and telling what is wrong with it.
+
+use std::path::{Path, PathBuf};
+
+use engine::cook::{Engine, Settings};
+use engine::files::unreadable;
+use engine::graph::{Fault, FaultClass, Graph, Part, probe};
+use formats::Format;
+
+use crate::CATALOGUE;
+use crate::args::Setting;
+use crate::failure::{Failure, exit_of_faults};
+
+/// The graph at `path`, with some params and controls set anew.
+///
+/// # Errors
+/// Where the file cannot be read, or its faults.
+pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
+    let bytes = std::fs::read(path).map_err(|error| {
+        let error = unreadable(path, &error);
+        Failure::file(format!("the graph {}", error.fact))
+    })?;
+    let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+    let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
+    Ok(Graph::load_bytes(&bytes, &folder, CATALOGUE, &set, &probe))
+}
+
+/// The graph at `path`, sound as far as can be known before it cooks: params that go together, files that are geometry,
+/// outputs that `format` can hold.
+///
+/// # Errors
+/// Where it cannot be read or is wrong; all faults at once.
+pub fn sound_graph(
+    path: &Path,
+    set: &[Setting],
+    engine: &Engine,
+    format: Option<Format>,
+) -> Result<Result<Graph, Vec<Fault>>, Failure> {
+    let graph = match graph(path, set)? {
+        Ok(graph) => graph,
+        Err(faults) => return Ok(Err(faults)),
+    };
+    let mut faults = engine.verify(&graph, None);
+    if let Some(format) = format {
+        let outputs: Vec<usize> = (0..graph.outputs.len()).collect();
+        faults.extend(misfits(&graph, &outputs, format));
+    }
+    Ok(if faults.is_empty() { Ok(graph) } else { Err(faults) })
+}
+
+/// Faults of outputs with components that `format` cannot hold.
+pub fn misfits(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for output in outputs.iter().map(|place| &graph.outputs[*place]) {
+        let kinds = graph.carries(output.from);
+        if let Some(kind) = kinds.iter().find(|kind| !format.holds(**kind)) {
+            let fact = format!("`{}` has {kind}, which {format} cannot hold", output.name);
+            let able: Vec<&str> = Format::holding(kinds.iter().copied()).iter().map(|format| format.name()).collect();
+            let fault = graph.fault_at(Part::Output(&output.name), "output-format", FaultClass::Graph, fact);
+            faults.push(fault.hint(format!("use --format {}", able.join(" or "))));
+        }
+    }
+    faults
+}
+
+/// The failure of some faults, a line each.
+pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
+    let file = path.display().to_string();
+    let mut lines: Vec<String> = faults.iter().map(|fault| fault.in_file(&file)).collect();
+    if faults.len() > 1 {
+        lines.push(format!("{} faults", faults.len()));
+    }
+    Failure { exit: exit_of_faults(faults), lines }
+}
+
+/// An engine for this command.
+///
+/// # Errors
+/// Where the system gives no threads, or `CONVECT_SIMD` is not a path.
+pub fn engine(threads: usize, memory: usize) -> Result<Engine, Failure> {
+    use crate::failure::Exit;
+    numerics::simd::Path::from_environment().map_err(|error| Failure::new(Exit::CommandLine, error.to_string()))?;
+    Engine::new(&Settings { threads, memory }).map_err(|error| Failure::new(Exit::Cook, error))
+}
+
+/// Places of the outputs asked by name; all of them where none is named.
+///
+/// # Errors
+/// Where the graph has no output of a name.
+pub fn outputs(graph: &Graph, names: &[String]) -> Result<Vec<usize>, Failure> {
+    use crate::failure::Exit;
+    if names.is_empty() {
+        return Ok((0..graph.outputs.len()).collect());
+    }
+    let mut places = Vec::new();
+    for name in names {
+        let place = graph.outputs.iter().position(|output| *output.name == **name).ok_or_else(|| {
+            let known: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
+            Failure::new(Exit::CommandLine, format!("the graph has no output `{name}`; it has {}", known.join(", ")))
+        })?;
+        places.push(place);
+    }
+    places.sort_unstable();
+    places.dedup();
+    Ok(places)
+}

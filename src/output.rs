@@ -1,0 +1,151 @@
+//! Files of outputs: one USD file with all frames, or a file a frame.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use engine::cook::Delivered;
+use engine::graph::Graph;
+use engine::time::Frame;
+use formats::atomic::{AtomicFile, FileError, sweep};
+use formats::usd::{Flavour, UsdWriter};
+use formats::{Format, FrameStamp};
+
+use crate::failure::Failure;
+
+/// What was written for one output.
+#[derive(Clone, Debug, Default)]
+pub struct Written {
+    /// Files, in the order of frames.
+    pub files: Vec<PathBuf>,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Frames in them.
+    pub frames: Vec<Frame>,
+}
+
+enum Target {
+    /// All frames in one file. Open from the first frame on.
+    Sequence { flavour: Flavour, writer: Option<UsdWriter> },
+    /// A file a frame.
+    PerFrame,
+}
+
+/// The files of all outputs of a cook.
+pub struct Writers<'g> {
+    graph: &'g Graph,
+    folder: PathBuf,
+    format: Format,
+    outputs: Vec<(usize, Target, Written)>,
+}
+
+impl<'g> Writers<'g> {
+    /// Writers of some outputs into `folder`, which is made where it is missing. Temporaries of killed cooks are swept.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made or written to.
+    pub fn new(graph: &'g Graph, outputs: &[usize], folder: &Path, format: Format) -> Result<Self, Failure> {
+        fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "made", error)))?;
+        sweep(folder).map_err(|error| failed(&error))?;
+        let target = || match format {
+            Format::Usdc => Target::Sequence { flavour: Flavour::Usdc, writer: None },
+            Format::Usda => Target::Sequence { flavour: Flavour::Usda, writer: None },
+            Format::Obj | Format::Ply | Format::Json => Target::PerFrame,
+        };
+        let outputs = outputs.iter().map(|output| (*output, target(), Written::default())).collect();
+        Ok(Self { graph, folder: folder.to_owned(), format, outputs })
+    }
+
+    /// Writes finished frames.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn take(&mut self, finished: &[Delivered]) -> Result<(), Failure> {
+        let (graph, folder, format) = (self.graph, &self.folder, self.format);
+        for (output, target, written) in &mut self.outputs {
+            let mine: Vec<&Delivered> = finished.iter().filter(|one| one.output == *output).collect();
+            let name = &graph.outputs[*output].name;
+            match target {
+                Target::Sequence { flavour, writer } => {
+                    for one in mine {
+                        if writer.is_none() {
+                            let path = folder.join(format!("{name}.{format}"));
+                            let scene = &graph.scene;
+                            let new = UsdWriter::create(path, *flavour, name, scene.fps, scene.origin);
+                            *writer = Some(new.map_err(|error| Failure::file(error.to_string()))?);
+                        }
+                        let Some(writer) = writer else { continue };
+                        let result = writer.frame(one.frame.number(), &one.geometry);
+                        result.map_err(|error| Failure::file(error.to_string()))?;
+                        written.frames.push(one.frame);
+                    }
+                }
+                Target::PerFrame => {
+                    use rayon::prelude::*;
+                    let files = mine.par_iter().map(|one| write_frame(graph, folder, format, one)).collect::<Vec<_>>();
+                    for (file, one) in files.into_iter().zip(mine) {
+                        let (path, bytes) = file?;
+                        written.files.push(path);
+                        written.bytes += bytes;
+                        written.frames.push(one.frame);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Finishes files that hold all frames, but for outputs in `spoiled`: a sequence with frames missing would be taken
+    /// for a whole one. What was written, by place of the output.
+    ///
+    /// # Errors
+    /// Where a file cannot be finished.
+    pub fn finish(self, spoiled: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
+        let mut all = Vec::new();
+        for (output, target, mut written) in self.outputs {
+            if let Target::Sequence { writer: Some(writer), .. } = target {
+                if spoiled.contains(&output) {
+                    written.frames.clear();
+                } else {
+                    let name = &self.graph.outputs[output].name;
+                    let summary = writer.finish().map_err(|error| Failure::file(error.to_string()))?;
+                    written.files.push(self.folder.join(format!("{name}.{}", self.format)));
+                    written.bytes = summary.bytes;
+                }
+            }
+            all.push((output, written));
+        }
+        Ok(all)
+    }
+}
+
+fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) -> Result<(PathBuf, u64), Failure> {
+    let name = &graph.outputs[one.output].name;
+    let path = folder.join(format!("{name}.{}.{format}", one.frame.file_label()));
+    let stamp = FrameStamp { frame: one.frame.number(), seconds: one.frame.seconds(graph.scene.fps) };
+    let mut bytes = Vec::new();
+    formats::write(format, &one.geometry, &stamp, &mut bytes)
+        .map_err(|error| Failure::file(format!("`{}` could not be written: {error}", path.display())))?;
+    let mut file = AtomicFile::create(&path).map_err(|error| failed(&error))?;
+    file.write_all(&bytes).map_err(|error| failed(&file.failed(error)))?;
+    file.commit().map_err(|error| failed(&error))?;
+    Ok((path, bytes.len() as u64))
+}
+
+/// Writes a whole file at once, or nothing.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut file = AtomicFile::create(path).map_err(|error| failed(&error))?;
+    file.write_all(bytes).map_err(|error| failed(&file.failed(error)))?;
+    file.commit().map_err(|error| failed(&error))
+}
+
+/// The failure of a file, with its hint.
+pub fn failed(error: &FileError) -> Failure {
+    match error.hint() {
+        Some(hint) => Failure::file(format!("{error}; {hint}")),
+        None => Failure::file(error.to_string()),
+    }
+}

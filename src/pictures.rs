@@ -1,0 +1,154 @@
+//! Pictures of a cook: a contact sheet, or a PNG a frame; outputs side by side.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use engine::cook::Delivered;
+use engine::geometry::Geometry;
+use engine::graph::Graph;
+use engine::plan::Request;
+use engine::time::Frame;
+use preview::{Camera, Image, Layer, Settings, attribute_range, bounds, render, union};
+
+use crate::args::Frames;
+use crate::failure::{Exit, Failure};
+use crate::output::write_whole;
+
+/// What `cook` takes for pictures.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Pictures")]
+pub struct Args {
+    /// Draw a contact sheet of six frames, DIR/preview.png
+    #[arg(long)]
+    preview: bool,
+    /// Draw these frames instead, a PNG each: DIR/preview.0024.png
+    #[arg(long, value_name = "FRAMES", requires = "preview", allow_hyphen_values = true)]
+    preview_frames: Option<Frames>,
+    /// Width and height of a panel in pixels
+    #[arg(long, value_name = "WxH", requires = "preview", default_value = "640x480")]
+    preview_size: String,
+    /// Where to look from: eye=1,2,3 target=0,0,0 fov=35; framed automatically by default
+    #[arg(long, value_name = "CAMERA", requires = "preview")]
+    camera: Option<String>,
+    /// Attribute drawn as colour
+    #[arg(long, value_name = "ATTRIBUTE", requires = "preview")]
+    color_by: Option<String>,
+}
+
+/// Frames of a contact sheet.
+const SHEET_FRAMES: usize = 6;
+
+/// Columns of a contact sheet with one output.
+const SHEET_COLUMNS: usize = 3;
+
+/// Collects the frames to draw.
+pub struct Pictures {
+    names: Vec<(usize, String)>,
+    frames: Vec<Frame>,
+    sheet: bool,
+    settings: Settings,
+    folder: PathBuf,
+    kept: BTreeMap<(Frame, usize), Arc<Geometry>>,
+}
+
+impl Pictures {
+    /// What is to be drawn, if anything.
+    ///
+    /// # Errors
+    /// Where size or camera make no sense, or a frame is asked that is not cooked.
+    pub fn new(args: &Args, graph: &Graph, request: &Request, folder: &Path) -> Result<Option<Self>, Failure> {
+        if !args.preview {
+            return Ok(None);
+        }
+        let wrong = |text: String| Failure::new(Exit::CommandLine, text);
+        let size = args.preview_size.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+        let (width, height): (usize, usize) =
+            size.ok_or_else(|| wrong(format!("`{}` is not a size in pixels; write 640x480", args.preview_size)))?;
+        let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
+        let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
+        let frames = match &args.preview_frames {
+            None => spread(&request.frames),
+            Some(frames) => frames.frames(),
+        };
+        if let Some(frame) = frames.iter().find(|frame| !request.frames.contains(frame)) {
+            return Err(wrong(format!("frame {frame} is to be drawn, but is not among the frames to cook")));
+        }
+        let settings = Settings { width, height, camera, color_by: args.color_by.clone(), ..Settings::default() };
+        let names = request.outputs.iter().map(|place| (*place, graph.outputs[*place].name.to_string())).collect();
+        let sheet = args.preview_frames.is_none();
+        Ok(Some(Self { names, frames, sheet, settings, folder: folder.to_owned(), kept: BTreeMap::new() }))
+    }
+
+    /// Keeps the frames that are to be drawn.
+    pub fn take(&mut self, finished: &[Delivered]) {
+        for one in finished.iter().filter(|one| self.frames.contains(&one.frame)) {
+            self.kept.insert((one.frame, one.output), one.geometry.clone());
+        }
+    }
+
+    /// Draws and writes; the files' names.
+    ///
+    /// # Errors
+    /// Where a picture cannot be drawn or written.
+    pub fn write(mut self) -> Result<Vec<PathBuf>, Failure> {
+        if self.kept.is_empty() {
+            return Ok(Vec::new());
+        }
+        self.frame_all();
+        let drawn: Vec<Frame> =
+            self.frames.iter().copied().filter(|frame| self.kept.keys().any(|(at, _)| at == frame)).collect();
+        let mut rows = Vec::new();
+        for frame in drawn {
+            let panels =
+                self.names.iter().map(|(output, name)| self.panel(frame, *output, name)).collect::<Result<Vec<_>, _>>();
+            rows.push((frame, panels.map_err(drawing)?));
+        }
+        if self.sheet {
+            let columns = if self.names.len() == 1 { SHEET_COLUMNS } else { self.names.len() };
+            let panels: Vec<Image> = rows.into_iter().flat_map(|(_, panels)| panels).collect();
+            let sheet = preview::contact_sheet(&panels, columns).map_err(drawing)?;
+            return Ok(vec![save(&sheet, self.folder.join("preview.png"))?]);
+        }
+        let each = rows.into_iter().map(|(frame, panels)| {
+            let picture = preview::side_by_side(&panels).map_err(drawing)?;
+            save(&picture, self.folder.join(format!("preview.{}.png", frame.file_label())))
+        });
+        each.collect()
+    }
+
+    /// One camera and one range of colours for all panels.
+    fn frame_all(&mut self) {
+        let layers: Vec<Layer<'_>> = self.kept.values().map(|geometry| Layer::new("", geometry)).collect();
+        let all = layers.iter().map(|layer| bounds(std::slice::from_ref(layer))).fold(None, union);
+        let range = self.settings.color_by.as_ref().and_then(|name| attribute_range(&layers, name));
+        self.settings.bounds = all;
+        self.settings.range = range;
+    }
+
+    fn panel(&self, frame: Frame, output: usize, name: &str) -> Result<Image, preview::Error> {
+        let geometry = self.kept.get(&(frame, output));
+        let layers: Vec<Layer<'_>> = geometry.map(|geometry| Layer::new(name, geometry)).into_iter().collect();
+        let settings = Settings { label: Some(format!("{name} {frame}")), ..self.settings.clone() };
+        render(&layers, &settings)
+    }
+}
+
+fn drawing(error: preview::Error) -> Failure {
+    Failure::new(Exit::CommandLine, format!("no picture: {error}"))
+}
+
+fn save(image: &Image, path: PathBuf) -> Result<PathBuf, Failure> {
+    let mut bytes = Vec::new();
+    image.write_png(&mut bytes).map_err(drawing)?;
+    write_whole(&path, &bytes)?;
+    Ok(path)
+}
+
+/// Frames of a contact sheet, evenly spread, first and last among them.
+fn spread(frames: &[Frame]) -> Vec<Frame> {
+    if frames.len() <= SHEET_FRAMES {
+        return frames.to_vec();
+    }
+    (0..SHEET_FRAMES).map(|k| frames[k * (frames.len() - 1) / (SHEET_FRAMES - 1)]).collect()
+}

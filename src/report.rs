@@ -1,0 +1,120 @@
+//! The report of a cook as JSON, as `--report` writes it.
+
+use std::time::Duration;
+
+use engine::cook::{NodeReport, Report};
+use engine::graph::Graph;
+use engine::time::Frame;
+use serde_json::{Map, Value, json};
+
+use crate::output::Written;
+
+/// What stands in a report besides what the engine measured.
+pub struct Cooked<'a> {
+    /// The graph's path.
+    pub graph_path: String,
+    /// The graph.
+    pub graph: &'a Graph,
+    /// Frames asked.
+    pub frames: &'a [Frame],
+    /// What was written, by place of the output.
+    pub written: &'a [(usize, Written)],
+    /// Threads that cooked.
+    pub threads: usize,
+    /// Wall time of writing.
+    pub writing: Duration,
+}
+
+/// The report.
+pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
+    let nodes: Map<String, Value> =
+        report.nodes.iter().filter_map(|node| Some((node.id.as_ref()?.to_string(), node_to_json(node)))).collect();
+    let outputs: Map<String, Value> = cooked
+        .written
+        .iter()
+        .map(|(place, written)| {
+            let output = &cooked.graph.outputs[*place];
+            let errors = report.errors.iter().filter(|(spoiled, _, _)| spoiled == place);
+            let errors: Vec<Value> = errors
+                .map(|(_, error, frames)| {
+                    json!({
+                        "node": *error.node, "frame": number(error.frame), "frames": frames,
+                        "fact": error.error.fact, "hint": error.error.hint,
+                    })
+                })
+                .collect();
+            let files: Vec<String> = written.files.iter().map(|path| path.display().to_string()).collect();
+            let value = json!({
+                "from": *cooked.graph.nodes[output.from.node].id,
+                "frames": written.frames.len(),
+                "bytes": written.bytes,
+                "files": files,
+                "errors": errors,
+            });
+            (output.name.to_string(), value)
+        })
+        .collect();
+    let frames: Vec<Value> = cooked.frames.iter().map(|frame| number(*frame)).collect();
+    let seconds = report.cooking.as_secs_f64();
+    let delivered = report.delivered.values().copied().max().unwrap_or(0);
+    json!({
+        "report": 1,
+        "graph": cooked.graph_path,
+        "frames": frames,
+        "nodes": nodes,
+        "outputs": outputs,
+        "total": {
+            "cooking_ms": ms(report.cooking),
+            "writing_ms": ms(cooked.writing),
+            "wall_ms": ms(report.wall),
+            "cpu_ms": ms(report.cpu),
+            "frames_per_second": if seconds > 0.0 { delivered as f64 / seconds } else { 0.0 },
+            "peak_bytes": report.peak_bytes,
+            "threads": cooked.threads,
+            "simd": numerics::simd::Path::chosen().name(),
+            "from_disk": report.from_disk,
+            "interrupted": report.cancelled,
+            "notes": report.notes,
+        },
+    })
+}
+
+fn node_to_json(node: &NodeReport) -> Value {
+    let left_out: Vec<Value> = match node.needed {
+        true => node.left_out.iter().map(|stage| json!({"stage": stage.stage, "why": stage.why})).collect(),
+        false => vec![json!({"stage": "all", "why": NOT_NEEDED})],
+    };
+    let metrics: Map<String, Value> = node
+        .metrics
+        .iter()
+        .map(|(name, values)| {
+            let values: Map<String, Value> =
+                values.iter().map(|(frame, value)| (frame.to_string(), json!(value))).collect();
+            ((*name).to_owned(), Value::Object(values))
+        })
+        .collect();
+    json!({
+        "type": node.type_name,
+        "time": node.time,
+        "varies": node.varies,
+        "cooks": node.cooks,
+        "from_cache": node.from_cache,
+        "left_out": left_out,
+        "wall_ms": ms(node.wall),
+        "cpu_ms": ms(node.cpu),
+        "peak_bytes": node.peak_bytes,
+        "metrics": metrics,
+    })
+}
+
+/// Why a node that nothing depends on is left out.
+pub const NOT_NEEDED: &str = "no requested output depends on it";
+
+fn ms(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// A frame as a number: whole where it is.
+fn number(frame: Frame) -> Value {
+    if frame.is_whole() { json!(frame.floor_number()) } else { json!(frame.number()) }
+}
