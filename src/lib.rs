@@ -6,14 +6,19 @@
 pub mod args;
 pub mod check;
 pub mod completions;
+pub mod convert;
 pub mod cook;
+pub mod diff;
 pub mod explain;
 pub mod failure;
+pub mod geometry_file;
 pub mod load;
 pub mod nodes;
 pub mod output;
 pub mod pictures;
 pub mod report;
+pub mod schema;
+pub mod stats;
 
 use engine::graph::Catalogue;
 use engine::node::Node;

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use convect::failure::{Exit, Failure};
-use convect::{check, completions, cook, explain, nodes};
+use convect::{check, completions, convert, cook, diff, explain, nodes, schema, stats};
 
 /// Cooks node graphs that make geometry move: wind on fur and grass, soft dough, viscous sauces.
 #[derive(Debug, Parser)]
@@ -18,6 +18,14 @@ enum Verb {
     Explain(explain::Args),
     /// List the nodes, or show the help of one
     Nodes(nodes::Args),
+    /// Measure a geometry file: counts, bounds, lengths, areas, volumes, attributes
+    Stats(stats::Args),
+    /// Compare two geometries: exit code 0 where they are the same, 1 where not, 2 for trouble
+    Diff(diff::Args),
+    /// Convert geometry files from one format to another
+    Convert(convert::Args),
+    /// Print a JSON Schema of graph files, for editors
+    Schema,
     /// Print completions for a shell
     Completions(completions::Args),
 }
@@ -51,6 +59,10 @@ fn run(verb: &Verb) -> Result<(), Failure> {
         Verb::Check(args) => check::run(args),
         Verb::Explain(args) => explain::run(args),
         Verb::Nodes(args) => nodes::run(args),
+        Verb::Stats(args) => stats::run(args),
+        Verb::Diff(args) => diff::run(args),
+        Verb::Convert(args) => convert::run(args),
+        Verb::Schema => schema::run(),
         Verb::Completions(args) => completions::run::<Verb>(args),
     }
 }

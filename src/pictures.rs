@@ -18,6 +18,8 @@ use crate::output::write_whole;
 /// What `cook` takes for pictures.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Pictures")]
+// A group would have the name of the one around it.
+#[group(skip)]
 pub struct Args {
     /// Draw a contact sheet of six frames, DIR/preview.png
     #[arg(long)]
@@ -129,7 +131,7 @@ impl Pictures {
     fn panel(&self, frame: Frame, output: usize, name: &str) -> Result<Image, preview::Error> {
         let geometry = self.kept.get(&(frame, output));
         let layers: Vec<Layer<'_>> = geometry.map(|geometry| Layer::new(name, geometry)).into_iter().collect();
-        let settings = Settings { label: Some(format!("{name} {frame}")), ..self.settings.clone() };
+        let settings = Settings { note: Some(frame.to_string()), ..self.settings.clone() };
         render(&layers, &settings)
     }
 }

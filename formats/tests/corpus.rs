@@ -11,9 +11,7 @@ mod reader;
 
 #[test]
 fn every_file_of_the_corpora_loads_or_is_refused() {
-    for (format, folder) in
-        [(Format::Obj, "read_obj"), (Format::Ply, "read_ply"), (Format::Json, "read_json")]
-    {
+    for (format, folder) in [(Format::Obj, "read_obj"), (Format::Ply, "read_ply"), (Format::Json, "read_json")] {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(folder);
         let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path()).collect();
         files.sort();

@@ -236,3 +236,206 @@ fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
         _ => Vec::new(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::graph::Scene;
+    use engine::testing::{Bench, Tasted, bench};
+
+    /// A straight curve up from the origin, of `segments` segments and length 1.
+    fn upright(segments: usize) -> Geometry {
+        let cv = |k: usize| [0.0, k as f32 / segments as f32, 0.0];
+        Component::curves(vec![segments as u32 + 1], (0..=segments).map(cv).collect()).unwrap().into()
+    }
+
+    /// A field of upright curves, a metre apart.
+    fn field(n: usize) -> Geometry {
+        let cvs = (0..n * n).flat_map(|i| (0..5).map(move |k| [(i % n) as f32, 0.25 * k as f32, (i / n) as f32]));
+        Component::curves(vec![5; n * n], cvs.collect()).unwrap().into()
+    }
+
+    fn calm(curves: Geometry) -> Bench {
+        bench(&NODE).input(CURVES, curves).set(NOISE, Noise::None)
+    }
+
+    /// Angle of each segment of the first curve to the wind along x, radians.
+    fn angles(out: &Tasted) -> Vec<f64> {
+        let cvs = &out.curves().positions()[out.curves().runs().range(0)];
+        let angle = |pair: &[[f32; 3]]| {
+            let d: [f64; 3] = std::array::from_fn(|k| f64::from(pair[1][k]) - f64::from(pair[0][k]));
+            libm::atan2((d[1] * d[1] + d[2] * d[2]).sqrt(), d[0])
+        };
+        cvs.windows(2).map(angle).collect()
+    }
+
+    const RIGHT: f64 = std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn segment_k_is_left_with_the_share_one_minus_g_to_the_k_of_the_angle() {
+        // W2 by hand: at every CV the rest of a straight curve turns by g of what is left, so segment k = 1… has
+        // 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
+        let out = calm(upright(4)).set(GLOBAL_ROTATE, Masked { value: 0.5, attribute: None }).cook();
+        for (k, angle) in angles(&out).iter().enumerate() {
+            let left = RIGHT / f64::from(2 << k);
+            assert!((angle - left).abs() < 4e-6, "segment {}: {angle} rad, expected {left}", k + 1);
+        }
+        assert!((out.metrics["max_angle"] - (RIGHT - RIGHT / 16.0)).abs() < 4e-6);
+        assert!(out.metrics["length_error"] < 1e-6);
+    }
+
+    #[test]
+    fn resolution_free_bends_the_same_for_any_number_of_cvs() {
+        let tip = |segments: usize| {
+            let out = calm(upright(segments)).set(MODE, Mode::ResolutionFree).cook();
+            out.curves().positions()[segments]
+        };
+        let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f32>().sqrt();
+        let fine = tip(1024);
+        let [coarse, finer] = [8, 16].map(|segments| distance(tip(segments), fine));
+        assert!(coarse < 1e-2, "{coarse}");
+        assert!((3.0..5.0).contains(&(coarse / finer)), "order 2: {coarse} to {finer}");
+    }
+
+    #[test]
+    fn the_envelope_scales_the_turn_and_its_absence_is_one() {
+        let with = |envelope: f32| {
+            let mut curves = upright(1);
+            curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![envelope; 2]).unwrap();
+            angles(&calm(curves).cook())[0]
+        };
+        assert!((with(0.5) - RIGHT * 0.75).abs() < 1e-6);
+        assert_eq!(with(0.0), RIGHT);
+        assert_eq!(with(-3.0), RIGHT, "an envelope below 0 is none");
+        assert_eq!(with(1.0), angles(&calm(upright(1)).cook())[0]);
+    }
+
+    #[test]
+    fn masks_scale_point_by_point_and_say_when_they_are_missing() {
+        let mut curves = upright(1);
+        curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::point("soft"), vec![0.5, 1.0]).unwrap();
+        let masked = Masked { value: 0.5, attribute: Some("soft".into()) };
+        let out = calm(curves).set(GLOBAL_ROTATE, masked.clone()).cook();
+        assert!((angles(&out)[0] - RIGHT * 0.75).abs() < 1e-6);
+        let error = calm(upright(1)).set(GLOBAL_ROTATE, masked).try_cook().unwrap_err();
+        assert_eq!(error.fact, "`global_rotate` is masked by `soft`, which is not there");
+    }
+
+    #[test]
+    fn half_a_blend_is_half_the_turn_and_keeps_lengths() {
+        let whole = angles(&calm(upright(4)).cook());
+        let out = calm(upright(4)).set(BLEND, Masked { value: 0.5, attribute: None }).cook();
+        for (half, whole) in angles(&out).iter().zip(whole) {
+            assert!((RIGHT - half - 0.5 * (RIGHT - whole)).abs() < 4e-6);
+        }
+        assert!(out.metrics["length_error"] < 1e-6);
+    }
+
+    #[test]
+    fn without_a_turn_the_very_arrays_go_through() {
+        let curves = field(2);
+        for share in [GLOBAL_ROTATE, BLEND] {
+            let out =
+                bench(&NODE).input(CURVES, curves.clone()).set(share, Masked { value: 0.0, attribute: None }).cook();
+            let column = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
+            assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
+        }
+    }
+
+    #[test]
+    fn noise_scrolls_downwind() {
+        // After a second at 2 m/s, what stood at x now stands at x + 2: curve 2 bends as curve 0 did.
+        let windy = bench(&NODE).input(CURVES, field(4)).set(SCROLL, 2.0);
+        let shape = |out: &Tasted, curve: usize| {
+            let cvs = &out.curves().positions()[out.curves().runs().range(curve)];
+            cvs.iter().map(|cv| std::array::from_fn::<f32, 3, _>(|k| cv[k] - cvs[0][k])).collect::<Vec<_>>()
+        };
+        let (early, late) = (windy.clone().at(10.0).cook(), windy.at(34.0).cook());
+        for (a, b) in shape(&early, 0).iter().zip(shape(&late, 2)) {
+            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?} {b:?}");
+        }
+        assert_ne!(shape(&early, 0), shape(&late, 0));
+    }
+
+    #[test]
+    fn a_keyed_scroll_does_not_jump() {
+        // From 1 to 100 m/s within a frame: the pattern may not move further than its speed allows.
+        let windy =
+            bench(&NODE).input(CURVES, field(3)).set(FREQUENCY, 0.001).keyed(SCROLL, &[(10.0, 1.0), (11.0, 100.0)]);
+        let frames = windy.frames(8..=14);
+        let moved = |pair: &[Tasted]| {
+            let points = pair.iter().map(|out| out.curves().positions()).collect::<Vec<_>>();
+            points[0].iter().zip(points[1]).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max)
+        };
+        // 100 m/s × 1/24 s × 0.001 cells a metre is 0.004 cells; the field's slope is below 4 a cell.
+        assert!(frames.windows(2).map(moved).fold(0.0, f32::max) < 0.02);
+    }
+
+    #[test]
+    fn any_frame_alone_has_the_bits_it_has_in_order() {
+        let windy = bench(&NODE)
+            .input(CURVES, field(5))
+            .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
+            .keyed(SCROLL, &[(1.0, 0.5), (20.0, 3.0)]);
+        let bits = |out: &Tasted| out.curves().table(Owner::Point).column("P").unwrap().to_bytes();
+        let in_order = windy.frames(1..=20);
+        for frame in [20_i64, 7, 13, 1] {
+            let alone = windy.clone().threads(if frame == 7 { 1 } else { 7 }).at(frame as f64).cook();
+            assert_eq!(bits(&alone), bits(&in_order[frame as usize - 1]), "frame {frame}");
+        }
+    }
+
+    #[test]
+    fn rest_noise_sticks_to_a_moving_animal() {
+        let moving = |frame: Frame| {
+            let mut curves = field(3);
+            for row in curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap() {
+                row[0] += 0.37 * (frame.number() - 1.0) as f32;
+            }
+            curves
+        };
+        let windy = bench(&NODE).moving(CURVES, moving).set(SCROLL, 0.0);
+        let bend = |space: Space, frame: f64| {
+            let out = windy.clone().set(NOISE_SPACE, space).at(frame).cook();
+            let cvs = out.curves().positions();
+            [cvs[4][0] - cvs[0][0], cvs[4][1] - cvs[0][1]]
+        };
+        let close = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-5 && (a[1] - b[1]).abs() < 1e-5;
+        assert!(close(bend(Space::Rest, 1.0), bend(Space::Rest, 9.0)));
+        assert!(!close(bend(Space::World, 1.0), bend(Space::World, 9.0)));
+    }
+
+    #[test]
+    fn the_scenes_origin_moves_the_noise_and_nothing_else() {
+        let windy = bench(&NODE).input(CURVES, field(2));
+        let at = |origin: [f64; 3], shift: f32| {
+            let mut curves = field(2);
+            curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap().iter_mut().for_each(|row| row[0] += shift);
+            let scene = Scene { origin, ..Scene::default() };
+            let out = bench(&NODE).input(CURVES, curves).scene(scene).cook();
+            out.curves().positions().iter().map(|row| [row[0] - shift, row[1], row[2]]).collect::<Vec<_>>()
+        };
+        let (near, far) = (at([0.0; 3], 8.0), at([8.0, 0.0, 0.0], 0.0));
+        assert!(near.iter().zip(&far).all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 2e-6)));
+        assert_ne!(windy.cook().curves().positions(), far);
+    }
+
+    #[test]
+    fn wind_of_any_length_and_against_the_curve_is_finite() {
+        for wind in [[1e-300, 0.0, 0.0], [1e300, 1e300, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]] {
+            let out = calm(upright(4)).set(WIND_DIR, wind).cook();
+            assert!(out.curves().positions().as_flattened().iter().all(|x| x.is_finite()), "{wind:?}");
+            assert!(out.metrics["length_error"] < 1e-5);
+        }
+        let error = calm(upright(1)).set(WIND_DIR, [0.0; 3]).try_cook().unwrap_err();
+        assert_eq!(error.fact, "`wind_dir` is [0, 0, 0], which has no direction");
+    }
+
+    #[test]
+    fn empty_and_single_cv_curves_go_through() {
+        let none = Geometry::from(Component::curves(Vec::new(), Vec::new()).unwrap());
+        assert_eq!(bench(&NODE).input(CURVES, none).cook().curves().point_count(), 0);
+        let dots = Geometry::from(Component::curves(vec![1, 1], vec![[1.0; 3], [2.0; 3]]).unwrap());
+        assert_eq!(bench(&NODE).input(CURVES, dots).cook().curves().positions(), [[1.0; 3], [2.0; 3]]);
+    }
+}

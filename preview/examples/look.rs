@@ -1,10 +1,11 @@
 //! Draws obj files into one picture, to look at what the rasteriser does.
 //!
-//! `cargo run --release -p preview --example look -- OUT.png [--size WxH] [--camera TEXT] [--color-by NAME] [--repeat N]
-//! FILE.obj…`. Reads `v`, `f` and `l` lines. `--color-by` knows `along` (root to tip), `length` (of a curve) and `height`.
+//! `cargo run --release -p preview --example look -- OUT.png [--size WxH] [--camera TEXT] [--color-by NAME] [--curve-width METRES]
+//! [--note TEXT] [--repeat N] FILE.obj…`. Reads `v`, `f` and `l` lines. `--color-by` knows `along` (root to tip), `length` (of a curve) and `height`.
 
 use std::error::Error;
 use std::fs;
+use std::path::Path;
 
 use engine::geometry::{Column, Component, Geometry, Owner};
 use preview::{Layer, Settings, render};
@@ -24,13 +25,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--camera" => settings.camera = Some(value()?.parse()?),
             "--color-by" => settings.color_by = Some(value()?),
             "--curve-width" => settings.curve_width = Some(value()?.parse()?),
-            "--label" => settings.label = Some(value()?),
+            "--note" => settings.note = Some(value()?),
             "--repeat" => repeat = value()?.parse()?,
             _ => files.push(argument),
         }
     }
     let geometries = files.iter().map(|file| read(&fs::read_to_string(file)?)).collect::<Result<Vec<_>, _>>()?;
-    let layers: Vec<Layer<'_>> = files.iter().zip(&geometries).map(|(file, part)| Layer::new(file, part)).collect();
+    let name = |file| Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let layers: Vec<Layer<'_>> =
+        files.iter().zip(&geometries).map(|(file, part)| Layer::new(name(file), part)).collect();
     for _ in 1..repeat {
         render(&layers, &settings)?;
     }

@@ -72,8 +72,10 @@ pub struct Settings {
     pub background: [u8; 3],
     /// Whether a floor under the bounds takes shadows.
     pub ground: bool,
-    /// Text in the upper left: the output's name, the frame.
-    pub label: Option<String>,
+    /// Whether the layers' names are written into the upper left.
+    pub names: bool,
+    /// What is written after them: the frame.
+    pub note: Option<String>,
     /// Whether a bar explains the colours of `color_by`.
     pub legend: bool,
 }
@@ -91,7 +93,8 @@ impl Default for Settings {
             point_width: None,
             background: [232, 230, 226],
             ground: true,
-            label: None,
+            names: true,
+            note: None,
             legend: true,
         }
     }

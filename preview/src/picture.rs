@@ -48,9 +48,10 @@ pub fn render(layers: &[Layer<'_>], settings: &Settings) -> Result<Image, Error>
         }
     }
 
-    if let Some(label) = &settings.label {
-        text::label(&mut image, label);
-    }
+    let names = layers.iter().filter(|_| settings.names).map(|layer| layer.name);
+    let names = names.collect::<Vec<_>>().join(", ");
+    let note = settings.note.as_deref().unwrap_or_default();
+    text::label(&mut image, [names.as_str(), note].join("  ").trim());
     if let (Some(name), Some(range), true) = (&settings.color_by, range, settings.legend) {
         text::legend(&mut image, name, range);
     }

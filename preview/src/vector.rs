@@ -62,8 +62,9 @@ pub(crate) fn unit<T: Real>(a: [T; 3]) -> Option<[T; 3]> {
     let size = |x: T| if x < T::ZERO { T::ZERO - x } else { x };
     let greatest = a.iter().fold(T::ZERO, |most, x| if size(*x) > most { size(*x) } else { most });
     let near_one = a.map(|x| x / greatest);
+    // NaN where a coordinate is not finite, or all are 0.
     let length = length(near_one);
-    (length - length == T::ZERO && length > T::ZERO).then(|| near_one.map(|x| x / length))
+    (length > T::ZERO).then(|| near_one.map(|x| x / length))
 }
 
 pub(crate) fn mix(a: V3, b: V3, t: f32) -> V3 {

@@ -15,7 +15,7 @@ mod store;
 mod sweep;
 mod verify;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -27,6 +27,7 @@ use crate::error::Error;
 use crate::files::Files;
 use crate::geometry::{Geometry, Name};
 use crate::graph::Graph;
+use crate::key::Key;
 use crate::plan::{Plan, Request};
 use crate::time::Frame;
 use store::Store;
@@ -91,6 +92,8 @@ pub struct Engine {
     memory: usize,
     store: Mutex<Store>,
     files: Arc<Files>,
+    /// What a check of a graph has cooked already, for the report of the cook that follows.
+    verified: Mutex<BTreeMap<Key, NodeReport>>,
 }
 
 impl Engine {
@@ -105,7 +108,7 @@ impl Engine {
             .build()
             .map_err(|error| format!("no threads to cook with: {error}"))?;
         let store = Mutex::new(Store::new(settings.memory / 2));
-        Ok(Self { pool, memory: settings.memory, store, files: Arc::default() })
+        Ok(Self { pool, memory: settings.memory, store, files: Arc::default(), verified: Mutex::default() })
     }
 
     /// Plans a request on `graph`.
@@ -145,6 +148,7 @@ impl Engine {
             memory: self.memory,
             store: Mutex::new(Store::new(usize::MAX)),
             files: self.files.clone(),
+            verified: Mutex::default(),
         };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         match sweep::Sweep::new(&fresh, &plan, None, &cancel, true).run(&mut nothing) {
@@ -162,6 +166,15 @@ impl Engine {
     /// The files this engine has read.
     pub fn files(&self) -> &Arc<Files> {
         &self.files
+    }
+
+    fn note_verified(&self, key: Key, report: &NodeReport) {
+        let mut verified = self.verified.lock().unwrap_or_else(PoisonError::into_inner);
+        verified.entry(key).or_insert_with(|| report.clone());
+    }
+
+    fn take_verified(&self, key: Key) -> Option<NodeReport> {
+        self.verified.lock().unwrap_or_else(PoisonError::into_inner).remove(&key)
     }
 
     fn store<T>(&self, work: impl FnOnce(&mut Store) -> T) -> T {

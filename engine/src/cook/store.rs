@@ -9,8 +9,12 @@ use crate::key::Key;
 /// The geometries of a node's outputs.
 pub(crate) type Cooked = Arc<[Arc<Geometry>]>;
 
+/// What a node published when it made a result.
+pub(crate) type Metrics = Vec<(&'static str, f64)>;
+
 struct Entry {
     cooked: Cooked,
+    metrics: Metrics,
     bytes: usize,
     used: u64,
 }
@@ -29,21 +33,21 @@ impl Store {
         Self { budget, ..Self::default() }
     }
 
-    pub(crate) fn get(&mut self, key: Key) -> Option<Cooked> {
+    pub(crate) fn get(&mut self, key: Key) -> Option<(Cooked, Metrics)> {
         self.clock += 1;
         let entry = self.entries.get_mut(&key)?;
         entry.used = self.clock;
-        Some(entry.cooked.clone())
+        Some((entry.cooked.clone(), entry.metrics.clone()))
     }
 
     pub(crate) fn contains(&self, key: Key) -> bool {
         self.entries.contains_key(&key)
     }
 
-    pub(crate) fn keep(&mut self, key: Key, cooked: &Cooked) {
+    pub(crate) fn keep(&mut self, key: Key, cooked: &Cooked, metrics: Metrics) {
         self.clock += 1;
         let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
-        let entry = Entry { cooked: cooked.clone(), bytes, used: self.clock };
+        let entry = Entry { cooked: cooked.clone(), metrics, bytes, used: self.clock };
         self.bytes += bytes;
         if let Some(old) = self.entries.insert(key, entry) {
             self.bytes -= old.bytes;
@@ -80,10 +84,10 @@ mod tests {
     fn what_was_used_least_recently_goes_first() {
         let mut store = Store::new(2 * 12 * 10);
         let [a, b, c] = [1, 2, 3].map(|k| Key([k; 16]));
-        store.keep(a, &points(10));
-        store.keep(b, &points(10));
+        store.keep(a, &points(10), Vec::new());
+        store.keep(b, &points(10), Vec::new());
         assert!(store.get(a).is_some());
-        store.keep(c, &points(10));
+        store.keep(c, &points(10), Vec::new());
         assert!(store.contains(a) && !store.contains(b) && store.contains(c));
         assert_eq!(store.bytes(), 240);
     }
@@ -91,7 +95,7 @@ mod tests {
     #[test]
     fn what_is_larger_than_the_budget_is_not_kept() {
         let mut store = Store::new(100);
-        store.keep(Key::default(), &points(1000));
+        store.keep(Key::default(), &points(1000), Vec::new());
         assert_eq!(store.bytes(), 0);
     }
 }

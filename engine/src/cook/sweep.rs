@@ -39,6 +39,8 @@ const WORTH_A_THREAD: Duration = Duration::from_micros(20);
 struct Running {
     at: i64,
     state: Result<StateBox, Arc<CookError>>,
+    /// The slice that moved it last.
+    moved: u64,
 }
 
 /// What a slice needs of a chain's stretch.
@@ -74,9 +76,13 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     cancel: &'e AtomicBool,
     /// Whether this is a rehearsal, in which no node is called.
     dry: bool,
+    /// Whether this cook only looks at sources, for a cook that follows.
+    pub(super) verifying: bool,
     keys: Keys<'p, 'g>,
     results: Vec<BTreeMap<Frame, Outcome>>,
     running: Vec<BTreeMap<Stretch, Running>>,
+    /// Slices cooked so far.
+    slices: u64,
     /// By chain: its last whole frames' outputs, which samples between frames ask for again.
     recent: Vec<BTreeMap<i64, Outcome>>,
     integrals: Vec<Option<Integral<'p>>>,
@@ -84,6 +90,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     pace: Vec<Duration>,
     /// By node: key of the result kept because it may hold.
     held: Vec<Option<Key>>,
+    /// Keys of results this cook has made or found.
+    own: BTreeSet<Key>,
     report: Report,
     /// Bytes of the slice's results, by node and in all.
     node_bytes: Vec<usize>,
@@ -127,13 +135,16 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             disk,
             cancel,
             dry,
+            verifying: false,
             keys: Keys::new(plan),
             results: (0..count).map(|_| BTreeMap::new()).collect(),
             running: (0..count).map(|_| BTreeMap::new()).collect(),
+            slices: 0,
             recent: maps(),
             integrals,
             pace: vec![Duration::MAX; count],
             held: vec![None; count],
+            own: BTreeSet::new(),
             report,
             node_bytes: vec![0; count],
             live_bytes: 0,
@@ -144,9 +155,13 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     pub(super) fn run<E: Send>(mut self, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
         let watch = Stopwatch::start();
         let frames = self.plan.request.frames.clone();
-        let chains = self.plan.graph.nodes.iter().zip(&self.plan.nodes).any(|(node, planned)| {
-            planned.needed && node.node().is_some_and(|node| node.cook.is_chain())
-        });
+        let chains = self
+            .plan
+            .graph
+            .nodes
+            .iter()
+            .zip(&self.plan.nodes)
+            .any(|(node, planned)| planned.needed && node.node().is_some_and(|node| node.cook.is_chain()));
         let mut rest = frames.as_slice();
         while let Some(first) = rest.first() {
             let most = self.slice_length();
@@ -236,6 +251,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         }
         finished.sort_by_key(|delivered| (delivered.frame, delivered.output));
         self.end_slice();
+        self.forget_windows_left_behind();
         Ok(finished)
     }
 
@@ -374,14 +390,34 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             Err(error) => Err(error),
             Ok(spot) => match self.engine.store(|store| store.get(spot.key)) {
                 None => return true,
-                Some(cooked) => {
-                    self.report.nodes[node].from_cache += 1;
+                Some((cooked, metrics)) => {
+                    self.book_found(node, spot.key);
+                    self.publish(node, frame, &metrics);
                     Ok(cooked)
                 }
             },
         };
         self.results[node].insert(frame, outcome);
         false
+    }
+
+    /// Books a result that was there already: what a check of the graph cooked counts as cooked, what an earlier cook left
+    /// as found; what this cook keeps from slice to slice is neither.
+    fn book_found(&mut self, node: usize, key: Key) {
+        if !self.own.insert(key) {
+            return;
+        }
+        let report = &mut self.report.nodes[node];
+        match self.engine.take_verified(key) {
+            None => report.from_cache += 1,
+            Some(cost) => {
+                report.cooks += cost.cooks;
+                report.wall += cost.wall;
+                report.cpu += cost.cpu;
+                report.peak_bytes = report.peak_bytes.max(cost.peak_bytes);
+                report.metrics = cost.metrics;
+            }
+        }
     }
 
     fn demand(&mut self, slice: &mut Slice, node: usize, frame: Frame) {
@@ -427,6 +463,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             let first = advance.outputs.first().copied().unwrap_or(advance.goal);
             self.find_state(node, *stretch, first);
             advance.from = self.running[node].get(stretch).map(|running| running.at);
+        }
+        self.move_beside(node, &mut advances);
+        for (stretch, advance) in &advances {
             let next = advance.from.map_or(stretch.start, |at| at + 1);
             let steps = next..=advance.goal;
             for frame in steps.clone() {
@@ -438,6 +477,34 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
         }
         slice.advance[node] = advances;
+    }
+
+    /// Lets the stretches of a window that later frames will ask for move beside those asked now: what they read is at
+    /// hand, and would have to be cooked again later.
+    fn move_beside(&mut self, node: usize, advances: &mut BTreeMap<Stretch, Advance>) {
+        let next = |stretch: Stretch, from: Option<i64>| from.map_or(stretch.start, |at| at + 1);
+        let low = advances.iter().map(|(stretch, advance)| next(*stretch, advance.from)).min();
+        let high = advances.values().map(|advance| advance.goal).max();
+        let until = advances.keys().map(|stretch| stretch.until).max();
+        let (Some(low), Some(high), Some(mut until)) = (low, high, until) else { return };
+        while until < i64::MAX
+            && let Ok(stretch) = self.keys.stretch(node, until)
+            && stretch.start <= high
+            && self.is_asked_later(node, stretch)
+        {
+            let from = self.running[node].get(&stretch).map(|running| running.at);
+            if (low..=high).contains(&next(stretch, from)) {
+                advances.insert(stretch, Advance { goal: high, from, ..Advance::default() });
+            }
+            until = stretch.until;
+        }
+    }
+
+    /// Whether a frame of the request lies in the stretch, or beyond it where a chain will pass through.
+    fn is_asked_later(&self, node: usize, stretch: Stretch) -> bool {
+        let frames = &self.plan.request.frames;
+        let first = frames.get(frames.partition_point(|frame| frame.floor_number() < stretch.from));
+        first.is_some_and(|frame| self.plan.nodes[node].feeds_chain || frame.floor_number() < stretch.until)
     }
 
     fn demand_of_step(&mut self, slice: &mut Slice, node: usize, frame: i64, starts: bool) {
@@ -474,7 +541,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             let state = disk.checkpoint(key).and_then(|bytes| (solver.load)(&bytes));
             if let Some(state) = state {
                 self.report.nodes[node].from_cache += 1;
-                self.running[node].insert(stretch, Running { at, state: Ok(state) });
+                self.running[node].insert(stretch, Running { at, state: Ok(state), moved: self.slices });
                 return;
             }
         }
@@ -591,29 +658,35 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             false => jobs.iter().map(one).collect(),
         };
         self.pace[node] = watch.wall() / (jobs.len().max(1) as u32);
-        let mut outcomes: Vec<(Key, Outcome)> = Vec::with_capacity(cooked.len());
+        let mut outcomes: Vec<(Key, Frame, Outcome)> = Vec::with_capacity(cooked.len());
         for (key, frame, returned) in cooked.drain(..) {
-            outcomes.push((key, self.take(node, frame, returned)));
+            self.count(node, frame, returned.as_ref().err());
+            outcomes.push((key, frame, self.take(node, frame, returned)));
         }
         for (frame, key) in keys {
-            let outcome = outcomes.iter().find(|(known, _)| *known == key).map(|(_, outcome)| outcome.clone());
-            if let Some(outcome) = outcome {
-                self.results[node].insert(frame, outcome);
+            let Some((_, cooked_at, outcome)) = outcomes.iter().find(|(known, _, _)| *known == key) else { continue };
+            self.results[node].insert(frame, outcome.clone());
+            if *cooked_at != frame {
+                let metrics = self.published(node, *cooked_at);
+                self.publish(node, frame, &metrics);
             }
         }
     }
 
+    /// Counts a call, unless an error upstream or of an earlier frame kept it from being made.
+    fn count(&mut self, node: usize, frame: Frame, error: Option<&Arc<CookError>>) {
+        let own = |error: &Arc<CookError>| error.node == self.plan.graph.nodes[node].id && error.frame == frame;
+        self.report.nodes[node].cooks += u64::from(error.is_none_or(own));
+    }
+
     /// Books what a call returned.
     fn take(&mut self, node: usize, frame: Frame, returned: Result<Returned, Arc<CookError>>) -> Outcome {
-        let report = &mut self.report.nodes[node];
-        report.cooks += 1;
         let returned = returned?;
+        let report = &mut self.report.nodes[node];
         report.peak_bytes = report.peak_bytes.max(returned.new_bytes);
         self.live_bytes += returned.new_bytes;
         self.node_bytes[node] += returned.new_bytes;
-        for (name, value) in returned.metrics {
-            report.metrics.entry(name).or_default().insert(frame, value);
-        }
+        self.publish(node, frame, &returned.metrics);
         Ok(returned.cooked)
     }
 
@@ -715,9 +788,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     Some(Running { state: Ok(state), .. }) => self.chain_step(node, declared, chain, frame, state),
                     Some(Running { state: Err(error), .. }) => Err(error),
                 };
-                self.report.nodes[node].cooks += 1;
+                self.count(node, Frame::whole(frame), state.as_ref().err());
                 self.save_state(node, stretch, frame, solver, state.as_ref().ok())?;
-                running = Some(Running { at: frame, state });
+                running = Some(Running { at: frame, state, moved: self.slices });
                 if advance.outputs.contains(&frame) {
                     self.chain_output(node, declared, chain, running.as_ref(), frame);
                 }
@@ -762,8 +835,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let inputs = self.inputs(node, declared, at, &params, Reading::Start)?;
         let (state, finished) =
             self.context(node, declared, at, &params, inputs).run(|cx| (chain.start)(cx)).map_err(fail)?;
-        let metrics = finished.metrics();
-        self.publish(node, at, metrics);
+        self.publish(node, at, &finished.metrics());
         Ok(state)
     }
 
@@ -785,14 +857,20 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let call = self.context(node, declared, at, &params, inputs);
         let stepped = call.step(at.plus(-1), |cx| (chain.step)(&mut state, cx));
         let metrics = stepped.map_err(fail)?.metrics();
-        self.publish(node, at, metrics);
+        self.publish(node, at, &metrics);
         Ok(state)
     }
 
-    fn publish(&mut self, node: usize, frame: Frame, metrics: Vec<(&'static str, f64)>) {
+    fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
         for (name, value) in metrics {
-            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, value);
+            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, *value);
         }
+    }
+
+    /// What a node published at a frame.
+    fn published(&self, node: usize, frame: Frame) -> Vec<(&'static str, f64)> {
+        let metrics = &self.report.nodes[node].metrics;
+        metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
     }
 
     fn chain_output(
@@ -810,10 +888,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
             self.call(node, declared, at, &params, &|cx: &FrameCx| (chain.output)(state, cx))
         });
-        let cooks = self.report.nodes[node].cooks;
         let outcome = self.take(node, at, returned);
-        // A chain's cooks are its steps.
-        self.report.nodes[node].cooks = cooks;
         self.recent[node].insert(frame, outcome);
     }
 
@@ -854,9 +929,14 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             && let Some(Ok(cooked)) = self.results[node].get(&start)
             && let Ok(spot) = self.keys.spot(node, start)
         {
+            self.own.insert(spot.key);
+            if self.verifying {
+                self.engine.note_verified(spot.key, &self.report.nodes[node]);
+            }
+            let metrics = self.published(node, start);
             self.engine.store(|store| {
                 if !store.contains(spot.key) {
-                    store.keep(spot.key, cooked)
+                    store.keep(spot.key, cooked, metrics)
                 }
             });
         }
@@ -866,10 +946,19 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             && let Ok(spot) = self.keys.spot(node, *frame)
             && self.held[node] != Some(spot.key)
         {
+            self.own.insert(spot.key);
+            self.own.insert(spot.key);
             let before = self.held[node].replace(spot.key);
+            if let Some(before) = before {
+                self.own.remove(&before);
+            }
+            if let Some(before) = before {
+                self.own.remove(&before);
+            }
+            let metrics = self.published(node, *frame);
             self.engine.store(|store| {
                 before.into_iter().for_each(|key| store.drop(key));
-                store.keep(spot.key, cooked);
+                store.keep(spot.key, cooked, metrics);
             });
         }
     }
@@ -881,6 +970,14 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
 
     fn forget_results(&mut self) {
         (0..self.results.len()).for_each(|node| self.forget(node));
+    }
+
+    /// Drops the states of windows that this slice did not move: what is asked lies beyond them.
+    fn forget_windows_left_behind(&mut self) {
+        for running in &mut self.running {
+            running.retain(|stretch, running| stretch.until == i64::MAX || running.moved == self.slices);
+        }
+        self.slices += 1;
     }
 
     fn end_slice(&mut self) {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use super::sweep::Sweep;
 use super::{CookError, Delivered, Engine, Stopped};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Name;
@@ -58,10 +59,15 @@ impl Engine {
         let request = Request { outputs: (0..sources.len()).collect(), frames };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         let cancel = AtomicBool::new(false);
-        match self.cook(&graph, &request, None, &cancel, &mut nothing) {
+        let Ok(plan) = self.plan(&graph, &request) else { return Vec::new() };
+        let cooked = self.pool.install(|| {
+            let mut sweep = Sweep::new(self, &plan, None, &cancel, false);
+            sweep.verifying = true;
+            sweep.run(&mut nothing)
+        });
+        match cooked {
             Ok(report) => report.errors.into_iter().map(|(output, error, _)| (sources[output], error)).collect(),
-            Err(Stopped::Asked(error)) => sources.first().map(|source| (*source, error)).into_iter().collect(),
-            Err(Stopped::Sink(_) | Stopped::Cache(_)) => Vec::new(),
+            Err(Stopped::Asked(_) | Stopped::Sink(_) | Stopped::Cache(_)) => Vec::new(),
         }
     }
 }

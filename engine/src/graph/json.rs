@@ -4,6 +4,7 @@
 //! Promise: every number that is read is finite. Limit: whole numbers beyond ±2⁶³ are refused.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use jsonc_parser::ast::Value;
 use jsonc_parser::common::{Range, Ranged};
@@ -17,14 +18,22 @@ use crate::expr::suggest::nearest;
 pub(super) struct Json<'a> {
     pub(super) value: &'a Value<'a>,
     pub(super) text: &'a Text<'a>,
-    pub(super) path: String,
+    /// Path of the innermost object or of the outermost list; the items within follow.
+    base: Rc<str>,
+    /// Places in lists within lists, outermost first. Lists of a million items are read without making a path of each.
+    items: [u32; NESTED],
+    depth: usize,
 }
+
+/// Lists within lists whose paths are made only when asked for. A vector in a key of keyframes has three.
+const NESTED: usize = 4;
 
 /// A member of an object.
 #[derive(Clone)]
 pub(super) struct Entry<'a> {
     pub(super) name: &'a str,
-    key: Range,
+    /// Where its name stands.
+    pub(super) key: Range,
     pub(super) json: Json<'a>,
 }
 
@@ -78,7 +87,7 @@ pub(super) fn did_you_mean<'n>(
 impl<'a> Entry<'a> {
     /// A fault of the key.
     pub(super) fn fault(&self, code: &'static str, fact: impl Into<String>) -> Fault {
-        self.json.text.fault(self.key.start, &self.json.path, code, fact)
+        self.json.text.fault(self.key.start, &self.json.path(), code, fact)
     }
 
     /// The entry that a `--set` makes, its place being the value.
@@ -90,17 +99,33 @@ impl<'a> Entry<'a> {
 impl<'a> Json<'a> {
     /// The value that a whole text holds.
     pub(super) fn root(value: &'a Value<'a>, text: &'a Text<'a>) -> Self {
-        Self { value, text, path: String::new() }
+        Self::with_path(value, text, "")
+    }
+
+    fn with_path(value: &'a Value<'a>, text: &'a Text<'a>, path: &str) -> Self {
+        Self { value, text, base: path.into(), items: [0; NESTED], depth: 0 }
+    }
+
+    /// Its path.
+    pub(super) fn path(&self) -> String {
+        let items = self.items[..self.depth].iter().map(|place| format!("[{place}]"));
+        std::iter::once(self.base.to_string()).chain(items).collect()
     }
 
     /// The same value read from elsewhere.
     pub(super) fn at_path(&self, path: &str) -> Self {
-        Self { path: path.to_owned(), ..self.clone() }
+        Self::with_path(self.value, self.text, path)
     }
 
     /// Item `place` of this list.
     pub(super) fn item(&self, value: &'a Value<'a>, place: usize) -> Self {
-        Self { value, text: self.text, path: format!("{}[{place}]", self.path) }
+        let mut item = match self.depth < NESTED {
+            true => Self { value, ..self.clone() },
+            false => Self::with_path(value, self.text, &self.path()),
+        };
+        item.items[item.depth] = place as u32;
+        item.depth += 1;
+        item
     }
 
     /// A fault of this value.
@@ -110,16 +135,14 @@ impl<'a> Json<'a> {
 
     /// A fault of this value at byte `offset` of the text.
     pub(super) fn fault_at(&self, offset: usize, code: &'static str, fact: impl Into<String>) -> Fault {
-        self.text.fault(offset, &self.path, code, fact)
+        self.text.fault(offset, &self.path(), code, fact)
     }
 
     /// The fault of a value of another kind than expected.
     pub(super) fn unexpected(&self, expected: &str) -> Fault {
         let fault = self.fault(code::WRONG_KIND, format!("found {}, expected {expected}", self.found()));
         match self.value {
-            Value::NullKeyword(_) if !self.path.ends_with(']') => {
-                fault.hint("leave the key out where nothing is to be set")
-            }
+            Value::NullKeyword(_) if self.depth == 0 => fault.hint("leave the key out where nothing is to be set"),
             _ => fault,
         }
     }
@@ -145,9 +168,10 @@ impl<'a> Json<'a> {
         let Value::Object(object) = self.value else { return Err(self.unexpected(expected)) };
         let mut firsts: BTreeMap<&str, usize> = BTreeMap::new();
         let mut entries = Vec::with_capacity(object.properties.len());
+        let path = self.path();
         for member in &object.properties {
             let (name, key) = (member.name.as_str(), member.name.range());
-            let json = Json { value: &member.value, text: self.text, path: member_path(&self.path, name) };
+            let json = Json::with_path(&member.value, self.text, &member_path(&path, name));
             let entry = Entry { name, key, json };
             match firsts.get(name) {
                 Some(first) => {

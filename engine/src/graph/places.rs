@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::Graph;
 use super::fault::{Fault, FaultClass};
 use super::json::member_path;
+use super::text::{Place, Text};
 
 /// A part of a graph that something may be wrong with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,10 +45,10 @@ struct Spot {
 pub struct Places(BTreeMap<String, Spot>);
 
 impl Places {
-    /// Remembers where what stands at the fault's path is.
-    pub(super) fn note(&mut self, fault: Fault) {
-        let Fault { line, column, set, path, .. } = fault;
-        self.0.insert(path, Spot { line, column, set });
+    /// Remembers that what has that path stands at byte `offset` of the text.
+    pub(super) fn note(&mut self, path: String, text: &Text<'_>, offset: usize) {
+        let Place { line, column } = text.place(offset);
+        self.0.insert(path, Spot { line, column, set: text.set.map(Into::into) });
     }
 
     /// The place of `path`, or of what it is in.

@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use choice::{Choice, ChoiceOption};
 pub use handle::{Param, ParamDecl, ParamType, RampDefault};
+pub(crate) use source::mixed_seed;
 pub use source::{Clock, Keyframe, Keyframes, Source};
 pub use spec::{Bounds, Facts, ParamSpec, Shape, Unset};
 pub use turn::euler_to_turn;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use numerics::ramp::{Interpolation, Ramp};
+use numerics::random::Key;
 
 use super::spec::Shape;
 use super::turn::{self, euler_to_turn};
@@ -88,7 +89,8 @@ impl Source {
                     Env { frame, time: frame / clock.fps, fps: clock.fps, seed: clock.seed as f64, controls: &numbers };
                 let x = |k: usize| exprs[k].eval(&env);
                 match shape {
-                    Shape::Int | Shape::Seed => Value::Int(whole(x(0))),
+                    Shape::Int => Value::Int(whole(x(0))),
+                    Shape::Seed => Value::Int(mixed_seed(clock.seed, whole(x(0)))),
                     Shape::Bool => Value::Bool(x(0) != 0.0),
                     Shape::Vec2 => Value::Vec2([x(0), x(1)]),
                     Shape::Span => Value::Span([x(0), x(1)]),
@@ -104,6 +106,11 @@ impl Source {
             Self::Masked(value, attribute) => Value::Masked(value.at(frame, clock).number(), Some(attribute.clone())),
         }
     }
+}
+
+/// The seed that a node gets: a param's own and the scene's, mixed. Always within u32.
+pub(crate) fn mixed_seed(scene: i64, own: i64) -> i64 {
+    i64::from(Key::new(scene as u64).of(own as u64).u32())
 }
 
 /// The nearest whole number; saturates where it does not fit, and NaN becomes the least, which every range refuses.

@@ -193,8 +193,14 @@ impl ParamSpec {
             Value::Vec3(v) => v,
             Value::Span(v) => v,
             Value::Turn(v) => v,
+            // What an expression makes of NaN.
+            Value::Int(i64::MIN) => return outside("not a number".into()),
             Value::Int(i) => return (!hard.hold(*i as f64)).then(|| outside(i.to_string()))?,
             Value::Int3(v) => return (!v.iter().all(|i| hard.hold(*i as f64))).then(|| outside(value.to_string()))?,
+            Value::Ramp(ramp) => {
+                let outside_key = ramp.keys().iter().find(|[_, y]| !hard.hold(f64::from(*y)));
+                return outside_key.and_then(|[x, y]| outside(format!("{y} at {x}")));
+            }
             _ => return None,
         };
         // A rotation's numbers are a quaternion's by now: finite is all one can ask.
@@ -218,6 +224,7 @@ impl ParamSpec {
     pub fn unit_text(&self) -> String {
         match self.facts.unit {
             Unit::None => String::new(),
+            unit if unit.sign().starts_with('1') => format!(" ({})", unit.sign()),
             unit => format!(" {}", unit.sign()),
         }
     }
@@ -232,7 +239,9 @@ impl ParamSpec {
         match (&self.default, self.shape) {
             (Value::Choice(place), Shape::Choice(options)) => options[*place].word.into(),
             (Value::Turn(_), _) => "[0, 0, 0]".into(),
-            (Value::Nothing | Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => "none".into(),
+            (Value::Nothing | Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => {
+                "none".into()
+            }
             (default, _) => default.to_string(),
         }
     }

@@ -86,7 +86,10 @@ impl<'g> Plan<'g> {
             let above =
                 |test: &dyn Fn(&Planned) -> bool| node.inputs().iter().flatten().any(|link| test(&nodes[link.node]));
             // What is not needed is not looked at: neither its params nor its files are anyone's business.
-            let resolver = if needed[place] { Resolver::new(node, graph, &files) } else { Resolver::idle(graph, &files) };
+            let resolver = match needed[place] {
+                true => Resolver::new(node, graph, &files),
+                false => Resolver::unasked(node, graph, &files),
+            };
             let (varies, may_hold, has_solver) = match &node.body {
                 _ if !needed[place] => (false, false, false),
                 Body::Given { moves, .. } => (*moves, false, false),

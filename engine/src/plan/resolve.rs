@@ -23,16 +23,7 @@ pub(crate) struct Resolver {
 
 impl Resolver {
     pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
-        let Body::Node { specs, params, .. } = &node.body else { return Self::idle(graph, files) };
-        let mut resolver = Self {
-            log: Arc::new(ReadLog::new(specs.len())),
-            specs: specs.clone(),
-            sources: params.clone(),
-            files: files.clone(),
-            clock: graph.scene.clock(),
-            animated: false,
-            constant: None,
-        };
+        let mut resolver = Self::unasked(node, graph, files);
         let start = graph.scene.start();
         // A param that is not read does not make a node move, whatever it does.
         resolver.animated = match resolver.evaluate(start.number()) {
@@ -45,12 +36,16 @@ impl Resolver {
         resolver
     }
 
-    /// The resolver of a node without params.
-    pub(crate) fn idle(graph: &Graph, files: &Arc<Files>) -> Self {
+    /// The resolver of a node that nothing asked depends on: it looks at params and files only where someone asks.
+    pub(crate) fn unasked(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+        let (specs, sources) = match &node.body {
+            Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
+            Body::Given { .. } => (Arc::from([]), Vec::new()),
+        };
         Self {
-            specs: Arc::from([]),
-            sources: Vec::new(),
-            log: Arc::default(),
+            log: Arc::new(ReadLog::new(specs.len())),
+            specs,
+            sources,
             files: files.clone(),
             clock: graph.scene.clock(),
             animated: false,

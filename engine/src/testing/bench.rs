@@ -173,7 +173,9 @@ impl Bench {
         }
         let metrics = |frame: Frame| {
             let of_node = report.nodes.last().map(|node| &node.metrics);
-            let at = |(name, values): (&&'static str, &BTreeMap<Frame, f64>)| values.get(&frame).map(|value| (*name, *value));
+            let at = |(name, values): (&&'static str, &BTreeMap<Frame, f64>)| {
+                values.get(&frame).map(|value| (*name, *value))
+            };
             of_node.into_iter().flatten().filter_map(at).collect()
         };
         let tasted = |frame: &Frame| Tasted {
@@ -221,7 +223,9 @@ pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(
         found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));
         Ok(())
     };
-    let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut sink).unwrap_or_else(|stopped| panic!("{stopped:?}"));
+    let report = engine
+        .cook(graph, &request, None, &AtomicBool::new(false), &mut sink)
+        .unwrap_or_else(|stopped| panic!("{stopped:?}"));
     (found, report)
 }
 

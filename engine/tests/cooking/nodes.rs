@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use engine::geometry::{Attr, Component, Geometry, P};
-use engine::node::{Cook, Cx, FrameCx, Input, Many, Metric, Node, Output, Outputs, StepCx, Times};
 use engine::node::{Chain, Opt};
+use engine::node::{Cook, Cx, FrameCx, Input, Many, Metric, Node, Output, Outputs, StepCx, Times};
 use engine::param::{Param, Unit};
 use engine::{Error, Result, inputs, params};
 use serde::{Deserialize, Serialize};
@@ -88,10 +88,15 @@ params! { SOURCE_PARAMS:
 }
 
 /// `count` points at x = `amount`.
-pub(crate) static SOURCE: Node = Node::new("Source", 1, "Points on a spot.", Cook::Pure(|cx| {
-    note(cx, "cook", None, Vec::new());
-    Ok(OUT.with(Geometry::from(Component::points(vec![[cx.get(SOURCE_AMOUNT), 0.0, 0.0]; cx.get(COUNT) as usize]))))
-}))
+pub(crate) static SOURCE: Node = Node::new(
+    "Source",
+    1,
+    "Points on a spot.",
+    Cook::Pure(|cx| {
+        note(cx, "cook", None, Vec::new());
+        Ok(OUT.with(Geometry::from(Component::points(vec![[cx.get(SOURCE_AMOUNT), 0.0, 0.0]; cx.get(COUNT) as usize]))))
+    }),
+)
 .params(SOURCE_PARAMS)
 .outputs(&[&OUT]);
 
@@ -104,12 +109,17 @@ params! { ADD_PARAMS:
 inputs! { ADD_INPUTS: ADD_POINTS: Input = POINTS; }
 
 /// Adds `amount`, and `more` where it is to be read.
-pub(crate) static ADD: Node = Node::new("Add", 1, "Moves points.", Cook::Pure(|cx| {
-    note(cx, "cook", None, Vec::new());
-    let more = if cx.get(TWICE) { cx.get(MORE) } else { 0.0 };
-    let amount = cx.get(ADD_AMOUNT) + more;
-    Ok(OUT.with(moved(cx.input(ADD_POINTS), |x| x + amount)?))
-}))
+pub(crate) static ADD: Node = Node::new(
+    "Add",
+    1,
+    "Moves points.",
+    Cook::Pure(|cx| {
+        note(cx, "cook", None, Vec::new());
+        let more = if cx.get(TWICE) { cx.get(MORE) } else { 0.0 };
+        let amount = cx.get(ADD_AMOUNT) + more;
+        Ok(OUT.with(moved(cx.input(ADD_POINTS), |x| x + amount)?))
+    }),
+)
 .inputs(ADD_INPUTS)
 .params(ADD_PARAMS)
 .outputs(&[&OUT])
@@ -119,11 +129,16 @@ inputs! { SUM_INPUTS: SUM_POINTS: Input<Many> = Input::many("points", engine::ge
 params! { SUM_PARAMS: SUM_PROBE: Param<i64> = PROBE; }
 
 /// One point at the sum of the first points' x.
-pub(crate) static SUM: Node = Node::new("Sum", 1, "Adds points up.", Cook::Pure(|cx| {
-    note(cx, "cook", None, Vec::new());
-    let sum = cx.input(SUM_POINTS).iter().map(|wire| first_x(wire)).sum::<f32>();
-    Ok(OUT.with(Geometry::from(Component::points(vec![[sum, 0.0, 0.0]]))))
-}))
+pub(crate) static SUM: Node = Node::new(
+    "Sum",
+    1,
+    "Adds points up.",
+    Cook::Pure(|cx| {
+        note(cx, "cook", None, Vec::new());
+        let sum = cx.input(SUM_POINTS).iter().map(|wire| first_x(wire)).sum::<f32>();
+        Ok(OUT.with(Geometry::from(Component::points(vec![[sum, 0.0, 0.0]]))))
+    }),
+)
 .inputs(SUM_INPUTS)
 .params(SUM_PARAMS)
 .outputs(&[&OUT]);
@@ -139,16 +154,21 @@ inputs! { CLOCK_INPUTS: CLOCK_POINTS: Input = POINTS; }
 const HEIGHT: Metric = Metric::new("height", Unit::Metres, "How far the first point is.");
 
 /// Adds `amount` × frame; at 0 it does not look at the clock.
-pub(crate) static CLOCK: Node = Node::new("Clock", 1, "Moves points with the clock.", Cook::Frame {
-    cook: |cx| {
-        note(cx, "cook", Some(cx.frame().number()), Vec::new());
-        let amount = cx.get(CLOCK_AMOUNT) * cx.frame().number() as f32;
-        let geometry = moved(cx.input(CLOCK_POINTS), |x| x + amount)?;
-        cx.publish(HEIGHT, f64::from(first_x(&geometry)));
-        Ok(OUT.with(geometry))
+pub(crate) static CLOCK: Node = Node::new(
+    "Clock",
+    1,
+    "Moves points with the clock.",
+    Cook::Frame {
+        cook: |cx| {
+            note(cx, "cook", Some(cx.frame().number()), Vec::new());
+            let amount = cx.get(CLOCK_AMOUNT) * cx.frame().number() as f32;
+            let geometry = moved(cx.input(CLOCK_POINTS), |x| x + amount)?;
+            cx.publish(HEIGHT, f64::from(first_x(&geometry)));
+            Ok(OUT.with(geometry))
+        },
+        reads_clock: |params| params.get(CLOCK_AMOUNT) != 0.0,
     },
-    reads_clock: |params| params.get(CLOCK_AMOUNT) != 0.0,
-})
+)
 .inputs(CLOCK_INPUTS)
 .params(CLOCK_PARAMS)
 .outputs(&[&OUT])
@@ -162,14 +182,19 @@ params! { DRIFT_PARAMS:
 inputs! { DRIFT_INPUTS: DRIFT_POINTS: Input = POINTS; }
 
 /// Adds ∫ speed dt from time 0.
-pub(crate) static DRIFT: Node = Node::new("Drift", 1, "Moves points at a keyed speed.", Cook::Frame {
-    cook: |cx| {
-        let upto = cx.frame().plus(-(cx.get(UPTO) as i64));
-        let way = cx.integral(upto)[0] as f32;
-        Ok(OUT.with(moved(cx.input(DRIFT_POINTS), |x| x + way)?))
+pub(crate) static DRIFT: Node = Node::new(
+    "Drift",
+    1,
+    "Moves points at a keyed speed.",
+    Cook::Frame {
+        cook: |cx| {
+            let upto = cx.frame().plus(-(cx.get(UPTO) as i64));
+            let way = cx.integral(upto)[0] as f32;
+            Ok(OUT.with(moved(cx.input(DRIFT_POINTS), |x| x + way)?))
+        },
+        reads_clock: |_| true,
     },
-    reads_clock: |_| true,
-})
+)
 .inputs(DRIFT_INPUTS)
 .params(DRIFT_PARAMS)
 .outputs(&[&OUT])
@@ -183,11 +208,16 @@ inputs! { FROM_START_INPUTS:
 }
 
 /// How far points are from where `rest` was at the scene's start.
-pub(crate) static FROM_START: Node = Node::new("From_Start", 1, "Motion since the start.", Cook::Pure(|cx| {
-    note(cx, "cook", None, Vec::new());
-    let rest = first_x(cx.at_start(REST));
-    Ok(OUT.with(moved(cx.input(FROM_POINTS), |x| x - rest)?))
-}))
+pub(crate) static FROM_START: Node = Node::new(
+    "From_Start",
+    1,
+    "Motion since the start.",
+    Cook::Pure(|cx| {
+        note(cx, "cook", None, Vec::new());
+        let rest = first_x(cx.at_start(REST));
+        Ok(OUT.with(moved(cx.input(FROM_POINTS), |x| x - rest)?))
+    }),
+)
 .inputs(FROM_START_INPUTS)
 .params(FROM_START_PARAMS)
 .outputs(&[&OUT])
@@ -200,26 +230,31 @@ params! { FAIL_PARAMS:
 inputs! { FAIL_INPUTS: FAIL_POINTS: Input = POINTS; }
 
 /// Fails at one frame.
-pub(crate) static FAIL: Node = Node::new("Fail", 1, "Fails.", Cook::Frame {
-    cook: |cx| {
-        let now = cx.frame().number() == cx.get(WHEN) as f64;
-        match cx.get(HOW) {
-            1 if now => panic!("all is lost"),
-            2 if now => {
-                let mut geometry = cx.input(FAIL_POINTS).clone();
-                let points = geometry.part_mut(engine::geometry::Kind::Points).expect("checked");
-                if let Some(last) = points.edit(P).and_then(<[_]>::last_mut) {
-                    last[1] = f32::NAN;
+pub(crate) static FAIL: Node = Node::new(
+    "Fail",
+    1,
+    "Fails.",
+    Cook::Frame {
+        cook: |cx| {
+            let now = cx.frame().number() == cx.get(WHEN) as f64;
+            match cx.get(HOW) {
+                1 if now => panic!("all is lost"),
+                2 if now => {
+                    let mut geometry = cx.input(FAIL_POINTS).clone();
+                    let points = geometry.part_mut(engine::geometry::Kind::Points).expect("checked");
+                    if let Some(last) = points.edit(P).and_then(<[_]>::last_mut) {
+                        last[1] = f32::NAN;
+                    }
+                    Ok(OUT.with(geometry))
                 }
-                Ok(OUT.with(geometry))
+                3 if now => Err(Error::refused("there is no such frame").hint("ask for another")),
+                4 if now => Ok(Outputs::default()),
+                _ => Ok(OUT.with(cx.input(FAIL_POINTS).clone())),
             }
-            3 if now => Err(Error::refused("there is no such frame").hint("ask for another")),
-            4 if now => Ok(Outputs::default()),
-            _ => Ok(OUT.with(cx.input(FAIL_POINTS).clone())),
-        }
+        },
+        reads_clock: |_| true,
     },
-    reads_clock: |_| true,
-})
+)
 .inputs(FAIL_INPUTS)
 .params(FAIL_PARAMS)
 .outputs(&[&OUT])
@@ -231,15 +266,20 @@ const WANTED: Metric = Metric::new("wanted", Unit::None, "1 where someone takes 
 inputs! { DUSTY_INPUTS: DUSTY_POINTS: Input = POINTS; }
 
 /// Writes `dust`.
-pub(crate) static DUSTY: Node = Node::new("Dusty", 1, "Makes dust.", Cook::Pure(|cx| {
-    cx.publish(WANTED, f64::from(u8::from(cx.wants(DUST))));
-    let mut geometry = cx.input(DUSTY_POINTS).clone();
-    if let Some(points) = geometry.part_mut(engine::geometry::Kind::Points) {
-        let rows = points.point_count();
-        points.set(DUST, vec![0.5; rows])?;
-    }
-    Ok(OUT.with(geometry))
-}))
+pub(crate) static DUSTY: Node = Node::new(
+    "Dusty",
+    1,
+    "Makes dust.",
+    Cook::Pure(|cx| {
+        cx.publish(WANTED, f64::from(u8::from(cx.wants(DUST))));
+        let mut geometry = cx.input(DUSTY_POINTS).clone();
+        if let Some(points) = geometry.part_mut(engine::geometry::Kind::Points) {
+            let rows = points.point_count();
+            points.set(DUST, vec![0.5; rows])?;
+        }
+        Ok(OUT.with(geometry))
+    }),
+)
 .inputs(DUSTY_INPUTS)
 .outputs(&[&OUT])
 .metrics(&[&WANTED])

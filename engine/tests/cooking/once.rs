@@ -1,7 +1,7 @@
 //! What is cooked at all, and how often.
 
-use engine::plan::Request;
 use engine::param::{Keyframes, ParamType, Source};
+use engine::plan::Request;
 use engine::time::Frame;
 use numerics::ramp::Interpolation;
 use std::sync::Arc;

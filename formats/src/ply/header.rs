@@ -125,7 +125,7 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
                     FormatError::at(Place::Line(number), format!("{} is not a number of rows", shown(rows)))
                 })?;
                 let name = String::from_utf8_lossy(name).into_owned();
-                if elements.iter().any(|element| element.name == name && is_known(&name)) {
+                if is_known(&name) && elements.iter().any(|element| element.name == name) {
                     return fail(format!("element `{name}` is there twice"));
                 }
                 names.clear();

@@ -220,6 +220,14 @@ fn a_broken_header_is_named_with_its_line() {
 }
 
 #[test]
+fn a_header_of_many_elements_and_properties_takes_no_time() {
+    let elements: String = (0..40_000).map(|k| format!("element e{k} 0\nproperty int a\n")).collect();
+    let properties: String = (0..40_000).map(|k| format!(",int p{k}")).collect();
+    let text = ascii(&format!("{elements}{}", vertex(0, &format!("{XYZ}{properties}"))), "");
+    assert_eq!(read(text), Geometry::default());
+}
+
+#[test]
 fn broken_data_is_named_with_its_place() {
     let faces = format!("{}element face 1\n{FACE}", vertex(1, XYZ));
     let edges = format!("{}element edge 1\nproperty int vertex1\nproperty int vertex2\n", vertex(1, XYZ));

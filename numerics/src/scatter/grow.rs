@@ -4,6 +4,7 @@
 //! with the triangle. Limit: nothing bends, and curves may cross each other and the surface.
 
 use super::{Spot, corners_of, cross, dot, length, normal, sub};
+use crate::trig::sin_cos;
 use rayon::prelude::*;
 
 /// A curve to grow.
@@ -12,11 +13,11 @@ pub struct Blade {
     /// Where its root is.
     pub root: Spot,
     /// Root to tip, metres.
-    pub length: f64,
+    pub length: f32,
     /// Angle to the surface's normal, radians.
-    pub lean: f64,
+    pub lean: f32,
     /// Where to it leans: the angle about the normal from the triangle's first edge, radians.
-    pub around: f64,
+    pub around: f32,
 }
 
 /// Unit normals of the points (f64): the mean of the triangles around each, weighted by area; zero where there is none.
@@ -54,7 +55,7 @@ pub fn grow(
             .unwrap_or([0.0, 1.0, 0.0]);
         let direction = leaning(up, sub(corners[1], corners[0]), blade);
         for (k, point) in points.iter_mut().enumerate() {
-            let along = blade.length * k as f64 / (cvs - 1) as f64;
+            let along = f64::from(blade.length) * k as f64 / (cvs - 1) as f64;
             *point = std::array::from_fn(|axis| (root[axis] + along * direction[axis]) as f32);
         }
     });
@@ -66,8 +67,10 @@ fn leaning(up: [f64; 3], edge: [f64; 3], blade: &Blade) -> [f64; 3] {
     let along = dot(edge, up);
     let side = unit([0, 1, 2].map(|k| edge[k] - along * up[k])).unwrap_or_else(|| perpendicular(up));
     let across = cross(up, side);
-    let (sin, cos) = (libm::sin(blade.lean), libm::cos(blade.lean));
-    let (s, c) = (libm::sin(blade.around), libm::cos(blade.around));
+    let [(sin, cos), (s, c)] = [blade.lean, blade.around].map(|angle| {
+        let (sin, cos) = sin_cos(angle);
+        (f64::from(sin), f64::from(cos))
+    });
     std::array::from_fn(|k| cos * up[k] + sin * (c * side[k] + s * across[k]))
 }
 

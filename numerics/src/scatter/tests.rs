@@ -22,20 +22,20 @@ fn gaps(places: &[[f64; 3]]) -> Vec<f64> {
 #[test]
 fn no_two_points_are_close_and_no_hole_is_left() {
     let square = Surface::new(&SQUARE, &HALVES);
-    for count in [100, 1000, 3000] {
+    for count in [30, 100, 300, 1000, 3000] {
         let spots = square.spread(count, Key::new(3));
         assert_eq!(spots.len(), count);
         let places = places(&SQUARE, &HALVES, &spots);
         let gaps = gaps(&places);
         let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
         let mean = gaps.iter().sum::<f64>() / count as f64;
-        assert!(least > 0.42 && mean > 0.68, "{count}: least {least}, mean {mean}");
-        // A disc without a point is never wider than two and a half spacings of a square lattice.
+        assert!(least > 0.47 && mean > 0.71, "{count}: least {least}, mean {mean}");
+        // The widest void: of a square lattice 0.71, of random points 1.6 and more.
         let lattice = (0..1600).map(|k| [f64::from(k % 40) / 39.0, 0.0, f64::from(k / 40) / 39.0]);
         let farthest = lattice
             .map(|at| places.iter().map(|place| length(sub(*place, at))).fold(f64::INFINITY, f64::min))
             .fold(0.0, f64::max);
-        assert!(farthest * (count as f64).sqrt() < 1.25, "{count}: {farthest}");
+        assert!(farthest * (count as f64).sqrt() < 1.6, "{count}: {farthest}");
     }
 }
 
@@ -49,19 +49,29 @@ fn a_shorter_list_begins_a_longer_one() {
 }
 
 #[test]
-fn triangles_get_points_by_their_area() {
-    // A strip of quads, each twice as wide as the one before.
-    let columns: Vec<f32> = (0..8).map(|k| ((1 << k) - 1) as f32).collect();
-    let positions: Vec<[f32; 3]> = columns.iter().flat_map(|x| [[*x, 0.0, 0.0], [*x, 0.0, 40.0]]).collect();
-    let triangles: Vec<[u32; 3]> = (0..7_u32).flat_map(|k| [[0, 1, 3], [0, 3, 2]].map(|t| t.map(|c| c + 2 * k))).collect();
-    let strip = Surface::new(&positions, &triangles);
-    assert_eq!(strip.area(), 127.0 * 40.0);
-    let spots = strip.spread(5080, Key::new(9));
-    for k in 0..7 {
-        let found = spots.iter().filter(|spot| spot.triangle / 2 == k).count() as f64;
-        let expected = f64::from(1_u32 << k) * 40.0;
-        // A random spread would stray by √expected.
-        assert!((found - expected).abs() < 0.6 * expected.sqrt() + 2.0, "quad {k}: {found} of {expected}");
+fn bands_of_a_sphere_get_points_by_their_area() {
+    let sphere = crate::shapes::sphere([2.0; 3], 8);
+    let positions: Vec<[f32; 3]> = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let (mut triangles, mut first, mut ends) = (Vec::new(), 0, Vec::new());
+    for (face, count) in sphere.counts.iter().enumerate() {
+        let corners = &sphere.corners[first..first + *count as usize];
+        triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+        first += corners.len();
+        if (face + 1) % 32 == 0 {
+            ends.push(triangles.len());
+        }
+    }
+    let whole = Surface::new(&positions, &triangles);
+    let count = 20_000;
+    let spots = whole.spread(count, Key::new(9));
+    let mut start = 0;
+    for end in ends {
+        let band = Surface::new(&positions, &triangles[start..end]);
+        let expected = band.area() / whole.area() * count as f64;
+        let found = spots.iter().filter(|spot| (start..end).contains(&(spot.triangle as usize))).count() as f64;
+        // Random points would stray by √expected.
+        assert!((found - expected).abs() < 1.2 * expected.sqrt(), "{found} of {expected}");
+        start = end;
     }
 }
 
@@ -95,8 +105,9 @@ fn any_number_of_threads_gives_the_same_spots() {
 fn a_scene_scaled_by_a_power_of_two_gets_the_same_spots() {
     let spots = |scale: f32| Surface::new(&SQUARE.map(|p| p.map(|x| x * scale)), &HALVES).spread(500, Key::new(5));
     let expected = spots(1.0);
-    for scale in [2.0_f32, 1.0 / 1024.0, 1_048_576.0, 1.0e-30_f32.max(f32::from_bits(0x0d80_0000))] {
-        assert_eq!(spots(scale), expected, "{scale}");
+    for exponent in [-90, -10, 1, 20, 60] {
+        let scale = f32::from_bits(((127 + exponent) as u32) << 23);
+        assert!(spots(scale) == expected, "2^{exponent}");
     }
 }
 
@@ -120,7 +131,7 @@ fn weights_are_shares() {
     }
 }
 
-fn blade(lean: f64, around: f64) -> Blade {
+fn blade(lean: f32, around: f32) -> Blade {
     Blade { root: Spot { triangle: 0, weights: [0.25, 0.5, 0.25] }, length: 2.0, lean, around }
 }
 
@@ -144,7 +155,7 @@ fn without_lean_a_blade_stands_on_the_normal() {
 
 #[test]
 fn a_blade_leans_from_the_first_edge_round_the_normal() {
-    let right = std::f64::consts::FRAC_PI_2;
+    let right = std::f32::consts::FRAC_PI_2;
     let h = std::f32::consts::FRAC_1_SQRT_2;
     // The first edge runs along (1, 0, 1).
     assert_close(&grown(&SQUARE, blade(right, 0.0), 2)[1..], &[[0.75 + 2.0 * h, 0.0, 0.5 + 2.0 * h]]);

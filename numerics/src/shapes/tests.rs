@@ -105,8 +105,8 @@ fn no_coordinate_is_minus_zero() {
 #[test]
 fn a_block_has_its_own_volume_and_area() {
     let shape = block([2.0, 3.0, 5.0], [4, 2, 3]);
-    assert!((volume(&shape) - 30.0).abs() < 1e-13);
-    assert!((area(&shape) - 62.0).abs() < 1e-13);
+    assert!((volume(&shape) - 30.0).abs() < 1e-12);
+    assert!((area(&shape) - 62.0).abs() < 1e-12);
     // 2·(4·2 + 2·3 + 4·3) quads.
     assert_eq!((shape.counts.len(), shape.points.len()), (52, 54));
 }
@@ -118,8 +118,8 @@ fn a_cylinder_is_a_prism_of_four_n_sides() {
         let base = sides / 2.0 * 0.25 * libm::sin(2.0 * PI / sides);
         let side = sides * 2.0 * libm::sin(PI / sides) * 0.5 * 3.0;
         let shape = cylinder([1.0, 3.0, 1.0], n);
-        assert!((volume(&shape) - 3.0 * base).abs() < 1e-13, "{n}");
-        assert!((area(&shape) - (2.0 * base + side)).abs() < 1e-13, "{n}");
+        assert!((volume(&shape) - 3.0 * base).abs() < 1e-12, "{n}");
+        assert!((area(&shape) - (2.0 * base + side)).abs() < 1e-12, "{n}");
     }
 }
 
@@ -164,7 +164,8 @@ fn corners_of_a_sphere_lie_on_it() {
 fn one_quad_a_quarter_makes_an_octahedron() {
     let shape = sphere([2.0; 3], 1);
     assert_eq!(shape.counts, [3; 8]);
-    let expected = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+    let expected =
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
     assert_eq!(shape.points, expected);
 }
 
@@ -172,7 +173,7 @@ fn one_quad_a_quarter_makes_an_octahedron() {
 fn a_grid_faces_up_and_is_open_at_its_border() {
     let shape = grid([2.0, 4.0], 3);
     assert_eq!((shape.counts.len(), shape.points.len()), (9, 16));
-    assert_eq!(area(&shape), 8.0);
+    assert!((area(&shape) - 8.0).abs() < 1e-12);
     assert!(triangles(&shape).iter().all(|[a, b, c]| cross(sub(*b, *a), sub(*c, *a))[1] > 0.0));
     assert_eq!(open_edges(&shape), 12);
     assert_eq!(bounds(&shape), [[-1.0, 0.0, -2.0], [1.0, 0.0, 2.0]]);

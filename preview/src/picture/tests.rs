@@ -32,7 +32,7 @@ fn still_life(scale: f32) -> Geometry {
 }
 
 fn small() -> Settings {
-    Settings { width: 160, height: 120, ..Settings::default() }
+    Settings { width: 160, height: 120, names: false, ..Settings::default() }
 }
 
 fn picture(geometry: &Geometry, settings: &Settings) -> Image {
@@ -42,7 +42,7 @@ fn picture(geometry: &Geometry, settings: &Settings) -> Image {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let geometry = still_life(1.0);
-    let settings = Settings { color_by: Some("heat".into()), label: Some("still life".into()), ..small() };
+    let settings = Settings { color_by: Some("heat".into()), note: Some("still life".into()), ..small() };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| [picture(&geometry, &small()), picture(&geometry, &settings)])
@@ -108,6 +108,21 @@ fn hostile_geometry_is_a_picture_too() {
     ] {
         picture(&geometry, &settings);
     }
+}
+
+#[test]
+fn names_and_a_note_are_written_and_nothing_else_changes() {
+    let geometry = still_life(1.0);
+    let quiet = picture(&geometry, &small());
+    let named = picture(&geometry, &Settings { names: true, ..small() });
+    let noted = picture(&geometry, &Settings { note: Some("one".into()), ..small() });
+    let changed = |image: &Image| {
+        let differ = image.pixels().iter().zip(quiet.pixels()).enumerate().filter(|(_, (a, b))| a != b);
+        differ.map(|(k, _)| [k % 160, k / 160]).collect::<Vec<_>>()
+    };
+    let [name, note] = [changed(&named), changed(&noted)];
+    assert!(name.iter().all(|[x, y]| *x < 40 && *y < 20) && !name.is_empty());
+    assert_eq!(name.len(), note.len());
 }
 
 #[test]

@@ -93,8 +93,8 @@ impl Field<'_> {
                 let (a, b) = (values[low], values[low | 1 << axis]);
                 if (a < 0.0) != (b < 0.0) {
                     let along = a / (a - b);
-                    for k in 0..3 {
-                        sum[k] += if k == axis { along } else { (low >> k & 1) as f32 };
+                    for (k, sum) in sum.iter_mut().enumerate() {
+                        *sum += if k == axis { along } else { (low >> k & 1) as f32 };
                     }
                     count += 1.0;
                 }

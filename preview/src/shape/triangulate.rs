@@ -32,9 +32,9 @@ fn flatten(corners: &[[f32; 3]]) -> Option<Vec<[f64; 2]>> {
     let mut normal = [0.0_f64; 3];
     for (k, a) in local.iter().enumerate() {
         let b = local[(k + 1) % local.len()];
-        for axis in 0..3 {
+        for (axis, sum) in normal.iter_mut().enumerate() {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            normal[axis] += (a[u] - b[u]) * (a[v] + b[v]);
+            *sum += (a[u] - b[u]) * (a[v] + b[v]);
         }
     }
     let axis = (0..3).fold(0, |best, k| if normal[k].abs() > normal[best].abs() { k } else { best });

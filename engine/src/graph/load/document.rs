@@ -61,7 +61,7 @@ impl<'a> Document<'a> {
         const KEYS: [&str; 6] = ["convect", "scene", "controls", "nodes", "outputs", "$schema"];
         let members = root.members("an object {\"convect\": 1, \"nodes\": {…}, \"outputs\": {…}}", faults);
         let entries = keep(members, faults)?;
-        let mut required = |key, hint, faults: &mut _| required(root, &entries, &KEYS, key, hint, faults);
+        let required = |key, hint, faults: &mut _| required(root, &entries, &KEYS, key, hint, faults);
         let number = required("convect", "a graph starts with \"convect\": 1", faults)
             .and_then(|json| Some((keep(json.whole("the format number 1"), faults)?, json)));
         if let Some((number, json)) = number

@@ -20,8 +20,11 @@ mod param;
 mod scene;
 mod wires;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+
+use jsonc_parser::common::Ranged;
 
 use self::components::Components;
 use self::control::Controls;
@@ -128,8 +131,11 @@ fn load(
     let scene = scene::read(document.scene.as_ref(), faults);
     let controls = Controls::read(&document.controls, faults);
     let mut reader = Reader { scene: &scene, controls: &controls, folder, files, faults };
-    let mut drafts: Vec<Draft<'_>> =
-        std::mem::take(&mut document.nodes).into_iter().map(|node| draft(node, catalogue, &mut reader)).collect();
+    let mut specs = BTreeMap::new();
+    let mut drafts: Vec<Draft<'_>> = std::mem::take(&mut document.nodes)
+        .into_iter()
+        .map(|node| draft(node, catalogue, &mut specs, &mut reader))
+        .collect();
     wires::connect(&mut drafts, faults);
 
     let order = order(&wires::sources(&drafts));
@@ -147,8 +153,13 @@ fn load(
     Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), places })
 }
 
-/// Reads a node's type and params.
-fn draft<'a>(text: NodeText<'a>, catalogue: Catalogue, reader: &mut Reader<'a, '_>) -> Draft<'a> {
+/// Reads a node's type and params. Nodes of a type share its `specs`.
+fn draft<'a>(
+    text: NodeText<'a>,
+    catalogue: Catalogue,
+    specs: &mut BTreeMap<&'static str, Arc<[ParamSpec]>>,
+    reader: &mut Reader<'a, '_>,
+) -> Draft<'a> {
     let node = text.kind.as_ref().and_then(|kind| {
         let name = kind.string()?;
         let node = catalogue.get(name);
@@ -160,7 +171,8 @@ fn draft<'a>(text: NodeText<'a>, catalogue: Catalogue, reader: &mut Reader<'a, '
         }
         node
     });
-    let specs: Arc<[ParamSpec]> = node.map(Node::param_specs).unwrap_or_default().into();
+    let of_type = |node: &'static Node| specs.entry(node.name).or_insert_with(|| node.param_specs().into()).clone();
+    let specs = node.map_or_else(|| Arc::from([]), of_type);
     let inputs = node.map(Node::input_specs).unwrap_or_default();
     let params = match node {
         Some(node) => reader.params(node, &specs, &text.params),
@@ -173,13 +185,16 @@ fn draft<'a>(text: NodeText<'a>, catalogue: Catalogue, reader: &mut Reader<'a, '
 fn places(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Places {
     let mut places = Places::default();
     for draft in drafts {
-        places.note(draft.text.entry.fault("", ""));
+        let id = &draft.text.entry;
+        places.note(id.json.path(), id.json.text, id.key.start);
         for entry in draft.text.params.iter().chain(&draft.text.inputs) {
-            places.note(entry.json.fault("", ""));
+            places.note(entry.json.path(), entry.json.text, entry.json.value.start());
         }
     }
     let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok());
-    members.into_iter().flatten().for_each(|output| places.note(output.fault("", "")));
+    for output in members.into_iter().flatten() {
+        places.note(output.json.path(), output.json.text, output.key.start);
+    }
     places
 }
 

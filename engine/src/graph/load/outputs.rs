@@ -3,7 +3,7 @@
 use super::Draft as NodeDraft;
 use super::document::{check_name, missing};
 use super::order::Order;
-use super::wires::{Wire, follow};
+use super::wires::{Nodes, Wire};
 use crate::geometry::{Name, V};
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Entry, Json, find, keep, refuse_unknown, shown};
@@ -33,15 +33,15 @@ pub(super) fn read<'a>(
         let fault = json.fault(code::NO_OUTPUTS, "there are no outputs, so nothing would be cooked");
         faults.push(fault.hint("name what is to come out: {\"name\": \"node\"}"));
     }
-    let motion = Motion::along(drafts, order);
-    Some(entries.iter().filter_map(|entry| output(entry, drafts, &motion, faults)).collect())
+    let (nodes, motion) = (Nodes::of(drafts), Motion::along(drafts, order));
+    Some(entries.iter().filter_map(|entry| output(entry, &nodes, &motion, faults)).collect())
 }
 
-fn output<'a>(entry: &Entry<'a>, drafts: &[NodeDraft<'a>], motion: &Motion, faults: &mut Vec<Fault>) -> Option<Draft> {
+fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, motion: &Motion, faults: &mut Vec<Fault>) -> Option<Draft> {
     check_name(entry, "an output", faults);
     let name: Name = entry.name.into();
     if entry.json.string().is_some() {
-        let Wire { node, port, .. } = follow(&entry.json, drafts, faults)?;
+        let Wire { node, port, .. } = nodes.follow(&entry.json, faults)?;
         return Some(Draft { name, node, port, attributes: None, v: false });
     }
     let members = entry.json.members("a node \"id\", or {\"from\": \"id\", \"attributes\": […], \"v\": true}", faults);
@@ -53,11 +53,11 @@ fn output<'a>(entry: &Entry<'a>, drafts: &[NodeDraft<'a>], motion: &Motion, faul
         faults.push(missing(&entry.json, "from", "it names the node: {\"from\": \"id\"}"));
         return None;
     };
-    let Wire { node, port, .. } = follow(&from.json, drafts, faults)?;
+    let Wire { node, port, .. } = nodes.follow(&from.json, faults)?;
     if let Some((true, json)) = v
-        && let Some(culprit) = motion.without_velocity(node, drafts)
+        && let Some(culprit) = motion.without_velocity(node, nodes.drafts)
     {
-        let id = shown(drafts[culprit].text.entry.name);
+        let id = shown(nodes.drafts[culprit].text.entry.name);
         let fact = format!("there are no velocities where points come and go, as they may at `{id}`");
         faults.push(json.fault(code::NO_VELOCITY, fact).hint("leave `v` out, or take the output before that node"));
     }

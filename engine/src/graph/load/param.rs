@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::param::mixed_seed;
 use jsonc_parser::ast::Value as Ast;
 use jsonc_parser::common::Ranged;
-use numerics::random::Key;
 
 use super::FileProbe;
 use super::control::{Controls, Found};
@@ -135,7 +135,7 @@ impl<'a> Reader<'a, '_> {
     fn finished(&self, shape: Shape, value: Value) -> Value {
         match (shape, value) {
             (Shape::Turn, Value::Vec3(degrees)) => euler_to_turn(degrees),
-            (Shape::Seed, Value::Int(seed)) => Value::Int(mixed(self.scene.seed, seed)),
+            (Shape::Seed, Value::Int(seed)) => Value::Int(mixed_seed(self.scene.seed, seed)),
             (_, value) => value,
         }
     }
@@ -144,6 +144,34 @@ impl<'a> Reader<'a, '_> {
     fn form(&mut self, spec: &ParamSpec, json: &Json<'a>, within: Within) -> Option<Source> {
         let members = json.members("", self.faults);
         let entries = keep(members, self.faults)?;
+        let form = self.form_among(spec, json, &entries, within)?;
+        match form.name {
+            "keyframes" => self.keyed(spec, &form.json, find(&entries, "interpolation")),
+            "ramp" => {
+                let between = interpolation(find(&entries, "interpolation"), self.faults);
+                let ramp = ramp(&form.json, between.unwrap_or_default(), self.faults)?;
+                let value = self.legal(spec, &form.json, Value::Ramp(Arc::new(ramp)))?;
+                between.map(|_| Source::Constant(value))
+            }
+            "value" => self.mask(spec, json, &form.json, find(&entries, "attribute")),
+            "control" => self.controlled(spec, &form.json, json),
+            _ => {
+                let source = expression::read(spec, &form.json, self.controls, self.scene, self.faults)?;
+                let Source::Constant(value) = source else { return Some(source) };
+                let value = self.legal(spec, &form.json, value)?;
+                Some(Source::Constant(self.finished(spec.shape, value)))
+            }
+        }
+    }
+
+    /// The one member that says the value, and nothing that does not belong beside it.
+    fn form_among<'e>(
+        &mut self,
+        spec: &ParamSpec,
+        json: &Json<'a>,
+        entries: &'e [Entry<'a>],
+        within: Within,
+    ) -> Option<&'e Entry<'a>> {
         let forms: Vec<&Entry<'a>> = entries.iter().filter(|entry| FORMS.contains(&entry.name)).collect();
         let form = match forms[..] {
             [form] => form,
@@ -176,7 +204,7 @@ impl<'a> Reader<'a, '_> {
         }
         if may_be(spec.shape, "value", within)
             && form.name != "value"
-            && let Some(attribute) = find(&entries, "attribute")
+            && let Some(attribute) = find(entries, "attribute")
         {
             let fact = format!("`attribute` stands beside `{}`", form.name);
             let hint = format!("a mask is written {{\"value\": {{\"{}\": …}}, \"attribute\": \"…\"}}", form.name);
@@ -189,25 +217,8 @@ impl<'a> Reader<'a, '_> {
             _ => None,
         };
         let known: Vec<&str> = std::iter::once(form.name).chain(partner).collect();
-        refuse_unknown(&entries, &known, "keys here", self.faults);
-
-        match form.name {
-            "keyframes" => self.keyed(spec, &form.json, find(&entries, "interpolation")),
-            "ramp" => {
-                let between = interpolation(find(&entries, "interpolation"), self.faults);
-                let ramp = ramp(&form.json, between.unwrap_or_default(), self.faults)?;
-                let value = self.legal(spec, &form.json, Value::Ramp(Arc::new(ramp)))?;
-                between.map(|_| Source::Constant(value))
-            }
-            "value" => self.mask(spec, json, &form.json, find(&entries, "attribute")),
-            "control" => self.controlled(spec, &form.json, json),
-            _ => {
-                let source = expression::read(spec, &form.json, self.controls, self.scene, self.faults)?;
-                let Source::Constant(value) = source else { return Some(source) };
-                let value = self.legal(spec, &form.json, value)?;
-                Some(Source::Constant(self.finished(spec.shape, value)))
-            }
-        }
+        refuse_unknown(entries, &known, "keys here", self.faults);
+        Some(form)
     }
 
     /// Keyframes. Where all have one value it is a constant.
@@ -269,7 +280,7 @@ impl<'a> Reader<'a, '_> {
         };
         match self.controls.get(text) {
             Found::Value(value) => {
-                let value = value.at_path(&reader.path);
+                let value = value.at_path(&reader.path());
                 let before = self.faults.len();
                 let source = self.written(spec, &value, Within::Control);
                 self.faults[before..].iter_mut().for_each(|fault| fault.fact += &format!(", in the control `{text}`"));
@@ -331,9 +342,4 @@ fn bare_ramp(json: &Json<'_>) -> Fault {
         text if text.len() <= 60 && !text.contains(['\n', '\r']) => fault.hint(format!("write {{\"ramp\": {text}}}")),
         _ => fault.hint("write {\"ramp\": …} around it"),
     }
-}
-
-/// The seed that a node gets: a param's own and the scene's, mixed. Always within u32.
-fn mixed(scene: i64, own: i64) -> i64 {
-    i64::from(Key::new(scene as u64).of(own as u64).u32())
 }

@@ -1,5 +1,7 @@
 //! Wires: which output each input is wired to.
 
+use std::collections::BTreeMap;
+
 use jsonc_parser::ast::Value as Ast;
 
 use super::Draft;
@@ -17,9 +19,16 @@ pub(super) struct Wire<'a> {
     pub(super) port: Option<usize>,
 }
 
+/// The nodes that wires can come from.
+pub(super) struct Nodes<'d, 'a> {
+    pub(super) drafts: &'d [Draft<'a>],
+    by_id: BTreeMap<&'a str, usize>,
+}
+
 /// Follows the wires of all nodes.
 pub(super) fn connect<'a>(drafts: &mut [Draft<'a>], faults: &mut Vec<Fault>) {
-    let wires: Vec<Vec<Vec<Wire<'a>>>> = drafts.iter().map(|draft| wires_of(draft, drafts, faults)).collect();
+    let nodes = Nodes::of(drafts);
+    let wires: Vec<Vec<Vec<Wire<'a>>>> = drafts.iter().map(|draft| wires_of(draft, &nodes, faults)).collect();
     drafts.iter_mut().zip(wires).for_each(|(draft, wires)| draft.wires = wires);
 }
 
@@ -47,7 +56,7 @@ pub(super) fn refuse_cycles(drafts: &[Draft<'_>], order: &Order, faults: &mut Ve
 }
 
 /// The wires of each input of a node. Wires of inputs that are not known are followed too, for their faults.
-fn wires_of<'a>(draft: &Draft<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>) -> Vec<Vec<Wire<'a>>> {
+fn wires_of<'a>(draft: &Draft<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -> Vec<Vec<Wire<'a>>> {
     let entries = &draft.text.inputs;
     for entry in entries.iter().filter(|entry| !draft.inputs.iter().any(|input| input.name == entry.name)) {
         if let Some(node) = draft.node {
@@ -63,10 +72,10 @@ fn wires_of<'a>(draft: &Draft<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>
             |items| items.iter().enumerate().map(|(place, item)| entry.json.item(item, place)).collect(),
         );
         // An input of no known kind may be anything; only a name can be looked up.
-        links.iter().filter(|link| link.string().is_some()).for_each(|json| drop(follow(json, drafts, faults)));
+        links.iter().filter(|link| link.string().is_some()).for_each(|json| drop(nodes.follow(json, faults)));
     }
     let wired = |input: &InputSpec| match find(entries, input.name) {
-        Some(entry) => wires_of_input(input, &entry.json, drafts, faults),
+        Some(entry) => wires_of_input(input, &entry.json, nodes, faults),
         None => {
             let link = match input.arity {
                 Arity::One => "\"id\"",
@@ -87,10 +96,10 @@ fn wires_of<'a>(draft: &Draft<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>
 fn wires_of_input<'a>(
     input: &InputSpec,
     json: &Json<'a>,
-    drafts: &[Draft<'a>],
+    nodes: &Nodes<'_, 'a>,
     faults: &mut Vec<Fault>,
 ) -> Vec<Wire<'a>> {
-    let follow_one = |json: &Json<'a>, faults: &mut Vec<Fault>| follow(json, drafts, faults).into_iter().collect();
+    let follow_one = |json: &Json<'a>, faults: &mut Vec<Fault>| nodes.follow(json, faults).into_iter().collect();
     let Arity::Many { least } = input.arity else {
         let fault = match json.value {
             Ast::Array(list) if list.elements.len() > 1 => {
@@ -108,29 +117,37 @@ fn wires_of_input<'a>(
         let fact = format!("the input `{}` has {}", input.name, counted(items.len(), "wire"));
         faults.push(json.fault(code::MISSING_INPUT, fact).hint(format!("expected at least {least}")));
     }
-    items.iter().enumerate().filter_map(|(place, item)| follow(&json.item(item, place), drafts, faults)).collect()
+    items.iter().enumerate().filter_map(|(place, item)| nodes.follow(&json.item(item, place), faults)).collect()
 }
 
-/// Follows `"id"` or `"id.output"`.
-pub(super) fn follow<'a>(json: &Json<'a>, drafts: &[Draft<'a>], faults: &mut Vec<Fault>) -> Option<Wire<'a>> {
-    let Some(text) = json.string() else {
-        faults.push(json.unexpected("a node \"id\" or \"id.output\""));
-        return None;
-    };
-    let (id, port) = text.split_once('.').map_or((text, None), |(id, port)| (id, Some(port)));
-    let Some(node) = drafts.iter().position(|draft| draft.text.entry.name == id) else {
-        let fault = json.fault(code::UNKNOWN_NODE, format!("there is no node `{}`", shown(id)));
-        let hint = did_you_mean(id, drafts.iter().map(|draft| draft.text.entry.name), "nodes");
-        faults.push(Fault { hint, ..fault });
-        return None;
-    };
-    let Some(declared) = drafts[node].node else { return Some(Wire { json: json.clone(), node, port: None }) };
-    let Some(port) = port else { return Some(Wire { json: json.clone(), node, port: Some(0) }) };
-    let found = declared.outputs.iter().position(|output| output.name == port);
-    if found.is_none() {
-        let fact = format!("`{}` is a `{}`, which has no output `{}`", shown(id), declared.name, shown(port));
-        let hint = did_you_mean(port, declared.outputs.iter().map(|output| output.name), "its outputs");
-        faults.push(Fault { hint, ..json.fault(code::UNKNOWN_PORT, fact) });
+impl<'d, 'a> Nodes<'d, 'a> {
+    pub(super) fn of(drafts: &'d [Draft<'a>]) -> Self {
+        let by_id = drafts.iter().enumerate().map(|(place, draft)| (draft.text.entry.name, place)).collect();
+        Self { drafts, by_id }
     }
-    Some(Wire { json: json.clone(), node, port: found })
+
+    /// Follows `"id"` or `"id.output"`.
+    pub(super) fn follow(&self, json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<Wire<'a>> {
+        let Some(text) = json.string() else {
+            faults.push(json.unexpected("a node \"id\" or \"id.output\""));
+            return None;
+        };
+        let (id, port) = text.split_once('.').map_or((text, None), |(id, port)| (id, Some(port)));
+        let Some(&node) = self.by_id.get(id) else {
+            let fault = json.fault(code::UNKNOWN_NODE, format!("there is no node `{}`", shown(id)));
+            let hint = did_you_mean(id, self.drafts.iter().map(|draft| draft.text.entry.name), "nodes");
+            faults.push(Fault { hint, ..fault });
+            return None;
+        };
+        let json = json.clone();
+        let Some(declared) = self.drafts[node].node else { return Some(Wire { json, node, port: None }) };
+        let Some(port) = port else { return Some(Wire { json, node, port: Some(0) }) };
+        let found = declared.outputs.iter().position(|output| output.name == port);
+        if found.is_none() {
+            let fact = format!("`{}` is a `{}`, which has no output `{}`", shown(id), declared.name, shown(port));
+            let hint = did_you_mean(port, declared.outputs.iter().map(|output| output.name), "its outputs");
+            faults.push(Fault { hint, ..json.fault(code::UNKNOWN_PORT, fact) });
+        }
+        Some(Wire { json, node, port: found })
+    }
 }

@@ -1,6 +1,8 @@
 //! What becomes of graphs without a fault: order, wires, and the sources of params.
 
-use super::super::{Body, Graph, Link, Scene};
+use std::io::ErrorKind;
+
+use super::super::{Body, Graph, Link, Scene, probe};
 use super::{good, load_with};
 use crate::geometry::Column;
 use crate::param::{Source, Value, euler_to_turn};
@@ -214,4 +216,15 @@ fn velocities_are_refused_only_where_points_come_and_go() {
     assert!(!v(&scatter(numbered, "10")));
     assert!(v(&format!(r#""o": {numbered}"#)), "a sequence may have one topology");
     assert!(v(&format!(r#""m": {still}, "o": {{"type": "Softbody", "inputs": {{"bodies": "m"}}}}"#)), "it writes `v`");
+}
+
+#[test]
+fn the_probe_tells_files_from_folders_and_from_nothing() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let file = folder.path().join("a.obj");
+    let kind = |path| probe(path).map_err(|error| error.kind());
+    assert_eq!(kind(&file), Err(ErrorKind::NotFound));
+    std::fs::write(&file, "v 0 0 0").expect("the file can be written");
+    assert_eq!(kind(&file), Ok(()));
+    assert_eq!(kind(folder.path()), Err(ErrorKind::IsADirectory));
 }

@@ -1,0 +1,203 @@
+//! Mesh_Primitive: a simple shape to press, pour and grow on.
+//!
+//! Solids are closed, faces outward counter-clockwise; the grid is open and faces up. Every shape is centred on the
+//! origin and fills `size` to the last bit; its making is in [`numerics::shapes`].
+
+use engine::prelude::*;
+use numerics::shapes::{self, Polygons};
+
+choice! {
+    /// Which shape.
+    pub enum Solid {
+        Box = "box": "six sides of quads",
+        Sphere = "sphere": "an ellipsoid, its poles on y",
+        Cylinder = "cylinder": "upright, with flat lids",
+        Capsule = "capsule": "an upright cylinder with domes, as long as it is higher than wide",
+        Grid = "grid": "a flat sheet in x and z, open, facing up; the height of `size` does not matter",
+        Torus = "torus": "a ring lying flat, its tube round while the height is at most a third of the width",
+        Bowl = "bowl": "half a hollow ellipsoid, open at the top",
+        Plate = "plate": "a box as high as `thickness`; the height of `size` does not matter",
+    }
+}
+
+/// At this many the largest shapes have 8 million vertices and take about half a gigabyte.
+const MOST_DIVISIONS: f64 = 1000.0;
+
+params! { PARAMS:
+    SHAPE: Param<Solid> = Param::choice("shape", Solid::Box, "What it is.");
+    SIZE: Param<[f32; 3]> = Param::vec3("size", [1.0; 3],
+        "Width, height and depth of the whole shape. 0 flattens it.").unit(Unit::Metres).at_least(0.0);
+    DIVISIONS: Param<i64> = Param::int("divisions", 16,
+        "Quads along an edge of what is straight, and along a quarter turn of what is round.")
+        .within(1.0, MOST_DIVISIONS).soft(1.0, 64.0);
+    THICK: Param<f32> = Param::float("thickness", 0.01,
+        "How thick the wall of a bowl is, at its rim and at its bottom, or how thick a plate.")
+        .unit(Unit::Metres).above(0.0).soft(0.001, 0.1)
+        .when(|params| matches!(params.get(SHAPE), Solid::Bowl | Solid::Plate));
+}
+
+const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The shape, with `uvw`.");
+
+/// See the module.
+pub static NODE: Node = Node::new(
+    "Mesh_Primitive",
+    1,
+    "A box, sphere, cylinder, capsule, grid, torus, bowl or plate, centred on the origin. Solids are closed and face \
+     outwards, so they can collide, be filled and be cut into tets. `uvw` is the place in the shape's bounds, 0 to 1 \
+     along x, y and z.",
+    Cook::Pure(cook),
+)
+.params(PARAMS)
+.outputs(&[&MESH])
+.writes(&[&P, &UVW])
+.changes_topology();
+
+fn cook(cx: &Cx) -> Result<Outputs> {
+    let (size, thickness) = (cx.get(SIZE).map(f64::from), f64::from(cx.get(THICK)));
+    let n = cx.get(DIVISIONS) as usize;
+    let [width, _, depth] = size;
+    let (size, shape) = match cx.get(SHAPE) {
+        Solid::Box => (size, shapes::block(size, [n; 3])),
+        Solid::Sphere => (size, shapes::sphere(size, n)),
+        Solid::Cylinder => (size, shapes::cylinder(size, n)),
+        Solid::Capsule => (size, shapes::capsule(size, n)),
+        Solid::Grid => ([width, 0.0, depth], shapes::grid([width, depth], n)),
+        Solid::Torus => (size, shapes::torus(size, n)),
+        Solid::Bowl => (size, shapes::bowl(size, thickness, n).ok_or_else(|| solid_bowl(cx.get(SIZE), cx.get(THICK)))?),
+        Solid::Plate => {
+            let size = [width, thickness, depth];
+            (size, shapes::block(size, [n, 1, n]))
+        }
+    };
+    mesh(cx, size, shape)
+}
+
+/// The shape as a mesh.
+fn mesh(cx: &Cx, size: [f64; 3], Polygons { counts, corners, points }: Polygons) -> Result<Outputs> {
+    let positions = points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let mut mesh = Component::mesh(counts, corners, positions)?;
+    if cx.wants(UVW) {
+        // A direction without extent has no place in it: its middle stands for all.
+        let place = |k: usize, x: f64| if size[k] > 0.0 { (x / size[k] + 0.5) as f32 } else { 0.5 };
+        mesh.set(UVW, points.iter().map(|p| [0, 1, 2].map(|k| place(k, p[k]))).collect())?;
+    }
+    Ok(MESH.with(Geometry::from(mesh)))
+}
+
+fn solid_bowl(size: [f32; 3], thickness: f32) -> Error {
+    let [x, y, z] = size;
+    let hollow = (0.5 * x).min(y).min(0.5 * z);
+    Error::refused(format!("`thickness` is {thickness}, which leaves no hollow in a bowl of [{x}, {y}, {z}]"))
+        .hint(format!("expected less than {hollow} m, the least of half the width, half the depth and the height"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::param::Choice;
+    use engine::testing::bench;
+
+    const SOLIDS: [Solid; 7] =
+        [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Bowl, Solid::Plate];
+
+    fn extent(mesh: &Component) -> [f32; 3] {
+        let [low, high] = mesh.bounds().unwrap();
+        [0, 1, 2].map(|k| high[k] - low[k])
+    }
+
+    /// Volume inside the faces, positive where they look outwards.
+    fn volume(mesh: &Component) -> f64 {
+        let at = |corner: u32| mesh.positions()[corner as usize].map(f64::from);
+        let wedge = |[a, b, c]: [[f64; 3]; 3]| {
+            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+        };
+        let fan = |face: &[u32]| (2..face.len()).map(|k| wedge([face[0], face[k - 1], face[k]].map(at))).sum::<f64>();
+        mesh.faces().unwrap().iter().map(fan).sum::<f64>() / 6.0
+    }
+
+    #[test]
+    fn a_box_of_one_division_is_a_cube_of_eight_corners() {
+        let out = bench(&NODE).set(DIVISIONS, 1).set(SIZE, [2.0, 4.0, 6.0]).cook();
+        assert_eq!((out.mesh().point_count(), out.mesh().element_count()), (8, 6));
+        assert_eq!(out.mesh().bounds(), Some([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]));
+        assert_eq!(volume(out.mesh()), 48.0);
+    }
+
+    #[test]
+    fn every_shape_fills_its_size_exactly_at_any_scale() {
+        for scale in [1e-6, 1.0, 1e6] {
+            let size = [0.7 * scale, 0.3 * scale, 0.9 * scale];
+            for shape in SOLIDS {
+                let out = bench(&NODE).set(SHAPE, shape).set(SIZE, size).set(DIVISIONS, 3).set(THICK, 0.1 * scale).cook();
+                let expected = if shape == Solid::Plate { [size[0], 0.1 * scale, size[2]] } else { size };
+                assert_eq!(extent(out.mesh()), expected, "{shape:?}");
+                assert!(volume(out.mesh()) > 0.0, "{shape:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_grid_is_flat_and_faces_up() {
+        let out = bench(&NODE).set(SHAPE, Solid::Grid).set(DIVISIONS, 1).set(SIZE, [2.0, 9.0, 2.0]).cook();
+        assert_eq!(out.mesh().positions(), [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0]]);
+        assert_eq!(out.mesh().faces().unwrap().face(0), [0, 2, 3, 1]);
+    }
+
+    #[test]
+    fn a_bowl_holds_what_its_closed_form_says() {
+        // Half a ball of radius 1 less half a ball of radius 0.9, to the order of 1/n².
+        let out = bench(&NODE).set(SHAPE, Solid::Bowl).set(SIZE, [2.0, 1.0, 2.0]).set(THICK, 0.1).set(DIVISIONS, 64).cook();
+        let exact = 2.0 / 3.0 * std::f64::consts::PI * (1.0 - 0.729);
+        assert!((volume(out.mesh()) / exact - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_bowl_thicker_than_its_hollow_is_refused() {
+        let bowl = bench(&NODE).set(SHAPE, Solid::Bowl).set(SIZE, [1.0, 0.4, 1.0]);
+        let error = bowl.set(THICK, 0.4).try_cook().unwrap_err();
+        assert_eq!(error.fact, "`thickness` is 0.4, which leaves no hollow in a bowl of [1, 0.4, 1]");
+        assert!(error.hint.unwrap().starts_with("expected less than 0.4 m"));
+    }
+
+    #[test]
+    fn thickness_matters_to_bowls_and_plates_alone() {
+        for place in 0..Solid::OPTIONS.len() {
+            let shape = Solid::at(place).unwrap();
+            let cook = |thickness| bench(&NODE).set(SHAPE, shape).set(DIVISIONS, 2).set(THICK, thickness).cook();
+            let differs = cook(0.1).mesh().positions() != cook(0.2).mesh().positions();
+            assert_eq!(differs, matches!(shape, Solid::Bowl | Solid::Plate), "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn uvw_is_the_place_in_the_bounds() {
+        for shape in SOLIDS {
+            let out = bench(&NODE).set(SHAPE, shape).set(SIZE, [0.3, 0.7, 1.1]).set(DIVISIONS, 3).cook();
+            let uvw = out.mesh().get(UVW).unwrap();
+            assert!(uvw.as_flattened().iter().all(|x| (0.0..=1.0).contains(x)), "{shape:?}");
+            for k in 0..3 {
+                assert!(uvw.iter().any(|at| at[k] == 0.0) && uvw.iter().any(|at| at[k] == 1.0), "{shape:?}");
+            }
+        }
+        let grid = bench(&NODE).set(SHAPE, Solid::Grid).set(DIVISIONS, 1).cook();
+        assert_eq!(grid.mesh().get(UVW).unwrap()[1], [1.0, 0.5, 0.0]);
+    }
+
+    #[test]
+    fn a_shape_without_size_is_finite() {
+        for shape in [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Grid] {
+            let out = bench(&NODE).set(SHAPE, shape).set(SIZE, [0.0; 3]).set(DIVISIONS, 2).cook();
+            assert!(out.mesh().positions().as_flattened().iter().all(|x| *x == 0.0), "{shape:?}");
+        }
+        let huge = bench(&NODE).set(SIZE, [f32::MAX; 3]).set(DIVISIONS, 2).cook();
+        assert_eq!(huge.mesh().bounds(), Some([[-0.5 * f32::MAX; 3], [0.5 * f32::MAX; 3]]));
+    }
+
+    #[test]
+    fn sizes_and_divisions_out_of_range_are_refused() {
+        let error = |bench: engine::testing::Bench| bench.try_cook().unwrap_err().fact;
+        assert_eq!(error(bench(&NODE).set(SIZE, [1.0, -1.0, 1.0])), "`size` is [1, -1, 1]");
+        assert_eq!(error(bench(&NODE).set(DIVISIONS, 0)), "`divisions` is 0");
+        assert_eq!(error(bench(&NODE).set(DIVISIONS, 1001)), "`divisions` is 1001");
+    }
+}

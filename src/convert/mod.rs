@@ -1,0 +1,179 @@
+//! `convect convert`: geometry files from one format to another, one or a numbered sequence.
+
+mod scale;
+
+use std::path::{Path, PathBuf};
+
+use engine::geometry::Geometry;
+use engine::time::Frame;
+use formats::atomic::sweep;
+use formats::usd::{Flavour, UsdError, UsdWriter};
+use formats::{Format, FormatError, FrameStamp};
+use rayon::prelude::*;
+
+use crate::failure::{Exit, Failure};
+use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
+use crate::output::{failed, write_whole};
+use scale::scaled;
+
+/// What `convert` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// An obj, ply or json file, or a numbered sequence: fur.####.json
+    from: PathBuf,
+    /// The file to write; its ending says the format. A sequence becomes one usdc or usda file, or a file a frame:
+    /// fur.####.ply
+    to: PathBuf,
+    /// Multiply lengths and velocities: 0.01 for a file in centimetres
+    #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
+    scale: f64,
+    /// Frames a second, for the time in usdc, usda and json files
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = positive)]
+    fps: f64,
+    /// Say only what went wrong
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| format!("`{text}` is not a number above 0"))
+}
+
+/// Converts.
+///
+/// # Errors
+/// Where a file cannot be read or written, or the format cannot hold what is in it.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let command_line = |line: String| Failure::new(Exit::CommandLine, line);
+    let format =
+        Format::of_path(&args.to).map_err(|error| command_line(format!("`{}`: {error}", args.to.display())))?;
+    let files = match Numbered::of(&args.from)? {
+        Some(numbered) => numbered.find()?,
+        None => vec![(stem_and_frame(&args.from).1.unwrap_or(Frame::whole(1)), args.from.clone())],
+    };
+    let to = Numbered::of(&args.to)?;
+    if to.is_none() && !format.is_sequence() && files.len() > 1 {
+        let (stem, ending) = (stem_and_frame(&args.to).0, format.name());
+        let line = format!("{} files cannot become one {format} file; write {stem}.####.{ending}", files.len());
+        return Err(command_line(line));
+    }
+    sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
+    let conversion = Conversion { format, scale: args.scale, fps: args.fps };
+    let written = match &to {
+        Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,
+        None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
+        None => conversion.file_a_frame(&files, |_| args.to.clone(), "")?,
+    };
+    if !args.quiet {
+        tell(&written);
+    }
+    Ok(())
+}
+
+/// What was written, on stderr.
+fn tell(written: &Written) {
+    let files = match written.files.as_slice() {
+        [] => return,
+        [one] => one.display().to_string(),
+        [first, .., last] => format!("{} … {} ({} files)", first.display(), last.display(), written.files.len()),
+    };
+    let s = if written.frames == 1 { "" } else { "s" };
+    eprintln!("wrote {files}: {} frame{s}, {}", written.frames, indicatif::HumanBytes(written.bytes));
+    if !written.lost.is_empty() {
+        eprintln!("note: left out {}, which the format cannot hold", written.lost.join(", "));
+    }
+}
+
+/// What a conversion wrote.
+#[derive(Default)]
+struct Written {
+    files: Vec<PathBuf>,
+    frames: usize,
+    bytes: u64,
+    /// What the format dropped of the first file.
+    lost: Vec<String>,
+}
+
+struct Conversion {
+    format: Format,
+    scale: f64,
+    fps: f64,
+}
+
+impl Conversion {
+    /// All frames in one file. Several are read at once and written in order.
+    fn one_file(&self, files: &[(Frame, PathBuf)], to: &Path, name: &str) -> Result<Written, Failure> {
+        let failed = |error: UsdError| Failure::file(error.to_string());
+        let flavour = if self.format == Format::Usda { Flavour::Usda } else { Flavour::Usdc };
+        let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(failed)?;
+        for some in files.chunks(rayon::current_num_threads()) {
+            let read: Vec<_> = some.par_iter().map(|(_, path)| self.read(path)).collect();
+            for (geometry, (frame, _)) in read.into_iter().zip(some) {
+                writer.frame(frame.number(), &geometry?).map_err(failed)?;
+            }
+        }
+        let bytes = writer.finish().map_err(failed)?.bytes;
+        Ok(Written { files: vec![to.to_owned()], frames: files.len(), bytes, lost: Vec::new() })
+    }
+
+    /// A file a frame, at the path that `to` gives for it.
+    fn file_a_frame(
+        &self,
+        files: &[(Frame, PathBuf)],
+        to: impl Fn(Frame) -> PathBuf + Sync,
+        name: &str,
+    ) -> Result<Written, Failure> {
+        let convert = |(place, from): (usize, &(Frame, PathBuf))| {
+            let to = to(from.0);
+            match self.format.is_sequence() {
+                true => self.one_file(std::slice::from_ref(from), &to, name),
+                false => self.one_frame(from, to, place == 0),
+            }
+        };
+        let converted: Vec<_> = files.par_iter().enumerate().map(convert).collect();
+        converted.into_iter().try_fold(Written::default(), |mut all, one| {
+            let one = one?;
+            all.files.extend(one.files);
+            all.frames += one.frames;
+            all.bytes += one.bytes;
+            all.lost.extend(one.lost);
+            Ok(all)
+        })
+    }
+
+    fn one_frame(&self, (frame, from): &(Frame, PathBuf), to: PathBuf, look_back: bool) -> Result<Written, Failure> {
+        let geometry = self.read(from)?;
+        let stamp = FrameStamp { frame: frame.number(), seconds: frame.seconds(self.fps) };
+        let mut bytes = Vec::new();
+        formats::write(self.format, &geometry, &stamp, &mut bytes).map_err(|error| refused(&to, &error))?;
+        let lost = if look_back { self.lost(&geometry, &bytes) } else { Vec::new() };
+        write_whole(&to, &bytes)?;
+        Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost })
+    }
+
+    /// Reads a file as it will be written.
+    fn read(&self, path: &Path) -> Result<Geometry, Failure> {
+        let geometry = read(path)?.geometry;
+        if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {
+            return Err(refused(path, &FormatError::CannotHold { format: self.format, kind }));
+        }
+        scaled(geometry, self.scale).map_err(|fact| Failure::file(format!("`{}`: {fact}", path.display())))
+    }
+
+    /// Names of what is in `geometry` and not in the file that was made of it.
+    fn lost(&self, geometry: &Geometry, bytes: &[u8]) -> Vec<String> {
+        // A file that cannot be read back loses nothing that could be named.
+        let Ok(back) = formats::read(self.format, bytes) else { return Vec::new() };
+        let mut lost = Vec::new();
+        for part in geometry.parts() {
+            let Some(back) = back.part(part.kind()) else {
+                lost.push(format!("the {}", part.kind()));
+                continue;
+            };
+            let gone = part.columns().filter(|(owner, name, _)| back.table(*owner).column(name).is_none());
+            lost.extend(gone.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
+        }
+        lost
+    }
+}

@@ -1,0 +1,394 @@
+//! Two geometries, side by side: what one of them lacks, and how far apart the rest is.
+//!
+//! Without a tolerance numbers are the same where their bits are. With one, floats are the same where they are no
+//! farther apart (and NaN where both are), and whole numbers where they are equal: an id is not nearly another one.
+//! Rows are compared in their order; where the numbers of rows differ, the counts are what is said. Differences are f64,
+//! summed in the order of the rows.
+
+use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
+
+use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, Table, Topology, Volume};
+
+/// One of the two geometries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    A,
+    B,
+}
+
+/// Something that is not the same bit for bit.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Finding {
+    pub(super) kind: Kind,
+    pub(super) what: What,
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum What {
+    /// Only this side has the component.
+    Component(Side),
+    /// Numbers of points or elements.
+    Count { of: &'static str, counts: [usize; 2] },
+    /// As many elements, but `differing` of them join other points.
+    Topology { of: &'static str, differing: usize, elements: usize, first: usize },
+    /// The grids of two volumes.
+    Grid([Grid; 2]),
+    /// Only this side has the attribute.
+    Attribute(Place, Side),
+    /// An attribute of two types.
+    Type(Place, [ColumnType; 2]),
+    /// The numbers of an attribute.
+    Values(Place, Values),
+}
+
+/// Which attribute. One without an owner is a field of a volume.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) owner: Option<Owner>,
+    pub(super) name: Name,
+}
+
+/// How two columns of as many rows differ.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Values {
+    pub(super) kind: ColumnType,
+    /// Numbers in each of the two.
+    pub(super) numbers: usize,
+    /// Numbers that are not the same.
+    pub(super) differing: usize,
+    /// Pairs without a finite difference.
+    pub(super) not_finite: usize,
+    /// Greatest absolute difference, and its row; of the finite ones.
+    pub(super) largest: f64,
+    pub(super) largest_row: usize,
+    /// Mean absolute difference of all finite ones, zeros included.
+    pub(super) mean: f64,
+    /// The first number that is not the same.
+    pub(super) first: Option<First>,
+}
+
+/// A number that is not the same: its row, its place there, and both its values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct First {
+    pub(super) row: usize,
+    pub(super) lane: usize,
+    pub(super) values: [f64; 2],
+}
+
+impl Finding {
+    /// Whether this makes the two geometries differ; else it is a difference within the tolerance.
+    pub(super) fn differs(&self) -> bool {
+        !matches!(&self.what, What::Values(_, values) if values.differing == 0)
+    }
+}
+
+/// All that is not the same bit for bit, component by component. `tolerance` is a length or another attribute's unit.
+pub(super) fn compare(a: &Geometry, b: &Geometry, tolerance: Option<f64>) -> Vec<Finding> {
+    let mut findings = Findings { tolerance, kind: Kind::Curves, found: Vec::new() };
+    for kind in Kind::ALL {
+        findings.kind = kind;
+        let has = |geometry: &Geometry| geometry.kinds().any(|there| there == kind);
+        match (has(a), has(b)) {
+            (true, false) => findings.add(What::Component(Side::A)),
+            (false, true) => findings.add(What::Component(Side::B)),
+            _ => {}
+        }
+        if let (Some(a), Some(b)) = (a.part(kind), b.part(kind)) {
+            findings.components(a, b);
+        }
+    }
+    if let (Some(a), Some(b)) = (a.volume(), b.volume()) {
+        findings.volumes(a, b);
+    }
+    findings.found
+}
+
+/// What was found so far.
+struct Findings {
+    tolerance: Option<f64>,
+    /// The component at hand.
+    kind: Kind,
+    found: Vec<Finding>,
+}
+
+impl Findings {
+    fn add(&mut self, what: What) {
+        self.found.push(Finding { kind: self.kind, what });
+    }
+
+    fn components(&mut self, a: &Component, b: &Component) {
+        self.count("points", a.point_count(), b.point_count());
+        match (a.topology(), b.topology()) {
+            (Topology::Curves(a), Topology::Curves(b)) => self.elements("curves", a.counts(), b.counts()),
+            (Topology::Mesh(a), Topology::Mesh(b)) => self.elements("faces", a.iter(), b.iter()),
+            (Topology::Tets(a), Topology::Tets(b)) => self.elements("tets", a.iter(), b.iter()),
+            _ => {}
+        }
+        for owner in Owner::ALL {
+            self.tables(owner, a.table(owner), b.table(owner));
+        }
+    }
+
+    fn count(&mut self, of: &'static str, a: usize, b: usize) {
+        if a != b {
+            self.add(What::Count { of, counts: [a, b] });
+        }
+    }
+
+    fn elements<T: PartialEq>(
+        &mut self,
+        of: &'static str,
+        a: impl ExactSizeIterator<Item = T>,
+        b: impl ExactSizeIterator<Item = T>,
+    ) {
+        let elements = a.len();
+        if elements != b.len() {
+            return self.count(of, elements, b.len());
+        }
+        let mut differing = a.zip(b).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
+        if let Some(first) = differing.next() {
+            self.add(What::Topology { of, differing: 1 + differing.count(), elements, first });
+        }
+    }
+
+    fn tables(&mut self, owner: Owner, a: &Table, b: &Table) {
+        let names: BTreeSet<&Name> = a.iter().chain(b.iter()).map(|(name, _)| name).collect();
+        for name in names {
+            let place = Place { owner: Some(owner), name: name.clone() };
+            match (a.column(name), b.column(name)) {
+                (Some(a), Some(b)) => self.columns(place, a, b),
+                (Some(_), None) => self.add(What::Attribute(place, Side::A)),
+                (None, _) => self.add(What::Attribute(place, Side::B)),
+            }
+        }
+    }
+
+    fn columns(&mut self, place: Place, a: &Column, b: &Column) {
+        // Formats need not say the type of a column without rows.
+        if a.len() != b.len() || a.is_empty() {
+            return;
+        }
+        let (kind, tolerance) = (a.kind(), self.tolerance);
+        let values = match (a, b) {
+            (Column::F1(a), Column::F1(b)) => values(a.as_chunks::<1>().0, b.as_chunks().0, kind, tolerance),
+            (Column::F3(a), Column::F3(b)) => values(a, b, kind, tolerance),
+            (Column::F4(a), Column::F4(b)) => values(a, b, kind, tolerance),
+            (Column::I1(a), Column::I1(b)) => values(a.as_chunks::<1>().0, b.as_chunks().0, kind, None),
+            (Column::I3(a), Column::I3(b)) => values(a, b, kind, None),
+            (Column::I4(a), Column::I4(b)) => values(a, b, kind, None),
+            _ => return self.add(What::Type(place, [kind, b.kind()])),
+        };
+        if let Some(values) = values {
+            self.add(What::Values(place, values));
+        }
+    }
+
+    fn volumes(&mut self, a: &Volume, b: &Volume) {
+        if a.grid() != b.grid() {
+            self.add(What::Grid([a.grid(), b.grid()]));
+        }
+        let names = ["level_set", "velocity_x", "velocity_y", "velocity_z"];
+        let fields = |volume: &Volume| {
+            let [x, y, z] = volume.velocity().clone();
+            [volume.level_set().clone(), x, y, z].map(Column::F1)
+        };
+        for (name, (a, b)) in names.into_iter().zip(fields(a).iter().zip(&fields(b))) {
+            self.columns(Place { owner: None, name: name.into() }, a, b);
+        }
+        self.tables(Owner::Once, a.once(), b.once());
+    }
+}
+
+/// A number of a column.
+trait Number: Copy {
+    fn bits(self) -> u32;
+    fn value(self) -> f64;
+}
+
+impl Number for f32 {
+    fn bits(self) -> u32 {
+        self.to_bits()
+    }
+
+    fn value(self) -> f64 {
+        self.into()
+    }
+}
+
+impl Number for i32 {
+    fn bits(self) -> u32 {
+        self.cast_unsigned()
+    }
+
+    fn value(self) -> f64 {
+        self.into()
+    }
+}
+
+/// How `a` and `b`, of as many rows, differ; `None` where all bits are the same.
+fn values<const N: usize, T: Number>(
+    a: &[[T; N]],
+    b: &[[T; N]],
+    kind: ColumnType,
+    tolerance: Option<f64>,
+) -> Option<Values> {
+    let numbers = a.len() * N;
+    let mut found =
+        Values { kind, numbers, differing: 0, not_finite: 0, largest: 0.0, largest_row: 0, mean: 0.0, first: None };
+    let (mut unequal, mut sum) = (0, 0.0);
+    for (place, (a, b)) in a.as_flattened().iter().zip(b.as_flattened()).enumerate() {
+        if a.bits() == b.bits() {
+            continue;
+        }
+        unequal += 1;
+        let values = [a.value(), b.value()];
+        let distance = (values[0] - values[1]).abs();
+        let (row, lane) = (place / N, place % N);
+        if distance.is_finite() {
+            sum += distance;
+            if distance > found.largest {
+                (found.largest, found.largest_row) = (distance, row);
+            }
+        } else {
+            found.not_finite += 1;
+        }
+        let both_nan = values.iter().all(|x| x.is_nan());
+        if !tolerance.is_some_and(|tolerance| distance <= tolerance || both_nan) {
+            found.differing += 1;
+            found.first.get_or_insert(First { row, lane, values });
+        }
+    }
+    found.mean = NonZeroUsize::new(numbers - found.not_finite).map_or(0.0, |finite| sum / finite.get() as f64);
+    (unequal > 0).then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::geometry::{ENVELOPE, ID};
+
+    fn points(rows: &[[f32; 3]]) -> Geometry {
+        Component::points(rows.to_vec()).into()
+    }
+
+    fn only_values(a: &Geometry, b: &Geometry, tolerance: Option<f64>) -> Values {
+        match compare(a, b, tolerance).as_slice() {
+            [Finding { what: What::Values(_, values), .. }] => values.clone(),
+            found => panic!("{found:?}"),
+        }
+    }
+
+    #[test]
+    fn the_same_bits_are_the_same_even_where_they_are_not_numbers() {
+        let odd = points(&[[f32::NAN, f32::INFINITY, -0.0]]);
+        assert_eq!(compare(&odd, &odd.clone(), None), []);
+    }
+
+    #[test]
+    fn differences_are_counted_and_measured() {
+        let a = points(&[[0.0; 3], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        let b = points(&[[0.0; 3], [1.0, 2.5, 3.0], [4.0, 5.0, 7.0]]);
+        let values = only_values(&a, &b, None);
+        assert_eq!((values.numbers, values.differing, values.largest, values.largest_row), (9, 2, 1.0, 2));
+        assert_eq!(values.mean, 1.5 / 9.0);
+        assert_eq!(values.first, Some(First { row: 1, lane: 1, values: [2.0, 2.5] }));
+    }
+
+    #[test]
+    fn a_tolerance_is_met_by_what_is_as_far_apart_and_no_farther() {
+        let (a, b) = (points(&[[0.0, 1.0, 2.0]]), points(&[[0.0, 1.25, 2.5]]));
+        let differing = |tolerance| only_values(&a, &b, Some(tolerance)).differing;
+        assert_eq!((differing(0.5), differing(0.499), differing(0.249)), (0, 1, 2));
+        assert!(!compare(&a, &b, Some(0.5))[0].differs());
+    }
+
+    #[test]
+    fn signs_of_zero_differ_in_bits_and_in_nothing_else() {
+        let (a, b) = (points(&[[0.0; 3]]), points(&[[0.0, -0.0, 0.0]]));
+        assert_eq!(only_values(&a, &b, None).differing, 1);
+        assert_eq!(only_values(&a, &b, Some(0.0)).differing, 0);
+    }
+
+    #[test]
+    fn nan_is_near_nothing_but_nan() {
+        let (a, b) = (points(&[[f32::NAN, 1.0, 0.0]]), points(&[[1.0, 1.0, f32::INFINITY]]));
+        let values = only_values(&a, &b, Some(1e9));
+        assert_eq!((values.differing, values.not_finite, values.largest, values.mean), (2, 2, 0.0, 0.0));
+        let other = points(&[[f32::from_bits(f32::NAN.to_bits() | 1), 1.0, 0.0]]);
+        assert_eq!(only_values(&a, &other, None).differing, 1);
+        assert_eq!(only_values(&a, &other, Some(0.0)).differing, 0);
+    }
+
+    #[test]
+    fn whole_numbers_know_no_tolerance() {
+        let with_id = |id| {
+            let mut points = Component::points(vec![[0.0; 3]]);
+            points.set(ID, vec![id]).unwrap();
+            Geometry::from(points)
+        };
+        let values = only_values(&with_id(i32::MIN), &with_id(i32::MAX), Some(1e10));
+        assert_eq!((values.differing, values.largest), (1, 4_294_967_295.0));
+    }
+
+    #[test]
+    fn what_one_side_lacks_is_named() {
+        let mut curves = Component::curves(vec![1], vec![[0.0; 3]]).unwrap();
+        let bare = Geometry::from(curves.clone());
+        curves.set(ENVELOPE, vec![1.0]).unwrap();
+        let whats = |a: &Geometry, b: &Geometry| -> Vec<What> {
+            compare(a, b, None).into_iter().map(|finding| finding.what).collect()
+        };
+        let envelope = Place { owner: Some(Owner::Point), name: "envelope".into() };
+        assert_eq!(whats(&curves.clone().into(), &bare), [What::Attribute(envelope.clone(), Side::A)]);
+        assert_eq!(whats(&bare, &curves.into()), [What::Attribute(envelope, Side::B)]);
+        assert_eq!(whats(&bare, &Geometry::default()), [What::Component(Side::A)]);
+    }
+
+    #[test]
+    fn other_counts_are_said_and_the_numbers_left() {
+        let curves = |counts: &[u32]| {
+            let points = counts.iter().sum::<u32>() as usize;
+            Geometry::from(Component::curves(counts.to_vec(), vec![[0.0; 3]; points]).unwrap())
+        };
+        let whats = |a: &[u32], b: &[u32]| -> Vec<What> {
+            compare(&curves(a), &curves(b), None).into_iter().map(|finding| finding.what).collect()
+        };
+        assert_eq!(
+            whats(&[2, 3], &[2, 3, 1]),
+            [What::Count { of: "points", counts: [5, 6] }, What::Count { of: "curves", counts: [2, 3] }]
+        );
+        assert_eq!(
+            whats(&[2, 3, 1], &[2, 1, 3]),
+            [What::Topology { of: "curves", differing: 2, elements: 3, first: 1 }]
+        );
+    }
+
+    #[test]
+    fn a_type_that_rows_do_not_show_is_no_difference() {
+        let with = |column: Column, rows: usize| {
+            let mut points = Component::points(vec![[0.0; 3]; rows]);
+            points.set_column(Owner::Point, "mask", column).unwrap();
+            Geometry::from(points)
+        };
+        assert_eq!(compare(&with(Column::new::<i32>(vec![]), 0), &with(Column::new::<f32>(vec![]), 0), None), []);
+        let found = compare(&with(Column::new(vec![1]), 1), &with(Column::new(vec![1.0_f32]), 1), None);
+        let place = Place { owner: Some(Owner::Point), name: "mask".into() };
+        assert_eq!(found[0].what, What::Type(place, [ColumnType::I1, ColumnType::F1]));
+    }
+
+    #[test]
+    fn volumes_compare_grid_and_fields() {
+        let volume = |cell: f32, phi: f32| {
+            let grid = Grid { origin: [0.0; 3], cell, size: [1; 3] };
+            let mut geometry = Geometry::default();
+            geometry.put_volume(Volume::new(grid, vec![phi], [(); 3].map(|()| vec![0.0; 2])).unwrap());
+            geometry
+        };
+        assert_eq!(compare(&volume(0.5, 1.0), &volume(0.5, 1.0), None), []);
+        let found = compare(&volume(0.5, 1.0), &volume(0.25, 2.0), None);
+        assert!(matches!(found[0].what, What::Grid(_)));
+        assert!(matches!(&found[1].what, What::Values(place, _) if &*place.name == "level_set"));
+    }
+}

@@ -1,0 +1,77 @@
+//! `convect diff`: whether two geometries are the same, and how far they are apart where they are not.
+
+mod compare;
+mod pairs;
+mod show;
+
+use std::io::{ErrorKind, Write as _};
+use std::path::PathBuf;
+
+use crate::failure::{Exit, Failure};
+use crate::geometry_file::read;
+use compare::{Finding, compare};
+use pairs::{Pair, pairs};
+
+/// What `diff` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// An obj, ply or json file; a folder of such; or a numbered sequence: fur.####.json
+    a: PathBuf,
+    /// What to compare it with; the formats may differ
+    b: PathBuf,
+    /// Floats no farther apart than this are the same: metres for `P`, an attribute's own unit else. Without it every
+    /// bit counts. Whole numbers are compared exactly
+    #[arg(long, value_name = "T", value_parser = tolerance)]
+    tolerance: Option<f64>,
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| format!("`{text}` is no tolerance; expected a number of at least 0"))
+}
+
+/// Two files, and what of them is not the same.
+struct Compared {
+    pair: Pair,
+    findings: Vec<Finding>,
+}
+
+impl Compared {
+    fn differs(&self) -> bool {
+        self.pair.a.is_none() || self.pair.b.is_none() || self.findings.iter().any(Finding::differs)
+    }
+}
+
+/// Compares, and prints what differs.
+///
+/// # Errors
+/// With [`Exit::File`] where something differs, with [`Exit::CommandLine`] for any trouble.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let trouble = |failure: Failure| Failure { exit: Exit::CommandLine, ..failure };
+    let mut all = Vec::new();
+    for pair in pairs(&args.a, &args.b).map_err(trouble)? {
+        let findings = match (&pair.a, &pair.b) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (read(a).map_err(trouble)?, read(b).map_err(trouble)?);
+                compare(&a.geometry, &b.geometry, args.tolerance)
+            }
+            _ => Vec::new(),
+        };
+        all.push(Compared { pair, findings });
+    }
+    let text = match args.json {
+        true => show::json(&all, args.tolerance),
+        false => show::text(&all, args.tolerance),
+    };
+    let written = std::io::stdout().write_all(text.as_bytes());
+    // Whoever reads no further still asks for the exit code.
+    if let Err(error) = written.as_ref().map_err(std::io::Error::kind)
+        && error != ErrorKind::BrokenPipe
+    {
+        return written.map_err(|error| trouble(error.into()));
+    }
+    if all.iter().any(Compared::differs) { Err(Failure::told(Exit::File)) } else { Ok(()) }
+}

@@ -1,0 +1,171 @@
+//! What differs as text and as JSON.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use engine::geometry::{ColumnType, Kind, Owner};
+use serde_json::{Value, json};
+
+use super::Compared;
+use super::compare::{Finding, Place, Side, Values, What};
+
+/// JSON: `same`, and a list of pairs with what was found, differences within the tolerance included.
+pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
+    let path = |path: &Option<PathBuf>| json!(path.as_ref().map(|path| path.display().to_string()));
+    let pairs: Vec<Value> = all
+        .iter()
+        .map(|one| {
+            let findings: Vec<Value> = one.findings.iter().map(finding_json).collect();
+            json!({"a": path(&one.pair.a), "b": path(&one.pair.b), "same": !one.differs(), "findings": findings})
+        })
+        .collect();
+    let same = !all.iter().any(Compared::differs);
+    let all = json!({"same": same, "tolerance": tolerance, "pairs": pairs});
+    serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"
+}
+
+fn finding_json(finding: &Finding) -> Value {
+    let mut object = json!({"component": finding.kind.name(), "same": !finding.differs()});
+    let mut put = |key: &str, value: Value| object[key] = value;
+    if let What::Attribute(place, _) | What::Type(place, _) | What::Values(place, _) = &finding.what {
+        put("attribute", json!(*place.name));
+        put("of", json!(row_name(finding.kind, place.owner)));
+    }
+    match &finding.what {
+        What::Component(side) | What::Attribute(_, side) => put("only_in", json!(side_name(*side))),
+        What::Count { of, counts } => {
+            put("of", json!(of));
+            put("counts", json!(counts));
+        }
+        What::Topology { of, differing, elements, first } => {
+            put("of", json!(of));
+            put("differing", json!(differing));
+            put("elements", json!(elements));
+            put("first", json!(first));
+        }
+        What::Grid(grids) => {
+            let grid = |k: usize| json!({"origin": grids[k].origin, "cell": grids[k].cell, "size": grids[k].size});
+            put("grids", json!([grid(0), grid(1)]));
+        }
+        What::Type(_, types) => put("types", json!(types.map(|kind| kind.to_string()))),
+        What::Values(_, values) => {
+            put("numbers", json!(values.numbers));
+            put("differing", json!(values.differing));
+            put("not_finite", json!(values.not_finite));
+            put("largest", json!(values.largest));
+            put("largest_row", json!(values.largest_row));
+            put("mean", json!(values.mean));
+            let first = values.first.map(|first| json!({"row": first.row, "axis": first.lane, "values": first.values}));
+            put("first", json!(first));
+        }
+    }
+    object
+}
+
+fn side_name(side: Side) -> &'static str {
+    match side {
+        Side::A => "a",
+        Side::B => "b",
+    }
+}
+
+/// What a row of an attribute is.
+fn row_name(kind: Kind, owner: Option<Owner>) -> &'static str {
+    match (owner, kind) {
+        (None, _) => "cell or face",
+        (Some(Owner::Point), _) => "point",
+        (Some(Owner::Element), Kind::Curves) => "curve",
+        (Some(Owner::Element), Kind::Mesh) => "face",
+        (Some(Owner::Element), _) => "tet",
+        (Some(Owner::Once), _) => "component",
+    }
+}
+
+/// Text: a line a finding that makes a difference, and the verdict.
+pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
+    let mut text = String::new();
+    for one in all {
+        let named = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        let (a, b) = (named(&one.pair.a), named(&one.pair.b));
+        match (&one.pair.a, &one.pair.b) {
+            (Some(_), None) => _ = writeln!(text, "only {a} is there"),
+            (None, _) => _ = writeln!(text, "only {b} is there"),
+            _ if all.len() > 1 && one.differs() => _ = writeln!(text, "{a} and {b}:"),
+            _ => {}
+        }
+        for finding in one.findings.iter().filter(|finding| finding.differs()) {
+            let indent = if all.len() > 1 { "  " } else { "" };
+            let _ = writeln!(text, "{indent}{}: {}", finding.kind, line(finding, &a, &b));
+        }
+    }
+    let differing = all.iter().filter(|one| one.differs()).count();
+    let _ = match (differing, tolerance) {
+        (0, None) => writeln!(text, "the same"),
+        (0, Some(tolerance)) => writeln!(text, "the same within {tolerance}{}", nearest_miss(all)),
+        (_, _) if all.len() > 1 => writeln!(text, "different: {differing} of {} pairs", all.len()),
+        _ => writeln!(text, "different"),
+    };
+    text
+}
+
+/// How far apart what counts as the same is, where it is.
+fn nearest_miss(all: &[Compared]) -> String {
+    let largest = all.iter().flat_map(|one| &one.findings).filter_map(|finding| match &finding.what {
+        What::Values(place, values) => Some((values.largest, place, finding.kind)),
+        _ => None,
+    });
+    match largest.max_by(|(a, ..), (b, ..)| a.total_cmp(b)) {
+        Some((largest, place, kind)) => format!("; at most {largest} apart, in `{}` of {kind}", place.name),
+        None => "; every bit is".to_owned(),
+    }
+}
+
+fn line(finding: &Finding, a: &str, b: &str) -> String {
+    let side = |side: Side| if side == Side::A { a } else { b };
+    match &finding.what {
+        What::Component(there) => format!("only in {}", side(*there)),
+        What::Attribute(place, there) => format!("`{}`: only in {}", place.name, side(*there)),
+        What::Count { of, counts: [a, b] } => format!("{a} {of} and {b}"),
+        What::Topology { of, differing, elements, first } => {
+            format!("{differing} of {elements} {of} join other points; the first is {first}")
+        }
+        What::Grid([a, b]) => {
+            let grid = |grid: &engine::geometry::Grid| {
+                let [x, y, z] = grid.size;
+                format!("{x} × {y} × {z} cells of {} m from {:?}", grid.cell, grid.origin)
+            };
+            format!("{} and {}", grid(a), grid(b))
+        }
+        What::Type(place, [a, b]) => format!("`{}`: {a} and {b}", place.name),
+        What::Values(place, values) => values_line(finding.kind, place, values),
+    }
+}
+
+fn values_line(kind: Kind, place: &Place, values: &Values) -> String {
+    let Values { numbers, differing, not_finite, largest, largest_row, mean, .. } = values;
+    let row = match place.owner {
+        Some(Owner::Once) => |_: &str, _: usize| String::new(),
+        _ => |name: &str, row: usize| format!(" at {name} {row}"),
+    };
+    let name = row_name(kind, place.owner);
+    let mut line = format!("`{}`: {differing} of {numbers} numbers differ", place.name);
+    let _ = match *largest > 0.0 {
+        true => write!(line, ", by {mean:.3e} on average and at most {largest}{}", row(name, *largest_row)),
+        false if *not_finite == 0 => write!(line, ", but only in the sign of zero (see --tolerance 0)"),
+        false => Ok(()),
+    };
+    if *not_finite > 0 {
+        let _ = write!(line, ", {not_finite} without end");
+    }
+    if let Some(first) = values.first {
+        let axis = if values.kind.width() > 1 { format!("[{}]", first.lane) } else { String::new() };
+        let [a, b] = first.values.map(|value| shown(value, values.kind));
+        let _ = write!(line, "; the first{axis}{}: {a} and {b}", row(name, first.row));
+    }
+    line
+}
+
+/// A number in the shortest form that is it.
+fn shown(value: f64, kind: ColumnType) -> String {
+    if kind.is_float() { format!("{:?}", value as f32) } else { value.to_string() }
+}

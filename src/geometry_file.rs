@@ -1,0 +1,210 @@
+//! Geometry files named on the command line, and the frame numbers in their names.
+//!
+//! What [`read`] gives was read to its end; a run of `#` in a [`Numbered`] name stands for the frame, as it does in a
+//! graph. The limit: a file is read whole, and USD is not read at all.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use engine::geometry::Geometry;
+use engine::time::Frame;
+use formats::Format;
+use formats::atomic::FileError;
+
+use crate::failure::{Exit, Failure};
+
+/// A geometry file that was read.
+#[derive(Debug)]
+pub struct GeometryFile {
+    /// Its format, by its ending.
+    pub format: Format,
+    /// Its size.
+    pub bytes: u64,
+    /// What it holds.
+    pub geometry: Geometry,
+}
+
+/// Reads the file at `path`.
+///
+/// # Errors
+/// Where it cannot be read or is not what its ending says.
+pub fn read(path: &Path) -> Result<GeometryFile, Failure> {
+    let unread = |error: io::Error| Failure::file(FileError::new(path, "read", error).to_string());
+    if fs::metadata(path).map_err(unread)?.is_dir() {
+        return Err(unread(io::ErrorKind::IsADirectory.into()));
+    }
+    let refused = |error| refused(path, &error);
+    let format = Format::of_path(path).map_err(refused)?;
+    let bytes = if format.is_read() { fs::read(path).map_err(unread)? } else { Vec::new() };
+    let geometry = formats::read(format, &bytes).map_err(refused)?;
+    Ok(GeometryFile { format, bytes: bytes.len() as u64, geometry })
+}
+
+/// The failure of a file that its format refuses, with the hint.
+pub fn refused(path: &Path, error: &formats::FormatError) -> Failure {
+    let hint = error.hint().map(|hint| format!("; {hint}")).unwrap_or_default();
+    Failure::file(format!("`{}`: {error}{hint}", path.display()))
+}
+
+/// A path with a run of `#` in its file name: the frame, with as many digits at least.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Numbered {
+    path: PathBuf,
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Numbered {
+    /// `path` as a numbered one; `None` where its name has no `#`.
+    ///
+    /// # Errors
+    /// Where the name has several runs of `#`.
+    pub fn of(path: &Path) -> Result<Option<Self>, Failure> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let Some(start) = name.find('#') else { return Ok(None) };
+        let after = name[start..].trim_start_matches('#');
+        if after.contains('#') {
+            let line = format!("`{}` has several runs of `#`, expected one, for the frame", path.display());
+            return Err(Failure::new(Exit::CommandLine, line));
+        }
+        let digits = name.len() - start - after.len();
+        Ok(Some(Self { path: path.to_owned(), before: name[..start].into(), digits, after: after.into() }))
+    }
+
+    /// The file of `frame`.
+    pub fn at(&self, frame: Frame) -> PathBuf {
+        let number = frame.number().abs().to_string();
+        let (whole, fraction) = number.split_once('.').unwrap_or((&number, ""));
+        let sign = if frame < Frame::whole(0) { "-" } else { "" };
+        let point = if fraction.is_empty() { "" } else { "_" };
+        let digits = self.digits;
+        self.path.with_file_name(format!("{}{sign}{whole:0>digits$}{point}{fraction}{}", self.before, self.after))
+    }
+
+    /// The files that are there, frames ascending.
+    ///
+    /// # Errors
+    /// Where the folder cannot be listed, or there is no such file.
+    pub fn find(&self) -> Result<Vec<(Frame, PathBuf)>, Failure> {
+        let folder = folder_of(&self.path);
+        let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
+        let mut found = Vec::new();
+        for entry in fs::read_dir(folder).map_err(unread)? {
+            let name = entry.map_err(unread)?.file_name();
+            if let Some(frame) = name.to_str().and_then(|name| self.frame_in(name)) {
+                found.push((frame, self.path.with_file_name(name)));
+            }
+        }
+        found.sort_unstable();
+        if found.is_empty() {
+            return Err(Failure::file(format!("no file is called `{}` with a frame number", self.path.display())));
+        }
+        Ok(found)
+    }
+
+    /// The frame of a file of that name; `None` where it is none of these. Each frame has one name.
+    fn frame_in(&self, name: &str) -> Option<Frame> {
+        let label = name.strip_prefix(&*self.before)?.strip_suffix(&*self.after)?;
+        let frame = parse_label(label)?;
+        (self.at(frame).file_name()?.to_str()? == name).then_some(frame)
+    }
+
+    /// The name without the frame, and without what separates it: `fur` of `fur.####.json`.
+    pub fn stem(&self) -> &str {
+        self.before.trim_end_matches(SEPARATORS)
+    }
+}
+
+/// What may stand between a name and its frame.
+const SEPARATORS: [char; 3] = ['.', '_', '-'];
+
+/// A file's name without ending and frame, and its frame where the name ends on one: (`fur`, 12) of `fur.0012.json`.
+pub fn stem_and_frame(path: &Path) -> (String, Option<Frame>) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    // A sub-frame has a separator inside (`fur.0010_5`), so a dot is looked for first.
+    for separator in ['.', '_'] {
+        if let Some((name, label)) = stem.rsplit_once(separator)
+            && let Some(frame) = parse_label(label)
+        {
+            return (name.to_owned(), Some(frame));
+        }
+    }
+    (stem, None)
+}
+
+/// The inverse of [`Frame::file_label`].
+fn parse_label(label: &str) -> Option<Frame> {
+    if label.contains('.') { None } else { label.replacen('_', ".", 1).parse().ok() }
+}
+
+/// The folder a path lies in.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(path: &str) -> Numbered {
+        Numbered::of(Path::new(path)).unwrap().unwrap()
+    }
+
+    fn frame(number: f64) -> Frame {
+        Frame::exactly(number).unwrap()
+    }
+
+    #[test]
+    fn a_run_of_hashes_is_the_frame_with_as_many_digits_at_least() {
+        let at = |path: &str, number: f64| numbered(path).at(frame(number)).display().to_string();
+        assert_eq!(at("in/fur.####.json", 7.0), "in/fur.0007.json");
+        assert_eq!(at("fur.####.json", 10.5), "fur.0010_5.json");
+        assert_eq!(at("fur.####.json", -3.25), "fur.-0003_25.json");
+        assert_eq!(at("fur_#.obj", 1234.0), "fur_1234.obj");
+        assert_eq!(Numbered::of(Path::new("a#/fur.json")).unwrap(), None, "folders are not numbered");
+        let error = Numbered::of(Path::new("a.##.##.json")).unwrap_err();
+        assert_eq!(error.lines, ["`a.##.##.json` has several runs of `#`, expected one, for the frame"]);
+    }
+
+    #[test]
+    fn only_the_one_name_of_a_frame_is_its_file() {
+        let frame_in = |name: &str| numbered("fur.####.json").frame_in(name).map(Frame::number);
+        assert_eq!(frame_in("fur.0007.json"), Some(7.0));
+        assert_eq!(frame_in("fur.0010_5.json"), Some(10.5));
+        assert_eq!(frame_in("fur.-0003.json"), Some(-3.0));
+        assert_eq!(frame_in("fur.12345.json"), Some(12345.0));
+        for name in ["fur.7.json", "fur.00007.json", "fur.0007.obj", "fur.0007.5.json", "fur..json", "skin.0007.json"] {
+            assert_eq!(frame_in(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_frame_of_a_name_is_the_number_it_ends_on() {
+        let of = |path: &str| {
+            let (stem, frame) = stem_and_frame(Path::new(path));
+            (stem, frame.map(Frame::number))
+        };
+        assert_eq!(of("in/fur.0012.json"), ("fur".into(), Some(12.0)));
+        assert_eq!(of("fur.0010_5.json"), ("fur".into(), Some(10.5)));
+        assert_eq!(of("fur.-0003.json"), ("fur".into(), Some(-3.0)));
+        assert_eq!(of("fur_0012.obj"), ("fur".into(), Some(12.0)));
+        assert_eq!(of("fur_bear_10k.obj"), ("fur_bear_10k".into(), None));
+        assert_eq!(of("bear2.obj"), ("bear2".into(), None));
+        assert_eq!(of("fur.json"), ("fur".into(), None));
+    }
+
+    #[test]
+    fn files_of_a_sequence_come_by_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.0010.obj", "a.0002.obj", "a.0002_5.obj", "a.obj", "b.0001.obj"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = numbered(&folder.path().join("a.####.obj").display().to_string()).find().unwrap();
+        let frames: Vec<f64> = found.iter().map(|(frame, _)| frame.number()).collect();
+        assert_eq!(frames, [2.0, 2.5, 10.0]);
+        let error = numbered(&folder.path().join("c.##.obj").display().to_string()).find().unwrap_err();
+        assert!(error.lines[0].ends_with("c.##.obj` with a frame number"), "{error:?}");
+    }
+}

@@ -1,0 +1,37 @@
+//! `convect stats`: what a geometry file holds, in numbers that a pipeline can assert on.
+
+mod measure;
+mod show;
+mod surface;
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use crate::failure::Failure;
+use crate::geometry_file::read;
+
+/// What `stats` takes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// An obj, ply or json file
+    file: PathBuf,
+    /// Print as JSON, with all digits; text is rounded to six
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the numbers.
+///
+/// # Errors
+/// Where the file cannot be read or stdout cannot be written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let file = read(&args.file)?;
+    let stats = measure::stats(&file.geometry);
+    let name = args.file.display().to_string();
+    let text = match args.json {
+        true => show::json(&name, &file, &stats),
+        false => show::text(&name, &file, &stats),
+    };
+    std::io::stdout().write_all(text.as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! Stats as text and as JSON.
+
+use std::fmt::Write as _;
+
+use engine::geometry::{Kind, Owner};
+use serde_json::{Map, Value, json};
+
+use super::measure::{AttributeStats, PartStats, Shape, Spread, Stats, VolumeStats};
+use crate::geometry_file::GeometryFile;
+
+/// JSON: an object a component, with the tables of the json form.
+pub(super) fn json(name: &str, file: &GeometryFile, stats: &Stats) -> String {
+    let mut all = json!({"file": name, "format": file.format.name(), "bytes": file.bytes});
+    for part in &stats.parts {
+        all[part.kind.name()] = part_json(part);
+    }
+    if let Some(volume) = &stats.volume {
+        all[Kind::Volume.name()] = volume_json(volume);
+    }
+    serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"
+}
+
+fn part_json(part: &PartStats) -> Value {
+    let mut object = json!({"points": part.points, "bounds": part.bounds.map(|[min, max]| {
+        json!({"min": min.map(decimal), "max": max.map(decimal)})
+    })});
+    match &part.shape {
+        Shape::Curves { cvs, length } => {
+            object["curves"] = json!(part.elements);
+            object["cvs"] = spread_json(cvs.as_ref());
+            object["length"] = spread_json(length.as_ref());
+        }
+        Shape::Mesh(surface) => {
+            object["faces"] = json!(part.elements);
+            object["corners"] = spread_json(Spread::of(surface.corners.iter().map(|n| f64::from(*n))).as_ref());
+            object["edges"] = json!({
+                "all": surface.edges, "manifold": surface.manifold, "boundary": surface.boundary,
+                "non_manifold": surface.non_manifold, "flipped": surface.flipped,
+            });
+            object["closed"] = json!(surface.volume.is_some());
+            object["area"] = json!(surface.area);
+            object["volume"] = json!(surface.volume);
+        }
+        Shape::Points => {}
+        Shape::Tets { volume, inverted } => {
+            object["tets"] = json!(part.elements);
+            object["volume"] = spread_json(volume.as_ref());
+            object["inverted"] = json!(inverted);
+        }
+    }
+    for (owner, attributes) in &part.attributes {
+        let has_table = *owner != Owner::Element || part.kind != Kind::Points;
+        if has_table {
+            object[table_name(*owner)] = attributes_json(attributes);
+        }
+    }
+    object
+}
+
+fn volume_json(volume: &VolumeStats) -> Value {
+    let grid = &volume.grid;
+    json!({
+        "origin": grid.origin.map(decimal), "cell": decimal(grid.cell), "size": grid.size,
+        "cells": grid.cells(), "inside": volume.inside,
+        "fields": attributes_json(&volume.fields), "attributes": attributes_json(&volume.attributes),
+    })
+}
+
+fn attributes_json(attributes: &[AttributeStats]) -> Value {
+    attributes.iter().map(|one| (one.name.to_string(), attribute_json(one))).collect::<Map<_, _>>().into()
+}
+
+/// Least, greatest and mean are numbers where rows are, else lists.
+fn attribute_json(attribute: &AttributeStats) -> Value {
+    let each = |number: &dyn Fn(&Spread) -> f64| match attribute.spreads.as_slice() {
+        [one] => json!(one.as_ref().map(number)),
+        many => many.iter().map(|one| one.as_ref().map(number)).collect(),
+    };
+    json!({
+        "type": attribute.kind.to_string(), "rows": attribute.rows, "not_finite": attribute.not_finite,
+        "min": each(&|spread| as_stored(attribute, spread.min)), "max": each(&|spread| as_stored(attribute, spread.max)),
+        "mean": each(&Spread::mean),
+    })
+}
+
+fn spread_json(spread: Option<&Spread>) -> Value {
+    json!(
+        spread.map(|spread| {
+            json!({"min": spread.min, "max": spread.max, "mean": spread.mean(), "total": spread.sum})
+        })
+    )
+}
+
+/// The name of an owner's table in the json form.
+fn table_name(owner: Owner) -> &'static str {
+    match owner {
+        Owner::Point => "point_attributes",
+        Owner::Element => "element_attributes",
+        Owner::Once => "attributes",
+    }
+}
+
+/// A number of an attribute as its file would say it.
+fn as_stored(attribute: &AttributeStats, number: f64) -> f64 {
+    if attribute.kind.is_float() { decimal(number as f32) } else { number }
+}
+
+/// The f64 with the digits of the shortest decimal of an f32: 0.1 for 0.1, not 0.10000000149.
+fn decimal(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or_else(|_| f64::from(number))
+}
+
+/// Text, a block a component.
+pub(super) fn text(name: &str, file: &GeometryFile, stats: &Stats) -> String {
+    let mut text = format!("{name}: {}, {} bytes\n", file.format, file.bytes);
+    for part in &stats.parts {
+        part_text(part, &mut text);
+    }
+    if let Some(volume) = &stats.volume {
+        volume_text(volume, &mut text);
+    }
+    if stats.parts.is_empty() && stats.volume.is_none() {
+        text += "no component\n";
+    }
+    text
+}
+
+fn part_text(part: &PartStats, text: &mut String) {
+    let PartStats { kind, points, elements, .. } = part;
+    match part.shape {
+        Shape::Curves { .. } => line(text, kind.name(), &format!("{elements}, {points} points")),
+        Shape::Mesh(_) => line(text, kind.name(), &format!("{elements} faces, {points} points")),
+        Shape::Points => line(text, kind.name(), &points.to_string()),
+        Shape::Tets { .. } => line(text, kind.name(), &format!("{elements}, {points} points")),
+    }
+    if let Some([low, high]) = part.bounds {
+        let size: Vec<f64> = (0..3).map(|k| f64::from(high[k]) - f64::from(low[k])).collect();
+        let [low, high] = [low, high].map(|corner| list(&corner.map(f64::from)));
+        line(text, "  bounds", &format!("{low} to {high} m, size {}", list(&size)));
+    }
+    match &part.shape {
+        Shape::Curves { cvs, length } => {
+            spread_line(text, "  cvs", cvs.as_ref(), "");
+            spread_line(text, "  length", length.as_ref(), " m");
+        }
+        Shape::Mesh(surface) => {
+            line(text, "  area", &format!("{} m²", short(surface.area)));
+            match surface.volume {
+                Some(volume) => line(text, "  volume", &format!("{} m³", short(volume))),
+                None => line(text, "  volume", "none: the surface is not closed"),
+            }
+            let mut edges = format!("{}: {} manifold, {} boundary", surface.edges, surface.manifold, surface.boundary);
+            let _ = write!(edges, ", {} non-manifold, {} flipped", surface.non_manifold, surface.flipped);
+            line(text, "  edges", &edges);
+        }
+        Shape::Points => {}
+        Shape::Tets { volume, inverted } => {
+            spread_line(text, "  volume", volume.as_ref(), " m³");
+            line(text, "  inverted", &inverted.to_string());
+        }
+    }
+    for (owner, attributes) in &part.attributes {
+        attributes_text(&owner.to_string(), attributes, text);
+    }
+}
+
+fn volume_text(volume: &VolumeStats, text: &mut String) {
+    let grid = &volume.grid;
+    let [x, y, z] = grid.size;
+    line(text, Kind::Volume.name(), &format!("{x} × {y} × {z} cells of {} m", decimal(grid.cell)));
+    line(text, "  origin", &list(&grid.origin.map(f64::from)));
+    line(text, "  inside", &format!("{} of {} cells", volume.inside, grid.cells()));
+    attributes_text("field", &volume.fields, text);
+    attributes_text(&Owner::Once.to_string(), &volume.attributes, text);
+}
+
+/// A line an attribute: what owns it, its type, its range.
+fn attributes_text(owner: &str, attributes: &[AttributeStats], text: &mut String) {
+    for attribute in attributes {
+        let each = |number: &dyn Fn(&Spread) -> f64| match attribute.spreads.as_slice() {
+            [one] => one.as_ref().map_or("none".to_owned(), |spread| short(number(spread))),
+            many => list(&many.iter().map(|one| one.as_ref().map_or(f64::NAN, number)).collect::<Vec<_>>()),
+        };
+        let mut facts = format!("{owner} {}, ", attribute.kind);
+        let _ = match attribute.rows {
+            0 => write!(facts, "no row"),
+            _ => write!(facts, "{} to {}, mean {}", each(&|x| x.min), each(&|x| x.max), each(&Spread::mean)),
+        };
+        if attribute.not_finite > 0 {
+            let _ = write!(facts, ", {} not finite", attribute.not_finite);
+        }
+        line(text, &format!("  {}", attribute.name), &facts);
+    }
+}
+
+fn spread_line(text: &mut String, label: &str, spread: Option<&Spread>, unit: &str) {
+    if let Some(spread) = spread {
+        let [min, max, mean, sum] = [spread.min, spread.max, spread.mean(), spread.sum].map(short);
+        line(text, label, &format!("{min} to {max}{unit}, mean {mean}, total {sum}"));
+    }
+}
+
+fn line(text: &mut String, label: &str, facts: &str) {
+    let _ = writeln!(text, "{label:<14} {facts}");
+}
+
+fn list(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(|x| short(*x)).collect();
+    format!("[{}]", numbers.join(", "))
+}
+
+/// Six digits.
+fn short(number: f64) -> String {
+    let rounded: f64 = format!("{number:.5e}").parse().unwrap_or(number);
+    let text = format!("{rounded:?}");
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_shown_with_six_digits_and_no_needless_zero() {
+        let shown: Vec<String> = [5.0, 1.0 / 3.0, -0.0, 1e-7, 123_456_789.0, 0.1].map(short).into();
+        assert_eq!(shown, ["5", "0.333333", "-0", "1e-7", "123457000", "0.1"]);
+    }
+
+    #[test]
+    fn an_f32_is_the_decimal_that_its_file_says() {
+        assert_eq!(decimal(0.1), 0.1);
+        assert_eq!(decimal(f32::MAX), 3.402_823_5e38);
+    }
+}

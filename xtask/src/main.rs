@@ -1,0 +1,42 @@
+//! Chores of the repository: `cargo xtask new-node NAME`.
+
+mod new_node;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Chores of the repository.
+#[derive(Parser)]
+enum Chore {
+    /// Write a node that passes its tests, and its line in the family's list
+    NewNode {
+        /// The node's name, such as Curve_Smooth
+        name: String,
+        /// The family it belongs to: a folder of nodes/
+        #[arg(long, default_value = "geometry")]
+        family: String,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Chore::parse() {
+        Chore::NewNode { name, family } => new_node::write(&root(), &name, &family),
+    };
+    match result {
+        Ok(said) => {
+            println!("{said}");
+            ExitCode::SUCCESS
+        }
+        Err(fact) => {
+            eprintln!("{fact}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The repository's root.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map_or_else(PathBuf::new, Path::to_owned)
+}

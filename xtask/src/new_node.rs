@@ -1,0 +1,96 @@
+//! `new-node`: a node's file and its two lines in the family's list.
+
+use std::fs;
+use std::path::Path;
+
+/// A node that moves curves; a start that passes conformance.
+const TEMPLATE: &str = include_str!("node.rs.txt");
+
+/// Writes node `name` into `family`; says what to do next.
+///
+/// # Errors
+/// Where the name is no node's name, the family is unknown, or the node is there already.
+pub(crate) fn write(root: &Path, name: &str, family: &str) -> Result<String, String> {
+    let module = module_name(name)?;
+    let folder = root.join("nodes").join(family);
+    let list = folder.join("lib.rs");
+    let text = fs::read_to_string(&list)
+        .map_err(|error| format!("`{family}` is no family: `{}` could not be read: {error}", list.display()))?;
+    let file = folder.join(format!("{module}.rs"));
+    if file.exists() || folder.join(&module).exists() {
+        return Err(format!("`{}` is there already", file.display()));
+    }
+    let text =
+        with_module(&text, &module).ok_or_else(|| format!("`{}` has no list of modules to add to", list.display()))?;
+    let written = fs::write(&file, TEMPLATE.replace("NODE_NAME", name)).and_then(|()| fs::write(&list, text));
+    written.map_err(|error| format!("`{}` could not be written: {error}", file.display()))?;
+    Ok(format!("wrote nodes/{family}/{module}.rs and its lines in lib.rs; try: cargo test -p {family} {module}"))
+}
+
+/// `Curve_Wind` → `curve_wind`.
+fn module_name(name: &str) -> Result<String, String> {
+    let parts = || name.split('_');
+    let word = |part: &str| {
+        part.chars().next().is_some_and(|c| c.is_ascii_uppercase()) && part.chars().all(|c| c.is_ascii_alphanumeric())
+    };
+    match parts().all(word) {
+        true => Ok(name.to_ascii_lowercase()),
+        false => Err(format!("`{name}` is not a node's name; write it like Curve_Smooth")),
+    }
+}
+
+/// The family's `lib.rs` with a module and a line in `NODES` more, both in order.
+fn with_module(text: &str, module: &str) -> Option<String> {
+    let text = inserted(text, &format!("pub mod {module};"), |line| line.starts_with("pub mod "))?;
+    if text.contains("= &[\n") {
+        return inserted(&text, &format!("    &{module}::NODE,"), |line| line.starts_with("    &"));
+    }
+    // A list on one line is broken into lines first.
+    let start = text.find("= &[")? + "= &[".len();
+    let end = start + text[start..].find("];")?;
+    let mut entries: Vec<String> =
+        text[start..end].split(',').map(|entry| entry.trim().to_owned()).filter(|entry| !entry.is_empty()).collect();
+    entries.push(format!("&{module}::NODE"));
+    entries.sort();
+    let lines: String = entries.iter().map(|entry| format!("    {entry},\n")).collect();
+    Some(format!("{}\n{lines}{}", &text[..start], &text[end..]))
+}
+
+/// `text` with `line` put in order among the lines that are `like` it.
+fn inserted(text: &str, line: &str, like: impl Fn(&str) -> bool) -> Option<String> {
+    let lines: Vec<&str> = text.lines().collect();
+    let last = lines.iter().rposition(|other| like(other))?;
+    let at = lines.iter().position(|other| like(other) && *other > line).unwrap_or(last + 1);
+    let mut all = lines;
+    all.insert(at, line);
+    Some(all.join("\n") + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_module_and_its_node_are_put_in_order() {
+        let before =
+            "//! F.\n\npub mod a;\npub mod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &c::NODE,\n];\n";
+        let after = "//! F.\n\npub mod a;\npub mod b;\npub mod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n    &c::NODE,\n];\n";
+        assert_eq!(with_module(before, "b").unwrap(), after);
+    }
+
+    #[test]
+    fn a_list_on_one_line_is_broken() {
+        let before = "pub mod a;\n\npub static NODES: &[&Node] = &[&a::NODE];\n";
+        let after = "pub mod a;\npub mod b;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n];\n";
+        assert_eq!(with_module(before, "b").unwrap(), after);
+    }
+
+    #[test]
+    fn names_are_words_joined_by_underscores() {
+        assert_eq!(module_name("Curve_Smooth").unwrap(), "curve_smooth");
+        assert_eq!(module_name("FluidSolve").unwrap(), "fluidsolve");
+        assert!(
+            module_name("curve").is_err() && module_name("Curve_").is_err() && module_name("Curve Smooth").is_err()
+        );
+    }
+}
