@@ -12,12 +12,12 @@ use engine::graph::Graph;
 use engine::plan::Request;
 use engine::time::Frame;
 use formats::Format;
-use formats::atomic::FileError;
+use formats::atomic::{AtomicFile, FileError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, Setting, Size, half_of_memory};
 use crate::failure::{Exit, Failure, exit_of_error};
-use crate::output::{Writers, Written, failed, write_whole};
+use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
 use crate::{load, report};
 
@@ -56,14 +56,15 @@ pub struct Args {
     /// Write what each node cost and published, as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    #[command(flatten)]
-    pictures: pictures::Args,
     /// Say more
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
     /// Say only what went wrong
     #[arg(short, long)]
     quiet: bool,
+    // Last: its heading would go on over what follows.
+    #[command(flatten)]
+    pictures: pictures::Args,
 }
 
 /// Cooks.
@@ -107,6 +108,8 @@ fn cook(
         }
     };
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
+    // Before the cook, so that a path that cannot be written costs no cooking.
+    let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let cancel = cancelled_by_ctrl_c();
     let progress = progress(args, request);
     let mut writing = Duration::ZERO;
@@ -135,7 +138,7 @@ fn cook(
     let written = writers.finish(&spoiled)?;
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write())?;
     writing += watch.wall();
-    if let Some(path) = &args.report {
+    if let Some(file) = report_file {
         let cooked = report::Cooked {
             graph_path: args.graph.display().to_string(),
             graph,
@@ -145,7 +148,7 @@ fn cook(
             writing,
         };
         let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
-        write_whole(path, format!("{text}\n").as_bytes())?;
+        fill(file, format!("{text}\n").as_bytes())?;
     }
     if !args.quiet {
         report.notes.iter().for_each(|note| eprintln!("note: {note}"));

@@ -14,6 +14,7 @@ pub mod failure;
 pub mod geometry_file;
 pub mod load;
 pub mod nodes;
+pub mod numbers;
 pub mod output;
 pub mod pictures;
 pub mod report;

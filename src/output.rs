@@ -126,9 +126,7 @@ fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) ->
     let mut bytes = Vec::new();
     formats::write(format, &one.geometry, &stamp, &mut bytes)
         .map_err(|error| Failure::file(format!("`{}` could not be written: {error}", path.display())))?;
-    let mut file = AtomicFile::create(&path).map_err(|error| failed(&error))?;
-    file.write_all(&bytes).map_err(|error| failed(&file.failed(error)))?;
-    file.commit().map_err(|error| failed(&error))?;
+    write_whole(&path, &bytes)?;
     Ok((path, bytes.len() as u64))
 }
 
@@ -137,7 +135,14 @@ fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) ->
 /// # Errors
 /// Where the file cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let mut file = AtomicFile::create(path).map_err(|error| failed(&error))?;
+    fill(AtomicFile::create(path).map_err(|error| failed(&error))?, bytes)
+}
+
+/// Gives a file its bytes and its name.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn fill(mut file: AtomicFile, bytes: &[u8]) -> Result<(), Failure> {
     file.write_all(bytes).map_err(|error| failed(&file.failed(error)))?;
     file.commit().map_err(|error| failed(&error))
 }

@@ -64,9 +64,8 @@ impl Pictures {
             return Ok(None);
         }
         let wrong = |text: String| Failure::new(Exit::CommandLine, text);
-        let size = args.preview_size.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-        let (width, height): (usize, usize) =
-            size.ok_or_else(|| wrong(format!("`{}` is not a size in pixels; write 640x480", args.preview_size)))?;
+        let (width, height) = size(&args.preview_size)
+            .ok_or_else(|| wrong(format!("`{}` is not a size in pixels; write 640x480", args.preview_size)))?;
         let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let frames = match &args.preview_frames {
@@ -134,6 +133,14 @@ impl Pictures {
         let settings = Settings { note: Some(frame.to_string()), ..self.settings.clone() };
         render(&layers, &settings)
     }
+}
+
+/// `WxH`, of a picture that can be made.
+fn size(text: &str) -> Option<(usize, usize)> {
+    let (width, height) = text.split_once('x')?;
+    let (width, height): (usize, usize) = (width.parse().ok()?, height.parse().ok()?);
+    let pixels = width.checked_mul(height)?;
+    (1..=Image::MOST_PIXELS).contains(&pixels).then_some((width, height))
 }
 
 fn drawing(error: preview::Error) -> Failure {

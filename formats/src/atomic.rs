@@ -234,6 +234,7 @@ fn cause(error: &io::Error) -> String {
         ErrorKind::IsADirectory => "it is a folder".into(),
         ErrorKind::NotADirectory => "a part of the path is not a folder".into(),
         ErrorKind::NotFound => "no such file or folder".into(),
+        ErrorKind::AlreadyExists => "a file of that name is in the way".into(),
         ErrorKind::InvalidFilename => "the name is too long or not allowed".into(),
         _ => error.to_string(),
     }

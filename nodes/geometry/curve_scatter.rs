@@ -6,6 +6,7 @@
 //! first where it is lower, so that it thins evenly. A blade's place in the list is its `curve_id`, which its length and
 //! lean are drawn by (`id` is left for points). Curves stand in the order of the skin's faces.
 //!
+//! Each frame of a moving skin costs as much as the first; Curve_Attach moves curves that were grown on a still one.
 //! Faces with more than three corners are cut into triangles from their first corner; a hollow one may so get roots
 //! beside it. Distances are straight through space: nearby folds that face the same way share their room.
 
@@ -32,8 +33,11 @@ params! { PARAMS:
         "A point attribute of the skin that multiplies the density. Empty, there is none.");
 }
 
-const CURVES: Output = Output::new("curves", &[Kind::Curves],
-    "The curves, root first, with `Pref`, `curve_id` and, where the skin has it, the `uvw` of the root.");
+const CURVES: Output = Output::new(
+    "curves",
+    &[Kind::Curves],
+    "The curves, root first, with `Pref`, `curve_id` and, where the skin has it, the `uvw` of the root.",
+);
 
 /// Which of the endless list of curves each is.
 const CURVE_ID: Attr<i32> = Attr::element("curve_id");
@@ -70,7 +74,7 @@ const SIDE_DRAW: u64 = 2;
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let skin = cx.part(SKIN);
-    let rest = cx.at_start(SKIN).mesh().unwrap_or(skin);
+    let rest = cx.at_start(SKIN).mesh().expect("the engine refuses a wire that lacks what its input needs");
     let triangles = triangles(rest, skin)?;
     let blades = blades(cx, rest, &triangles)?;
     cx.check_cancelled()?;
@@ -128,8 +132,9 @@ fn blades(cx: &Cx, rest: &Component, triangles: &[[u32; 3]]) -> Result<Vec<(usiz
     let unmasked = f64::from(cx.get(DENSITY)) * surface.area();
     let places = (unmasked * most_share).round();
     let cvs = cx.get(CVS) as f64;
-    if !(places * cvs <= MOST_CVS) {
-        let fact = format!("{places} curves of {cvs} CVs would grow on {} m², more than {MOST_CVS} CVs", surface.area());
+    if places * cvs > MOST_CVS {
+        let fact =
+            format!("{places} curves of {cvs} CVs would grow on {} m², more than {MOST_CVS} CVs", surface.area());
         return Err(Error::refused(fact).hint("lower `density` or `cvs`, or scale the skin to metres"));
     }
     let key = Key::new(u64::from(cx.get(SEED).0));
@@ -177,7 +182,8 @@ fn mask<'c>(cx: &Cx, rest: &'c Component) -> Result<Option<&'c [f32]>> {
     match (table.get(&name), table.column(&name)) {
         (Some(mask), _) => Ok(Some(mask)),
         (None, found) => {
-            let what = found.map_or("which `skin` does not have".into(), |column| format!("which is {}", column.kind()));
+            let what =
+                found.map_or("which `skin` does not have".into(), |column| format!("which is {}", column.kind()));
             Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected a float a point of the skin"))
         }
     }

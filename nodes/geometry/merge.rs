@@ -121,7 +121,8 @@ mod tests {
 
     #[test]
     fn curves_follow_each_other_in_the_order_of_the_wires() {
-        let out = bench(&NODE).input(GEOMETRY, curve(1.0)).input(GEOMETRY, curve(2.0)).input(GEOMETRY, curve(3.0)).cook();
+        let out =
+            bench(&NODE).input(GEOMETRY, curve(1.0)).input(GEOMETRY, curve(2.0)).input(GEOMETRY, curve(3.0)).cook();
         assert_eq!(out.curves().runs().starts(), [0, 2, 4, 6]);
         let roots: Vec<f32> = out.curves().positions().iter().step_by(2).map(|p| p[0]).collect();
         assert_eq!(roots, [1.0, 2.0, 3.0]);

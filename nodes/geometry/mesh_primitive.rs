@@ -128,7 +128,8 @@ mod tests {
         for scale in [1e-6, 1.0, 1e6] {
             let size = [0.7 * scale, 0.3 * scale, 0.9 * scale];
             for shape in SOLIDS {
-                let out = bench(&NODE).set(SHAPE, shape).set(SIZE, size).set(DIVISIONS, 3).set(THICK, 0.1 * scale).cook();
+                let out =
+                    bench(&NODE).set(SHAPE, shape).set(SIZE, size).set(DIVISIONS, 3).set(THICK, 0.1 * scale).cook();
                 let expected = if shape == Solid::Plate { [size[0], 0.1 * scale, size[2]] } else { size };
                 assert_eq!(extent(out.mesh()), expected, "{shape:?}");
                 assert!(volume(out.mesh()) > 0.0, "{shape:?}");
@@ -146,7 +147,8 @@ mod tests {
     #[test]
     fn a_bowl_holds_what_its_closed_form_says() {
         // Half a ball of radius 1 less half a ball of radius 0.9, to the order of 1/n².
-        let out = bench(&NODE).set(SHAPE, Solid::Bowl).set(SIZE, [2.0, 1.0, 2.0]).set(THICK, 0.1).set(DIVISIONS, 64).cook();
+        let out =
+            bench(&NODE).set(SHAPE, Solid::Bowl).set(SIZE, [2.0, 1.0, 2.0]).set(THICK, 0.1).set(DIVISIONS, 64).cook();
         let exact = 2.0 / 3.0 * std::f64::consts::PI * (1.0 - 0.729);
         assert!((volume(out.mesh()) / exact - 1.0).abs() < 1e-3);
     }

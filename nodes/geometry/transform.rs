@@ -274,8 +274,7 @@ mod tests {
 
     #[test]
     fn a_volume_moves_and_grows_with_its_distances_and_speeds() {
-        let out =
-            bench(&NODE).input(GEOMETRY, volume()).set(SCALE, [2.0; 3]).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
+        let out = bench(&NODE).input(GEOMETRY, volume()).set(SCALE, [2.0; 3]).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
         let moved = out.geometry.volume().unwrap();
         assert_eq!(moved.grid(), Grid { origin: [2.0, 1.0, 0.0], cell: 1.0, size: [1, 1, 1] });
         assert_eq!(moved.level_set()[..], [-0.5]);

@@ -58,7 +58,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let line = format!("{} files cannot become one {format} file; write {stem}.####.{ending}", files.len());
         return Err(command_line(line));
     }
-    sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
+    if folder_of(&args.to).is_dir() {
+        sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
+    }
     let conversion = Conversion { format, scale: args.scale, fps: args.fps };
     let written = match &to {
         Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::Compared;
 use super::compare::{Finding, Place, Side, Values, What};
+use crate::numbers::{decimal, short};
 
 /// JSON: `same`, and a list of pairs with what was found, differences within the tolerance included.
 pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
@@ -55,7 +56,10 @@ fn finding_json(finding: &Finding) -> Value {
             put("largest", json!(values.largest));
             put("largest_row", json!(values.largest_row));
             put("mean", json!(values.mean));
-            let first = values.first.map(|first| json!({"row": first.row, "axis": first.lane, "values": first.values}));
+            let stored = |value: f64| if values.kind.is_float() { decimal(value as f32) } else { value };
+            let first = values.first.map(|first| {
+                json!({"row": first.row, "axis": first.lane, "values": first.values.map(stored)})
+            });
             put("first", json!(first));
         }
     }
@@ -88,8 +92,8 @@ pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
         let named = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
         let (a, b) = (named(&one.pair.a), named(&one.pair.b));
         match (&one.pair.a, &one.pair.b) {
-            (Some(_), None) => _ = writeln!(text, "only {a} is there"),
-            (None, _) => _ = writeln!(text, "only {b} is there"),
+            (Some(_), None) => _ = writeln!(text, "{a}: nothing to compare it with"),
+            (None, _) => _ = writeln!(text, "{b}: nothing to compare it with"),
             _ if all.len() > 1 && one.differs() => _ = writeln!(text, "{a} and {b}:"),
             _ => {}
         }
@@ -115,7 +119,7 @@ fn nearest_miss(all: &[Compared]) -> String {
         _ => None,
     });
     match largest.max_by(|(a, ..), (b, ..)| a.total_cmp(b)) {
-        Some((largest, place, kind)) => format!("; at most {largest} apart, in `{}` of {kind}", place.name),
+        Some((largest, place, kind)) => format!("; `{}` of {kind} is {} apart", place.name, short(largest)),
         None => "; every bit is".to_owned(),
     }
 }
@@ -142,25 +146,24 @@ fn line(finding: &Finding, a: &str, b: &str) -> String {
 }
 
 fn values_line(kind: Kind, place: &Place, values: &Values) -> String {
-    let Values { numbers, differing, not_finite, largest, largest_row, mean, .. } = values;
-    let row = match place.owner {
-        Some(Owner::Once) => |_: &str, _: usize| String::new(),
-        _ => |name: &str, row: usize| format!(" at {name} {row}"),
-    };
+    let Values { numbers, differing, not_finite, .. } = values;
     let name = row_name(kind, place.owner);
     let mut line = format!("`{}`: {differing} of {numbers} numbers differ", place.name);
-    let _ = match *largest > 0.0 {
-        true => write!(line, ", by {mean:.3e} on average and at most {largest}{}", row(name, *largest_row)),
-        false if *not_finite == 0 => write!(line, ", but only in the sign of zero (see --tolerance 0)"),
+    let _ = match values.largest > 0.0 {
+        true => {
+            let (largest, row, mean) = (short(values.largest), values.largest_row, short(values.mean));
+            write!(line, ", by at most {largest} ({name} {row}) and {mean} on average")
+        }
+        false if *not_finite == 0 => write!(line, ", but only in the sign of zero; --tolerance 0 passes over that"),
         false => Ok(()),
     };
     if *not_finite > 0 {
-        let _ = write!(line, ", {not_finite} without end");
+        let _ = write!(line, ", {not_finite} of them without end");
     }
     if let Some(first) = values.first {
         let axis = if values.kind.width() > 1 { format!("[{}]", first.lane) } else { String::new() };
         let [a, b] = first.values.map(|value| shown(value, values.kind));
-        let _ = write!(line, "; the first{axis}{}: {a} and {b}", row(name, first.row));
+        let _ = write!(line, "; the first is {name} {}{axis}: {a} and {b}", first.row);
     }
     line
 }

@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::measure::{AttributeStats, PartStats, Shape, Spread, Stats, VolumeStats};
 use crate::geometry_file::GeometryFile;
+use crate::numbers::{decimal, short};
 
 /// JSON: an object a component, with the tables of the json form.
 pub(super) fn json(name: &str, file: &GeometryFile, stats: &Stats) -> String {
@@ -103,11 +104,6 @@ fn table_name(owner: Owner) -> &'static str {
 /// A number of an attribute as its file would say it.
 fn as_stored(attribute: &AttributeStats, number: f64) -> f64 {
     if attribute.kind.is_float() { decimal(number as f32) } else { number }
-}
-
-/// The f64 with the digits of the shortest decimal of an f32: 0.1 for 0.1, not 0.10000000149.
-fn decimal(number: f32) -> f64 {
-    number.to_string().parse().unwrap_or_else(|_| f64::from(number))
 }
 
 /// Text, a block a component.
@@ -207,28 +203,4 @@ fn line(text: &mut String, label: &str, facts: &str) {
 fn list(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|x| short(*x)).collect();
     format!("[{}]", numbers.join(", "))
-}
-
-/// Six digits.
-fn short(number: f64) -> String {
-    let rounded: f64 = format!("{number:.5e}").parse().unwrap_or(number);
-    let text = format!("{rounded:?}");
-    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_shown_with_six_digits_and_no_needless_zero() {
-        let shown: Vec<String> = [5.0, 1.0 / 3.0, -0.0, 1e-7, 123_456_789.0, 0.1].map(short).into();
-        assert_eq!(shown, ["5", "0.333333", "-0", "1e-7", "123457000", "0.1"]);
-    }
-
-    #[test]
-    fn an_f32_is_the_decimal_that_its_file_says() {
-        assert_eq!(decimal(0.1), 0.1);
-        assert_eq!(decimal(f32::MAX), 3.402_823_5e38);
-    }
 }

@@ -488,6 +488,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let until = advances.keys().map(|stretch| stretch.until).max();
         let (Some(low), Some(high), Some(mut until)) = (low, high, until) else { return };
         while until < i64::MAX
+            && self.plan.nodes[node].varies
             && let Ok(stretch) = self.keys.stretch(node, until)
             && stretch.start <= high
             && self.is_asked_later(node, stretch)

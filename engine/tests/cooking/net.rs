@@ -149,6 +149,11 @@ pub(crate) fn engine(threads: usize, memory: usize) -> Engine {
     Engine::new(&Settings { threads, memory }).expect("threads")
 }
 
+/// Runs what panics on purpose without the words of the panic on the terminal.
+pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> T {
+    work()
+}
+
 pub(crate) fn at(frame: f64) -> Frame {
     Frame::exactly(frame).expect("a frame")
 }

@@ -339,8 +339,11 @@ pub(crate) static FOLLOW: Node =
 
 // ——— solver ———
 
+/// Where no start is set.
+const UNSET: i64 = -1_000_000;
+
 params! { BOUNCE_PARAMS:
-    START: Param<i64> = Param::int("start_frame", i64::MIN, "Where it starts; the scene's first frame if left out.").fixed();
+    START: Param<i64> = Param::int("start_frame", UNSET, "Where it starts; the scene's first frame if left out.").fixed();
     GRAVITY: Param<f32> = Param::float("gravity", -9.81, "How fast it falls.").unit(Unit::MetresPerSecondSquared);
     SAMPLES: Param<i64> = Param::int("samples", 4, "Times within a step at which the floor is read.").within(1.0, 8.0);
     BOUNCE_PROBE: Param<i64> = PROBE;
@@ -398,7 +401,7 @@ pub(crate) static BOUNCE: Node = Node::new(
     "Bounce",
     1,
     "Points that fall and bounce.",
-    Cook::solver::<Bounce>(|params| Some(params.get(START)).filter(|start| *start != i64::MIN)),
+    Cook::solver::<Bounce>(|params| Some(params.get(START)).filter(|start| *start != UNSET)),
 )
 .inputs(BOUNCE_INPUTS)
 .params(BOUNCE_PARAMS)

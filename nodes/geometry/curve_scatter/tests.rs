@@ -37,7 +37,12 @@ fn density_times_area_curves_grow() {
 
 #[test]
 fn without_lean_curves_stand_on_the_skin() {
-    let out = meadow(square(1.0)).set(DENSITY, 50.0).set(LEAN, 0.0).set(LENGTH, Span { low: 0.5, high: 0.5 }).set(CVS, 3).cook();
+    let out = meadow(square(1.0))
+        .set(DENSITY, 50.0)
+        .set(LEAN, 0.0)
+        .set(LENGTH, Span { low: 0.5, high: 0.5 })
+        .set(CVS, 3)
+        .cook();
     for cvs in out.curves().runs().ranges() {
         let cvs = &out.curves().positions()[cvs];
         let [x, y, z] = cvs[0];
@@ -81,7 +86,8 @@ fn roots_lie_on_the_skin_and_apart() {
         assert!(off < 1e-7, "{root:?} is {off} off");
     }
     let roots = roots(&out);
-    let nearest = |i: usize| (0..roots.len()).filter(|j| *j != i).map(|j| length(roots[i], roots[j])).fold(f64::MAX, f64::min);
+    let nearest =
+        |i: usize| (0..roots.len()).filter(|j| *j != i).map(|j| length(roots[i], roots[j])).fold(f64::MAX, f64::min);
     let least = (0..roots.len()).map(nearest).fold(f64::MAX, f64::min);
     // A hundred on a square metre are 0.1 apart in rows; at random, the nearest two of 1,200 would be 1.4e-3.
     assert!(least > 0.045, "{least}");
@@ -90,15 +96,14 @@ fn roots_lie_on_the_skin_and_apart() {
 /// Distance to the triangle's plane, where the foot is inside or a hair beside it.
 fn height(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
     let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let normal = cross(sub(b, a), sub(c, a));
     let size = dot(normal, normal);
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|(from, to)| {
-        dot(cross(sub(*to, *from), sub(p, *from)), normal) > -1e-6 * size
-    });
+    let inside = [(a, b), (b, c), (c, a)]
+        .iter()
+        .all(|(from, to)| dot(cross(sub(*to, *from), sub(p, *from)), normal) > -1e-6 * size);
     inside.then(|| (dot(sub(p, a), normal) / size.sqrt()).abs())
 }
 
@@ -224,7 +229,9 @@ fn a_skin_without_area_grows_nothing() {
 
 #[test]
 fn any_cvs_and_lengths_are_finite() {
-    let curve = |cvs, length| meadow(square(0.1)).set(DENSITY, 200.0).set(CVS, cvs).set(LENGTH, Span { low: 0.0, high: length }).cook();
+    let curve = |cvs, length| {
+        meadow(square(0.1)).set(DENSITY, 200.0).set(CVS, cvs).set(LENGTH, Span { low: 0.0, high: length }).cook()
+    };
     for (cvs, length) in [(2, 0.0), (10_000, 1.0), (3, 1e30)] {
         assert_eq!(curve(cvs, length).curves().point_count(), 2 * cvs as usize);
     }
@@ -236,7 +243,8 @@ fn more_than_fits_is_refused() {
     assert_eq!(error.fact, "1000000000000000 curves of 5 CVs would grow on 1000000000000 m², more than 67108864 CVs");
     // A mask that leaves a small lawn of the same plain makes it fit: only faces it touches count.
     let far = 1e6;
-    let points = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [far, 0.0, 0.0], [far, 0.0, far], [0.0, 0.0, far]];
+    let points =
+        vec![[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [far, 0.0, 0.0], [far, 0.0, far], [0.0, 0.0, far]];
     let mut plain = Component::mesh(vec![3, 3], vec![0, 1, 2, 3, 5, 4], points).unwrap();
     plain.set(Attr::<f32>::point("lawn"), vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).unwrap();
     assert_eq!(meadow(plain).set(MASK, "lawn".into()).cook().curves().element_count(), 500);

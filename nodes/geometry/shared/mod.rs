@@ -1,3 +1,4 @@
 //! What several nodes of the family need, and none of them is.
 
+pub(crate) mod neutral;
 pub(crate) mod source;

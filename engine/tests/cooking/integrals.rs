@@ -1,0 +1,96 @@
+//! Integrals over time of what a node's params were.
+
+use std::sync::Arc;
+
+use engine::expr::{Expr, Scope};
+use engine::param::{Keyframes, ParamType, Shape, Source};
+use numerics::ramp::Interpolation;
+
+use crate::net::{Cooked, Net, at, engine, keyed};
+use crate::nodes::{DRIFT, SOURCE};
+
+fn drift(first: i64, speed: Source, upto: f32) -> Net {
+    let mut net = Net::new(first, 100);
+    let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
+    net.add("drift", &DRIFT).source("speed", speed).set("upto", upto).wire("points", a).out();
+    net
+}
+
+fn cook(net: &Net, frames: &[f64]) -> Cooked {
+    let frames: Vec<_> = frames.iter().map(|frame| at(*frame)).collect();
+    net.cook_with(&engine(2, 1 << 30), &frames, None)
+}
+
+#[test]
+fn constant_speed_is_exact_at_any_frame() {
+    let net = drift(1, Source::Constant(3.0_f32.value()), 0.0);
+    let cooked = cook(&net, &[-12.0, 0.0, 10.5, 24.0, 1e8]);
+    assert_eq!(cooked.xs(), [-1.5, 0.0, 1.3125, 3.0, 1.25e7]);
+}
+
+#[test]
+fn keyed_speed_meets_the_closed_form() {
+    // v = f/12 m/s up to frame 24, then 2: ∫ = f²/576 m, then 1 + (f − 24)/12.
+    let net = drift(1, keyed(&[(0.0, 0.0), (24.0, 2.0)]), 0.0);
+    let cooked = cook(&net, &[0.0, 1.0, 6.5, 12.0, 24.0, 30.0]);
+    for (frame, x) in [(0.0, 0.0), (1.0, 1.0 / 576.0), (6.5, 42.25 / 576.0), (12.0, 0.25), (24.0, 1.0), (30.0, 1.5)] {
+        assert!((cooked.x(frame) - x).abs() <= 1e-7, "frame {frame}: {} for {x}", cooked.x(frame));
+    }
+}
+
+#[test]
+fn smooth_keys_meet_the_closed_form() {
+    // s(t) = 3t² − 2t³ with t = f/24: ∫₀^f = (t³ − t⁴/2) · 1 s.
+    let keys = vec![(0.0, 0.0_f32.value()), (24.0, 1.0_f32.value())];
+    let keys = Keyframes { keys, interpolation: Interpolation::Smooth };
+    let net = drift(1, Source::Keys(Arc::new(keys), f32::shape()), 0.0);
+    let cooked = cook(&net, &[6.0, 12.0, 17.75]);
+    for frame in [6.0, 12.0, 17.75] {
+        let t = frame / 24.0;
+        let exact = (t * t * t - 0.5 * t * t * t * t) as f32;
+        assert!((cooked.x(frame) - exact).abs() <= 1e-7, "frame {frame}: {} for {exact}", cooked.x(frame));
+    }
+}
+
+#[test]
+fn an_expression_meets_the_closed_form() {
+    // ∫₀^t sin(5t) dt = (1 − cos 5t)/5; four Gauss points a frame leave far less than f32 shows.
+    let speed = Expr::parse("sin(5*time)", &Scope::default()).expect("an expression");
+    let net = drift(-20, Source::Exprs(Arc::new(vec![speed]), Shape::Float, Arc::default()), 0.0);
+    let frames = [1.0, 7.5, 31.0, 96.0, -20.0];
+    let cooked = cook(&net, &frames);
+    for frame in frames {
+        let exact = ((1.0 - libm::cos(5.0 * frame / 24.0)) / 5.0) as f32;
+        assert!((cooked.x(frame) - exact).abs() <= 1e-7, "frame {frame}: {} for {exact}", cooked.x(frame));
+    }
+}
+
+#[test]
+fn any_frame_alone_has_the_bits_it_has_among_others() {
+    let speed = || keyed(&[(-30.0, 0.3), (-7.0, 1.1), (3.0, 0.1), (24.0, 2.0), (31.0, -1.0)]);
+    let net = drift(-20, speed(), 0.0);
+    let frames: Vec<f64> = (-40..60).map(|k| f64::from(k) * 0.7).map(|f| (f * 10.0).round() / 10.0).collect();
+    let together = cook(&net, &frames);
+    for frame in frames.iter().step_by(7) {
+        assert_eq!(cook(&net, &[*frame]).x(*frame).to_bits(), together.x(*frame).to_bits(), "frame {frame}");
+    }
+}
+
+#[test]
+fn before_the_scenes_start_params_are_taken_to_have_held() {
+    // v = 1 + (f + 10)/10 from frame −10 to 10, 1 before. x(5) reads the integral up to frame −15.
+    let net = drift(-10, keyed(&[(-10.0, 1.0), (10.0, 3.0)]), 20.0);
+    // ∫₀^−10 (2 + f/10) df = −20 + 5 = −15 frames; five frames more at 1: −20; a second has 24 frames.
+    let exact = -20.0 / 24.0;
+    assert!((cook(&net, &[5.0]).x(5.0) - exact).abs() <= 1e-6);
+    // What was keyed before the scene's start is not seen.
+    let other = drift(-10, keyed(&[(-14.0, 9.0), (-10.0, 1.0), (10.0, 3.0)]), 20.0);
+    assert_eq!(cook(&other, &[5.0]).x(5.0).to_bits(), cook(&net, &[5.0]).x(5.0).to_bits());
+}
+
+#[test]
+fn the_future_is_not_known() {
+    let net = drift(1, keyed(&[(0.0, 0.0), (24.0, 2.0)]), -2.0);
+    let error = cook(&net, &[5.0]).error();
+    assert!(error.contains("an integral up to frame 7, which is after frame 5"), "{error}");
+}

@@ -1,0 +1,387 @@
+//! Attribute_Expr: attributes made of attributes, by a few lines of code.
+//!
+//! The language is [`engine::expr`]'s. A row sees itself: its own attributes, what stands once for the whole component,
+//! and over the points of curves also those of the curve. A well-known attribute that is missing reads as the value
+//! that changes nothing (`envelope` 1, `width` 0, `v` 0, `orient` no turn, `Pref` the position), so that code runs on
+//! raw curves. `rand` and `noise` hang on `seed`, and `seed` in the code is the node's, the scene's mixed in.
+
+use crate::shared::neutral;
+use engine::expr::{Env, ExprError, Program, RunError, Scope};
+use engine::prelude::*;
+
+inputs! { INPUTS:
+    GEOMETRY: Input = Input::any("geometry", "What gets the attributes.");
+}
+
+choice! {
+    /// Which component the code runs on.
+    pub enum Part {
+        Curves = "curves": "the curves",
+        Mesh = "mesh": "the mesh",
+        Points = "points": "the loose points",
+        Tets = "tets": "the tets",
+    }
+}
+
+choice! {
+    /// What a row is.
+    pub enum Over {
+        Points = "points": "every CV, vertex, particle or tet point",
+        Elements = "elements": "every curve, face or tet",
+    }
+}
+
+params! { PARAMS:
+    CODE: Param<Name> = Param::text("code", "",
+        "One assignment a line: `envelope = clamp(envelope*P.y, 0, 1)`, `P.y += 0.1*sin(time)`, `let h = P.y*2`. A new \
+         name makes an attribute, a number or a vector as its value is. Known are attributes by name, `.x .y .z .w`, \
+         `frame time fps seed pi`, `i` (the row, from 0) and `count`; `+ - * / % ^`, comparisons, `&& || !`, `a ? b : \
+         c`; sin cos tan sqrt exp log pow abs floor ceil min max clamp mix smoothstep noise rand vec length dot cross \
+         normalize and others. Angles are radians. Empty, it does nothing.").fixed();
+    COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "What it runs on.");
+    OVER: Param<Over> = Param::choice("over", Over::Points, "What a row is.");
+    SEED: Param<Seed> = Param::seed("Other numbers give other `rand` and `noise`.");
+}
+
+const CHANGED: Output = Output::like("geometry", &GEOMETRY, "The same, with the attributes that the code assigns.");
+
+const ROWS: Metric = Metric::new("rows", Unit::None, "Points or elements that the code ran over.");
+
+/// See the module.
+pub static NODE: Node = Node::new(
+    "Attribute_Expr",
+    1,
+    "Makes or changes attributes, positions included, by an expression for every point or element. A row sees its own \
+     attributes and those of the whole; over the points of curves also the curve's. Missing well-known attributes read \
+     as what changes nothing: `envelope` 1, `width` and `v` 0.",
+    Cook::Frame { cook, reads_clock },
+)
+.inputs(INPUTS)
+.params(PARAMS)
+.outputs(&[&CHANGED])
+.attributes(attributes)
+.metrics(&[&ROWS])
+.checks(check)
+.leaves_out(|params, _| match program(params) {
+    Ok(program) if program.writes().is_empty() => vec![LeftOut::new("code", "it assigns nothing")],
+    _ => Vec::new(),
+});
+
+/// The program that the code is.
+///
+/// # Errors
+/// Every line's fault, with its line and column; the hint is the first's.
+fn program(params: &Params) -> Result<Program> {
+    Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
+        let place = |fault: &ExprError| format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
+        let facts: Vec<String> = faults.iter().map(place).collect();
+        Error { hint: faults.into_iter().find_map(|fault| fault.hint), ..Error::refused(facts.join("; ")) }
+    })
+}
+
+/// What can be wrong whatever the geometry is.
+fn check(params: &Params) -> Result<()> {
+    let program = program(params)?;
+    let elements = params.get(OVER) == Over::Elements;
+    if elements && params.get(COMPONENT) == Part::Points {
+        return Err(Error::refused("loose points have no elements").hint("set `over` to \"points\""));
+    }
+    if elements && program.writes().iter().any(|name| name == P.name) {
+        return Err(
+            Error::refused("`P` belongs to points, and the code runs over elements").hint("set `over` to \"points\"")
+        );
+    }
+    Ok(())
+}
+
+/// The frame rate counts as the clock: it is the scene's, not a param.
+fn reads_clock(params: &Params) -> bool {
+    program(params).is_ok_and(|program| program.uses().time || program.uses().fps)
+}
+
+/// What is written is read too: points and elements of other components may have an attribute of that name.
+fn attributes(params: &Params) -> [AttrNames; 2] {
+    let names = |lists: &[&[String]]| {
+        AttrNames::These(lists.iter().flat_map(|list| list.iter()).map(|name| Name::from(name.as_str())).collect())
+    };
+    match program(params) {
+        Ok(program) => [names(&[program.reads(), program.writes()]), names(&[program.writes()])],
+        Err(_) => [names(&[]), names(&[])],
+    }
+}
+
+fn cook(cx: &FrameCx) -> Result<Outputs> {
+    check(cx.params())?;
+    let program = program(cx.params())?;
+    let mut geometry = cx.input(GEOMETRY).clone();
+    if program.writes().is_empty() {
+        return Ok(CHANGED.with(geometry));
+    }
+    let part = part(&mut geometry, cx.get(COMPONENT))?;
+    let owner = match cx.get(OVER) {
+        Over::Points => Owner::Point,
+        Over::Elements => Owner::Element,
+    };
+    let written = run(&program, &env(cx), part, owner)?;
+    cx.publish(ROWS, part.table(owner).rows() as f64);
+    for (name, column) in written {
+        part.set_column(owner, name, column)?;
+    }
+    Ok(CHANGED.with(geometry))
+}
+
+fn env(cx: &FrameCx) -> Env<'static> {
+    let seed = f64::from(cx.get(SEED).0);
+    Env { frame: cx.frame().number(), time: cx.seconds(), fps: cx.fps(), seed, controls: &[] }
+}
+
+fn part(geometry: &mut Geometry, component: Part) -> Result<&mut Component> {
+    let kind = match component {
+        Part::Curves => Kind::Curves,
+        Part::Mesh => Kind::Mesh,
+        Part::Points => Kind::Points,
+        Part::Tets => Kind::Tets,
+    };
+    let there: Vec<&str> = geometry.kinds().map(Kind::name).collect();
+    let hint =
+        format!("set `component`; it has {}", if there.is_empty() { "nothing".into() } else { there.join(", ") });
+    geometry.part_mut(kind).ok_or_else(|| Error::refused(format!("`geometry` has no {kind}")).hint(hint))
+}
+
+/// The columns that the program writes.
+fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Result<Vec<(String, Column)>> {
+    let table = part.table(owner);
+    let lent: Vec<(&str, Column)> = program
+        .reads()
+        .iter()
+        .filter(|name| table.column(name).is_none())
+        .filter_map(|name| Some((name.as_str(), lent(part, owner, name)?)))
+        .collect();
+    for name in program.writes() {
+        check_owner(part, owner, name)?;
+    }
+    let own = table.iter().map(|(name, column)| (&**name, column));
+    let columns: Vec<(&str, &Column)> = own.chain(lent.iter().map(|(name, column)| (*name, column))).collect();
+    program.run(env, &columns, table.rows()).map_err(|error| explained(error, part, owner))
+}
+
+/// An attribute that rows of `owner` do not have themselves: of the whole, of a CV's curve, or neutral.
+fn lent(part: &Component, owner: Owner, name: &str) -> Option<Column> {
+    if let Some(column) = part.table(Owner::Once).column(name) {
+        return Some(column.gather(&vec![0; part.table(owner).rows()]));
+    }
+    match (part.topology(), part.table(other(owner)).column(name)) {
+        (Topology::Curves(runs), Some(column)) if owner == Owner::Point => {
+            let curves = runs.counts().enumerate();
+            let rows: Vec<u32> = curves.flat_map(|(k, cvs)| std::iter::repeat_n(k as u32, cvs as usize)).collect();
+            Some(column.gather(&rows))
+        }
+        (_, Some(_)) => None,
+        (_, None) => neutral::column(part, owner, name),
+    }
+}
+
+fn other(owner: Owner) -> Owner {
+    if owner == Owner::Point { Owner::Element } else { Owner::Point }
+}
+
+/// Refuses an attribute that the other kind of row has: two of one name would go their own ways.
+fn check_owner(part: &Component, owner: Owner, name: &str) -> Result<()> {
+    let theirs = other(owner);
+    if part.table(owner).column(name).is_none() && part.table(theirs).column(name).is_some() {
+        let fact = format!("`{name}` of the {} belongs to {theirs}s, and the code runs over {owner}s", part.kind());
+        return Err(Error::refused(fact).hint(format!("set `over` to \"{theirs}s\", or assign to another name")));
+    }
+    Ok(())
+}
+
+/// The error, with a hint where the code names what the other kind of row has.
+fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
+    let RunError::Code(fault) = &error else { return error.into() };
+    let theirs = part.table(other(owner));
+    let named = theirs.iter().map(|(name, _)| name).find(|name| fault.fact.contains(&format!("`{name}`")));
+    let hint = named.map(|name| match owner {
+        Owner::Point => format!("`{name}` belongs to elements, and a point of the {} may lie in several", part.kind()),
+        _ => format!("`{name}` belongs to points, of which an element has several; set `over` to \"points\""),
+    });
+    let error = Error::from(error);
+    Error { hint: hint.or(error.hint), ..error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::cook::{Engine, Settings};
+    use engine::testing::{Bench, Tasted, bench, cook_all};
+
+    fn curves() -> Component {
+        let points = vec![[0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [3.0, 1.0, 0.0]];
+        let mut curves = Component::curves(vec![2, 1], points).unwrap();
+        curves.set(SHIELDED, vec![0.25, 0.75]).unwrap();
+        curves
+    }
+
+    fn code(text: &str) -> Bench {
+        bench(&NODE).input(GEOMETRY, curves()).set(CODE, text.into())
+    }
+
+    fn floats<'a>(out: &'a Tasted, name: &'static str) -> &'a [f32] {
+        out.curves().get(Attr::point(name)).unwrap()
+    }
+
+    fn refused(bench: &Bench) -> String {
+        bench.try_cook().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_line_of_the_manual_runs_on_raw_curves() {
+        let out = code("envelope = clamp(envelope*P.y, 0, 1)").cook();
+        assert_eq!(out.curves().get(ENVELOPE), Some(&[0.5, 1.0, 1.0][..]));
+        assert_eq!(out.metrics["rows"], 3.0);
+    }
+
+    #[test]
+    fn positions_may_be_written_and_all_else_is_shared() {
+        let input = curves();
+        let out = bench(&NODE).input(GEOMETRY, input.clone()).set(CODE, "P.y *= 2; P.x = i".into()).cook();
+        assert_eq!(out.curves().positions(), [[0.0, 1.0, 0.0], [1.0, 4.0, 0.0], [2.0, 2.0, 0.0]]);
+        assert!(out.curves().topology().same(input.topology()));
+        let shielded = |curves: &Component| curves.table(Owner::Element).column("shielded").unwrap().address();
+        assert_eq!(shielded(out.curves()), shielded(&input));
+    }
+
+    #[test]
+    fn nothing_assigned_shares_everything() {
+        let input = Geometry::from(curves());
+        for text in ["", "// nothing", "let a = P.x"] {
+            let out = bench(&NODE).input(GEOMETRY, input.clone()).set(CODE, text.into()).cook();
+            assert_eq!(out.geometry.arrays(), input.arrays());
+        }
+    }
+
+    #[test]
+    fn a_cv_sees_its_curve_and_the_whole() {
+        let mut input = curves();
+        input.set(Attr::<f32>::once("gain"), vec![10.0]).unwrap();
+        let out = bench(&NODE).input(GEOMETRY, input).set(CODE, "a = shielded*gain".into()).cook();
+        assert_eq!(floats(&out, "a"), [2.5, 2.5, 7.5]);
+    }
+
+    #[test]
+    fn missing_well_known_attributes_change_nothing() {
+        let out = code("a = width + v.x + shielded*0 + orient.w + (Pref.y - P.y) + thickness").cook();
+        assert_eq!(floats(&out, "a"), [1.0; 3]);
+    }
+
+    #[test]
+    fn elements_have_their_own_attributes() {
+        let out = code("shielded = 1 - shielded; k = i").set(OVER, Over::Elements).cook();
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.75, 0.25][..]));
+        assert_eq!(out.curves().get(Attr::<f32>::element("k")), Some(&[0.0, 1.0][..]));
+    }
+
+    #[test]
+    fn time_and_frame_are_those_of_the_cook() {
+        let moving = code("a = time*24; b = frame");
+        for frame in [1.0, 2.5, 40.0] {
+            let out = moving.clone().at(frame).cook();
+            assert_eq!(floats(&out, "a"), [frame as f32; 3]);
+            assert_eq!(floats(&out, "b"), [frame as f32; 3]);
+        }
+    }
+
+    #[test]
+    fn the_seed_changes_chance_alone() {
+        let random = |seed| floats(&code("a = rand(i)").set(SEED, Seed(seed)).cook(), "a").to_vec();
+        assert_eq!(random(1), random(1));
+        assert_ne!(random(1), random(2));
+        assert_ne!(random(1)[0].to_bits(), random(1)[1].to_bits());
+    }
+
+    #[test]
+    fn code_that_does_not_name_the_clock_runs_once() {
+        let cooks = |text: &str| {
+            let engine = Engine::new(&Settings::default()).unwrap();
+            let frames: Vec<Frame> = (1..=5).map(Frame::whole).collect();
+            let (_, report) = cook_all(&engine, &code(text).graph(), &frames);
+            report.nodes.last().unwrap().cooks
+        };
+        assert_eq!(cooks("a = P.x + rand(i)"), 1);
+        assert_eq!(cooks("a = time"), 5);
+        assert_eq!(cooks("a = fps"), 5);
+    }
+
+    #[test]
+    fn every_component_has_points() {
+        let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[1.0; 3]; 3]).unwrap();
+        let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[1.0; 3]; 4]).unwrap();
+        let all = Geometry::from(curves()).with(mesh).with(tets).with(Component::points(vec![[1.0; 3]]));
+        for (component, kind) in [
+            (Part::Curves, Kind::Curves),
+            (Part::Mesh, Kind::Mesh),
+            (Part::Points, Kind::Points),
+            (Part::Tets, Kind::Tets),
+        ] {
+            let out =
+                bench(&NODE).input(GEOMETRY, all.clone()).set(CODE, "a = 1".into()).set(COMPONENT, component).cook();
+            for other in [Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets] {
+                let written = out.part(other).table(Owner::Point).column("a").is_some();
+                assert_eq!(written, other == kind);
+            }
+        }
+    }
+
+    #[test]
+    fn faults_of_the_code_have_line_and_column() {
+        assert_eq!(refused(&code("a = 1\nb = sin(")), "line 2, column 9: expected a value, found the end");
+        assert_eq!(
+            refused(&code("a = envelop")),
+            "line 1, column 5: there is no attribute, control or value `envelop`"
+        );
+        assert_eq!(refused(&code("a = 1/(P.x - 3)")), "line 1, element 2: `a` would be inf, not a finite number");
+        let two = refused(&code("a = clamp(1)\nb = 2\nc = 3 +"));
+        assert!(two.starts_with("line 1, column 5: ") && two.contains("; line 3, column 8: "), "{two}");
+    }
+
+    #[test]
+    fn rows_of_the_other_kind_are_named() {
+        assert_eq!(
+            refused(&code("a = P.x").set(OVER, Over::Elements)),
+            "line 1, column 5: there is no attribute, control or value `P`; \
+             `P` belongs to points, of which an element has several; set `over` to \"points\""
+        );
+        assert_eq!(
+            refused(&code("shielded = 1")),
+            "`shielded` of the curves belongs to elements, and the code runs over points; \
+             set `over` to \"elements\", or assign to another name"
+        );
+        let mut mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[1.0; 3]; 3]).unwrap();
+        mesh.set(Attr::<f32>::element("mask"), vec![1.0]).unwrap();
+        let mesh = bench(&NODE).input(GEOMETRY, mesh).set(COMPONENT, Part::Mesh).set(CODE, "a = mask".into());
+        assert!(refused(&mesh).ends_with("`mask` belongs to elements, and a point of the mesh may lie in several"));
+    }
+
+    #[test]
+    fn what_no_geometry_could_have_is_refused_before_the_cook() {
+        let loose = code("a = 1").set(COMPONENT, Part::Points).set(OVER, Over::Elements);
+        assert_eq!(refused(&loose), "loose points have no elements; set `over` to \"points\"");
+        let positions = code("P = P*2").set(OVER, Over::Elements);
+        assert_eq!(
+            refused(&positions),
+            "`P` belongs to points, and the code runs over elements; set `over` to \"points\""
+        );
+        let absent = code("a = 1").set(COMPONENT, Part::Tets);
+        assert_eq!(refused(&absent), "`geometry` has no tets; set `component`; it has curves");
+    }
+
+    #[test]
+    fn no_rows_and_many_threads() {
+        let empty = Component::curves(vec![], vec![]).unwrap();
+        let out = bench(&NODE).input(GEOMETRY, empty).set(CODE, "a = P.x".into()).cook();
+        assert_eq!(floats(&out, "a"), [0.0; 0]);
+        let points: Vec<[f32; 3]> = (0..9_999).map(|k| [k as f32, 0.5, -1.0]).collect();
+        let many = bench(&NODE).input(GEOMETRY, Component::curves(vec![9_999], points).unwrap());
+        let many = many.set(CODE, "a = noise(P*0.1) + sin(P.x)".into());
+        assert_eq!(many.clone().threads(1).cook().geometry, many.threads(7).cook().geometry);
+    }
+}
