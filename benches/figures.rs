@@ -88,7 +88,8 @@ impl Figures {
 }
 
 fn cook(engine: &Engine, graph: &Graph, frames: i64) -> Report {
-    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: (1..=frames).map(Frame::whole).collect() };
+    let request =
+        Request { outputs: (0..graph.outputs.len()).collect(), frames: (1..=frames).map(Frame::whole).collect() };
     let mut nothing = |_: &[Delivered]| -> std::result::Result<(), Infallible> { Ok(()) };
     engine.cook(graph, &request, None, &AtomicBool::new(false), &mut nothing).expect("it cooks")
 }
@@ -141,7 +142,10 @@ fn trivial_chain(nodes: usize) -> Graph {
 
 /// Nodes one after the other, each with its defaults, on given curves.
 fn chain_of(given: Geometry, types: &[&'static Node]) -> Graph {
-    let mut nodes = vec![GraphNode { id: "given".into(), body: Body::Given { at: Arc::new(move |_| given.clone()), moves: false } }];
+    let mut nodes = vec![GraphNode {
+        id: "given".into(),
+        body: Body::Given { at: Arc::new(move |_| given.clone()), moves: false },
+    }];
     for node in types {
         let before = Link { node: nodes.len() - 1, port: 0 };
         let specs: Arc<[_]> = node.param_specs().into();
@@ -153,4 +157,3 @@ fn chain_of(given: Geometry, types: &[&'static Node]) -> Graph {
     let outputs = vec![GraphOutput { name: "out".into(), from, attributes: None, v: false }];
     Graph { scene: Scene { last: 48, ..Scene::default() }, nodes, outputs, ..Graph::default() }
 }
-

@@ -9,7 +9,7 @@ use engine::geometry::Geometry;
 use engine::graph::Graph;
 use engine::plan::Request;
 use engine::time::Frame;
-use preview::{Camera, Image, Layer, Settings, attribute_range, bounds, render, union};
+use preview::{Camera, Image, Layer, Settings, attribute_names, attribute_range, bounds, render, union};
 
 use crate::args::Frames;
 use crate::failure::{Exit, Failure};
@@ -96,7 +96,10 @@ impl Pictures {
         if self.kept.is_empty() {
             return Ok(Vec::new());
         }
-        self.frame_all();
+        let names = self.frame_all();
+        if let (Some(name), None) = (&self.settings.color_by, self.settings.range) {
+            eprintln!("note: no output has a number `{name}` to colour by; there are {}", names.join(", "));
+        }
         let drawn: Vec<Frame> =
             self.frames.iter().copied().filter(|frame| self.kept.keys().any(|(at, _)| at == frame)).collect();
         let mut rows = Vec::new();
@@ -118,13 +121,15 @@ impl Pictures {
         each.collect()
     }
 
-    /// One camera and one range of colours for all panels.
-    fn frame_all(&mut self) {
+    /// One camera and one range of colours for all panels. Names of the attributes there are.
+    fn frame_all(&mut self) -> Vec<String> {
         let layers: Vec<Layer<'_>> = self.kept.values().map(|geometry| Layer::new("", geometry)).collect();
         let all = layers.iter().map(|layer| bounds(std::slice::from_ref(layer))).fold(None, union);
         let range = self.settings.color_by.as_ref().and_then(|name| attribute_range(&layers, name));
+        let names = attribute_names(&layers).into_iter().map(|name| format!("`{name}`")).collect();
         self.settings.bounds = all;
         self.settings.range = range;
+        names
     }
 
     fn panel(&self, frame: Frame, output: usize, name: &str) -> Result<Image, preview::Error> {

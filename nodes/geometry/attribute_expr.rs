@@ -61,37 +61,31 @@ pub static NODE: Node = Node::new(
 .outputs(&[&CHANGED])
 .attributes(attributes)
 .metrics(&[&ROWS])
-.checks(check)
+.checks(|params| program(params).map(drop))
 .leaves_out(|params, _| match program(params) {
     Ok(program) if program.writes().is_empty() => vec![LeftOut::new("code", "it assigns nothing")],
     _ => Vec::new(),
 });
 
-/// The program that the code is.
+/// The program that the code is, as far as it can be known without the geometry.
 ///
 /// # Errors
-/// Every line's fault, with its line and column; the hint is the first's.
+/// Every line's fault, with its line and column; the hint is the first's. Rows that no geometry has.
 fn program(params: &Params) -> Result<Program> {
-    Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
+    let program = Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
         let place = |fault: &ExprError| format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
         let facts: Vec<String> = faults.iter().map(place).collect();
         Error { hint: faults.into_iter().find_map(|fault| fault.hint), ..Error::refused(facts.join("; ")) }
-    })
-}
-
-/// What can be wrong whatever the geometry is.
-fn check(params: &Params) -> Result<()> {
-    let program = program(params)?;
+    })?;
     let elements = params.get(OVER) == Over::Elements;
-    if elements && params.get(COMPONENT) == Part::Points {
-        return Err(Error::refused("loose points have no elements").hint("set `over` to \"points\""));
-    }
-    if elements && program.writes().iter().any(|name| name == P.name) {
-        return Err(
-            Error::refused("`P` belongs to points, and the code runs over elements").hint("set `over` to \"points\"")
-        );
-    }
-    Ok(())
+    let fact = match params.get(COMPONENT) {
+        Part::Points if elements => "loose points have no elements",
+        _ if elements && program.writes().iter().any(|name| name == P.name) => {
+            "`P` belongs to points, and the code runs over elements"
+        }
+        _ => return Ok(program),
+    };
+    Err(Error::refused(fact).hint("set `over` to \"points\""))
 }
 
 /// The frame rate counts as the clock: it is the scene's, not a param.
@@ -111,7 +105,6 @@ fn attributes(params: &Params) -> [AttrNames; 2] {
 }
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
-    check(cx.params())?;
     let program = program(cx.params())?;
     let mut geometry = cx.input(GEOMETRY).clone();
     if program.writes().is_empty() {
@@ -336,7 +329,7 @@ mod tests {
         assert_eq!(refused(&code("a = 1\nb = sin(")), "line 2, column 9: expected a value, found the end");
         assert_eq!(
             refused(&code("a = envelop")),
-            "line 1, column 5: there is no attribute, control or value `envelop`"
+            "line 1, column 5: there is no attribute, control or value `envelop`; there are `P`"
         );
         assert_eq!(refused(&code("a = 1/(P.x - 3)")), "line 1, element 2: `a` would be inf, not a finite number");
         let two = refused(&code("a = clamp(1)\nb = 2\nc = 3 +"));

@@ -127,14 +127,17 @@ fn blades(cx: &Cx, rest: &Component, triangles: &[[u32; 3]]) -> Result<Vec<(usiz
         .collect();
     let ground: Vec<[u32; 3]> = fertile.iter().map(|triangle| triangles[*triangle as usize]).collect();
     let surface = Surface::new(rest.positions(), &ground);
+    let area = surface.area();
+    if !area.is_finite() {
+        return Err(Error::refused(format!("the area of `skin` is {area}")).hint("its positions must be finite"));
+    }
     let most_share = ground.as_flattened().iter().map(|corner| share(*corner)).fold(0.0, f64::max);
 
-    let unmasked = f64::from(cx.get(DENSITY)) * surface.area();
+    let unmasked = f64::from(cx.get(DENSITY)) * area;
     let places = (unmasked * most_share).round();
     let cvs = cx.get(CVS) as f64;
     if places * cvs > MOST_CVS {
-        let fact =
-            format!("{places} curves of {cvs} CVs would grow on {} m², more than {MOST_CVS} CVs", surface.area());
+        let fact = format!("{places} curves of {cvs} CVs would grow on {area} m², more than {MOST_CVS} CVs");
         return Err(Error::refused(fact).hint("lower `density` or `cvs`, or scale the skin to metres"));
     }
     let key = Key::new(u64::from(cx.get(SEED).0));

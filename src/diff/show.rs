@@ -57,9 +57,9 @@ fn finding_json(finding: &Finding) -> Value {
             put("largest_row", json!(values.largest_row));
             put("mean", json!(values.mean));
             let stored = |value: f64| if values.kind.is_float() { decimal(value as f32) } else { value };
-            let first = values.first.map(|first| {
-                json!({"row": first.row, "axis": first.lane, "values": first.values.map(stored)})
-            });
+            let first = values
+                .first
+                .map(|first| json!({"row": first.row, "axis": first.lane, "values": first.values.map(stored)}));
             put("first", json!(first));
         }
     }

@@ -56,7 +56,7 @@ impl<'a> Integral<'a> {
 
     /// The integrand at a frame number. The key of this frame has evaluated it there before: it was no error then.
     fn value(&self, frame: f64) -> [f64; 3] {
-        self.resolver.evaluate(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params))
+        self.resolver.past(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params))
     }
 }
 

@@ -136,6 +136,22 @@ impl Engine {
         self.pool.install(|| sweep::Sweep::new(self, &plan, disk, cancel, false).run(sink))
     }
 
+    /// Cooks a plan for a test that wants to look at the plan afterwards; `reload` writes the state of every solver and
+    /// reads it back after each step, which must not change a bit.
+    pub(crate) fn try_plan<E: Send>(
+        &self,
+        plan: &Plan,
+        reload: bool,
+        sink: &mut Sink<'_, E>,
+    ) -> Result<Report, Stopped<E>> {
+        let cancel = AtomicBool::new(false);
+        self.pool.install(|| {
+            let mut sweep = sweep::Sweep::new(self, plan, None, &cancel, false);
+            sweep.reload = reload;
+            sweep.run(sink)
+        })
+    }
+
     /// What a cook would do, without cooking: how often each node would cook.
     ///
     /// # Errors

@@ -78,6 +78,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     dry: bool,
     /// Whether this cook only looks at sources, for a cook that follows.
     pub(super) verifying: bool,
+    /// Whether states are written and read back after every step.
+    pub(super) reload: bool,
     keys: Keys<'p, 'g>,
     results: Vec<BTreeMap<Frame, Outcome>>,
     running: Vec<BTreeMap<Stretch, Running>>,
@@ -136,6 +138,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             cancel,
             dry,
             verifying: false,
+            reload: false,
             keys: Keys::new(plan),
             results: (0..count).map(|_| BTreeMap::new()).collect(),
             running: (0..count).map(|_| BTreeMap::new()).collect(),
@@ -790,6 +793,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     Some(Running { state: Err(error), .. }) => Err(error),
                 };
                 self.count(node, Frame::whole(frame), state.as_ref().err());
+                let state = match solver.filter(|_| self.reload) {
+                    None => state,
+                    Some(solver) => state.and_then(|state| self.reloaded(node, frame, solver, &state)),
+                };
                 self.save_state(node, stretch, frame, solver, state.as_ref().ok())?;
                 running = Some(Running { at: frame, state, moved: self.slices });
                 if advance.outputs.contains(&frame) {
@@ -801,6 +808,20 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
         }
         Ok(())
+    }
+
+    /// The state as a checkpoint would give it back.
+    fn reloaded(
+        &self,
+        node: usize,
+        frame: i64,
+        solver: SolverFns,
+        state: &StateBox,
+    ) -> Result<StateBox, Arc<CookError>> {
+        (solver.save)(state).and_then(|bytes| (solver.load)(&bytes)).ok_or_else(|| {
+            let error = crate::Error::contract("its state cannot be written and read back");
+            Arc::new(self.plan.error(node, Frame::whole(frame), error))
+        })
     }
 
     fn save_state(

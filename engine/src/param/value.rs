@@ -99,11 +99,14 @@ impl Value {
             Self::Turn(q) => q.iter().fold(key.tag(8), |key, x| key.f64(*x)),
             Self::Choice(i) => key.tag(9).i64(*i as i64),
             Self::Ramp(ramp) => {
-                let key = key.tag(10).i64(ramp.interpolation() as i64);
+                let key = key.tag(10).i64(ramp.interpolation() as i64).i64(ramp.keys().len() as i64);
                 ramp.keys().iter().fold(key, |key, [x, y]| key.f64(f64::from(*x)).f64(f64::from(*y)))
             }
             Self::Text(text) => key.tag(11).text(text),
-            Self::Texts(texts) => texts.iter().fold(key.tag(12), |key, text| key.text(text)),
+            Self::Texts(texts) => {
+                let key = key.tag(12).i64(texts.len() as i64);
+                texts.iter().fold(key, |key, text| key.text(text))
+            }
             Self::File(None) => key.tag(13),
             Self::File(Some(file)) => key.tag(14).text(file.extension()).key(file.key()),
             Self::Masked(x, attribute) => key.tag(15).f64(*x).text(attribute.as_deref().unwrap_or_default()),
@@ -119,9 +122,12 @@ impl Value {
                 let key = key.tag(18).i64(rows.len() as i64);
                 rows.as_flattened().iter().fold(key, |key, i| key.bytes(&i.to_le_bytes()))
             }
-            Self::Columns(columns) => columns.iter().fold(key.tag(19), |key, (name, column)| {
-                key.text(name).i64(column.kind() as i64).i64(column.len() as i64).bytes(&column.to_bytes())
-            }),
+            Self::Columns(columns) => {
+                let key = key.tag(19).i64(columns.len() as i64);
+                columns.iter().fold(key, |key, (name, column)| {
+                    key.text(name).i64(column.kind() as i64).i64(column.len() as i64).bytes(&column.to_bytes())
+                })
+            }
         };
     }
 }

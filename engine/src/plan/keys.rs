@@ -184,7 +184,7 @@ impl<'p, 'g> Keys<'p, 'g> {
     fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let integrand = declared.integrand.expect("asked for nodes with an integrand");
         let resolver = &self.plan.nodes[node].resolver;
-        let value = |at: f64| resolver.evaluate(at).map(|params| integrand(&params));
+        let value = |at: f64| resolver.past(at).map(|params| integrand(&params));
         let over = |hasher: &mut Hasher, from: f64, to: f64| -> Result<()> {
             for x in gauss_points(from, to) {
                 value(x)?.iter().fold(&mut *hasher, |hasher, x| hasher.f64(*x));

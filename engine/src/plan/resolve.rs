@@ -26,12 +26,12 @@ impl Resolver {
         let mut resolver = Self::unasked(node, graph, files);
         let start = graph.scene.start();
         // A param that is not read does not make a node move, whatever it does.
-        resolver.animated = match resolver.evaluate(start.number()) {
+        resolver.animated = match resolver.evaluate(start.number(), false) {
             Ok(params) => (0..resolver.sources.len()).any(|place| resolver.moves(place, &params)),
             Err(_) => resolver.sources.iter().any(Source::is_animated),
         };
         if !resolver.animated {
-            resolver.constant = Some(resolver.evaluate(start.number()));
+            resolver.constant = Some(resolver.evaluate(start.number(), false));
         }
         resolver
     }
@@ -84,12 +84,17 @@ impl Resolver {
     pub(crate) fn at(&self, frame: Frame) -> Result<Params> {
         match &self.constant {
             Some(params) => params.clone(),
-            None => self.evaluate(frame.number()),
+            None => self.evaluate(frame.number(), false),
         }
     }
 
-    /// The params at a frame number with any fraction, as integrals over time need them.
-    pub(crate) fn evaluate(&self, frame: f64) -> Result<Params> {
+    /// The params at a frame number with any fraction, as integrals over time need them: a param that is read over all
+    /// times counts there too where the others say that it is not read.
+    pub(crate) fn past(&self, frame: f64) -> Result<Params> {
+        self.evaluate(frame, true)
+    }
+
+    fn evaluate(&self, frame: f64, past: bool) -> Result<Params> {
         let mut values = Vec::with_capacity(self.sources.len());
         for (spec, source) in self.specs.iter().zip(&self.sources) {
             let value = source.at(frame, self.clock);
@@ -99,12 +104,14 @@ impl Resolver {
             values.push(value);
         }
         let params = Params { specs: self.specs.clone(), values: values.into(), log: self.log.clone() };
-        let params = self.without_unread(params);
+        let params = self.without_unread(params, past);
         self.with_files(params)
     }
 
-    fn without_unread(&self, mut params: Params) -> Params {
-        let unread: Vec<usize> = (0..self.specs.len()).filter(|place| !self.is_read(*place, &params)).collect();
+    fn without_unread(&self, mut params: Params, past: bool) -> Params {
+        let in_past = |place: usize| past && self.specs[place].facts.history;
+        let unread = (0..self.specs.len()).filter(|place| !in_past(*place) && !self.is_read(*place, &params));
+        let unread: Vec<usize> = unread.collect();
         if !unread.is_empty() {
             let mut values = params.values.to_vec();
             for place in unread {

@@ -66,7 +66,7 @@ fn curves_are_straight_and_as_long_and_as_lean_as_asked() {
     }
     // A thousand draws come near both ends and never pass them; half a right angle has cosine 0.7071.
     assert!(least > 0.2 - 1e-6 && least < 0.202 && most < 0.4 + 1e-6 && most > 0.398, "{least} {most}");
-    assert!(flattest > 0.707_106 && flattest < 0.712, "{flattest}");
+    assert!(flattest > std::f64::consts::FRAC_1_SQRT_2 - 1e-6 && flattest < 0.712, "{flattest}");
 }
 
 #[test]
@@ -224,6 +224,28 @@ fn a_skin_without_area_grows_nothing() {
     for skin in [empty, line] {
         let out = meadow(skin).cook();
         assert_eq!((out.curves().element_count(), out.curves().point_count()), (0, 0));
+    }
+}
+
+#[test]
+fn a_scaled_scene_grows_the_same_scaled() {
+    let grown = |scale: f32| {
+        let length = Span { low: 0.05 * scale, high: 0.1 * scale };
+        meadow(square(scale)).set(DENSITY, 1000.0 / (scale * scale)).set(LENGTH, length).cook()
+    };
+    let expected = grown(1.0);
+    for scale in [2_f32.recip() / 524_288.0, 1_048_576.0] {
+        let scaled: Vec<[f32; 3]> = expected.curves().positions().iter().map(|p| p.map(|x| x * scale)).collect();
+        assert!(grown(scale).curves().positions() == scaled, "{scale}");
+    }
+}
+
+#[test]
+fn a_skin_that_is_not_finite_is_refused() {
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut skin = square(1.0);
+        skin.edit(P).unwrap()[1][1] = bad;
+        assert_eq!(meadow(skin).try_cook().unwrap_err().fact, "the area of `skin` is NaN");
     }
 }
 

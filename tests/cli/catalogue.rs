@@ -1,0 +1,80 @@
+//! `nodes`, `check`, `explain` and `completions`.
+
+use serde_json::{Value, json};
+
+use crate::bench::{Bench, CALM_AT_2};
+
+fn names(bench: &Bench) -> Vec<String> {
+    let nodes = bench.json(&["nodes", "--json"]);
+    nodes.as_array().unwrap().iter().map(|node| node["name"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn every_node_is_listed_and_has_a_help_page() {
+    let bench = Bench::new();
+    let list = bench.done(&["nodes"]);
+    let names = names(&bench);
+    assert!(names.contains(&"Curve_In".to_owned()));
+    let listed: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(listed, names);
+    for name in &names {
+        let page = bench.done(&["nodes", name]);
+        assert!(page.starts_with(name.as_str()) && page.lines().count() > 5, "{name}: {page}");
+        let only = bench.json(&["nodes", name, "--json"]);
+        assert_eq!((&only[0]["name"], only.as_array().unwrap().len()), (&json!(name), 1));
+    }
+}
+
+#[test]
+fn a_sound_graph_has_no_faults() {
+    let bench = Bench::new();
+    assert_eq!(bench.done(&["check", "g.json"]), "");
+    assert_eq!(bench.json(&["check", "g.json", "--json"]), json!([]));
+}
+
+#[test]
+fn faults_as_json_go_to_stdout_alone() {
+    let bench = Bench::with_graph(&CALM_AT_2.replace("\"wind_dir\"", "\"wind_dirr\""));
+    let ran = bench.run(&["check", "g.json", "--json"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), ""));
+    let faults: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let expected = json!([{
+        "code": "unknown-param", "line": 8, "column": 19, "path": "nodes.wind.params.wind_dirr",
+        "fact": "`Curve_Wind` has no param `wind_dirr`", "hint": "did you mean `wind_dir`?",
+    }]);
+    assert_eq!(faults, expected);
+}
+
+#[test]
+fn a_plan_says_how_often_each_node_cooks_and_what_is_left_out() {
+    let bench = Bench::new();
+    let text = bench.done(&["explain", "g.json", "--output", "still"]);
+    assert!(text.contains("no requested output depends on it"), "{text}");
+    let plan = bench.json(&["explain", "g.json", "--json"]);
+    assert_eq!(plan["frames"], json!(4));
+    let cooks: Vec<(&Value, &Value)> =
+        plan["nodes"].as_array().unwrap().iter().map(|node| (&node["id"], &node["cooks"])).collect();
+    assert_eq!(cooks, [(&json!("blades"), &json!(1)), (&json!("wind"), &json!(4))]);
+    assert_eq!(bench.names("out").len(), 0, "nothing is cooked");
+}
+
+#[test]
+fn completions_are_there_for_every_shell() {
+    let bench = Bench::new();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let text = bench.done(&["completions", shell]);
+        assert!(text.contains("convect") && text.contains("completions"), "{shell}");
+    }
+}
+
+#[test]
+fn help_and_version_are_answers() {
+    let bench = Bench::new();
+    let help = bench.done(&["--help"]);
+    for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "completions"] {
+        assert!(help.contains(&format!("\n  {verb} ")), "{verb} in {help}");
+        let page = bench.done(&[verb, "--help"]);
+        assert!(page.contains(&format!("Usage: convect {verb}")), "{page}");
+    }
+    assert_eq!(bench.done(&["--version"]), concat!("convect ", env!("CARGO_PKG_VERSION"), "\n"));
+}

@@ -1,0 +1,116 @@
+//! `convert`: one file, and sequences.
+
+use serde_json::json;
+
+use crate::bench::Bench;
+
+#[test]
+fn a_geometry_comes_back_through_every_format_that_is_read() {
+    let bench = Bench::new();
+    for (from, to) in [("grass.obj", "a.ply"), ("a.ply", "b.json"), ("b.json", "c.obj")] {
+        let ran = bench.run(&["convert", from, to]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (Some(0), ""), "{}", ran.stderr);
+        assert!(ran.stderr.starts_with(&format!("wrote {to}: 1 frame, ")), "{}", ran.stderr);
+    }
+    assert_eq!(bench.done(&["diff", "grass.obj", "c.obj"]), "the same\n");
+}
+
+#[test]
+fn what_a_format_drops_is_told() {
+    let bench = Bench::new();
+    bench.write("a.json", r#"{"points": {"points": [[0, 0, 0]], "point_attributes": {"heat": [1.5]}}}"#);
+    let ran = bench.run(&["convert", "a.json", "a.obj"]);
+    assert_eq!(ran.stderr.lines().nth(1), Some("note: left out `heat` of points, which the format cannot hold"));
+    assert_eq!(bench.run(&["convert", "a.json", "a.obj", "--quiet"]).stderr, "");
+}
+
+#[test]
+fn a_component_that_the_target_cannot_hold_is_refused_and_nothing_written() {
+    let bench = Bench::new();
+    bench.write(
+        "t.json",
+        r#"{"tets": {"indices": [[0, 1, 2, 3]],
+        "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}}"#,
+    );
+    for target in ["t.obj", "t.ply"] {
+        let ran = bench.run(&["convert", "t.json", target]);
+        let format = &target[2..];
+        let line = format!("`t.json`: {format} cannot hold tets; formats that can: usdc, usda, json\n");
+        assert_eq!((ran.code, ran.stderr), (Some(1), line));
+    }
+    assert_eq!(bench.names(""), ["g.json", "grass.obj", "t.json"]);
+    bench.done(&["convert", "t.json", "t.usda"]);
+}
+
+#[test]
+fn the_frame_is_the_number_in_the_name() {
+    let bench = Bench::new();
+    bench.write("a.0012_5.json", r#"{"points": {"points": [[0, 0, 0]]}}"#);
+    bench.done(&["convert", "a.0012_5.json", "b.json", "--fps", "25"]);
+    let file = bench.read_json("b.json");
+    assert_eq!((&file["frame"], &file["time"]), (&json!(12.5), &json!(0.5)));
+    bench.done(&["convert", "a.0012_5.json", "c.usda"]);
+    let text = std::fs::read_to_string(bench.path("c.usda")).unwrap();
+    assert!(text.contains("startTimeCode = 12.5") && text.contains("defaultPrim = \"c\""), "{text}");
+    bench.done(&["convert", "grass.obj", "d.json"]);
+    assert_eq!(bench.read_json("d.json")["frame"], json!(1));
+    bench.done(&["convert", "a.0012_5.json", "e.###.obj"]);
+    assert!(bench.names("").contains(&"e.012_5.obj".to_owned()));
+}
+
+#[test]
+fn a_sequence_becomes_one_file_or_a_file_a_frame() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
+    bench.done(&["cook", "g.json", "--format", "usdc", "--output", "grass", "--out", "usd"]);
+    bench.done(&["convert", "out/grass.####.json", "grass.usdc"]);
+    assert!(bench.files("usd")["grass.usdc"] == std::fs::read(bench.path("grass.usdc")).unwrap(), "as cook writes it");
+    std::fs::create_dir(bench.path("ply")).unwrap();
+    bench.done(&["convert", "out/grass.####.json", "ply/g_##.ply"]);
+    assert_eq!(bench.names("ply"), ["g_01.ply", "g_02.ply", "g_03.ply", "g_04.ply"]);
+    assert_eq!(bench.done(&["diff", "out/grass.####.json", "ply/g_##.ply"]), "the same\n");
+    std::fs::create_dir(bench.path("each")).unwrap();
+    bench.done(&["convert", "out/grass.####.json", "each/grass.####.usdc"]);
+    assert_eq!(bench.names("each").len(), 4);
+}
+
+#[test]
+fn a_sequence_that_has_no_place_or_is_not_there_is_refused() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
+    let ran = bench.run(&["convert", "out/grass.####.json", "all.ply"]);
+    let line = "4 files cannot become one ply file; write all.####.ply\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), line));
+    let ran = bench.run(&["convert", "out/fur.####.json", "fur.usdc"]);
+    let line = "no file is called `out/fur.####.json` with a frame number\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
+    let ran = bench.run(&["convert", "out/grass.####.json", "none/grass.####.ply"]);
+    let line = "`none/grass.0001.ply` could not be created: no such file or folder; \
+                check the path, or make the folder first\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
+}
+
+#[test]
+fn lengths_are_scaled() {
+    let bench = Bench::new();
+    bench.write(
+        "a.json",
+        r#"{"points": {"points": [[100, 0, 50]],
+        "point_attributes": {"v": [[200, 0, 0]], "width": [10], "heat": [3.5]}}}"#,
+    );
+    bench.done(&["convert", "a.json", "b.json", "--scale", "0.01"]);
+    let points = &bench.read_json("b.json")["points"];
+    let expected = json!({"v": [[2.0, 0.0, 0.0]], "width": [0.1], "heat": [3.5]});
+    assert_eq!((&points["points"], &points["point_attributes"]), (&json!([[1.0, 0.0, 0.5]]), &expected));
+    let ran = bench.run(&["convert", "a.json", "c.usdc", "--scale", "1e37"]);
+    let line = "`a.json`: `P` of points times 1e37 is more than an f32 holds\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
+}
+
+#[test]
+fn a_file_may_be_converted_onto_itself() {
+    let bench = Bench::new();
+    bench.done(&["convert", "grass.obj", "grass.obj", "--scale", "2"]);
+    let stats = bench.json(&["stats", "grass.obj", "--json"]);
+    assert_eq!(stats["curves"]["bounds"]["max"], json!([1.8, 0.4, 1.0]));
+}

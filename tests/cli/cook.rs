@@ -1,0 +1,124 @@
+//! `cook`, as far as it goes well: files and their names, frames, settings, the report.
+
+use std::fs;
+
+use serde_json::json;
+
+use crate::bench::Bench;
+
+fn cooked(args: &[&str]) -> Vec<String> {
+    let bench = Bench::new();
+    bench.done(&[&["cook", "g.json", "--output", "grass"], args].concat());
+    bench.names("out")
+}
+
+#[test]
+fn all_outputs_are_written_as_usdc_into_out_and_nothing_else() {
+    let bench = Bench::new();
+    let ran = bench.run(&["cook", "g.json"]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(0), ""), "stdout carries data only");
+    assert!(ran.stderr.contains("wrote out/grass.usdc: 4 frames"), "{}", ran.stderr);
+    assert_eq!(bench.names("out"), ["grass.usdc", "still.usdc"]);
+    assert_eq!(&bench.files("out")["grass.usdc"][..8], b"PXR-USDC");
+    assert_eq!(bench.names(""), ["g.json", "grass.obj", "out"]);
+}
+
+#[test]
+fn every_format_has_its_files() {
+    assert_eq!(cooked(&["--format", "usda"]), ["grass.usda"]);
+    for format in ["obj", "ply", "json"] {
+        let expected: Vec<String> = (1..=4).map(|frame| format!("grass.000{frame}.{format}")).collect();
+        assert_eq!(cooked(&["--format", format]), expected);
+    }
+}
+
+#[test]
+fn frames_are_ranges_steps_and_sub_frames() {
+    let files = |frames: &str| cooked(&["--format", "json", "--frames", frames]).join(" ").replace(".json", "");
+    assert_eq!(files("3"), "grass.0003");
+    assert_eq!(files("1-4x2"), "grass.0001 grass.0003");
+    assert_eq!(files("10.5"), "grass.0010_5");
+    assert_eq!(files("1-2x0.25"), "grass.0001 grass.0001_25 grass.0001_5 grass.0001_75 grass.0002");
+    assert_eq!(files("-1-1"), "grass.-0001 grass.0000 grass.0001");
+    assert_eq!(files("4,1-2"), "grass.0001 grass.0002 grass.0004");
+    assert_eq!(files("12345"), "grass.12345");
+}
+
+#[test]
+fn a_json_file_says_its_frame_and_time() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--format", "json", "--frames", "10.5"]);
+    let file = bench.read_json("out/grass.0010_5.json");
+    assert_eq!((&file["frame"], &file["time"]), (&json!(10.5), &json!(0.4375)));
+    assert_eq!(file["curves"]["counts"], json!(vec![5; 60]));
+}
+
+#[test]
+fn outputs_are_chosen_by_name_and_folders_are_made() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--output", "still", "--out", "a/b", "--format", "obj", "--frames", "1"]);
+    assert_eq!(bench.names("a/b"), ["still.0001.obj"]);
+}
+
+#[test]
+fn quiet_says_nothing_and_verbose_more() {
+    let bench = Bench::new();
+    assert_eq!(bench.run(&["cook", "g.json", "-q"]).stderr, "");
+    assert!(bench.run(&["cook", "g.json", "-v"]).stderr.contains("wind (Curve_Wind): 4 cooked"));
+}
+
+#[test]
+fn params_and_controls_are_set_from_the_command_line() {
+    let bench = Bench::new();
+    let cook = |out: &str, set: &[&str]| {
+        let args = ["cook", "g.json", "--format", "json", "--frames", "2", "--out", out];
+        bench.done(&[&args, set].concat());
+        bench.read_json(&format!("{out}/grass.0002.json"))["curves"].clone()
+    };
+    let plain = cook("plain", &[]);
+    assert_eq!(cook("same", &["--set", "wind_dir=[1, 0, 0.2]"]), plain);
+    assert_ne!(cook("control", &["--set", "wind_dir=[0, 0, -1]"]), plain);
+    let still = cook("still", &["--set", "wind.global_rotate=0", "--set", "blades.scale=2"]);
+    assert_eq!(still["points"][4], json!([0.0, 0.4, 0.0]), "no wind, twice as long");
+}
+
+#[test]
+fn the_report_is_as_documented() {
+    let bench = Bench::new();
+    let set = ["--set", "wind.amplitude=0", "--report", "report.json"];
+    bench.done(&[&["cook", "g.json", "--format", "json", "--output", "grass", "--frames", "1-2"], &set[..]].concat());
+    let report = bench.read_json("report.json");
+    let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(keys(&report), ["frames", "graph", "nodes", "outputs", "report", "total"]);
+    assert_eq!((&report["report"], &report["frames"]), (&json!(1), &json!([1, 2])));
+    let wind = &report["nodes"]["wind"];
+    let documented = ["type", "time", "cooks", "from_cache", "left_out", "wall_ms", "cpu_ms", "peak_bytes", "metrics"];
+    documented.iter().for_each(|key| assert!(!wind[key].is_null(), "`{key}` in {wind}"));
+    assert_eq!((&wind["type"], &wind["time"], &wind["cooks"]), (&json!("Curve_Wind"), &json!("frame"), &json!(2)));
+    assert_eq!(keys(&wind["metrics"]["max_angle"]), ["1", "2"], "a value a frame");
+    assert!(keys(&wind["left_out"][0]).iter().eq(&["stage", "why"]), "{wind}");
+    let grass = &report["outputs"]["grass"];
+    assert_eq!((&grass["from"], &grass["frames"], &grass["errors"]), (&json!("wind"), &json!(2), &json!([])));
+    assert_eq!(grass["files"], json!(["out/grass.0001.json", "out/grass.0002.json"]));
+    let bytes: u64 = bench.files("out").values().map(|file| file.len() as u64).sum();
+    assert_eq!(grass["bytes"], json!(bytes));
+    assert_eq!(bench.names("out"), ["grass.0001.json", "grass.0002.json"]);
+}
+
+#[test]
+fn a_preview_is_a_png_beside_the_outputs() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--output", "still", "--preview", "--preview-size", "64x48"]);
+    assert_eq!(bench.names("out"), ["preview.png", "still.usdc"]);
+    assert_eq!(&bench.files("out")["preview.png"][1..4], b"PNG");
+}
+
+#[test]
+fn files_that_were_there_are_replaced() {
+    let bench = Bench::new();
+    bench.write("out/grass.usdc", "old");
+    bench.write("out/other.txt", "kept");
+    bench.done(&["cook", "g.json", "--output", "grass"]);
+    assert_eq!(bench.names("out"), ["grass.usdc", "other.txt"]);
+    assert!(fs::read(bench.path("out/grass.usdc")).unwrap().starts_with(b"PXR-USDC"));
+}

@@ -1,0 +1,167 @@
+//! Exit codes: 0 done, 1 file, 2 command line, 3 graph, 4 cook; of two classes the lowest.
+
+use std::fs;
+
+use crate::bench::{Bench, CALM_AT_2};
+
+fn code(graph: &str, args: &[&str]) -> Option<i32> {
+    Bench::with_graph(graph).run(args).code
+}
+
+fn graph(nodes: &str) -> String {
+    format!(r#"{{"convect": 1, "nodes": {{{nodes}}}, "outputs": {{"o": "a"}}}}"#)
+}
+
+const CURVE: &str = r#""a": {"type": "Curve_In", "params": {"points": [[0, 0, 0], [0, 1, 0]]}}"#;
+const MISSING: &str = r#""a": {"type": "Curve_In", "params": {"file": "missing.obj"}}"#;
+
+#[test]
+fn a_graph_that_cannot_be_opened_is_1_and_one_that_cannot_be_parsed_3() {
+    for verb in ["cook", "check", "explain"] {
+        assert_eq!(code("", &[verb, "missing.json"]), Some(1), "{verb}");
+        assert_eq!(code("", &[verb, "."]), Some(1), "{verb} of a folder");
+        assert_eq!(code("{\"convect\": 1", &[verb, "g.json"]), Some(3), "{verb}");
+        assert_eq!(code("", &[verb, "g.json"]), Some(3), "{verb} of nothing");
+    }
+}
+
+#[test]
+fn a_wrong_command_line_is_2() {
+    let graph = graph(CURVE);
+    for args in [
+        &["cook"][..],
+        &["fly"],
+        &["cook", "g.json", "--fast"],
+        &["cook", "g.json", "--frames", "5-1"],
+        &["cook", "g.json", "--format", "abc"],
+        &["cook", "g.json", "--output", "none"],
+        &["cook", "g.json", "--memory", "much"],
+        &["cook", "g.json", "--threads", "some"],
+        &["cook", "g.json", "--set", "scale"],
+        &["cook", "g.json", "--preview", "--preview-size", "0x0"],
+        &["nodes", "Curve_Wnd"],
+        &["completions", "csh"],
+        &["convert", "g.json", "g.abc"],
+        &["convert", "g.json", "h.obj", "--scale", "0"],
+        &["diff", "g.json", "g.json", "--tolerance", "-1"],
+    ] {
+        assert_eq!(code(&graph, args), Some(2), "{args:?}");
+    }
+}
+
+#[test]
+fn an_unknown_simd_path_is_2() {
+    let bench = Bench::new();
+    let output = bench.command(&["cook", "g.json"]).env("CONVECT_SIMD", "mmx").output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn a_graph_that_is_wrong_is_3() {
+    for nodes in [
+        r#""a": {"type": "Curve_Inn"}"#,
+        r#""a": {"type": "Curve_Wind"}"#,
+        r#""a": {"type": "Curve_Wind", "inputs": {"curves": "a"}}"#,
+        r#""a": {"type": "Curve_In", "params": {"scale": "big"}}"#,
+        r#""a": {"type": "Curve_Wind", "inputs": {"curves": "b"}, "params": {"wind_dir": [0, 0, 0]}},
+           "b": {"type": "Curve_In", "params": {"points": [[0, 0, 0]]}}"#,
+    ] {
+        assert_eq!(code(&graph(nodes), &["cook", "g.json"]), Some(3), "{nodes}");
+    }
+    assert_eq!(code(&graph(CURVE), &["cook", "g.json", "--set", "a.scale=two"]), Some(3));
+}
+
+#[test]
+fn a_format_that_cannot_hold_an_output_is_3_before_anything_is_cooked() {
+    let tets = r#""a": {"type": "Tet_In", "params": {
+        "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "tets": [[0, 1, 2, 3]]}}"#;
+    let bench = Bench::with_graph(&graph(tets));
+    let ran = bench.run(&["cook", "g.json", "--format", "obj"]);
+    assert_eq!((ran.code, bench.names("out").len()), (Some(3), 0), "{}", ran.stderr);
+    assert_eq!(bench.run(&["cook", "g.json", "--format", "usda"]).code, Some(0));
+}
+
+#[test]
+fn a_file_of_the_graph_that_is_missing_or_broken_is_1() {
+    assert_eq!(code(&graph(MISSING), &["cook", "g.json"]), Some(1));
+    for obj in ["v 0 nan 0\nl 1 1\n", "v 0 0 0\nl 1 9999999999\n", "f 1 2 3\n", "\0\u{1}\u{2}", ""] {
+        let bench = Bench::with_graph(&graph(&MISSING.replace("missing", "hostile")));
+        bench.write("hostile.obj", obj);
+        let ran = bench.run(&["cook", "g.json"]);
+        assert_eq!((ran.code, bench.names("out").len()), (Some(1), 0), "{obj:?}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn of_two_classes_the_lowest_is_told() {
+    let both = format!(r#"{MISSING}, "b": {{"type": "Curve_Inn"}}"#);
+    let ran = Bench::with_graph(&graph(&both)).run(&["check", "g.json"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.ends_with("2 faults\n"), "both are told: {}", ran.stderr);
+}
+
+#[test]
+fn a_node_that_fails_at_a_frame_is_4_and_spoils_only_its_output() {
+    let bench = Bench::with_graph(CALM_AT_2);
+    let ran = bench.run(&["cook", "g.json", "--format", "json"]);
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    let (grass, still) = (["grass.0001.json", "grass.0003.json"], [1, 2, 3].map(|k| format!("still.000{k}.json")));
+    assert_eq!(bench.names("out"), [&grass.map(str::to_owned)[..], &still].concat());
+    let ran = bench.run(&["cook", "g.json", "--out", "usd"]);
+    assert_eq!(
+        (ran.code, bench.names("usd")),
+        (Some(4), vec!["still.usdc".into()]),
+        "a sequence is whole or not there"
+    );
+    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1,3", "--out", "usd"]).code, Some(0));
+}
+
+#[test]
+fn what_cannot_be_written_is_1() {
+    let graph = graph(CURVE);
+    let bench = Bench::with_graph(&graph);
+    bench.write("file", "");
+    for out in ["file", "file/out"] {
+        let ran = bench.run(&["cook", "g.json", "--out", out]);
+        assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    }
+    for (format, name) in [("json", "o.0001.json"), ("usdc", "o.usdc")] {
+        fs::create_dir_all(bench.path("taken").join(name)).unwrap();
+        let ran = bench.run(&["cook", "g.json", "--out", "taken", "--format", format]);
+        assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    }
+    assert_eq!(bench.names("taken"), ["o.0001.json", "o.usdc"], "no temporary is left");
+    for args in [["--report", "none/report.json"], ["--cache", "file"]] {
+        let ran = bench.run(&[&["cook", "g.json"], &args[..]].concat());
+        assert_eq!((ran.code, bench.names("out").len()), (Some(1), 0), "before it cooks: {}", ran.stderr);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_without_permission_is_1() {
+    use std::os::unix::fs::PermissionsExt;
+    let bench = Bench::new();
+    fs::create_dir(bench.path("locked")).unwrap();
+    fs::set_permissions(bench.path("locked"), fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(bench.path("locked/probe"), "").is_ok() {
+        eprintln!("skipped: this user may write anywhere");
+        return;
+    }
+    let ran = bench.run(&["cook", "g.json", "--out", "locked"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.contains("permission denied; choose a place you may write to"), "{}", ran.stderr);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_stdout_that_is_full_is_1() {
+    let bench = Bench::new();
+    for args in [&["nodes"][..], &["explain", "g.json"], &["stats", "grass.obj"], &["completions", "bash"]] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let output = bench.command(args).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{args:?}");
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(text.starts_with("stdout could not be written: "), "{args:?}: {text}");
+    }
+}

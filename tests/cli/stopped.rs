@@ -1,0 +1,173 @@
+//! Cooks that are cut short: by Ctrl-C, by a kill, by a full disk, by a reader that has seen enough, by little memory.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use crate::bench::{Bench, Ran, names};
+
+/// Far more frames than any test waits for.
+const LONG: &str = "1-1000000";
+
+fn signal(name: &str, child: &Child) {
+    let status = Command::new("sh").args(["-c", &format!("kill -{name} {}", child.id())]).status().unwrap();
+    assert!(status.success());
+}
+
+/// Waits until `folder` holds at least `count` files, hidden ones too.
+fn wait_for(count: usize, folder: &Path) {
+    for _ in 0..2000 {
+        if names(folder).len() >= count {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("{} has only {:?} after ten seconds", folder.display(), names(folder));
+}
+
+fn start(bench: &Bench, args: &[&str]) -> Child {
+    bench.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn ended(child: Child) -> Ran {
+    Ran::of(&child.wait_with_output().unwrap())
+}
+
+#[test]
+fn ctrl_c_leaves_whole_frames_and_no_temporary() {
+    let bench = Bench::new();
+    let args = ["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass", "--report", "report.json"];
+    let child = start(&bench, &args);
+    wait_for(5, &bench.path("out"));
+    signal("INT", &child);
+    let ran = ended(child);
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    let files = bench.names("out");
+    let expected: Vec<String> = (1..=files.len()).map(|frame| format!("grass.{frame:04}.json")).collect();
+    assert_eq!(files, expected, "frames without a gap, and nothing hidden");
+    for (place, name) in files.iter().enumerate() {
+        assert_eq!(bench.read_json(&format!("out/{name}"))["frame"], place + 1);
+    }
+    assert!(ran.stderr.contains(&format!("interrupted; {} whole frames were written", files.len())), "{}", ran.stderr);
+    assert_eq!(bench.read_json("report.json")["total"]["interrupted"], true);
+}
+
+#[test]
+fn ctrl_c_finishes_a_sequence_with_the_frames_it_has() {
+    let bench = Bench::new();
+    let child = start(&bench, &["cook", "g.json", "--frames", LONG, "--format", "usda", "--output", "grass"]);
+    wait_for(1, &bench.path("out"));
+    signal("INT", &child);
+    let ran = ended(child);
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    assert_eq!(bench.names("out"), ["grass.usda"]);
+    let text = fs::read_to_string(bench.path("out/grass.usda")).unwrap();
+    assert!(text.starts_with("#usda 1.0") && text.ends_with("}\n"), "whole");
+}
+
+#[test]
+fn what_a_kill_leaves_the_next_cook_sweeps() {
+    let bench = Bench::new();
+    let mut child = start(&bench, &["cook", "g.json", "--frames", LONG, "--output", "grass"]);
+    wait_for(1, &bench.path("out"));
+    child.kill().unwrap();
+    assert_eq!(child.wait().unwrap().code(), None);
+    let left = bench.names("out");
+    assert!(left.iter().all(|name| name.starts_with(".grass.usdc.tmp-")), "nothing under a final name: {left:?}");
+    assert_eq!(left.len(), 1);
+    bench.done(&["cook", "g.json", "--frames", "1", "--format", "json", "--output", "grass"]);
+    assert_eq!(bench.names("out"), ["grass.0001.json"]);
+}
+
+#[test]
+fn a_killed_cook_resumes_from_its_cache_with_the_same_bits() {
+    let bench = Bench::new();
+    let cook = |out, frames| {
+        [
+            "cook", "g.json", "--format", "json", "--output", "grass", "--cache", "cache", "--out", out, "--frames",
+            frames,
+        ]
+    };
+    let mut child = start(&bench, &cook("out", LONG));
+    wait_for(8, &bench.path("out"));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    bench.done(&cook("out", "1-12"));
+    bench.done(&["cook", "g.json", "--format", "json", "--output", "grass", "--frames", "1-12", "--out", "fresh"]);
+    let resumed = bench.files("out");
+    assert!(bench.files("fresh").iter().all(|(name, file)| resumed[name] == *file));
+    assert!(resumed.keys().all(|name| name.starts_with("grass.")), "no temporary is left: {:?}", resumed.keys());
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_trouble() {
+    let bench = Bench::new();
+    bench.write("other.obj", "v 0 0 0\n");
+    for (args, code) in [
+        (&["nodes"][..], 0),
+        (&["nodes", "--json"], 0),
+        (&["nodes", "Curve_Wind"], 0),
+        (&["completions", "zsh"], 0),
+        (&["explain", "g.json"], 0),
+        (&["check", "g.json", "--json"], 0),
+        (&["stats", "grass.obj"], 0),
+        (&["diff", "grass.obj", "grass.obj"], 0),
+        (&["diff", "grass.obj", "other.obj"], 1),
+        (&["--help"], 0),
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let ran = Ran::of(&bench.command(args).stdout(writer).output().unwrap());
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(code), ""), "{args:?}");
+    }
+}
+
+/// A file system of 64 kB, gone with this.
+struct TinyDisk<'a>(&'a Path);
+
+impl<'a> TinyDisk<'a> {
+    fn at(folder: &'a Path) -> Option<Self> {
+        fs::create_dir(folder).unwrap();
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", "size=64k", "tmpfs"]).arg(folder).stderr(Stdio::null());
+        mount.status().is_ok_and(|status| status.success()).then_some(Self(folder))
+    }
+}
+
+impl Drop for TinyDisk<'_> {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.0).status();
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_and_holds_nothing_half_written() {
+    let bench = Bench::new();
+    let disk = bench.path("disk");
+    let Some(_mounted) = TinyDisk::at(&disk) else {
+        eprintln!("skipped: this user may not mount a small disk");
+        return;
+    };
+    for format in ["json", "usdc", "usda"] {
+        let args = ["cook", "g.json", "--frames", "1-100", "--format", format, "--out", "disk", "--output", "grass"];
+        let ran = bench.run(&args);
+        assert_eq!(ran.code, Some(1), "{format}: {}", ran.stderr);
+        assert!(ran.stderr.contains("the disk is full; free some space"), "{format}: {}", ran.stderr);
+        for name in bench.names("disk") {
+            assert_eq!(bench.read_json(&format!("disk/{name}"))["curves"]["counts"].as_array().unwrap().len(), 60);
+            fs::remove_file(disk.join(name)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn four_gigabytes_of_address_space_are_enough() {
+    let bench = Bench::new();
+    let mut command = Command::new("sh");
+    let script = "ulimit -v 4194304 && exec \"$0\" cook g.json --threads 8 --cache cache";
+    command.args(["-c", script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+    let ran = Ran::of(&command.output().unwrap());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+}
