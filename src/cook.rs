@@ -2,8 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use engine::clock::Stopwatch;
@@ -16,7 +14,7 @@ use formats::atomic::{AtomicFile, FileError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, Setting, Size, half_of_memory};
-use crate::failure::{Exit, Failure, exit_of_error};
+use crate::failure::{Exit, Failure, cancelled_by_ctrl_c, exit_of_error};
 use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
 use crate::{load, report};
@@ -220,19 +218,6 @@ fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result
         Some(exit) => Err(Failure { exit, lines }),
         None => Ok(()),
     }
-}
-
-/// A flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
-fn cancelled_by_ctrl_c() -> Arc<AtomicBool> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let flag = cancel.clone();
-    // Without a handler Ctrl-C still ends the program, only less politely.
-    let _ = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(Exit::Interrupted as i32);
-        }
-    });
-    cancel
 }
 
 fn progress(args: &Args, request: &Request) -> ProgressBar {

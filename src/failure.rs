@@ -2,6 +2,8 @@
 
 use std::io;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use engine::cook::CookError;
 use engine::error::ErrorKind;
@@ -83,4 +85,17 @@ pub fn exit_of_error(error: &CookError) -> Exit {
         ErrorKind::Cancelled => Exit::Interrupted,
         ErrorKind::Refused | ErrorKind::NotFinite | ErrorKind::Panic | ErrorKind::Contract => Exit::Cook,
     }
+}
+
+/// A flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
+pub fn cancelled_by_ctrl_c() -> Arc<AtomicBool> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let flag = cancel.clone();
+    // Without a handler Ctrl-C still ends the program, only less politely.
+    let _ = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    });
+    cancel
 }

@@ -11,7 +11,7 @@ use convect::{check, completions, convert, cook, diff, explain, nodes, schema, s
 #[command(version, arg_required_else_help = true, max_term_width = 100)]
 enum Verb {
     /// Cook a graph and write its outputs
-    Cook(cook::Args),
+    Cook(Box<cook::Args>),
     /// Find all that is wrong with a graph, without cooking it
     Check(check::Args),
     /// Show what a cook would do: which nodes, how often, and what is left out and why

@@ -8,7 +8,7 @@ use engine::cook::Delivered;
 use engine::graph::Graph;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError, sweep};
-use formats::usd::{Flavour, UsdWriter};
+use formats::usd::{Flavour, UsdError, UsdWriter};
 use formats::{Format, FrameStamp};
 
 use crate::failure::Failure;
@@ -26,7 +26,7 @@ pub struct Written {
 
 enum Target {
     /// All frames in one file. Open from the first frame on.
-    Sequence { flavour: Flavour, writer: Option<UsdWriter> },
+    Sequence { flavour: Flavour, writer: Option<Box<UsdWriter>> },
     /// A file a frame.
     PerFrame,
 }
@@ -72,11 +72,10 @@ impl<'g> Writers<'g> {
                             let path = folder.join(format!("{name}.{format}"));
                             let scene = &graph.scene;
                             let new = UsdWriter::create(path, *flavour, name, scene.fps, scene.origin);
-                            *writer = Some(new.map_err(|error| Failure::file(error.to_string()))?);
+                            *writer = Some(Box::new(new.map_err(usd_failed)?));
                         }
                         let Some(writer) = writer else { continue };
-                        let result = writer.frame(one.frame.number(), &one.geometry);
-                        result.map_err(|error| Failure::file(error.to_string()))?;
+                        writer.frame(one.frame.number(), &one.geometry).map_err(usd_failed)?;
                         written.frames.push(one.frame);
                     }
                 }
@@ -108,7 +107,7 @@ impl<'g> Writers<'g> {
                     written.frames.clear();
                 } else {
                     let name = &self.graph.outputs[output].name;
-                    let summary = writer.finish().map_err(|error| Failure::file(error.to_string()))?;
+                    let summary = writer.finish().map_err(usd_failed)?;
                     written.files.push(self.folder.join(format!("{name}.{}", self.format)));
                     written.bytes = summary.bytes;
                 }
@@ -152,5 +151,13 @@ pub fn failed(error: &FileError) -> Failure {
     match error.hint() {
         Some(hint) => Failure::file(format!("{error}; {hint}")),
         None => Failure::file(error.to_string()),
+    }
+}
+
+/// The failure of a USD file, with its hint where the file system is to blame.
+pub fn usd_failed(error: UsdError) -> Failure {
+    match error {
+        UsdError::File(error) => failed(&error),
+        refused => Failure::file(refused.to_string()),
     }
 }

@@ -1,5 +1,7 @@
 //! Every node file is in its family's list, and nodes do not call each other.
 
+#![allow(clippy::unwrap_used, reason = "a test's helpers")]
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -61,22 +61,30 @@ pub static NODE: Node = Node::new(
 .outputs(&[&CHANGED])
 .attributes(attributes)
 .metrics(&[&ROWS])
-.checks(|params| program(params).map(drop))
+.checks(|params| checked_program(params).map(drop))
 .leaves_out(|params, _| match program(params) {
     Ok(program) if program.writes().is_empty() => vec![LeftOut::new("code", "it assigns nothing")],
     _ => Vec::new(),
 });
 
-/// The program that the code is, as far as it can be known without the geometry.
+/// The program that the code is.
 ///
 /// # Errors
-/// Every line's fault, with its line and column; the hint is the first's. Rows that no geometry has.
+/// Every line's fault, with its line and column; the hint is the first's.
 fn program(params: &Params) -> Result<Program> {
-    let program = Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
+    Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
         let place = |fault: &ExprError| format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
         let facts: Vec<String> = faults.iter().map(place).collect();
         Error { hint: faults.into_iter().find_map(|fault| fault.hint), ..Error::refused(facts.join("; ")) }
-    })?;
+    })
+}
+
+/// The program, where there may be rows for it to run over.
+///
+/// # Errors
+/// Those of the code; rows that no geometry has.
+fn checked_program(params: &Params) -> Result<Program> {
+    let program = program(params)?;
     let elements = params.get(OVER) == Over::Elements;
     let fact = match params.get(COMPONENT) {
         Part::Points if elements => "loose points have no elements",
@@ -105,7 +113,7 @@ fn attributes(params: &Params) -> [AttrNames; 2] {
 }
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
-    let program = program(cx.params())?;
+    let program = checked_program(cx.params())?;
     let mut geometry = cx.input(GEOMETRY).clone();
     if program.writes().is_empty() {
         return Ok(CHANGED.with(geometry));
@@ -205,7 +213,7 @@ fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
 mod tests {
     use super::*;
     use engine::cook::{Engine, Settings};
-    use engine::testing::{Bench, Tasted, bench, cook_all};
+    use engine::testing::{Bench, Tasted, bench, conformance, cook_all};
 
     fn curves() -> Component {
         let points = vec![[0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [3.0, 1.0, 0.0]];
@@ -376,5 +384,11 @@ mod tests {
         let many = bench(&NODE).input(GEOMETRY, Component::curves(vec![9_999], points).unwrap());
         let many = many.set(CODE, "a = noise(P*0.1) + sin(P.x)".into());
         assert_eq!(many.clone().threads(1).cook().geometry, many.threads(7).cook().geometry);
+    }
+
+    #[test]
+    fn it_conforms() {
+        let code = |text: &'static str| move |bench: Bench| bench.set(CODE, text.into());
+        conformance(&NODE).with(code("a = i + rand(i)")).with(code("b = time")).run();
     }
 }

@@ -30,7 +30,7 @@ params! { PARAMS:
          flat. Each leans by its own share, to its own side.").at_least(0.0).soft(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Other numbers give other places, lengths and sides.");
     MASK: Param<Name> = Param::text("mask", "",
-        "A point attribute of the skin that multiplies the density. Empty, there is none.");
+        "A point attribute of the skin that multiplies the density. Empty, there is none.").fixed();
 }
 
 const CURVES: Output = Output::new(
@@ -128,9 +128,6 @@ fn blades(cx: &Cx, rest: &Component, triangles: &[[u32; 3]]) -> Result<Vec<(usiz
     let ground: Vec<[u32; 3]> = fertile.iter().map(|triangle| triangles[*triangle as usize]).collect();
     let surface = Surface::new(rest.positions(), &ground);
     let area = surface.area();
-    if !area.is_finite() {
-        return Err(Error::refused(format!("the area of `skin` is {area}")).hint("its positions must be finite"));
-    }
     let most_share = ground.as_flattened().iter().map(|corner| share(*corner)).fold(0.0, f64::max);
 
     let unmasked = f64::from(cx.get(DENSITY)) * area;

@@ -108,7 +108,7 @@ fn completed(part: &Component, names: &[(Owner, Name)]) -> Result<Component> {
 mod tests {
     use super::*;
     use engine::geometry::Grid;
-    use engine::testing::bench;
+    use engine::testing::{bench, conforms};
 
     fn curve(x: f32) -> Component {
         Component::curves(vec![2], vec![[x, 0.0, 0.0], [x, 1.0, 0.0]]).unwrap()
@@ -196,5 +196,10 @@ mod tests {
         let empty = Component::curves(vec![], vec![]).unwrap();
         let out = bench(&NODE).input(GEOMETRY, empty.clone()).input(GEOMETRY, curve(1.0)).input(GEOMETRY, empty).cook();
         assert_eq!(out.curves().runs().starts(), [0, 2]);
+    }
+
+    #[test]
+    fn it_conforms() {
+        conforms(&NODE);
     }
 }

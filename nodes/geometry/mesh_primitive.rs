@@ -54,7 +54,6 @@ pub static NODE: Node = Node::new(
 .changes_topology();
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    check(cx.params())?;
     let (size, thickness) = (cx.get(SIZE).map(f64::from), f64::from(cx.get(THICK)));
     let n = cx.get(DIVISIONS) as usize;
     let [width, _, depth] = size;
@@ -65,7 +64,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         Solid::Capsule => (size, shapes::capsule(size, n)),
         Solid::Grid => ([width, 0.0, depth], shapes::grid([width, depth], n)),
         Solid::Torus => (size, shapes::torus(size, n)),
-        Solid::Bowl => (size, shapes::bowl(size, thickness, n).unwrap_or_default()),
+        Solid::Bowl => (size, shapes::bowl(size, thickness, n).ok_or_else(|| no_hollow(cx.params()))?),
         Solid::Plate => {
             let size = [width, thickness, depth];
             (size, shapes::block(size, [n, 1, n]))
@@ -86,23 +85,31 @@ fn mesh(cx: &Cx, size: [f64; 3], Polygons { counts, corners, points }: Polygons)
     Ok(MESH.with(Geometry::from(mesh)))
 }
 
-/// Refuses a bowl whose wall fills it.
+/// Refuses a bowl that its wall fills.
 fn check(params: &Params) -> Result<()> {
-    let ([x, y, z], thickness) = (params.get(SIZE), params.get(THICK));
-    let hollow = (0.5 * x).min(y).min(0.5 * z);
-    if params.get(SHAPE) != Solid::Bowl || thickness < hollow {
-        return Ok(());
+    match params.get(SHAPE) == Solid::Bowl && params.get(THICK) >= hollow(params) {
+        true => Err(no_hollow(params)),
+        false => Ok(()),
     }
-    let fact = format!("`thickness` is {thickness}, which leaves no hollow in a bowl of [{x}, {y}, {z}]");
-    Err(Error::refused(fact)
-        .hint(format!("expected less than {hollow} m, the least of half the width, half the depth and the height")))
+}
+
+/// A wall as thick as this fills a bowl, metres.
+fn hollow(params: &Params) -> f32 {
+    let [x, y, z] = params.get(SIZE);
+    (0.5 * x).min(y).min(0.5 * z)
+}
+
+fn no_hollow(params: &Params) -> Error {
+    let ([x, y, z], thickness, hollow) = (params.get(SIZE), params.get(THICK), hollow(params));
+    Error::refused(format!("`thickness` is {thickness}, which leaves no hollow in a bowl of [{x}, {y}, {z}]"))
+        .hint(format!("expected less than {hollow} m, the least of half the width, half the depth and the height"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use engine::param::Choice;
-    use engine::testing::bench;
+    use engine::testing::{bench, conforms};
 
     const SOLIDS: [Solid; 7] =
         [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Bowl, Solid::Plate];
@@ -208,5 +215,10 @@ mod tests {
         assert_eq!(error(bench(&NODE).set(SIZE, [1.0, -1.0, 1.0])), "`size` is [1, -1, 1]");
         assert_eq!(error(bench(&NODE).set(DIVISIONS, 0)), "`divisions` is 0");
         assert_eq!(error(bench(&NODE).set(DIVISIONS, 513)), "`divisions` is 513");
+    }
+
+    #[test]
+    fn it_conforms() {
+        conforms(&NODE);
     }
 }

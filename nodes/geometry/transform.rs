@@ -42,10 +42,9 @@ pub static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&MOVED])
 .writes(&[&P])
-.attributes(|params| {
-    let names: &[&str] = if is_linear(params) { &FOLLOWING } else { &[] };
+.attributes(|_| {
     // Only what is there is changed, so whoever needs it after this needs it before.
-    [(); 2].map(|()| AttrNames::These(names.iter().map(|name| Name::from(*name)).collect()))
+    [(); 2].map(|()| AttrNames::These(FOLLOWING.map(Name::from).to_vec()))
 });
 
 /// Attributes that follow a scale or a turn.
@@ -155,7 +154,7 @@ fn moved_volume(volume: &Volume, affine: &Affine, cx: &Cx) -> Result<Volume> {
 mod tests {
     use super::*;
     use engine::param::{Value, euler_to_turn};
-    use engine::testing::bench;
+    use engine::testing::{bench, conforms};
 
     fn degrees(x: f64, y: f64, z: f64) -> Turn {
         let Value::Turn(turn) = euler_to_turn([x, y, z]) else { panic!("a rotation") };
@@ -309,5 +308,10 @@ mod tests {
         let grown = |scale: f64| bench(&NODE).input(GEOMETRY, far.clone()).set(SCALE, [scale; 3]).try_cook();
         assert_eq!(grown(1e-30).unwrap().part(Kind::Points).positions(), [[1.0, 0.0, 0.0]]);
         assert_eq!(grown(1e30).unwrap_err().kind, ErrorKind::NotFinite);
+    }
+
+    #[test]
+    fn it_conforms() {
+        conforms(&NODE);
     }
 }

@@ -3,17 +3,19 @@
 mod scale;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use engine::geometry::Geometry;
 use engine::time::Frame;
 use formats::atomic::sweep;
-use formats::usd::{Flavour, UsdError, UsdWriter};
+use formats::usd::{Flavour, UsdWriter};
 use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
-use crate::failure::{Exit, Failure};
+use crate::failure::{Exit, Failure, cancelled_by_ctrl_c};
 use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
-use crate::output::{failed, write_whole};
+use crate::output::{failed, usd_failed, write_whole};
 use scale::scaled;
 
 /// What `convert` takes.
@@ -61,7 +63,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if folder_of(&args.to).is_dir() {
         sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
     }
-    let conversion = Conversion { format, scale: args.scale, fps: args.fps };
+    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_ctrl_c() };
     let written = match &to {
         Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
@@ -101,21 +103,22 @@ struct Conversion {
     format: Format,
     scale: f64,
     fps: f64,
+    /// Whether someone pressed Ctrl-C.
+    cancel: Arc<AtomicBool>,
 }
 
 impl Conversion {
     /// All frames in one file. Several are read at once and written in order.
     fn one_file(&self, files: &[(Frame, PathBuf)], to: &Path, name: &str) -> Result<Written, Failure> {
-        let failed = |error: UsdError| Failure::file(error.to_string());
         let flavour = if self.format == Format::Usda { Flavour::Usda } else { Flavour::Usdc };
-        let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(failed)?;
+        let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
         for some in files.chunks(rayon::current_num_threads()) {
             let read: Vec<_> = some.par_iter().map(|(_, path)| self.read(path)).collect();
             for (geometry, (frame, _)) in read.into_iter().zip(some) {
-                writer.frame(frame.number(), &geometry?).map_err(failed)?;
+                writer.frame(frame.number(), &geometry?).map_err(usd_failed)?;
             }
         }
-        let bytes = writer.finish().map_err(failed)?.bytes;
+        let bytes = writer.finish().map_err(usd_failed)?.bytes;
         Ok(Written { files: vec![to.to_owned()], frames: files.len(), bytes, lost: Vec::new() })
     }
 
@@ -154,8 +157,11 @@ impl Conversion {
         Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost })
     }
 
-    /// Reads a file as it will be written.
+    /// Reads a file as it will be written, unless someone pressed Ctrl-C.
     fn read(&self, path: &Path) -> Result<Geometry, Failure> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Failure::new(Exit::Interrupted, "interrupted; what is there is whole"));
+        }
         let geometry = read(path)?.geometry;
         if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {
             return Err(refused(path, &FormatError::CannotHold { format: self.format, kind }));

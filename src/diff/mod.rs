@@ -7,6 +7,8 @@ mod show;
 use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
 
+use rayon::prelude::*;
+
 use crate::failure::{Exit, Failure};
 use crate::geometry_file::read;
 use compare::{Finding, compare};
@@ -51,17 +53,16 @@ impl Compared {
 /// With [`Exit::File`] where something differs, with [`Exit::CommandLine`] for any trouble.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let trouble = |failure: Failure| Failure { exit: Exit::CommandLine, ..failure };
-    let mut all = Vec::new();
-    for pair in pairs(&args.a, &args.b).map_err(trouble)? {
+    let compared = |pair: Pair| -> Result<Compared, Failure> {
         let findings = match (&pair.a, &pair.b) {
-            (Some(a), Some(b)) => {
-                let (a, b) = (read(a).map_err(trouble)?, read(b).map_err(trouble)?);
-                compare(&a.geometry, &b.geometry, args.tolerance)
-            }
+            (Some(a), Some(b)) => compare(&read(a)?.geometry, &read(b)?.geometry, args.tolerance),
             _ => Vec::new(),
         };
-        all.push(Compared { pair, findings });
-    }
+        Ok(Compared { pair, findings })
+    };
+    let all: Vec<_> = pairs(&args.a, &args.b).map_err(trouble)?.into_par_iter().map(compared).collect();
+    // In the order of the pairs, so that of several troubles the same one is always told.
+    let all = all.into_iter().collect::<Result<Vec<_>, _>>().map_err(trouble)?;
     let text = match args.json {
         true => show::json(&all, args.tolerance),
         false => show::text(&all, args.tolerance),

@@ -84,7 +84,9 @@ mod tests {
     }
 
     fn names(pairs: &[Pair]) -> Vec<[Option<&str>; 2]> {
-        let name = |path: &'_ Option<PathBuf>| -> Option<&'_ str> { path.as_ref()?.file_name()?.to_str() };
+        fn name(path: &Option<PathBuf>) -> Option<&str> {
+            path.as_ref()?.file_name()?.to_str()
+        }
         pairs.iter().map(|pair| [name(&pair.a), name(&pair.b)]).collect()
     }
 

@@ -142,12 +142,12 @@ impl Ran {
     }
 }
 
-/// Upright curves of five CVs, an obj file.
+/// Upright curves of five CVs, a quarter tall, an eighth apart; an obj file.
 pub(crate) fn blades(count: usize) -> String {
     let mut text = String::new();
     for blade in 0..count {
-        let (x, z) = ((blade % 10) as f32 * 0.1, (blade / 10) as f32 * 0.1);
-        (0..5).for_each(|cv| _ = writeln!(text, "v {x} {} {z}", cv as f32 * 0.05));
+        let (x, z) = ((blade % 10) as f32 / 8.0, (blade / 10) as f32 / 8.0);
+        (0..5).for_each(|cv| _ = writeln!(text, "v {x} {} {z}", cv as f32 / 16.0));
         let first = blade * 5 + 1;
         let _ = writeln!(text, "l {} {} {} {} {}", first, first + 1, first + 2, first + 3, first + 4);
     }

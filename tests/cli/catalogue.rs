@@ -59,6 +59,13 @@ fn a_plan_says_how_often_each_node_cooks_and_what_is_left_out() {
 }
 
 #[test]
+fn the_schema_is_json_that_names_every_node() {
+    let bench = Bench::new();
+    let schema = bench.json(&["schema"]).to_string();
+    assert!(names(&bench).iter().all(|name| schema.contains(&format!("\"{name}\""))));
+}
+
+#[test]
 fn completions_are_there_for_every_shell() {
     let bench = Bench::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
@@ -71,7 +78,7 @@ fn completions_are_there_for_every_shell() {
 fn help_and_version_are_answers() {
     let bench = Bench::new();
     let help = bench.done(&["--help"]);
-    for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "completions"] {
+    for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "schema", "completions"] {
         assert!(help.contains(&format!("\n  {verb} ")), "{verb} in {help}");
         let page = bench.done(&[verb, "--help"]);
         assert!(page.contains(&format!("Usage: convect {verb}")), "{page}");

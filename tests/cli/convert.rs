@@ -112,5 +112,5 @@ fn a_file_may_be_converted_onto_itself() {
     let bench = Bench::new();
     bench.done(&["convert", "grass.obj", "grass.obj", "--scale", "2"]);
     let stats = bench.json(&["stats", "grass.obj", "--json"]);
-    assert_eq!(stats["curves"]["bounds"]["max"], json!([1.8, 0.4, 1.0]));
+    assert_eq!(stats["curves"]["bounds"]["max"], json!([2.25, 0.5, 1.25]));
 }

@@ -79,7 +79,7 @@ fn params_and_controls_are_set_from_the_command_line() {
     assert_eq!(cook("same", &["--set", "wind_dir=[1, 0, 0.2]"]), plain);
     assert_ne!(cook("control", &["--set", "wind_dir=[0, 0, -1]"]), plain);
     let still = cook("still", &["--set", "wind.global_rotate=0", "--set", "blades.scale=2"]);
-    assert_eq!(still["points"][4], json!([0.0, 0.4, 0.0]), "no wind, twice as long");
+    assert_eq!(still["points"][4], json!([0.0, 0.5, 0.0]), "no wind, twice as long");
 }
 
 #[test]

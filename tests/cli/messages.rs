@@ -54,7 +54,7 @@ fn a_circle_is_told_node_by_node() {
 fn a_broken_file_is_told_with_its_line() {
     let bench = Bench::new();
     bench.write("grass.obj", "v 0 0 0\nv 0 nan 0\n");
-    let expected = "g.json:7:58: nodes.blades.params.file: `grass.obj`: line 2: `nan` is not a finite number\n";
+    let expected = "g.json:7:57: nodes.blades.params.file: `grass.obj`: line 2: `nan` is not a finite number\n";
     assert_eq!(bench.run(&["cook", "g.json"]).stderr, expected);
 }
 

@@ -67,6 +67,21 @@ fn ctrl_c_finishes_a_sequence_with_the_frames_it_has() {
 }
 
 #[test]
+fn ctrl_c_stops_a_conversion_between_two_files() {
+    let bench = Bench::new();
+    for frame in 0..3000 {
+        bench.write(&format!("in/a.{frame:04}.json"), r#"{"points": {"points": [[0, 0, 0]]}}"#);
+    }
+    fs::create_dir(bench.path("out")).unwrap();
+    let child = start(&bench, &["convert", "in/a.####.json", "out/a.####.ply"]);
+    wait_for(5, &bench.path("out"));
+    signal("INT", &child);
+    let ran = ended(child);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), "interrupted; what is there is whole\n"));
+    assert!(bench.names("out").iter().all(|name| name.starts_with("a.")), "no temporary is left");
+}
+
+#[test]
 fn what_a_kill_leaves_the_next_cook_sweeps() {
     let bench = Bench::new();
     let mut child = start(&bench, &["cook", "g.json", "--frames", LONG, "--output", "grass"]);

@@ -8,6 +8,8 @@ use super::ast::{Ast, COMPONENTS, Node, NodeId, Statement, Target};
 use super::code::Unary;
 use super::error::{ExprError, Place};
 use super::functions::{Does, Function};
+use super::lexer::shortened;
+use super::suggest::listed;
 use crate::geometry::ColumnType;
 
 /// What is known of an attribute.
@@ -86,7 +88,7 @@ impl Checker<'_> {
         value: MaybeWidth,
         place: Place,
     ) -> Result<(), ExprError> {
-        let name = &self.ast.attributes[attribute];
+        let name = shortened(&self.ast.attributes[attribute]);
         let known = self.attributes[attribute];
         if let Some(component) = component {
             let width = match known {
@@ -174,11 +176,8 @@ impl Checker<'_> {
         let own = ["frame", "time", "fps", "seed", "count"];
         let named = made.chain(&self.ast.locals).map(String::as_str);
         let candidates = named.chain(self.others.iter().copied()).chain(own);
-        let fault = place.fault(format!("there is no attribute, control or value `{name}`"));
-        fault.suggest(name, candidates, || {
-            let others = self.others.join("`, `");
-            (!others.is_empty()).then(|| format!("there are `{others}`"))
-        })
+        let fault = place.fault(format!("there is no attribute, control or value `{}`", shortened(name)));
+        fault.suggest(name, candidates, || listed(self.others).map(|names| format!("there are {names}")))
     }
 }
 

@@ -206,6 +206,11 @@ fn name_length(text: &str) -> Option<usize> {
         .then(|| text.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count())
 }
 
+/// Whether `text` is a name and nothing else.
+pub(super) fn is_name(text: &str) -> bool {
+    name_length(text) == Some(text.len())
+}
+
 /// At most the first 24 characters, so that a message stays readable.
 pub(super) fn shortened(text: &str) -> String {
     const SHOWN: usize = 24;

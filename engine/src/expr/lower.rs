@@ -189,8 +189,8 @@ impl Lowering<'_> {
 
     fn gather(&mut self, width: Width, mut id: impl FnMut(&mut Builder, u32) -> Id) -> Value {
         let mut ids = [id(&mut self.code, 0); 4];
-        for k in 1..width.count() {
-            ids[k] = id(&mut self.code, k as u32);
+        for (k, slot) in ids.iter_mut().enumerate().take(width.count()).skip(1) {
+            *slot = id(&mut self.code, k as u32);
         }
         Value { width, ids }
     }

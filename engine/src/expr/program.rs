@@ -12,6 +12,7 @@ use super::check::{self, Known};
 use super::code::Input;
 use super::error::ExprError;
 use super::functions::Does;
+use super::lexer::is_name;
 use super::lower::{Lowered, lower};
 use super::{Env, Scope, Uses, Width, parser};
 use crate::error::{Error, ErrorKind};
@@ -188,7 +189,9 @@ impl Program {
         };
         let mut attributes: Vec<Known> = self.ast.attributes.iter().zip(sources).map(known).collect();
         let controls = self.controls.iter().map(|(name, _)| name.as_str());
-        let others: Vec<&str> = columns.iter().map(|(name, _)| *name).chain(controls).collect();
+        let others = columns.iter().map(|(name, _)| *name).chain(controls);
+        // A file may call its attributes what no text can name.
+        let others: Vec<&str> = others.filter(|name| is_name(name)).collect();
         let widths = widths(&self.controls);
         check::check(&self.ast, &widths, &others, &mut attributes).map_err(|mut faults| faults.swap_remove(0))?;
         let kind = |known: &Known| match known {

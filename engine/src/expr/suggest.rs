@@ -3,11 +3,16 @@
 //! Promise: the same answer for the same candidates in the same order; the first of equals wins.
 //! Limit: names longer than 64 characters are not compared, so the cost stays bounded.
 
+use super::lexer::shortened;
+
+use std::cmp::Reverse;
+
 /// Longest name that is compared, in characters.
 const LONGEST: usize = 64;
 
 /// The candidate with the fewest edits from `name`, if they are no more than a third of its
-/// characters, or one. Case costs nothing, swapped neighbours are one edit.
+/// characters, or one; of equals the one that begins alike for longest. Case costs nothing, swapped
+/// neighbours are one edit.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = folded(name)?;
     let allowed = (wanted.len() / 3).max(1);
@@ -18,10 +23,18 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
             // One letter is within one edit of every other letter; that is no likeness.
             let alike = wanted.len() > 1 || wanted == known;
             let edits = distance(&wanted, &known);
-            (alike && edits <= allowed).then_some((edits, candidate))
+            let start = wanted.iter().zip(&known).take_while(|(a, b)| a == b).count();
+            (alike && edits <= allowed).then_some((edits, Reverse(start), candidate))
         })
-        .min_by_key(|(edits, _)| *edits)
-        .map(|(_, candidate)| candidate)
+        .min_by_key(|(edits, start, _)| (*edits, *start))
+        .map(|(_, _, candidate)| candidate)
+}
+
+/// `` `a`, `b` ``: the names, where they are few enough to read.
+pub(super) fn listed(names: &[&str]) -> Option<String> {
+    const LISTED: usize = 24;
+    let names: Vec<String> = names.iter().map(|name| shortened(name)).collect();
+    (1..=LISTED).contains(&names.len()).then(|| format!("`{}`", names.join("`, `")))
 }
 
 fn folded(name: &str) -> Option<Vec<char>> {
@@ -58,6 +71,7 @@ mod tests {
         assert_eq!(nearest("TIME", known), Some("time"));
         assert_eq!(nearest("mitme", known), None);
         assert_eq!(nearest("tiem", known), Some("time"));
+        assert_eq!(nearest("Curve_Win", ["Curve_In", "Curve_Wind"]), Some("Curve_Wind"));
         assert_eq!(nearest("smothstp", known), Some("smoothstep"));
     }
 

@@ -77,9 +77,12 @@ pub(super) fn did_you_mean<'n>(
     const LISTED: usize = 24;
     let candidates: Vec<&str> = candidates.into_iter().collect();
     match nearest(name, candidates.iter().copied()) {
-        Some(near) => Some(format!("did you mean `{near}`?")),
+        Some(near) => Some(format!("did you mean `{}`?", shown(near))),
         None if candidates.is_empty() => Some(format!("there are no {what}")),
-        None if candidates.len() <= LISTED => Some(format!("{what} are `{}`", candidates.join("`, `"))),
+        None if candidates.len() <= LISTED => {
+            let names: Vec<String> = candidates.into_iter().map(shown).collect();
+            Some(format!("{what} are `{}`", names.join("`, `")))
+        }
         None => None,
     }
 }

@@ -8,6 +8,7 @@ use jsonc_parser::errors::{ParseError, ParseErrorKind};
 use jsonc_parser::{CollectOptions, ParseOptions, ParseStringErrorKind, parse_to_ast};
 
 use super::fault::{Fault, code};
+use super::json::shown;
 use super::text::Text;
 
 /// Deepest nesting of lists and objects. A graph needs eight.
@@ -52,7 +53,7 @@ fn ends_early(text: &Text<'_>, error: &ParseError) -> bool {
 fn nothing(text: &Text<'_>) -> Fault {
     let fault = text.fault(0, "", code::EMPTY, format!("{} is empty", text.noun()));
     match text.set {
-        Some(key) => fault.hint(format!("write `{key}=` and the value, such as `{key}=1`")),
+        Some(key) => fault.hint(format!("write `{0}=` and the value, such as `{0}=1`", shown(key))),
         None => fault.hint(r#"a graph starts with {"convect": 1, "nodes": {…}, "outputs": {…}}"#),
     }
 }
@@ -187,7 +188,9 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
     };
     let fault = text.fault(start, "", code::SYNTAX, fact);
     match text.set {
-        Some(key) if is_word => fault.hint(format!(r#"a text needs quotes that the shell leaves: '{key}="{word}"'"#)),
+        Some(key) if is_word => {
+            fault.hint(format!(r#"a text needs quotes that the shell leaves: '{}="{word}"'"#, shown(key)))
+        }
         _ => Fault { hint: hint.map(Into::into), ..fault },
     }
 }
@@ -201,9 +204,10 @@ fn string_fact(kind: &ParseStringErrorKind) -> &'static str {
     }
 }
 
-/// The word at the start of `rest`, as far as it is worth showing.
+/// The word at the start of `rest`, as far as it is worth showing, and without characters that a terminal obeys.
 fn word(rest: &str) -> String {
-    rest.chars().take_while(|c| !c.is_whitespace() && !r#"{}[],:"'/"#.contains(*c)).take(40).collect()
+    let word = rest.chars().take_while(|c| !c.is_whitespace() && !r#"{}[],:"'/"#.contains(*c));
+    word.take(40).flat_map(char::escape_debug).collect()
 }
 
 #[cfg(test)]
@@ -231,6 +235,7 @@ mod tests {
             ("[01]", "1:3: a number has a leading zero; write it without the zero"),
             ("[1 2]", "1:3: expected `,`"),
             ("[NaN]", "1:2: `NaN` is no number that a graph can hold; expected a finite number"),
+            ("[a\0b\u{1b}]", r#"1:2: found `a\0b\u{1b}`, expected a value; a text stands between `"`"#),
             ("[-Infinity]", "1:2: `-Infinity` is no number that a graph can hold; expected a finite number"),
             (r#"["\x41"]"#, r"1:3: a text has a `\` that starts nothing known; `\` itself is written `\\`"),
             (r#"["\ud800"]"#, r"1:3: a `\u` is half of a surrogate pair; `\` itself is written `\\`"),

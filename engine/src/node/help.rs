@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Arity, Carries, Needs, Node};
-use crate::param::{Bounds, Shape};
+use crate::param::{Bounds, Shape, Unset, Value};
 
 impl Node {
     /// The help page: what it does, inputs, params with unit, range and default, outputs, attributes, metrics.
@@ -42,7 +42,10 @@ impl Node {
             self.param_specs()
                 .iter()
                 .map(|param| {
-                    let mut head = format!("{} = {}{}", param.name, param.default_text(), param.unit_text());
+                    // A default in words has no unit.
+                let worded = param.facts.unset != Unset::Default || matches!(param.default, Value::Nothing);
+                let unit = if worded { String::new() } else { param.unit_text() };
+                let mut head = format!("{} = {}{}", param.name, param.default_text(), unit);
                     let mut notes = Vec::new();
                     if let Shape::Choice(options) = param.shape {
                         notes.push(options.iter().map(|option| option.word).collect::<Vec<_>>().join(" | "));

@@ -86,7 +86,7 @@ pub enum Value {
 
 impl Value {
     /// Adds this value to a key.
-    pub fn hash(&self, key: &mut Hasher) {
+    pub fn add_to(&self, key: &mut Hasher) {
         match self {
             Self::Nothing => key.tag(20),
             Self::Float(x) => key.tag(1).f64(*x),

@@ -24,6 +24,7 @@ pub(crate) struct Spot {
 }
 
 type Known = std::result::Result<Arc<Spot>, Arc<CookError>>;
+type KeyOrError = std::result::Result<Key, Arc<CookError>>;
 
 /// Frames from an anchor to the next. At least as long as the window, so that two states at most run side by side and a
 /// frame costs two updates whatever the window's length.
@@ -45,7 +46,7 @@ pub(crate) struct Keys<'p, 'g> {
     plan: &'p Plan<'g>,
     spots: Vec<BTreeMap<Frame, Known>>,
     /// Keys of a chain's states: by stretch, from its start on.
-    chains: Vec<BTreeMap<Stretch, Vec<std::result::Result<Key, Arc<CookError>>>>>,
+    chains: Vec<BTreeMap<Stretch, Vec<KeyOrError>>>,
     /// Keys of what integrands were: from time 0 on, frame by frame, and before it as a whole.
     histories: Vec<Vec<Key>>,
     before: Vec<Option<Key>>,
@@ -158,7 +159,7 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(Arc::new(Spot { params: Some(params), times, key }))
     }
 
-    fn key_of(&mut self, node: usize, frame: Frame) -> std::result::Result<Key, Arc<CookError>> {
+    fn key_of(&mut self, node: usize, frame: Frame) -> KeyOrError {
         self.spot(node, self.plan.canonical(node, frame)).map(|spot| spot.key)
     }
 
@@ -253,12 +254,7 @@ impl<'p, 'g> Keys<'p, 'g> {
     }
 
     /// The key of a chain's state at `frame`, which lies in the stretch.
-    pub(crate) fn state_key(
-        &mut self,
-        node: usize,
-        stretch: Stretch,
-        frame: i64,
-    ) -> std::result::Result<Key, Arc<CookError>> {
+    pub(crate) fn state_key(&mut self, node: usize, stretch: Stretch, frame: i64) -> KeyOrError {
         let index = (frame - stretch.start) as usize;
         loop {
             let known = self.chains[node].entry(stretch).or_default();
@@ -276,12 +272,7 @@ impl<'p, 'g> Keys<'p, 'g> {
         }
     }
 
-    fn advance_key(
-        &mut self,
-        node: usize,
-        frame: i64,
-        before: Option<Key>,
-    ) -> std::result::Result<Key, Arc<CookError>> {
+    fn advance_key(&mut self, node: usize, frame: i64, before: Option<Key>) -> KeyOrError {
         let plan = self.plan;
         let at = Frame::whole(frame);
         let Body::Node { node: declared, inputs, .. } = &plan.graph.nodes[node].body else {
@@ -339,6 +330,6 @@ impl Plan<'_> {
 fn hash_recipe(hasher: &mut Hasher, declared: &Node, params: &Params) {
     hasher.text(declared.name).i64(i64::from(declared.version));
     for value in params.values.iter() {
-        value.hash(hasher);
+        value.add_to(hasher);
     }
 }

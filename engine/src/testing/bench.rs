@@ -73,6 +73,11 @@ impl Bench {
         self.wire(input.name(), Arc::new(at), true)
     }
 
+    /// Where each param's value comes from, in the order of the declaration.
+    pub(super) fn sources(&self) -> &[Source] {
+        &self.params
+    }
+
     pub(super) fn wire(mut self, input: &str, at: Moving, moves: bool) -> Self {
         let place = self.node.inputs.iter().position(|declared| declared.spec().name == input);
         let place = place.unwrap_or_else(|| panic!("{} has no input `{input}`", self.node.name));

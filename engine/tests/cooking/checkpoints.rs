@@ -137,7 +137,8 @@ fn a_limited_cache_stays_below_its_limit() {
     let frames: Vec<Frame> = (1..=40).map(Frame::whole).collect();
     let cooked = net.cook_with(&engine(1, 1 << 30), &frames, Some(&mut disk));
     assert!(cooked.bits() == net.cook(1..=40).bits());
-    let bytes = |kind| files(folder.path(), kind).iter().map(|path| fs::metadata(path).expect("a file").len()).sum::<u64>();
+    let bytes =
+        |kind| files(folder.path(), kind).iter().map(|path| fs::metadata(path).expect("a file").len()).sum::<u64>();
     let total = bytes("frame") + bytes("checkpoint");
     assert!(total <= limit && total > 0, "{total}");
     assert!(cook(&net, 1..=40, folder.path()).bits() == cooked.bits());

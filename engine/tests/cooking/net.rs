@@ -151,7 +151,7 @@ pub(crate) fn engine(threads: usize, memory: usize) -> Engine {
 
 /// Runs what panics on purpose without the words of the panic on the terminal.
 pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> T {
-    work()
+    engine::testing::quietly(work)
 }
 
 pub(crate) fn at(frame: f64) -> Frame {

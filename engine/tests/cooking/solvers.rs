@@ -48,14 +48,16 @@ fn a_solver_runs_once_from_its_start_whatever_frames_are_asked() {
 #[test]
 fn before_its_start_a_solver_gives_its_initial_state() {
     let probe = Probe::new();
-    let net = bounce(&probe).with("bounce", "start_frame", engine::param::Source::Constant(engine::param::Value::Int(10)));
+    let net =
+        bounce(&probe).with("bounce", "start_frame", engine::param::Source::Constant(engine::param::Value::Int(10)));
     let cooked = net.cook([-5, 1, 9, 10, 11]);
     assert_eq!(cooked.xs()[..4], [1.0; 4]);
     assert!(cooked.x(11.0) < 1.0);
     assert_eq!((probe.frames("start"), probe.frames("step")), (vec![10.0], vec![11.0]));
     // A start before the scene runs up to it.
     let probe = Probe::new();
-    let net = bounce(&probe).with("bounce", "start_frame", engine::param::Source::Constant(engine::param::Value::Int(-3)));
+    let net =
+        bounce(&probe).with("bounce", "start_frame", engine::param::Source::Constant(engine::param::Value::Int(-3)));
     net.cook([1]);
     assert_eq!((probe.frames("start"), probe.frames("step")), (vec![-3.0], vec![-2.0, -1.0, 0.0, 1.0]));
 }

@@ -1,7 +1,7 @@
 //! Laws of scattered curves.
 
 use super::*;
-use engine::testing::{Bench, Tasted, bench};
+use engine::testing::{Bench, Tasted, bench, conforms};
 
 /// A square in x and z around the origin, `size` wide, facing up.
 fn square(size: f32) -> Component {
@@ -241,15 +241,6 @@ fn a_scaled_scene_grows_the_same_scaled() {
 }
 
 #[test]
-fn a_skin_that_is_not_finite_is_refused() {
-    for bad in [f32::NAN, f32::INFINITY] {
-        let mut skin = square(1.0);
-        skin.edit(P).unwrap()[1][1] = bad;
-        assert_eq!(meadow(skin).try_cook().unwrap_err().fact, "the area of `skin` is NaN");
-    }
-}
-
-#[test]
 fn any_cvs_and_lengths_are_finite() {
     let curve = |cvs, length| {
         meadow(square(0.1)).set(DENSITY, 200.0).set(CVS, cvs).set(LENGTH, Span { low: 0.0, high: length }).cook()
@@ -270,4 +261,9 @@ fn more_than_fits_is_refused() {
     let mut plain = Component::mesh(vec![3, 3], vec![0, 1, 2, 3, 5, 4], points).unwrap();
     plain.set(Attr::<f32>::point("lawn"), vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).unwrap();
     assert_eq!(meadow(plain).set(MASK, "lawn".into()).cook().curves().element_count(), 500);
+}
+
+#[test]
+fn it_conforms() {
+    conforms(&NODE);
 }

@@ -54,7 +54,7 @@ pub struct Surface<'a> {
     ends: Vec<f64>,
     /// Of each triangle, not normalised.
     normals: Vec<[f64; 3]>,
-    /// Least coordinates: places are kept relative to it, so that none is negative and a cast rounds down.
+    /// Least coordinates of all corners: places are kept relative to it, so that none is negative and a cast rounds down.
     low: [f64; 3],
 }
 
@@ -72,7 +72,9 @@ impl<'a> Surface<'a> {
             area
         });
         let ends = ends.collect();
-        let least = |k: usize| positions.iter().map(|p| f64::from(p[k])).fold(f64::INFINITY, f64::min);
+        // Of the triangles' corners alone: a stray point far away would cost all others their digits.
+        let corners = || triangles.as_flattened().iter().map(|corner| positions[*corner as usize]);
+        let least = |k: usize| corners().map(|p| f64::from(p[k])).fold(f64::INFINITY, f64::min);
         Self { positions, triangles, ends, normals, low: [least(0), least(1), least(2)] }
     }
 
@@ -122,10 +124,11 @@ impl<'a> Surface<'a> {
     /// at random across.
     fn candidate(&self, i: u64, key: Key) -> Spot {
         let along = key.u64().wrapping_add(i.wrapping_mul(GOLDEN));
-        let target = (along >> 11) as f64 / (1_u64 << 53) as f64 * self.area();
-        let triangle = self.ends.partition_point(|end| *end <= target).min(self.ends.len() - 1);
+        // Never rounded up to the very end, where no triangle begins.
+        let target = ((along >> 11) as f64 / (1_u64 << 53) as f64 * self.area()).min(self.area().next_down());
+        let triangle = self.ends.partition_point(|end| *end <= target);
         let start = if triangle == 0 { 0.0 } else { self.ends[triangle - 1] };
-        let share = ((target - start) / (self.ends[triangle] - start)).clamp(0.0, 1.0);
+        let share = (target - start) / (self.ends[triangle] - start);
         let (down, across) = (share.sqrt(), key.of(i).f64());
         Spot { triangle: triangle as u32, weights: [1.0 - down, down * (1.0 - across), down * across] }
     }
@@ -140,8 +143,8 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// Points that are kept (none with a negative coordinate), found again by place: in cubes at least twice as wide as the spacing, so that eight of them
-/// hold all that is nearer. Cubes share chains by chance, which costs time and no answer.
+/// Points that are kept (none with a negative coordinate), found again by place: in cubes at least twice as wide as the
+/// spacing, so that eight of them hold all that is nearer. Cubes share chains by chance, which costs time and no answer.
 struct Kept {
     points: Vec<Point>,
     cubes_per_metre: f64,

@@ -124,6 +124,13 @@ fn a_surface_without_area_gets_no_point() {
 }
 
 #[test]
+fn a_stray_point_far_away_changes_nothing() {
+    let stray = [SQUARE.to_vec(), vec![[-1e30; 3]]].concat();
+    let spots = |positions: &[[f32; 3]]| Surface::new(positions, &HALVES).spread(300, Key::new(4));
+    assert_eq!(spots(&stray), spots(&SQUARE));
+}
+
+#[test]
 fn weights_are_shares() {
     for spot in Surface::new(&SQUARE, &HALVES).spread(1000, Key::new(8)) {
         assert!(spot.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));

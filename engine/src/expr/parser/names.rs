@@ -4,7 +4,8 @@ use super::super::ast::Node;
 use super::super::code::Input;
 use super::super::error::{ExprError, Place};
 use super::super::functions::{self, FOREIGN, FUNCTIONS, Function};
-use super::super::lexer::{Symbol, Token, TokenKind, shortened};
+use super::super::lexer::{Symbol, Token, TokenKind, is_name, shortened};
+use super::super::suggest::listed;
 use super::{Language, Parser};
 use crate::geometry::fixed_type;
 
@@ -44,19 +45,20 @@ impl<'a> Parser<'a> {
         if self.language == Language::Program {
             return Ok(Node::Attribute(self.attribute(name)));
         }
-        let fault = place.fault(format!("the attribute `{name}` cannot be read here"));
+        let fault = place.fault(format!("the attribute `{}` cannot be read here", shortened(name)));
         Err(fault.hint("attributes are read by Attribute_Expr; a param may be masked by one"))
     }
 
     fn unknown_name(&self, name: &str, place: Place) -> ExprError {
         let own = RESERVED[..5].iter().copied();
-        let controls = self.scope.controls.iter().map(|(name, _)| *name);
+        let controls = self.scope.controls.iter().map(|(name, _)| *name).filter(|name| is_name(name));
         let candidates: Vec<&str> = own.chain(controls).collect();
+        let listed = || listed(&candidates).map(|names| format!("known are {names}"));
         let fault = place.fault(format!("the name `{}` is not known", shortened(name)));
         if matches!(name, "i" | "count") || fixed_type(name).is_some() {
             return fault.hint("attributes, `i` and `count` are known in Attribute_Expr only");
         }
-        foreign(fault, name, candidates.iter().copied(), || Some(format!("known are `{}`", candidates.join("`, `"))))
+        foreign(fault, name, candidates.iter().copied(), listed)
     }
 
     pub(super) fn unknown_function(&self, name: &str, place: Place) -> ExprError {
@@ -65,6 +67,7 @@ impl<'a> Parser<'a> {
             || self.scope.control(name).is_some()
             || self.attributes.contains_key(name);
         if is_value {
+            let name = shortened(name);
             let fault = place.fault(format!("`{name}` is a value, not a function"));
             return fault.hint(format!("multiplication is written `{name}*(…)`"));
         }

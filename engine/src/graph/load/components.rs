@@ -74,7 +74,7 @@ impl Components {
             .enumerate()
             .find(|(port, _)| self.of(wire.node, Some(*port)).is_some_and(|kinds| kinds.contains(&kind)));
         if let Some((_, output)) = sibling {
-            return Some(format!("`{}.{}` carries {kind}", source.text.entry.name, output.name));
+            return Some(format!("`{}.{}` carries {kind}", shown(source.text.entry.name), output.name));
         }
         let gives = |carries: &Carries| matches!(carries, Carries::Kinds(kinds) if kinds.contains(&kind));
         let types: Vec<&str> = catalogue

@@ -1,7 +1,9 @@
 //! The parts of a graph file: which keys there are, and which there must be. What the parts say is read elsewhere.
 
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, did_you_mean, find, is_misspelt, is_name, keep, refuse_unknown, shown};
+use crate::graph::json::{
+    Entry, Json, did_you_mean, find, is_misspelt, is_name, keep, member_path, refuse_unknown, shown,
+};
 
 /// The number of the format that is read.
 const FORMAT: i64 = 1;
@@ -96,14 +98,14 @@ impl<'a> Document<'a> {
     pub(super) fn set(&mut self, value: Json<'a>, faults: &mut Vec<Fault>) {
         let key = value.text.set.unwrap_or_default();
         let Some((id, param)) = key.split_once('.') else {
-            let path = format!("controls.{key}");
+            let path = member_path("controls", key);
             return match self.controls.iter_mut().find(|control| control.name == key) {
                 Some(control) => *control = Entry::of_set(control.name, value.at_path(&path)),
                 None => {
                     let fault = value.fault(code::UNKNOWN_SET, format!("there is no control `{}`", shown(key)));
                     let names = self.controls.iter().map(|control| control.name);
                     let hint = match self.nodes.iter().any(|node| node.entry.name == key) {
-                        true => Some(format!("a param of the node is set with `{key}.param=…`")),
+                        true => Some(format!("a param of the node is set with `{}.param=…`", shown(key))),
                         false => did_you_mean(key, names, "controls"),
                     };
                     faults.push(Fault { hint, ..fault });
@@ -115,7 +117,7 @@ impl<'a> Document<'a> {
             let hint = did_you_mean(id, self.nodes.iter().map(|node| node.entry.name), "nodes");
             return faults.push(Fault { hint, ..fault });
         };
-        let value = value.at_path(&format!("nodes.{id}.params.{param}"));
+        let value = value.at_path(&member_path(&(member_path("nodes", id) + ".params"), param));
         match node.params.iter_mut().find(|entry| entry.name == param) {
             Some(entry) => *entry = Entry::of_set(param, value),
             None => node.params.push(Entry::of_set(param, value)),

@@ -6,7 +6,7 @@ use super::control::Controls;
 use crate::expr::{Expr, ExprError, Scope};
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Json, keep};
+use crate::graph::json::{Json, keep, shown};
 use crate::param::{ParamSpec, Shape, Source, Value};
 
 /// The source that a param's expressions make; constant where they hang on no time. `None` after a fault, and for a shape
@@ -75,7 +75,9 @@ fn explain(json: &Json<'_>, text: &str, controls: &Controls<'_>, error: ExprErro
     }
     let place = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
     let hint = match controls.unreadable_in(&fact) {
-        Some(name) => Some(format!("the control `{name}` is no number or vector, which is what expressions read")),
+        Some(name) => {
+            Some(format!("the control `{}` is no number or vector, which is what expressions read", shown(name)))
+        }
         None => hint,
     };
     Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {place} of the expression")) }

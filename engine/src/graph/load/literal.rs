@@ -86,7 +86,7 @@ fn tuple<T: Copy + Default, const N: usize>(
     let Some(items) = items else {
         let fault = json.unexpected(expected);
         faults.push(match json.value {
-            Ast::NumberLit(number) => fault.hint(format!("write [{}]", vec![number.value; N].join(", "))),
+            Ast::NumberLit(number) => fault.hint(format!("write [{}]", vec![shown(number.value); N].join(", "))),
             _ => fault,
         });
         return None;

@@ -283,7 +283,9 @@ impl<'a> Reader<'a, '_> {
                 let value = value.at_path(&reader.path());
                 let before = self.faults.len();
                 let source = self.written(spec, &value, Within::Control);
-                self.faults[before..].iter_mut().for_each(|fault| fault.fact += &format!(", in the control `{text}`"));
+                self.faults[before..]
+                    .iter_mut()
+                    .for_each(|fault| fault.fact += &format!(", in the control `{}`", shown(text)));
                 source
             }
             Found::Faulty => None,
@@ -337,9 +339,11 @@ fn bare_ramp(json: &Json<'_>) -> Fault {
     let range = json.value.range();
     match &json.text.content[range.start..range.end] {
         text if json.elements().is_none() => {
-            fault.hint(format!("a ramp of one value is written {{\"ramp\": [[0, {text}]]}}"))
+            fault.hint(format!("a ramp of one value is written {{\"ramp\": [[0, {}]]}}", shown(text)))
         }
-        text if text.len() <= 60 && !text.contains(['\n', '\r']) => fault.hint(format!("write {{\"ramp\": {text}}}")),
+        text if text.len() <= 60 && !text.contains(char::is_control) => {
+            fault.hint(format!("write {{\"ramp\": {text}}}"))
+        }
         _ => fault.hint("write {\"ramp\": …} around it"),
     }
 }

@@ -39,6 +39,8 @@ pub(super) fn sources(drafts: &[Draft<'_>]) -> Vec<Vec<usize>> {
 
 /// Puts a fault for each cycle, at the wire that closes it.
 pub(super) fn refuse_cycles(drafts: &[Draft<'_>], order: &Order, faults: &mut Vec<Fault>) {
+    /// Most nodes of a circle that are named.
+    const LISTED: usize = 12;
     for cycle in &order.cycles {
         let (first, last) = (cycle[0], cycle[cycle.len() - 1]);
         let closing = drafts[first].wires.iter().flatten().find(|wire| wire.node == last);
@@ -47,7 +49,10 @@ pub(super) fn refuse_cycles(drafts: &[Draft<'_>], order: &Order, faults: &mut Ve
         let fault = match cycle.len() {
             1 => wire.json.fault(code::CYCLE, format!("`{}` is wired to itself", id(&first))),
             _ => {
-                let ids: Vec<String> = cycle.iter().chain([&first]).map(id).collect();
+                let mut ids: Vec<String> = cycle.iter().chain([&first]).map(id).collect();
+                if ids.len() > LISTED {
+                    ids.splice(LISTED / 2..ids.len() - LISTED / 2, ["…".into()]);
+                }
                 wire.json.fault(code::CYCLE, format!("the wires go round: {}", ids.join(" → ")))
             }
         };

@@ -1,0 +1,207 @@
+//! What a declaration must say, before anything is cooked.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::Findings;
+use crate::geometry::{Name, fixed_type};
+use crate::node::{Arity, AttrDecl, Carries, Cook, InputSpec, Node};
+use crate::param::{Bounds, ParamSpec, Params, ReadLog, Shape, Unit, Value};
+use crate::testing::quiet::quietly;
+
+/// Adds what is wrong; says whether the node can be tried at all.
+pub(super) fn check(node: &'static Node, findings: &mut Findings) -> bool {
+    if !is_node_name(node.name) {
+        findings.add(format!("its name `{}` is not made of capitalised words joined by `_`", node.name));
+    }
+    if node.version == 0 {
+        findings.add("its version is 0; the first is 1");
+    }
+    if node.outputs.is_empty() {
+        findings.add("it has no output");
+    }
+    check_help("it", node.help, findings);
+    let specs = match quietly(|| catch_unwind(AssertUnwindSafe(|| node.param_specs()))) {
+        Ok(specs) => specs,
+        Err(_) => {
+            findings.add("the default of one of its ramps is no ramp");
+            return false;
+        }
+    };
+    let inputs = node.input_specs();
+    for spec in &specs {
+        check_param(spec, findings);
+    }
+    for input in &inputs {
+        check_help(&format!("the input `{}`", input.name), input.help, findings);
+    }
+    for output in node.outputs {
+        check_help(&format!("the output `{}`", output.name), output.help, findings);
+        check_carries(output.name, output.carries, &inputs, findings);
+    }
+    for metric in node.metrics {
+        check_help(&format!("the metric `{}`", metric.name), metric.help, findings);
+    }
+    check_names("param", specs.iter().map(|spec| spec.name), findings);
+    check_names("input", inputs.iter().map(|input| input.name), findings);
+    check_names("output", node.outputs.iter().map(|output| output.name), findings);
+    check_names("metric", node.metrics.iter().map(|metric| metric.name), findings);
+    check_attributes("reads", node.reads, findings);
+    check_attributes("writes", node.writes, findings);
+    check_what_plans_read(node, &specs, findings);
+    true
+}
+
+/// Capitalised words, joined by `_`: `Curve_Wind`.
+fn is_node_name(name: &str) -> bool {
+    let word = |word: &str| {
+        word.starts_with(|c: char| c.is_ascii_uppercase()) && word.bytes().all(|byte| byte.is_ascii_alphanumeric())
+    };
+    name.split('_').all(word)
+}
+
+fn is_snake_case(name: &str) -> bool {
+    let letters = name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
+    letters && name.starts_with(|c: char| c.is_ascii_lowercase()) && !name.ends_with('_') && !name.contains("__")
+}
+
+/// At least a sentence: two words, a capital first, a full stop last.
+fn check_help(whose: &str, help: &str, findings: &mut Findings) {
+    let first = help.chars().next();
+    let starts = first.is_some_and(|c| !c.is_lowercase());
+    if help.split_whitespace().count() < 2 || !starts || !help.ends_with('.') {
+        findings.add(format!("{whose} needs help of at least a sentence, from a capital to a full stop: {help:?}"));
+    }
+}
+
+fn check_names(what: &str, names: impl Iterator<Item = &'static str>, findings: &mut Findings) {
+    let mut known = Vec::new();
+    for name in names {
+        if !is_snake_case(name) {
+            findings.add(format!("the {what} `{name}` is not in snake_case"));
+        }
+        if known.contains(&name) {
+            findings.add(format!("the {what} `{name}` is declared twice"));
+        }
+        known.push(name);
+    }
+}
+
+fn check_param(spec: &ParamSpec, findings: &mut Findings) {
+    let name = spec.name;
+    check_help(&format!("the param `{name}`"), spec.help, findings);
+    if let Shape::Choice(options) = spec.shape {
+        for option in options.iter().filter(|option| option.help.trim().is_empty()) {
+            findings.add(format!("the option `{}` of `{name}` has no help", option.word));
+        }
+        check_names("option", options.iter().map(|option| option.word), findings);
+    }
+    let hard = spec.facts.hard;
+    if hard.low > hard.high {
+        findings.add(format!("the hard range of `{name}` runs backwards: {hard}"));
+        return;
+    }
+    if let Some([low, high]) = spec.facts.soft
+        && (low >= high || low < hard.low || high > hard.high)
+    {
+        findings.add(format!("the usual range {low}…{high} of `{name}` is empty, or not within {hard}"));
+    }
+    if let Some((fact, hint)) = spec.refuses(&spec.default) {
+        findings.add(format!("the default of `{name}` is refused: {fact}; {hint}"));
+    }
+    let numbers = match spec.shape {
+        Shape::Float | Shape::Int | Shape::Vec2 | Shape::Int3 | Shape::Span | Shape::Masked => true,
+        Shape::Vec3 => !spec.facts.direction,
+        _ => false,
+    };
+    let ranged = hard != Bounds::ALL || spec.facts.soft.is_some();
+    if numbers && spec.facts.unit == Unit::None && !ranged {
+        findings.add(format!("`{name}` is a number with neither unit nor range"));
+    }
+}
+
+fn check_carries(output: &str, carries: Carries, inputs: &[InputSpec], findings: &mut Findings) {
+    let arity = |name: &str| inputs.iter().find(|input| input.name == name).map(|input| input.arity);
+    let fits = match carries {
+        Carries::Kinds(kinds) => !kinds.is_empty(),
+        Carries::Like(input) => arity(input).is_some_and(|arity| !matches!(arity, Arity::Many { .. })),
+        Carries::Union(input) => arity(input).is_some_and(|arity| matches!(arity, Arity::Many { .. })),
+    };
+    if !fits {
+        findings.add(format!("the output `{output}` does not say which components it carries: {carries:?}"));
+    }
+}
+
+fn check_attributes(what: &str, attributes: &[&dyn AttrDecl], findings: &mut Findings) {
+    let mut known = Vec::new();
+    for attribute in attributes {
+        let (name, owner, kind) = attribute.spec();
+        if let Some(fixed) = fixed_type(name).filter(|fixed| *fixed != kind) {
+            findings.add(format!("it {what} `{name}` as {kind}, which is always {fixed}"));
+        }
+        if known.contains(&(name, owner)) {
+            findings.add(format!("it lists `{name}` twice among what it {what}"));
+        }
+        known.push((name, owner));
+    }
+}
+
+/// What plans ask before anything is cooked may hang only on params that stand still, or that are kept over time.
+fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mut Findings) {
+    let fixed = |spec: &ParamSpec| spec.facts.fixed;
+    if let Some(attributes) = node.attributes {
+        let read = read_by(specs, |params| {
+            attributes(params);
+        });
+        for spec in read.iter().filter(|spec| !fixed(spec)) {
+            findings.add(format!("its attributes hang on `{}`, which may be animated; declare it `fixed`", spec.name));
+        }
+    }
+    if let Cook::Solver(_, solver) = node.cook {
+        let read = read_by(specs, |params| {
+            (solver.start_frame)(params);
+        });
+        for spec in read.iter().filter(|spec| !fixed(spec)) {
+            findings.add(format!("its start hangs on `{}`, which may be animated; declare it `fixed`", spec.name));
+        }
+    }
+    let integrated = match node.integrand {
+        Some(integrand) => read_by(specs, |params| {
+            integrand(params);
+        }),
+        None => Vec::new(),
+    };
+    for spec in integrated.iter().filter(|spec| !spec.facts.history && !fixed(spec)) {
+        findings.add(format!("it integrates over `{}`, which is not declared with `history`", spec.name));
+    }
+    for spec in specs.iter().filter(|spec| spec.facts.history) {
+        if !integrated.iter().any(|read| read.name == spec.name) {
+            findings.add(format!("`{}` is declared with `history`, and nothing is integrated over it", spec.name));
+        }
+    }
+}
+
+/// Which params a function of the params reads, by default and with every choice made another way.
+fn read_by(specs: &[ParamSpec], ask: impl Fn(&Params)) -> Vec<ParamSpec> {
+    let options = specs.iter().map(|spec| match spec.shape {
+        Shape::Choice(options) => options.len(),
+        Shape::Bool => 2,
+        _ => 1,
+    });
+    let log = std::sync::Arc::new(ReadLog::new(specs.len()));
+    for option in 0..options.max().unwrap_or(1) {
+        let value = |spec: &ParamSpec| match spec.shape {
+            Shape::Choice(options) => Value::Choice(option % options.len()),
+            Shape::Bool => Value::Bool(option % 2 == 1),
+            _ => spec.default.clone(),
+        };
+        let params = Params { specs: specs.into(), values: specs.iter().map(value).collect(), log: log.clone() };
+        // What panics here panics when the node is tried, and is told then.
+        let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| ask(&params))));
+    }
+    specs.iter().enumerate().filter(|(place, _)| log.was_read(*place)).map(|(_, spec)| spec.clone()).collect()
+}
+
+/// Whether a list of names has this one.
+pub(super) fn has(names: &[Name], name: &str) -> bool {
+    names.iter().any(|known| **known == *name)
+}

@@ -1,0 +1,183 @@
+//! The conformance suite: what every node is held to, derived from its declaration alone.
+//!
+//! Promise: a node that passes reads and writes what it declares and nothing else, in every setting that was tried; its
+//! params, inputs and metrics all matter; it has the same bits on any number of threads, in any order of frames, alone or
+//! among others; it answers extremes with finite numbers or an error. Limit: a search. What a node does only with more
+//! than a few hundred rows, or with two params at one rare pair of values, it may not see. What it cannot invent (files,
+//! texts in a language) a test gives it through [`Conformance::with`].
+
+mod bits;
+mod declaration;
+mod passes;
+mod reads;
+#[cfg(test)]
+mod tests;
+mod trial;
+
+use std::sync::Arc;
+
+use numerics::random::Key;
+
+use super::bench::Bench;
+use super::samples::Form;
+use super::settings;
+use crate::node::{Arity, Node};
+use crate::param::{Source, Unset};
+use trial::{Motion, Outcome, Prepare, Subject, Trial};
+
+/// Fails where a node breaks any rule, with everything that was found.
+///
+/// # Panics
+/// Where the node does not conform.
+pub fn conforms(node: &'static Node) {
+    conformance(node).run();
+}
+
+/// What is wrong with a node, a line a finding; empty where it conforms.
+pub fn faults(node: &'static Node) -> Vec<String> {
+    conformance(node).faults()
+}
+
+/// The suite for a node that needs something the suite cannot invent.
+pub fn conformance(node: &'static Node) -> Conformance {
+    Conformance { node, samples: Vec::new() }
+}
+
+/// A node under the suite, and how it is prepared.
+pub struct Conformance {
+    node: &'static Node,
+    samples: Vec<Prepare>,
+}
+
+impl Conformance {
+    /// Tries the node with what `prepare` sets on the bench: a file, a text in a language. Several samples take turns. What
+    /// a sample sets is not varied otherwise.
+    #[must_use]
+    pub fn with(mut self, prepare: impl Fn(Bench) -> Bench + Send + Sync + 'static) -> Self {
+        self.samples.push(Arc::new(prepare));
+        self
+    }
+
+    /// Fails where the node breaks any rule, with everything that was found.
+    ///
+    /// # Panics
+    /// Where the node does not conform.
+    pub fn run(self) {
+        let name = self.node.name;
+        let faults = self.faults();
+        assert!(faults.is_empty(), "{name} does not conform:\n  {}", faults.join("\n  "));
+    }
+
+    /// What is wrong with the node, a line a finding.
+    pub fn faults(self) -> Vec<String> {
+        let mut findings = Findings::default();
+        if !declaration::check(self.node, &mut findings) {
+            return findings.0;
+        }
+        let subject = Subject::new(self.node, self.samples);
+        let tried = try_all(&subject);
+        passes::check(&subject, &tried, &mut findings);
+        if !tried.iter().any(|(_, outcome)| outcome.is_whole()) {
+            let said =
+                tried.first().and_then(|(_, outcome)| outcome.errors.first()).map(|(_, _, error)| error.as_str());
+            findings.add(format!(
+                "it refuses all that the suite can offer; give it samples with `with`: {}",
+                said.unwrap_or("")
+            ));
+            return findings.0;
+        }
+        reads::check(&subject, &tried, &mut findings);
+        bits::check(&subject, &tried, &mut findings);
+        findings.0
+    }
+}
+
+/// What was found, each once.
+#[derive(Default)]
+struct Findings(Vec<String>);
+
+impl Findings {
+    fn add(&mut self, finding: impl Into<String>) {
+        let finding = finding.into();
+        if !self.0.contains(&finding) {
+            self.0.push(finding);
+        }
+    }
+}
+
+/// How many mixtures of settings are tried.
+const MIXTURES: u64 = 32;
+
+/// All trials, cooked: defaults in several dresses, each param at each of its values, mixtures.
+fn try_all(subject: &Subject) -> Vec<(Trial, Outcome)> {
+    let frames = subject.frames();
+    let trials = defaults(subject).into_iter().chain(singles(subject)).chain(mixtures(subject));
+    trials.map(|trial| (trial.clone(), subject.run(&trial, &frames))).collect()
+}
+
+/// Defaults: dressed and naked, with optional inputs and without, lists of 0, 1 and 2 wires, both forms.
+fn defaults(subject: &Subject) -> Vec<Trial> {
+    let full = subject.defaults(2);
+    let mut bare = Trial { declared: None, others: None, ..subject.defaults(0) };
+    for (wires, input) in bare.wires.iter_mut().zip(&subject.inputs) {
+        if input.arity == Arity::Optional {
+            wires.clear();
+        }
+    }
+    let mut trials = vec![
+        full.clone(),
+        Trial { others: None, ..subject.defaults(1) },
+        Trial { form: Form::Other, declared: None, ..full.clone() },
+        bare,
+    ];
+    trials.extend((1..6).filter(|_| takes_any(subject)).map(|any| Trial { any, ..full.clone() }));
+    trials.extend((1..subject.samples.len()).map(|sample| Trial { sample, ..full.clone() }));
+    trials
+}
+
+fn takes_any(subject: &Subject) -> bool {
+    subject.inputs.iter().any(|input| input.needs == crate::node::Needs::Any)
+}
+
+/// Each param at each of its values, all else by default.
+fn singles(subject: &Subject) -> Vec<Trial> {
+    let full = subject.defaults(2);
+    let mut trials = Vec::new();
+    for (place, spec) in subject.specs.iter().enumerate() {
+        for value in settings::candidates(spec) {
+            let mut trial = full.clone();
+            trial.settings[place] = Source::Constant(value);
+            trials.push(trial);
+        }
+    }
+    trials
+}
+
+/// Everything at random.
+fn mixtures(subject: &Subject) -> Vec<Trial> {
+    (0..MIXTURES).map(|k| mixture(subject, k)).collect()
+}
+
+fn mixture(subject: &Subject, k: u64) -> Trial {
+    let at = Key::new(0x00c0_4fec).of(k);
+    let mut trial = subject.defaults(k as usize % 3);
+    for (place, spec) in subject.specs.iter().enumerate() {
+        if spec.facts.unset == Unset::Default {
+            trial.settings[place] = Source::Constant(settings::random(spec, at.of(place as u64)));
+        }
+    }
+    for (place, (wires, input)) in trial.wires.iter_mut().zip(&subject.inputs).enumerate() {
+        if input.arity == Arity::Optional && at.of(500 + place as u64).f32() < 0.3 {
+            wires.clear();
+        }
+    }
+    trial.sample = k as usize % subject.samples.len().max(1);
+    trial.declared = (k % 4 != 3).then_some(k);
+    trial.others = (k % 3 != 2).then_some(k);
+    trial.form = if k % 5 == 4 { Form::Other } else { Form::Small };
+    trial.any = if k % 2 == 0 { 0 } else { k as usize / 2 };
+    if subject.is_timed() && k % 3 == 1 {
+        trial.motion = Motion::Still;
+    }
+    trial
+}

@@ -1,0 +1,374 @@
+//! One try of a node: settings and inputs, cooked, and what came out of it.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, LazyLock};
+
+use crate::cook::{Delivered, Engine, Settings, Stopped};
+use crate::error::ErrorKind;
+use crate::geometry::{ColumnType, Geometry, Kind, Name, Owner, P, Topology};
+use crate::graph::{Graph, Scene};
+use crate::key::{Hasher, Key};
+use crate::node::{Arity, AttrNames, Cook, InputSpec, LeftOut, Needs, Node};
+use crate::param::{ParamSpec, Params, Source, Value};
+use crate::plan::{Plan, Request};
+use crate::testing::bench::{Bench, bench};
+use crate::testing::quiet::quietly;
+use crate::testing::samples::{self, Dress, Form};
+use crate::time::Frame;
+
+/// Sets what the suite cannot invent: files, texts in a language.
+pub(super) type Prepare = Arc<dyn Fn(Bench) -> Bench + Send + Sync>;
+
+/// The node that is tried, and what is known of it.
+pub(super) struct Subject {
+    pub(super) node: &'static Node,
+    pub(super) specs: Vec<ParamSpec>,
+    pub(super) inputs: Vec<InputSpec>,
+    pub(super) samples: Vec<Prepare>,
+    reads: Vec<(String, Owner, ColumnType)>,
+}
+
+/// How inputs go with time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Motion {
+    /// They stand still, and the engine knows.
+    Still,
+    /// They move.
+    Moving,
+    /// They stand still, and the engine does not know.
+    Unknown,
+}
+
+/// Settings and inputs.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    pub(super) settings: Vec<Source>,
+    /// Which of the prepared samples, where there are any.
+    pub(super) sample: usize,
+    /// By input: the seed of each wire.
+    pub(super) wires: Vec<Vec<u64>>,
+    pub(super) form: Form,
+    /// Seed of the attributes that the node declares to read.
+    pub(super) declared: Option<u64>,
+    /// Seed of those that it does not.
+    pub(super) others: Option<u64>,
+    /// The one of those that is taken away.
+    pub(super) without: Option<String>,
+    /// The input whose wires have no row.
+    pub(super) empty: Option<usize>,
+    /// Which components inputs have that take any.
+    pub(super) any: usize,
+    pub(super) motion: Motion,
+    pub(super) first: i64,
+}
+
+/// What came out.
+pub(super) struct Outcome {
+    pub(super) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
+    /// By output, the first error of each node.
+    pub(super) errors: Vec<(usize, ErrorKind, String)>,
+    pub(super) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    /// Which params were read.
+    pub(super) read: Vec<bool>,
+    pub(super) left_out: Vec<LeftOut>,
+    /// Attributes read and written as the params say.
+    pub(super) names: Option<[AttrNames; 2]>,
+    /// The first geometry of each wire, as it was given; all but `P` is what the node got.
+    pub(super) given: Vec<Vec<Geometry>>,
+}
+
+/// How often a cook is tried: on one thread, or more.
+pub(super) fn engine(threads: usize) -> &'static Engine {
+    static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
+        // No memory: nothing may be found that an earlier trial left.
+        [1, 2, 7].map(|threads| (threads, Engine::new(&Settings { threads, memory: 0 }).expect("threads")))
+    });
+    let found = ENGINES.iter().find(|(count, _)| *count == threads);
+    &found.expect("one of the counts the suite tries").1
+}
+
+impl Subject {
+    pub(super) fn new(node: &'static Node, samples: Vec<Prepare>) -> Self {
+        let (specs, inputs, reads) = (node.param_specs(), node.input_specs(), samples::described(node.reads));
+        Self { node, specs, inputs, samples, reads }
+    }
+
+    /// Frames that show how a node goes with time.
+    pub(super) fn frames(&self) -> Vec<Frame> {
+        let frames: &[f64] = match self.node.cook {
+            Cook::Pure(_) => &[1.0],
+            Cook::Frame { .. } => &[1.0, 2.5, 30.0],
+            Cook::Window(..) => &[1.0, 3.0, 12.0],
+            Cook::Solver(..) => &[1.0, 2.0, 4.0],
+        };
+        frames.iter().map(|frame| Frame::exactly(*frame).expect("a frame")).collect()
+    }
+
+    /// Whether it knows of time at all.
+    pub(super) fn is_timed(&self) -> bool {
+        !matches!(self.node.cook, Cook::Pure(_))
+    }
+
+    /// Defaults; every input wired, lists `many` times.
+    pub(super) fn defaults(&self, many: usize) -> Trial {
+        let wires = |(place, input): (usize, &InputSpec)| {
+            let count = if let Arity::Many { least } = input.arity { many.max(least) } else { 1 };
+            (0..count).map(|wire| (place * 10 + wire) as u64).collect()
+        };
+        Trial {
+            settings: self.specs.iter().map(|spec| self.unset(spec)).collect(),
+            sample: 0,
+            wires: self.inputs.iter().enumerate().map(wires).collect(),
+            form: Form::Small,
+            declared: Some(1),
+            others: Some(1),
+            without: None,
+            empty: None,
+            any: 0,
+            motion: if self.is_timed() { Motion::Moving } else { Motion::Still },
+            first: 1,
+        }
+    }
+
+    fn unset(&self, spec: &ParamSpec) -> Source {
+        match spec.facts.unset {
+            crate::param::Unset::CurrentFrame => Source::CurrentFrame,
+            crate::param::Unset::SceneStart => Source::Constant(Value::Int(1)),
+            crate::param::Unset::Default => Source::Constant(spec.default.clone()),
+        }
+    }
+
+    /// What the prepared sample sets besides: the places of those params.
+    pub(super) fn prepared(&self, sample: usize) -> Vec<usize> {
+        let Some(prepare) = self.samples.get(sample) else { return Vec::new() };
+        let (before, after) = (bench(self.node), prepare(bench(self.node)));
+        let differs =
+            |place: &usize| format!("{:?}", before.sources()[*place]) != format!("{:?}", after.sources()[*place]);
+        (0..self.specs.len()).filter(differs).collect()
+    }
+
+    fn graph(&self, trial: &Trial) -> (Graph, Vec<Vec<Geometry>>) {
+        let mut bench =
+            bench(self.node).scene(Scene { first: trial.first, last: trial.first + 47, ..Scene::default() });
+        for (spec, source) in self.specs.iter().zip(&trial.settings) {
+            bench = bench.source(spec.name, source.clone());
+        }
+        if let Some(prepare) = self.samples.get(trial.sample) {
+            bench = prepare(bench);
+        }
+        let dress = Dress { declared: trial.declared, others: trial.others, reads: &self.reads };
+        let mut given = Vec::new();
+        for (place, (input, seeds)) in self.inputs.iter().zip(&trial.wires).enumerate() {
+            let kinds = kinds(input.needs, trial.any);
+            let form = if trial.empty == Some(place) { Form::Empty } else { trial.form };
+            let mut wires: Vec<Geometry> =
+                seeds.iter().map(|seed| samples::geometry(&kinds, form, *seed, dress)).collect();
+            if let Some(name) = &trial.without {
+                wires.iter_mut().for_each(|geometry| take_away(geometry, name));
+            }
+            for geometry in &wires {
+                let (geometry, motion) = (geometry.clone(), trial.motion);
+                let at = move |frame: Frame| {
+                    if motion == Motion::Moving { moved(&geometry, frame) } else { geometry.clone() }
+                };
+                bench = bench.wire(input.name, Arc::new(at), motion != Motion::Still);
+            }
+            given.push(wires);
+        }
+        (bench.graph(), given)
+    }
+
+    /// The params of a trial, unless they are refused.
+    pub(super) fn params(&self, trial: &Trial) -> Option<Params> {
+        let (graph, _) = self.graph(trial);
+        let request = Request::everything(&graph);
+        let plan = quietly(|| catch_unwind(AssertUnwindSafe(|| Plan::new(&graph, &request, Arc::default()))));
+        plan.ok()?.ok()?.nodes.last()?.resolver.at(graph.scene.start()).ok()
+    }
+
+    /// Cooks a trial at some frames.
+    pub(super) fn run(&self, trial: &Trial, frames: &[Frame]) -> Outcome {
+        self.run_on(1, false, trial, frames)
+    }
+
+    pub(super) fn run_on(&self, threads: usize, reload: bool, trial: &Trial, frames: &[Frame]) -> Outcome {
+        let (graph, given) = self.graph(trial);
+        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
+        let mut found = BTreeMap::new();
+        let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
+            found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));
+            Ok(())
+        };
+        let mut outcome = Outcome {
+            found: BTreeMap::new(),
+            errors: Vec::new(),
+            metrics: BTreeMap::new(),
+            read: vec![false; self.specs.len()],
+            left_out: Vec::new(),
+            names: None,
+            given,
+        };
+        let cooked = quietly(|| {
+            catch_unwind(AssertUnwindSafe(|| {
+                let plan = Plan::new(&graph, &request, Arc::default()).map_err(Stopped::Asked)?;
+                let report = engine(threads).try_plan(&plan, reload, &mut sink)?;
+                let last = plan.nodes.len() - 1;
+                let resolver = &plan.nodes[last].resolver;
+                let names = resolver.at(graph.scene.start()).ok();
+                let names = names.and_then(|params| Some((self.node.attributes?)(&params)));
+                let read = (0..self.specs.len()).map(|place| resolver.log().was_read(place)).collect::<Vec<_>>();
+                Ok::<_, Stopped<std::convert::Infallible>>((report, read, names))
+            }))
+        });
+        match cooked {
+            Err(panic) => {
+                let said = panic.downcast_ref::<String>().cloned();
+                let said = said.or_else(|| panic.downcast_ref::<&str>().map(|said| (*said).to_owned()));
+                let said = format!("while it was planned: {}", said.unwrap_or_default());
+                outcome.errors.push((0, ErrorKind::Panic, said));
+            }
+            Ok(Err(Stopped::Asked(error))) => {
+                outcome.errors.push((0, error.error.kind, error.error.to_string()));
+            }
+            Ok(Err(stopped)) => outcome.errors.push((0, ErrorKind::Contract, format!("{stopped:?}"))),
+            Ok(Ok((report, read, names))) => {
+                let errors = report.errors.iter();
+                outcome
+                    .errors
+                    .extend(errors.map(|(place, error, _)| (*place, error.error.kind, error.error.to_string())));
+                outcome.read = read;
+                outcome.names = names;
+                if let Some(node) = report.nodes.into_iter().last() {
+                    outcome.left_out = node.left_out;
+                    outcome.metrics = node.metrics;
+                }
+            }
+        }
+        outcome.found = found;
+        outcome
+    }
+}
+
+/// Components of a wire.
+fn kinds(needs: Needs, any: usize) -> Vec<Kind> {
+    match needs {
+        Needs::Kind(kind) => vec![kind],
+        Needs::Any => match any % 6 {
+            0 => vec![Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets],
+            1 => vec![Kind::Curves],
+            2 => vec![Kind::Mesh],
+            3 => vec![Kind::Points],
+            4 => vec![Kind::Tets],
+            _ => vec![Kind::Volume, Kind::Points],
+        },
+    }
+}
+
+fn take_away(geometry: &mut Geometry, name: &str) {
+    for kind in Kind::ALL {
+        let Some(part) = geometry.part_mut(kind) else { continue };
+        Owner::ALL.iter().for_each(|owner| drop(part.remove(*owner, name)));
+    }
+}
+
+/// The geometry at a frame: drifting along x, and growing.
+fn moved(geometry: &Geometry, frame: Frame) -> Geometry {
+    let mut geometry = geometry.clone();
+    let (drift, growth) = (0.002 * frame.number() as f32, 1.0 + 0.003 * frame.number() as f32);
+    for kind in [Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets] {
+        let Some(part) = geometry.part_mut(kind) else { continue };
+        for p in part.edit(P).into_iter().flatten() {
+            *p = [p[0] * growth + drift, p[1] * growth, p[2]];
+        }
+    }
+    geometry
+}
+
+impl Outcome {
+    /// A key of all that came out, and of all that was refused; attributes that `ignore` names left out.
+    pub(super) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> Key {
+        let mut key = Hasher::default();
+        for ((output, frame), geometry) in &self.found {
+            hash_geometry(key.i64(*output as i64).i64(frame.ticks()), geometry, ignore);
+        }
+        for (output, _, error) in &self.errors {
+            key.i64(*output as i64).text(error);
+        }
+        for (name, values) in &self.metrics {
+            key.text(name);
+            for (frame, value) in values {
+                key.i64(frame.ticks()).bytes(&value.to_bits().to_le_bytes());
+            }
+        }
+        key.finish()
+    }
+
+    /// A key of everything.
+    pub(super) fn whole(&self) -> Key {
+        self.digest(&|_| false)
+    }
+
+    /// A key of what came out at one frame; where nothing did, of what was refused.
+    pub(super) fn at(&self, frame: Frame) -> Key {
+        let mut key = Hasher::default();
+        let mut there = false;
+        for ((output, _), geometry) in self.found.iter().filter(|((_, at), _)| *at == frame) {
+            there = true;
+            hash_geometry(key.i64(*output as i64), geometry, &|_| false);
+        }
+        for (output, kind, _) in self.errors.iter().filter(|_| !there) {
+            key.i64(*output as i64).i64(*kind as i64);
+        }
+        key.finish()
+    }
+
+    /// Whether all frames of all outputs came out.
+    pub(super) fn is_whole(&self) -> bool {
+        self.errors.is_empty()
+    }
+}
+
+fn hash_geometry(key: &mut Hasher, geometry: &Geometry, ignore: &dyn Fn(&str) -> bool) {
+    for part in geometry.parts() {
+        key.tag(part.kind() as u8).i64(part.point_count() as i64).i64(part.element_count() as i64);
+        match part.topology() {
+            Topology::Curves(runs) => hash_words(key, runs.starts()),
+            Topology::Mesh(faces) => {
+                hash_words(key, faces.runs.starts());
+                hash_words(key, &faces.corners);
+            }
+            Topology::Tets(tets) => hash_words(key, tets.as_flattened()),
+            Topology::Points => {}
+        }
+        for (owner, name, column) in part.columns().filter(|(_, name, _)| !ignore(name)) {
+            key.tag(owner as u8).text(name).tag(column.kind() as u8).bytes(&column.to_bytes());
+        }
+    }
+    if let Some(volume) = geometry.volume() {
+        let grid = volume.grid();
+        hash_words(key, &grid.size);
+        let fields = std::iter::once(volume.level_set()).chain(volume.velocity());
+        let floats = grid.origin.iter().chain([&grid.cell]).chain(fields.flat_map(|field| field.iter()));
+        for x in floats {
+            key.bytes(&x.to_le_bytes());
+        }
+        for (name, column) in volume.once().iter().filter(|(name, _)| !ignore(name)) {
+            key.text(name).bytes(&column.to_bytes());
+        }
+    }
+}
+
+fn hash_words(key: &mut Hasher, words: &[u32]) {
+    for word in words {
+        key.bytes(&word.to_le_bytes());
+    }
+}
+
+/// The attribute that masks a param by its settings.
+pub(super) fn masks(settings: &[Source]) -> impl Iterator<Item = &Name> {
+    settings.iter().filter_map(|source| match source {
+        Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => Some(attribute),
+        _ => None,
+    })
+}

@@ -1,0 +1,49 @@
+//! Panics that a test expects, without their words on the terminal.
+//!
+//! Promise: what panics outside [`quietly`] is shown as ever. Limit: while any thread is inside, panics of threads that
+//! cook are not shown, whoever they cook for.
+
+use std::cell::Cell;
+use std::sync::Once;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+thread_local! { static HERE: Cell<bool> = const { Cell::new(false) }; }
+
+/// How many threads are inside [`quietly`].
+static INSIDE: AtomicUsize = AtomicUsize::new(0);
+
+/// Runs `work`; panics in it, and in the threads that cook for it, print nothing.
+///
+/// The hook is put in once and stays, asking each time: hooks belong to the whole process, and tests that run side by
+/// side would take out each other's.
+pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let shown = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            let cooks = std::thread::current().name().is_some_and(|name| name.starts_with("convect "));
+            if !HERE.get() && !(cooks && INSIDE.load(Ordering::Relaxed) > 0) {
+                shown(panic);
+            }
+        }));
+    });
+    let _inside = Inside::enter();
+    work()
+}
+
+/// Leaves where it is dropped, so also where `work` panics.
+struct Inside(bool);
+
+impl Inside {
+    fn enter() -> Self {
+        INSIDE.fetch_add(1, Ordering::Relaxed);
+        Self(HERE.replace(true))
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        INSIDE.fetch_sub(1, Ordering::Relaxed);
+        HERE.set(self.0);
+    }
+}

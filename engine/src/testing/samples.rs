@@ -1,0 +1,384 @@
+//! Geometry to try nodes on: small components of every kind, in several shapes, with attributes a node did not ask for.
+//!
+//! All samples of one kind and shape have the same topology, whatever their seed: what a node compares point by point
+//! (a rest pose, a moving skin) fits together.
+
+use numerics::random::Key;
+
+use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
+use crate::node::AttrDecl;
+
+/// How points lie, and how many there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    /// A few curves of 1 to 9 CVs, a closed mesh, a dozen points, a few tets.
+    Small,
+    /// Another count of everything; the mesh is open.
+    Other,
+    /// Enough for several threads.
+    Large,
+    /// Components without a row.
+    Empty,
+    /// Coordinates near the largest f32.
+    Huge,
+    /// Coordinates that are denormal.
+    Tiny,
+    /// All points on one spot.
+    Heap,
+    /// Small, a long way from the origin.
+    Far,
+}
+
+impl Form {
+    /// Forms that no scene should have, and any may.
+    pub(super) const EXTREMES: [Self; 5] = [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far];
+
+    fn place(self, [x, y, z]: [f32; 3], at: Key) -> [f32; 3] {
+        match self {
+            Self::Huge => [x, y, z].map(|x| x * 1e30),
+            Self::Tiny => [x, y, z].map(|x| x * 1e-41),
+            Self::Heap => [0.25, 0.5, at.of(7).f32() * 0.0],
+            Self::Far => [x + 1e6, y - 3e6, z],
+            _ => [x, y, z],
+        }
+    }
+}
+
+/// Which attributes besides `P` a sample has.
+#[derive(Clone, Copy)]
+pub(super) struct Dress<'a> {
+    /// Attributes that the node reads, random; their seed.
+    pub(super) declared: Option<u64>,
+    /// Attributes that it does not read, random; their seed.
+    pub(super) others: Option<u64>,
+    /// What the node reads.
+    pub(super) reads: &'a [(String, Owner, ColumnType)],
+}
+
+/// A geometry with components of `kinds`. `seed` moves points a little and changes nothing else.
+pub(super) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
+    let mut geometry = Geometry::default();
+    for kind in kinds {
+        match kind {
+            Kind::Volume => geometry.put_volume(volume(form, seed)),
+            kind => {
+                let mut part = component(*kind, form, Key::new(seed).of(*kind as u64));
+                dressed(&mut part, dress);
+                geometry.put(part);
+            }
+        }
+    }
+    geometry
+}
+
+/// What the samples have besides what a node reads: attributes as artists and readers leave them.
+pub(super) fn usual() -> Vec<(String, Owner, ColumnType)> {
+    use ColumnType as T;
+    use Owner as O;
+    let rows = [
+        ("v", O::Point, T::F3),
+        ("envelope", O::Point, T::F1),
+        ("width", O::Point, T::F1),
+        ("uvw", O::Point, T::F3),
+        ("Pref", O::Point, T::F3),
+        ("thickness", O::Point, T::F1),
+        ("N", O::Point, T::F3),
+        ("orient", O::Point, T::F4),
+        ("id", O::Point, T::I1),
+        ("shielded", O::Element, T::F1),
+        ("sample_mask", O::Point, T::F1),
+        ("sample_ints", O::Point, T::I3),
+        ("sample_group", O::Element, T::I1),
+        ("sample_shade", O::Element, T::F4),
+        ("sample_once", O::Once, T::F1),
+    ];
+    rows.map(|(name, owner, kind)| (name.to_owned(), owner, kind)).to_vec()
+}
+
+/// The float a point that masks of the suite name.
+pub(super) const MASK: &str = "sample_mask";
+
+/// Name, owner and type of declared attributes.
+pub(super) fn described(attributes: &[&dyn AttrDecl]) -> Vec<(String, Owner, ColumnType)> {
+    let described = |attribute: &&dyn AttrDecl| {
+        let (name, owner, kind) = attribute.spec();
+        (name.to_owned(), owner, kind)
+    };
+    attributes.iter().map(described).collect()
+}
+
+fn dressed(part: &mut Component, dress: Dress) {
+    let is_read = |name: &str| dress.reads.iter().any(|(read, _, _)| read == name);
+    let usual = usual();
+    let read = dress.reads.iter().filter_map(|attribute| Some((attribute, dress.declared?)));
+    let others = usual.iter().filter(|(name, _, _)| !is_read(name));
+    let others = others.filter_map(|attribute| Some((attribute, dress.others?)));
+    for ((name, owner, kind), seed) in read.chain(others) {
+        if name == "P" || fixed_type(name).is_some_and(|fixed| fixed != *kind) {
+            continue;
+        }
+        let rows = part.table(*owner).rows();
+        let column = match name.as_str() {
+            "Pref" => rest(part, Key::new(seed)),
+            _ => column(*kind, rows, Key::new(seed).of(hash(name))),
+        };
+        part.set_column(*owner, name.as_str(), column).expect("as many rows as the table, of the type the name has");
+    }
+}
+
+/// Another number for another name.
+fn hash(name: &str) -> u64 {
+    name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(257).wrapping_add(u64::from(byte)))
+}
+
+/// Positions, moved a little.
+fn rest(part: &Component, at: Key) -> Column {
+    let moved = |(row, p): (usize, &[f32; 3])| p.map(|x| x + 0.01 * at.of(row as u64).f32());
+    Column::new(part.positions().iter().enumerate().map(moved).collect::<Vec<_>>())
+}
+
+/// Random rows: floats from 0 to 1, whole numbers from 0 to 3; rows of four floats are rotations.
+fn column(kind: ColumnType, rows: usize, at: Key) -> Column {
+    let float = |row: usize, k: usize| at.of((row * 4 + k) as u64).f32();
+    let int = |row: usize, k: usize| (at.of((row * 4 + k) as u64).u32() % 4) as i32;
+    match kind {
+        ColumnType::F1 => Column::new((0..rows).map(|row| float(row, 0)).collect()),
+        ColumnType::F3 => {
+            Column::new((0..rows).map(|row| std::array::from_fn(|k| float(row, k))).collect::<Vec<[f32; 3]>>())
+        }
+        ColumnType::F4 => Column::new((0..rows).map(|row| rotation(std::array::from_fn(|k| float(row, k)))).collect()),
+        ColumnType::I1 => Column::new((0..rows).map(|row| int(row, 0)).collect()),
+        ColumnType::I3 => {
+            Column::new((0..rows).map(|row| std::array::from_fn(|k| int(row, k))).collect::<Vec<[i32; 3]>>())
+        }
+        ColumnType::I4 => {
+            Column::new((0..rows).map(|row| std::array::from_fn(|k| int(row, k))).collect::<Vec<[i32; 4]>>())
+        }
+    }
+}
+
+fn rotation(numbers: [f32; 4]) -> [f32; 4] {
+    let numbers = numbers.map(|x| x - 0.5);
+    let length = numbers.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if length > 0.0 { numbers.map(|x| x / length) } else { [0.0, 0.0, 0.0, 1.0] }
+}
+
+fn component(kind: Kind, form: Form, at: Key) -> Component {
+    match kind {
+        Kind::Curves => curves(form, at),
+        Kind::Mesh => mesh(form, at),
+        Kind::Tets => tets(form, at),
+        Kind::Points | Kind::Volume => points(form, at),
+    }
+}
+
+/// Up to a millimetre or two either way, so that nothing is regular by accident.
+fn jitter(at: Key, row: usize) -> [f32; 3] {
+    std::array::from_fn(|k| at.of((row * 3 + k) as u64).between([-0.002, 0.002]))
+}
+
+fn settled(form: Form, at: Key, mut positions: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+    for (row, p) in positions.iter_mut().enumerate() {
+        let moved = jitter(at, row);
+        *p = form.place(std::array::from_fn(|k| p[k] + moved[k]), at.of(row as u64));
+    }
+    positions
+}
+
+/// Fur of 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs.
+fn curves(form: Form, at: Key) -> Component {
+    let counts: Vec<u32> = match form {
+        Form::Empty => Vec::new(),
+        Form::Other => vec![3, 7, 1],
+        Form::Large => (0..400).map(|k| [5, 8, 2, 5, 1, 12][k % 6]).collect(),
+        _ => vec![5, 1, 2, 9, 4, 5],
+    };
+    let mut positions = Vec::new();
+    for (curve, count) in counts.iter().enumerate() {
+        let angle = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)][curve % 5];
+        let root = [0.06 * angle.0, 0.09 + 0.0001 * (curve / 5) as f32, 0.06 * angle.1];
+        let step = 0.05 / (*count).max(2) as f32;
+        positions.extend((0..*count).map(|cv| [root[0], root[1] + step * cv as f32, root[2] + 0.2 * step * cv as f32]));
+    }
+    let positions = settled(form, at, positions);
+    Component::curves(counts, positions).expect("counts that add up")
+}
+
+/// A ball of 10 cm radius made of quads and triangles, or an open sheet.
+fn mesh(form: Form, at: Key) -> Component {
+    let (counts, corners, positions) = match form {
+        Form::Empty => (Vec::new(), Vec::new(), Vec::new()),
+        Form::Other => sheet(5),
+        Form::Large => ball(24, 16),
+        _ => ball(8, 5),
+    };
+    let positions = settled(form, at, positions);
+    Component::mesh(counts, corners, positions).expect("corners in range")
+}
+
+type Faces = (Vec<u32>, Vec<u32>, Vec<[f32; 3]>);
+
+/// `around` meridians and `rings` rings of quads between two poles. Rational points on the sphere: no trigonometry.
+fn ball(around: u32, rings: u32) -> Faces {
+    const RADIUS: f32 = 0.1;
+    // (1 − t²)/(1 + t²), 2t/(1 + t²) runs around a quarter for t from 0 to 1.
+    let circle = |share: f32| {
+        let (quarter, t) = ((share * 4.0).floor(), (share * 4.0).fract());
+        let (c, s) = ((1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t));
+        match quarter as i32 % 4 {
+            0 => (c, s),
+            1 => (-s, c),
+            2 => (-c, -s),
+            _ => (s, -c),
+        }
+    };
+    let mut positions = vec![[0.0, -RADIUS, 0.0]];
+    for ring in 1..=rings {
+        let (up, out) = circle(ring as f32 / (rings + 1) as f32 / 2.0);
+        for k in 0..around {
+            let (c, s) = circle(k as f32 / around as f32);
+            positions.push([RADIUS * out * c, -RADIUS * up, RADIUS * out * s]);
+        }
+    }
+    positions.push([0.0, RADIUS, 0.0]);
+    let row = |ring: u32, k: u32| 1 + (ring - 1) * around + k % around;
+    let last = positions.len() as u32 - 1;
+    let (mut counts, mut corners) = (Vec::new(), Vec::new());
+    let mut face = |points: &[u32]| {
+        counts.push(points.len() as u32);
+        corners.extend(points);
+    };
+    for k in 0..around {
+        face(&[0, row(1, k), row(1, k + 1)]);
+        for ring in 1..rings {
+            face(&[row(ring, k), row(ring + 1, k), row(ring + 1, k + 1), row(ring, k + 1)]);
+        }
+        face(&[row(rings, k), last, row(rings, k + 1)]);
+    }
+    (counts, corners, positions)
+}
+
+/// An open square of `n` × `n` quads, 20 cm wide.
+fn sheet(n: u32) -> Faces {
+    let positions = (0..=n).flat_map(|z| (0..=n).map(move |x| (x, z)));
+    let positions = positions.map(|(x, z)| [0.2 * x as f32 / n as f32 - 0.1, 0.0, 0.2 * z as f32 / n as f32 - 0.1]);
+    let cells = (0..n).flat_map(|z| (0..n).map(move |x| x + z * (n + 1)));
+    let corners: Vec<u32> = cells.flat_map(|a| [a, a + n + 1, a + n + 2, a + 1]).collect();
+    (vec![4; (n * n) as usize], corners, positions.collect())
+}
+
+fn points(form: Form, at: Key) -> Component {
+    let count = match form {
+        Form::Empty => 0,
+        Form::Other => 5,
+        Form::Large => 2000,
+        _ => 12,
+    };
+    let spread = Key::new(11);
+    let position = |row: usize| std::array::from_fn(|k| spread.of((row * 3 + k) as u64).between([-0.08, 0.08]));
+    Component::points(settled(form, at, (0..count).map(position).collect()))
+}
+
+/// Cubes of six tets each, side by side, 5 cm wide.
+fn tets(form: Form, at: Key) -> Component {
+    let cubes = match form {
+        Form::Empty => 0,
+        Form::Other => 1,
+        Form::Large => 60,
+        _ => 2,
+    };
+    let (mut tets, mut positions) = (Vec::new(), Vec::new());
+    for cube in 0..cubes {
+        let base = positions.len() as u32;
+        let corner = |k: u32, axis: u32| (k >> axis & 1) as f32;
+        positions.extend(
+            (0..8).map(|k| [0.05 * corner(k, 0) + 0.06 * cube as f32, 0.05 * corner(k, 1), 0.05 * corner(k, 2)]),
+        );
+        // From corner 0 to corner 7 along the three axes in each of their six orders; odd orders turn the other way.
+        let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+        for (place, order) in orders.iter().enumerate() {
+            let [a, b] = [1 << order[0], (1 << order[0]) | (1 << order[1])];
+            let [a, b] = if place < 3 { [a, b] } else { [b, a] };
+            tets.push([base, base + a, base + b, base + 7]);
+        }
+    }
+    Component::tets(tets, settled(form, at, positions)).expect("corners in range")
+}
+
+/// A ball of liquid in a box, falling.
+fn volume(form: Form, seed: u64) -> Volume {
+    let n: u32 = match form {
+        Form::Empty => 0,
+        Form::Other => 5,
+        Form::Large => 24,
+        _ => 8,
+    };
+    let scale = match form {
+        Form::Huge => 1e28,
+        Form::Tiny => 1e-41,
+        _ => 1.0,
+    };
+    let cell = 0.2 * scale / n.max(1) as f32;
+    let at = Key::new(seed).of(Kind::Volume as u64);
+    let shift = if form == Form::Far { 1e6 } else { 0.0 };
+    let grid = Grid { origin: [shift - 0.1 * scale; 3], cell, size: [n; 3] };
+    let radius = 0.06 * scale * (1.0 + 0.01 * at.f32());
+    let distance = |row: usize| {
+        let n = n as usize;
+        let index = [row % n, row / n % n, row / (n * n)];
+        let squared = index.map(|i| (i as f32 + 0.5) * (cell / scale) - 0.1).iter().map(|x| x * x).sum::<f32>();
+        squared.sqrt() * scale - radius
+    };
+    let velocity = [0, 1, 2].map(|axis| vec![[0.0, -1.0, 0.1][axis] * scale * at.of(9).f32(); grid.faces(axis)]);
+    Volume::new(grid, (0..grid.cells()).map(distance).collect(), velocity).expect("as many rows as cells and faces")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAKED: Dress = Dress { declared: None, others: None, reads: &[] };
+
+    #[test]
+    fn samples_of_one_form_have_one_topology_whatever_their_seed() {
+        let forms = [Form::Small, Form::Other, Form::Large, Form::Empty, Form::Huge, Form::Tiny, Form::Heap, Form::Far];
+        for form in forms {
+            let [a, b] = [1, 2].map(|seed| geometry(&Kind::ALL, form, seed, NAKED));
+            for (a, b) in a.parts().zip(b.parts()) {
+                assert_eq!(a.topology(), b.topology(), "{form:?} {}", a.kind());
+                let same = a.positions() == b.positions();
+                assert_eq!(same, matches!(form, Form::Empty | Form::Heap), "{form:?} {}", a.kind());
+            }
+        }
+    }
+
+    #[test]
+    fn the_ball_is_closed_and_its_faces_look_outwards() {
+        let mesh = component(Kind::Mesh, Form::Small, Key::new(0));
+        let faces = mesh.faces().expect("a mesh");
+        let mut edges = std::collections::BTreeMap::new();
+        for face in faces.iter() {
+            for (k, a) in face.iter().enumerate() {
+                *edges.entry((*a, face[(k + 1) % face.len()])).or_insert(0) += 1;
+            }
+            let [a, b, c] = [0, 1, 2].map(|k| mesh.positions()[face[k] as usize]);
+            let (u, v): ([f32; 3], [f32; 3]) =
+                (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            assert!((0..3).map(|k| normal[k] * a[k]).sum::<f32>() > 0.0, "face {face:?}");
+        }
+        assert!(edges.iter().all(|((a, b), count)| *count == 1 && edges.contains_key(&(*b, *a))));
+    }
+
+    #[test]
+    fn tets_are_turned_the_right_way() {
+        let part = component(Kind::Tets, Form::Other, Key::new(3));
+        for tet in part.tet_corners() {
+            let [a, b, c, d] = tet.map(|k| part.positions()[k as usize]);
+            let edge = |p: [f32; 3]| -> [f32; 3] { std::array::from_fn(|k| p[k] - a[k]) };
+            let (u, v, w) = (edge(b), edge(c), edge(d));
+            let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            assert!((0..3).map(|k| cross[k] * w[k]).sum::<f32>() > 0.0, "{tet:?}");
+        }
+    }
+}
