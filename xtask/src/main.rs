@@ -1,9 +1,9 @@
-//! Chores of the repository: `cargo xtask new-node NAME`.
+//! Chores of the repository: `cargo xtask new-node NAME`, `cargo xtask bless`.
 
 mod new_node;
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 use clap::Parser;
 
@@ -18,11 +18,14 @@ enum Chore {
         #[arg(long, default_value = "geometry")]
         family: String,
     },
+    /// Store the expectations of the tests anew, and show what changed
+    Bless,
 }
 
 fn main() -> ExitCode {
     let result = match Chore::parse() {
         Chore::NewNode { name, family } => new_node::write(&root(), &name, &family),
+        Chore::Bless => bless(&root()),
     };
     match result {
         Ok(said) => {
@@ -34,6 +37,21 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs the tests with stored expectations so that they write them, then shows the difference.
+fn bless(root: &Path) -> Result<String, String> {
+    let run = |program: &str, arguments: &[&str]| {
+        let status = Command::new(program).args(arguments).current_dir(root).env("BLESS", "1").status();
+        status.map_err(|error| format!("`{program}` could not be run: {error}"))
+    };
+    for arguments in [&["test", "--test", "graphs"][..], &["test", "-p", "engine", "stored_messages"]] {
+        if !run("cargo", arguments)?.success() {
+            return Err(format!("`cargo {}` failed", arguments.join(" ")));
+        }
+    }
+    run("git", &["--no-pager", "diff", "--stat", "--patch", "--", "*.txt"])?;
+    Ok("stored anew; commit what you meant to change".into())
 }
 
 /// The repository's root.

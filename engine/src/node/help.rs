@@ -43,9 +43,9 @@ impl Node {
                 .iter()
                 .map(|param| {
                     // A default in words has no unit.
-                let worded = param.facts.unset != Unset::Default || matches!(param.default, Value::Nothing);
-                let unit = if worded { String::new() } else { param.unit_text() };
-                let mut head = format!("{} = {}{}", param.name, param.default_text(), unit);
+                    let worded = param.facts.unset != Unset::Default || matches!(param.default, Value::Nothing);
+                    let unit = if worded { String::new() } else { param.unit_text() };
+                    let mut head = format!("{} = {}{}", param.name, param.default_text(), unit);
                     let mut notes = Vec::new();
                     if let Shape::Choice(options) = param.shape {
                         notes.push(options.iter().map(|option| option.word).collect::<Vec<_>>().join(" | "));
