@@ -67,10 +67,20 @@ fn inline(cx: &Cx) -> Result<Component> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::bench;
+    use crate::shared::source::numbered_files;
+    use engine::testing::{bench, conformance};
 
     fn points(rows: &[[f32; 3]]) -> Option<Arc<Vec<[f32; 3]>>> {
         Some(Arc::new(rows.to_vec()))
+    }
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        let (_folder, files) = numbered_files("obj", |frame| format!("v 0 0 0\nv 0 {frame} 0\nl 1 2\n"));
+        conformance(&NODE)
+            .with(move |bench| bench.source(FILE.name(), files.clone()))
+            .with(|bench| bench.set(POINTS, Some(Arc::new(vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0; 3]]))))
+            .run();
     }
 
     #[test]

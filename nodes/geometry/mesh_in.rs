@@ -62,11 +62,25 @@ fn inline(cx: &Cx) -> Result<Component> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::bench;
+    use crate::shared::source::numbered_files;
+    use engine::testing::{bench, conformance};
 
     fn square() -> engine::testing::Bench {
         let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
         bench(&NODE).set(POINTS, Some(Arc::new(points.to_vec())))
+    }
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        let (_folder, files) = numbered_files("obj", |frame| format!("v 0 0 0\nv 0 {frame} 0\nv 1 0 0\nf 1 2 3\n"));
+        conformance(&NODE)
+            .with(move |bench| bench.source(FILE.name(), files.clone()))
+            .with(|bench| {
+                bench
+                    .set(POINTS, Some(Arc::new(vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0; 3]])))
+                    .set(INDICES, Arc::new(vec![0, 1, 2]))
+            })
+            .run();
     }
 
     #[test]

@@ -45,7 +45,17 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::bench;
+    use crate::shared::source::numbered_files;
+    use engine::testing::{bench, conformance};
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        let (_folder, files) = numbered_files("obj", |frame| format!("v 0 0 0\nv 0 {frame} 0\np 1 2\n"));
+        conformance(&NODE)
+            .with(move |bench| bench.source(FILE.name(), files.clone()))
+            .with(|bench| bench.set(POINTS, Some(Arc::new(vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0; 3]]))))
+            .run();
+    }
 
     #[test]
     fn inline_points_carry_their_attributes() {

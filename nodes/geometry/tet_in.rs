@@ -49,7 +49,25 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::bench;
+    use crate::shared::source::numbered_files;
+    use engine::testing::{bench, conformance};
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        let (_folder, files) = numbered_files("json", |frame| {
+            format!(
+                "{{\"tets\": {{\"indices\": [[0, 1, 2, 3]], \"points\": [[0.0, 0.0, 0.0], [0.0, {frame}.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]}}}}"
+            )
+        });
+        conformance(&NODE)
+            .with(move |bench| bench.source(FILE.name(), files.clone()))
+            .with(|bench| {
+                bench
+                    .set(POINTS, Some(Arc::new(vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])))
+                    .set(TETS, Arc::new(vec![[0, 1, 2, 3]]))
+            })
+            .run();
+    }
 
     #[test]
     fn inline_tets_are_checked_against_their_points() {

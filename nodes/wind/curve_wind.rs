@@ -241,7 +241,7 @@ fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
 mod tests {
     use super::*;
     use engine::graph::Scene;
-    use engine::testing::{Bench, Tasted, bench};
+    use engine::testing::{Bench, Tasted, bench, conforms};
 
     /// A straight curve up from the origin, of `segments` segments and length 1.
     fn upright(segments: usize) -> Geometry {
@@ -267,6 +267,11 @@ mod tests {
             libm::atan2((d[1] * d[1] + d[2] * d[2]).sqrt(), d[0])
         };
         cvs.windows(2).map(angle).collect()
+    }
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        conforms(&NODE);
     }
 
     const RIGHT: f64 = std::f64::consts::FRAC_PI_2;

@@ -9,6 +9,7 @@ mod memory;
 mod net;
 mod nodes;
 mod once;
+mod overhead;
 mod solvers;
 mod velocities;
 mod windows;

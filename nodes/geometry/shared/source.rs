@@ -77,3 +77,18 @@ pub(crate) fn file_or_inline(file: Option<&File>, has_inline: bool) -> Result<()
         _ => Ok(()),
     }
 }
+
+/// A numbered sequence of files in a folder of its own, for tests: what `text` says of each of the first frames.
+#[cfg(test)]
+pub(crate) fn numbered_files(
+    extension: &str,
+    text: impl Fn(i64) -> String,
+) -> (tempfile::TempDir, engine::param::Source) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for frame in 0..64 {
+        let path = folder.path().join(format!("in.{frame:04}.{extension}"));
+        std::fs::write(path, text(frame)).expect("a file in a temporary folder");
+    }
+    let path = folder.path().join(format!("in.####.{extension}")).into();
+    (folder, engine::param::Source::File { path, numbered: true })
+}

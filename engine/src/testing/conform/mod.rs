@@ -21,6 +21,7 @@ use numerics::random::Key;
 use super::bench::Bench;
 use super::samples::Form;
 use super::settings;
+use crate::error::ErrorKind;
 use crate::node::{Arity, Node};
 use crate::param::{Source, Unset};
 use trial::{Motion, Outcome, Prepare, Subject, Trial};
@@ -78,12 +79,11 @@ impl Conformance {
         let tried = try_all(&subject);
         passes::check(&subject, &tried, &mut findings);
         if !tried.iter().any(|(_, outcome)| outcome.is_whole()) {
-            let said =
-                tried.first().and_then(|(_, outcome)| outcome.errors.first()).map(|(_, _, error)| error.as_str());
-            findings.add(format!(
-                "it refuses all that the suite can offer; give it samples with `with`: {}",
-                said.unwrap_or("")
-            ));
+            let first = tried.first().and_then(|(_, outcome)| outcome.errors.first());
+            if let Some((_, ErrorKind::Refused | ErrorKind::File, said)) = first {
+                let fact = "it refuses all that the suite can offer; give it samples with `with`";
+                findings.add(format!("{fact}: {said}"));
+            }
             return findings.0;
         }
         reads::check(&subject, &tried, &mut findings);
