@@ -49,6 +49,7 @@ impl DiskCache {
             Err(error) => return Err(error),
         }
         write_whole(&mark, FORMAT.as_bytes())?;
+        sweep(folder)?;
         let mut cache = Self { folder: folder.to_owned(), limit, recent: BTreeMap::new(), note };
         cache.trim()?;
         Ok(cache)
@@ -123,6 +124,24 @@ fn files(folder: &Path) -> io::Result<Vec<(PathBuf, u64, SystemTime)>> {
         }
     }
     Ok(found)
+}
+
+/// Removes what processes that are gone were writing. Where the system does not tell who lives, it stays until the limit
+/// takes it.
+fn sweep(folder: &Path) -> io::Result<()> {
+    let proc = Path::new("/proc");
+    if !proc.join("self").exists() {
+        return Ok(());
+    }
+    for (path, _, _) in files(folder)? {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let owner =
+            name.strip_suffix(".part").and_then(|name| name.rsplit_once('.')).map(|(_, owner)| owner.to_owned());
+        if owner.is_some_and(|owner| owner.parse::<u32>().is_ok() && !proc.join(owner).exists()) {
+            remove_if_there(&path)?;
+        }
+    }
+    Ok(())
 }
 
 fn remove_if_there(path: &Path) -> io::Result<()> {

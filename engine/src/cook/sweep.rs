@@ -232,7 +232,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
         }
         self.run_up(&targets)?;
-        let slice = self.close(&targets, &[]);
+        let slice = self.close(&targets, &[], Reach::Whole);
         let peak = self.cook_slice(slice, &targets)?;
         if self.cancelled() {
             return Ok(finished);
@@ -328,7 +328,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     /// Moves chains that are far behind, a slice at a time, without keeping what they put out on the way.
     fn run_up(&mut self, targets: &[(usize, Frame)]) -> std::io::Result<()> {
         loop {
-            let slice = self.close(targets, &[]);
+            let slice = self.close(targets, &[], Reach::Near);
             let mut behind: Vec<Silent> = Vec::new();
             let mut begins = Vec::new();
             for (node, stretches) in slice.advance.iter().enumerate() {
@@ -350,7 +350,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 .map(|(silent, _)| Silent { goal: until.max(silent.stretch.start), ..silent })
                 .collect();
             self.forget_results();
-            let slice = self.close(&[], &silent);
+            let slice = self.close(&[], &silent, Reach::Whole);
             self.cook_slice(slice, &[])?;
             self.end_slice();
             if self.cancelled() {
@@ -360,7 +360,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     }
 
     /// From the targets upwards: everything the slice must have and has not.
-    fn close(&mut self, targets: &[(usize, Frame)], silent: &[Silent]) -> Slice {
+    fn close(&mut self, targets: &[(usize, Frame)], silent: &[Silent], reach: Reach) -> Slice {
         let count = self.plan.graph.nodes.len();
         let mut slice =
             Slice { need: vec![BTreeSet::new(); count], advance: (0..count).map(|_| BTreeMap::new()).collect() };
@@ -379,7 +379,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 }
                 self.demand(&mut slice, node, frame);
             }
-            self.demand_of_chain(&mut slice, node);
+            self.demand_of_chain(&mut slice, node, reach);
         }
         slice
     }
@@ -460,7 +460,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     }
 
     /// What a chain reads while it moves.
-    fn demand_of_chain(&mut self, slice: &mut Slice, node: usize) {
+    fn demand_of_chain(&mut self, slice: &mut Slice, node: usize, reach: Reach) {
         let mut advances = std::mem::take(&mut slice.advance[node]);
         for (stretch, advance) in &mut advances {
             let first = advance.outputs.first().copied().unwrap_or(advance.goal);
@@ -470,8 +470,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.move_beside(node, &mut advances);
         for (stretch, advance) in &advances {
             let next = advance.from.map_or(stretch.start, |at| at + 1);
-            let steps = next..=advance.goal;
-            for frame in steps.clone() {
+            let last = match reach {
+                Reach::Whole => advance.goal,
+                Reach::Near => advance.goal.min(next.saturating_add(LONGEST)),
+            };
+            for frame in next..=last {
                 self.demand_of_step(slice, node, frame, frame == stretch.start);
             }
             // The frame it stands at is read again by an output there.
@@ -1038,6 +1041,15 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
 
 /// Whole frames that a sample between frames may ask of a chain again.
 const KEPT_NEIGHBOURS: usize = 4;
+
+/// How far ahead of a chain that is far behind its inputs are asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Reach {
+    /// All the way.
+    Whole,
+    /// As far as a slice moves it: enough to see which chains must move first.
+    Near,
+}
 
 /// For which moment a node's inputs are gathered.
 #[derive(Clone, Copy, PartialEq)]

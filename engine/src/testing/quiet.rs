@@ -22,7 +22,8 @@ pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
         let shown = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
             let cooks = std::thread::current().name().is_some_and(|name| name.starts_with("convect "));
-            if !HERE.get() && !(cooks && INSIDE.load(Ordering::Relaxed) > 0) {
+            let hidden = HERE.get() || cooks && INSIDE.load(Ordering::Relaxed) > 0;
+            if !hidden {
                 shown(panic);
             }
         }));

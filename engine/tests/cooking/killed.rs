@@ -92,5 +92,9 @@ fn a_cook_killed_at_random_moments_ends_with_the_same_bits() {
             folder = tempfile::tempdir().expect("a folder");
         }
     }
+    DiskCache::open(&folder.path().join("cache"), u64::MAX).expect("a cache");
+    let left =
+        fs::read_dir(folder.path().join("cache")).expect("a folder").map(|entry| entry.expect("an entry").path());
+    assert_eq!(left.filter(|path| path.extension().is_some_and(|extension| extension == "part")).count(), 0);
     assert!(resumed >= 5, "only {resumed} of {KILLS} killed cooks had something to resume from");
 }

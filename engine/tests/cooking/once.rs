@@ -23,8 +23,7 @@ fn a_node_that_no_output_depends_on_is_never_called() {
 }
 
 #[test]
-fn a_file_that_no_output_depends_on_is_not_opened() {
-    // A broken param aside is no one's business either.
+fn a_broken_param_that_no_output_depends_on_is_not_looked_at() {
     let mut net = Net::new(1, 2);
     let a = net.add("a", &SOURCE).out();
     net.add("aside", &ADD).source("amount", keyed(&[(1.0, f32::INFINITY)])).wire("points", a).done();

@@ -149,3 +149,19 @@ fn sub_frames_of_a_solver_are_refused_and_so_are_those_of_what_it_feeds() {
                     ask for whole frames";
     assert_eq!(error, expected);
 }
+
+#[test]
+fn a_late_frame_alone_costs_about_what_all_frames_cost() {
+    let mut net = Net::new(1, 4000);
+    let zero = net.add("zero", &SOURCE).set("amount", 0.0_f32).done();
+    let clock = net.add("clock", &CLOCK).set("amount", 1e-6_f32).wire("points", zero).done();
+    let follow = net.add("follow", &FOLLOW).set("frames", 100_i64).wire("points", clock).done();
+    net.add("bounce", &BOUNCE).set("gravity", 0.0_f32).wire("points", zero).wire("push", follow).out();
+    let alone = net.cook([4000]);
+    let together = net.cook(1..=4000);
+    assert_eq!(alone.x(4000.0).to_bits(), together.x(4000.0).to_bits());
+    assert_eq!((alone.cooks("bounce"), alone.cooks("clock")), (4000, 4000));
+    assert!(alone.report.peak_bytes <= 2 * together.report.peak_bytes);
+    let (alone, together) = (alone.report.cooking, together.report.cooking);
+    assert!(alone < together * 3, "{alone:?} alone, {together:?} together");
+}

@@ -8,6 +8,9 @@ use engine::time::Frame;
 use crate::net::{Net, at, engine, keyed, row};
 use crate::nodes::{CLOCK, DRIFT, FAIL, FOLLOW, Probe, SOURCE};
 
+/// An array of positions that someone else may have dropped.
+type Positions = Weak<Vec<[f32; 3]>>;
+
 /// A window over a source that wobbles.
 fn follow(last: i64, frames: i64) -> Net {
     let mut net = Net::new(1, last);
@@ -93,7 +96,7 @@ fn frames_far_apart_do_not_move_what_lies_between() {
 #[test]
 fn memory_does_not_hang_on_the_windows_length() {
     let most = [8, 800].map(|frames| {
-        let alive: Arc<Mutex<(Vec<Weak<Vec<[f32; 3]>>>, usize)>> = Arc::default();
+        let alive: Arc<Mutex<(Vec<Positions>, usize)>> = Arc::default();
         let seen = alive.clone();
         let mut net = Net::new(1, 1000);
         let moving = net.given("moving", move |frame| {

@@ -23,6 +23,8 @@ struct Control<'a> {
     name: &'a str,
     json: Json<'a>,
     sound: bool,
+    /// Whether it is in the scope of expressions.
+    is_numeric: bool,
 }
 
 /// What a name finds among the controls.
@@ -41,11 +43,13 @@ impl<'a> Controls<'a> {
         let (mut all, mut scope, mut sources) = (Vec::new(), Vec::new(), Vec::new());
         for Entry { name, json, .. } in entries {
             let before = faults.len();
-            if let Some((width, source)) = numeric(json, faults) {
+            let numeric = numeric(json, faults);
+            let (sound, is_numeric) = (faults.len() == before, numeric.is_some());
+            all.push(Control { name, json: json.clone(), sound, is_numeric });
+            if let Some((width, source)) = numeric {
                 scope.push((*name, width));
                 sources.push(source);
             }
-            all.push(Control { name, json: json.clone(), sound: faults.len() == before });
         }
         Self { all, scope, sources: Arc::new(sources) }
     }
@@ -66,7 +70,7 @@ impl<'a> Controls<'a> {
 
     /// The control in a text's fact that is there and that expressions cannot name, because it is no number or vector.
     pub(super) fn unreadable_in(&self, fact: &str) -> Option<&'a str> {
-        let unreadable = self.names().filter(|name| !self.scope.iter().any(|(known, _)| known == name));
+        let unreadable = self.all.iter().filter(|control| !control.is_numeric).map(|control| control.name);
         unreadable.into_iter().find(|name| fact.contains(&format!("`{name}`")))
     }
 }

@@ -130,7 +130,8 @@ fn load(
 
     let scene = scene::read(document.scene.as_ref(), faults);
     let controls = Controls::read(&document.controls, faults);
-    let mut reader = Reader { scene: &scene, controls: &controls, folder, files, faults };
+    let mut reader =
+        Reader { scene: &scene, controls: &controls, folder, files, faults, read: BTreeMap::new(), kind: "" };
     let mut specs = BTreeMap::new();
     let mut drafts: Vec<Draft<'_>> = std::mem::take(&mut document.nodes)
         .into_iter()

@@ -1,5 +1,6 @@
 //! Params: which form a value is written in, and the source it makes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -32,6 +33,11 @@ pub(super) struct Reader<'a, 'r> {
     pub(super) folder: &'r Path,
     pub(super) files: &'r FileProbe,
     pub(super) faults: &'r mut Vec<Fault>,
+    /// What controls came to, by control, type of node and param, or the first fault. Nodes of a type share what they
+    /// read: a value of its own for each would let a small file ask for any amount of memory.
+    pub(super) read: BTreeMap<(&'a str, &'static str, &'static str), Result<Source, Fault>>,
+    /// The type of the node whose params are read.
+    pub(super) kind: &'static str,
 }
 
 /// Where a value stands: not every form may stand everywhere.
@@ -63,6 +69,7 @@ pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize,
 impl<'a> Reader<'a, '_> {
     /// The sources of a node's params, in the order of its declaration.
     pub(super) fn params(&mut self, node: &Node, specs: &[ParamSpec], entries: &[Entry<'a>]) -> Vec<Source> {
+        self.kind = node.name;
         for entry in entries.iter().filter(|entry| !specs.iter().any(|spec| spec.name == entry.name)) {
             let fact = format!("`{}` has no param `{}`", node.name, shown(entry.name));
             let hint = match node.inputs.iter().any(|input| input.spec().name == entry.name) {
@@ -280,12 +287,26 @@ impl<'a> Reader<'a, '_> {
         };
         match self.controls.get(text) {
             Found::Value(value) => {
+                let key = (text, self.kind, spec.name);
+                match self.read.get(&key) {
+                    Some(Ok(source)) => return Some(source.clone()),
+                    Some(Err(fault)) => {
+                        self.faults.push(Fault { path: reader.path(), ..fault.clone() });
+                        return None;
+                    }
+                    None => {}
+                }
                 let value = value.at_path(&reader.path());
                 let before = self.faults.len();
                 let source = self.written(spec, &value, Within::Control);
                 self.faults[before..]
                     .iter_mut()
                     .for_each(|fault| fault.fact += &format!(", in the control `{}`", shown(text)));
+                let read = match self.faults.get(before) {
+                    Some(fault) => Err(fault.clone()),
+                    None => Ok(source.clone()?),
+                };
+                self.read.insert(key, read);
                 source
             }
             Found::Faulty => None,

@@ -175,7 +175,7 @@ fn mixture(subject: &Subject, k: u64) -> Trial {
     trial.declared = (k % 4 != 3).then_some(k);
     trial.others = (k % 3 != 2).then_some(k);
     trial.form = if k % 5 == 4 { Form::Other } else { Form::Small };
-    trial.any = if k % 2 == 0 { 0 } else { k as usize / 2 };
+    trial.any = if k.is_multiple_of(2) { 0 } else { k as usize / 2 };
     if subject.is_timed() && k % 3 == 1 {
         trial.motion = Motion::Still;
     }

@@ -178,7 +178,7 @@ fn only_what_is_declared_is_read() {
 fn a_read_behind_a_choice_and_a_switch_and_a_missing_wire_is_found() {
     let node = shift(|cx| {
         let hidden = cx.get(WAY) == Way::Along && cx.get(TWICE) && cx.input(OTHER).is_none();
-        let more = if hidden { cx.get(SPARE) } else { cx.input(OTHER).map_or(0.0, |other| first_y(other)) };
+        let more = if hidden { cx.get(SPARE) } else { cx.input(OTHER).map_or(0.0, first_y) };
         let twice = if cx.get(TWICE) { 2.0 } else { 1.0 };
         let along = if cx.get(WAY) == Way::Along { -1.0 } else { 1.0 };
         Ok(OUT.with(up(cx, along * twice * cx.get(AMOUNT) + more)?))
