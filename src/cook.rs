@@ -40,8 +40,8 @@ pub struct Args {
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
     /// Threads; as many as the machine has by default
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-    threads: usize,
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
     /// Memory for results; half of the machine's by default. It never changes a result
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
@@ -72,7 +72,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
-    let engine = load::engine(args.threads, usize::try_from(memory).unwrap_or(usize::MAX))?;
+    let engine = load::engine(usize::from(args.threads), usize::try_from(memory).unwrap_or(usize::MAX))?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
@@ -82,6 +82,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     faults.extend(load::misfits(&graph, &request.outputs, format));
     if !faults.is_empty() {
         return Err(load::faulty(&args.graph, &faults));
+    }
+    if let Some(report) = &args.report
+        && report.canonicalize().is_ok_and(|report| args.graph.canonicalize().is_ok_and(|graph| graph == report))
+    {
+        let line = format!("--report would be written over the graph `{}`; choose another name", args.graph.display());
+        return Err(Failure::new(Exit::CommandLine, line));
     }
     let pictures = Pictures::new(&args.pictures, &graph, &request, &args.out)?;
     cook(args, &engine, &graph, &request, format, pictures)
@@ -106,6 +112,9 @@ fn cook(
         }
     };
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
+    let mut inputs = graph.files(&request.frames);
+    inputs.push(args.graph.clone());
+    writers.spare(&inputs, &request.frames)?;
     // Before the cook, so that a path that cannot be written costs no cooking.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let cancel = cancelled_by_ctrl_c();
@@ -149,7 +158,7 @@ fn cook(
         fill(file, format!("{text}\n").as_bytes())?;
     }
     if !args.quiet {
-        report.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        report.notes.iter().for_each(|note| crate::say!("note: {note}"));
         tell(&report, &written, &drawn, args.verbose);
     }
     ended(graph, &report, &written)
@@ -165,15 +174,15 @@ fn tell(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbos
             };
             let frames = written.frames.len();
             let s = if frames == 1 { "" } else { "s" };
-            eprintln!("wrote {files}: {frames} frame{s}, {}", indicatif::HumanBytes(written.bytes));
+            crate::say!("wrote {files}: {frames} frame{s}, {}", indicatif::HumanBytes(written.bytes));
         }
     }
-    drawn.iter().for_each(|path| eprintln!("wrote {}", path.display()));
+    drawn.iter().for_each(|path| crate::say!("wrote {}", path.display()));
     let frames: BTreeSet<Frame> = written.iter().flat_map(|(_, written)| written.frames.iter().copied()).collect();
     let seconds = report.cooking.as_secs_f64();
     if !frames.is_empty() && seconds > 0.0 {
         let rate = frames.len() as f64 / seconds;
-        eprintln!(
+        crate::say!(
             "cooked {} frame{} in {seconds:.2} s ({rate:.0} a second)",
             frames.len(),
             if frames.len() == 1 { "" } else { "s" }
@@ -182,8 +191,8 @@ fn tell(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbos
     if verbose {
         for node in report.nodes.iter().filter(|node| node.needed) {
             let id = node.id.as_deref().unwrap_or_default();
-            eprintln!("  {id} ({}): {} cooked, {:.1} ms", node.type_name, node.cooks, node.wall.as_secs_f64() * 1e3);
-            node.left_out.iter().for_each(|stage| eprintln!("    left out {}: {}", stage.stage, stage.why));
+            crate::say!("  {id} ({}): {} cooked, {:.1} ms", node.type_name, node.cooks, node.wall.as_secs_f64() * 1e3);
+            node.left_out.iter().for_each(|stage| crate::say!("    left out {}: {}", stage.stage, stage.why));
         }
     }
 }

@@ -3,6 +3,15 @@
 //! This crate is the program: the catalogue of all nodes, and a file a verb. The engine knows no node; the nodes know no
 //! file but those they read; what writes files is here and in `formats`.
 
+/// Says a line on stderr. Where nobody can hear it, that is no reason to fail.
+#[macro_export]
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 pub mod args;
 pub mod check;
 pub mod completions;

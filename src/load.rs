@@ -1,5 +1,6 @@
 //! Loading a graph file, and telling what is wrong with it.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use engine::cook::{Engine, Settings};
@@ -11,15 +12,21 @@ use crate::CATALOGUE;
 use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
 
+/// Larger graph files are refused: they are something else, or hold geometry that belongs into files.
+const LARGEST_GRAPH: u64 = 256 << 20;
+
 /// The graph at `path`, with some params and controls set anew.
 ///
 /// # Errors
 /// Where the file cannot be read, or its faults.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| {
-        let error = unreadable(path, &error);
-        Failure::file(format!("the graph {}", error.fact))
-    })?;
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
+    file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
+    if bytes.len() as u64 > LARGEST_GRAPH {
+        let fact = format!("the graph `{}` has more than {} MiB", path.display(), LARGEST_GRAPH >> 20);
+        return Err(Failure::file(format!("{fact}; put geometry into files of its own")));
+    }
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
     Ok(Graph::load_bytes(&bytes, &folder, CATALOGUE, &set, &probe))

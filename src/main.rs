@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use convect::failure::{Exit, Failure};
+use convect::say;
 use convect::{check, completions, convert, cook, diff, explain, nodes, schema, stats};
 
 /// Cooks node graphs that make geometry move: wind on fur and grass, soft dough, viscous sauces.
@@ -47,7 +48,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => Exit::Done.into(),
         Err(failure) => {
-            failure.lines.iter().for_each(|line| eprintln!("{line}"));
+            failure.lines.iter().for_each(|line| say!("{line}"));
             failure.exit.into()
         }
     }

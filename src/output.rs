@@ -1,5 +1,6 @@
 //! Files of outputs: one USD file with all frames, or a file a frame.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -54,6 +55,30 @@ impl<'g> Writers<'g> {
         };
         let outputs = outputs.iter().map(|output| (*output, target(), Written::default())).collect();
         Ok(Self { graph, folder: folder.to_owned(), format, outputs })
+    }
+
+    /// Refuses to write over the graph or a file it reads: the next cook would read its own result.
+    ///
+    /// # Errors
+    /// Where one of `frames` would be written over one of `inputs`.
+    pub fn spare(&self, inputs: &[PathBuf], frames: &[Frame]) -> Result<(), Failure> {
+        let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
+        for (output, target, _) in &self.outputs {
+            let name = &self.graph.outputs[*output].name;
+            let paths: Vec<PathBuf> = match target {
+                Target::Sequence { .. } => vec![self.folder.join(format!("{name}.{}", self.format))],
+                Target::PerFrame => {
+                    frames.iter().map(|frame| frame_path(&self.folder, name, *frame, self.format)).collect()
+                }
+            };
+            let same = paths.iter().find(|path| path.canonicalize().is_ok_and(|path| inputs.contains(&path)));
+            if let Some(path) = same {
+                let line =
+                    format!("`{}` would be written over, but the graph reads it; choose another --out", path.display());
+                return Err(Failure::file(line));
+            }
+        }
+        Ok(())
     }
 
     /// Writes finished frames.
@@ -118,9 +143,13 @@ impl<'g> Writers<'g> {
     }
 }
 
+fn frame_path(folder: &Path, name: &str, frame: Frame, format: Format) -> PathBuf {
+    folder.join(format!("{name}.{}.{format}", frame.file_label()))
+}
+
 fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) -> Result<(PathBuf, u64), Failure> {
     let name = &graph.outputs[one.output].name;
-    let path = folder.join(format!("{name}.{}.{format}", one.frame.file_label()));
+    let path = frame_path(folder, name, one.frame, format);
     let stamp = FrameStamp { frame: one.frame.number(), seconds: one.frame.seconds(graph.scene.fps) };
     let mut bytes = Vec::new();
     formats::write(format, &one.geometry, &stamp, &mut bytes)

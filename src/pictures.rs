@@ -98,7 +98,7 @@ impl Pictures {
         }
         let names = self.frame_all();
         if let (Some(name), None) = (&self.settings.color_by, self.settings.range) {
-            eprintln!("note: no output has a number `{name}` to colour by; there are {}", names.join(", "));
+            crate::say!("note: no output has a number `{name}` to colour by; there are {}", names.join(", "));
         }
         let drawn: Vec<Frame> =
             self.frames.iter().copied().filter(|frame| self.kept.keys().any(|(at, _)| at == frame)).collect();

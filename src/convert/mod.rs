@@ -83,9 +83,9 @@ fn tell(written: &Written) {
         [first, .., last] => format!("{} … {} ({} files)", first.display(), last.display(), written.files.len()),
     };
     let s = if written.frames == 1 { "" } else { "s" };
-    eprintln!("wrote {files}: {} frame{s}, {}", written.frames, indicatif::HumanBytes(written.bytes));
+    crate::say!("wrote {files}: {} frame{s}, {}", written.frames, indicatif::HumanBytes(written.bytes));
     if !written.lost.is_empty() {
-        eprintln!("note: left out {}, which the format cannot hold", written.lost.join(", "));
+        crate::say!("note: left out {}, which the format cannot hold", written.lost.join(", "));
     }
 }
 

@@ -165,3 +165,38 @@ fn a_stdout_that_is_full_is_1() {
         assert!(text.starts_with("stdout could not be written: "), "{args:?}: {text}");
     }
 }
+
+#[test]
+fn what_the_graph_reads_is_never_written_over() {
+    let bench = Bench::new();
+    bench.write("hair.0001.obj", "v 0 0 0\nv 0 1 0\nl 1 2\n");
+    let graph = r#"{"convect": 1, "nodes": {"c": {"type": "Curve_In", "params": {"file": "hair.####.obj"}}}, "outputs": {"hair": "c"}}"#;
+    bench.write("h.json", graph);
+    let run = |arguments: &[&str]| {
+        let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_convect"));
+        program.current_dir(bench.path("")).args(arguments).output().unwrap()
+    };
+    let over = run(&["cook", "h.json", "--out", ".", "--format", "obj"]);
+    assert_eq!(over.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&over.stderr).contains("would be written over, but the graph reads it"));
+    let over = run(&["cook", "h.json", "--report", "h.json"]);
+    assert_eq!(over.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(bench.path("h.json")).unwrap(), graph);
+}
+
+#[test]
+fn nobody_listening_on_stderr_changes_no_exit_code() {
+    let bench = Bench::new();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_convect"));
+    let status = program.current_dir(bench.path("")).args(["cook", "nope.json"]).stderr(full).status().unwrap();
+    assert_eq!(status.code(), Some(1));
+}
+
+#[test]
+fn more_threads_than_any_machine_has_are_a_wrong_command_line() {
+    let bench = Bench::new();
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_convect"));
+    let ended = program.current_dir(bench.path("")).args(["cook", "g.json", "--threads", "100000"]).output().unwrap();
+    assert_eq!(ended.status.code(), Some(2));
+}

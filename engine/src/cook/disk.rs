@@ -14,7 +14,7 @@ use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner
 use crate::key::Key;
 
 /// Changes whenever files of an older convect can no longer be used.
-const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 1");
+const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 2");
 
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
@@ -66,13 +66,13 @@ impl DiskCache {
 
     /// The state a solver was saved in under that key.
     pub(crate) fn checkpoint(&self, key: Key) -> Option<Vec<u8>> {
-        read_whole(&self.path("checkpoint", key))
+        read_entry(&self.path("checkpoint", key), key)
     }
 
     /// Saves a solver's state, and removes older ones that need not stay.
     pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: Key, state: &[u8]) -> io::Result<()> {
         let path = self.path("checkpoint", key);
-        write_whole(&path, state)?;
+        write_entry(&path, key, state)?;
         let recent = self.recent.entry(node.to_owned()).or_default();
         recent.push((frame, path));
         if recent.len() > 2 {
@@ -86,12 +86,12 @@ impl DiskCache {
 
     /// A finished frame of an output.
     pub(crate) fn frame(&self, key: Key) -> Option<Geometry> {
-        decode(&read_whole(&self.path("frame", key))?)
+        decode(&read_entry(&self.path("frame", key), key)?)
     }
 
     /// Keeps a finished frame of an output.
     pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry) -> io::Result<()> {
-        write_whole(&self.path("frame", key), &encode(geometry))?;
+        write_entry(&self.path("frame", key), key, &encode(geometry))?;
         self.trim()
     }
 
@@ -151,31 +151,27 @@ fn remove_if_there(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes beside the name and renames, a checksum in front. Killed at any moment, the name holds nothing or all.
+/// Writes an entry, in front of it a checksum of its key and itself: what was damaged or exchanged is not taken.
+fn write_entry(path: &Path, key: Key, bytes: &[u8]) -> io::Result<()> {
+    write_whole(path, &[checksum(key, bytes).as_bytes().as_slice(), bytes].concat())
+}
+
+fn read_entry(path: &Path, key: Key) -> Option<Vec<u8>> {
+    let bytes = fs::read(path).ok()?;
+    let (sum, rest) = bytes.split_at_checked(blake3::OUT_LEN)?;
+    (checksum(key, rest).as_bytes().as_slice() == sum).then(|| rest.to_vec())
+}
+
+fn checksum(key: Key, bytes: &[u8]) -> blake3::Hash {
+    blake3::Hasher::new().update(&key.0).update(bytes).finalize()
+}
+
+/// Writes beside the name and renames. Killed at any moment, the name holds nothing or all.
 fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(format!(".{}.part", std::process::id()));
     let part = PathBuf::from(part);
-    let is_mark = path.file_name().is_some_and(|name| name == "version");
-    let sum = blake3::hash(bytes);
-    let whole = if is_mark { bytes.to_vec() } else { [sum.as_bytes().as_slice(), bytes].concat() };
-    fs::write(&part, whole).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
-}
-
-fn read_whole(path: &Path) -> Option<Vec<u8>> {
-    let mut bytes = fs::read(path).ok()?;
-    let rest = bytes.split_off_checked(32)?;
-    (blake3::hash(&rest).as_bytes().as_slice() == bytes).then_some(rest)
-}
-
-trait SplitOffChecked {
-    fn split_off_checked(&mut self, at: usize) -> Option<Vec<u8>>;
-}
-
-impl SplitOffChecked for Vec<u8> {
-    fn split_off_checked(&mut self, at: usize) -> Option<Vec<u8>> {
-        (self.len() >= at).then(|| self.split_off(at))
-    }
+    fs::write(&part, bytes).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
 }
 
 /// A geometry as bytes, every bit of it.
@@ -350,6 +346,16 @@ mod tests {
             fs::write(&path, &whole[..length]).unwrap();
             assert!(cache.frame(key).is_none(), "{length} bytes");
         }
+    }
+
+    #[test]
+    fn exchanged_files_are_ignored() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let (a, b) = (Key::of(b"a"), Key::of(b"b"));
+        cache.save_frame(a, &sample()).unwrap();
+        fs::rename(cache.path("frame", a), cache.path("frame", b)).unwrap();
+        assert!(cache.frame(b).is_none());
     }
 
     #[test]

@@ -26,6 +26,8 @@ impl Engine {
         for (place, node) in graph.nodes.iter().enumerate() {
             let Body::Node { node: declared, params, .. } = &node.body else { continue };
             let error = match plan.nodes[place].resolver.at(graph.scene.start()) {
+                // A moving param may be refused at frames that nobody asks for: the cook will tell.
+                Err(_) if plan.nodes[place].resolver.is_animated() => None,
                 Err(error) => Some(error),
                 Ok(params) => declared.checks.and_then(|checks| checks(&params).err()),
             };

@@ -1,14 +1,17 @@
 //! Did you mean …? The known name nearest to one that is not known.
 //!
 //! Promise: the same answer for the same candidates in the same order; the first of equals wins.
-//! Limit: names longer than 64 characters are not compared, so the cost stays bounded.
-
-use super::lexer::shortened;
+//! Limit: names longer than 64 characters, and candidates after the first 1000, are not compared, so
+//! the cost stays bounded however many a file has.
 
 use std::cmp::Reverse;
 
+use super::lexer::shortened;
+
 /// Longest name that is compared, in characters.
 const LONGEST: usize = 64;
+/// Most candidates that are compared.
+const MOST: usize = 1000;
 
 /// The candidate with the fewest edits from `name`, if they are no more than a third of its
 /// characters, or one; of equals the one that begins alike for longest. Case costs nothing, swapped
@@ -18,13 +21,17 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let allowed = (wanted.len() / 3).max(1);
     candidates
         .into_iter()
+        .take(MOST)
         .filter_map(|candidate| {
             let known = folded(candidate)?;
             // One letter is within one edit of every other letter; that is no likeness.
             let alike = wanted.len() > 1 || wanted == known;
+            if !alike || wanted.len().abs_diff(known.len()) > allowed {
+                return None;
+            }
             let edits = distance(&wanted, &known);
             let start = wanted.iter().zip(&known).take_while(|(a, b)| a == b).count();
-            (alike && edits <= allowed).then_some((edits, Reverse(start), candidate))
+            (edits <= allowed).then_some((edits, Reverse(start), candidate))
         })
         .min_by_key(|(edits, start, _)| (*edits, *start))
         .map(|(_, _, candidate)| candidate)
@@ -46,8 +53,9 @@ fn folded(name: &str) -> Option<Vec<char>> {
 fn distance(a: &[char], b: &[char]) -> usize {
     let mut before = vec![0; b.len() + 1];
     let mut last: Vec<usize> = (0..=b.len()).collect();
+    let mut row = before.clone();
     for i in 1..=a.len() {
-        let mut row = vec![i; b.len() + 1];
+        row[0] = i;
         for j in 1..=b.len() {
             let replaced = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
             row[j] = replaced.min(last[j] + 1).min(row[j - 1] + 1);
@@ -55,7 +63,8 @@ fn distance(a: &[char], b: &[char]) -> usize {
                 row[j] = row[j].min(before[j - 2] + 1);
             }
         }
-        before = std::mem::replace(&mut last, row);
+        std::mem::swap(&mut before, &mut last);
+        std::mem::swap(&mut last, &mut row);
     }
     last[b.len()]
 }
@@ -82,6 +91,13 @@ mod tests {
         assert_eq!(nearest("p", ["P", "N"]), Some("P"));
         assert_eq!(nearest("", ["P"]), None);
         assert_eq!(nearest(&"x".repeat(100_000), ["P"]), None);
+    }
+
+    #[test]
+    fn only_the_first_thousand_names_are_compared() {
+        let far = std::iter::repeat_n("zebra", 999);
+        assert_eq!(nearest("tiem", far.clone().chain(["time"])), Some("time"));
+        assert_eq!(nearest("tiem", far.chain(["zebra", "time"])), None);
     }
 
     #[test]

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use crate::geometry::{Geometry, Kind, Name};
 use crate::node::{Carries, Node, Output};
 use crate::param::{Clock, ParamSpec, Source};
+use crate::plan::numbered_path;
 use crate::time::Frame;
 
 pub use catalogue::Catalogue;
@@ -131,6 +132,24 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// The files the nodes read at some frames, as the params name them; numbered ones at the whole frames.
+    pub fn files(&self, frames: &[Frame]) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        for node in &self.nodes {
+            let Body::Node { params, .. } = &node.body else { continue };
+            for source in params {
+                match source {
+                    Source::File { path, numbered: false } => files.push(path.to_path_buf()),
+                    Source::File { path, numbered: true } => {
+                        files.extend(frames.iter().map(|frame| numbered_path(path, frame.floor_number())));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        files
+    }
+
     /// The components that come out at an output of a node, as its declaration says; nothing of given geometry.
     pub fn carries(&self, link: Link) -> Vec<Kind> {
         let mut carried: Vec<Vec<Vec<Kind>>> = Vec::with_capacity(link.node + 1);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 pub(crate) use keys::{Keys, Stretch};
-pub(crate) use resolve::Resolver;
+pub(crate) use resolve::{Resolver, numbered_path};
 
 use crate::cook::CookError;
 use crate::error::Error;
@@ -172,10 +172,22 @@ impl<'g> Plan<'g> {
         CookError { node: node.id.clone(), type_name: node.type_name(), frame, error }
     }
 
-    /// Stages of `node` that are left out, given its params at the scene's start.
+    /// Stages of `node` that are left out at every frame asked.
     pub fn left_out(&self, node: usize) -> Vec<LeftOut> {
-        let params = self.nodes[node].resolver.at(self.graph.scene.start());
-        params.map(|params| self.left_out_with(node, &params)).unwrap_or_default()
+        let resolver = &self.nodes[node].resolver;
+        let at = |frame: Frame| resolver.at(frame).map(|params| self.left_out_with(node, &params)).unwrap_or_default();
+        let mut stages =
+            at(self.canonical(node, self.request.frames.first().copied().unwrap_or(self.graph.scene.start())));
+        if resolver.is_animated() {
+            for frame in &self.request.frames {
+                if stages.is_empty() {
+                    break;
+                }
+                let here = at(*frame);
+                stages.retain(|stage| here.contains(stage));
+            }
+        }
+        stages
     }
 
     pub(crate) fn left_out_with(&self, node: usize, params: &Params) -> Vec<LeftOut> {

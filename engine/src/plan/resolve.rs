@@ -152,7 +152,7 @@ impl Resolver {
 }
 
 /// `path` with each run of `#` in its file name replaced by the frame number, as many digits at least.
-fn numbered_path(path: &Path, frame: i64) -> PathBuf {
+pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut numbered = String::new();
     let mut rest = name.as_str();

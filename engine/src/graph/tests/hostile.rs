@@ -65,6 +65,87 @@ fn a_graph_of_ten_thousand_nodes_loads() {
 }
 
 #[test]
+fn thousands_of_faults_among_thousands_of_names_are_answered() {
+    let mut text = String::from(r#"{"convect": 1, "outputs": {"end": "n1"}, "controls": {"end": 1"#);
+    (0..2_000).for_each(|n| text += &format!(r#", "c{n}": 1"#));
+    text += r#"}, "nodes": {"n": {"type": "Curve_In"}"#;
+    for n in 0..2_000 {
+        let params = format!(r#"{{"float": {{"expr": "control_{n}"}}, "double": {{"control": "control_{n}"}}}}"#);
+        text += &format!(r#", "n{n}": {{"type": "Every_Shape", "params": {params}}}"#);
+    }
+    assert_eq!(load(&(text + "}}")).err().unwrap_or_default().len(), 4_000);
+}
+
+#[test]
+fn nodes_of_a_type_share_what_they_read_of_a_control() {
+    use crate::graph::Body;
+    use crate::param::{Source, Value};
+    let mut text =
+        String::from(r#"{"convect": 1, "outputs": {"end": "n1"}, "controls": {"list": [[0, 0, 0]]}, "nodes": {"#);
+    let nodes: Vec<String> = (0..3)
+        .map(|n| format!(r#""n{n}": {{"type": "Every_Shape", "params": {{"offsets": {{"control": "list"}}}}}}"#))
+        .collect();
+    text += &(nodes.join(", ") + "}}");
+    let graph = load(&text).unwrap_or_else(|faults| panic!("{faults:#?}"));
+    let lists: Vec<_> = graph
+        .nodes
+        .iter()
+        .filter_map(|node| match &node.body {
+            Body::Node { params, .. } => params.iter().find_map(|source| match source {
+                Source::Constant(Value::Vec3s(rows)) if !rows.is_empty() => Some(rows.clone()),
+                _ => None,
+            }),
+            Body::Given { .. } => None,
+        })
+        .collect();
+    assert_eq!(lists.len(), 3);
+    assert!(lists.iter().all(|list| std::sync::Arc::ptr_eq(list, &lists[0])));
+
+    let faults = load(&text.replace("[[0, 0, 0]]", "[1, 2]")).err().unwrap_or_default();
+    let paths: Vec<&str> = faults.iter().map(|fault| &*fault.path).collect();
+    let first = "nodes.n0.params.offsets[0]";
+    assert_eq!(paths, [first, "nodes.n1.params.offsets", "nodes.n2.params.offsets"], "each of them says so");
+}
+
+#[test]
+fn what_a_terminal_obeys_reaches_no_message() {
+    let broken = [
+        ("{\"convect\": 1, \"outputs\"\u{1b}[2J: {}}", "a key"),
+        (r#"{"convect": 1, "nodes": {"\u001b[2J": {"type": "Curve_In"}}, "outputs": {"a": "b"}}"#, "a node to propose"),
+        (
+            r#"{"convect": 1, "controls": {"\u001b": "x"}, "outputs": {"a": "a"}, "nodes": {"a": {"type": "Every_Shape",
+            "params": {"float": {"control": "\u001b"}, "double": {"expr": "x"}}}}}"#,
+            "a control",
+        ),
+        (
+            "{\"convect\": 1, \"outputs\": {\"a\": \"a\"}, \"nodes\": {\"a\": {\"type\": \"Every_Shape\",
+            \"params\": {\"falloff\": [[0, /*\u{1b}[2J*/ 1]]}}}}",
+            "a ramp",
+        ),
+    ];
+    for (text, what) in broken {
+        let faults = load(text).err().unwrap_or_default();
+        let obeyed = |fault: &crate::graph::Fault| fault.to_string().contains(char::is_control);
+        assert!(!faults.is_empty() && !faults.iter().any(obeyed), "{what}: {faults:?}");
+    }
+    let faults = super::load_with(WHOLE, &[("\u{1b}[2J", ""), ("\u{1b}[2J", "word")]).err().unwrap_or_default();
+    assert!(!faults.iter().any(|fault| fault.to_string().contains(char::is_control)), "{faults:?}");
+}
+
+#[test]
+fn a_circle_of_thousands_names_a_few() {
+    let nodes = (0..5_000).map(|n| {
+        let next = (n + 1) % 5_000;
+        format!(r#""n{n}": {{"type": "Curve_Wind", "inputs": {{"curves": "n{next}"}}}}"#)
+    });
+    let nodes = nodes.collect::<Vec<_>>().join(", ");
+    let text = format!(r#"{{"convect": 1, "outputs": {{"end": "n0"}}, "nodes": {{{nodes}}}}}"#);
+    let faults = load(&text).err().unwrap_or_default();
+    let few = "the wires go round: n0 → n4999 → n4998 → n4997 → n4996 → n4995 → … → n5 → n4 → n3 → n2 → n1 → n0";
+    assert_eq!(faults.iter().map(|fault| &*fault.fact).collect::<Vec<_>>(), [few]);
+}
+
+#[test]
 fn bytes_that_are_no_text_are_said_to_be() {
     for bytes in [&b"\xff\xfe{\0}\0"[..], b"{\"a\": \"\xc3\x28\"}", b"\x1f\x8b\x08\x00", b"\0\0\0\0"] {
         let faults = Graph::load_bytes(bytes, Path::new(""), CATALOGUE, &[], &probe).err().unwrap_or_default();
