@@ -18,6 +18,10 @@ use engine::plan::Request;
 use engine::prelude::*;
 use engine::time::Frame;
 
+/// The program's own.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 const ROUNDS: usize = 7;
 
 fn main() {
