@@ -6,7 +6,9 @@
 mod attribute;
 mod column;
 mod component;
+mod derived;
 mod topology;
+mod triangles;
 mod volume;
 
 use std::sync::Arc;
@@ -15,6 +17,7 @@ pub use attribute::{Attr, ENVELOPE, ID, N, ORIENT, Owner, P, PREF, SHIELDED, THI
 pub use column::{Column, ColumnType, Item, Name, Table};
 pub use component::Component;
 pub use topology::{Faces, Runs, Topology};
+pub use triangles::Triangles;
 pub use volume::{Grid, Volume};
 
 /// Which component.
