@@ -20,6 +20,7 @@ pub mod random;
 pub mod scatter;
 pub mod shapes;
 pub mod simd;
+pub mod tree;
 pub mod triangulate;
 pub mod trig;
 pub mod vec3;
