@@ -13,6 +13,7 @@
 
 pub mod affine;
 pub mod bend;
+pub mod collide;
 pub mod lanes;
 pub mod noise;
 pub mod ramp;

@@ -22,7 +22,7 @@ impl TriangleTree {
     /// in the order of [`TriangleTree::blocks`], and with a bit for each lane of such a triangle. A
     /// box with a coordinate that is no number meets nothing.
     #[inline(always)]
-    pub fn visit_box(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(&Block, u16)) {
+    pub fn visit_box<'t>(&'t self, low: Vec3, high: Vec3, mut visit: impl FnMut(&'t Block, u16)) {
         self.any_in_box(low, high, |block, lanes| {
             visit(block, lanes);
             false
@@ -31,7 +31,7 @@ impl TriangleTree {
 
     /// As [`TriangleTree::visit_box`], until `found` says true; whether it did.
     #[inline(always)]
-    pub fn any_in_box(&self, low: Vec3, high: Vec3, mut found: impl FnMut(&Block, u16) -> bool) -> bool {
+    pub fn any_in_box<'t>(&'t self, low: Vec3, high: Vec3, mut found: impl FnMut(&'t Block, u16) -> bool) -> bool {
         let Some(top) = self.levels.len().checked_sub(1) else { return false };
         // At each level: the box that is open, and its lanes still to be entered.
         let (mut open, mut lanes) = ([0; MOST_LEVELS], [0; MOST_LEVELS]);

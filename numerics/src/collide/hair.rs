@@ -1,0 +1,116 @@
+//! One curve, root to tip.
+
+use super::crossing::{first_crossing, first_crossing_in, wide};
+use super::near::narrow;
+use super::sector::V3;
+use super::turn::{Nearby, Segment};
+use super::{Collide, Reached, perpendicular};
+use crate::vec3::{self, Vec3};
+use nalgebra::{Quaternion, UnitQuaternion};
+
+/// Of the first segment, the part not tested where the root may lie on the skin: this many gaps.
+const SKIPPED_GAPS: f64 = 5.0;
+
+/// A curve as it comes in, and where it is written.
+pub(super) struct Hair<'a> {
+    /// Row of its root in the attributes.
+    pub(super) first: usize,
+    pub(super) rest: &'a [Vec3],
+    pub(super) goal: &'a [Vec3],
+    pub(super) out: &'a mut [Vec3],
+}
+
+/// Memory used again from curve to curve.
+#[derive(Default)]
+pub(super) struct Scratch<'t> {
+    nearby: Nearby<'t>,
+    goal: Vec<V3>,
+}
+
+impl Hair<'_> {
+    /// Writes the curve as it collides.
+    #[inline(always)]
+    pub(super) fn collide<'t>(&mut self, all: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
+        let mut reached = Reached::default();
+        self.out.copy_from_slice(self.goal);
+        let cvs = self.goal.len();
+        if cvs < 2 || !self.is_finite() {
+            return reached;
+        }
+        let shift = all.skin.as_ref().map_or(V3::zeros(), |skin| skin.lift(self.rest[0], all.offset_root));
+        reached.started_inside = u64::from(self.starts_inside(all, &shift));
+        self.set_goals(all, &shift, &mut scratch.goal);
+        let goal = &scratch.goal;
+        let moved = shift != V3::zeros();
+        if moved {
+            self.out[0] = narrow(&goal[0]);
+        }
+        let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vec3::largest(*cv)));
+        let mut turned = UnitQuaternion::identity();
+        let mut axis = V3::zeros();
+        for k in 0..cvs - 1 {
+            let way = goal[k + 1] - goal[k];
+            let length = (wide(self.goal[k + 1]) - wide(self.goal[k])).norm();
+            if length == 0.0 || way.norm() == 0.0 {
+                self.out[k + 1] = self.out[k];
+                continue;
+            }
+            let to = way / way.norm();
+            let rest = wide(self.rest[k + 1]) - wide(self.rest[k]);
+            let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { to };
+            axis = perpendicular(&from, &axis);
+            let segment = Segment {
+                pivot: wide(self.out[k]),
+                from,
+                to,
+                axis,
+                length,
+                half: 0.5 * f64::from(all.width.at(self.first + k)),
+                gap: all.gap,
+                inner: if k == 0 && all.offset_root < all.gap { SKIPPED_GAPS * all.gap } else { 0.0 },
+                rounding: 1.2e-7 * (f64::from(largest) + length),
+            };
+            let mut done = segment.turn(all.method, all.tree, &mut scratch.nearby);
+            let mut end = segment.end(&done.direction);
+            if !done.met && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
+                end = self.goal[k + 1];
+            }
+            if first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
+                done = segment.turn_wary(all.method, all.tree, &mut scratch.nearby);
+                end = segment.end(&done.direction);
+                if let Some(crossing) = first_crossing(&scratch.nearby, segment.start(&done.direction), end) {
+                    reached.unfreed_segments += 1;
+                    reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
+                }
+            }
+            reached.contacts += u64::from(done.met);
+            turned = minimal_turn(&from, &done.direction, &axis) * turned;
+            self.out[k + 1] = end;
+        }
+        reached
+    }
+
+    fn is_finite(&self) -> bool {
+        let cvs = || self.goal.iter().chain(self.rest);
+        cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
+    }
+
+    /// Whether it crosses something at rest.
+    #[inline(always)]
+    fn starts_inside(&self, all: &Collide<'_>, shift: &V3) -> bool {
+        let at = |cv: Vec3| narrow(&(wide(cv) + shift));
+        self.rest.windows(2).any(|pair| first_crossing_in(all.tree, at(pair[0]), at(pair[1])).is_some())
+    }
+
+    fn set_goals(&self, _all: &Collide<'_>, shift: &V3, goals: &mut Vec<V3>) {
+        goals.clear();
+        goals.extend(self.goal.iter().map(|cv| wide(*cv) + shift));
+    }
+}
+
+/// The smallest turn from one unit vector to another; about `axis` where they are opposite.
+fn minimal_turn(from: &V3, to: &V3, axis: &V3) -> UnitQuaternion<f64> {
+    let real = 1.0 + from.dot(to);
+    let imaginary = if real > 1e-12 { from.cross(to) } else { *axis };
+    UnitQuaternion::new_normalize(Quaternion::from_parts(if real > 1e-12 { real } else { 0.0 }, imaginary))
+}
