@@ -2,19 +2,18 @@
 //!
 //! Fur on a sphere of 20,480 triangles, its curves bent by wind across it.
 
+use cpu_time::ProcessTime;
 use numerics::bend::{Bend, Mode, bend};
 use numerics::collide::{Collide, Collided, Method, Scaled, Skin, collide, normals};
 use numerics::ramp::Ramp;
 use numerics::tree::TriangleTree;
 use numerics::vec3::{Vec3, add, length, scale};
-use cpu_time::ProcessTime;
 use std::time::Duration;
 
 /// Rounds of each case, and how many cases: `collide_speed 1 1` is a run to profile.
 fn arg(k: usize, default: usize) -> usize {
     std::env::args().nth(k).and_then(|word| word.parse().ok()).unwrap_or(default)
 }
-
 
 #[allow(clippy::disallowed_methods, reason = "a clock is what this example reads")]
 fn least(mut run: impl FnMut() -> Collided) -> (Duration, Collided) {
@@ -58,6 +57,8 @@ fn main() {
                 method,
                 gap: 1e-4,
                 offset_root: 1e-4,
+                offset_scale: None,
+                blend: Scaled { value: 1.0, mask: None },
                 width: Scaled { value: 0.0, mask: None },
             };
             let (time, out) = least(|| collide(&starts, &rest, &goal, &how));
@@ -90,13 +91,40 @@ fn fur(curves: usize, cvs: usize) -> Vec<Vec3> {
 fn icosphere(times: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (a, b) = (0.525_731_1, 0.850_650_8);
     let mut points = vec![
-        [-a, b, 0.0], [a, b, 0.0], [-a, -b, 0.0], [a, -b, 0.0], [0.0, -a, b], [0.0, a, b],
-        [0.0, -a, -b], [0.0, a, -b], [b, 0.0, -a], [b, 0.0, a], [-b, 0.0, -a], [-b, 0.0, a],
+        [-a, b, 0.0],
+        [a, b, 0.0],
+        [-a, -b, 0.0],
+        [a, -b, 0.0],
+        [0.0, -a, b],
+        [0.0, a, b],
+        [0.0, -a, -b],
+        [0.0, a, -b],
+        [b, 0.0, -a],
+        [b, 0.0, a],
+        [-b, 0.0, -a],
+        [-b, 0.0, a],
     ];
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
-        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
-        [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..times {
         let mut middles = std::collections::BTreeMap::new();

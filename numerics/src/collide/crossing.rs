@@ -26,7 +26,8 @@ pub(super) fn wide(p: Vec3) -> V3 {
 /// The corners of a block's triangle.
 #[inline(always)]
 pub(super) fn corners(block: &Block, lane: usize) -> [V3; 3] {
-    block.corners.each_ref().map(|corner| wide(get(corner, lane)))
+    let [a, b, c] = &block.corners;
+    [wide(get(a, lane)), wide(get(b, lane)), wide(get(c, lane))]
 }
 
 /// Where the segment from `a` to `b` crosses the triangle; touching counts. None in the triangle's own plane.

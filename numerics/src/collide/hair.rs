@@ -37,7 +37,10 @@ impl Hair<'_> {
         if cvs < 2 || !self.is_finite() {
             return reached;
         }
-        let shift = all.skin.as_ref().map_or(V3::zeros(), |skin| skin.lift(self.rest[0], all.offset_root));
+        let shift = match &all.skin {
+            Some(skin) => skin.lift(self.rest[0], all.offset_root),
+            None => V3::zeros(),
+        };
         reached.started_inside = u64::from(self.starts_inside(all, &shift));
         self.set_goals(all, &shift, &mut scratch.goal);
         let goal = &scratch.goal;
@@ -47,7 +50,7 @@ impl Hair<'_> {
         }
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vec3::largest(*cv)));
         let mut turned = UnitQuaternion::identity();
-        let mut axis = V3::zeros();
+        let (mut axis, mut before) = (V3::zeros(), V3::zeros());
         for k in 0..cvs - 1 {
             let way = goal[k + 1] - goal[k];
             let length = (wide(self.goal[k + 1]) - wide(self.goal[k])).norm();
@@ -64,6 +67,7 @@ impl Hair<'_> {
                 from,
                 to,
                 axis,
+                before,
                 length,
                 half: 0.5 * f64::from(all.width.at(self.first + k)),
                 gap: all.gap,
@@ -85,8 +89,10 @@ impl Hair<'_> {
             }
             reached.contacts += u64::from(done.met);
             turned = minimal_turn(&from, &done.direction, &axis) * turned;
+            before = done.direction;
             self.out[k + 1] = end;
         }
+        self.blend(all, &shift);
         reached
     }
 
@@ -98,14 +104,72 @@ impl Hair<'_> {
     /// Whether it crosses something at rest.
     #[inline(always)]
     fn starts_inside(&self, all: &Collide<'_>, shift: &V3) -> bool {
-        let at = |cv: Vec3| narrow(&(wide(cv) + shift));
-        self.rest.windows(2).any(|pair| first_crossing_in(all.tree, at(pair[0]), at(pair[1])).is_some())
+        let mut before = narrow(&(wide(self.rest[0]) + shift));
+        for cv in &self.rest[1..] {
+            let next = narrow(&(wide(*cv) + shift));
+            if first_crossing_in(all.tree, before, next).is_some() {
+                return true;
+            }
+            before = next;
+        }
+        false
     }
 
-    fn set_goals(&self, _all: &Collide<'_>, shift: &V3, goals: &mut Vec<V3>) {
+    /// Where the CVs are to go: as they come in, or kept off the skin by `offset_scale` of their rest distance.
+    #[inline(always)]
+    fn set_goals(&self, all: &Collide<'_>, shift: &V3, goals: &mut Vec<V3>) {
         goals.clear();
-        goals.extend(self.goal.iter().map(|cv| wide(*cv) + shift));
+        let (Some(scale), Some(skin)) = (all.offset_scale, &all.skin) else {
+            goals.extend(self.goal.iter().map(|cv| wide(*cv) + shift));
+            return;
+        };
+        let mut before = wide(self.goal[0]);
+        goals.push(before + shift);
+        for k in 1..self.goal.len() {
+            let (from, to) = (wide(self.goal[k - 1]), wide(self.goal[k]));
+            let raised = skin.raised(self.rest[k], &to, scale);
+            // Lengths are restored root to tip: the raised CV says a direction only.
+            let way = raised - before;
+            let length = (to - from).norm();
+            before += if way.norm() > 0.0 { way * (length / way.norm()) } else { to - from };
+            goals.push(before + shift);
+        }
     }
+
+    /// Turns each segment back towards its goal by 1 − `blend`.
+    fn blend(&mut self, all: &Collide<'_>, shift: &V3) {
+        let share = |k: usize| f64::from(all.blend.at(self.first + k)).clamp(0.0, 1.0);
+        if (0..self.out.len()).all(|k| share(k) == 1.0) {
+            return;
+        }
+        let mut before = self.out[0];
+        self.out[0] = narrow(&(wide(self.goal[0]) + shift * share(0)));
+        for k in 1..self.out.len() {
+            let (goal, end) = (wide(self.goal[k]) - wide(self.goal[k - 1]), wide(self.out[k]) - wide(before));
+            before = self.out[k];
+            let (Some(to), Some(from)) = (end.try_normalize(0.0), goal.try_normalize(0.0)) else {
+                self.out[k] = self.out[k - 1];
+                continue;
+            };
+            self.out[k] = if share(k - 1) == 0.0 && self.out[k - 1] == self.goal[k - 1] {
+                self.goal[k]
+            } else {
+                let axis = perpendicular(&from, &V3::zeros());
+                let direction = part_way(&from, &to, &axis, share(k - 1));
+                narrow(&(wide(self.out[k - 1]) + direction * goal.norm()))
+            };
+        }
+    }
+}
+
+/// The unit vector a share of the way from one to another on their great circle; through `axis` × `from` where they are
+/// opposite.
+fn part_way(from: &V3, to: &V3, axis: &V3, share: f64) -> V3 {
+    let turn = from.cross(to);
+    let (sine, cosine) = (turn.norm(), from.dot(to));
+    let n = if sine > 1e-9 { turn / sine } else { *axis };
+    let (sine, cosine) = libm::sincos(share * libm::atan2(sine, cosine));
+    from * cosine + n.cross(from) * sine
 }
 
 /// The smallest turn from one unit vector to another; about `axis` where they are opposite.

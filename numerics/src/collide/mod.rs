@@ -63,6 +63,10 @@ pub struct Collide<'a> {
     pub gap: f64,
     /// How far outside of the skin the roots are brought, metres; 0 leaves them.
     pub offset_root: f64,
+    /// Keeps goals this many times as high over the skin as the curves are at rest, where they would be lower.
+    pub offset_scale: Option<f64>,
+    /// Share of each segment's collision that is kept, 0..1.
+    pub blend: Scaled<'a>,
     /// Thickness of the curves, metres, one value a CV where masked.
     pub width: Scaled<'a>,
 }
@@ -103,8 +107,8 @@ impl Reached {
     }
 }
 
-/// CVs that a task has at least: some 30 µs of work.
-const TASK_CVS: usize = 64;
+/// CVs that a task has at least: some 100 µs of work.
+const TASK_CVS: usize = 256;
 
 /// Collides curves `goal[starts[i]..starts[i + 1]]`, which at rest are those of `rest`.
 ///
@@ -171,7 +175,13 @@ fn perpendicular(to: &V3, near: &V3) -> V3 {
         return side / length;
     }
     let [x, y, z] = [to.x.abs(), to.y.abs(), to.z.abs()];
-    let away = if x <= y && x <= z { V3::x() } else if y <= z { V3::y() } else { V3::z() };
+    let away = if x <= y && x <= z {
+        V3::x()
+    } else if y <= z {
+        V3::y()
+    } else {
+        V3::z()
+    };
     let side = to.cross(&away);
     side / side.norm()
 }

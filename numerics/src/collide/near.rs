@@ -1,7 +1,7 @@
 //! Which triangles of a block may matter: sixteen at a time, in f32, letting pass what rounding leaves in doubt.
 
 use super::sector::{Sector, V3};
-use crate::lanes::{F32x16, LANES, get};
+use crate::lanes::LANES;
 use crate::tree::Block;
 use crate::vec3::{self, Vec3, cross, dot, sub};
 
@@ -25,10 +25,9 @@ pub(super) fn narrow(v: &V3) -> Vec3 {
 }
 
 impl Wedge {
-    /// The wedge of `sector` up to `angle`.
+    /// The wedge of `sector` up to an angle of this cosine and sine.
     #[inline(always)]
-    pub(super) fn new(sector: &Sector, angle: f64) -> Self {
-        let (sine, cosine) = libm::sincos(angle);
+    pub(super) fn new(sector: &Sector, [cosine, sine]: [f64; 2]) -> Self {
         let pivot = narrow(&sector.pivot);
         Self {
             axes: [narrow(&sector.u), narrow(&sector.v), narrow(&sector.n)],
@@ -43,24 +42,21 @@ impl Wedge {
     /// A bit for each lane whose triangle may be met within the wedge.
     #[inline(always)]
     pub(super) fn may_meet(&self, block: &Block) -> u16 {
-        let [along, up, height] = [0, 1, 2].map(|axis| {
-            block.corners.each_ref().map(|corner| {
-                let mut out = F32x16::splat(0.0);
-                for lane in 0..LANES {
-                    out.0[lane] = dot(sub(get(corner, lane), self.pivot), self.axes[axis]);
-                }
-                out
-            })
-        });
+        let (until, slack) = (self.until, self.slack);
         let mut mask = 0;
         for lane in 0..LANES {
-            let [x, y, s] = [&along, &up, &height].map(|values| values.each_ref().map(|value| value.0[lane]));
-            let size = most(most3(x.map(f32::abs)), most(most3(y.map(f32::abs)), most3(s.map(f32::abs))));
-            let slack = self.slack + ROUNDING * size;
+            let corners = block.around(lane, self.pivot);
+            let (x, y, s) = (along(corners, self.axes[0]), along(corners, self.axes[1]), along(corners, self.axes[2]));
+            let size = most(most(vec3::largest(x), vec3::largest(y)), vec3::largest(s));
+            let slack = slack + ROUNDING * size;
             let across = (most3(s) >= -(self.half + slack)) & (least3(s) <= self.half + slack);
             let ahead = most3(y) >= -(self.back + slack);
-            let side = |k: usize| x[k] * self.until[1] - y[k] * self.until[0];
-            let before = most3([side(0), side(1), side(2)]) >= -(self.back + slack);
+            let sides = [
+                x[0] * until[1] - y[0] * until[0],
+                x[1] * until[1] - y[1] * until[0],
+                x[2] * until[1] - y[2] * until[0],
+            ];
+            let before = most3(sides) >= -(self.back + slack);
             mask |= u16::from(across & ahead & before) << lane;
         }
         mask
@@ -74,22 +70,27 @@ pub(super) fn may_cross(block: &Block, a: Vec3, b: Vec3) -> u16 {
     let slack = ROUNDING * (vec3::largest(way) + 0.1 * vec3::largest(a));
     let mut mask = 0;
     for lane in 0..LANES {
-        let [p, q, r] = block.corners.each_ref().map(|corner| sub(get(corner, lane), a));
+        let [p, q, r] = block.around(lane, a);
         let (pq, pr) = (sub(q, p), sub(r, p));
         let normal = cross(pq, pr);
-        let size = most3([p, q, r].map(vec3::largest));
+        let size = most3([vec3::largest(p), vec3::largest(q), vec3::largest(r)]);
         // Heights over the plane, times twice the area; volumes with each edge.
         let start = -dot(normal, p);
         let end = dot(normal, sub(way, p));
         let doubt = (ROUNDING * size + slack) * (most(vec3::largest(pq), vec3::largest(pr))) * 4.0 * size;
         let passes = !((start > doubt) & (end > doubt)) & !((start < -doubt) & (end < -doubt));
-        let volume = |a: Vec3, b: Vec3| dot(way, cross(a, b));
-        let volumes = [volume(p, q), volume(q, r), volume(r, p)];
+        let volumes = [dot(way, cross(p, q)), dot(way, cross(q, r)), dot(way, cross(r, p))];
         let doubt = (ROUNDING * size + slack) * vec3::largest(way) * 8.0 * size;
         let around = !((most3(volumes) > doubt) & (least3(volumes) < -doubt));
         mask |= u16::from(passes & around) << lane;
     }
     mask
+}
+
+/// Each corner's share of `axis`.
+#[inline(always)]
+fn along(corners: [Vec3; 3], axis: Vec3) -> Vec3 {
+    [dot(corners[0], axis), dot(corners[1], axis), dot(corners[2], axis)]
 }
 
 #[inline(always)]

@@ -72,10 +72,14 @@ impl Sector {
         if low > self.half || high < -self.half {
             return;
         }
-        self.blocked_in_slab(&heights, corners.each_ref().map(|corner| {
-            let arm = *corner - self.pivot;
-            [self.u.dot(&arm), self.v.dot(&arm)]
-        }), found);
+        self.blocked_in_slab(
+            &heights,
+            corners.each_ref().map(|corner| {
+                let arm = *corner - self.pivot;
+                [self.u.dot(&arm), self.v.dot(&arm)]
+            }),
+            found,
+        );
     }
 
     /// As [`Sector::blocked_by`] for a thick segment.

@@ -41,10 +41,39 @@ impl Skin<'_> {
     /// The outward unit normal at a point of the surface; `None` where it has none.
     pub(super) fn normal(&self, at: &Closest) -> Option<V3> {
         let corners = self.triangles[at.triangle as usize];
-        let mixed = (0..3).fold(V3::zeros(), |sum, k| {
-            sum + wide(self.normals[corners[k] as usize]) * f64::from(at.weights[k])
-        });
+        let mixed =
+            (0..3).fold(V3::zeros(), |sum, k| sum + wide(self.normals[corners[k] as usize]) * f64::from(at.weights[k]));
         mixed.try_normalize(1e-12)
+    }
+
+    /// Height of a point over the surface, below 0 inside, and the normal it stands on.
+    #[inline(always)]
+    fn height(&self, p: &V3, reach: f32) -> Option<(f64, V3)> {
+        let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
+        let normal = self.normal(&closest)?;
+        let away = p - wide(closest.point);
+        // Beside an edge the normal leans: the distance is what counts, the normal says its side.
+        let height = away.norm().copysign(away.dot(&normal));
+        Some((height, normal))
+    }
+
+    /// A CV's goal, raised until it is `scale` times as high over the skin as the CV is at rest; as it is where it is
+    /// that high.
+    #[inline(always)]
+    pub(super) fn raised(&self, rest: Vec3, goal: &V3, scale: f64) -> V3 {
+        let rest = wide(rest);
+        let (low, high) = self.tree.bounds();
+        let size = vec3::largest(vec3::sub(high, low));
+        let Some((height, _)) = self.height(&rest, size) else { return *goal };
+        // It cannot have come nearer than by the way it went.
+        let moved = (goal - rest).norm();
+        if height - moved >= scale * height {
+            return *goal;
+        }
+        match self.height(goal, 2.0 * ((moved + height.abs()) as f32)) {
+            Some((now, normal)) if now < scale * height => goal + normal * (scale * height - now),
+            _ => *goal,
+        }
     }
 
     /// How far a root is to be moved until it is `offset` outside of the skin: zero where it is.
@@ -57,11 +86,7 @@ impl Skin<'_> {
         let (low, high) = self.tree.bounds();
         let size = vec3::largest(vec3::sub(high, low));
         for _ in 0..LIFTS {
-            let p = wide(root) + shift;
-            let p32 = [p.x as f32, p.y as f32, p.z as f32];
-            let Some(closest) = self.tree.closest(p32, size) else { break };
-            let Some(normal) = self.normal(&closest) else { break };
-            let height = (p - wide(closest.point)).dot(&normal);
+            let Some((height, normal)) = self.height(&(wide(root) + shift), size) else { break };
             if height >= offset * 0.999 {
                 break;
             }

@@ -8,6 +8,9 @@ use crate::tree::{Block, TriangleTree};
 use crate::vec3::Vec3;
 use std::f64::consts::PI;
 
+/// How straight into a surface a segment has to stick for the curve to say which way out is taken.
+const STRAIGHT_IN: f64 = 1e-3;
+
 /// A segment that is to turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
@@ -18,6 +21,8 @@ pub(super) struct Segment {
     pub(super) to: V3,
     /// About which it turns where the two are opposite.
     pub(super) axis: V3,
+    /// Where the segment before it points; zero at the root.
+    pub(super) before: V3,
     pub(super) length: f64,
     /// Half its thickness.
     pub(super) half: f64,
@@ -83,20 +88,19 @@ impl Segment {
     #[inline(always)]
     fn sweep<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Sweep {
         let sector = self.sector(self.from, self.to);
-        let angle = libm::atan2(self.from.cross(&self.to).norm(), self.from.dot(&self.to));
-        let (low, high) = sector.bounds(angle);
+        let (low, high) = sector.bounds(&self.to);
         gather(tree, low, high, nearby);
         if nearby.is_empty() {
             return Sweep::Free(Turned { direction: self.to, met: false });
         }
         let stop = match method {
-            Method::Exact => first_stop(&sector, angle, nearby),
-            Method::Steps(steps) => self.last_free_step(&sector, angle, steps, nearby),
+            Method::Exact => first_stop(&sector, &self.to, nearby),
+            Method::Steps(steps) => self.last_free_step(&sector, steps, nearby),
         };
         match stop {
-            None => Sweep::Stuck,
-            Some(stop) if stop >= angle => Sweep::Free(Turned { direction: self.to, met: false }),
-            Some(stop) => Sweep::Free(Turned { direction: sector.direction(stop), met: true }),
+            Stop::Stuck => Sweep::Stuck,
+            Stop::None => Sweep::Free(Turned { direction: self.to, met: false }),
+            Stop::At(angle) => Sweep::Free(Turned { direction: sector.direction(angle), met: true }),
         }
     }
 
@@ -116,18 +120,19 @@ impl Segment {
 
     /// The paper's way: small steps until one crosses.
     #[inline(always)]
-    fn last_free_step(&self, sector: &Sector, angle: f64, steps: u32, nearby: &Nearby<'_>) -> Option<f64> {
+    fn last_free_step(&self, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
+        let angle = sector.angle_of(&self.to);
         let at = |step: u32| angle * f64::from(step) / f64::from(steps);
         if self.crosses(&sector.u, nearby).is_some() {
-            return None;
+            return Stop::Stuck;
         }
         for step in 1..=steps {
             let direction = if step == steps { self.to } else { sector.direction(at(step)) };
             if self.crosses(&direction, nearby).is_some() {
-                return Some(at(step - 1));
+                return Stop::At(at(step - 1));
             }
         }
-        Some(angle)
+        Stop::None
     }
 
     /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
@@ -135,9 +140,10 @@ impl Segment {
     #[inline(always)]
     fn way_out<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Option<V3> {
         let crossed = self.crosses(&self.from, nearby);
-        let outwards = crossed.map_or(self.axis, |crossed| crossed.normal);
+        // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
+        let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
         let sector = self.sector(self.from, outwards);
-        let (low, high) = sector.bounds(PI);
+        let (low, high) = sector.bounds(&-sector.u);
         gather(tree, low, high, nearby);
         let angle = match method {
             Method::Exact => first_gap(&sector, nearby),
@@ -163,41 +169,51 @@ fn gather<'t>(tree: &'t TriangleTree, low: Vec3, high: Vec3, nearby: &mut Nearby
     tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
 }
 
-/// How far the sector may turn towards `angle`; `None` where something is in the way as it stands.
+/// Where a sweep is stopped.
+enum Stop {
+    /// Nowhere.
+    None,
+    At(f64),
+    /// Something is in the way where it starts.
+    Stuck,
+}
+
+/// How far the sector may turn towards the unit vector `to` of its plane.
 #[inline(always)]
-fn first_stop(sector: &Sector, angle: f64, nearby: &Nearby<'_>) -> Option<f64> {
-    let mut stop = angle;
-    let mut stuck = false;
-    let mut wedge = Wedge::new(sector, stop);
+fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
+    let mut wedge = Wedge::new(sector, [sector.u.dot(to), sector.v.dot(to).max(0.0)]);
+    let mut stop: Option<f64> = None;
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let before = stop;
+            let mut stuck = false;
+            let mut next = None;
             sector.blocked_by(&corners(block, lane), |blocked| {
-                if blocked.holds_start() {
-                    stuck = true;
-                } else if blocked.lo > 0.0 {
-                    stop = stop.min((blocked.lo - sector.back / blocked.lo_radius).max(0.0));
+                stuck |= blocked.holds_start();
+                if blocked.lo > 0.0 {
+                    let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
+                    next = Some(next.map_or(angle, |least: f64| least.min(angle)));
                 }
             });
             if stuck {
-                return None;
+                return Stop::Stuck;
             }
-            if stop < before {
-                wedge = Wedge::new(sector, stop);
-                lanes &= wedge.may_meet(block);
-            }
+            let Some(next) = next.filter(|next| *next < stop.unwrap_or_else(|| sector.angle_of(to))) else { continue };
+            stop = Some(next);
+            let (sine, cosine) = libm::sincos(next);
+            wedge = Wedge::new(sector, [cosine, sine]);
+            lanes &= wedge.may_meet(block);
         }
     }
-    Some(stop)
+    stop.map_or(Stop::None, Stop::At)
 }
 
 /// The first angle up to π at which nothing is within the sector's arc.
 #[inline(always)]
 fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
-    let wedge = Wedge::new(sector, PI);
+    let wedge = Wedge::new(sector, [-1.0, 0.0]);
     let mut taken: Vec<[f64; 2]> = Vec::new();
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
@@ -233,9 +249,13 @@ impl Blocked {
 }
 
 impl Sector {
-    /// A box around all that it sweeps while it turns by `angle`.
-    fn bounds(&self, angle: f64) -> (Vec3, Vec3) {
-        let end = self.direction(angle);
+    /// How far it has to turn to the unit vector `to` of its plane: 0…π.
+    fn angle_of(&self, to: &V3) -> f64 {
+        libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
+    }
+
+    /// A box around all that it sweeps while it turns to the unit vector `end` of its plane.
+    fn bounds(&self, end: &V3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {

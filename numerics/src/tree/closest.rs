@@ -130,6 +130,15 @@ impl Boxes {
     }
 }
 
+impl Block {
+    /// The corners of a lane's triangle as seen from `p`.
+    #[inline(always)]
+    pub(crate) fn around(&self, lane: usize, p: Vec3) -> [Vec3; 3] {
+        let [a, b, c] = &self.corners;
+        [sub(get(a, lane), p), sub(get(b, lane), p), sub(get(c, lane), p)]
+    }
+}
+
 /// The nearest so far.
 struct Found {
     square: f32,
@@ -145,8 +154,7 @@ impl Found {
     fn try_block(&mut self, block: &Block, p: Vec3) {
         let (mut squares, mut ab, mut ac) = (F32x16::splat(0.0), F32x16::splat(0.0), F32x16::splat(0.0));
         for lane in 0..LANES {
-            let corners = block.corners.map(|corner| sub(get(&corner, lane), p));
-            let (square, b, c) = nearest_on(corners);
+            let (square, b, c) = nearest_on(block.around(lane, p));
             squares.0[lane] = square;
             ab.0[lane] = b;
             ac.0[lane] = c;
@@ -155,12 +163,11 @@ impl Found {
             let (square, triangle) = (squares.0[lane], block.triangle[lane]);
             if triangle != NONE && (square < self.square || (square == self.square && triangle < self.triangle)) {
                 let (b, c) = (ab.0[lane], ac.0[lane]);
-                let corners = block.corners.map(|corner| sub(get(&corner, lane), p));
                 *self = Self {
                     square,
                     triangle,
                     weights: [((1.0 - b) - c).max(0.0), b, c],
-                    towards: between(corners, b, c),
+                    towards: between(block.around(lane, p), b, c),
                 };
             }
         }
@@ -185,19 +192,22 @@ fn nearest_on(corners: [Vec3; 3]) -> (f32, f32, f32) {
     let on_ab = along(a, ab);
     let on_ac = along(a, ac);
     let on_bc = along(b, sub(c, b));
-    let square = |u: f32, v: f32| {
-        let point = between(corners, u, v);
-        dot(point, point)
-    };
-    let (mut least, mut u, mut v) = (square(on_ab, 0.0), on_ab, 0.0);
-    let next = square(0.0, on_ac);
+    let (mut least, mut u, mut v) = (square_at(corners, on_ab, 0.0), on_ab, 0.0);
+    let next = square_at(corners, 0.0, on_ac);
     let nearer = next < least;
     (least, u, v) = if nearer { (next, 0.0, on_ac) } else { (least, u, v) };
-    let next = square(1.0 - on_bc, on_bc);
+    let next = square_at(corners, 1.0 - on_bc, on_bc);
     let nearer = next < least;
     (least, u, v) = if nearer { (next, 1.0 - on_bc, on_bc) } else { (least, u, v) };
-    let next = square(second, third);
+    let next = square_at(corners, second, third);
     if inside & (next < least) { (next, second, third) } else { (least, u, v) }
+}
+
+/// Distance squared of the origin to [`between`].
+#[inline(always)]
+fn square_at(corners: [Vec3; 3], u: f32, v: f32) -> f32 {
+    let point = between(corners, u, v);
+    dot(point, point)
 }
 
 /// The point of a triangle with weights `u` and `v` of its second and third corner.

@@ -163,13 +163,13 @@ impl Block {
     /// The box of each lane's triangle; a blank lane has that of the one it repeats.
     #[inline(always)]
     pub fn boxes(&self) -> Boxes {
-        let [a, b, c] = &self.corners;
-        let mut boxes = Boxes { low: *a, high: *a };
+        let blank = F32x16::splat(0.0);
+        let mut boxes = Boxes { low: [blank; 3], high: [blank; 3] };
         for axis in 0..3 {
+            let [a, b, c] = [&self.corners[0][axis], &self.corners[1][axis], &self.corners[2][axis]];
             for lane in 0..LANES {
-                let [a, b, c] = [a, b, c].map(|corner| corner[axis].0[lane]);
-                boxes.low[axis].0[lane] = least(least(a, b), c);
-                boxes.high[axis].0[lane] = most(most(a, b), c);
+                boxes.low[axis].0[lane] = least(least(a.0[lane], b.0[lane]), c.0[lane]);
+                boxes.high[axis].0[lane] = most(most(a.0[lane], b.0[lane]), c.0[lane]);
             }
         }
         boxes

@@ -7,10 +7,12 @@ impl Boxes {
     /// A bit for each lane whose box meets `low`…`high`, ends included.
     #[inline(always)]
     pub fn meeting(&self, low: Vec3, high: Vec3) -> u16 {
+        let ([low_x, low_y, low_z], [high_x, high_y, high_z]) = (&self.low, &self.high);
         let mut mask = 0;
         for lane in 0..LANES {
-            let [x, y, z] =
-                [0, 1, 2].map(|axis| (self.low[axis].0[lane] <= high[axis]) & (self.high[axis].0[lane] >= low[axis]));
+            let x = (low_x.0[lane] <= high[0]) & (high_x.0[lane] >= low[0]);
+            let y = (low_y.0[lane] <= high[1]) & (high_y.0[lane] >= low[1]);
+            let z = (low_z.0[lane] <= high[2]) & (high_z.0[lane] >= low[2]);
             mask |= u16::from(x & y & z) << lane;
         }
         mask
