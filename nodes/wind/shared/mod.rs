@@ -1,0 +1,3 @@
+//! What several wind nodes need.
+
+pub(crate) mod surface;
