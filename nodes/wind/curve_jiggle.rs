@@ -201,7 +201,7 @@ impl Swing {
             None => roots.frames(self.skin.as_ref()?.mesh()?.positions()),
         };
         let to = roots.frames(skin.positions());
-        let carries = from.iter().zip(&to).map(|(from, to)| Carry::between(from, to, share)).collect();
+        let carries = Carry::all_between(&from, &to, share);
         self.frames = Some(to);
         Some(carries)
     }

@@ -1,5 +1,7 @@
 //! What carries an oscillator along: a share of a rigid motion, applied to its state before each step.
 
+use rayon::prelude::*;
+
 /// A place with axes, in metres: the frame of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
@@ -21,6 +23,12 @@ pub struct Carry {
 impl Carry {
     /// Stays where it is.
     pub const NONE: Self = Self { change: [[0.0; 3]; 3], about: [0.0; 3], shift: [0.0; 3] };
+
+    /// [`Carry::between`] for each of many frames.
+    pub fn all_between(from: &[Frame], to: &[Frame], share: f64) -> Vec<Self> {
+        let pairs = from.par_iter().zip(to).with_min_len(512);
+        pairs.map(|(from, to)| Self::between(from, to, share)).collect()
+    }
 
     /// A share of the motion that takes `from` to `to`: about the frame's origin, that share of the turn's angle (the
     /// shorter way round) and of the way. 0 is no motion, 1 all of it.

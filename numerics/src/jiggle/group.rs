@@ -15,6 +15,29 @@ pub(super) struct F64x16(pub(super) [f64; LANES]);
 
 impl F64x16 {
     pub(super) const ZERO: Self = Self([0.0; LANES]);
+
+    /// The value that `of` gives for each lane.
+    #[inline(always)]
+    fn from_fn(of: impl Fn(usize) -> f64) -> Self {
+        let mut out = Self::ZERO;
+        for lane in 0..LANES {
+            out.0[lane] = of(lane);
+        }
+        out
+    }
+}
+
+/// What `of` gives for each axis. Not a loop: where f32 and f64 mix, the compiler would unroll the lanes inside of it and
+/// make vectors of three axes.
+#[inline(always)]
+fn axes<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
+}
+
+/// b − a, exactly where they are near each other.
+#[inline(always)]
+fn between(a: &Lanes<3>, b: &Lanes<3>) -> [F64x16; 3] {
+    axes(|axis| F64x16::from_fn(|lane| f64::from(b[axis].0[lane]) - f64::from(a[axis].0[lane])))
 }
 
 /// One CV of each lane.
@@ -84,10 +107,14 @@ impl Curves {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step as u32) as usize)
     }
 
-    /// Whether the CV at `step` is the lane's own.
+    /// Writes the lanes' own CVs to `out`, whose first point is `base`.
     #[inline(always)]
-    fn has(&self, lane: usize, step: usize) -> bool {
-        (step as u32) < self.count[lane]
+    fn write(&self, step: usize, points: &Lanes<3>, base: usize, out: &mut [Vec3]) {
+        for lane in 0..LANES {
+            if (step as u32) < self.count[lane] {
+                out[self.first[lane] as usize + step - base] = get(points, lane);
+            }
+        }
     }
 
     #[inline(always)]
@@ -131,7 +158,7 @@ fn step(curves: &Curves, slots: &mut [Slot], responses: &[Responses], targets: &
             for lane in 0..LANES {
                 let (offset, pace) = (slot.offset[axis].0[lane], slot.pace[axis].0[lane]);
                 let way = way[axis].0[lane];
-                slot.offset[axis].0[lane] = (a.0[lane] * offset + b.0[lane] * pace) - k.0[lane] * way;
+                slot.offset[axis].0[lane] = (a.0[lane] * offset + b.0[lane] * pace) + k.0[lane] * way;
                 slot.pace[axis].0[lane] = (c.0[lane] * offset + e.0[lane] * pace) + l.0[lane] * way;
             }
         }
@@ -207,16 +234,13 @@ pub(super) struct Blend<'a> {
 impl Blend<'_> {
     #[inline(always)]
     fn at(&self, curves: &Curves, step: usize) -> F64x16 {
-        let mut shares = F64x16([f64::from(self.share); LANES]);
-        if let Some(mask) = self.mask {
-            let at = curves.at(step);
-            for lane in 0..LANES {
-                let share = self.share * mask[at[lane]];
-                let share = if share > 0.0 { share } else { 0.0 };
-                shares.0[lane] = f64::from(if share < 1.0 { share } else { 1.0 });
-            }
-        }
-        shares
+        let Some(mask) = self.mask else { return F64x16([f64::from(self.share); LANES]) };
+        let at = curves.at(step);
+        F64x16::from_fn(|lane| {
+            let share = self.share * mask[at[lane]];
+            let share = if share > 0.0 { share } else { 0.0 };
+            f64::from(if share < 1.0 { share } else { 1.0 })
+        })
     }
 }
 
@@ -236,57 +260,52 @@ kernel! {
 fn shape(curves: &Curves, slots: &[Slot], blend: Blend<'_>, base: usize, out: &mut [Vec3]) -> f64 {
     let mut farthest = F64x16::ZERO;
     let mut moved = [F64x16::ZERO; 3];
-    let mut before: Option<(&Slot, [F64x16; 3])> = None;
-    for (step, slot) in slots.iter().enumerate() {
+    let Some(root) = slots.first() else { return 0.0 };
+    // The root's offset is 0.
+    let (mut target, mut shown) = (&root.target, [F64x16::ZERO; 3]);
+    curves.write(0, target, base, out);
+    for (step, slot) in slots.iter().enumerate().skip(1) {
         let shares = blend.at(curves, step);
-        let mut shown = slot.offset;
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                shown[axis].0[lane] *= shares.0[lane];
-            }
-        }
-        if let Some((last, last_shown)) = &before {
-            let mut rest = [F64x16::ZERO; 3];
-            let mut swung = rest;
-            for axis in 0..3 {
-                for lane in 0..LANES {
-                    rest[axis].0[lane] = f64::from(slot.target[axis].0[lane]) - f64::from(last.target[axis].0[lane]);
-                    swung[axis].0[lane] = rest[axis].0[lane] + (shown[axis].0[lane] - last_shown[axis].0[lane]);
-                }
-            }
-            for lane in 0..LANES {
-                let (long, now) = (square(&rest, lane).sqrt(), square(&swung, lane).sqrt());
-                // Equal segments give exactly 1; one without a direction keeps its target's.
-                let scale = if now > 0.0 { long / now } else { 0.0 };
-                for axis in 0..3 {
-                    let end = if now > 0.0 { scale * swung[axis].0[lane] } else { rest[axis].0[lane] };
-                    moved[axis].0[lane] += end - rest[axis].0[lane];
-                }
-                let distance = square(&moved, lane);
-                let counts = curves.has(lane, step) && distance > farthest.0[lane];
-                farthest.0[lane] = if counts { distance } else { farthest.0[lane] };
-            }
-        }
-        let mut written = slot.target;
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                let to = f64::from(slot.target[axis].0[lane]) + moved[axis].0[lane];
+        let next = axes(|axis| F64x16::from_fn(|lane| slot.offset[axis].0[lane] * shares.0[lane]));
+        let rest = between(target, &slot.target);
+        let swung =
+            axes(|axis| F64x16::from_fn(|lane| rest[axis].0[lane] + (next[axis].0[lane] - shown[axis].0[lane])));
+        let (long, now) = (squares(&rest), squares(&swung));
+        // Equal segments give exactly 1; one without a direction keeps its target's.
+        let ratio = F64x16::from_fn(|lane| (long.0[lane] / now.0[lane]).sqrt());
+        let scale = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { ratio.0[lane] } else { 0.0 });
+        let straight = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { 0.0 } else { 1.0 });
+        moved = axes(|axis| {
+            F64x16::from_fn(|lane| {
+                let rest = rest[axis].0[lane];
+                let end = scale.0[lane] * swung[axis].0[lane] + straight.0[lane] * rest;
+                moved[axis].0[lane] + (end - rest)
+            })
+        });
+        let distance = squares(&moved);
+        farthest = F64x16::from_fn(|lane| {
+            let distance = if (step as u32) < curves.count[lane] { distance.0[lane] } else { 0.0 };
+            if distance > farthest.0[lane] { distance } else { farthest.0[lane] }
+        });
+        let written = axes(|axis| {
+            F32x16::from_fn(|lane| {
+                let (target, moved) = (slot.target[axis].0[lane], moved[axis].0[lane]);
+                let to = (f64::from(target) + moved) as f32;
                 // Not the sum where nothing moved: −0 + 0 would lose its sign.
-                let still = moved[axis].0[lane] == 0.0;
-                written[axis].0[lane] = if still { slot.target[axis].0[lane] } else { to as f32 };
-            }
-        }
-        for lane in 0..LANES {
-            if curves.has(lane, step) {
-                out[curves.first[lane] as usize + step - base] = get(&written, lane);
-            }
-        }
-        before = Some((slot, shown));
+                if moved == 0.0 { target } else { to }
+            })
+        });
+        curves.write(step, &written, base, out);
+        (target, shown) = (&slot.target, next);
     }
     farthest.0.into_iter().fold(0.0, f64::max)
 }
 
+/// Squared lengths.
 #[inline(always)]
-fn square(v: &[F64x16; 3], lane: usize) -> f64 {
-    (v[0].0[lane] * v[0].0[lane] + v[1].0[lane] * v[1].0[lane]) + v[2].0[lane] * v[2].0[lane]
+fn squares(v: &[F64x16; 3]) -> F64x16 {
+    F64x16::from_fn(|lane| {
+        let [x, y, z] = [v[0].0[lane], v[1].0[lane], v[2].0[lane]];
+        (x * x + y * y) + z * z
+    })
 }

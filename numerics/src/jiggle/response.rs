@@ -1,7 +1,7 @@
 //! One step of a damped spring, exact for a target that moves straight from where it was to where it is.
 //!
 //! x'' = −2ζω(x' − d·τ') − ω²(x − τ), with ξ = x − τ and velocities p a step (v·dt), is over a step in which the target
-//! moves by D: ξ₁ = aξ₀ + bp₀ − kD, p₁ = cξ₀ + ep₀ + lD. All six depend on ω·dt and ζ alone. The forms here subtract no
+//! moves by D: ξ₁ = aξ₀ + bp₀ + kD, p₁ = cξ₀ + ep₀ + lD. All six depend on ω·dt and ζ alone. The forms here subtract no
 //! numbers that are nearly equal: near ζ = 1 and for steps from 1e-12 to 1e12 they keep ten digits. f64, no unit.
 
 /// What the damper resists.
@@ -59,10 +59,10 @@ impl Response {
         }
         let c = -phase * s;
         match drag {
-            Drag::Target => Self { a, b, c, e, k: b, l: 1.0 - e },
+            Drag::Target => Self { a, b, c, e, k: -b, l: 1.0 - e },
             Drag::World => {
                 let lag = if phase > 0.0 { 2.0 * zeta / phase * left } else { 0.0 };
-                Self { a, b, c, e, k: b + lag, l: left }
+                Self { a, b, c, e, k: -(b + lag), l: left }
             }
         }
     }
