@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{conformance, faults};
 use crate::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
 use crate::node::{
-    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, StepCx, Times,
+    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
 };
 use crate::param::{Masked, Param, Params, Seed, Unit};
 use crate::{Error, Result, choice};
