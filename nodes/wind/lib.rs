@@ -1,5 +1,6 @@
 //! The wind family: wind on fur and grass (paper W).
 
+pub mod curve_jiggle;
 pub mod curve_wind;
 pub mod curve_wind_collision;
 mod shared;
@@ -7,4 +8,4 @@ mod shared;
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&curve_wind::NODE, &curve_wind_collision::NODE];
+pub static NODES: &[&Node] = &[&curve_jiggle::NODE, &curve_wind::NODE, &curve_wind_collision::NODE];

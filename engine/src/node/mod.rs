@@ -6,10 +6,10 @@ mod cx;
 mod help;
 mod ports;
 
-use crate::geometry::{Attr, ColumnType, Item, Name, Owner};
-use crate::param::{ParamDecl, ParamSpec, Params, Unit};
+use crate::geometry::{Attr, ColumnType, Geometry, Item, Name, Owner};
+use crate::param::{Clock, ParamDecl, ParamSpec, Params, Unit};
 
-pub use chain::{Chain, Solver};
+pub use chain::{Chain, Past, Solver};
 pub(crate) use chain::{ChainFns, SolverFns, StateBox};
 pub use cx::{Cx, FrameCx, Outputs, StepCx};
 pub(crate) use cx::{History, InputData};
@@ -28,7 +28,7 @@ pub enum Cook {
         reads_clock: fn(&Params) -> bool,
     },
     /// This frame and some before it.
-    Window(ChainFns, fn(&Params) -> u32),
+    Window(ChainFns, fn(&Params, Clock) -> Past),
     /// Its own state of the frame before.
     Solver(ChainFns, SolverFns),
 }
@@ -147,7 +147,13 @@ pub struct Node {
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integral`] integrates over time; reads only params declared [`crate::param::Param::history`].
     pub integrand: Option<fn(&Params) -> [f64; 3]>,
+    /// What a window keeps that a cubic between its frames does not; see [`Node::mends_between`].
+    pub mend_between: Option<MendBetween>,
 }
+
+/// Puts right an output of a window `share` of the way between two whole frames, whose outputs are `near`; `P` and `v` of
+/// `between` lie on the cubic through them, all else is that of the first.
+pub type MendBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
 
 impl Node {
     /// A node of that name; `version` is raised when its bits change.
@@ -168,6 +174,7 @@ impl Node {
             leaves_out: None,
             checks: None,
             integrand: None,
+            mend_between: None,
         }
     }
 
@@ -245,6 +252,14 @@ impl Node {
     #[must_use]
     pub const fn integrates(mut self, integrand: fn(&Params) -> [f64; 3]) -> Self {
         self.integrand = Some(integrand);
+        self
+    }
+
+    /// Called on each output of a window between two whole frames, where positions are interpolated: to keep what the
+    /// node keeps at whole frames, such as lengths.
+    #[must_use]
+    pub const fn mends_between(mut self, mend: MendBetween) -> Self {
+        self.mend_between = Some(mend);
         self
     }
 

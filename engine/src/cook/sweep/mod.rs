@@ -189,6 +189,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
             self.keys.forget_before(slice[0].floor_number());
         }
+        for (node, report) in self.report.nodes.iter_mut().enumerate() {
+            report.window = self.keys.window(node);
+        }
         self.report.wall = watch.wall();
         self.report.cpu = watch.cpu();
         Ok(self.report)
@@ -431,7 +434,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         }
         // Cancelled on its way, a chain has not been everywhere.
         if declared.cook.is_chain() && !self.cancelled() {
-            self.finish_chain(node, &need);
+            self.finish_chain(node, declared, &need);
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{conformance, faults};
 use crate::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
 use crate::node::{
-    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, StepCx, Times,
+    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
 };
 use crate::param::{Masked, Param, Params, Seed, Unit};
 use crate::{Error, Result, choice};
@@ -506,8 +506,11 @@ impl<const LEAK: bool> Chain for Lag<LEAK> {
 #[test]
 fn a_window_stands_still_over_what_does() {
     let lag = |cook| Node { cook, ..GOOD }.params(&[&SPARE]);
-    assert_eq!(said(lag(Cook::window::<Lag<false>>(|_| 8))), [""; 0]);
-    only(lag(Cook::window::<Lag<true>>(|_| 8)), "over inputs that stand still it does not stand still");
+    assert_eq!(said(lag(Cook::window::<Lag<false>>(|_, _| Past::frames(8)))), [""; 0]);
+    only(
+        lag(Cook::window::<Lag<true>>(|_, _| Past::frames(8))),
+        "over inputs that stand still it does not stand still",
+    );
 }
 
 /// A solver: curves that fall, faster and faster.
