@@ -80,10 +80,10 @@ fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane)) {
-            if first.is_none_or(|first| found.share < first.share) {
-                *first = Some(found);
-            }
+        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane))
+            && first.is_none_or(|first| found.share < first.share)
+        {
+            *first = Some(found);
         }
     }
 }

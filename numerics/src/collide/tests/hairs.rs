@@ -194,7 +194,7 @@ fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
         out.iter().zip(&exact).map(|(a, b)| f64::from(vec3::length(vec3::sub(*a, *b)))).sum::<f64>()
     };
     let errors = [2, 4, 8, 16, 32, 64, 128, 256].map(error);
-    let slope = (errors[7] / errors[1]).ln() / (256.0_f64 / 4.0).ln();
+    let slope = libm::log(errors[7] / errors[1]) / libm::log(256.0 / 4.0);
     assert!((-1.2..-0.8).contains(&slope), "{slope}: {errors:?}");
 }
 
