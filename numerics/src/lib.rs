@@ -20,5 +20,6 @@ pub mod random;
 pub mod scatter;
 pub mod shapes;
 pub mod simd;
+pub mod tree;
 pub mod trig;
 pub mod vec3;
