@@ -2,7 +2,9 @@
 
 use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
 use crate::lanes::{F32x16, get};
+use crate::simd::{Path, kernel};
 use crate::vec3::{self, Vec3, cross, dot, scale, sub};
+use rayon::prelude::*;
 
 /// The nearest point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +23,34 @@ pub struct Closest {
 /// distance squared: above the rounding of both.
 const ROUNDING: f32 = 1e-6;
 
+/// Points that a task looks from: some 30 µs of work.
+const TASK: usize = 64;
+
+kernel! {
+    fn closest_chunk(tree: &TriangleTree, from: &[Vec3], reach: f32, out: &mut [Option<Closest>]) = chunk;
+}
+
+#[inline(always)]
+fn chunk(tree: &TriangleTree, from: &[Vec3], reach: f32, out: &mut [Option<Closest>]) {
+    for (out, p) in out.iter_mut().zip(from) {
+        *out = tree.closest(*p, reach);
+    }
+}
+
 impl TriangleTree {
+    /// [`TriangleTree::closest`] from each point of `from`, on the widest SIMD path.
+    pub fn closest_each(&self, from: &[Vec3], reach: f32) -> Vec<Option<Closest>> {
+        self.closest_each_on(Path::chosen(), from, reach)
+    }
+
+    /// [`TriangleTree::closest_each`] on a given SIMD path.
+    pub fn closest_each_on(&self, path: Path, from: &[Vec3], reach: f32) -> Vec<Option<Closest>> {
+        let mut out = vec![None; from.len()];
+        let chunks = out.par_chunks_mut(TASK).zip(from.par_chunks(TASK));
+        chunks.for_each(|(out, from)| closest_chunk(path, self, from, reach, out));
+        out
+    }
+
     /// The nearest point of the surface within `reach` metres of `p`, to a few roundings of the
     /// distance and of the triangle's size; of equally near triangles the one of lowest index. None
     /// where `p` is not finite.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::random::Key;
+use crate::simd::Path;
 
 /// `count` triangles about `size` large in the unit box.
 fn soup(seed: u64, count: u32, size: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -223,4 +224,17 @@ fn blocks_hold_each_triangle_once_and_blank_lanes_repeat_the_first() {
     let last = tree.blocks().last().unwrap();
     assert_eq!(last.triangle.iter().filter(|triangle| **triangle == NONE).count(), 5);
     assert_eq!(crate::lanes::get(&last.corners[1], 15), crate::lanes::get(&last.corners[1], 0));
+}
+
+#[test]
+fn every_simd_path_finds_the_same_bits() {
+    let (points, triangles) = soup(11, 3000, 0.1);
+    let tree = TriangleTree::build(&points, &triangles);
+    let key = |query: u64| Key::new(12).of(query);
+    let from: Vec<Vec3> = (0..500).map(|query| [0, 1, 2].map(|axis| key(query).of(axis).f32() * 1.5 - 0.2)).collect();
+    let narrow = tree.closest_each_on(Path::BASELINE, &from, 0.3);
+    assert!(narrow.iter().any(Option::is_none) && narrow.iter().any(Option::is_some));
+    for path in Path::all() {
+        assert_eq!(tree.closest_each_on(path, &from, 0.3), narrow, "{}", path.name());
+    }
 }
