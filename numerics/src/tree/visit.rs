@@ -32,11 +32,25 @@ impl TriangleTree {
     /// As [`TriangleTree::visit_box`], until `found` says true; whether it did.
     #[inline(always)]
     pub fn any_in_box(&self, low: Vec3, high: Vec3, mut found: impl FnMut(&Block, u16) -> bool) -> bool {
+        self.any_where(
+            |boxes| boxes.meeting(low, high),
+            |block| {
+                let block = &self.blocks[block];
+                let meeting = block.boxes().meeting(low, high) & block.filled();
+                meeting != 0 && found(block, meeting)
+            },
+        )
+    }
+
+    /// Calls `found` with the place of each block that `enter` lets through, a bit a lane, at all levels
+    /// of the tree, until it says true; whether it did. Blank lanes must not be let through.
+    #[inline(always)]
+    pub(crate) fn any_where(&self, mut enter: impl FnMut(&Boxes) -> u16, mut found: impl FnMut(usize) -> bool) -> bool {
         let Some(top) = self.levels.len().checked_sub(1) else { return false };
         // At each level: the box that is open, and its lanes still to be entered.
         let (mut open, mut lanes) = ([0; MOST_LEVELS], [0; MOST_LEVELS]);
         let mut level = top;
-        lanes[top] = self.levels[top][0].meeting(low, high);
+        lanes[top] = enter(&self.levels[top][0]);
         loop {
             if lanes[level] == 0 {
                 if level == top {
@@ -50,12 +64,8 @@ impl TriangleTree {
             if level > 0 {
                 level -= 1;
                 open[level] = child;
-                lanes[level] = self.levels[level][child].meeting(low, high);
-                continue;
-            }
-            let block = &self.blocks[child];
-            let meeting = block.boxes().meeting(low, high) & block.filled();
-            if meeting != 0 && found(block, meeting) {
+                lanes[level] = enter(&self.levels[level][child]);
+            } else if found(child) {
                 return true;
             }
         }

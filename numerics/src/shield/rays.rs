@@ -1,0 +1,124 @@
+//! Sixteen rays at once, each a lane, against one triangle after another.
+
+use super::Obstacle;
+use super::frame::Gap;
+use crate::lanes::{F32x16, LANES, Lanes, get, set};
+use crate::simd::kernel;
+use crate::tree::TriangleTree;
+use crate::vec3::{self, Vec3, cross, sub};
+
+kernel! {
+    /// 1 in `covered` for each of up to sixteen CVs that has a collider within `reach` upwind.
+    pub(super) fn cover(
+        obstacles: &[Obstacle],
+        at: &[Vec3],
+        gap: &[Gap],
+        reach: f32,
+        covered: &mut [f32],
+    ) = body;
+}
+
+#[inline(always)]
+fn body(obstacles: &[Obstacle], at: &[Vec3], gap: &[Gap], reach: f32, covered: &mut [f32]) {
+    // A lane without a CV repeats the first.
+    let mut rays = Rays { at: at[0].map(F32x16::splat), gap: F32x16::splat(0.0), reach };
+    for (lane, at) in at.iter().enumerate() {
+        set(&mut rays.at, lane, *at);
+    }
+    let mut hit = [0; LANES];
+    for obstacle in obstacles {
+        for lane in 0..LANES {
+            rays.gap.0[lane] = gap[if lane < gap.len() { lane } else { 0 }].at(obstacle.size);
+        }
+        if rays.meet(&obstacle.tree, &mut hit) {
+            break;
+        }
+    }
+    for (covered, hit) in covered.iter_mut().zip(hit) {
+        *covered = hit as f32;
+    }
+}
+
+/// Where sixteen rays start, all upwind.
+struct Rays {
+    at: Lanes<3>,
+    gap: F32x16,
+    reach: f32,
+}
+
+impl Rays {
+    /// Sets `hit` to 1 for each ray that meets the tree; whether all are.
+    #[inline(always)]
+    fn meet(&self, tree: &TriangleTree, hit: &mut [u32; LANES]) -> bool {
+        let (low, high) = self.bounds();
+        tree.any_in_box(low, [high[0], high[1], high[2] + self.reach], |block, mut lanes| {
+            while lanes != 0 {
+                let triangle = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                self.meet_triangle([0, 1, 2].map(|corner| get(&block.corners[corner], triangle)), hit);
+            }
+            let mut all = 1;
+            for lane in 0..LANES {
+                all &= hit[lane];
+            }
+            all == 1
+        })
+    }
+
+    /// Sets `hit` to 1 for each ray that meets the triangle.
+    #[inline(always)]
+    fn meet_triangle(&self, corners: [Vec3; 3], hit: &mut [u32; LANES]) {
+        let [a, b, c] = corners;
+        let area = vec3::length(cross(sub(b, a), sub(c, a)));
+        for lane in 0..LANES {
+            let at = get(&self.at, lane);
+            let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);
+            let far = seen.towards > self.gap.0[lane] * area;
+            let near = seen.towards <= self.reach * seen.across;
+            hit[lane] |= u32::from(seen.inside & far & near);
+        }
+    }
+
+    /// The box around the starts.
+    #[inline(always)]
+    fn bounds(&self) -> (Vec3, Vec3) {
+        let (mut low, mut high) = (get(&self.at, 0), get(&self.at, 0));
+        for lane in 1..LANES {
+            let at = get(&self.at, lane);
+            for axis in 0..3 {
+                low[axis] = if at[axis] < low[axis] { at[axis] } else { low[axis] };
+                high[axis] = if at[axis] > high[axis] { at[axis] } else { high[axis] };
+            }
+        }
+        (low, high)
+    }
+}
+
+/// A triangle as the start of a ray sees it along the third axis.
+pub(super) struct Seen {
+    /// Whether the ray, or its other way, goes through it, its sides included. Two triangles
+    /// compute a side they share as the same number, so nothing goes between them.
+    pub(super) inside: bool,
+    /// Twice its area across the ray, ≥ 0 where inside.
+    pub(super) across: f32,
+    /// `across` times the way to it; also twice its area in space times the distance of its plane,
+    /// below 0 where that lies behind.
+    pub(super) towards: f32,
+    /// Six times the volume of the tetrahedron that it spans with the start.
+    pub(super) volume: f32,
+}
+
+impl Seen {
+    /// From the corners less the start.
+    #[inline(always)]
+    pub(super) fn from([a, b, c]: [Vec3; 3]) -> Self {
+        let side = |p: Vec3, q: Vec3| p[0] * q[1] - p[1] * q[0];
+        let [x, y, z] = [side(b, c), side(c, a), side(a, b)];
+        let positive = (x >= 0.0) & (y >= 0.0) & (z >= 0.0);
+        let negative = (x <= 0.0) & (y <= 0.0) & (z <= 0.0);
+        let sum = x + y + z;
+        let volume = x * a[2] + y * b[2] + z * c[2];
+        let towards = if sum < 0.0 { -volume } else { volume };
+        Self { inside: positive | negative, across: sum.abs(), towards, volume }
+    }
+}
