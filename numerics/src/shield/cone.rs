@@ -173,10 +173,11 @@ impl Cone {
         }
     }
 
-    /// Whether a triangle, from its volume with the tip, is not one that the CV lies on.
+    /// Whether a triangle, from its volume with the tip, is one, and not one that the CV lies on.
     #[inline(always)]
     fn counts(&self, volume: f32, [a, b, c]: [Vec3; 3]) -> bool {
-        volume.abs() > self.gap * vec3::length(cross(sub(b, a), sub(c, a)))
+        let area = vec3::length(cross(sub(b, a), sub(c, a)));
+        (area > 0.0) & (volume.abs() > self.gap * area)
     }
 
     /// How much of the wind something stops at a distance: all but at the end of the offset.
