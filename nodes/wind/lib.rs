@@ -1,8 +1,9 @@
 //! The wind family: wind on fur and grass (paper W).
 
 pub mod curve_wind;
+pub mod curve_wind_shielding;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&curve_wind::NODE];
+pub static NODES: &[&Node] = &[&curve_wind::NODE, &curve_wind_shielding::NODE];

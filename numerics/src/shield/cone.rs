@@ -13,10 +13,10 @@
 
 use super::Obstacle;
 use super::frame::Gap;
-use super::rays::Seen;
+use super::rays::{Seen, beside};
 use crate::lanes::{F32x16, LANES, Lanes, get};
 use crate::simd::kernel;
-use crate::tree::Boxes;
+use crate::tree::{Boxes, Region};
 use crate::trig;
 use crate::vec3::{self, Vec3, cross, sub};
 use std::f32::consts::PI;
@@ -56,7 +56,11 @@ fn body(obstacles: &[Obstacle], at: &[Vec3], gap: &[Gap], reach: f32, cone: f32,
             let cone = Cone { at: *at, slope: sine / cosine, reach, gap: gap.at(obstacle.size) };
             cone.look(obstacle, &mut sums);
         }
-        let [front, back] = sums.map(|lanes| lanes.0.iter().fold(0.0, |sum, x| sum + x));
+        let (mut front, mut back) = (0.0, 0.0);
+        for lane in 0..LANES {
+            front += sums[0].0[lane];
+            back += sums[1].0[lane];
+        }
         let most = if front > back { front } else { back };
         let share = (most - ROUNDING) / (1.0 - 2.0 * ROUNDING);
         let share = if share > 0.0 { share } else { 0.0 };
@@ -79,44 +83,17 @@ impl Cone {
     fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2]) {
         let Some(edges) = &obstacle.edges else { return };
         let tree = &obstacle.tree;
-        tree.any_where(
-            |boxes| self.meeting(boxes),
-            |block| {
-                let thirds = edges.of_block(block);
-                let block = &tree.blocks()[block];
-                self.add(&self.seen(&block.corners), &self.seen(thirds), block.filled(), sums);
-                false
-            },
-        );
-    }
-
-    /// A bit for each lane whose box may have a part in the cone.
-    #[inline(always)]
-    fn meeting(&self, boxes: &Boxes) -> u16 {
-        let mut mask = 0;
-        for lane in 0..LANES {
-            let outside = |axis: usize| {
-                let below = boxes.low[axis].0[lane] - self.at[axis];
-                let above = self.at[axis] - boxes.high[axis].0[lane];
-                let outside = if below > above { below } else { above };
-                if outside > 0.0 { outside } else { 0.0 }
-            };
-            let (x, y) = (outside(0), outside(1));
-            let far = boxes.high[2].0[lane] - self.at[2];
-            let near = boxes.low[2].0[lane] - self.at[2];
-            // A little wider than the cone, for the rounding of both.
-            let radius = self.slope * 1.001 * far;
-            let meets = (far > 0.0) & (near <= self.reach) & (x * x + y * y <= radius * radius);
-            mask |= u16::from(meets) << lane;
+        for (block, lanes) in tree.walk(self) {
+            let (corners, thirds) = (&tree.blocks()[block].corners, edges.of_block(block));
+            self.add(&self.seen(corners), &self.seen(thirds), lanes, sums);
         }
-        mask
     }
 
     /// Points as the tip sees them, upright on the disc's middle.
     #[inline(always)]
     fn seen(&self, points: &[Lanes<3>; 3]) -> [Lanes<3>; 3] {
         let mut seen = *points;
-        let [x, y] = ASIDE.map(|aside| aside * self.slope);
+        let (x, y) = (ASIDE[0] * self.slope, ASIDE[1] * self.slope);
         for point in &mut seen {
             for lane in 0..LANES {
                 let upwind = point[2].0[lane] - self.at[2];
@@ -130,13 +107,13 @@ impl Cone {
 
     /// Adds sixteen triangles.
     #[inline(always)]
-    fn add(&self, corners: &[Lanes<3>; 3], thirds: &[Lanes<3>; 3], filled: u16, sums: &mut [F32x16; 2]) {
+    fn add(&self, corners: &[Lanes<3>; 3], thirds: &[Lanes<3>; 3], lanes: u16, sums: &mut [F32x16; 2]) {
         let mut count = F32x16::splat(0.0);
         let (mut front, mut open) = ([false; LANES], [[false; LANES]; 3]);
         for lane in 0..LANES {
-            let at @ [a, b, c] = [0, 1, 2].map(|corner| get(&corners[corner], lane));
+            let at @ [a, b, c] = [get(&corners[0], lane), get(&corners[1], lane), get(&corners[2], lane)];
             let seen = Seen::from(at);
-            let counts = self.counts(seen.volume, [a, b, c]) & (filled >> lane & 1 == 1);
+            let counts = self.counts(seen.volume, [a, b, c]) & (lanes >> lane & 1 == 1);
             front[lane] = seen.volume > 0.0;
 
             let [x, y, z] = [is_left(a, b), is_left(b, c), is_left(c, a)];
@@ -194,10 +171,12 @@ impl Cone {
     fn edge(&self, from: Vec3, to: Vec3) -> f32 {
         let (start, end) = self.near_the_cone(from, to);
         let along = sub(to, from);
-        let [p, q] = [start, end].map(|t| vec3::add(from, vec3::scale(along, t)));
+        // An end that is not cut keeps its bits: the next edge begins there.
+        let p = vec3::add(from, vec3::scale(along, start));
+        let q = vec3::sub(to, vec3::scale(along, 1.0 - end));
         let in_front = (start < end) & (p[2] > 0.0) & (q[2] > 0.0);
-        let flat = |p: Vec3| [p[0] / (p[2] * self.slope), p[1] / (p[2] * self.slope)];
-        let ([px, py], [qx, qy]) = (flat(p), flat(q));
+        let (near, far) = (1.0 / (p[2] * self.slope), 1.0 / (q[2] * self.slope));
+        let ([px, py], [qx, qy]) = ([p[0] * near, p[1] * near], [q[0] * far, q[1] * far]);
 
         // Where the straight line from p to q lies in the unit disc.
         let [dx, dy] = [qx - px, qy - py];
@@ -208,7 +187,8 @@ impl Cone {
         let (enters, leaves) = ((-half - root) / square, (root - half) / square);
         let enters = if enters > 0.0 { enters } else { 0.0 };
         let leaves = if leaves < 1.0 { leaves } else { 1.0 };
-        let ([ax, ay], [bx, by]) = ([px + enters * dx, py + enters * dy], [px + leaves * dx, py + leaves * dy]);
+        let [ax, ay] = [px + enters * dx, py + enters * dy];
+        let [bx, by] = [qx - (1.0 - leaves) * dx, qy - (1.0 - leaves) * dy];
         let twice_area = (ax * by - ay * bx).abs();
         let angle = trig::atan2(twice_area, ax * bx + ay * by);
 
@@ -242,11 +222,35 @@ impl Cone {
     }
 }
 
+impl Region for &Cone {
+    #[inline(always)]
+    fn meeting(&self, boxes: &Boxes) -> u16 {
+        let mut mask = 0;
+        for lane in 0..LANES {
+            let mut square = 0.0;
+            for axis in 0..2 {
+                let below = boxes.low[axis].0[lane] - self.at[axis];
+                let above = self.at[axis] - boxes.high[axis].0[lane];
+                let outside = if below > above { below } else { above };
+                let outside = if outside > 0.0 { outside } else { 0.0 };
+                square += outside * outside;
+            }
+            let far = boxes.high[2].0[lane] - self.at[2];
+            let near = boxes.low[2].0[lane] - self.at[2];
+            // A little wider than the cone, for the rounding of both and for `ASIDE`.
+            let radius = self.slope * 1.001 * far;
+            let meets = (far > 0.0) & (near <= self.reach) & (square <= radius * radius);
+            mask |= u16::from(meets) << lane;
+        }
+        mask
+    }
+}
+
 /// Whether the axis lies left of an edge as it is seen along the axis. Where it lies on it, of the two
 /// ways of running along the edge one has it left, so of two triangles one contains it.
 #[inline(always)]
 fn is_left(from: Vec3, to: Vec3) -> bool {
-    let side = from[0] * to[1] - from[1] * to[0];
+    let side = beside(from, to);
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     (side > 0.0) | ((side == 0.0) & ((dx > 0.0) | ((dx == 0.0) & (dy > 0.0))))
 }

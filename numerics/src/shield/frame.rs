@@ -59,8 +59,10 @@ impl Frame {
     /// A point of the scene, in the frame.
     #[inline(always)]
     pub(super) fn at(&self, point: Vec3) -> Vec3 {
-        let from = [0, 1, 2].map(|k| f64::from(point[k]) - self.middle[k]);
-        self.axes.map(|axis| dot(axis, from) as f32)
+        let [x, y, z] = point;
+        let from = [f64::from(x) - self.middle[0], f64::from(y) - self.middle[1], f64::from(z) - self.middle[2]];
+        let [a, b, c] = &self.axes;
+        [dot(*a, from) as f32, dot(*b, from) as f32, dot(*c, from) as f32]
     }
 
     /// A length of the scene, in the frame.
@@ -137,6 +139,7 @@ fn spread(x: u32) -> u32 {
     (x | x << 1) & 0x5555_5555
 }
 
+#[inline(always)]
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -4,7 +4,7 @@ use super::Obstacle;
 use super::frame::Gap;
 use crate::lanes::{F32x16, LANES, Lanes, get, set};
 use crate::simd::kernel;
-use crate::tree::TriangleTree;
+use crate::tree::{Cuboid, TriangleTree};
 use crate::vec3::{self, Vec3, cross, sub};
 
 kernel! {
@@ -50,19 +50,23 @@ impl Rays {
     /// Sets `hit` to 1 for each ray that meets the tree; whether all are.
     #[inline(always)]
     fn meet(&self, tree: &TriangleTree, hit: &mut [u32; LANES]) -> bool {
-        let (low, high) = self.bounds();
-        tree.any_in_box(low, [high[0], high[1], high[2] + self.reach], |block, mut lanes| {
+        let Cuboid { low, high } = self.bounds();
+        for (block, mut lanes) in tree.walk(Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }) {
+            let [a, b, c] = &tree.blocks()[block].corners;
             while lanes != 0 {
                 let triangle = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                self.meet_triangle([0, 1, 2].map(|corner| get(&block.corners[corner], triangle)), hit);
+                self.meet_triangle([get(a, triangle), get(b, triangle), get(c, triangle)], hit);
             }
             let mut all = 1;
             for lane in 0..LANES {
                 all &= hit[lane];
             }
-            all == 1
-        })
+            if all == 1 {
+                return true;
+            }
+        }
+        false
     }
 
     /// Sets `hit` to 1 for each ray that meets the triangle.
@@ -81,7 +85,7 @@ impl Rays {
 
     /// The box around the starts.
     #[inline(always)]
-    fn bounds(&self) -> (Vec3, Vec3) {
+    fn bounds(&self) -> Cuboid {
         let (mut low, mut high) = (get(&self.at, 0), get(&self.at, 0));
         for lane in 1..LANES {
             let at = get(&self.at, lane);
@@ -90,7 +94,7 @@ impl Rays {
                 high[axis] = if at[axis] > high[axis] { at[axis] } else { high[axis] };
             }
         }
-        (low, high)
+        Cuboid { low, high }
     }
 }
 
@@ -112,8 +116,7 @@ impl Seen {
     /// From the corners less the start.
     #[inline(always)]
     pub(super) fn from([a, b, c]: [Vec3; 3]) -> Self {
-        let side = |p: Vec3, q: Vec3| p[0] * q[1] - p[1] * q[0];
-        let [x, y, z] = [side(b, c), side(c, a), side(a, b)];
+        let [x, y, z] = [beside(b, c), beside(c, a), beside(a, b)];
         let positive = (x >= 0.0) & (y >= 0.0) & (z >= 0.0);
         let negative = (x <= 0.0) & (y <= 0.0) & (z <= 0.0);
         let sum = x + y + z;
@@ -121,4 +124,11 @@ impl Seen {
         let towards = if sum < 0.0 { -volume } else { volume };
         Self { inside: positive | negative, across: sum.abs(), towards, volume }
     }
+}
+
+/// Twice the area that a side spans with the axis, as it is seen along the axis: below 0 where that lies right
+/// of the way from `p` to `q`.
+#[inline(always)]
+pub(super) fn beside(p: Vec3, q: Vec3) -> f32 {
+    p[0] * q[1] - p[1] * q[0]
 }

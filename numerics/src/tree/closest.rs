@@ -145,8 +145,7 @@ impl Found {
     fn try_block(&mut self, block: &Block, p: Vec3) {
         let (mut squares, mut ab, mut ac) = (F32x16::splat(0.0), F32x16::splat(0.0), F32x16::splat(0.0));
         for lane in 0..LANES {
-            let corners = block.corners.map(|corner| sub(get(&corner, lane), p));
-            let (square, b, c) = nearest_on(corners);
+            let (square, b, c) = nearest_on(block.seen(lane, p));
             squares.0[lane] = square;
             ab.0[lane] = b;
             ac.0[lane] = c;
@@ -155,7 +154,7 @@ impl Found {
             let (square, triangle) = (squares.0[lane], block.triangle[lane]);
             if triangle != NONE && (square < self.square || (square == self.square && triangle < self.triangle)) {
                 let (b, c) = (ab.0[lane], ac.0[lane]);
-                let corners = block.corners.map(|corner| sub(get(&corner, lane), p));
+                let corners = block.seen(lane, p);
                 *self = Self {
                     square,
                     triangle,
@@ -164,6 +163,15 @@ impl Found {
                 };
             }
         }
+    }
+}
+
+impl Block {
+    /// The corners of one lane, less `p`.
+    #[inline(always)]
+    fn seen(&self, lane: usize, p: Vec3) -> [Vec3; 3] {
+        let [a, b, c] = &self.corners;
+        [sub(get(a, lane), p), sub(get(b, lane), p), sub(get(c, lane), p)]
     }
 }
 
@@ -185,18 +193,14 @@ fn nearest_on(corners: [Vec3; 3]) -> (f32, f32, f32) {
     let on_ab = along(a, ab);
     let on_ac = along(a, ac);
     let on_bc = along(b, sub(c, b));
-    let square = |u: f32, v: f32| {
-        let point = between(corners, u, v);
-        dot(point, point)
-    };
-    let (mut least, mut u, mut v) = (square(on_ab, 0.0), on_ab, 0.0);
-    let next = square(0.0, on_ac);
+    let (mut least, mut u, mut v) = (square(corners, on_ab, 0.0), on_ab, 0.0);
+    let next = square(corners, 0.0, on_ac);
     let nearer = next < least;
     (least, u, v) = if nearer { (next, 0.0, on_ac) } else { (least, u, v) };
-    let next = square(1.0 - on_bc, on_bc);
+    let next = square(corners, 1.0 - on_bc, on_bc);
     let nearer = next < least;
     (least, u, v) = if nearer { (next, 1.0 - on_bc, on_bc) } else { (least, u, v) };
-    let next = square(second, third);
+    let next = square(corners, second, third);
     if inside & (next < least) { (next, second, third) } else { (least, u, v) }
 }
 
@@ -204,6 +208,13 @@ fn nearest_on(corners: [Vec3; 3]) -> (f32, f32, f32) {
 #[inline(always)]
 fn between([a, b, c]: [Vec3; 3], u: f32, v: f32) -> Vec3 {
     vec3::add(a, vec3::add(scale(sub(b, a), u), scale(sub(c, a), v)))
+}
+
+/// Its distance squared.
+#[inline(always)]
+fn square(corners: [Vec3; 3], u: f32, v: f32) -> f32 {
+    let point = between(corners, u, v);
+    dot(point, point)
 }
 
 /// How far along `side` from `start` is nearest to the origin, 0..1; 0 on a side of no length.

@@ -18,6 +18,7 @@ use crate::lanes::{F32x16, LANES, Lanes, set};
 use crate::vec3::Vec3;
 pub use closest::Closest;
 use rayon::prelude::*;
+pub use visit::{Cuboid, Region, Walk};
 
 /// The index of a lane that holds no triangle.
 pub const NONE: u32 = u32::MAX;
@@ -167,7 +168,7 @@ impl Block {
         let mut boxes = Boxes { low: *a, high: *a };
         for axis in 0..3 {
             for lane in 0..LANES {
-                let [a, b, c] = [a, b, c].map(|corner| corner[axis].0[lane]);
+                let (a, b, c) = (a[axis].0[lane], b[axis].0[lane], c[axis].0[lane]);
                 boxes.low[axis].0[lane] = least(least(a, b), c);
                 boxes.high[axis].0[lane] = most(most(a, b), c);
             }
