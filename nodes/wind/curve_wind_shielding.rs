@@ -40,7 +40,7 @@ params! { PARAMS:
     SKIN_GAP: Param<f32> = Param::float("skin_gap", 0.0,
         "A CV this close to the plane of a face lies on it and is not sheltered by it. 0 allows for rounding alone; roots \
          that lie deeper in the skin need their depth.")
-        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");

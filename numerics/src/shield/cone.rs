@@ -12,8 +12,8 @@
 //! layer overlaps another in part.
 
 use super::Obstacle;
-use super::frame::Gap;
 use super::rays::{Seen, beside};
+use super::views::View;
 use crate::lanes::{F32x16, LANES, Lanes, get};
 use crate::simd::kernel;
 use crate::tree::{Boxes, Region};
@@ -39,8 +39,7 @@ kernel! {
     /// The share in `covered` that is sheltered of the cone of each CV, half of its angle `cone`.
     pub(super) fn cover(
         obstacles: &[Obstacle],
-        at: &[Vec3],
-        gap: &[Gap],
+        views: &[View],
         reach: f32,
         cone: f32,
         covered: &mut [f32],
@@ -48,12 +47,12 @@ kernel! {
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], at: &[Vec3], gap: &[Gap], reach: f32, cone: f32, covered: &mut [f32]) {
+fn body(obstacles: &[Obstacle], views: &[View], reach: f32, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
-    for ((at, gap), covered) in at.iter().zip(gap).zip(covered) {
+    for (view, covered) in views.iter().zip(covered) {
         let mut sums = [F32x16::splat(0.0); 2];
         for obstacle in obstacles {
-            let cone = Cone { at: *at, slope: sine / cosine, reach, gap: gap.at(obstacle.size) };
+            let cone = Cone { at: view.at, slope: sine / cosine, reach, gap: view.gap.at(obstacle.size) };
             cone.look(obstacle, &mut sums);
         }
         let (mut front, mut back) = (0.0, 0.0);

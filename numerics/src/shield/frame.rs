@@ -3,7 +3,6 @@
 
 use super::Collider;
 use crate::vec3::{self, Vec3};
-use rayon::prelude::*;
 
 /// From a point of the scene to the frame.
 pub(super) struct Frame {
@@ -15,7 +14,7 @@ pub(super) struct Frame {
 
 /// When a CV lies on a triangle, in the frame's unit: within `least` of its plane, or within
 /// `share` of the collider's size while that is not more than `most`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gap {
     least: f32,
     most: f32,
@@ -94,10 +93,9 @@ impl Bounds {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for point in points {
             for axis in 0..3 {
-                let x = point[axis];
-                let finite = x.abs() < f32::INFINITY;
-                low[axis] = if (x < low[axis]) & finite { x } else { low[axis] };
-                high[axis] = if (x > high[axis]) & finite { x } else { high[axis] };
+                let x = if point[axis].abs() < f32::INFINITY { point[axis] } else { f32::NAN };
+                low[axis] = if x < low[axis] { x } else { low[axis] };
+                high[axis] = if x > high[axis] { x } else { high[axis] };
             }
         }
         let some = |axis: usize, x: f32| if low[axis] <= high[axis] { x } else { 0.0 };
@@ -116,27 +114,6 @@ impl Bounds {
         };
         reach(0).max(reach(1)).max(reach(2))
     }
-}
-
-/// The curves' numbers, so that neighbours across the wind follow each other: along a Z-curve.
-pub(super) fn neighbours(frame: &Frame, starts: &[u32], points: &[Vec3]) -> Vec<u32> {
-    let key = |(curve, ends): (usize, &[u32])| {
-        let [x, y, _] = if ends[0] < ends[1] { frame.at(points[ends[0] as usize]) } else { [0.0; 3] };
-        // −2…2 to 16 bits.
-        let cell = |x: f32| spread(((x + 2.0) * 16_384.0) as u32 & 0xffff);
-        u64::from(cell(x) | cell(y) << 1) << 32 | curve as u64
-    };
-    let mut keys: Vec<u64> = starts.par_windows(2).enumerate().map(key).collect();
-    keys.par_sort_unstable();
-    keys.into_iter().map(|key| key as u32).collect()
-}
-
-/// Sixteen bits, a zero between each two.
-fn spread(x: u32) -> u32 {
-    let x = (x | x << 8) & 0x00ff_00ff;
-    let x = (x | x << 4) & 0x0f0f_0f0f;
-    let x = (x | x << 2) & 0x3333_3333;
-    (x | x << 1) & 0x5555_5555
 }
 
 #[inline(always)]
@@ -176,16 +153,5 @@ mod tests {
             let [.., upwind] = frame.at(points[0]);
             assert!((1.0..2.0).contains(&upwind), "{upwind}");
         }
-    }
-
-    #[test]
-    fn curves_side_by_side_follow_each_other() {
-        // A row across the wind, numbered at random: sorted, each step is to the next place.
-        let place = [5, 2, 7, 0, 3, 6, 1, 4];
-        let points: Vec<Vec3> = place.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
-        let starts: Vec<u32> = (0..=8).collect();
-        let order = neighbours(&Frame::of([0.0, 0.0, 1.0], &points, &[]), &starts, &points);
-        let along: Vec<i32> = order.iter().map(|curve| place[*curve as usize]).collect();
-        assert!(along.is_sorted() || along.iter().rev().is_sorted(), "{along:?}");
     }
 }

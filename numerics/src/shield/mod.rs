@@ -17,14 +17,16 @@ mod cone;
 mod edges;
 mod frame;
 mod rays;
+mod views;
 
-use crate::lanes::LANES;
+use crate::lanes::{F32x16, LANES, get};
 use crate::simd::Path;
-use crate::tree::TriangleTree;
-use crate::vec3::Vec3;
+use crate::tree::{Block, TriangleTree};
+use crate::vec3::{self, Vec3};
 use edges::Edges;
-use frame::{Frame, Gap};
+use frame::Frame;
 use rayon::prelude::*;
+use views::Views;
 
 /// A mesh that stops the wind.
 #[derive(Clone, Copy, Debug)]
@@ -50,12 +52,20 @@ pub struct Shield {
     pub skin_gap: f32,
 }
 
-/// Curves that a task has at least: a task's CVs fill lanes together.
-const TASK_CURVES: usize = 32;
+/// CVs that are sorted together: enough to lie close, and few enough to stay in a cache.
+const SORTED_CVS: usize = 1 << 18;
+
+/// Groups of sixteen CVs that a task has: some 30 µs of work.
+const TASK_GROUPS: usize = 32;
+
+/// Curves that a task sums up.
+const TASK_CURVES: usize = 1024;
 
 /// A collider in the frame of the wind.
 struct Obstacle {
     tree: TriangleTree,
+    /// Twice the area of each triangle, a block an entry.
+    areas: Vec<F32x16>,
     /// What bounds the mesh as a cone sees it; none where there are rays alone.
     edges: Option<Edges>,
     /// The longest side of its bounds.
@@ -77,84 +87,80 @@ pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shiel
 /// As [`shield()`].
 pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
     let curves = starts.len().saturating_sub(1);
-    let mut shares = vec![0.0; curves];
     let frame = Frame::of(shield.wind, points, colliders);
     let reach = frame.length(shield.offset);
-    let obstacles: Vec<Obstacle> = colliders.iter().map(|collider| obstacle(&frame, collider, shield)).collect();
-    if obstacles.iter().all(|obstacle| obstacle.tree.is_empty()) || !(reach > 0.0) {
-        return shares;
+    if curves == 0 || !(reach > 0.0) {
+        return vec![0.0; curves];
     }
-    let order = frame::neighbours(&frame, starts, points);
-    let scene = Scene { path, frame: &frame, obstacles: &obstacles, starts, points, reach, shield };
-    let tasks = order.par_chunks(TASK_CURVES);
-    let found: Vec<Vec<f32>> = tasks.map_init(Task::default, |task, curves| task.run(&scene, curves)).collect();
-    for (curve, share) in order.iter().zip(found.into_iter().flatten()) {
-        shares[*curve as usize] = share;
+    let obstacle = |collider: &Collider<'_>| Obstacle::of(&frame, collider, shield.cone > 0.0);
+    let mut shares = Vec::with_capacity(curves);
+    let mut batches = batches(starts).into_iter();
+    let first = batches.next().map(|batch| &starts[batch]).unwrap_or_default();
+    let (obstacles, mut views) = rayon::join(
+        || colliders.iter().map(obstacle).collect::<Vec<_>>(),
+        || Views::of(&frame, first, points, shield.skin_gap),
+    );
+    if obstacles.iter().all(|obstacle| obstacle.tree.is_empty()) {
+        return vec![0.0; curves];
     }
-    shares
-}
-
-/// A collider turned into the frame.
-fn obstacle(frame: &Frame, collider: &Collider<'_>, shield: &Shield) -> Obstacle {
-    let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
-    let tree = TriangleTree::build(&points, collider.triangles);
-    let (low, high) = tree.bounds();
-    let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
-    let edges = (shield.cone > 0.0).then(|| Edges::of(&tree, &points, collider.triangles));
-    Obstacle { tree, edges, size }
-}
-
-/// What all tasks share; positions are the scene's, lengths the frame's.
-struct Scene<'a> {
-    path: Path,
-    frame: &'a Frame,
-    obstacles: &'a [Obstacle],
-    starts: &'a [u32],
-    points: &'a [Vec3],
-    reach: f32,
-    shield: &'a Shield,
-}
-
-/// Memory of a thread: the CVs of some curves, one curve after the other.
-#[derive(Default)]
-struct Task {
-    at: Vec<Vec3>,
-    gap: Vec<Gap>,
-    covered: Vec<f32>,
-}
-
-impl Task {
-    /// The share of each of these curves.
-    fn run(&mut self, scene: &Scene<'_>, curves: &[u32]) -> Vec<f32> {
-        let range = |curve: &u32| scene.starts[*curve as usize] as usize..scene.starts[*curve as usize + 1] as usize;
-        self.at.clear();
-        self.gap.clear();
-        for cvs in curves.iter().map(range) {
-            let gap = scene.frame.gap(&scene.points[cvs.clone()], scene.shield.skin_gap);
-            self.gap.extend(std::iter::repeat_n(gap, cvs.len()));
-            self.at.extend(scene.points[cvs].iter().map(|point| scene.frame.at(*point)));
-        }
-        self.covered.clear();
-        self.covered.resize(self.at.len(), 0.0);
-        let looking = self.at.chunks(LANES).zip(self.gap.chunks(LANES)).zip(self.covered.chunks_mut(LANES));
-        for ((at, gap), covered) in looking {
-            if scene.shield.cone > 0.0 {
-                cone::cover(scene.path, scene.obstacles, at, gap, scene.reach, scene.shield.cone, covered);
-            } else {
-                rays::cover(scene.path, scene.obstacles, at, gap, scene.reach, covered);
+    let look = |views: &Views, covered: &mut [f32]| {
+        let tasks = covered.par_chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().par_chunks(TASK_GROUPS * LANES));
+        tasks.for_each(|(covered, views)| {
+            for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
+                if shield.cone > 0.0 {
+                    cone::cover(path, &obstacles, views, reach, shield.cone, covered);
+                } else {
+                    rays::cover(path, &obstacles, views, reach, covered);
+                }
             }
+        });
+    };
+    let mut covered = Vec::new();
+    loop {
+        covered.clear();
+        covered.resize(views.sorted().len(), 0.0);
+        look(&views, &mut covered);
+        shares.par_extend(views.curves().with_min_len(TASK_CURVES).map(|cvs| share(cvs, &covered)));
+        let Some(batch) = batches.next() else { return shares };
+        views = Views::of(&frame, &starts[batch], points, shield.skin_gap);
+    }
+}
+
+/// Runs of curves of about `SORTED_CVS`, as ranges of `starts`, its end included.
+fn batches(starts: &[u32]) -> Vec<std::ops::Range<usize>> {
+    let (mut batches, mut first) = (Vec::new(), 0);
+    for curve in 1..starts.len() {
+        if curve + 1 == starts.len() || (starts[curve] - starts[first]) as usize >= SORTED_CVS {
+            batches.push(first..curve + 1);
+            first = curve;
         }
-        let mut rest = &self.covered[..];
-        let share = |curve: &u32| {
-            let (mine, after) = rest.split_at(range(curve).len());
-            rest = after;
-            if mine.is_empty() {
-                0.0
-            } else {
-                (mine.iter().map(|x| f64::from(*x)).sum::<f64>() / mine.len() as f64) as f32
-            }
+    }
+    batches
+}
+
+/// The mean over a curve's CVs, which are at these places of `covered`; 0 for one without.
+fn share(cvs: &[u32], covered: &[f32]) -> f32 {
+    let sum: f64 = cvs.iter().map(|place| f64::from(covered[*place as usize])).sum();
+    if cvs.is_empty() { 0.0 } else { (sum / cvs.len() as f64) as f32 }
+}
+
+impl Obstacle {
+    /// A collider turned into the frame.
+    fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
+        let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
+        let tree = TriangleTree::build(&points, collider.triangles);
+        let area = |block: &Block| {
+            let [a, b, c] = &block.corners;
+            F32x16::from_fn(|lane| {
+                let [a, b, c] = [get(a, lane), get(b, lane), get(c, lane)];
+                vec3::length(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
+            })
         };
-        curves.iter().map(share).collect()
+        let areas = tree.blocks().par_iter().with_min_len(TASK_GROUPS).map(area).collect();
+        let (low, high) = tree.bounds();
+        let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
+        let edges = with_edges.then(|| Edges::of(&tree, &points, collider.triangles));
+        Self { tree, areas, edges, size }
     }
 }
 

@@ -1,36 +1,36 @@
 //! Sixteen rays at once, each a lane, against one triangle after another.
 
 use super::Obstacle;
-use super::frame::Gap;
+use super::views::View;
 use crate::lanes::{F32x16, LANES, Lanes, get, set};
 use crate::simd::kernel;
-use crate::tree::{Cuboid, TriangleTree};
-use crate::vec3::{self, Vec3, cross, sub};
+use crate::tree::Cuboid;
+use crate::vec3::{Vec3, sub};
 
 kernel! {
     /// 1 in `covered` for each of up to sixteen CVs that has a collider within `reach` upwind.
     pub(super) fn cover(
         obstacles: &[Obstacle],
-        at: &[Vec3],
-        gap: &[Gap],
+        views: &[View],
         reach: f32,
         covered: &mut [f32],
     ) = body;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], at: &[Vec3], gap: &[Gap], reach: f32, covered: &mut [f32]) {
+fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32]) {
+    let mut rays = Rays { at: [F32x16::splat(0.0); 3], gap: F32x16::splat(0.0), reach };
     // A lane without a CV repeats the first.
-    let mut rays = Rays { at: at[0].map(F32x16::splat), gap: F32x16::splat(0.0), reach };
-    for (lane, at) in at.iter().enumerate() {
-        set(&mut rays.at, lane, *at);
+    let view = |lane: usize| if lane < views.len() { views[lane] } else { views[0] };
+    for lane in 0..LANES {
+        set(&mut rays.at, lane, view(lane).at);
     }
     let mut hit = [0; LANES];
     for obstacle in obstacles {
         for lane in 0..LANES {
-            rays.gap.0[lane] = gap[if lane < gap.len() { lane } else { 0 }].at(obstacle.size);
+            rays.gap.0[lane] = view(lane).gap.at(obstacle.size);
         }
-        if rays.meet(&obstacle.tree, &mut hit) {
+        if rays.meet(obstacle, &mut hit) {
             break;
         }
     }
@@ -49,14 +49,15 @@ struct Rays {
 impl Rays {
     /// Sets `hit` to 1 for each ray that meets the tree; whether all are.
     #[inline(always)]
-    fn meet(&self, tree: &TriangleTree, hit: &mut [u32; LANES]) -> bool {
-        let Cuboid { low, high } = self.bounds();
+    fn meet(&self, obstacle: &Obstacle, hit: &mut [u32; LANES]) -> bool {
+        let (Cuboid { low, high }, tree) = (self.bounds(), &obstacle.tree);
         for (block, mut lanes) in tree.walk(Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }) {
-            let [a, b, c] = &tree.blocks()[block].corners;
+            let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
             while lanes != 0 {
                 let triangle = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                self.meet_triangle([get(a, triangle), get(b, triangle), get(c, triangle)], hit);
+                let corners = [get(a, triangle), get(b, triangle), get(c, triangle)];
+                self.meet_triangle(corners, areas.0[triangle], hit);
             }
             let mut all = 1;
             for lane in 0..LANES {
@@ -69,11 +70,10 @@ impl Rays {
         false
     }
 
-    /// Sets `hit` to 1 for each ray that meets the triangle.
+    /// Sets `hit` to 1 for each ray that meets the triangle, whose area is half of `area`.
     #[inline(always)]
-    fn meet_triangle(&self, corners: [Vec3; 3], hit: &mut [u32; LANES]) {
+    fn meet_triangle(&self, corners: [Vec3; 3], area: f32, hit: &mut [u32; LANES]) {
         let [a, b, c] = corners;
-        let area = vec3::length(cross(sub(b, a), sub(c, a)));
         for lane in 0..LANES {
             let at = get(&self.at, lane);
             let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);

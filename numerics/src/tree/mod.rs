@@ -166,8 +166,8 @@ impl Block {
     pub fn boxes(&self) -> Boxes {
         let [a, b, c] = &self.corners;
         let mut boxes = Boxes { low: *a, high: *a };
-        for axis in 0..3 {
-            for lane in 0..LANES {
+        for lane in 0..LANES {
+            for axis in 0..3 {
                 let (a, b, c) = (a[axis].0[lane], b[axis].0[lane], c[axis].0[lane]);
                 boxes.low[axis].0[lane] = least(least(a, b), c);
                 boxes.high[axis].0[lane] = most(most(a, b), c);
