@@ -5,7 +5,7 @@
 //! tip; so its mean over the disc is its value in the middle and, for each such edge, an integral
 //! along the part of it that lies in the disc (Green's theorem): half the area it spans with the middle
 //! less the disc's sector, over the disc's area. Both jump when an edge crosses the middle, by opposite
-//! amounts, and an edge adds nothing where it enters the disc: the mean is continuous in everything.
+//! amounts, and an edge adds nothing where it enters the disc: the mean is continuous in the wind.
 //!
 //! Faces that show the front and those that show the back are counted apart and the larger mean taken, at
 //! most 1: exact where what is seen lies in one layer, or covers all of the disc, at most too much where one

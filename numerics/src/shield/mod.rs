@@ -4,9 +4,10 @@
 //! third axis points upwind; there a ray is a box without width, a hit a point in a triangle, and a
 //! far offset costs no precision. A CV may ask a cone instead of a ray: what share of it is covered.
 //!
-//! Promise: for rays, exact to the rounding of the positions and to [`Shield::skin_gap`], without cracks between triangles
-//! that share their points; faces stop wind from both sides. For cones, continuous in the wind and in
-//! the positions. The same bits on every SIMD path and for any number of threads; finite for any input.
+//! Promise: rays are exact to the rounding of the positions and to [`Shield::skin_gap`], find no cracks
+//! between triangles that share their points, and are stopped by either side of a face. The share of a
+//! cone is continuous in the wind. The same bits on every SIMD path and for any number of threads; finite
+//! for any input.
 //!
 //! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the
 //! gap. So a root on the windward side of a closed skin is free, and one on the lee side is sheltered by
