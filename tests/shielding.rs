@@ -71,7 +71,7 @@ fn changes(frames: &[Vec<f32>]) -> [f64; 3] {
 
 #[test]
 fn smooth_shelter_does_not_pop_as_the_wind_turns() {
-    let figures = [0.0, 0.25, 0.5, 1.0].map(|smooth| (smooth, changes(&turning(smooth, 60))));
+    let figures = [0.0, 0.5, 1.0].map(|smooth| (smooth, changes(&turning(smooth, 60))));
     for (smooth, [largest, jumps, mean]) in figures {
         println!(
             "smooth {smooth}: largest change {largest:.3}, more than 0.1 in {:.3} %, mean {mean:.4}",
@@ -79,6 +79,6 @@ fn smooth_shelter_does_not_pop_as_the_wind_turns() {
         );
     }
     let [hard, .., soft] = figures.map(|(_, changes)| changes);
-    assert!(soft[0] < 0.5 * hard[0] && soft[1] < 0.2 * hard[1], "{soft:?} against {hard:?}");
+    assert!(soft[0] < 0.2 && soft[1] < 0.05 * hard[1], "{soft:?} against {hard:?}");
     assert!((soft[2] - hard[2]).abs() < 0.02, "the mean shelter is kept: {} and {}", soft[2], hard[2]);
 }

@@ -9,8 +9,9 @@
 //! * Rays are cast from the CV upwind, in a frame that looks along the wind ([`numerics::shield`]): a far offset costs
 //!   neither precision nor time. The skin that a CV lies on is not its own shelter, the far side of a body is.
 //! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through a
-//!   cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, wind
-//!   turning by 1° a frame, the mean over frames of the largest change of a curve's alpha falls from X to Y.
+//!   cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
+//!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5 and
+//!   0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 % (tests/shielding.rs).
 
 use engine::prelude::*;
 use numerics::shield::{Collider, Shield, shield};
