@@ -3,9 +3,11 @@
 pub mod curve_jiggle;
 pub mod curve_wind;
 pub mod curve_wind_collision;
+pub mod curve_wind_shielding;
 mod shared;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&curve_jiggle::NODE, &curve_wind::NODE, &curve_wind_collision::NODE];
+pub static NODES: &[&Node] =
+    &[&curve_jiggle::NODE, &curve_wind::NODE, &curve_wind_collision::NODE, &curve_wind_shielding::NODE];

@@ -21,6 +21,7 @@ pub mod ramp;
 pub mod random;
 pub mod scatter;
 pub mod shapes;
+pub mod shield;
 pub mod simd;
 pub mod tree;
 pub mod triangulate;
