@@ -13,6 +13,7 @@
 
 pub mod affine;
 pub mod bend;
+pub mod gusts;
 pub mod lanes;
 pub mod noise;
 pub mod ramp;
