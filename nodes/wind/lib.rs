@@ -1,8 +1,11 @@
 //! The wind family: wind on fur and grass (paper W).
 
 pub mod curve_wind;
+pub mod curve_wind_gusts;
+pub mod gust_control;
+mod shared;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&curve_wind::NODE];
+pub static NODES: &[&Node] = &[&curve_wind::NODE, &curve_wind_gusts::NODE, &gust_control::NODE];

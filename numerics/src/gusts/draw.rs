@@ -33,7 +33,7 @@ pub struct Draw {
 const SHORTEST_ROUND: f64 = 1.0 / 5040.0;
 
 /// Most gusts alive at a moment, so that no setting fills the memory.
-pub const MOST_LIVING: u64 = 1 << 20;
+pub const MOST_LIVING: u64 = 1 << 16;
 
 /// A gust alive at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,4 @@
+//! What several nodes of the family need, and none of them is.
+
+pub(crate) mod direction;
+pub(crate) mod gust_control;
