@@ -173,7 +173,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
             radius: gust.radius,
             strength: gust.strength,
             noise: gust.noise,
-            offset: gust.offset,
+            salt: gust.salt,
         }
     };
     (living.gusts.iter().map(sphere).collect(), living.dropped)

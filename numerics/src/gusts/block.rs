@@ -1,101 +1,94 @@
-//! A block of points, sixteen at a time: the influence of each region near by, summed in order.
+//! A block of points, sixteen side by side: the influence of each region near by, summed in order.
 
-use super::control::{Control, Local};
-use super::{LUMPS, Scene, Sphere};
+use super::control::Local;
+use super::cull::{Bounds, Boxes};
+use super::{BLOCK, LUMPS, Scene, Sphere};
 use crate::lanes::{F32x16, LANES, Lanes, get, set};
-use crate::noise::Field;
+use crate::noise;
 use crate::simd::kernel;
 use crate::vec3::{self, Vec3};
 
 /// The least share of a radius that noise leaves: a boundary at the centre itself has no inside.
 const LEAST_LEFT: f32 = 1e-3;
 
-/// The regions near a block, as seen from one of its points.
-#[derive(Default)]
-pub(super) struct Near {
-    /// The point that all is relative to.
-    origin: Vec3,
-    spheres: Vec<Ball>,
-    controls: Vec<(usize, Local)>,
-}
+/// Where on the lattice of noise a sphere's centre lies: no lattice point is at its axes' ends.
+const OFF_LATTICE: Vec3 = [0.37, 0.61, 0.13];
 
-/// A sphere near by.
-struct Ball {
-    centre: Vec3,
-    /// One over the radius.
-    inverse: f32,
-    strength: f32,
-    noise: f32,
-    offset: [f64; 3],
-}
-
-impl Near {
-    /// The `regions` of a scene, seen from `origin`.
-    pub(super) fn gather(&mut self, scene: &Scene<'_>, regions: Vec<u32>, origin: Vec3) {
-        self.origin = origin;
-        self.spheres.clear();
-        self.controls.clear();
-        for region in regions {
-            match scene.gusts.spheres.get(region as usize) {
-                Some(sphere) => self.spheres.push(Ball::of(sphere, origin)),
-                None => {
-                    let place = region as usize - scene.gusts.spheres.len();
-                    self.controls.push((place, scene.gusts.controls[place].local(origin)));
-                }
-            }
-        }
-    }
-}
-
-impl Ball {
-    fn of(sphere: &Sphere, origin: Vec3) -> Self {
-        Self {
-            centre: std::array::from_fn(|axis| (sphere.centre[axis] - f64::from(origin[axis])) as f32),
-            inverse: 1.0 / sphere.radius,
-            strength: sphere.strength,
-            noise: sphere.noise,
-            offset: sphere.offset,
-        }
-    }
-}
+/// Sixteens of a block.
+const ROWS: usize = BLOCK / LANES;
 
 kernel! {
-    /// Writes what `points` get to `out`, as many; gives how many of them something reaches.
-    pub(super) fn block_values(scene: &Scene<'_>, near: &Near, points: &[Vec3], out: &mut [f32]) -> usize = body;
+    /// Writes what up to [`BLOCK`] points within `bounds` get of the regions of `near` to `out`; gives
+    /// how many of them something reaches.
+    pub(super) fn block_values(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
 }
 
 #[inline(always)]
-fn body(scene: &Scene<'_>, near: &Near, points: &[Vec3], out: &mut [f32]) -> usize {
-    let base = scene.gusts.base;
-    if near.spheres.is_empty() && near.controls.is_empty() {
-        out.fill(clamped(base));
-        return 0;
-    }
-    let mut reached = 0;
-    for (points, out) in points.chunks(LANES).zip(out.chunks_mut(LANES)) {
-        let mut at = [F32x16::splat(0.0); 3];
-        for lane in 0..LANES {
-            set(&mut at, lane, vec3::sub(points[lane.min(points.len() - 1)], near.origin));
+fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize {
+    let spheres = scene.gusts.spheres;
+    let rows = points.len().div_ceil(LANES);
+    let origin = points[0];
+    let mut at = [[F32x16::splat(0.0); 3]; ROWS];
+    let mut sums = [Sum { value: F32x16::splat(scene.gusts.base), reached: [0; LANES] }; ROWS];
+    let mut loaded = false;
+    for first in (0..near.len()).step_by(LANES) {
+        let met = near.meet(first, bounds);
+        if met == [0; LANES] {
+            continue;
         }
-        let mut sum = Sum { value: F32x16::splat(base), reached: [0; LANES] };
-        for ball in &near.spheres {
-            let Some(share) = ball.share(&at, scene.field) else { continue };
-            sum.add(&share, &scene.gusts.falloff.eval_lanes(&share), ball.strength);
-            if scene.only_adds && sum.is_full() {
-                break;
+        if !loaded {
+            load(points, origin, &mut at);
+            loaded = true;
+        }
+        for lane in (0..LANES).filter(|lane| met[*lane] != 0) {
+            let region = near.region(first + lane);
+            match spheres.get(region) {
+                Some(sphere) => {
+                    let ball = Ball::of(sphere, origin);
+                    for row in 0..rows {
+                        if let Some(share) = ball.share(&at[row]) {
+                            sums[row].add(&share, &scene.falloff.eval(&share), ball.strength);
+                        }
+                    }
+                }
+                None => {
+                    let place = region - spheres.len();
+                    let control = &scene.gusts.controls[place];
+                    let local = control.local(origin);
+                    for row in 0..rows {
+                        add_control(&mut sums[row], &local, scene, place, &at[row]);
+                    }
+                }
             }
         }
-        for (place, local) in &near.controls {
-            let control: &Control = &scene.gusts.controls[*place];
-            let share = local.share(&at);
-            sum.add(&share, &control.ramp().eval_lanes(&share), control.strength());
+        if scene.only_adds && sums[..rows].iter().all(Sum::is_full) {
+            break;
         }
+    }
+    let mut reached = 0;
+    for (out, sum) in out.chunks_mut(LANES).zip(&sums) {
         for (lane, out) in out.iter_mut().enumerate() {
             *out = clamped(sum.value.0[lane]);
             reached += sum.reached[lane] as usize;
         }
     }
     reached
+}
+
+/// Differences of the points from `origin`; the last one fills its row.
+#[inline(always)]
+fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
+    for (points, at) in points.chunks(LANES).zip(at) {
+        for lane in 0..LANES {
+            set(at, lane, vec3::sub(points[lane.min(points.len() - 1)], origin));
+        }
+    }
+}
+
+#[inline(always)]
+fn add_control(sum: &mut Sum, local: &Local, scene: &Scene<'_>, place: usize, at: &Lanes<3>) {
+    let share = local.share(at);
+    sum.add(&share, &scene.ramps[place].eval(&share), scene.gusts.controls[place].strength());
 }
 
 /// Within 0..1; 0 where opposite infinities met.
@@ -106,6 +99,7 @@ fn clamped(value: f32) -> f32 {
 }
 
 /// What sixteen points have so far.
+#[derive(Clone, Copy)]
 struct Sum {
     value: F32x16,
     /// 1 where something was added.
@@ -117,8 +111,8 @@ impl Sum {
     #[inline(always)]
     fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32) {
         for lane in 0..LANES {
-            let inside = share.0[lane] < 1.0;
-            let influence = if inside { influence.0[lane] * strength } else { 0.0 };
+            let influence = influence.0[lane] * strength;
+            let influence = if share.0[lane] < 1.0 { influence } else { 0.0 };
             self.value.0[lane] += influence;
             self.reached[lane] |= u32::from(influence != 0.0);
         }
@@ -135,30 +129,49 @@ impl Sum {
     }
 }
 
+/// A sphere as seen from a point near by.
+struct Ball {
+    centre: Vec3,
+    /// One over the radius.
+    inverse: f32,
+    strength: f32,
+    noise: f32,
+    salt: u32,
+}
+
 impl Ball {
+    #[inline(always)]
+    fn of(sphere: &Sphere, origin: Vec3) -> Self {
+        Self {
+            centre: [0, 1, 2].map(|axis| (sphere.centre[axis] - f64::from(origin[axis])) as f32),
+            inverse: 1.0 / sphere.radius,
+            strength: sphere.strength,
+            noise: sphere.noise,
+            salt: sphere.salt,
+        }
+    }
+
     /// How far points are from the centre (0) to the boundary (1); `None` where all are outside.
     #[inline(always)]
-    fn share(&self, at: &Lanes<3>, field: &Field) -> Option<F32x16> {
+    fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
         let mut away = [F32x16::splat(0.0); 3];
-        let mut square = F32x16::splat(0.0);
+        let mut share = F32x16::splat(0.0);
+        let mut inside = 0;
         for lane in 0..LANES {
             let d = vec3::scale(vec3::sub(get(at, lane), self.centre), self.inverse);
             set(&mut away, lane, d);
-            square.0[lane] = vec3::dot(d, d);
-        }
-        let mut inside = 0;
-        for lane in 0..LANES {
-            inside |= u32::from(square.0[lane] < 1.0);
+            let square = vec3::dot(d, d);
+            inside |= u32::from(square < 1.0);
+            share.0[lane] = square;
         }
         if inside == 0 {
             return None;
         }
-        let mut share = square;
         for lane in 0..LANES {
-            share.0[lane] = square.0[lane].sqrt();
+            share.0[lane] = share.0[lane].sqrt();
         }
         if self.noise > 0.0 {
-            self.dent(&away, &mut share, field);
+            self.dent(&away, &mut share);
         }
         Some(share)
     }
@@ -167,20 +180,19 @@ impl Ball {
     /// it in that direction. The noise depends on the direction alone, so each ray from the centre
     /// falls off once, and the centre stays the centre.
     #[inline(always)]
-    fn dent(&self, away: &Lanes<3>, share: &mut F32x16, field: &Field) {
-        let mut cells = [[0.0; LANES]; 3];
+    fn dent(&self, away: &Lanes<3>, share: &mut F32x16) {
+        let mut cells = *away;
         for lane in 0..LANES {
             let length = share.0[lane];
-            let inverse = if length > 0.0 { 1.0 / length } else { 0.0 };
-            // Far outside, squares overflow; any direction will do.
-            let inverse = if length < 1.0 { inverse } else { 0.0 };
-            let direction = vec3::scale(get(away, lane), inverse);
+            // Outside any direction will do, and far outside there is none.
+            let inside = length > 0.0 && length < 1.0;
+            let inverse = LUMPS / if inside { length } else { 1.0 };
             for axis in 0..3 {
-                let direction = if length < 1.0 { direction[axis] } else { 0.0 };
-                cells[axis][lane] = self.offset[axis] + f64::from(direction) * LUMPS;
+                let cell = away[axis].0[lane] * inverse + OFF_LATTICE[axis];
+                cells[axis].0[lane] = if inside { cell } else { 0.0 };
             }
         }
-        let noise = &field.at_lanes(&cells)[0];
+        let noise = noise::bumps(self.salt, &cells);
         for lane in 0..LANES {
             let taken = clamped(0.5 + noise.0[lane]);
             let left = 1.0 - self.noise * taken;

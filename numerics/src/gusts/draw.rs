@@ -50,8 +50,8 @@ pub struct Gust {
     pub speed: f64,
     /// Where on the plane it starts: −1..1 each way.
     pub place: [f64; 2],
-    /// Where in the field of noise it lies, in cells.
-    pub offset: [f64; 3],
+    /// Which noise it has.
+    pub salt: u32,
 }
 
 /// All gusts alive at a moment, by number, then by round.
@@ -76,11 +76,8 @@ enum Draws {
     Decay,
     Across,
     Up,
-    Offset,
+    Salt,
 }
-
-/// Cells of the noise over which gusts are strewn.
-const CELLS: f64 = 65_536.0;
 
 impl Draw {
     /// The gusts alive at `frame`.
@@ -129,7 +126,7 @@ impl Draw {
             noise: of(Draws::Noise).between(self.noise).clamp(0.0, 1.0),
             speed: of(Draws::Speed).f64(),
             place: [side(Draws::Across), side(Draws::Up)],
-            offset: [0, 1, 2].map(|axis| of(Draws::Offset).of(axis).f64() * CELLS),
+            salt: of(Draws::Salt).u32(),
         })
     }
 }

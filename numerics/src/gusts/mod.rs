@@ -13,16 +13,19 @@
 
 mod block;
 mod control;
+mod cull;
 mod draw;
 mod launch;
+mod profile;
 
-use crate::noise::{Field, Kind};
 use crate::ramp::Ramp;
 use crate::simd::Path;
-use block::{Near, block_values};
+use block::block_values;
 pub use control::{AXIS_ROWS, Control, Shape, outline};
+use cull::{Boxes, NOWHERE, bounds_of, join, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
+use profile::Profile;
 use rayon::prelude::*;
 
 /// A procedural gust at one moment.
@@ -36,8 +39,8 @@ pub struct Sphere {
     pub strength: f32,
     /// Share of the radius that noise may take away, 0..1.
     pub noise: f32,
-    /// Where in the field of noise it lies, in cells.
-    pub offset: [f64; 3],
+    /// Which noise it has.
+    pub salt: u32,
 }
 
 /// Everything that is felt.
@@ -75,7 +78,7 @@ const TASK: usize = 2048;
 const BLOCK: usize = 64;
 
 /// Cells of noise across a sphere's radius: four or so lumps around it.
-const LUMPS: f64 = 1.5;
+const LUMPS: f32 = 1.5;
 
 /// How far a region reaches past its bounds for culling: more than all rounding together.
 const MARGIN: f64 = 1e-4;
@@ -93,16 +96,19 @@ pub fn feel(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Felt {
 /// # Panics
 /// As [`feel()`].
 pub fn feel_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Felt {
-    let field = Field::new(Kind::Perlin, 1, 0.0, 0);
-    let scene = Scene::new(gusts, &field);
-    let mut values = vec![0.0; points.len()];
+    let scene = Scene::new(gusts);
+    let mut values = vec![scene.gusts.base.clamp(0.0, 1.0); points.len()];
     let reached = values
         .par_chunks_mut(TASK)
         .zip(points.par_chunks(TASK))
         .enumerate()
         .map(|(task, (out, points))| {
             let incoming = gusts.incoming.map(|incoming| &incoming[task * TASK..][..points.len()]);
-            scene.task(path, points, incoming, out)
+            let reached = if scene.boxes.len() > 0 { scene.task(path, points, out) } else { 0 };
+            if let Some(incoming) = incoming {
+                scale(out, incoming);
+            }
+            reached
         })
         .sum();
     Felt { values, reached }
@@ -111,65 +117,51 @@ pub fn feel_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Felt {
 /// The gusts, and what of them is the same for all points.
 struct Scene<'a> {
     gusts: &'a Gusts<'a>,
-    field: &'a Field,
-    /// Where each region ends, spheres first: low and high corner.
-    bounds: Vec<[[f64; 3]; 2]>,
+    falloff: Profile,
+    /// Of the controls.
+    ramps: Vec<Profile>,
+    /// Where each region ends, spheres first.
+    boxes: Boxes,
     /// No influence is below 0: a point that has 1 keeps it.
     only_adds: bool,
 }
 
 impl<'a> Scene<'a> {
-    fn new(gusts: &'a Gusts<'a>, field: &'a Field) -> Self {
-        let around = |centre: [f64; 3], reach: [f64; 3]| {
-            let reach = reach.map(|reach| reach * (1.0 + MARGIN));
-            [[0, 1, 2].map(|axis| centre[axis] - reach[axis]), [0, 1, 2].map(|axis| centre[axis] + reach[axis])]
+    fn new(gusts: &'a Gusts<'a>) -> Self {
+        let mut boxes = Boxes::default();
+        let mut add = |region: usize, centre: [f64; 3], reach: [f64; 3]| {
+            boxes.push(region as u32, centre, reach.map(|reach| reach * (1.0 + MARGIN)));
         };
-        let nowhere = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        let sphere = |sphere: &Sphere| match sphere.radius >= SMALLEST && sphere.strength != 0.0 {
-            true => around(sphere.centre, [f64::from(sphere.radius); 3]),
-            false => nowhere,
-        };
-        let control = |control: &Control| control.reach().map_or(nowhere, |reach| around(control.centre(), reach));
-        let bounds = gusts.spheres.iter().map(sphere).chain(gusts.controls.iter().map(control)).collect();
+        for (region, sphere) in gusts.spheres.iter().enumerate() {
+            if sphere.radius >= SMALLEST && sphere.strength != 0.0 {
+                add(region, sphere.centre, [f64::from(sphere.radius); 3]);
+            }
+        }
+        for (place, control) in gusts.controls.iter().enumerate() {
+            if let Some(reach) = control.reach() {
+                add(gusts.spheres.len() + place, control.centre(), reach);
+            }
+        }
         let falloff_adds = gusts.spheres.is_empty() || gusts.falloff.min() >= 0.0;
         let only_adds = falloff_adds && gusts.controls.iter().all(Control::only_adds);
-        Self { gusts, field, bounds, only_adds }
+        let ramps = gusts.controls.iter().map(|control| Profile::new(control.ramp())).collect();
+        Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, only_adds }
     }
 
     /// The values of a task's points; gives how many were reached.
-    fn task(&self, path: Path, points: &[[f32; 3]], incoming: Option<&[f32]>, out: &mut [f32]) -> usize {
-        let all = 0..self.bounds.len() as u32;
-        let near_task = self.near(all, points);
+    fn task(&self, path: Path, points: &[[f32; 3]], out: &mut [f32]) -> usize {
+        let mut bounds = [NOWHERE; TASK / BLOCK];
+        let mut whole = NOWHERE;
+        for (points, bounds) in points.chunks(BLOCK).zip(&mut bounds) {
+            *bounds = bounds_of(path, points);
+            whole = join(whole, *bounds);
+        }
+        let near = meeting(path, &self.boxes, &whole);
         let mut reached = 0;
-        let mut near = Near::default();
         for (block, (points, out)) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
-            near.gather(self, self.near(near_task.iter().copied(), points), points[0]);
-            reached += block_values(path, self, &near, points, out);
-            if let Some(incoming) = incoming {
-                scale(out, &incoming[block * BLOCK..]);
-            }
+            reached += block_values(path, self, &near, &bounds[block], points, out);
         }
         reached
-    }
-
-    /// Which of `regions` the points' bounds meet, in order.
-    fn near(&self, regions: impl Iterator<Item = u32>, points: &[[f32; 3]]) -> Vec<u32> {
-        if self.bounds.is_empty() {
-            return Vec::new();
-        }
-        let mut box_ = [points[0]; 2];
-        for point in points {
-            for axis in 0..3 {
-                box_[0][axis] = box_[0][axis].min(point[axis]);
-                box_[1][axis] = box_[1][axis].max(point[axis]);
-            }
-        }
-        let [low, high] = box_.map(|corner| corner.map(f64::from));
-        let meets = |region: &u32| {
-            let [from, to] = &self.bounds[*region as usize];
-            (0..3).all(|axis| from[axis] <= high[axis] && to[axis] >= low[axis])
-        };
-        regions.filter(meets).collect()
     }
 }
 

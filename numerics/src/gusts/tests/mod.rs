@@ -19,7 +19,7 @@ fn one() -> Ramp {
 }
 
 fn sphere(centre: [f64; 3], radius: f32) -> Sphere {
-    Sphere { centre, radius, strength: 1.0, noise: 0.0, offset: [0.25; 3] }
+    Sphere { centre, radius, strength: 1.0, noise: 0.0, salt: 77 }
 }
 
 fn only<'a>(falloff: &'a Ramp, spheres: &'a [Sphere]) -> Gusts<'a> {

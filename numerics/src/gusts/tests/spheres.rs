@@ -75,13 +75,13 @@ fn noise_is_the_spheres_own_and_moves_along_with_it() {
     let points = strewn(2000, [0.0; 3], 1.0);
     let moved: Vec<[f32; 3]> = points.iter().map(|p| [p[0] + 4.0, p[1], p[2]]).collect();
     let falloff = smooth();
-    let at = |points: &[[f32; 3]], x: f64, offset: f64| {
-        let with = Sphere { noise: 0.8, offset: [offset; 3], ..sphere([x, 0.0, 0.0], 1.0) };
+    let at = |points: &[[f32; 3]], x: f64, salt: u32| {
+        let with = Sphere { noise: 0.8, salt, ..sphere([x, 0.0, 0.0], 1.0) };
         feel(points, &only(&falloff, &[with])).values
     };
-    let (here, there) = (at(&points, 0.0, 0.25), at(&moved, 4.0, 0.25));
+    let (here, there) = (at(&points, 0.0, 5), at(&moved, 4.0, 5));
     assert!(here.iter().zip(&there).all(|(a, b)| (a - b).abs() < 1e-5));
-    assert_ne!(here, at(&points, 0.0, 77.7));
+    assert_ne!(here, at(&points, 0.0, 6));
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
     let incoming: Vec<f32> = (0..points.len() as u64).map(|k| Key::new(9).of(k).f32()).collect();
     let spheres: Vec<Sphere> = strewn(40, [1.0, 0.0, 1.0], 1.2)
         .iter()
-        .map(|c| Sphere { noise: 0.4, strength: 0.7, offset: c.map(f64::from), ..sphere(c.map(f64::from), 0.3) })
+        .map(|c| Sphere { noise: 0.4, strength: 0.7, salt: c[0].to_bits(), ..sphere(c.map(f64::from), 0.3) })
         .collect();
     let axes = [[0.5, 0.1, 0.0], [0.0, 0.2, 0.0], [-0.1, 0.0, 0.4]];
     let controls =
