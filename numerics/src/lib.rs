@@ -14,6 +14,7 @@
 pub mod affine;
 pub mod bend;
 pub mod collide;
+pub mod gusts;
 pub mod jiggle;
 pub mod lanes;
 pub mod noise;

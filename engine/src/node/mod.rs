@@ -115,6 +115,12 @@ impl Wires<'_> {
     }
 }
 
+/// What a node integrates over time, given its params at one moment.
+pub type Integrand = fn(&Params) -> [f64; 3];
+
+/// Most integrands of a node.
+pub const MOST_INTEGRANDS: usize = 4;
+
 /// A node type: made as a `static`, read by everything.
 pub struct Node {
     /// Name in graph files.
@@ -145,8 +151,8 @@ pub struct Node {
     pub leaves_out: Option<fn(&Params, &Wires) -> Vec<LeftOut>>,
     /// What is wrong with the params together, beyond their ranges; asked before anything cooks.
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
-    /// What [`FrameCx::integral`] integrates over time; reads only params declared [`crate::param::Param::history`].
-    pub integrand: Option<fn(&Params) -> [f64; 3]>,
+    /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
+    pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
     /// What a window keeps that a cubic between its frames does not; see [`Node::mends_between`].
     pub mend_between: Option<MendBetween>,
 }
@@ -173,7 +179,7 @@ impl Node {
             metrics: &[],
             leaves_out: None,
             checks: None,
-            integrand: None,
+            integrands: [None; MOST_INTEGRANDS],
             mend_between: None,
         }
     }
@@ -248,10 +254,17 @@ impl Node {
         self
     }
 
-    /// What is integrated over time.
+    /// What is integrated over time; said again, another one, in that order.
+    ///
+    /// # Panics
+    /// While it is compiled, where it is said more than [`MOST_INTEGRANDS`] times.
     #[must_use]
-    pub const fn integrates(mut self, integrand: fn(&Params) -> [f64; 3]) -> Self {
-        self.integrand = Some(integrand);
+    pub const fn integrates(mut self, integrand: Integrand) -> Self {
+        let mut place = 0;
+        while self.integrands[place].is_some() {
+            place += 1;
+        }
+        self.integrands[place] = Some(integrand);
         self
     }
 

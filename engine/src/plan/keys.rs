@@ -66,7 +66,7 @@ pub(crate) struct Keys<'p, 'g> {
     spots: Vec<BTreeMap<Frame, Known>>,
     /// Keys of a chain's states: by stretch, from its start on.
     chains: Vec<BTreeMap<Stretch, Vec<KeyOrError>>>,
-    /// Keys of what integrands were: from time 0 on, frame by frame, and before it as a whole.
+    /// Keys of what a node's integrands were: from time 0 on, frame by frame, and before it as a whole.
     histories: Vec<Vec<Key>>,
     before: Vec<Option<Key>>,
     windows: Vec<Option<Anchors>>,
@@ -186,11 +186,11 @@ impl<'p, 'g> Keys<'p, 'g> {
         self.spot(node, self.plan.canonical(node, frame)).map(|spot| spot.key)
     }
 
-    /// The frame, the scene's clock and origin, and what the integrand has seen since time 0.
+    /// The frame, the scene's clock and origin, and what the integrands have seen since time 0.
     fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let scene = &self.plan.graph.scene;
         let resolver = &self.plan.nodes[node].resolver;
-        let animated = declared.integrand.is_some() && resolver.history_is_animated();
+        let animated = declared.integrands[0].is_some() && resolver.history_is_animated();
         let seen = match animated {
             true => Some(self.history_key(node, declared, frame)?),
             false => None,
@@ -203,12 +203,14 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(self.hasher.finish())
     }
 
-    /// A key of the integrand's values at the Gauss points of all that [`crate::node::FrameCx::integral`] may be asked at
+    /// A key of the integrands' values at the Gauss points of all that [`crate::node::FrameCx::integrals`] may be asked at
     /// `frame`: from the scene's start or time 0, whichever is earlier, to `frame`. Chained frame by frame.
     fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
-        let integrand = declared.integrand.expect("asked for nodes with an integrand");
         let resolver = &self.plan.nodes[node].resolver;
-        let value = |at: f64| resolver.past(at).map(|params| integrand(&params));
+        let value = |at: f64| -> Result<Vec<f64>> {
+            let params = resolver.past(at)?;
+            Ok(declared.integrands.iter().flatten().flat_map(|integrand| integrand(&params)).collect())
+        };
         let over = |hasher: &mut Hasher, from: f64, to: f64| -> Result<()> {
             for x in gauss_points(from, to) {
                 value(x)?.iter().fold(&mut *hasher, |hasher, x| hasher.f64(*x));

@@ -201,6 +201,33 @@ pub(crate) static DRIFT: Node = Node::new(
 .integrates(|params| [f64::from(params.get(SPEED)), 0.0, 0.0])
 .writes(&[&P]);
 
+params! { SPREAD_PARAMS:
+    SPREAD_SPEED: Param<f32> = Param::float("speed", 1.0, "How fast.").unit(Unit::MetresPerSecond).history();
+    SHARE: Param<f32> = Param::float("share", 1.0, "How much of it.").at_least(0.0);
+}
+inputs! { SPREAD_INPUTS: SPREAD_POINTS: Input = POINTS; }
+
+/// Adds share · (∫ speed dt + ∫ speed² dt) from time 0.
+pub(crate) static SPREAD: Node = Node::new(
+    "Spread",
+    1,
+    "Moves points at a keyed speed and at its square.",
+    Cook::Frame {
+        cook: |cx| {
+            let [way, square] = cx.integrals(cx.frame());
+            let way = cx.get(SHARE) * (way[0] + square[1]) as f32;
+            Ok(OUT.with(moved(cx.input(SPREAD_POINTS), |x| x + way)?))
+        },
+        reads_clock: |_| true,
+    },
+)
+.inputs(SPREAD_INPUTS)
+.params(SPREAD_PARAMS)
+.outputs(&[&OUT])
+.integrates(|params| [f64::from(params.get(SPREAD_SPEED)), 0.0, 0.0])
+.integrates(|params| [0.0, f64::from(params.get(SPREAD_SPEED)).powi(2), 0.0])
+.writes(&[&P]);
+
 params! { FROM_START_PARAMS: FROM_START_PROBE: Param<i64> = PROBE; }
 inputs! { FROM_START_INPUTS:
     FROM_POINTS: Input = POINTS;

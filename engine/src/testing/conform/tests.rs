@@ -466,7 +466,16 @@ fn an_integral_passes() {
     }
     .params(&[&SPEED]);
     caught(CREEP, "it asks for an integral and declares no integrand");
-    assert_eq!(said(CREEP.integrates(|params| [0.0, params.get(SPEED), 0.0])), [""; 0]);
+    const SUMMED: Node = CREEP.integrates(|params| [0.0, params.get(SPEED), 0.0]);
+    assert_eq!(said(SUMMED), [""; 0]);
+    const GREEDY: Node = Node {
+        cook: Cook::Frame {
+            cook: |cx| Ok(OUT.with(up(cx, cx.integrals::<2>(cx.frame())[1][0] as f32)?)),
+            reads_clock: |_| true,
+        },
+        ..SUMMED
+    };
+    caught(GREEDY, "it asks for 2 integrals and declares 1");
 }
 
 #[test]
