@@ -58,6 +58,7 @@ fn main() {
                 gap: 1e-4,
                 offset_root: 1e-4,
                 offset_scale: None,
+                coherence: 0.0,
                 blend: Scaled { value: 1.0, mask: None },
                 width: Scaled { value: 0.0, mask: None },
             };

@@ -62,8 +62,17 @@ impl Hair<'_> {
             let rest = wide(self.rest[k + 1]) - wide(self.rest[k]);
             let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { to };
             axis = perpendicular(&from, &axis);
+            let pivot = wide(self.out[k]);
+            let (from, to) = match all.ground(&pivot, length) {
+                None => (from, to),
+                Some(ground) => {
+                    let led =
+                        [&from, &to].map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, all.coherence));
+                    (led[0], led[1])
+                }
+            };
             let segment = Segment {
-                pivot: wide(self.out[k]),
+                pivot,
                 from,
                 to,
                 axis,

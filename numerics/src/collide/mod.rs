@@ -9,6 +9,7 @@
 //! nothing keeps its goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
 //! obstacles, not volumes, so a curve wholly inside of one stays there.
 
+mod coherence;
 mod crossing;
 mod hair;
 mod near;
@@ -19,6 +20,7 @@ mod turn;
 use crate::simd::{Path, kernel};
 use crate::tree::TriangleTree;
 use crate::vec3::Vec3;
+use coherence::Ground;
 use hair::{Hair, Scratch};
 use rayon::prelude::*;
 use sector::V3;
@@ -59,6 +61,8 @@ pub struct Collide<'a> {
     pub skin: Option<Skin<'a>>,
     /// How a turn is stopped.
     pub method: Method,
+    /// How far directions that lie in the skin are led out of it before a segment turns, 0..1; see [`coherence`].
+    pub coherence: f64,
     /// Arc kept from what is met, metres.
     pub gap: f64,
     /// How far outside of the skin the roots are brought, metres; 0 leaves them.
@@ -69,6 +73,14 @@ pub struct Collide<'a> {
     pub blend: Scaled<'a>,
     /// Thickness of the curves, metres, one value a CV where masked.
     pub width: Scaled<'a>,
+}
+
+impl Collide<'_> {
+    /// The skin that a segment is to be led out of, if any is.
+    #[inline(always)]
+    fn ground(&self, pivot: &V3, length: f64) -> Option<Ground> {
+        self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
+    }
 }
 
 /// Curves after their collisions.

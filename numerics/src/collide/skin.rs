@@ -1,5 +1,6 @@
 //! The surface that curves grow on: which way is out, and how far.
 
+use super::coherence::Ground;
 use super::crossing::wide;
 use super::sector::V3;
 use crate::tree::{Closest, TriangleTree};
@@ -55,6 +56,13 @@ impl Skin<'_> {
         // Beside an edge the normal leans: the distance is what counts, the normal says its side.
         let height = away.norm().copysign(away.dot(&normal));
         Some((height, normal))
+    }
+
+    /// The skin under a segment that stands on `pivot`, if it reaches that.
+    #[inline(always)]
+    pub(super) fn ground(&self, pivot: &V3, length: f64) -> Option<Ground> {
+        let (height, normal) = self.height(pivot, length as f32)?;
+        Some(Ground { normal, height: height.max(0.0) })
     }
 
     /// A CV's goal, raised until it is `scale` times as high over the skin as the CV is at rest; as it is where it is

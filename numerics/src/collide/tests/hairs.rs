@@ -13,6 +13,7 @@ fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
+        coherence: 0.0,
         blend: WHOLE,
         width: PLAIN,
     }
