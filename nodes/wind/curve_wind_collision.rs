@@ -132,6 +132,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
                 Method::Steps => Turn::Steps(cx.get(ROTATION_STEPS) as u32),
             },
             coherence: cx.get(COHERENCE),
+            at_rest: None,
             gap: cx.get(GAP),
             offset_root: cx.get(OFFSET_ROOT),
             offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),

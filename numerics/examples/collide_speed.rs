@@ -59,6 +59,7 @@ fn main() {
                 offset_root: 1e-4,
                 offset_scale: None,
                 coherence: 0.0,
+                at_rest: None,
                 blend: Scaled { value: 1.0, mask: None },
                 width: Scaled { value: 0.0, mask: None },
             };

@@ -15,6 +15,8 @@ const SKIPPED_GAPS: f64 = 5.0;
 pub(super) struct Hair<'a> {
     /// Row of its root in the attributes.
     pub(super) first: usize,
+    /// How far it is moved for `offset_root`.
+    pub(super) shift: V3,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -37,11 +39,7 @@ impl Hair<'_> {
         if cvs < 2 || !self.is_finite() {
             return reached;
         }
-        let shift = match &all.skin {
-            Some(skin) => skin.lift(self.rest[0], all.offset_root),
-            None => V3::zeros(),
-        };
-        reached.started_inside = u64::from(self.starts_inside(all, &shift));
+        let shift = self.shift;
         self.set_goals(all, &shift, &mut scratch.goal);
         let goal = &scratch.goal;
         let moved = shift != V3::zeros();
@@ -88,7 +86,7 @@ impl Hair<'_> {
             if !done.met && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
                 end = self.goal[k + 1];
             }
-            if first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
+            if !done.clear && first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
                 done = segment.turn_wary(all.method, all.obstacles, &mut scratch.nearby);
                 end = segment.end(&done.direction);
                 if let Some(crossing) = first_crossing(&scratch.nearby, segment.start(&done.direction), end) {
@@ -133,20 +131,6 @@ impl Hair<'_> {
     fn is_finite(&self) -> bool {
         let cvs = || self.goal.iter().chain(self.rest);
         cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
-    }
-
-    /// Whether it crosses something at rest.
-    #[inline(always)]
-    fn starts_inside(&self, all: &Collide<'_>, shift: &V3) -> bool {
-        let mut before = narrow(&(wide(self.rest[0]) + shift));
-        for cv in &self.rest[1..] {
-            let next = narrow(&(wide(*cv) + shift));
-            if first_crossing_in(all.obstacles, before, next).is_some() {
-                return true;
-            }
-            before = next;
-        }
-        false
     }
 
     /// Where the CVs are to go: as they come in, or kept off the skin by `offset_scale` of their rest distance.

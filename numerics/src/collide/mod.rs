@@ -13,6 +13,7 @@ mod coherence;
 mod crossing;
 mod hair;
 mod near;
+mod rest;
 mod sector;
 mod skin;
 mod turn;
@@ -23,8 +24,11 @@ use crate::vec3::Vec3;
 use coherence::Ground;
 use hair::{Hair, Scratch};
 use rayon::prelude::*;
+use rest::at_rest_on;
+pub use rest::{AtRest, at_rest};
 use sector::V3;
 pub use skin::{Skin, normals};
+use std::ops::Range;
 
 /// How a segment's turn is stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +73,8 @@ pub struct Collide<'a> {
     pub offset_root: f64,
     /// Keeps goals this many times as high over the skin as the curves are at rest, where they would be lower.
     pub offset_scale: Option<f64>,
+    /// What [`at_rest`] said of the same curves, if it was asked.
+    pub at_rest: Option<&'a AtRest>,
     /// Share of each segment's collision that is kept, 0..1.
     pub blend: Scaled<'a>,
     /// Thickness of the curves, metres, one value a CV where masked.
@@ -108,7 +114,6 @@ pub struct Collided {
 struct Reached {
     unfreed_segments: u64,
     crossings_left: u64,
-    started_inside: u64,
     contacts: u64,
     deepest_overlap: f64,
     length_error: f64,
@@ -118,7 +123,6 @@ impl Reached {
     fn and(self, other: Self) -> Self {
         Self {
             unfreed_segments: self.unfreed_segments + other.unfreed_segments,
-            started_inside: self.started_inside + other.started_inside,
             contacts: self.contacts + other.contacts,
             crossings_left: self.crossings_left + other.crossings_left,
             deepest_overlap: self.deepest_overlap.max(other.deepest_overlap),
@@ -143,6 +147,14 @@ pub fn collide(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) 
 /// # Panics
 /// As [`collide()`].
 pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
+    let looked;
+    let at_rest = match how.at_rest {
+        Some(at_rest) => at_rest,
+        None => {
+            looked = at_rest_on(path, starts, rest, how);
+            &looked
+        }
+    };
     let mut points = vec![[0.0; 3]; goal.len()];
     let mut tasks = Vec::new();
     let mut left = &mut points[..];
@@ -154,30 +166,46 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             end += 1;
         }
         let (out, rest) = left.split_at_mut((starts[end] - starts[first]) as usize);
-        tasks.push((&starts[first..=end], out));
+        tasks.push((first..end, out));
         (left, first) = (rest, end);
     }
     let reached = tasks
         .into_par_iter()
-        .map(|(starts, out)| collide_task(path, starts, rest, goal, how, out))
+        .map(|(curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out))
         .reduce(Reached::default, Reached::and);
-    let Reached { unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error } = reached;
+    let Reached { unfreed_segments, crossings_left, contacts, deepest_overlap, length_error } = reached;
+    let started_inside = at_rest.inside();
     Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
 }
 
 kernel! {
-    fn collide_task(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>, out: &mut [Vec3]) -> Reached = task;
+    fn collide_task(
+        curves: Range<usize>,
+        starts: &[u32],
+        positions: [&[Vec3]; 2],
+        how: &Collide<'_>,
+        at_rest: &AtRest,
+        out: &mut [Vec3],
+    ) -> Reached = task;
 }
 
 #[inline(always)]
-fn task(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>, out: &mut [Vec3]) -> Reached {
+fn task(
+    curves: Range<usize>,
+    starts: &[u32],
+    [rest, goal]: [&[Vec3]; 2],
+    how: &Collide<'_>,
+    at_rest: &AtRest,
+    out: &mut [Vec3],
+) -> Reached {
     let mut scratch = Scratch::default();
     let mut reached = Reached::default();
-    let base = starts[0] as usize;
-    for ends in starts.windows(2) {
-        let cvs = ends[0] as usize..ends[1] as usize;
+    let base = starts[curves.start] as usize;
+    for curve in curves {
+        let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let mut hair = Hair {
             first: cvs.start,
+            shift: at_rest.shift(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],
             out: &mut out[cvs.start - base..cvs.end - base],

@@ -4,7 +4,7 @@ use super::coherence::Ground;
 use super::crossing::wide;
 use super::sector::V3;
 use crate::tree::{Closest, TriangleTree};
-use crate::vec3::{self, Vec3};
+use crate::vec3::Vec3;
 
 /// How often a root is lifted again where the surface bends away below it.
 const LIFTS: usize = 4;
@@ -70,9 +70,7 @@ impl Skin<'_> {
     #[inline(always)]
     pub(super) fn raised(&self, rest: Vec3, goal: &V3, scale: f64) -> V3 {
         let rest = wide(rest);
-        let (low, high) = self.tree.bounds();
-        let size = vec3::largest(vec3::sub(high, low));
-        let Some((height, _)) = self.height(&rest, size) else { return *goal };
+        let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
         // It cannot have come nearer than by the way it went.
         let moved = (goal - rest).norm();
         if height - moved >= scale * height {
@@ -91,10 +89,8 @@ impl Skin<'_> {
         if offset <= 0.0 {
             return shift;
         }
-        let (low, high) = self.tree.bounds();
-        let size = vec3::largest(vec3::sub(high, low));
         for _ in 0..LIFTS {
-            let Some((height, normal)) = self.height(&(wide(root) + shift), size) else { break };
+            let Some((height, normal)) = self.height(&(wide(root) + shift), f32::INFINITY) else { break };
             if height >= offset * 0.999 {
                 break;
             }

@@ -41,6 +41,8 @@ pub(super) struct Turned {
     pub(super) direction: V3,
     /// Something kept it from its goal.
     pub(super) met: bool,
+    /// Nothing came near on its way: it crosses nothing, however positions are rounded.
+    pub(super) clear: bool,
 }
 
 /// Blocks of the tree that a segment may meet, with a bit for each triangle; memory that is used again.
@@ -58,10 +60,10 @@ impl Segment {
         match self.sweep(method, obstacles, nearby) {
             Sweep::Free(turned) => turned,
             Sweep::Stuck => match self.way_out(method, obstacles, nearby) {
-                None => Turned { direction: self.from, met: true },
+                None => Turned { direction: self.from, met: true, clear: false },
                 Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
                     Sweep::Free(turned) => Turned { met: true, ..turned },
-                    Sweep::Stuck => Turned { direction, met: true },
+                    Sweep::Stuck => Turned { direction, met: true, clear: false },
                 },
             },
         }
@@ -101,7 +103,7 @@ impl Segment {
         let (low, high) = sector.bounds(&self.to);
         gather(obstacles, low, high, nearby);
         if nearby.is_empty() {
-            return Sweep::Free(Turned { direction: self.to, met: false });
+            return Sweep::Free(Turned { direction: self.to, met: false, clear: true });
         }
         let stop = match method {
             Method::Exact => first_stop(&sector, &self.to, nearby),
@@ -109,8 +111,9 @@ impl Segment {
         };
         match stop {
             Stop::Stuck => Sweep::Stuck,
-            Stop::None => Sweep::Free(Turned { direction: self.to, met: false }),
-            Stop::At(angle) => Sweep::Free(Turned { direction: sector.direction(angle), met: true }),
+            Stop::Clear => Sweep::Free(Turned { direction: self.to, met: false, clear: true }),
+            Stop::None => Sweep::Free(Turned { direction: self.to, met: false, clear: false }),
+            Stop::At(angle) => Sweep::Free(Turned { direction: sector.direction(angle), met: true, clear: false }),
         }
     }
 
@@ -173,8 +176,9 @@ enum Sweep {
     Stuck,
 }
 
+/// All blocks of trees that a box meets.
 #[inline(always)]
-fn gather<'t>(obstacles: &'t [&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
+pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
     nearby.clear();
     for tree in obstacles {
         tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
@@ -183,6 +187,8 @@ fn gather<'t>(obstacles: &'t [&'t TriangleTree], low: Vec3, high: Vec3, nearby: 
 
 /// Where a sweep is stopped.
 enum Stop {
+    /// Nowhere, as there is nothing near.
+    Clear,
     /// Nowhere.
     None,
     At(f64),
@@ -194,9 +200,10 @@ enum Stop {
 #[inline(always)]
 fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
     let mut wedge = Wedge::new(sector, [sector.u.dot(to), sector.v.dot(to).max(0.0)]);
-    let mut stop: Option<f64> = None;
+    let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
+        clear &= lanes == 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
@@ -219,7 +226,11 @@ fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
             lanes &= wedge.may_meet(block);
         }
     }
-    stop.map_or(Stop::None, Stop::At)
+    match stop {
+        Some(angle) => Stop::At(angle),
+        None if clear => Stop::Clear,
+        None => Stop::None,
+    }
 }
 
 /// The first angle up to π at which nothing is within the sector's arc.

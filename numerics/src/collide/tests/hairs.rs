@@ -14,6 +14,7 @@ fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         offset_root: 1e-4,
         offset_scale: None,
         coherence: 0.0,
+        at_rest: None,
         blend: WHOLE,
         width: PLAIN,
     }
