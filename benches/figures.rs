@@ -9,7 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use engine::clock::Stopwatch;
+mod timing;
+
 use engine::cook::{Delivered, Engine, Report, Settings};
 use engine::geometry::{Component, Geometry};
 use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Scene, probe};
@@ -17,6 +18,7 @@ use engine::param::Source;
 use engine::plan::Request;
 use engine::prelude::*;
 use engine::time::Frame;
+use timing::Figures;
 
 /// The program's own.
 #[global_allocator]
@@ -27,7 +29,7 @@ const ROUNDS: usize = 7;
 fn main() {
     let mut figures = Figures::default();
     let engine = Engine::new(&Settings::default()).expect("threads");
-    println!("{} threads, SIMD path {}", engine.threads(), numerics::simd::Path::chosen().name());
+    timing::print_machine(&engine);
     let bear = bear_wind();
     let small = wind_on(10_000, 5);
     let large = wind_on(1_000_000, 5);
@@ -45,50 +47,6 @@ fn main() {
     let fresh = || Engine::new(&Settings::default()).expect("threads");
     let [short, long] = [100, 1000].map(|frames| cook(&fresh(), &chain, frames).peak_bytes);
     println!("peak of results, 100 trivial nodes: {short} bytes for 100 frames, {long} for 1,000");
-}
-
-/// Least times by name, and the calibration loop's.
-#[derive(Default)]
-struct Figures {
-    calibration: Option<Duration>,
-    times: Vec<(&'static str, u32, Duration)>,
-}
-
-impl Figures {
-    fn add(&mut self, name: &'static str, per: u32, time: Duration) {
-        match self.times.iter_mut().find(|(known, _, _)| *known == name) {
-            Some((_, _, least)) => *least = time.min(*least),
-            None => self.times.push((name, per, time)),
-        }
-    }
-
-    /// A loop of dependent multiplications and additions: 10 million on one core.
-    fn calibrate(&mut self) {
-        let watch = Stopwatch::start();
-        let mut x = 1.0_f64;
-        for k in 0..10_000_000 {
-            x = x * 0.999_999 + f64::from(k & 1);
-        }
-        std::hint::black_box(x);
-        let time = watch.wall();
-        self.calibration = Some(self.calibration.map_or(time, |least| least.min(time)));
-    }
-
-    /// Seconds of one unit.
-    fn least(&self, name: &str) -> f64 {
-        let (_, per, time) = self.times.iter().find(|(known, _, _)| *known == name).expect("it was measured");
-        time.as_secs_f64() / f64::from(*per)
-    }
-
-    fn print(&self) {
-        let loop_seconds = self.calibration.unwrap_or_default().as_secs_f64();
-        println!("calibration loop: {:.2} ms", loop_seconds * 1e3);
-        println!("{:<42} {:>12} {:>12}", "", "µs", "÷ loop");
-        for (name, _, _) in &self.times {
-            let seconds = self.least(name);
-            println!("{name:<42} {:>12.2} {:>12.5}", seconds * 1e6, seconds / loop_seconds);
-        }
-    }
 }
 
 fn cook(engine: &Engine, graph: &Graph, frames: i64) -> Report {

@@ -6,8 +6,9 @@ use cpu_time::ProcessTime;
 use numerics::bend::{Bend, Mode, bend};
 use numerics::collide::{Collide, Collided, Method, Scaled, Skin, collide, normals};
 use numerics::ramp::Ramp;
+use numerics::shapes::icosphere;
 use numerics::tree::TriangleTree;
-use numerics::vec3::{Vec3, add, length, scale};
+use numerics::vec3::{Vec3, scale};
 use std::time::Duration;
 
 /// Rounds of each case, and how many cases: `collide_speed 1 1` is a run to profile.
@@ -30,7 +31,9 @@ fn least(mut run: impl FnMut() -> Collided) -> (Duration, Collided) {
 }
 
 fn main() {
-    let (points, triangles) = icosphere(5);
+    let sphere = icosphere(1.0, 5);
+    let triangles = sphere.triangles();
+    let points: Vec<Vec3> = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
     let tree = TriangleTree::build(&points, &triangles);
     let normals = normals(&points, &triangles);
     let skin = Skin { tree: &tree, triangles: &triangles, normals: &normals };
@@ -87,62 +90,4 @@ fn fur(curves: usize, cvs: usize) -> Vec<Vec3> {
             (0..cvs).map(move |cv| scale(up, 1.0 + 0.1 * cv as f32 / (cvs - 1) as f32))
         })
         .collect()
-}
-
-/// A unit sphere of 20·4ⁿ triangles.
-fn icosphere(times: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let (a, b) = (0.525_731_1, 0.850_650_8);
-    let mut points = vec![
-        [-a, b, 0.0],
-        [a, b, 0.0],
-        [-a, -b, 0.0],
-        [a, -b, 0.0],
-        [0.0, -a, b],
-        [0.0, a, b],
-        [0.0, -a, -b],
-        [0.0, a, -b],
-        [b, 0.0, -a],
-        [b, 0.0, a],
-        [-b, 0.0, -a],
-        [-b, 0.0, a],
-    ];
-    let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5],
-        [0, 5, 1],
-        [0, 1, 7],
-        [0, 7, 10],
-        [0, 10, 11],
-        [1, 5, 9],
-        [5, 11, 4],
-        [11, 10, 2],
-        [10, 7, 6],
-        [7, 1, 8],
-        [3, 9, 4],
-        [3, 4, 2],
-        [3, 2, 6],
-        [3, 6, 8],
-        [3, 8, 9],
-        [4, 9, 5],
-        [2, 4, 11],
-        [6, 2, 10],
-        [8, 6, 7],
-        [9, 8, 1],
-    ];
-    for _ in 0..times {
-        let mut middles = std::collections::BTreeMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                let sum = add(points[a as usize], points[b as usize]);
-                points.push(scale(sum, 1.0 / length(sum)));
-                points.len() as u32 - 1
-            })
-        };
-        let mut finer = Vec::new();
-        for [a, b, c] in triangles {
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    (points, triangles)
 }

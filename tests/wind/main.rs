@@ -6,3 +6,4 @@
 mod coherence;
 mod cooked;
 mod shelter;
+mod storm;

@@ -1,15 +1,18 @@
 //! Shapes of polygons: boxes, and what a lathe turns.
 //!
-//! Every shape is centred on the origin in its bounds, y up, and fills the bounds asked for to the last bit. `n` is the
+//! Every shape is centred on the origin in its bounds, y up, and all but the icosphere fill the bounds asked for to the
+//! last bit. `n` is the
 //! number of quads along an edge of a box, and along a quarter turn of anything round, so that even 1 is a solid: round
 //! shapes have vertices on both axes and are mirror symmetric to the bit. Promise: solids are closed, every edge
 //! between two faces, outward counter-clockwise. Limit: corners of round shapes lie on the true surface, so volume and
 //! area are less than its own, by a share of the order of 1 ÷ n²; a size of 0 makes faces without area.
 
 mod boxes;
+mod icosphere;
 mod lathe;
 
 pub use boxes::{block, grid};
+pub use icosphere::icosphere;
 pub use lathe::{bowl, capsule, cylinder, sphere, torus};
 
 /// Polygons as a mesh takes them.

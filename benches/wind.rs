@@ -1,0 +1,207 @@
+//! What the wind chain costs: `cargo bench --bench wind`.
+//!
+//! Chains of Curve_Wind_Shielding, Curve_Wind_Gusts, Curve_Wind, Curve_Jiggle and Curve_Wind_Collision, on upright fur
+//! on a sphere of 20,480 triangles and on the bear of `graphs/`; frames in order, no cache, nothing written. Then
+//! collision's two methods by their error.
+
+use std::convert::Infallible;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use engine::cook::{Delivered, Engine, Report, Settings};
+use engine::geometry::{Component, Geometry};
+use engine::graph::{Body, Graph, probe};
+use engine::plan::Request;
+use engine::time::Frame;
+use numerics::shapes::icosphere;
+use timing::Figures;
+
+mod timing;
+
+/// The program's own.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+const ROUNDS: usize = 5;
+
+/// What of the chain is there.
+#[derive(Clone, Copy)]
+struct Chain {
+    name: &'static str,
+    /// Shelter, and whether it is looked for anew at every frame.
+    shielding: Option<bool>,
+    collision: Option<&'static str>,
+}
+
+const FULL: Chain = Chain { name: "full chain", shielding: Some(true), collision: Some("") };
+const STILL: Chain = Chain { name: "full chain, shielding still", shielding: Some(false), ..FULL };
+const NO_COLLISION: Chain = Chain { name: "no collision", collision: None, ..FULL };
+const NO_COLLIDERS: Chain = Chain { name: "gusts + wind + jiggle", shielding: None, collision: None };
+
+/// What it blows on.
+#[derive(Clone, Copy)]
+enum Fur {
+    /// That many curves of that many CVs on a sphere.
+    Sphere(usize, usize),
+    Bear,
+}
+
+fn main() {
+    let two = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
+    let one = Engine::new(&Settings { threads: 1, ..Settings::default() }).expect("threads");
+    timing::print_machine(&two);
+    let mut figures = Figures::default();
+    let sphere = Fur::Sphere(10_000, 5);
+    let small = [FULL, STILL, NO_COLLISION, NO_COLLIDERS].map(|chain| (chain, graph(chain, sphere, 24)));
+    let bear = graph(FULL, Fur::Bear, 24);
+    let larger =
+        [(100_000, 5), (10_000, 32)].map(|(curves, cvs)| (curves, cvs, graph(FULL, Fur::Sphere(curves, cvs), 6)));
+    let largest = graph(FULL, Fur::Sphere(1_000_000, 5), 2);
+    for round in 0..ROUNDS {
+        figures.calibrate();
+        for (chain, graph) in &small {
+            figures.add(format!("{}, 10,000 × 5", chain.name), 24, cook(&two, graph, 1..=24).cooking);
+        }
+        let report = cook(&one, &small[0].1, 1..=24);
+        figures.add("full chain, 10,000 × 5, 1 thread", 24, report.cooking);
+        for node in report.nodes.iter().filter(|node| node.type_name.starts_with("Curve_")) {
+            figures.add(format!("    of it {}", node.type_name), 24, node.wall);
+        }
+        figures.add("full chain, 10,000 × 5, frame 24 alone", 1, cook(&two, &small[0].1, 24..=24).cooking);
+        figures.add("full chain, bear (10,275 × 5)", 24, cook(&two, &bear, 1..=24).cooking);
+        for (curves, cvs, graph) in &larger {
+            figures.add(format!("full chain, {curves} × {cvs}"), 6, cook(&two, graph, 1..=6).cooking);
+        }
+        if round == 0 {
+            let report = cook(&two, &largest, 1..=2);
+            figures.add("full chain, 1,000,000 × 5", 2, report.cooking);
+            println!("peak of results, 1,000,000 × 5: {:.2} GB", report.peak_bytes as f64 * 1e-9);
+        }
+    }
+    figures.print();
+    work_and_precision(&one);
+}
+
+/// Time of collision alone, and the mean error of tips ÷ length against first contact with 10⁻⁹ of gap.
+fn work_and_precision(engine: &Engine) {
+    println!("\ncollision of 10,000 × 5, 1 thread: mean error of tips ÷ length, and ms a frame");
+    let run = |params: &str| -> (Vec<[f32; 3]>, f64) {
+        let params: &'static str = Box::leak(params.to_owned().into_boxed_str());
+        let chain = Chain { name: "", shielding: None, collision: Some(params) };
+        let graph = graph(chain, Fur::Sphere(10_000, 5), 4);
+        let (mut tips, mut least) = (Vec::new(), f64::INFINITY);
+        for _ in 0..3 {
+            tips.clear();
+            let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
+                for one in finished {
+                    tips.extend(one.geometry.curves().expect("curves").positions().chunks(5).map(|cvs| cvs[4]));
+                }
+                Ok(())
+            };
+            let report = cook_into(engine, &graph, 1..=4, &mut sink);
+            let node = report.nodes.iter().find(|node| node.type_name == "Curve_Wind_Collision").expect("it is there");
+            least = least.min(node.wall.as_secs_f64() * 1e3 / 4.0);
+        }
+        (tips, least)
+    };
+    let (reference, _) = run(r#""gap": 1e-9"#);
+    let error = |tips: &[[f32; 3]]| {
+        let far =
+            |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|k| f64::from(a[k] - b[k])).map(|x| x * x).sum::<f64>().sqrt();
+        tips.iter().zip(&reference).map(far).sum::<f64>() / tips.len() as f64 / 0.1
+    };
+    let (tips, exact) = run(r#""gap": 1e-6"#);
+    println!("{:<12} {:>10.2e} {exact:>9.2}", "exact", error(&tips));
+    let mut before: Option<f64> = None;
+    for steps in [4, 16, 64, 256, 1024, 4096] {
+        let (tips, time) = run(&format!(r#""gap": 1e-9, "method": "steps", "rotation_steps": {steps}"#));
+        let found = error(&tips);
+        let slope = before.map_or(String::new(), |before| format!("slope {:.2}", (found / before).log2() / 2.0));
+        println!("{steps:<5} steps  {found:>10.2e} {time:>9.2}  {:>7.1} × exact  {slope}", time / exact);
+        before = Some(found);
+    }
+}
+
+fn cook(engine: &Engine, graph: &Graph, frames: std::ops::RangeInclusive<i64>) -> Report {
+    cook_into(engine, graph, frames, &mut |_: &[Delivered]| -> Result<(), Infallible> { Ok(()) })
+}
+
+fn cook_into(
+    engine: &Engine,
+    graph: &Graph,
+    frames: std::ops::RangeInclusive<i64>,
+    sink: &mut dyn FnMut(&[Delivered]) -> Result<(), Infallible>,
+) -> Report {
+    let request = Request { outputs: vec![0], frames: frames.map(Frame::whole).collect() };
+    let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut { sink }).expect("it cooks");
+    assert!(report.errors.is_empty(), "{}", report.errors[0].1);
+    report
+}
+
+/// A chain on fur; the wind turns where shielding is to be looked for anew.
+fn graph(chain: Chain, fur: Fur, last: i64) -> Graph {
+    let mut nodes = String::from(
+        r#""fur": { "type": "Curve_In", "params": { "file": "../assets/fur_bear_10k_curves.obj" } },
+           "skin": { "type": "Mesh_In", "params": { "file": "../assets/bear.obj" } },"#,
+    );
+    let wind = match chain.shielding {
+        Some(false) => "[1, 0, 0.2]",
+        _ => r#"{ "expr": ["cos(0.02*frame)", "0", "sin(0.02*frame)"] }"#,
+    };
+    let mut before = "fur";
+    let mut add = |name: &'static str, inputs: &str, params: &str| {
+        writeln!(
+            nodes,
+            r#""{name}": {{ "type": "{name}", "inputs": {{ "curves": "{before}" {inputs} }}, "params": {{ {params} }} }},"#
+        )
+        .expect("memory");
+        before = name;
+    };
+    if chain.shielding.is_some() {
+        add("Curve_Wind_Shielding", r#", "colliders": ["skin"]"#, &format!(r#""wind_dir": {wind}"#));
+    }
+    add("Curve_Wind_Gusts", "", &format!(r#""wind_dir": {wind}, "num_gusts": 20, "base": 0.2"#));
+    add("Curve_Wind", "", &format!(r#""wind_dir": {wind}, "global_rotate": 0.5"#));
+    add("Curve_Jiggle", "", r#""frequency": 4, "damping": 0.3"#);
+    if let Some(params) = chain.collision {
+        add("Curve_Wind_Collision", r#", "rest": "fur", "colliders": ["skin"]"#, params);
+    }
+    let text = format!(
+        r#"{{ "convect": 1, "scene": {{ "frames": [1, {last}], "seed": 7 }}, "nodes": {{ {nodes} }}, "outputs": {{ "fur": "{before}" }} }}"#
+    );
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/bear_wind");
+    let mut graph =
+        Graph::load(&text, &folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
+    if let Fur::Sphere(curves, cvs) = fur {
+        give(&mut graph, "fur", upright(curves, cvs));
+        give(&mut graph, "skin", sphere());
+    }
+    graph
+}
+
+/// Puts a geometry in a node's place.
+fn give(graph: &mut Graph, id: &str, geometry: Geometry) {
+    let node = graph.nodes.iter_mut().find(|node| &*node.id == id).expect("a node");
+    node.body = Body::Given { at: Arc::new(move |_| geometry.clone()), moves: false };
+}
+
+/// A unit sphere of 20,480 triangles.
+fn sphere() -> Geometry {
+    let sphere = icosphere(1.0, 5);
+    let points = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
+    Component::mesh(sphere.counts, sphere.corners, points).expect("a mesh").into()
+}
+
+/// Curves a tenth of the radius long, spread evenly.
+fn upright(curves: usize, cvs: usize) -> Geometry {
+    let at = |curve: usize, cv: usize| {
+        let y = 1.0 - 2.0 * (curve as f64 + 0.5) / curves as f64;
+        let (sine, cosine) = libm::sincos(2.399_963 * curve as f64);
+        let (side, far) = ((1.0 - y * y).sqrt(), 1.0 + 0.1 * cv as f64 / (cvs - 1) as f64);
+        [far * cosine * side, far * y, far * sine * side].map(|x| x as f32)
+    };
+    let points = (0..curves).flat_map(|curve| (0..cvs).map(move |cv| at(curve, cv))).collect();
+    Component::curves(vec![cvs as u32; curves], points).expect("curves").into()
+}
