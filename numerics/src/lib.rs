@@ -12,8 +12,10 @@
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod affine;
+pub mod attach;
 pub mod bend;
 pub mod collide;
+pub mod guides;
 pub mod lanes;
 pub mod noise;
 pub mod ramp;

@@ -1,0 +1,9 @@
+//! Laws of interpolated hairs.
+
+use super::*;
+use engine::testing::conforms;
+
+#[test]
+fn it_conforms() {
+    conforms(&NODE);
+}
