@@ -52,7 +52,7 @@ fn main() {
         let goal = bend(&starts, &rest, &wind).points;
         for method in [Method::Exact, Method::Steps(10)].into_iter().take(arg(2, 2)) {
             let how = Collide {
-                tree: &tree,
+                obstacles: &[&tree],
                 skin: Some(skin),
                 method,
                 gap: 1e-4,

@@ -62,13 +62,15 @@ pub(super) fn first_crossing(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Opti
     first
 }
 
-/// As [`first_crossing`] with all triangles of a tree.
+/// As [`first_crossing`] with all triangles of trees.
 #[inline(always)]
-pub(super) fn first_crossing_in(tree: &TriangleTree, a: Vec3, b: Vec3) -> Option<Crossing> {
+pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -> Option<Crossing> {
     let mut first = None;
-    let low = std::array::from_fn(|axis| a[axis].min(b[axis]));
-    let high = std::array::from_fn(|axis| a[axis].max(b[axis]));
-    tree.visit_box(low, high, |block, lanes| add_crossings(block, lanes, a, b, &mut first));
+    let low = [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])];
+    let high = [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
+    for tree in obstacles {
+        tree.visit_box(low, high, |block, lanes| add_crossings(block, lanes, a, b, &mut first));
+    }
     first
 }
 
@@ -78,10 +80,10 @@ fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane)) {
-            if first.is_none_or(|first| found.share < first.share) {
-                *first = Some(found);
-            }
+        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane))
+            && first.is_none_or(|first| found.share < first.share)
+        {
+            *first = Some(found);
         }
     }
 }

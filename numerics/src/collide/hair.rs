@@ -74,13 +74,13 @@ impl Hair<'_> {
                 inner: if k == 0 && all.offset_root < all.gap { SKIPPED_GAPS * all.gap } else { 0.0 },
                 rounding: 1.2e-7 * (f64::from(largest) + length),
             };
-            let mut done = segment.turn(all.method, all.tree, &mut scratch.nearby);
+            let mut done = segment.turn(all.method, all.obstacles, &mut scratch.nearby);
             let mut end = segment.end(&done.direction);
             if !done.met && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
                 end = self.goal[k + 1];
             }
             if first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
-                done = segment.turn_wary(all.method, all.tree, &mut scratch.nearby);
+                done = segment.turn_wary(all.method, all.obstacles, &mut scratch.nearby);
                 end = segment.end(&done.direction);
                 if let Some(crossing) = first_crossing(&scratch.nearby, segment.start(&done.direction), end) {
                     reached.unfreed_segments += 1;
@@ -92,8 +92,33 @@ impl Hair<'_> {
             before = done.direction;
             self.out[k + 1] = end;
         }
-        self.blend(all, &shift);
+        reached.crossings_left = match self.blend(all, &shift) {
+            false => reached.unfreed_segments,
+            true => self.crossings(all),
+        };
+        reached.length_error = self.length_error();
         reached
+    }
+
+    /// Segments that cross something as they are written.
+    #[inline(always)]
+    fn crossings(&self, all: &Collide<'_>) -> u64 {
+        let mut count = 0;
+        for k in 1..self.out.len() {
+            count += u64::from(first_crossing_in(all.obstacles, self.out[k - 1], self.out[k]).is_some());
+        }
+        count
+    }
+
+    /// The largest change of a segment's length, as a share of the curve's.
+    fn length_error(&self) -> f64 {
+        let (mut worst, mut whole) = (0.0_f64, 0.0);
+        for k in 1..self.out.len() {
+            let length = (wide(self.goal[k]) - wide(self.goal[k - 1])).norm();
+            worst = worst.max(((wide(self.out[k]) - wide(self.out[k - 1])).norm() - length).abs());
+            whole += length;
+        }
+        if whole > 0.0 { worst / whole } else { 0.0 }
     }
 
     fn is_finite(&self) -> bool {
@@ -107,7 +132,7 @@ impl Hair<'_> {
         let mut before = narrow(&(wide(self.rest[0]) + shift));
         for cv in &self.rest[1..] {
             let next = narrow(&(wide(*cv) + shift));
-            if first_crossing_in(all.tree, before, next).is_some() {
+            if first_crossing_in(all.obstacles, before, next).is_some() {
                 return true;
             }
             before = next;
@@ -136,11 +161,11 @@ impl Hair<'_> {
         }
     }
 
-    /// Turns each segment back towards its goal by 1 − `blend`.
-    fn blend(&mut self, all: &Collide<'_>, shift: &V3) {
+    /// Turns each segment back towards its goal by 1 − `blend`; whether that is anything.
+    fn blend(&mut self, all: &Collide<'_>, shift: &V3) -> bool {
         let share = |k: usize| f64::from(all.blend.at(self.first + k)).clamp(0.0, 1.0);
         if (0..self.out.len()).all(|k| share(k) == 1.0) {
-            return;
+            return false;
         }
         let mut before = self.out[0];
         self.out[0] = narrow(&(wide(self.goal[0]) + shift * share(0)));
@@ -159,6 +184,7 @@ impl Hair<'_> {
                 narrow(&(wide(self.out[k - 1]) + direction * goal.norm()))
             };
         }
+        true
     }
 }
 

@@ -53,8 +53,8 @@ impl Scaled<'_> {
 /// What curves collide with, and how.
 #[derive(Clone)]
 pub struct Collide<'a> {
-    /// The obstacles' triangles.
-    pub tree: &'a TriangleTree,
+    /// The obstacles' triangles, a tree an obstacle.
+    pub obstacles: &'a [&'a TriangleTree],
     /// The surface that the curves grow on.
     pub skin: Option<Skin<'a>>,
     /// How a turn is stopped.
@@ -77,23 +77,29 @@ pub struct Collide<'a> {
 pub struct Collided {
     /// One point for every incoming one.
     pub points: Vec<Vec3>,
-    /// Segments that end in something.
+    /// Segments that no turn frees from what they are in.
     pub unfreed_segments: u64,
+    /// Segments that cross something as they are written: with a whole blend the unfreed ones.
+    pub crossings_left: u64,
     /// Curves that cross something at rest.
     pub started_inside: u64,
     /// Segments that something keeps from their goal.
     pub contacts: u64,
     /// The deepest that a segment reaches through a surface, metres.
     pub deepest_overlap: f64,
+    /// Largest |length − goal's| of a segment ÷ curve length, as written.
+    pub length_error: f64,
 }
 
 /// What some curves reached.
 #[derive(Clone, Copy, Default)]
 struct Reached {
     unfreed_segments: u64,
+    crossings_left: u64,
     started_inside: u64,
     contacts: u64,
     deepest_overlap: f64,
+    length_error: f64,
 }
 
 impl Reached {
@@ -102,7 +108,9 @@ impl Reached {
             unfreed_segments: self.unfreed_segments + other.unfreed_segments,
             started_inside: self.started_inside + other.started_inside,
             contacts: self.contacts + other.contacts,
+            crossings_left: self.crossings_left + other.crossings_left,
             deepest_overlap: self.deepest_overlap.max(other.deepest_overlap),
+            length_error: self.length_error.max(other.length_error),
         }
     }
 }
@@ -141,8 +149,8 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
         .into_par_iter()
         .map(|(starts, out)| collide_task(path, starts, rest, goal, how, out))
         .reduce(Reached::default, Reached::and);
-    let Reached { unfreed_segments, started_inside, contacts, deepest_overlap } = reached;
-    Collided { points, unfreed_segments, started_inside, contacts, deepest_overlap }
+    let Reached { unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error } = reached;
+    Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
 }
 
 kernel! {

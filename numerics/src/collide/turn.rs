@@ -49,12 +49,17 @@ pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
 impl Segment {
     /// Turns as `method` says. Afterwards `nearby` holds all that the segment may cross where it points now.
     #[inline(always)]
-    pub(super) fn turn<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Turned {
-        match self.sweep(method, tree, nearby) {
+    pub(super) fn turn<'t>(
+        &self,
+        method: Method,
+        obstacles: &'t [&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Turned {
+        match self.sweep(method, obstacles, nearby) {
             Sweep::Free(turned) => turned,
-            Sweep::Stuck => match self.way_out(method, tree, nearby) {
+            Sweep::Stuck => match self.way_out(method, obstacles, nearby) {
                 None => Turned { direction: self.from, met: true },
-                Some(direction) => match (Self { from: direction, ..*self }).sweep(method, tree, nearby) {
+                Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
                     Sweep::Free(turned) => Turned { met: true, ..turned },
                     Sweep::Stuck => Turned { direction, met: true },
                 },
@@ -64,9 +69,14 @@ impl Segment {
 
     /// As [`Segment::turn`] where that ended in a crossing: obstacles as thick as what rounding may have hidden.
     #[inline(always)]
-    pub(super) fn turn_wary<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Turned {
+    pub(super) fn turn_wary<'t>(
+        &self,
+        method: Method,
+        obstacles: &'t [&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Turned {
         Self { half: self.half + 8.0 * self.rounding, gap: self.gap + 8.0 * self.rounding, ..*self }
-            .turn(method, tree, nearby)
+            .turn(method, obstacles, nearby)
     }
 
     fn sector(&self, from: V3, towards: V3) -> Sector {
@@ -86,10 +96,10 @@ impl Segment {
     }
 
     #[inline(always)]
-    fn sweep<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Sweep {
+    fn sweep<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
         let sector = self.sector(self.from, self.to);
         let (low, high) = sector.bounds(&self.to);
-        gather(tree, low, high, nearby);
+        gather(obstacles, low, high, nearby);
         if nearby.is_empty() {
             return Sweep::Free(Turned { direction: self.to, met: false });
         }
@@ -138,13 +148,13 @@ impl Segment {
     /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
     /// up to half a turn.
     #[inline(always)]
-    fn way_out<'t>(&self, method: Method, tree: &'t TriangleTree, nearby: &mut Nearby<'t>) -> Option<V3> {
+    fn way_out<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Option<V3> {
         let crossed = self.crosses(&self.from, nearby);
         // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
         let sector = self.sector(self.from, outwards);
         let (low, high) = sector.bounds(&-sector.u);
-        gather(tree, low, high, nearby);
+        gather(obstacles, low, high, nearby);
         let angle = match method {
             Method::Exact => first_gap(&sector, nearby),
             Method::Steps(steps) => {
@@ -164,9 +174,11 @@ enum Sweep {
 }
 
 #[inline(always)]
-fn gather<'t>(tree: &'t TriangleTree, low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
+fn gather<'t>(obstacles: &'t [&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
     nearby.clear();
-    tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
+    for tree in obstacles {
+        tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
+    }
 }
 
 /// Where a sweep is stopped.

@@ -6,7 +6,7 @@
 //!
 //! Promise: the same tree on any number of threads, and the same bits from queries on every SIMD path;
 //! no triangle that a query's own box meets is missed. Queries are inlined, so inside a `kernel!` they
-//! run its vectors. Triangles without area are kept as the segments or points they are; one with a
+//! run its vectors; there, go through blocks by [`TriangleTree::walk`]. Triangles without area are kept as the segments or points they are; one with a
 //! corner that is not finite is left out until a refit makes it finite. Limit: [`TriangleTree::closest`] takes
 //! fourth powers of lengths as they come, in f32, so edges and distances should lie between 1e-9 and 1e9.
 
@@ -18,6 +18,7 @@ use crate::lanes::{F32x16, LANES, Lanes, set};
 use crate::vec3::Vec3;
 pub use closest::Closest;
 use rayon::prelude::*;
+pub use visit::{Cuboid, Region, Walk};
 
 /// The index of a lane that holds no triangle.
 pub const NONE: u32 = u32::MAX;

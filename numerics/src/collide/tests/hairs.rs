@@ -5,9 +5,9 @@ use super::*;
 const PLAIN: Scaled<'static> = Scaled { value: 0.0, mask: None };
 const WHOLE: Scaled<'static> = Scaled { value: 1.0, mask: None };
 
-fn on(tree: &TriangleTree) -> Collide<'_> {
+fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
     Collide {
-        tree,
+        obstacles,
         skin: None,
         method: Method::Exact,
         gap: 1e-4,
@@ -105,9 +105,10 @@ fn a_hair_laid_down_by_wind_stops_its_gap_above_the_floor() {
     // arc 1e-4 of a radius of 1.
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
+    let obstacles = [&tree];
     let rest = [[0.0, 0.1, 0.0], [0.0, 1.1, 0.0]];
     let goal = [[0.0, 0.1, 0.0], [0.6, -0.7, 0.0]];
-    let out = collide(&[0, 2], &rest, &goal, &on(&tree));
+    let out = collide(&[0, 2], &rest, &goal, &on(&obstacles));
     let angle = libm::asin(0.1) - 1e-4;
     let tip = [libm::cos(angle), 0.1 - libm::sin(angle)];
     assert!((f64::from(out.points[1][0]) - tip[0]).abs() < 1e-6, "{:?} {tip:?}", out.points[1]);
@@ -119,11 +120,12 @@ fn a_hair_laid_down_by_wind_stops_its_gap_above_the_floor() {
 fn a_hair_that_meets_nothing_keeps_its_goals_bits() {
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
+    let obstacles = [&tree];
     let rest = [[0.0, 0.1, 0.0], [0.0, 0.4, 0.0], [0.0, 0.7, 0.0]];
     let goal = [[0.0, 0.1, 0.0], [0.17, 0.34, 0.03], [0.456, 0.41, 0.06]];
-    assert_eq!(collide(&[0, 3], &rest, &goal, &on(&tree)).points, goal);
+    assert_eq!(collide(&[0, 3], &rest, &goal, &on(&obstacles)).points, goal);
     let empty = TriangleTree::build(&[], &[]);
-    assert_eq!(collide(&[0, 3], &rest, &goal, &on(&empty)).points, goal);
+    assert_eq!(collide(&[0, 3], &rest, &goal, &on(&[&empty])).points, goal);
 }
 
 #[test]
@@ -132,9 +134,10 @@ fn a_segment_pushed_through_a_wall_by_the_one_before_turns_out_of_it() {
     // floor, from where it turns up again until it is free: level, its gap above the floor.
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
+    let obstacles = [&tree];
     let rest = [[0.0, 0.01, 0.0], [0.0, 0.51, 0.0], [0.5, 0.51, 0.0]];
     let goal = [[0.0, 0.01, 0.0], [0.5, 0.01, 0.0], [0.5, -0.49, 0.0]];
-    let out = collide(&[0, 3], &rest, &goal, &on(&tree));
+    let out = collide(&[0, 3], &rest, &goal, &on(&obstacles));
     assert_eq!((out.unfreed_segments, out.contacts), (0, 1));
     let [x, y, _] = out.points[2];
     assert!(y > 0.0 && y < 0.001 && x > 0.99, "{:?}", out.points[2]);
@@ -148,8 +151,9 @@ fn nothing_passes_a_blade_that_steps_miss() {
     let mut points = vec![blade(middle), blade(middle + 0.017)];
     points.extend([[0.9, 0.55, -0.2], [0.9, 0.55, 0.2]]);
     let tree = TriangleTree::build(&points, &[[0, 2, 3], [1, 2, 3]]);
+    let obstacles = [&tree];
     let (rest, goal) = ([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [0.0, 1.0, 0.0]]);
-    let with = |method| collide(&[0, 2], &rest, &goal, &Collide { method, ..on(&tree) });
+    let with = |method| collide(&[0, 2], &rest, &goal, &Collide { method, ..on(&obstacles) });
     let exact = with(Method::Exact);
     assert_eq!(exact.contacts, 1);
     let angle = libm::atan2(f64::from(exact.points[1][1]), f64::from(exact.points[1][0]));
@@ -161,13 +165,14 @@ fn nothing_passes_a_blade_that_steps_miss() {
 fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
     for (k, wind) in [V3::x(), -V3::y(), unit(Key::new(8))].iter().enumerate() {
         for (cvs, long) in [(2, 0.2), (5, 0.4), (12, 1.5)] {
             let (starts, rest, goal) = fur(400, cvs, long, *wind);
             assert_eq!(crossings(&starts, &rest, &mesh), 0);
             let before = crossings(&starts, &goal, &mesh);
             assert!(before > 20, "the wind of case {k} presses {before} segments into the skin");
-            let out = collide(&starts, &rest, &goal, &on(&tree));
+            let out = collide(&starts, &rest, &goal, &on(&obstacles));
             assert_eq!(out.unfreed_segments, 0, "case {k}, {cvs} CVs");
             assert_eq!(crossings(&starts, &out.points, &mesh), 0);
             assert!(worst_length(&starts, &goal, &out.points) < 1e-6);
@@ -180,15 +185,16 @@ fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
 fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
     let (starts, rest, goal) = fur(2000, 2, 0.3, V3::x());
-    let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9, ..on(&tree) }).points;
+    let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9, ..on(&obstacles) }).points;
     let error = |steps: u32| {
-        let how = Collide { method: Method::Steps(steps), gap: 1e-9, ..on(&tree) };
+        let how = Collide { method: Method::Steps(steps), gap: 1e-9, ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &how).points;
         out.iter().zip(&exact).map(|(a, b)| f64::from(vec3::length(vec3::sub(*a, *b)))).sum::<f64>()
     };
     let errors = [2, 4, 8, 16, 32, 64, 128, 256].map(error);
-    let slope = (errors[7] / errors[1]).ln() / (256.0_f64 / 4.0).ln();
+    let slope = libm::log(errors[7] / errors[1]) / libm::log(256.0 / 4.0);
     assert!((-1.2..-0.8).contains(&slope), "{slope}: {errors:?}");
 }
 
@@ -196,17 +202,18 @@ fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
 fn the_skin_lifts_roots_and_keeps_goals_off() {
     let mesh = sphere(48);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(200, 5, 0.3, V3::x());
-    let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&tree) };
+    let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&obstacles) };
     let out = collide(&starts, &rest, &goal, &lifted);
     let height = |p: &Vec3| f64::from(vec3::length(*p)) - 1.0;
     let roots: Vec<f64> = out.points.iter().step_by(5).map(height).collect();
     // A facet of π/48 by π/48 lies up to 2 (1 − cos(π/96)) below the sphere.
     assert!(roots.iter().all(|height| (0.0089..0.0101).contains(height)), "{roots:?}");
     for scale in [1.0, 0.5] {
-        let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale), ..on(&tree) };
+        let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale), ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &kept);
         // Lengths are kept, so a CV lies a little lower than what was asked, above all at a bend.
         let share: Vec<f64> = out.points.iter().zip(&rest).map(|(now, rest)| height(now) / height(rest)).collect();
@@ -220,6 +227,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
 fn at_no_offset_roots_keep_their_bits_though_they_lie_on_the_skin() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
     let (starts, mut rest, mut goal) = fur(300, 4, 0.3, V3::x());
     // Roots on corners of the mesh: nothing lies nearer.
     for (k, ends) in starts.windows(2).enumerate() {
@@ -232,7 +240,7 @@ fn at_no_offset_roots_keep_their_bits_though_they_lie_on_the_skin() {
             rest[cv] = (corner * (1.0 + u)).map(|x| x as f32).into();
         }
     }
-    let out = collide(&starts, &rest, &goal, &Collide { offset_root: 0.0, ..on(&tree) });
+    let out = collide(&starts, &rest, &goal, &Collide { offset_root: 0.0, ..on(&obstacles) });
     for ends in starts.windows(2) {
         assert_eq!(out.points[ends[0] as usize], goal[ends[0] as usize]);
     }
@@ -243,9 +251,10 @@ fn at_no_offset_roots_keep_their_bits_though_they_lie_on_the_skin() {
 fn blend_turns_back_towards_the_goal() {
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
+    let obstacles = [&tree];
     let (rest, goal) = ([[0.0, 0.5, 0.0], [0.0, 1.5, 0.0]], [[0.0, 0.5, 0.0], [0.8, -0.1, 0.0]]);
     let angle = |value: f32| {
-        let how = Collide { blend: Scaled { value, mask: None }, ..on(&tree) };
+        let how = Collide { blend: Scaled { value, mask: None }, ..on(&obstacles) };
         let tip = collide(&[0, 2], &rest, &goal, &how).points[1];
         (libm::atan2(f64::from(0.5 - tip[1]), f64::from(tip[0])), tip)
     };
@@ -261,18 +270,20 @@ fn odd_curves_and_meshes_are_taken_as_they_are() {
     // No area, a point, and one that is no number.
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [nan, 0.0, 0.0]];
     let tree = TriangleTree::build(&points, &[[0, 1, 2], [1, 1, 1], [0, 1, 3]]);
+    let obstacles = [&tree];
     let equal = [[0.5, 0.1, 0.0]; 4];
-    assert_eq!(collide(&[0, 4], &equal, &equal, &on(&tree)).points, equal);
+    assert_eq!(collide(&[0, 4], &equal, &equal, &on(&obstacles)).points, equal);
     let one = [[0.5, 0.1, 0.0]];
-    assert_eq!(collide(&[0, 1], &one, &one, &on(&tree)).points, one);
+    assert_eq!(collide(&[0, 1], &one, &one, &on(&obstacles)).points, one);
     let broken = [[0.0; 3], [nan, 1.0, 0.0]];
-    let out = collide(&[0, 2], &broken, &broken, &on(&tree)).points;
+    let out = collide(&[0, 2], &broken, &broken, &on(&obstacles)).points;
     assert!(out[1][0].is_nan() && out[1][1] == 1.0);
     // Opposite directions turn about some axis, without a NaN.
     let (rest, goal) = ([[0.0, 1.0, 0.0], [0.0, 2.0, 0.0]], [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]);
     let floor = floor();
     let tree = TriangleTree::build(&floor.0, &floor.1);
-    let out = collide(&[0, 2], &rest, &goal, &on(&tree));
+    let obstacles = [&tree];
+    let out = collide(&[0, 2], &rest, &goal, &on(&obstacles));
     assert!(out.points[1].iter().all(|x| x.is_finite()));
     assert_eq!(crossings(&[0, 2], &out.points, &floor), 0);
 }
@@ -281,11 +292,16 @@ fn odd_curves_and_meshes_are_taken_as_they_are() {
 fn any_threads_and_any_path_give_the_same_bits() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(500, 5, 0.4, V3::x());
-    let how =
-        Collide { skin: Some(skin), offset_scale: Some(0.3), width: Scaled { value: 1e-3, mask: None }, ..on(&tree) };
+    let how = Collide {
+        skin: Some(skin),
+        offset_scale: Some(0.3),
+        width: Scaled { value: 1e-3, mask: None },
+        ..on(&obstacles)
+    };
     let expected = collide(&starts, &rest, &goal, &how);
     for path in Path::all() {
         for threads in [1, 2, 7] {

@@ -30,7 +30,7 @@ fn first_by_events(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
     };
     // normal · (reach (u cos φ + v sin φ) − p) = 0.
     let (a, b) = (sector.reach * normal.dot(&sector.u), sector.reach * normal.dot(&sector.v));
-    let share = normal.dot(p) / a.hypot(b);
+    let share = normal.dot(p) / libm::hypot(a, b);
     if share.abs() <= 1.0 {
         let middle = libm::atan2(b, a);
         for angle in [middle - libm::acos(share), middle + libm::acos(share)] {
