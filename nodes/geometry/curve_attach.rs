@@ -8,14 +8,14 @@
 //!
 //! Where the skin around a root has no direction left (scaled to nothing, or to a line), its curve moves and does not
 //! turn, and is counted; a single face that is lost leaves its curves to its neighbours. A face turned inside out turns
-//! its curves inwards. The motion of the skin is not added to `v`. The binding is kept as long as `curves` and
-//! `rest_skin` stand still, so a frame costs what moves.
+//! its curves inwards. The motion of the skin is not added to `v`. The binding is kept as long as the roots and `rest_skin`
+//! stand still, so curves that already move at rest cost no more.
 
 use engine::prelude::*;
 use numerics::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
 
 use crate::shared::faces::{counted, same_faces};
-use crate::shared::kept::{Shape, kept};
+use crate::shared::kept::{Roots, kept};
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they grew on `rest_skin`, root first.");
@@ -55,9 +55,10 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         let [skin, rest] = [skin, rest].map(counted);
         let fact = format!("`skin` has {skin}, `rest_skin` {rest}, or they are joined otherwise");
         return Err(Error::refused(fact)
-            .hint("they are poses of one mesh; where one is mirrored, mirror the curves and the other instead of it"));
+            .hint("they are poses of one mesh; a mirroring Transform turns faces round, so mirror what comes out instead"));
     }
-    let binding = kept(curves, Shape::of(rest), || bind(curves, rest))?;
+    let roots = Roots::of(curves);
+    let binding = kept(rest, roots.clone(), || bind(&roots.0, rest))?;
     cx.check_cancelled()?;
 
     let mut out = curves.clone();
@@ -86,9 +87,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 ///
 /// # Errors
 /// Where there are roots and nothing to bind them to.
-fn bind(curves: &Component, rest: &Component) -> Result<Binding> {
-    let roots: Vec<[f32; 3]> = curves.runs().ranges().map(|cvs| curves.positions()[cvs.start]).collect();
-    Binding::nearest(rest.positions(), &rest.triangles().corners, &roots).ok_or_else(|| {
+fn bind(roots: &[[f32; 3]], rest: &Component) -> Result<Binding> {
+    Binding::nearest(rest.positions(), &rest.triangles().corners, roots).ok_or_else(|| {
         let fact = format!("`rest_skin` has no face for {} curves to hold on to", roots.len());
         Error::refused(fact).hint("connect the mesh that the curves grew on")
     })

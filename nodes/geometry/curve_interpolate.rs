@@ -16,7 +16,7 @@ use numerics::attach::{Binding, Pose};
 use numerics::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
 use numerics::scatter::Spot;
 
-use crate::shared::kept::{Array, Shape, kept};
+use crate::shared::kept::{Array, Roots, kept};
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
 inputs! { INPUTS:
@@ -133,7 +133,7 @@ fn moved(root: &[f64; 3], pose: &Pose) -> [f64; 3] {
 /// What a coat hangs on.
 #[derive(PartialEq)]
 struct Asked {
-    guides: Shape,
+    guides: Roots,
     mask: Array,
     density: u32,
     count: i64,
@@ -144,7 +144,7 @@ struct Asked {
 impl Asked {
     fn of(cx: &Cx, guides: &Component, skin: &Component, cvs: usize) -> Self {
         Self {
-            guides: Shape::of(guides),
+            guides: Roots::of(guides),
             mask: Array::of(skin, &cx.get(MASK)),
             density: cx.get(DENSITY).to_bits(),
             count: cx.get(COUNT),
@@ -181,7 +181,7 @@ impl Coat {
             })
             .collect();
         let hairs = Binding::on(points, triangles, &spots);
-        let guide_roots: Vec<[f32; 3]> = guides.runs().ranges().map(|cvs| guides.positions()[cvs.start]).collect();
+        let Roots(guide_roots) = Roots::of(guides);
         // Where there is nothing to hold on to, nothing grows either.
         let guides = Binding::nearest(points, triangles, &guide_roots);
         let guides = guides.unwrap_or_else(|| Binding::on(points, triangles, &[]));
