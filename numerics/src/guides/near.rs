@@ -85,6 +85,7 @@ fn chunk(field: &Field<'_>, hairs: &[Stand], per_hair: usize, shares: &mut [Shar
     for (hair, shares) in hairs.iter().zip(shares.chunks_mut(per_hair)) {
         // As far as the hair before had to look, and as far as this one is from it: a guess, which changes no answer.
         let moved = vec3::length(vec3::scale(vec3::sub(hair.at, before), field.unit));
+        let moved = if moved < reach { moved } else { reach };
         let nearest = field.nearest(hair, per_hair + 1, (reach + moved) * GUESS);
         reach = nearest.reach();
         before = hair.at;
@@ -107,8 +108,9 @@ struct Field<'a> {
 
 impl<'a> Field<'a> {
     fn new(guides: &'a [Stand], hairs: &[Stand]) -> Self {
-        let from = guides[0].at;
-        let all = guides.iter().chain(hairs);
+        let finite = |stand: &&Stand| stand.at.iter().all(|x| x.is_finite());
+        let from = guides.iter().find(finite).map_or([0.0; 3], |stand| stand.at);
+        let all = guides.iter().chain(hairs).filter(finite);
         let size = all.map(|stand| largest(vec3::sub(stand.at, from))).fold(0.0, f32::max);
         let (unit, _) = power_of_two_to_one(size);
         let points: Vec<Vec3> = guides.iter().map(|guide| vec3::scale(vec3::sub(guide.at, from), unit)).collect();
