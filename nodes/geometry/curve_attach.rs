@@ -54,8 +54,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     if !same_faces(rest, skin) {
         let [skin, rest] = [skin, rest].map(counted);
         let fact = format!("`skin` has {skin}, `rest_skin` {rest}, or they are joined otherwise");
-        return Err(Error::refused(fact)
-            .hint("they are poses of one mesh; a mirroring Transform turns faces round, so mirror what comes out instead"));
+        return Err(Error::refused(fact).hint(
+            "they are poses of one mesh; a mirroring Transform turns faces round, so mirror what comes out instead",
+        ));
     }
     let roots = Roots::of(curves);
     let binding = kept(rest, roots.clone(), || bind(&roots.0, rest))?;
