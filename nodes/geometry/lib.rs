@@ -1,7 +1,9 @@
 //! The geometry family: sources, and helpers that any scene needs.
 
 pub mod attribute_expr;
+pub mod curve_attach;
 pub mod curve_in;
+pub mod curve_interpolate;
 pub mod curve_scatter;
 pub mod merge;
 pub mod mesh_in;
@@ -16,7 +18,9 @@ use engine::node::Node;
 /// The family's nodes, by name.
 pub static NODES: &[&Node] = &[
     &attribute_expr::NODE,
+    &curve_attach::NODE,
     &curve_in::NODE,
+    &curve_interpolate::NODE,
     &curve_scatter::NODE,
     &merge::NODE,
     &mesh_in::NODE,

@@ -12,8 +12,10 @@
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod affine;
+pub mod attach;
 pub mod bend;
 pub mod collide;
+pub mod guides;
 pub mod gusts;
 pub mod jiggle;
 pub mod lanes;

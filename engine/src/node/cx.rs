@@ -76,7 +76,12 @@ impl Cx<'_> {
 
     /// Whether anything downstream, or a file, takes that attribute of this node's result.
     pub fn wants<T: Item>(&self, attribute: Attr<T>) -> bool {
-        self.live.is_none_or(|live| live.iter().any(|name| **name == *attribute.name))
+        self.wants_named(attribute.name)
+    }
+
+    /// As [`Cx::wants`], of an attribute that the node does not know.
+    pub fn wants_named(&self, attribute: &str) -> bool {
+        self.live.is_none_or(|live| live.iter().any(|name| **name == *attribute))
     }
 
     /// Publishes a metric of this frame.

@@ -75,7 +75,8 @@ fn roots_lie_on_the_skin_and_apart() {
     let points = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
     let skin = Component::mesh(sphere.counts, sphere.corners, points).unwrap();
     let out = meadow(skin.clone()).set(DENSITY, 100.0).cook();
-    let triangles = triangles(&skin, &skin).unwrap();
+    let cut = skin.triangles();
+    let triangles = &cut.corners;
     let at = |corner: u32| skin.positions()[corner as usize].map(f64::from);
     for root in roots(&out) {
         // Least height over the planes of triangles whose three sides it is within.

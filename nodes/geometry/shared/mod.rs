@@ -1,4 +1,7 @@
 //! What several nodes of the family need, and none of them is.
 
+pub(crate) mod faces;
+pub(crate) mod kept;
 pub(crate) mod neutral;
+pub(crate) mod planting;
 pub(crate) mod source;

@@ -1,0 +1,256 @@
+//! Curve_Interpolate: hairs that fill the skin between guide curves.
+//!
+//! At the scene's first frame roots are spread over the skin as Curve_Scatter does it, and each hair is bound to the
+//! guides whose roots are nearest, with weights that are 0 before a guide is exchanged for another
+//! ([`numerics::guides`]). Both are kept from then on, so nothing hangs on where guides are blown: a hair is at every
+//! frame the same mix of its guides' shapes as they are now, and any frame cooks alone. Shapes are mixed in the frames
+//! of the roots: on a curved skin a hair stands on it as its guides do, and where the skin moves, frames turn as in
+//! Curve_Attach. Roots stay on their faces. A hair at a guide's root is that guide.
+//!
+//! Numbers on the guides are mixed alike, `v` and `N` turned along; whole numbers, and `orient`, are those of the
+//! heaviest guide. `curve_id` is the hair's place in the endless list of roots, `Pref` the hair at the scene's first
+//! frame, `uvw` the skin's where it has one.
+
+use engine::prelude::*;
+use numerics::attach::{Binding, Pose};
+use numerics::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
+use numerics::scatter::Spot;
+
+use crate::shared::kept::{Array, Roots, kept};
+use crate::shared::planting::{self, Planting, at_roots, same_rows};
+
+inputs! { INPUTS:
+    GUIDES: Input = Input::one("guides", Kind::Curves, "Curves on the skin, root first. They may move; their CVs must stay.")
+        .read_at(|_| Times::START.and(Times::NOW));
+    SKIN: Input = Input::one("skin", Kind::Mesh, "The mesh that hairs grow on. It may move; its faces must stay.")
+        .read_at(|_| Times::START.and(Times::NOW));
+}
+
+params! { PARAMS:
+    DENSITY: Param<f32> = Param::float("density", 10_000.0, "Hairs on a square metre, before the mask.")
+        .unit(Unit::PerSquareMetre).at_least(0.0).soft(0.0, 1_000_000.0);
+    COUNT: Param<i64> = Param::int("guides", 3,
+        "How many of the nearest guides a hair is a mix of: 1 gathers hairs into clumps around their guides, more make \
+         the coat smoother.").within(1.0, MOST_GUIDES as f64).soft(1.0, 8.0);
+    CVS: Param<i64> = Param::int("cvs", 0, "CVs of each hair. 0 takes as many as the guide that has most.")
+        .within(0.0, 10_000.0).soft(0.0, 32.0);
+    SEED: Param<Seed> = Param::seed("Other numbers give other places.");
+    MASK: Param<Name> = Param::text("mask", "",
+        "A point attribute of the skin that multiplies the density. Empty, there is none.").fixed();
+}
+
+const CURVES: Output = Output::new(
+    "curves",
+    &[Kind::Curves],
+    "The hairs, root first, with `Pref`, `curve_id` and what their guides have.",
+);
+
+/// Which of the endless list of hairs each is.
+const CURVE_ID: Attr<i32> = Attr::element("curve_id");
+
+const GROWN: Metric = Metric::new("curves", Unit::None, "Hairs that grew.");
+const LENGTH_ERROR: Metric = Metric::new(
+    "length_error",
+    Unit::None,
+    "The largest difference of a hair's length from the mix of its guides' lengths, as a share of that.",
+);
+
+/// See the module.
+pub static NODE: Node = Node::new(
+    "Curve_Interpolate",
+    1,
+    "Fills a skin with hairs between guide curves. Each hair has the mixed shape and length of the guides nearest to its \
+     root and moves as they do; where guides disagree, hairs turn from one to the other and do not shrink.",
+    Cook::Pure(cook),
+)
+.inputs(INPUTS)
+.params(PARAMS)
+.outputs(&[&CURVES])
+.writes(&[&P, &PREF, &CURVE_ID])
+.attributes(|_| [AttrNames::All, AttrNames::All])
+.metrics(&[&GROWN, &LENGTH_ERROR])
+.changes_topology();
+
+fn cook(cx: &Cx) -> Result<Outputs> {
+    let (rest, skin) = (planting::kept_faces(cx.at_start(SKIN), cx.part(SKIN))?, cx.part(SKIN));
+    let (first, guides) = (guides_at_start(cx)?, cx.part(GUIDES));
+    let cvs = match cx.get(CVS) {
+        0 => guides.runs().counts().max().unwrap_or(2) as usize,
+        cvs => cvs as usize,
+    };
+    let coat = kept(rest, Asked::of(cx, first, rest, cvs), || Coat::grow(cx, first, rest, cvs))?;
+    cx.check_cancelled()?;
+
+    let poses = (rest.positions() != skin.positions()).then(|| coat.carried(skin));
+    let roots: Vec<[f64; 3]> = match &poses {
+        None => coat.roots.clone(),
+        Some((hairs, _)) => coat.roots.iter().zip(hairs).map(|(root, pose)| moved(root, pose)).collect(),
+    };
+    let now =
+        Blend { mix: &coat.mix, roots: &roots, poses: poses.as_ref().map(|(hairs, guides)| (&hairs[..], &guides[..])) };
+    let shapes = Shapes::new(guides.runs().starts(), guides.positions(), cvs);
+    let blended = blend(shapes.clone(), &now);
+    let mut curves = Component::curves(vec![cvs as u32; roots.len()], blended.points)?;
+    curves.set(CURVE_ID, coat.ids.clone())?;
+    if cx.wants(PREF) {
+        let still = poses.is_none() && same_rows(guides, first, P.name);
+        let column = if still { curves.table(Owner::Point).column(P.name).cloned() } else { None };
+        curves.set_column(Owner::Point, PREF.name, column.unwrap_or_else(|| Column::new(coat.at_rest(first, cvs))))?;
+    }
+    carry_over(cx, &mut curves, guides, &shapes, &now)?;
+    if let Some(uvw) = skin.get(UVW).filter(|_| cx.wants(UVW)) {
+        curves.set(UVW, at_roots(uvw, &rest.triangles().corners, coat.spots.iter(), cvs))?;
+    }
+    cx.publish(GROWN, roots.len() as f64);
+    cx.publish(LENGTH_ERROR, blended.length_error);
+    Ok(CURVES.with(Geometry::from(curves)))
+}
+
+/// The guides at the scene's first frame.
+///
+/// # Errors
+/// Where they had other CVs.
+fn guides_at_start<'c>(cx: &'c Cx) -> Result<&'c Component> {
+    let first = cx.at_start(GUIDES).curves().expect("the engine refuses a wire that lacks what its input needs");
+    let now = cx.part(GUIDES);
+    if first.runs() == now.runs() {
+        return Ok(first);
+    }
+    let fact = format!(
+        "`guides` has {} curves and {} CVs, at the scene's first frame {} and {}, or they are shared out otherwise",
+        now.element_count(),
+        now.point_count(),
+        first.element_count(),
+        first.point_count()
+    );
+    Err(Error::refused(fact).hint("hairs are mixed of guides that move but keep their CVs"))
+}
+
+fn moved(root: &[f64; 3], pose: &Pose) -> [f64; 3] {
+    [0, 1, 2].map(|k| root[k] + pose.shift[k])
+}
+
+/// What a coat hangs on.
+#[derive(PartialEq)]
+struct Asked {
+    guides: Roots,
+    mask: Array,
+    density: u32,
+    count: i64,
+    cvs: usize,
+    seed: u32,
+}
+
+impl Asked {
+    fn of(cx: &Cx, guides: &Component, skin: &Component, cvs: usize) -> Self {
+        Self {
+            guides: Roots::of(guides),
+            mask: Array::of(skin, &cx.get(MASK)),
+            density: cx.get(DENSITY).to_bits(),
+            count: cx.get(COUNT),
+            cvs,
+            seed: cx.get(SEED).0,
+        }
+    }
+}
+
+/// Where hairs grow and what they are made of: the same at every frame.
+struct Coat {
+    ids: Vec<i32>,
+    spots: Vec<Spot>,
+    /// At the scene's first frame.
+    roots: Vec<[f64; 3]>,
+    mix: Mix,
+    hairs: Binding,
+    guides: Binding,
+}
+
+impl Coat {
+    fn grow(cx: &Cx, guides: &Component, skin: &Component, cvs: usize) -> Result<Self> {
+        let mask = planting::mask(&cx.get(MASK), skin)?;
+        let density = if guides.runs().is_empty() { 0.0 } else { cx.get(DENSITY) };
+        let planted = Planting { density, mask, cvs, seed: cx.get(SEED) }.spots(cx, skin)?;
+        let (ids, spots): (Vec<i32>, Vec<Spot>) = planted.into_iter().map(|(place, spot)| (place as i32, spot)).unzip();
+        cx.check_cancelled()?;
+
+        let (points, triangles) = (skin.positions(), &skin.triangles().corners);
+        let roots: Vec<[f64; 3]> = spots
+            .iter()
+            .map(|spot| {
+                spot.mix(triangles[spot.triangle as usize].map(|corner| points[corner as usize].map(f64::from)))
+            })
+            .collect();
+        let hairs = Binding::on(points, triangles, &spots);
+        let Roots(guide_roots) = Roots::of(guides);
+        // Where there is nothing to hold on to, nothing grows either.
+        let guides = Binding::nearest(points, triangles, &guide_roots);
+        let guides = guides.unwrap_or_else(|| Binding::on(points, triangles, &[]));
+        let stands = |places: &[[f32; 3]], normals: Vec<[f64; 3]>| -> Vec<Stand> {
+            let stand = |(at, normal): (&[f32; 3], [f64; 3])| Stand { at: *at, normal: normal.map(|x| x as f32) };
+            places.iter().zip(normals).map(stand).collect()
+        };
+        let narrow: Vec<[f32; 3]> = roots.iter().map(|root| root.map(|x| x as f32)).collect();
+        let mix =
+            mix(&stands(&guide_roots, guides.normals()), &stands(&narrow, hairs.normals()), cx.get(COUNT) as usize);
+        Ok(Self { ids, spots, roots, mix, hairs, guides })
+    }
+
+    /// How hairs' roots and guides' roots have moved with the skin.
+    fn carried(&self, skin: &Component) -> (Vec<Pose>, Vec<Pose>) {
+        (self.hairs.carry(skin.positions()), self.guides.carry(skin.positions()))
+    }
+
+    /// The hairs at the scene's first frame.
+    fn at_rest(&self, guides: &Component, cvs: usize) -> Vec<[f32; 3]> {
+        let shapes = Shapes::new(guides.runs().starts(), guides.positions(), cvs);
+        blend(shapes, &Blend { mix: &self.mix, roots: &self.roots, poses: None }).points
+    }
+}
+
+/// Gives hairs what their guides have.
+fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shapes, now: &Blend) -> Result<()> {
+    let own = |name: &str| [P.name, PREF.name, CURVE_ID.name].contains(&name);
+    for (owner, name, column) in guides.columns().filter(|(_, name, _)| !own(name)) {
+        let rows = match owner {
+            Owner::Once => {
+                hairs.set_column(owner, name.clone(), column.clone())?;
+                continue;
+            }
+            Owner::Point => Rows::Point,
+            Owner::Element => Rows::Element,
+        };
+        if hairs.element_count() == 0 || !cx.wants_named(name) {
+            continue;
+        }
+        let table = guides.table(owner);
+        let mixed = if let Some(vectors) = table.get::<[f32; 3]>(name).filter(|_| [V.name, N.name].contains(&&**name)) {
+            let mut vectors = now.vectors(shapes, vectors, rows);
+            if **name == *N.name {
+                vectors.iter_mut().for_each(|normal| *normal = unit(*normal));
+            }
+            Column::new(vectors)
+        } else if let Some(turns) = table.get::<[f32; 4]>(name).filter(|_| **name == *ORIENT.name) {
+            Column::new(now.orientations(shapes, turns, rows))
+        } else if let Some(numbers) = table.get::<f32>(name) {
+            let numbers: Vec<[f32; 1]> = numbers.iter().map(|number| [*number]).collect();
+            Column::new(now.numbers(shapes, &numbers, rows).into_iter().map(|[number]| number).collect::<Vec<f32>>())
+        } else if let Some(numbers) = table.get::<[f32; 3]>(name) {
+            Column::new(now.numbers(shapes, numbers, rows))
+        } else if let Some(numbers) = table.get::<[f32; 4]>(name) {
+            Column::new(now.numbers(shapes, numbers, rows))
+        } else {
+            column.gather(&now.heaviest(shapes, rows))
+        };
+        hairs.set_column(owner, name.clone(), mixed)?;
+    }
+    Ok(())
+}
+
+/// At length 1; zero where it has no direction.
+fn unit(v: [f32; 3]) -> [f32; 3] {
+    let length = v.iter().map(|x| f64::from(*x) * f64::from(*x)).sum::<f64>().sqrt();
+    if length > 0.0 { v.map(|x| (f64::from(x) / length) as f32) } else { v }
+}
+
+#[cfg(test)]
+mod tests;
