@@ -132,7 +132,7 @@ fn cook_into(
     engine: &Engine,
     graph: &Graph,
     frames: std::ops::RangeInclusive<i64>,
-    sink: &mut dyn FnMut(&[Delivered]) -> Result<(), Infallible>,
+    sink: &mut (dyn FnMut(&[Delivered]) -> Result<(), Infallible> + Send),
 ) -> Report {
     let request = Request { outputs: vec![0], frames: frames.map(Frame::whole).collect() };
     let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut { sink }).expect("it cooks");

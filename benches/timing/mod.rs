@@ -6,20 +6,20 @@ use engine::clock::Stopwatch;
 use engine::cook::Engine;
 
 /// Threads and instructions that times were taken with.
-pub fn print_machine(engine: &Engine) {
+pub(crate) fn print_machine(engine: &Engine) {
     println!("{} threads, SIMD path {}", engine.threads(), numerics::simd::Path::chosen().name());
 }
 
 /// Least times by name, and the calibration loop's.
 #[derive(Default)]
-pub struct Figures {
+pub(crate) struct Figures {
     calibration: Option<Duration>,
     times: Vec<(String, u32, Duration)>,
 }
 
 impl Figures {
     /// Another run of `per` units of a kind.
-    pub fn add(&mut self, name: impl Into<String>, per: u32, time: Duration) {
+    pub(crate) fn add(&mut self, name: impl Into<String>, per: u32, time: Duration) {
         let name = name.into();
         match self.times.iter_mut().find(|(known, _, _)| *known == name) {
             Some((_, _, least)) => *least = time.min(*least),
@@ -28,7 +28,7 @@ impl Figures {
     }
 
     /// A loop of dependent multiplications and additions: 10 million on one core.
-    pub fn calibrate(&mut self) {
+    pub(crate) fn calibrate(&mut self) {
         let watch = Stopwatch::start();
         let mut x = 1.0_f64;
         for k in 0..10_000_000 {
@@ -40,13 +40,13 @@ impl Figures {
     }
 
     /// Seconds of one unit.
-    pub fn least(&self, name: &str) -> f64 {
+    pub(crate) fn least(&self, name: &str) -> f64 {
         let (_, per, time) = self.times.iter().find(|(known, _, _)| *known == name).expect("it was measured");
         time.as_secs_f64() / f64::from(*per)
     }
 
     /// The table of all.
-    pub fn print(&self) {
+    pub(crate) fn print(&self) {
         let loop_seconds = self.calibration.unwrap_or_default().as_secs_f64();
         println!("calibration loop: {:.2} ms", loop_seconds * 1e3);
         println!("{:<58} {:>12} {:>12}", "", "µs", "÷ loop");

@@ -15,7 +15,7 @@ use engine::prelude::*;
 use numerics::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
 
 use crate::shared::faces::{counted, same_faces};
-use crate::shared::kept::{Roots, kept};
+use crate::shared::kept::Roots;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they grew on `rest_skin`, root first.");
@@ -59,7 +59,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         ));
     }
     let roots = Roots::of(curves);
-    let binding = kept(rest, roots.clone(), || bind(&roots.0, rest))?;
+    let binding = rest.kept(roots.clone(), || bind(&roots.0, rest))?;
     cx.check_cancelled()?;
 
     let mut out = curves.clone();

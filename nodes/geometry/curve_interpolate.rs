@@ -16,7 +16,7 @@ use numerics::attach::{Binding, Pose};
 use numerics::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
 use numerics::scatter::Spot;
 
-use crate::shared::kept::{Array, Roots, kept};
+use crate::shared::kept::{Array, Roots};
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
 inputs! { INPUTS:
@@ -78,7 +78,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         0 => guides.runs().counts().max().unwrap_or(2) as usize,
         cvs => cvs as usize,
     };
-    let coat = kept(rest, Asked::of(cx, first, rest, cvs), || Coat::grow(cx, first, rest, cvs))?;
+    let coat = rest.kept(Asked::of(cx, first, rest, cvs), || Coat::grow(cx, first, rest, cvs))?;
     cx.check_cancelled()?;
 
     let poses = (rest.positions() != skin.positions()).then(|| coat.carried(skin));

@@ -17,7 +17,7 @@
 use std::sync::Arc;
 
 use engine::prelude::*;
-use numerics::collide::{Collide, Method as Turn, Scaled, collide};
+use numerics::collide::{Collide, Method as Turn, Scaled, at_rest, collide};
 use numerics::tree::TriangleTree;
 
 use crate::shared::surface::{Surface, tree};
@@ -120,26 +120,27 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let trees: Vec<Arc<TriangleTree>> = colliders.iter().map(|mesh| tree(mesh)).collect();
     let obstacles: Vec<&TriangleTree> = trees.iter().map(Arc::as_ref).collect();
     let skin = Surface::of(cx.input(SKIN).and_then(Geometry::mesh).unwrap_or(first));
-    let collided = collide(
-        curves.runs().starts(),
-        rest.positions(),
-        curves.positions(),
-        &Collide {
-            obstacles: &obstacles,
-            skin: Some(skin.skin()),
-            method: match cx.get(METHOD) {
-                Method::Exact => Turn::Exact,
-                Method::Steps => Turn::Steps(cx.get(ROTATION_STEPS) as u32),
-            },
-            coherence: cx.get(COHERENCE),
-            at_rest: None,
-            gap: cx.get(GAP),
-            offset_root: cx.get(OFFSET_ROOT),
-            offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
-            blend: Scaled { value: blend, mask: blend_mask },
-            width: Scaled { value: width, mask: width_mask },
+    let mut how = Collide {
+        obstacles: &obstacles,
+        skin: Some(skin.skin()),
+        method: match cx.get(METHOD) {
+            Method::Exact => Turn::Exact,
+            Method::Steps => Turn::Steps(cx.get(ROTATION_STEPS) as u32),
         },
-    );
+        coherence: cx.get(COHERENCE),
+        gap: cx.get(GAP),
+        offset_root: cx.get(OFFSET_ROOT),
+        offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
+        at_rest: None,
+        blend: Scaled { value: blend, mask: blend_mask },
+        width: Scaled { value: width, mask: width_mask },
+    };
+    let starts = curves.runs().starts();
+    // While nothing moves, what is so at rest is looked at once.
+    let still = Still { obstacles: trees.clone(), skin: skin.tree().clone(), offset: how.offset_root };
+    let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
+    how.at_rest = Some(&at_rest);
+    let collided = collide(starts, rest.positions(), curves.positions(), &how);
     cx.publish(CROSSINGS_LEFT, collided.crossings_left as f64);
     cx.publish(UNFREED, collided.unfreed_segments as f64);
     cx.publish(STARTED_INSIDE, collided.started_inside as f64);
@@ -148,6 +149,23 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(LENGTH_ERROR, collided.length_error);
     out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves").set(P, collided.points)?;
     Ok(OUT.with(out))
+}
+
+/// What curves at rest are looked at with; equal where trees are the very same.
+struct Still {
+    obstacles: Vec<Arc<TriangleTree>>,
+    skin: Arc<TriangleTree>,
+    offset: f64,
+}
+
+impl PartialEq for Still {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |(a, b): (&Arc<TriangleTree>, &Arc<TriangleTree>)| Arc::ptr_eq(a, b);
+        self.obstacles.len() == other.obstacles.len()
+            && self.obstacles.iter().zip(&other.obstacles).all(same)
+            && Arc::ptr_eq(&self.skin, &other.skin)
+            && self.offset == other.offset
+    }
 }
 
 fn count(curves: &Component) -> String {

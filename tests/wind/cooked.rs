@@ -55,8 +55,7 @@ fn cook_text(text: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
         })
         .collect();
     let engine = Engine::new(&Settings::default()).unwrap();
-    let request =
-        Request { outputs: (0..outputs.len()).collect(), frames: (1..=frames).map(Frame::whole).collect() };
+    let request = Request { outputs: (0..outputs.len()).collect(), frames: (1..=frames).map(Frame::whole).collect() };
     let mut found = vec![vec![Geometry::default(); frames as usize]; outputs.len()];
     let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
         for one in finished {

@@ -7,6 +7,7 @@ mod attribute;
 mod column;
 mod component;
 mod derived;
+mod kept;
 mod topology;
 mod triangles;
 mod volume;

@@ -29,6 +29,11 @@ impl Surface {
         Self { tree: tree(mesh), triangles, normals }
     }
 
+    /// The tree of its triangles.
+    pub(crate) fn tree(&self) -> &Arc<TriangleTree> {
+        &self.tree
+    }
+
     /// What the kernel takes.
     pub(crate) fn skin(&self) -> Skin<'_> {
         Skin { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
