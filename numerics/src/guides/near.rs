@@ -161,7 +161,9 @@ impl<'a> Field<'a> {
     /// How far each guide of a block counts as being.
     #[inline(always)]
     fn distances(&self, block: &Block, normal: Vec3, at: Vec3) -> F32x16 {
-        let normals = &self.normals[self.row_of[block.triangle[0] as usize] as usize];
+        // A guide that is not finite leaves its lane blank; a block of such alone is never met.
+        let guide = block.triangle.into_iter().find(|guide| *guide != NONE);
+        let normals = &self.normals[guide.map_or(0, |guide| self.row_of[guide as usize] as usize)];
         let mut distances = F32x16::splat(0.0);
         for lane in 0..LANES {
             let away = vec3::length(vec3::sub(get(&block.corners[0], lane), at));
