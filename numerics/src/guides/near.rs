@@ -2,9 +2,9 @@
 
 use super::Share as Part;
 use crate::attach::vectors::{cross, dot, wide};
-use crate::lanes::{F32x16, LANES, get};
+use crate::lanes::{F32x16, LANES, Lanes, get, set};
 use crate::simd::{Path, kernel};
-use crate::tree::{Block, TriangleTree};
+use crate::tree::{Block, NONE, TriangleTree};
 use crate::vec3::{self, Vec3, largest, power_of_two_to_one};
 use rayon::prelude::*;
 
@@ -100,6 +100,10 @@ const GUESS: f32 = 1.05;
 struct Field<'a> {
     guides: &'a [Stand],
     tree: TriangleTree,
+    /// Of the guides of each block of the tree.
+    normals: Vec<Lanes<3>>,
+    /// Which block a guide is in.
+    row_of: Vec<u32>,
     from: Vec3,
     /// Brings the field to a size of about 1.
     unit: f32,
@@ -116,8 +120,16 @@ impl<'a> Field<'a> {
         let points: Vec<Vec3> = guides.iter().map(|guide| vec3::scale(vec3::sub(guide.at, from), unit)).collect();
         let spots: Vec<[u32; 3]> = (0..guides.len() as u32).map(|guide| [guide; 3]).collect();
         let tree = TriangleTree::build(&points, &spots);
+        let mut normals = vec![[F32x16::splat(0.0); 3]; tree.blocks().len()];
+        let mut row_of = vec![0; guides.len()];
+        for (row, block) in tree.blocks().iter().enumerate() {
+            for (lane, guide) in block.triangle.into_iter().enumerate().filter(|(_, guide)| *guide != NONE) {
+                set(&mut normals[row], lane, guides[guide as usize].normal);
+                row_of[guide as usize] = row as u32;
+            }
+        }
         let first_reach = 4.0 / (guides.len() as f32).sqrt();
-        Self { guides, tree, from, unit, first_reach }
+        Self { guides, tree, normals, row_of, from, unit, first_reach }
     }
 
     /// The `count` nearest guides (all, where they are fewer), of equals the first.
@@ -149,17 +161,13 @@ impl<'a> Field<'a> {
     /// How far each guide of a block counts as being.
     #[inline(always)]
     fn distances(&self, block: &Block, normal: Vec3, at: Vec3) -> F32x16 {
-        let mut normals = [F32x16::splat(0.0); 3];
-        for lane in 0..LANES {
-            let guide = block.triangle[lane] as usize;
-            // A blank lane has no guide; what is computed for it is not looked at.
-            let of = self.guides.get(guide).map_or([0.0; 3], |guide| guide.normal);
-            crate::lanes::set(&mut normals, lane, of);
-        }
+        // A guide that is not finite leaves its lane blank; a block of such alone is never met.
+        let guide = block.triangle.into_iter().find(|guide| *guide != NONE);
+        let normals = &self.normals[guide.map_or(0, |guide| self.row_of[guide as usize] as usize)];
         let mut distances = F32x16::splat(0.0);
         for lane in 0..LANES {
             let away = vec3::length(vec3::sub(get(&block.corners[0], lane), at));
-            let cosine = vec3::dot(get(&normals, lane), normal);
+            let cosine = vec3::dot(get(normals, lane), normal);
             let cosine = if cosine < 1.0 { cosine } else { 1.0 };
             let cosine = if cosine > -1.0 { cosine } else { -1.0 };
             distances.0[lane] = away * ((2.0 + BEHIND) / (1.0 + cosine + BEHIND));
