@@ -23,7 +23,7 @@ pub enum Exit {
     Graph = 3,
     /// A node could not cook.
     Cook = 4,
-    /// Ctrl-C.
+    /// Ctrl-C, or a polite request to end: SIGTERM, SIGHUP.
     Interrupted = 130,
 }
 
@@ -87,7 +87,7 @@ pub fn exit_of_error(error: &CookError) -> Exit {
     }
 }
 
-/// A flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
+/// A flag that Ctrl-C, SIGTERM and SIGHUP set; a second one ends the program at once.
 pub fn cancelled_by_ctrl_c() -> Arc<AtomicBool> {
     let cancel = Arc::new(AtomicBool::new(false));
     let flag = cancel.clone();

@@ -21,7 +21,7 @@ const LARGEST_GRAPH: u64 = 256 << 20;
 /// Where the file cannot be read, or its faults.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
+    let file = engine::files::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
     if bytes.len() as u64 > LARGEST_GRAPH {
         let fact = format!("the graph `{}` has more than {} MiB", path.display(), LARGEST_GRAPH >> 20);

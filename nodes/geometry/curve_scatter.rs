@@ -39,9 +39,6 @@ const CURVES: Output = Output::new(
     "The curves, root first, with `Pref`, `curve_id` and, where the skin has it, the `uvw` of the root.",
 );
 
-/// Which of the endless list of curves each is.
-const CURVE_ID: Attr<i32> = Attr::element("curve_id");
-
 const GROWN: Metric = Metric::new("curves", Unit::None, "Curves that grew.");
 
 /// See the module.
@@ -178,15 +175,11 @@ fn mask<'c>(cx: &Cx, rest: &'c Component) -> Result<Option<&'c [f32]>> {
     if name.is_empty() {
         return Ok(None);
     }
-    let table = rest.table(Owner::Point);
-    match (table.get(&name), table.column(&name)) {
-        (Some(mask), _) => Ok(Some(mask)),
-        (None, found) => {
-            let what =
-                found.map_or("which `skin` does not have".into(), |column| format!("which is {}", column.kind()));
-            Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected a float a point of the skin"))
-        }
+    if let Some(mask) = rest.table(Owner::Point).get(&name) {
+        return Ok(Some(mask));
     }
+    let what = rest.describe(&name).map_or("which `skin` does not have".into(), |found| format!("which is {found}"));
+    Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected one float for each vertex"))
 }
 
 /// The skin's own normals, or else those of its faces around each point.

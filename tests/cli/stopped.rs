@@ -54,6 +54,21 @@ fn ctrl_c_leaves_whole_frames_and_no_temporary() {
 }
 
 #[test]
+fn being_asked_to_end_is_like_ctrl_c() {
+    for name in ["TERM", "HUP"] {
+        let bench = Bench::new();
+        let child = start(&bench, &["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass"]);
+        wait_for(5, &bench.path("out"));
+        signal(name, &child);
+        let ran = ended(child);
+        assert_eq!(ran.code, Some(130), "{name}: {}", ran.stderr);
+        let expected: Vec<String> =
+            (1..=bench.names("out").len()).map(|frame| format!("grass.{frame:04}.json")).collect();
+        assert_eq!(bench.names("out"), expected, "frames without a gap, and nothing hidden");
+    }
+}
+
+#[test]
 fn ctrl_c_finishes_a_sequence_with_the_frames_it_has() {
     let bench = Bench::new();
     let child = start(&bench, &["cook", "g.json", "--frames", LONG, "--format", "usda", "--output", "grass"]);
@@ -175,6 +190,30 @@ fn a_full_disk_is_told_and_holds_nothing_half_written() {
             fs::remove_file(disk.join(name)).unwrap();
         }
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_under_the_cache_is_told_once_and_does_not_stop_the_cook() {
+    let bench = Bench::new();
+    let disk = bench.path("disk");
+    let Some(_mounted) = TinyDisk::at(&disk) else {
+        eprintln!("skipped: this user may not mount a small disk");
+        return;
+    };
+    let args = ["cook", "g.json", "--frames", "1-40", "--format", "json", "--cache", "disk", "--output", "grass"];
+    for _ in 0..2 {
+        let ran = bench.run(&args);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let note = "note: the cache `disk` could not be written: the disk is full; the cook goes on without it\n";
+        assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
+        assert_eq!(bench.names("out").len(), 40);
+        assert!(bench.names("disk").iter().all(|name| !name.ends_with(".part")), "{:?}", bench.names("disk"));
+    }
+    fs::write(disk.join("filler"), vec![0; 1 << 16]).unwrap_err();
+    let ran = bench.run(&[&args[..7], &["disk/new", "--output", "grass"]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the disk is full; the cook goes on without it"), "{}", ran.stderr);
 }
 
 #[test]

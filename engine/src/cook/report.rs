@@ -24,8 +24,10 @@ pub struct NodeReport {
     pub varies: bool,
     /// Results cooked; steps of a window or solver.
     pub cooks: u64,
-    /// Results taken from memory or disk instead.
+    /// Results taken from memory instead, and states of solvers from disk.
     pub from_cache: u64,
+    /// Frames for which a finished frame on disk, that this node has a part in, was taken.
+    pub from_disk: u64,
     /// Stages that could not matter.
     pub left_out: Vec<LeftOut>,
     /// Wall time.

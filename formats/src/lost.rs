@@ -1,0 +1,112 @@
+//! What a format drops of a geometry, by name: so that nobody looks for it in the file in vain.
+//!
+//! Promise: what is named here is what the format's own reader does not find again; a test holds it to that. Limit: what
+//! other programs drop of a file is theirs.
+
+use engine::geometry::{Component, Geometry, Kind, N, Name, Owner, P, UVW};
+
+use crate::Format;
+use crate::obj::CD;
+
+/// Names of what is in `geometry` and will not be in a file of that format: `` `envelope` of curves ``, `the curves
+/// without a point`. Components that the format cannot hold at all are refused elsewhere.
+pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
+    let holds: fn(&Component, Owner, &Name, bool) -> bool = match format {
+        Format::Usdc | Format::Usda | Format::Json => return Vec::new(),
+        Format::Ply => |_, owner, _, _| owner != Owner::Once,
+        Format::Obj => obj_holds,
+    };
+    let is_alone = geometry.parts().filter(|part| part.point_count() > 0).count() < 2;
+    let mut lost = Vec::new();
+    for part in geometry.parts() {
+        let kind = part.kind();
+        if part.point_count() == 0 {
+            lost.push(format!("the {kind} without a point"));
+            continue;
+        }
+        // Of no rows nothing is lost: points have no elements.
+        let columns = part.columns().filter(|(_, _, column)| !column.is_empty());
+        let columns = columns.filter(|(owner, name, _)| !holds(part, *owner, name, is_alone));
+        lost.extend(columns.map(|(_, name, _)| format!("`{name}` of {kind}")));
+    }
+    lost
+}
+
+/// Whether an OBJ file holds that attribute. Normals of curves and points have no place of their own in it: they are
+/// taken for those of all vertices, where there is no other component.
+fn obj_holds(part: &Component, owner: Owner, name: &Name, is_alone: bool) -> bool {
+    let is_vector = part.table(owner).get::<[f32; 3]>(name).is_some();
+    owner == Owner::Point
+        && is_vector
+        && match &**name {
+            name if name == P.name || name == UVW.name || name == CD => true,
+            name if name == N.name => part.kind() == Kind::Mesh || is_alone,
+            _ => false,
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::FrameStamp;
+    use engine::geometry::{Column, ColumnType};
+
+    fn full(mut part: Component) -> Component {
+        for (owner, name, kind) in [
+            (Owner::Point, "N", ColumnType::F3),
+            (Owner::Point, "uvw", ColumnType::F3),
+            (Owner::Point, "Cd", ColumnType::F3),
+            (Owner::Point, "envelope", ColumnType::F1),
+            (Owner::Element, "clump", ColumnType::I1),
+            (Owner::Once, "gain", ColumnType::F1),
+        ] {
+            let rows = part.table(owner).rows();
+            part.set_column(owner, name, Column::zeros(kind, rows)).unwrap();
+        }
+        part
+    }
+
+    fn samples() -> Vec<Geometry> {
+        let positions = vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
+        let curves = full(Component::curves(vec![3], positions.clone()).unwrap());
+        let mesh = full(Component::mesh(vec![3], vec![0, 1, 2], positions.clone()).unwrap());
+        let points = full(Component::points(positions));
+        let none = Component::curves(Vec::new(), Vec::new()).unwrap();
+        vec![
+            curves.clone().into(),
+            mesh.clone().into(),
+            points.clone().into(),
+            Geometry::from(curves).with(mesh.clone()).with(points),
+            none.clone().into(),
+            Geometry::from(none).with(mesh),
+        ]
+    }
+
+    #[test]
+    fn what_is_named_is_what_does_not_come_back() {
+        let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
+        for (place, geometry) in samples().iter().enumerate() {
+            for format in [Format::Obj, Format::Ply, Format::Json] {
+                let mut bytes = Vec::new();
+                crate::write(format, geometry, &stamp, &mut bytes).unwrap();
+                let back = crate::read(format, &bytes).unwrap();
+                let mut gone = Vec::new();
+                for part in geometry.parts() {
+                    let Some(back) = back.part(part.kind()) else {
+                        gone.push(format!("the {} without a point", part.kind()));
+                        continue;
+                    };
+                    let columns = part.columns().filter(|(owner, name, _)| back.table(*owner).column(name).is_none());
+                    let columns = columns.filter(|(_, _, column)| !column.is_empty());
+                    gone.extend(columns.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
+                }
+                assert_eq!(lost(format, geometry), gone, "{format} of sample {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn usd_holds_everything() {
+        assert!(samples().iter().all(|geometry| lost(Format::Usdc, geometry).is_empty()));
+    }
+}
