@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use engine::cook::NodeReport;
-use engine::plan::Request;
+use engine::plan::{Request, Window};
 use serde_json::{Value, json};
 
 use crate::args::{Frames, Setting};
@@ -71,8 +71,13 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
     let _ = match (node.varies, node.cooks) {
         (false, 1) if frames > 1 => writeln!(text, "cooked once: it stands still"),
         (_, 1) => writeln!(text, "cooked once"),
-        (_, n) if node.time == "window" || node.time == "solver" => writeln!(text, "{n} steps"),
-        (_, n) => writeln!(text, "cooked {n} times"),
+        (_, n) => match node.window {
+            Some(Window { frames: back, every }) => {
+                writeln!(text, "{n} steps for {frames} frames: it looks back {back}, from anchors every {every}")
+            }
+            None if node.time == "solver" => writeln!(text, "{n} steps"),
+            None => writeln!(text, "cooked {n} times"),
+        },
     };
     for stage in &node.left_out {
         let _ = writeln!(text, "{:<16} left out {}: {}", "", stage.stage, stage.why);
@@ -87,5 +92,6 @@ fn to_json(node: &NodeReport) -> Value {
     json!({
         "id": node.id.as_deref(), "type": node.type_name, "time": node.time, "needed": node.needed,
         "varies": node.varies, "cooks": node.cooks, "left_out": left_out,
+        "window": node.window.map(|window| json!({"frames": window.frames, "every": window.every})),
     })
 }

@@ -8,7 +8,7 @@ use engine::clock::Stopwatch;
 use engine::cook::{Delivered, Engine, Settings};
 use engine::geometry::{Component, Geometry, Kind};
 use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Scene};
-use engine::node::{Chain, Cook, FrameCx, Input, Node, Output, Outputs, StepCx};
+use engine::node::{Chain, Cook, FrameCx, Input, Node, Output, Outputs, Past, StepCx};
 use engine::plan::Request;
 
 const POINTS: Input = Input::one("points", Kind::Points, "Points.");
@@ -48,8 +48,9 @@ impl Chain for Nothing {
 }
 
 /// Looks back eight frames, and hands on what it got.
-static WINDOW: Node =
-    Node::new("Window", 1, "Hands points on.", Cook::window::<Nothing>(|_| 8)).inputs(&[&POINTS]).outputs(&[&OUT]);
+static WINDOW: Node = Node::new("Window", 1, "Hands points on.", Cook::window::<Nothing>(|_, _| Past::frames(8)))
+    .inputs(&[&POINTS])
+    .outputs(&[&OUT]);
 
 /// `count` nodes in a row, the first over a frame node over a still source.
 fn graph(node: &'static Node, count: usize, frames: i64) -> Graph {

@@ -24,10 +24,10 @@ pub mod prelude {
         Runs, SHIELDED, THICKNESS, Topology, UVW, V, Volume, WIDTH,
     };
     pub use crate::node::{
-        AttrDecl, AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs,
+        AttrDecl, AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past,
         StepCx, Times, Wires,
     };
-    pub use crate::param::{Code, Masked, Param, Params, Seed, Span, Turn, Unit};
+    pub use crate::param::{Clock, Code, Masked, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;
     pub use crate::{choice, inputs, params};
 }

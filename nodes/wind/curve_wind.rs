@@ -10,6 +10,7 @@
 //! * A curve of n segments bends more than one of n/2: `resolution_free` takes a share of the angle a length instead.
 //! * `blend` turns each segment back towards where it came from, so that half a wind keeps lengths too.
 
+use crate::shared::direction::unit;
 use engine::prelude::*;
 use numerics::bend::{Bend, BendNoise, Mode as BendMode, bend};
 use numerics::noise::{Field, Kind as NoiseKind};
@@ -164,13 +165,9 @@ fn still(cx: &FrameCx, out: Geometry) -> Result<Outputs> {
     Ok(OUT.with(out))
 }
 
-/// The wind's direction, of length 1. Its numbers are brought near 1 first, so that any length will do.
+/// The wind's direction, of length 1.
 fn direction(params: &Params) -> [f64; 3] {
-    let v = params.get(WIND_DIR);
-    let largest = v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let v = v.map(|x| x / largest);
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    v.map(|x| x / length)
+    unit(params.get(WIND_DIR))
 }
 
 fn has_kind(params: &Params) -> bool {

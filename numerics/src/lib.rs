@@ -13,12 +13,18 @@
 
 pub mod affine;
 pub mod bend;
+pub mod collide;
+pub mod gusts;
+pub mod jiggle;
 pub mod lanes;
 pub mod noise;
 pub mod ramp;
 pub mod random;
 pub mod scatter;
 pub mod shapes;
+pub mod shield;
 pub mod simd;
+pub mod tree;
+pub mod triangulate;
 pub mod trig;
 pub mod vec3;

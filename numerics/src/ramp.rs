@@ -116,6 +116,11 @@ impl Ramp {
         self.keys.iter().map(|key| key[1]).fold(f32::NEG_INFINITY, f32::max)
     }
 
+    /// The smallest value, likewise.
+    pub fn min(&self) -> f32 {
+        self.keys.iter().map(|key| key[1]).fold(f32::INFINITY, f32::min)
+    }
+
     /// The one value, where all keys have the same.
     pub fn is_constant(&self) -> Option<f32> {
         let first = self.keys[0][1];
@@ -254,9 +259,9 @@ mod tests {
     }
 
     #[test]
-    fn largest_value_and_constancy_are_told() {
+    fn extreme_values_and_constancy_are_told() {
         let ramp = Ramp::new(vec![[0.0, 0.2], [0.5, 3.0], [1.0, 1.0]], Interpolation::Smooth).unwrap();
-        assert_eq!((ramp.max(), ramp.is_constant()), (3.0, None));
+        assert_eq!((ramp.min(), ramp.max(), ramp.is_constant()), (0.2, 3.0, None));
         let flat = Ramp::new(vec![[0.0, 0.3], [1.0, 0.3]], Interpolation::Smooth).unwrap();
         assert_eq!((flat.is_constant(), flat.eval(0.37)), (Some(0.3), 0.3));
         assert_eq!(Ramp::constant(f32::NAN).is_constant(), Some(0.0));

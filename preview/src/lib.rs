@@ -28,7 +28,6 @@ pub use color::{attribute_names, attribute_range, color_map};
 pub use image::{Image, contact_sheet, side_by_side};
 pub use picture::render;
 pub use scene::{bounds, union};
-pub use shape::triangulate::triangulate;
 
 /// A geometry in a picture.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::camera::Bounds;
 use crate::color::{Paint, SPEED};
-use crate::shape::{boundary, level_set, smooth, triangulate};
+use crate::shape::{boundary, level_set, smooth};
 use crate::vector::{V3, finite, scale, sub, unit};
 use crate::view::Stage;
 use crate::{Layer, Settings};
@@ -141,18 +141,8 @@ impl Scene {
     }
 
     fn mesh(&mut self, part: &Component, paint: &Paint, stage: &Stage) {
-        let Some(faces) = part.faces() else { return };
-        let (triangles, elements): (Vec<_>, Vec<_>) = (0..faces.runs.len())
-            .into_par_iter()
-            .flat_map_iter(|face| {
-                let corners = faces.face(face);
-                let at: Vec<V3> = corners.iter().map(|k| part.positions()[*k as usize]).collect();
-                triangulate::triangulate(&at)
-                    .into_iter()
-                    .map(move |ear| (ear.map(|k| corners[k as usize]), face as u32))
-            })
-            .unzip();
-        self.surface(&place(part.positions(), stage), &triangles, &elements, paint);
+        let triangles = part.triangles();
+        self.surface(&place(part.positions(), stage), &triangles.corners, &triangles.faces, paint);
     }
 
     fn volume(&mut self, volume: &Volume, color_by: Option<(&str, [f32; 2])>, plain: V3, stage: &Stage) {

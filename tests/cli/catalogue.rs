@@ -59,6 +59,24 @@ fn a_plan_says_how_often_each_node_cooks_and_what_is_left_out() {
 }
 
 #[test]
+fn a_plan_says_how_far_back_a_window_looks_and_what_that_costs() {
+    let bench = Bench::with_graph(
+        r#"{ "convect": 1, "scene": { "frames": [1, 96] },
+             "nodes": {
+               "hair": { "type": "Curve_In", "params": { "counts": [2], "points": [[0, 0, 0], [0, 1, 0]] } },
+               "wind": { "type": "Curve_Wind", "inputs": { "curves": "hair" } },
+               "jiggle": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" }, "params": { "frequency": 12 } } },
+             "outputs": { "hair": "jiggle" } }"#,
+    );
+    // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors, each but the first run up from 9 earlier.
+    let text = bench.done(&["explain", "g.json"]);
+    assert!(text.contains("186 steps for 96 frames: it looks back 9, from anchors every 9"), "{text}");
+    let plan = bench.json(&["explain", "g.json", "--json"]);
+    assert_eq!(plan["nodes"][2]["window"], json!({"frames": 9, "every": 9}));
+    assert_eq!(plan["nodes"][1]["window"], Value::Null);
+}
+
+#[test]
 fn the_schema_is_json_that_names_every_node() {
     let bench = Bench::new();
     let schema = bench.json(&["schema"]).to_string();

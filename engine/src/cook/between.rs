@@ -2,14 +2,31 @@
 
 use std::sync::Arc;
 
+use super::call::guarded;
 use super::store::Cooked;
+use crate::error::Result;
 use crate::geometry::{Geometry, P, V};
+use crate::node::MendBetween;
 
 /// The results of a window `share` of the way from `near[1]` to `near[2]`; `near[0]` and `near[3]` are the frames before
 /// and after. `P` and `v` go along the cubic Hermite through them (Catmull–Rom slopes); all else is that of `near[1]`.
-pub(super) fn between(near: [&Cooked; 4], share: f32) -> Cooked {
-    let ports = near[1].len();
-    (0..ports).map(|port| Arc::new(geometry_between(near.map(|cooked| &*cooked[port]), share))).collect()
+/// `mend` has the last word on each output.
+///
+/// # Errors
+/// Where `mend` panics.
+pub(super) fn between(near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
+    let one = |port: usize| {
+        let near = near.map(|cooked| &*cooked[port]);
+        let mut result = geometry_between(near, share);
+        if let Some(mend) = mend {
+            guarded(|| {
+                mend([near[1], near[2]], share, &mut result);
+                Ok(())
+            })?;
+        }
+        Ok(Arc::new(result))
+    };
+    (0..near[1].len()).map(one).collect()
 }
 
 fn geometry_between(near: [&Geometry; 4], share: f32) -> Geometry {

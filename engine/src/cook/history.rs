@@ -1,10 +1,9 @@
 //! Integrals over time of what a node's params were, kept from frame to frame.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use crate::graph::Scene;
-use crate::node::History;
-use crate::param::Params;
+use crate::node::{History, Integrand, Node};
 use crate::plan::Resolver;
 use crate::time::Frame;
 
@@ -27,20 +26,45 @@ pub(crate) fn history_start(scene: &Scene) -> i64 {
     scene.first.min(0)
 }
 
-/// One node's integral.
-pub(crate) struct Integral<'a> {
+/// One node's integrals, in the order of its integrands.
+pub(crate) struct Integrals<'a>(Vec<Integral<'a>>);
+
+impl<'a> Integrals<'a> {
+    pub(crate) fn new(resolver: &'a Resolver, node: &Node, scene: &Scene) -> Self {
+        let of = |integrand: &Integrand| Integral::new(resolver, *integrand, scene);
+        Self(node.integrands.iter().flatten().map(of).collect())
+    }
+}
+
+impl History for Integrals<'_> {
+    fn integral(&self, place: usize, upto: Frame) -> [f64; 3] {
+        self.0[place].upto(upto)
+    }
+}
+
+struct Integral<'a> {
     resolver: &'a Resolver,
-    integrand: fn(&Params) -> [f64; 3],
+    integrand: Integrand,
     fps: f64,
     since: Frame,
+    /// Whether the integrand changes with time, and its value where it does not.
+    animated: bool,
+    constant: OnceLock<[f64; 3]>,
     /// Sums over whole frames from frame 0, forwards and backwards, grown on demand in frame order.
     sums: [Mutex<Vec<[f64; 3]>>; 2],
 }
 
 impl<'a> Integral<'a> {
-    pub(crate) fn new(resolver: &'a Resolver, integrand: fn(&Params) -> [f64; 3], scene: &Scene) -> Self {
-        let since = Frame::whole(history_start(scene));
-        Self { resolver, integrand, fps: scene.fps, since, sums: Default::default() }
+    fn new(resolver: &'a Resolver, integrand: Integrand, scene: &Scene) -> Self {
+        Self {
+            resolver,
+            integrand,
+            fps: scene.fps,
+            since: Frame::whole(history_start(scene)),
+            animated: resolver.history_is_animated(),
+            constant: OnceLock::new(),
+            sums: Default::default(),
+        }
     }
 
     /// ∫ from frame `a` to frame `b`, in the integrand's unit × frames.
@@ -58,15 +82,15 @@ impl<'a> Integral<'a> {
     fn value(&self, frame: f64) -> [f64; 3] {
         self.resolver.past(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params))
     }
-}
 
-impl History for Integral<'_> {
-    fn integral(&self, upto: Frame) -> [f64; 3] {
-        if !self.resolver.history_is_animated() {
-            return self.value(upto.number()).map(|x| x * upto.seconds(self.fps));
+    /// ∫ from time 0 to `upto`, in the integrand's unit × seconds.
+    fn upto(&self, upto: Frame) -> [f64; 3] {
+        if !self.animated {
+            let value = self.constant.get_or_init(|| self.value(upto.number()));
+            return value.map(|x| x * upto.seconds(self.fps));
         }
         if upto < self.since {
-            let (seen, held) = (self.integral(self.since), self.value(self.since.number()));
+            let (seen, held) = (self.upto(self.since), self.value(self.since.number()));
             let before = upto.seconds(self.fps) - self.since.seconds(self.fps);
             return std::array::from_fn(|axis| seen[axis] + held[axis] * before);
         }

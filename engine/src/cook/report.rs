@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::CookError;
 use crate::geometry::Name;
 use crate::node::LeftOut;
+use crate::plan::Window;
 use crate::time::Frame;
 
 /// One node's part in a cook.
@@ -24,6 +25,8 @@ pub struct NodeReport {
     pub varies: bool,
     /// Results cooked; steps of a window or solver.
     pub cooks: u64,
+    /// Of a window: how far back it goes, and every how many frames its state starts anew.
+    pub window: Option<Window>,
     /// Results taken from memory instead, and states of solvers from disk.
     pub from_cache: u64,
     /// Frames for which a finished frame on disk, that this node has a part in, was taken.

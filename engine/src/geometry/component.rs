@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::attribute::{Attr, Owner, P, fixed_type};
 use super::column::{Column, Item, Name, Table};
+use super::derived::Derived;
 use super::topology::{Faces, Runs, Topology};
 use super::{GeometryError, Kind};
 
@@ -14,6 +15,7 @@ pub struct Component {
     points: Table,
     elements: Table,
     once: Table,
+    derived: Derived,
 }
 
 impl Component {
@@ -66,7 +68,7 @@ impl Component {
         let elements = Table::new(topology.elements());
         let mut points = Table::new(positions.len());
         points.set(P.name, Column::new(positions)).expect("the table was made with this many rows");
-        Self { topology, points, elements, once: Table::new(1) }
+        Self { topology, points, elements, once: Table::new(1), derived: Derived::default() }
     }
 
     /// A component of the same points and topology with these tables, as a cache reads them back.
@@ -89,7 +91,7 @@ impl Component {
         {
             return Err(GeometryError::Tables);
         }
-        Ok(Self { topology, points, elements, once })
+        Ok(Self { topology, points, elements, once, derived: Derived::default() })
     }
 
     /// Which component this is.
@@ -192,12 +194,27 @@ impl Component {
         if let Some(expected) = fixed_type(&name).filter(|expected| *expected != column.kind()) {
             return Err(GeometryError::Type { name, found: column.kind(), expected });
         }
+        self.forget_derived(owner, &name);
         self.table_mut(owner).set(name, column)
     }
 
     /// An attribute's rows for writing; copied first if anyone else holds them.
     pub fn edit<T: Item>(&mut self, attr: Attr<T>) -> Option<&mut [T]> {
+        self.forget_derived(attr.owner, attr.name);
         self.table_mut(attr.owner).edit(attr.name)
+    }
+
+    /// What `compute` makes of the topology and positions, kept with them: a still mesh has its tree made once for all
+    /// frames and nodes that ask. Two threads that ask at once may both compute it.
+    pub fn derived<T: Send + Sync + 'static>(&self, compute: impl FnOnce(&Self) -> T) -> Arc<T> {
+        self.derived.get_or(|| compute(self))
+    }
+
+    /// Positions are about to change: what was computed from them is another component's from here on.
+    fn forget_derived(&mut self, owner: Owner, name: &str) {
+        if owner == P.owner && name == P.name {
+            self.derived = Derived::default();
+        }
     }
 
     /// Takes an attribute out. `P` stays.
@@ -251,6 +268,7 @@ impl Component {
             points: self.points.concat(&other.points),
             elements: self.elements.concat(&other.elements),
             once,
+            derived: Derived::default(),
         })
     }
 

@@ -6,9 +6,11 @@
 mod attribute;
 mod column;
 mod component;
+mod derived;
 mod lengths;
 mod neutral;
 mod topology;
+mod triangles;
 mod volume;
 
 use std::sync::Arc;
@@ -19,6 +21,7 @@ pub use attribute::{
 pub use column::{Column, ColumnType, Item, Name, Table};
 pub use component::Component;
 pub use topology::{Faces, Runs, Topology};
+pub use triangles::Triangles;
 pub use volume::{Grid, Volume};
 
 /// Which component.

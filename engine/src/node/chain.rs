@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Cook, FrameCx, Outputs, StepCx};
 use crate::Result;
-use crate::param::Params;
+use crate::param::{Clock, Params};
 
 /// A state that runs through whole frames, oldest first. Inputs of a frame are dropped once it is stepped over.
 pub trait Chain: Send + Sync + Sized + 'static {
@@ -33,6 +33,24 @@ pub trait Chain: Send + Sync + Sized + 'static {
 /// A chain whose state can be written to a checkpoint and read back bit for bit.
 pub trait Solver: Chain + Serialize + DeserializeOwned {}
 impl<S: Chain + Serialize + DeserializeOwned> Solver for S {}
+
+/// How much of the past a window hangs on, given its params at a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Past {
+    /// Steps like the one to this frame after which nothing is left of what was before them; each leaves out its share.
+    /// 0: this step forgets all.
+    pub frames: u32,
+    /// Frames before the scene's first at which the state may begin; read at the scene's first frame. 0: what was before
+    /// the scene was as it is at its first frame.
+    pub preroll: u32,
+}
+
+impl Past {
+    /// That many frames, none before the scene's first.
+    pub const fn frames(frames: u32) -> Self {
+        Self { frames, preroll: 0 }
+    }
+}
 
 /// A state of any type.
 pub(crate) type StateBox = Box<dyn Any + Send + Sync>;
@@ -71,11 +89,12 @@ impl ChainFns {
 }
 
 impl Cook {
-    /// A window: frame f depends on at least `frames(params)` frames before it, and on no more than the engine's
+    /// A window: frame f depends on at least as many frames before it as `past` says, and on no more than the engine's
     /// anchors add to that. The state starts that many frames before an anchor; anchors are fixed, so a frame's bits do
-    /// not depend on which frames are asked.
-    pub const fn window<S: Chain>(frames: fn(&Params) -> u32) -> Self {
-        Self::Window(ChainFns::of::<S>(), frames)
+    /// not depend on which frames are asked. Where params are animated, each step counts by its own: one that would take
+    /// n frames to forget all forgets an n-th.
+    pub const fn window<S: Chain>(past: fn(&Params, Clock) -> Past) -> Self {
+        Self::Window(ChainFns::of::<S>(), past)
     }
 
     /// A solver: runs from `start_frame(params)`, or the scene's first frame, in order, whatever frames are asked.

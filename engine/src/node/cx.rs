@@ -106,9 +106,10 @@ impl Cx<'_> {
     }
 }
 
-/// Integrals over time of a node's integrand, kept by the engine from frame to frame.
+/// Integrals over time of a node's integrands, kept by the engine from frame to frame.
 pub(crate) trait History: Sync {
-    fn integral(&self, upto: Frame) -> [f64; 3];
+    /// Of the integrand at `place`.
+    fn integral(&self, place: usize, upto: Frame) -> [f64; 3];
 }
 
 /// What a node knows that may read the clock.
@@ -148,7 +149,7 @@ impl FrameCx<'_> {
         self.origin
     }
 
-    /// ∫ of the node's integrand from time 0 to `upto`, in its unit × seconds; `upto` lies in the past of the frame that
+    /// ∫ of the node's first integrand from time 0 to `upto`, in its unit × seconds; `upto` lies in the past of the frame that
     /// is cooked, or is that frame. Exact where the params it reads are constant, else 4-point Gauss a whole frame plus
     /// the fraction, summed in frame order; so any frame cooks alone. Before the scene's start (or time 0, where that is
     /// earlier) the params are taken to have held.
@@ -156,9 +157,23 @@ impl FrameCx<'_> {
     /// # Panics
     /// Where the node declares no integrand, or asks for the future, which its key does not know.
     pub fn integral(&self, upto: Frame) -> [f64; 3] {
+        let [integral] = self.integrals(upto);
+        integral
+    }
+
+    /// The same of the node's first `N` integrands.
+    ///
+    /// # Panics
+    /// Where the node declares fewer, or asks for the future.
+    pub fn integrals<const N: usize>(&self, upto: Frame) -> [[f64; 3]; N] {
         let now = self.frame.max(Frame::whole(0));
         assert!(upto <= now, "it asks for an integral up to frame {upto}, which is after frame {now}");
-        self.history.unwrap_or_else(|| panic!("it asks for an integral and declares no integrand")).integral(upto)
+        let declared = self.node.integrands.iter().flatten().count();
+        match self.history {
+            Some(history) if N <= declared => std::array::from_fn(|place| history.integral(place, upto)),
+            Some(_) => panic!("it asks for {N} integrals and declares {declared}"),
+            None => panic!("it asks for an integral and declares no integrand"),
+        }
     }
 }
 

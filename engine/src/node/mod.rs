@@ -6,10 +6,10 @@ mod cx;
 mod help;
 mod ports;
 
-use crate::geometry::{Attr, ColumnType, Item, Name, Owner};
-use crate::param::{ParamDecl, ParamSpec, Params, Unit};
+use crate::geometry::{Attr, ColumnType, Geometry, Item, Name, Owner};
+use crate::param::{Clock, ParamDecl, ParamSpec, Params, Unit};
 
-pub use chain::{Chain, Solver};
+pub use chain::{Chain, Past, Solver};
 pub(crate) use chain::{ChainFns, SolverFns, StateBox};
 pub use cx::{Cx, FrameCx, Outputs, StepCx};
 pub(crate) use cx::{History, InputData};
@@ -28,7 +28,7 @@ pub enum Cook {
         reads_clock: fn(&Params) -> bool,
     },
     /// This frame and some before it.
-    Window(ChainFns, fn(&Params) -> u32),
+    Window(ChainFns, fn(&Params, Clock) -> Past),
     /// Its own state of the frame before.
     Solver(ChainFns, SolverFns),
 }
@@ -115,6 +115,12 @@ impl Wires<'_> {
     }
 }
 
+/// What a node integrates over time, given its params at one moment.
+pub type Integrand = fn(&Params) -> [f64; 3];
+
+/// Most integrands of a node.
+pub const MOST_INTEGRANDS: usize = 4;
+
 /// A node type: made as a `static`, read by everything.
 pub struct Node {
     /// Name in graph files.
@@ -145,9 +151,15 @@ pub struct Node {
     pub leaves_out: Option<fn(&Params, &Wires) -> Vec<LeftOut>>,
     /// What is wrong with the params together, beyond their ranges; asked before anything cooks.
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
-    /// What [`FrameCx::integral`] integrates over time; reads only params declared [`crate::param::Param::history`].
-    pub integrand: Option<fn(&Params) -> [f64; 3]>,
+    /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
+    pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
+    /// What a window keeps that a cubic between its frames does not; see [`Node::mends_between`].
+    pub mend_between: Option<MendBetween>,
 }
+
+/// Puts right an output of a window `share` of the way between two whole frames, whose outputs are `near`; `P` and `v` of
+/// `between` lie on the cubic through them, all else is that of the first.
+pub type MendBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
 
 impl Node {
     /// A node of that name; `version` is raised when its bits change.
@@ -167,7 +179,8 @@ impl Node {
             metrics: &[],
             leaves_out: None,
             checks: None,
-            integrand: None,
+            integrands: [None; MOST_INTEGRANDS],
+            mend_between: None,
         }
     }
 
@@ -241,10 +254,25 @@ impl Node {
         self
     }
 
-    /// What is integrated over time.
+    /// What is integrated over time; said again, another one, in that order.
+    ///
+    /// # Panics
+    /// While it is compiled, where it is said more than [`MOST_INTEGRANDS`] times.
     #[must_use]
-    pub const fn integrates(mut self, integrand: fn(&Params) -> [f64; 3]) -> Self {
-        self.integrand = Some(integrand);
+    pub const fn integrates(mut self, integrand: Integrand) -> Self {
+        let mut place = 0;
+        while self.integrands[place].is_some() {
+            place += 1;
+        }
+        self.integrands[place] = Some(integrand);
+        self
+    }
+
+    /// Called on each output of a window between two whole frames, where positions are interpolated: to keep what the
+    /// node keeps at whole frames, such as lengths.
+    #[must_use]
+    pub const fn mends_between(mut self, mend: MendBetween) -> Self {
+        self.mend_between = Some(mend);
         self
     }
 

@@ -11,7 +11,7 @@ use crate::cook::{CookError, gauss_points, history_start};
 use crate::error::Result;
 use crate::graph::{Body, Link};
 use crate::key::{Hasher, Key};
-use crate::node::{Cook, Node, Times};
+use crate::node::{Cook, Node, Past, Times};
 use crate::param::Params;
 use crate::time::Frame;
 
@@ -41,16 +41,35 @@ pub(crate) struct Stretch {
     pub(crate) until: i64,
 }
 
+/// How far back a window goes, and how often its state starts anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Frames before an anchor at which the state starts, or would if the scene did not start later; at most, where that
+    /// changes with time.
+    pub frames: i64,
+    /// Frames from an anchor to the next.
+    pub every: i64,
+}
+
+/// Where a window's states start.
+struct Anchors {
+    window: Window,
+    /// Before this frame none starts.
+    earliest: i64,
+    /// By anchor: where its state starts.
+    starts: BTreeMap<i64, i64>,
+}
+
 /// Finds keys, and remembers those of the slice at hand.
 pub(crate) struct Keys<'p, 'g> {
     plan: &'p Plan<'g>,
     spots: Vec<BTreeMap<Frame, Known>>,
     /// Keys of a chain's states: by stretch, from its start on.
     chains: Vec<BTreeMap<Stretch, Vec<KeyOrError>>>,
-    /// Keys of what integrands were: from time 0 on, frame by frame, and before it as a whole.
+    /// Keys of what a node's integrands were: from time 0 on, frame by frame, and before it as a whole.
     histories: Vec<Vec<Key>>,
     before: Vec<Option<Key>>,
-    windows: Vec<Option<i64>>,
+    windows: Vec<Option<Anchors>>,
     hasher: Hasher,
 }
 
@@ -63,7 +82,7 @@ impl<'p, 'g> Keys<'p, 'g> {
             chains: (0..nodes).map(|_| BTreeMap::new()).collect(),
             histories: vec![Vec::new(); nodes],
             before: vec![None; nodes],
-            windows: vec![None; nodes],
+            windows: (0..nodes).map(|_| None).collect(),
             hasher: Hasher::default(),
         }
     }
@@ -81,6 +100,10 @@ impl<'p, 'g> Keys<'p, 'g> {
     pub(crate) fn forget_before(&mut self, frame: i64) {
         for chains in &mut self.chains {
             chains.retain(|stretch, _| stretch.until > frame - 4 * LEAST_BLOCK);
+        }
+        for anchors in self.windows.iter_mut().flatten() {
+            let every = anchors.window.every;
+            anchors.starts.retain(|from, _| from + every > frame - 4 * LEAST_BLOCK);
         }
     }
 
@@ -163,11 +186,11 @@ impl<'p, 'g> Keys<'p, 'g> {
         self.spot(node, self.plan.canonical(node, frame)).map(|spot| spot.key)
     }
 
-    /// The frame, the scene's clock and origin, and what the integrand has seen since time 0.
+    /// The frame, the scene's clock and origin, and what the integrands have seen since time 0.
     fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let scene = &self.plan.graph.scene;
         let resolver = &self.plan.nodes[node].resolver;
-        let animated = declared.integrand.is_some() && resolver.history_is_animated();
+        let animated = declared.integrands[0].is_some() && resolver.history_is_animated();
         let seen = match animated {
             true => Some(self.history_key(node, declared, frame)?),
             false => None,
@@ -180,12 +203,14 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(self.hasher.finish())
     }
 
-    /// A key of the integrand's values at the Gauss points of all that [`crate::node::FrameCx::integral`] may be asked at
+    /// A key of the integrands' values at the Gauss points of all that [`crate::node::FrameCx::integrals`] may be asked at
     /// `frame`: from the scene's start or time 0, whichever is earlier, to `frame`. Chained frame by frame.
     fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
-        let integrand = declared.integrand.expect("asked for nodes with an integrand");
         let resolver = &self.plan.nodes[node].resolver;
-        let value = |at: f64| resolver.past(at).map(|params| integrand(&params));
+        let value = |at: f64| -> Result<Vec<f64>> {
+            let params = resolver.past(at)?;
+            Ok(declared.integrands.iter().flatten().flat_map(|integrand| integrand(&params)).collect())
+        };
         let over = |hasher: &mut Hasher, from: f64, to: f64| -> Result<()> {
             for x in gauss_points(from, to) {
                 value(x)?.iter().fold(&mut *hasher, |hasher, x| hasher.f64(*x));
@@ -234,16 +259,29 @@ impl<'p, 'g> Keys<'p, 'g> {
             resolver.at(frame).map_err(|error| Arc::new(plan.error(node, frame, error)))
         };
         match plan.graph.nodes[node].node().map(|declared| declared.cook) {
-            Some(Cook::Window(_, frames)) => {
-                let block = match self.windows[node] {
-                    Some(block) => block,
-                    None => i64::from(frames(&at(first)?)).max(LEAST_BLOCK),
+            Some(Cook::Window(_, past)) => {
+                let clock = plan.graph.scene.clock();
+                let past = |frame: i64| at(frame).map(|params| past(&params, clock));
+                let anchors = match &mut self.windows[node] {
+                    Some(anchors) => anchors,
+                    none => {
+                        let Past { frames, preroll } = past(first)?;
+                        let frames = i64::from(frames);
+                        let window = Window { frames, every: frames.max(LEAST_BLOCK) };
+                        none.insert(Anchors { window, earliest: first - i64::from(preroll), starts: BTreeMap::new() })
+                    }
                 };
-                self.windows[node] = Some(block);
-                let from = first + (frame - first).max(0) / block * block;
-                let back = i64::from(frames(&at(from)?));
+                let every = anchors.window.every;
+                let from = first + (frame - first).max(0) / every * every;
+                let start = match anchors.starts.get(&from) {
+                    Some(start) => *start,
+                    None if !resolver.is_animated() => (from - anchors.window.frames).max(anchors.earliest),
+                    None => forgotten(from, anchors.earliest, |frame| past(frame).map(|past| past.frames))?,
+                };
+                anchors.starts.insert(from, start);
+                anchors.window.frames = anchors.window.frames.max(from - start);
                 let answers_from = if from == first { i64::MIN } else { from };
-                Ok(Stretch { start: (from - back).max(first), from: answers_from, until: from + block })
+                Ok(Stretch { start, from: answers_from, until: from + every })
             }
             Some(Cook::Solver(_, solver)) => {
                 let start = (solver.start_frame)(&at(first)?).unwrap_or(first);
@@ -251,6 +289,11 @@ impl<'p, 'g> Keys<'p, 'g> {
             }
             _ => unreachable!("only windows and solvers have stretches"),
         }
+    }
+
+    /// How far back a window goes, once one of its frames was asked.
+    pub(crate) fn window(&self, node: usize) -> Option<Window> {
+        self.windows[node].as_ref().map(|anchors| anchors.window)
     }
 
     /// The key of a chain's state at `frame`, which lies in the stretch.
@@ -314,6 +357,27 @@ impl<'p, 'g> Keys<'p, 'g> {
         }
         Ok(self.hasher.finish())
     }
+}
+
+/// The latest frame not before `earliest` of which nothing is left at `from`, where the step to a frame forgets one part
+/// in `frames(frame)`.
+fn forgotten<E>(
+    from: i64,
+    earliest: i64,
+    frames: impl Fn(i64) -> std::result::Result<u32, E>,
+) -> std::result::Result<i64, E> {
+    // A sum of n parts of 1/n may miss 1 by its rounding.
+    const ALL: f64 = 1.0 - 1e-9;
+    let (mut start, mut share) = (from, 0.0);
+    while start > earliest && share < ALL {
+        let frames = frames(start)?;
+        if frames == 0 {
+            break;
+        }
+        share += 1.0 / f64::from(frames);
+        start -= 1;
+    }
+    Ok(start)
 }
 
 impl Plan<'_> {

@@ -11,6 +11,7 @@ mod resolve;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+pub use keys::Window;
 pub(crate) use keys::{Keys, Stretch};
 pub(crate) use resolve::{Resolver, numbered_path};
 

@@ -116,7 +116,9 @@ impl Resolver {
         let mut values = Vec::with_capacity(self.sources.len());
         for (spec, source) in self.specs.iter().zip(&self.sources) {
             let value = source.at(frame, self.clock);
-            if let Some((fact, hint)) = spec.refuses(&value) {
+            // Integrals over the past read those params alone: what the others were then refuses nothing now.
+            let matters = !past || spec.facts.history || spec.facts.fixed;
+            if let Some((fact, hint)) = spec.refuses(&value).filter(|_| matters) {
                 return Err(Error::refused(fact).hint(hint).of(spec.name));
             }
             values.push(value);

@@ -34,6 +34,7 @@ pub fn bench(node: &'static Node) -> Bench {
         node,
         params: params.collect(),
         inputs: node.inputs.iter().map(|_| Vec::new()).collect(),
+        changes: vec![None; node.inputs.len()],
         scene,
         frame: Frame::whole(1),
         threads: 2,
@@ -41,6 +42,7 @@ pub fn bench(node: &'static Node) -> Bench {
 }
 
 type Moving = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
+type Change = fn(Geometry) -> Geometry;
 
 /// A node with given inputs and params.
 #[derive(Clone)]
@@ -48,6 +50,7 @@ pub struct Bench {
     node: &'static Node,
     params: Vec<Source>,
     inputs: Vec<Vec<(Moving, bool)>>,
+    changes: Vec<Option<Change>>,
     scene: Scene,
     frame: Frame,
     threads: usize,
@@ -71,6 +74,18 @@ impl Bench {
     #[must_use]
     pub fn moving<A>(self, input: Input<A>, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
         self.wire(input.name(), Arc::new(at), true)
+    }
+
+    /// Changes what every wire of an input brings, whenever it is added: for inputs that take nothing but what a certain node makes.
+    ///
+    /// # Panics
+    /// Where the node has no such input.
+    #[must_use]
+    pub fn changed<A>(mut self, input: Input<A>, change: Change) -> Self {
+        let place = self.node.inputs.iter().position(|declared| declared.spec().name == input.name());
+        let place = place.unwrap_or_else(|| panic!("{} has no input `{}`", self.node.name, input.name()));
+        self.changes[place] = Some(change);
+        self
     }
 
     /// Where each param's value comes from, in the order of the declaration.
@@ -194,12 +209,19 @@ impl Bench {
     pub fn graph(&self) -> Graph {
         let mut nodes = Vec::new();
         let mut inputs = Vec::new();
-        for (declared, wires) in self.node.inputs.iter().zip(&self.inputs) {
+        for ((declared, wires), change) in self.node.inputs.iter().zip(&self.inputs).zip(&self.changes) {
             let mut links = Vec::new();
             for (at, moves) in wires {
                 links.push(Link { node: nodes.len(), port: 0 });
                 let id = format!("{}{}", declared.spec().name, links.len()).into();
-                nodes.push(GraphNode { id, body: Body::Given { at: at.clone(), moves: *moves } });
+                let at: Moving = match *change {
+                    Some(change) => {
+                        let given = at.clone();
+                        Arc::new(move |frame| change(given(frame)))
+                    }
+                    None => at.clone(),
+                };
+                nodes.push(GraphNode { id, body: Body::Given { at, moves: *moves } });
             }
             inputs.push(links);
         }

@@ -55,7 +55,7 @@ pub(super) struct Dress<'a> {
     pub(super) reads: &'a [(String, Owner, ColumnType)],
 }
 
-/// A geometry with components of `kinds`. `seed` moves points a little and changes nothing else.
+/// A geometry with components of `kinds`. `seed` moves points and changes nothing else.
 pub(super) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
     let mut geometry = Geometry::default();
     for kind in kinds {
@@ -185,7 +185,8 @@ fn settled(form: Form, at: Key, mut positions: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
     positions
 }
 
-/// Fur of 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs.
+/// Fur of some 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs. Each seed leans its
+/// curves another way, some into the mesh.
 fn curves(form: Form, at: Key) -> Component {
     let counts: Vec<u32> = match form {
         Form::Empty => Vec::new(),
@@ -198,7 +199,10 @@ fn curves(form: Form, at: Key) -> Component {
         let angle = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)][curve % 5];
         let root = [0.06 * angle.0, 0.09 + 0.0001 * (curve / 5) as f32, 0.06 * angle.1];
         let step = 0.05 / (*count).max(2) as f32;
-        positions.extend((0..*count).map(|cv| [root[0], root[1] + step * cv as f32, root[2] + 0.2 * step * cv as f32]));
+        let lean: [f32; 2] = [0, 1].map(|axis| 2.0 * at.of(9).of(curve as u64).of(axis).f32() - 1.0);
+        let way = [lean[0], 0.4 - 0.5 * lean[1], 0.2 + lean[1]].map(|x| step * x);
+        positions
+            .extend((0..*count).map(|cv| std::array::from_fn::<f32, 3, _>(|axis| root[axis] + way[axis] * cv as f32)));
     }
     let positions = settled(form, at, positions);
     Component::curves(counts, positions).expect("counts that add up")

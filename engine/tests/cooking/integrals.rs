@@ -7,7 +7,7 @@ use engine::param::{Keyframes, ParamType, Shape, Source};
 use numerics::ramp::Interpolation;
 
 use crate::net::{Cooked, Net, at, engine, keyed};
-use crate::nodes::{DRIFT, SOURCE};
+use crate::nodes::{DRIFT, SOURCE, SPREAD};
 
 fn drift(first: i64, speed: Source, upto: f32) -> Net {
     let mut net = Net::new(first, 100);
@@ -86,6 +86,38 @@ fn before_the_scenes_start_params_are_taken_to_have_held() {
     // What was keyed before the scene's start is not seen.
     let other = drift(-10, keyed(&[(-14.0, 9.0), (-10.0, 1.0), (10.0, 3.0)]), 20.0);
     assert_eq!(cook(&other, &[5.0]).x(5.0).to_bits(), cook(&net, &[5.0]).x(5.0).to_bits());
+}
+
+#[test]
+fn several_integrands_are_integrated_each_for_itself() {
+    let mut net = Net::new(1, 100);
+    let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
+    net.add("spread", &SPREAD).keyed("speed", &[(0.0, 0.0), (24.0, 2.0)]).wire("points", a).out();
+    // v = f/12 m/s: ∫ = f²/576 m, ∫ v² = f³/10,368.
+    for frame in [1.0, 6.5, 24.0] {
+        let (exact, x) = (frame * frame / 576.0 + frame * frame * frame / 10_368.0, cook(&net, &[frame]).x(frame));
+        assert!((f64::from(x) - exact).abs() <= 1e-6, "frame {frame}: {x} for {exact}");
+    }
+    // −1 and its square cancel.
+    let mut net = Net::new(1, 100);
+    let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
+    net.add("spread", &SPREAD).set("speed", -1.0_f32).wire("points", a).out();
+    assert_eq!(cook(&net, &[24.0]).x(24.0), 0.0);
+}
+
+#[test]
+fn what_no_integral_reads_refuses_nothing_in_the_past() {
+    let net = |share: &[(f64, f32)]| {
+        let mut net = Net::new(1, 100);
+        let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
+        let spread = net.add("spread", &SPREAD).keyed("speed", &[(0.0, 0.0), (24.0, 2.0)]);
+        spread.keyed("share", share).wire("points", a).out();
+        net
+    };
+    let refused_then = net(&[(3.0, -1.0), (5.0, 1.0)]);
+    assert!(cook(&refused_then, &[3.0]).error().contains("`share` is -1"));
+    let always = net(&[(3.0, 1.0), (5.0, 1.0)]);
+    assert_eq!(cook(&refused_then, &[12.0]).x(12.0).to_bits(), cook(&always, &[12.0]).x(12.0).to_bits());
 }
 
 #[test]

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use engine::geometry::{Attr, Component, Geometry, P};
-use engine::node::{Chain, Opt};
+use engine::node::{Chain, Opt, Past};
 use engine::node::{Cook, Cx, FrameCx, Input, Many, Metric, Node, Output, Outputs, StepCx, Times};
-use engine::param::{Param, Unit};
+use engine::param::{Clock, Param, Params, Unit};
 use engine::{Error, Result, inputs, params};
 use serde::{Deserialize, Serialize};
 
@@ -201,6 +201,33 @@ pub(crate) static DRIFT: Node = Node::new(
 .integrates(|params| [f64::from(params.get(SPEED)), 0.0, 0.0])
 .writes(&[&P]);
 
+params! { SPREAD_PARAMS:
+    SPREAD_SPEED: Param<f32> = Param::float("speed", 1.0, "How fast.").unit(Unit::MetresPerSecond).history();
+    SHARE: Param<f32> = Param::float("share", 1.0, "How much of it.").at_least(0.0);
+}
+inputs! { SPREAD_INPUTS: SPREAD_POINTS: Input = POINTS; }
+
+/// Adds share · (∫ speed dt + ∫ speed² dt) from time 0.
+pub(crate) static SPREAD: Node = Node::new(
+    "Spread",
+    1,
+    "Moves points at a keyed speed and at its square.",
+    Cook::Frame {
+        cook: |cx| {
+            let [way, square] = cx.integrals(cx.frame());
+            let way = cx.get(SHARE) * (way[0] + square[1]) as f32;
+            Ok(OUT.with(moved(cx.input(SPREAD_POINTS), |x| x + way)?))
+        },
+        reads_clock: |_| true,
+    },
+)
+.inputs(SPREAD_INPUTS)
+.params(SPREAD_PARAMS)
+.outputs(&[&OUT])
+.integrates(|params| [f64::from(params.get(SPREAD_SPEED)), 0.0, 0.0])
+.integrates(|params| [0.0, f64::from(params.get(SPREAD_SPEED)).powi(2), 0.0])
+.writes(&[&P]);
+
 params! { FROM_START_PARAMS: FROM_START_PROBE: Param<i64> = PROBE; }
 inputs! { FROM_START_INPUTS:
     FROM_POINTS: Input = POINTS;
@@ -289,6 +316,8 @@ pub(crate) static DUSTY: Node = Node::new(
 
 params! { FOLLOW_PARAMS:
     FRAMES: Param<i64> = Param::int("frames", 8, "How far it looks back.").unit(Unit::Frames).at_least(0.0);
+    PREROLL: Param<i64> = Param::int("preroll", 0, "Frames before the scene's first that it has seen.").unit(Unit::Frames)
+        .at_least(0.0);
     RATE: Param<f32> = Param::float("rate", 0.5, "Share of the way made a frame.").within(0.0, 1.0);
     FOLLOW_PROBE: Param<i64> = PROBE;
 }
@@ -329,13 +358,25 @@ impl Chain for Follow {
     }
 }
 
+fn past(params: &Params, _: Clock) -> Past {
+    Past { frames: params.get(FRAMES) as u32, preroll: params.get(PREROLL) as u32 }
+}
+
 /// Follows its input, half of the way a frame.
-pub(crate) static FOLLOW: Node =
-    Node::new("Follow", 1, "Points that lag.", Cook::window::<Follow>(|params| params.get(FRAMES) as u32))
-        .inputs(FOLLOW_INPUTS)
-        .params(FOLLOW_PARAMS)
-        .outputs(&[&OUT])
-        .writes(&[&P]);
+const FOLLOW_NODE: Node = Node::new("Follow", 1, "Points that lag.", Cook::window::<Follow>(past))
+    .inputs(FOLLOW_INPUTS)
+    .params(FOLLOW_PARAMS)
+    .outputs(&[&OUT])
+    .writes(&[&P]);
+
+/// Follows its input, half of the way a frame.
+pub(crate) static FOLLOW: Node = FOLLOW_NODE;
+
+/// The same, and between frames on the straight line between its neighbours.
+pub(crate) static MENDED: Node = Node { name: "Mended", ..FOLLOW_NODE }.mends_between(|[from, to], share, between| {
+    let straight = first_x(from) + (first_x(to) - first_x(from)) * share;
+    *between = moved(between, |_| straight).expect("as many rows as before");
+});
 
 // ——— solver ———
 

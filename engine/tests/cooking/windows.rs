@@ -6,7 +6,7 @@ use engine::geometry::{Column, Owner};
 use engine::time::Frame;
 
 use crate::net::{Net, at, engine, keyed, row};
-use crate::nodes::{CLOCK, DRIFT, FAIL, FOLLOW, Probe, SOURCE};
+use crate::nodes::{CLOCK, DRIFT, FAIL, FOLLOW, MENDED, Probe, SOURCE};
 
 /// An array of positions that someone else may have dropped.
 type Positions = Weak<Vec<[f32; 3]>>;
@@ -146,6 +146,24 @@ fn between_frames_a_window_runs_along_a_cubic_through_its_neighbours() {
 }
 
 #[test]
+fn what_a_window_keeps_is_mended_between_frames_and_only_there() {
+    let mut net = follow(40, 8);
+    let moving = engine::graph::Link { node: net.place("moving"), port: 0 };
+    net.add("mended", &MENDED).set("frames", 8_i64).set("rate", 0.3_f32).wire("points", moving).out();
+    let frames = [9.0, 9.25, 16.5, 39.5].map(at);
+    let cooked = net.cook_with(&engine(2, 1 << 30), &frames, None);
+    let whole = net.cook(1..=40);
+    let x =
+        |net: &crate::net::Cooked, frame: f64| net.found[&(1, at(frame))].points().expect("points").positions()[0][0];
+    for frame in [9.25, 16.5, 39.5_f64] {
+        let [from, to] = [frame.floor(), frame.floor() + 1.0].map(|frame| x(&whole, frame));
+        assert_eq!(x(&cooked, frame), from + (to - from) * frame.fract() as f32, "frame {frame}");
+        assert_ne!(x(&cooked, frame), cooked.x(frame), "frame {frame}");
+    }
+    assert_eq!(x(&cooked, 9.0), cooked.x(9.0));
+}
+
+#[test]
 fn between_the_last_frames_nothing_past_the_scene_is_asked() {
     let mut net = Net::new(1, 6);
     let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
@@ -191,6 +209,61 @@ fn an_animated_window_length_keeps_the_bits() {
         assert_eq!(net.cook([frame]).x(frame as f64).to_bits(), together.x(frame as f64).to_bits(), "frame {frame}");
     }
     assert_eq!(together.cooks("moving"), 70);
+}
+
+#[test]
+fn a_window_goes_back_until_each_step_by_its_own_length_has_forgotten_its_share() {
+    // Steps up to frame 47 forget a 16th each, those to 48 and later ones a quarter. The anchor at 49 forgets a quarter by
+    // each of the steps to 49 and 48, and the other half by the eight steps to 47 … 40: it starts at 39.
+    let frames = [(1.0, 16), (48.0, 4), (80.0, 4)];
+    let keys = frames.map(|(frame, length)| (frame, engine::param::Value::Int(length))).to_vec();
+    let keys = engine::param::Keyframes { keys, interpolation: numerics::ramp::Interpolation::Constant };
+    let keys = engine::param::Source::Keys(Arc::new(keys), engine::param::Shape::Int);
+    let starts = |asked: i64| {
+        let probe = Probe::new();
+        let net = follow(80, 16).with("follow", "frames", keys.clone());
+        let net =
+            net.with("follow", "probe", engine::param::Source::Constant(engine::param::Value::Int(probe.number())));
+        let _ = net.cook([asked]);
+        probe.frames("start")
+    };
+    // Anchors stand every 16 frames: at 1, 17, 33, 49.
+    assert_eq!(starts(52), [39.0]);
+    assert_eq!(starts(40), [17.0]);
+    assert_eq!(starts(70), [61.0]);
+}
+
+#[test]
+fn preroll_lets_a_window_see_frames_before_the_scene() {
+    let with = |preroll: i64, frames: i64| {
+        let mut net = Net::new(1, 20);
+        let a = net.add("a", &SOURCE).set("amount", 0.0_f32).done();
+        let clock = net.add("clock", &CLOCK).set("amount", 1.0_f32).wire("points", a).done();
+        net.add("follow", &FOLLOW).set("frames", frames).set("preroll", preroll).wire("points", clock).out();
+        net
+    };
+    // Halfway to the frame's number a frame, from rest: 1 at once; from −1 on: −1, −½, ¼.
+    assert_eq!(with(0, 8).cook([1]).x(1.0), 1.0);
+    assert_eq!(with(2, 8).cook([1]).x(1.0), 0.25);
+    assert_eq!(with(2, 8).cook([0]).x(0.0), -0.5);
+    assert_eq!(with(2, 8).cook([-7]).x(-7.0), -1.0);
+    // No further back than the window.
+    assert_eq!(with(2, 1).cook([1]).x(1.0), 0.5);
+    let net = with(5, 8);
+    let together = net.cook(-3..=20);
+    for frame in [-3, 1, 9, 17] {
+        assert_eq!(net.cook([frame]).x(frame as f64).to_bits(), together.x(frame as f64).to_bits(), "frame {frame}");
+    }
+}
+
+#[test]
+fn the_report_says_how_far_back_a_window_goes() {
+    let cooked = follow(70, 20).cook(1..=70);
+    let window = cooked.node("follow").window.expect("a window");
+    assert_eq!((window.frames, window.every), (20, 20));
+    let window = follow(70, 3).cook([1]).node("follow").window.expect("a window");
+    assert_eq!((window.frames, window.every), (3, 8));
+    assert_eq!(cooked.node("moving").window, None);
 }
 
 #[test]

@@ -23,6 +23,24 @@ impl Point {
     }
 }
 
+impl Point {
+    /// The point at `coordinates` within ±2²² cells, by f32 alone.
+    #[inline(always)]
+    pub(super) fn near(coordinates: [f32; 3]) -> Self {
+        // As in `split`: the sum is rounded to an integer, which then stands in its low bits.
+        const ROUND: f32 = 12_582_912.0;
+        let split = |x: f32| {
+            let rounded = x + ROUND;
+            let nearest = rounded - ROUND;
+            let above = nearest > x;
+            let cell = rounded.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_sub(u32::from(above));
+            (cell, x - nearest + if above { 1.0 } else { 0.0 })
+        };
+        let [(i, x), (j, y), (k, z)] = coordinates.map(split);
+        Self { cell: [i, j, k], share: [x, y, z] }
+    }
+}
+
 /// Sixteen [`Point`]s, an axis an array.
 pub(super) struct Points {
     cell: [[u32; LANES]; 3],
@@ -101,6 +119,14 @@ mod tests {
             (1e9 + 0.625, 1_000_000_000, 0.625),
         ] {
             assert_eq!(split(x), (cell, share), "{x}");
+        }
+    }
+
+    #[test]
+    fn near_points_are_where_f64_has_them() {
+        for x in [0.0, 0.25, 0.75, 2.5, 3.5, -0.25, -1.0, -1.5, 4_000_000.5, -2_000_000.5] {
+            let (near, at) = (Point::near([x, 0.5, -0.5]), Point::at([f64::from(x), 0.5, -0.5]));
+            assert_eq!((near.cell, near.share), (at.cell, at.share), "{x}");
         }
     }
 

@@ -128,5 +128,16 @@ pub fn noise3(seed: u32, point: [f64; 3]) -> f32 {
     perlin::noise(Point::at(point), Key::new(u64::from(seed)).u32())[0]
 }
 
+/// One octave of scalar gradient noise on sixteen points, counted in cells, within ±2²² of them: that
+/// of [`noise3`] but for the rounding of f32.
+#[inline(always)]
+pub(crate) fn bumps(salt: u32, points: &Lanes<3>) -> F32x16 {
+    let mut out = F32x16::splat(0.0);
+    for lane in 0..LANES {
+        out.0[lane] = perlin::noise(Point::near(get(points, lane)), salt)[0];
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests;

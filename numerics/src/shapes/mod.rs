@@ -24,6 +24,18 @@ pub struct Polygons {
 }
 
 impl Polygons {
+    /// The faces cut into triangles, each from its first corner.
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        let mut rest = &self.corners[..];
+        for count in &self.counts {
+            let (face, after) = rest.split_at(*count as usize);
+            triangles.extend(face[1..].windows(2).map(|pair| [face[0], pair[0], pair[1]]));
+            rest = after;
+        }
+        triangles
+    }
+
     fn face<const N: usize>(&mut self, corners: [usize; N]) {
         self.counts.push(N as u32);
         self.corners.extend(corners.map(|corner| corner as u32));

@@ -3,4 +3,3 @@
 pub(crate) mod boundary;
 pub(crate) mod level_set;
 pub(crate) mod smooth;
-pub(crate) mod triangulate;

@@ -156,7 +156,7 @@ impl Sweep<'_, '_, '_> {
     }
 
     /// A chain's results at the frames that were asked, between whole frames too.
-    pub(super) fn finish_chain(&mut self, node: usize, need: &BTreeSet<Frame>) {
+    pub(super) fn finish_chain(&mut self, node: usize, declared: &'static Node, need: &BTreeSet<Frame>) {
         for frame in need {
             let whole = |frame: i64, this: &mut Self| -> Outcome {
                 let stretch = this.keys.stretch(node, frame)?;
@@ -172,9 +172,10 @@ impl Sweep<'_, '_, '_> {
                 let near = self.plan.neighbours(*frame).into_iter();
                 let near: Result<Vec<Cooked>, _> = near.map(|frame| whole(frame, self)).collect();
                 let share = (frame.ticks() - frame.floor().ticks()) as f32 / Frame::TICKS as f32;
-                near.map(|near| match self.dry {
-                    true => near[1].clone(),
-                    false => between::between([&near[0], &near[1], &near[2], &near[3]], share),
+                near.and_then(|near| match self.dry {
+                    true => Ok(near[1].clone()),
+                    false => between::between([&near[0], &near[1], &near[2], &near[3]], share, declared.mend_between)
+                        .map_err(|error| Arc::new(self.plan.error(node, *frame, error))),
                 })
             };
             self.results[node].insert(*frame, outcome);

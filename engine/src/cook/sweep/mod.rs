@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::call::{Call, Returned};
 use super::disk::KeptMetric;
-use super::history::Integral;
+use super::history::Integrals;
 use super::store::Cooked;
 use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, deliver};
 use crate::clock::Stopwatch;
@@ -93,7 +93,7 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     slices: u64,
     /// By chain: its last whole frames' outputs, which samples between frames ask for again.
     recent: Vec<BTreeMap<i64, Outcome>>,
-    integrals: Vec<Option<Integral<'p>>>,
+    integrals: Vec<Option<Integrals<'p>>>,
     /// By node: mean wall time of a call.
     pace: Vec<Duration>,
     /// By node: key of the result kept because it may hold.
@@ -133,8 +133,8 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             ..NodeReport::default()
         });
         let integrals = plan.graph.nodes.iter().zip(&plan.nodes).map(|(node, planned)| {
-            let integrand = node.node().and_then(|node| node.integrand);
-            integrand.map(|integrand| Integral::new(&planned.resolver, integrand, &plan.graph.scene))
+            let declared = node.node().filter(|node| node.integrands[0].is_some());
+            declared.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene))
         });
         let integrals = integrals.collect();
         let report = Report { nodes: nodes.collect(), ..Report::default() };
@@ -192,6 +192,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 *self.report.delivered.entry(delivered.output).or_default() += 1;
             }
             self.keys.forget_before(slice[0].floor_number());
+        }
+        for (node, report) in self.report.nodes.iter_mut().enumerate() {
+            report.window = self.keys.window(node);
         }
         self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()).cloned());
         self.note_unseen();
@@ -482,7 +485,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         }
         // Cancelled on its way, a chain has not been everywhere.
         if declared.cook.is_chain() && !self.cancelled() {
-            self.finish_chain(node, &need);
+            self.finish_chain(node, declared, &need);
         }
     }
 
@@ -717,7 +720,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             cancel: self.cancel,
             clock: scene.clock(),
             origin: scene.origin,
-            history: self.integrals[node].as_ref().map(|integral| integral as &dyn History),
+            history: self.integrals[node].as_ref().map(|integrals| integrals as &dyn History),
         }
     }
 }

@@ -165,12 +165,11 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
             findings.add(format!("its start hangs on `{}`, which may be animated; declare it `fixed`", spec.name));
         }
     }
-    let integrated = match node.integrand {
-        Some(integrand) => read_by(specs, |params| {
+    let integrated = read_by(specs, |params| {
+        for integrand in node.integrands.iter().flatten() {
             integrand(params);
-        }),
-        None => Vec::new(),
-    };
+        }
+    });
     for spec in integrated.iter().filter(|spec| !spec.facts.history && !fixed(spec)) {
         findings.add(format!("it integrates over `{}`, which is not declared with `history`", spec.name));
     }

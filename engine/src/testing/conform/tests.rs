@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{conformance, faults};
 use crate::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
 use crate::node::{
-    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, StepCx, Times,
+    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
 };
 use crate::param::{Masked, Param, Params, Seed, Unit};
 use crate::{Error, Result, choice};
@@ -466,7 +466,16 @@ fn an_integral_passes() {
     }
     .params(&[&SPEED]);
     caught(CREEP, "it asks for an integral and declares no integrand");
-    assert_eq!(said(CREEP.integrates(|params| [0.0, params.get(SPEED), 0.0])), [""; 0]);
+    const SUMMED: Node = CREEP.integrates(|params| [0.0, params.get(SPEED), 0.0]);
+    assert_eq!(said(SUMMED), [""; 0]);
+    const GREEDY: Node = Node {
+        cook: Cook::Frame {
+            cook: |cx| Ok(OUT.with(up(cx, cx.integrals::<2>(cx.frame())[1][0] as f32)?)),
+            reads_clock: |_| true,
+        },
+        ..SUMMED
+    };
+    caught(GREEDY, "it asks for 2 integrals and declares 1");
 }
 
 #[test]
@@ -506,8 +515,11 @@ impl<const LEAK: bool> Chain for Lag<LEAK> {
 #[test]
 fn a_window_stands_still_over_what_does() {
     let lag = |cook| Node { cook, ..GOOD }.params(&[&SPARE]);
-    assert_eq!(said(lag(Cook::window::<Lag<false>>(|_| 8))), [""; 0]);
-    only(lag(Cook::window::<Lag<true>>(|_| 8)), "over inputs that stand still it does not stand still");
+    assert_eq!(said(lag(Cook::window::<Lag<false>>(|_, _| Past::frames(8)))), [""; 0]);
+    only(
+        lag(Cook::window::<Lag<true>>(|_, _| Past::frames(8))),
+        "over inputs that stand still it does not stand still",
+    );
 }
 
 /// A solver: curves that fall, faster and faster.

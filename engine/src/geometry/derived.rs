@@ -1,0 +1,83 @@
+//! What is computed from a component's topology and positions and kept with them, such as a mesh's tree.
+//!
+//! Promise: shared by all clones of a component until the positions of one change. It is no part of its value: two
+//! components that differ in it alone are equal. Limit: its memory is not counted in [`super::Geometry::bytes`].
+
+use std::any::Any;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Values of distinct types; see the module.
+#[derive(Clone, Default)]
+pub(super) struct Derived(Arc<Mutex<Vec<Arc<dyn Any + Send + Sync>>>>);
+
+impl Derived {
+    /// The value of type `T`, computed if it is not there. Nothing is locked while it is computed: a thread that waits
+    /// for its own pool's work would else wait for itself. The first value kept is everyone's.
+    pub(super) fn get_or<T: Send + Sync + 'static>(&self, compute: impl FnOnce() -> T) -> Arc<T> {
+        if let Some(value) = self.find() {
+            return value;
+        }
+        let computed = Arc::new(compute());
+        let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match first::<T>(&values) {
+            Some(value) => value,
+            None => {
+                values.push(computed.clone());
+                computed
+            }
+        }
+    }
+
+    fn find<T: Send + Sync + 'static>(&self) -> Option<Arc<T>> {
+        first(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+fn first<T: Send + Sync + 'static>(values: &[Arc<dyn Any + Send + Sync>]) -> Option<Arc<T>> {
+    values.iter().find_map(|value| value.clone().downcast().ok())
+}
+
+impl PartialEq for Derived {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl std::fmt::Debug for Derived {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Derived")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::{Attr, Component, ENVELOPE, P};
+
+    struct Highest(f32);
+
+    fn highest(part: &Component) -> f32 {
+        part.derived(|part| Highest(part.positions().iter().map(|p| p[1]).fold(f32::MIN, f32::max))).0
+    }
+
+    #[test]
+    fn it_is_computed_once_and_shared_until_positions_change() {
+        let mut part = Component::curves(vec![2], vec![[0.0; 3], [0.0, 2.0, 0.0]]).unwrap();
+        assert_eq!(highest(&part), 2.0);
+        let mut clone = part.clone();
+        clone.set(ENVELOPE, vec![0.0; 2]).unwrap();
+        clone.derived::<Highest>(|_| panic!("it is there already"));
+        clone.edit(P).unwrap()[1][1] = 3.0;
+        assert_eq!((highest(&clone), highest(&part)), (3.0, 2.0));
+        part.set(P, vec![[0.0; 3], [0.0, 5.0, 0.0]]).unwrap();
+        part.set(Attr::<f32>::element("P"), vec![1.0]).unwrap_err();
+        assert_eq!(highest(&part), 5.0);
+    }
+
+    #[test]
+    fn values_of_several_types_live_side_by_side() {
+        let part = Component::points(vec![[1.0, 2.0, 3.0]]);
+        assert_eq!(highest(&part), 2.0);
+        assert_eq!(*part.derived(|part| part.point_count()), 1);
+        assert_eq!(highest(&part), 2.0);
+    }
+}

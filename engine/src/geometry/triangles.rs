@@ -1,0 +1,58 @@
+//! A mesh's polygons as triangles, concave ones too.
+
+use std::sync::Arc;
+
+use numerics::triangulate::triangulate;
+use rayon::prelude::*;
+
+use super::Component;
+
+/// Triangles of a mesh, in the order and winding of its faces.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Triangles {
+    /// Points of each triangle.
+    pub corners: Vec<[u32; 3]>,
+    /// The face each is part of.
+    pub faces: Vec<u32>,
+}
+
+impl Component {
+    /// The mesh's triangles, computed once; none for other components.
+    pub fn triangles(&self) -> Arc<Triangles> {
+        self.derived(Triangles::of)
+    }
+}
+
+impl Triangles {
+    fn of(mesh: &Component) -> Self {
+        let Some(faces) = mesh.faces() else { return Self::default() };
+        let (corners, faces) = (0..faces.runs.len())
+            .into_par_iter()
+            .flat_map_iter(|face| {
+                let corners = faces.face(face);
+                let at: Vec<_> = corners.iter().map(|corner| mesh.positions()[*corner as usize]).collect();
+                let ears = triangulate(&at).into_iter().map(move |ear| ear.map(|k| corners[k as usize]));
+                ears.map(move |corners| (corners, face as u32))
+            })
+            .unzip();
+        Self { corners, faces }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::Component;
+
+    #[test]
+    fn a_concave_quad_is_cut_inside_and_a_triangle_stays() {
+        // An arrowhead whose notch is corner 3, and a triangle beside it.
+        let points = [[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [5.0, 0.0], [6.0, 0.0], [5.0, 1.0]];
+        let points = points.iter().map(|[x, z]| [*x, 0.0, *z]).collect();
+        let mesh = Component::mesh(vec![4, 3], vec![0, 1, 2, 3, 4, 5, 6], points).unwrap();
+        let triangles = mesh.triangles();
+        assert_eq!(triangles.faces, [0, 0, 1]);
+        assert!(triangles.corners[..2].iter().all(|corners| corners.contains(&1) && corners.contains(&3)));
+        assert_eq!(triangles.corners[2], [4, 5, 6]);
+        assert!(Component::points(Vec::new()).triangles().corners.is_empty());
+    }
+}

@@ -1,0 +1,81 @@
+use super::*;
+use engine::testing::{Bench, bench, conforms};
+
+fn floor(height: f32) -> Geometry {
+    let points = vec![[-9.0, height, -9.0], [-9.0, height, 9.0], [9.0, height, 9.0], [9.0, height, -9.0]];
+    Component::mesh(vec![4], vec![0, 1, 2, 3], points).unwrap().into()
+}
+
+fn curve(points: &[[f32; 3]]) -> Geometry {
+    Component::curves(vec![points.len() as u32], points.to_vec()).unwrap().into()
+}
+
+fn goal() -> Geometry {
+    curve(&[[0.0, 0.5, 0.0], [0.6, -0.3, 0.0]])
+}
+
+fn laid_down() -> Bench {
+    bench(&NODE).input(CURVES, goal()).input(REST, curve(&[[0.0, 0.5, 0.0], [0.0, 1.5, 0.0]]))
+}
+
+#[test]
+fn conforms_to_its_declaration() {
+    conforms(&NODE);
+}
+
+#[test]
+fn a_hair_stops_its_gap_above_a_floor() {
+    // From half its length above the floor a segment turns down to 30°, less the gap over its length.
+    for gap in [1e-4, 1e-2] {
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap).cook();
+        let tip = out.curves().positions()[1];
+        let angle = std::f64::consts::FRAC_PI_6 - gap;
+        assert!((f64::from(tip[0]) - libm::cos(angle)).abs() < 1e-6, "{tip:?}");
+        assert_eq!(out.metrics["contacts"], 1.0);
+        assert_eq!(out.metrics["crossings_left"], 0.0);
+    }
+}
+
+#[test]
+fn several_colliders_are_met_and_the_first_is_the_skin() {
+    let both = laid_down().input(COLLIDERS, floor(-5.0)).input(COLLIDERS, floor(0.0));
+    let alone = laid_down().input(COLLIDERS, floor(0.0));
+    assert_eq!(both.cook().curves().positions(), alone.cook().curves().positions());
+    let lifted = laid_down().input(COLLIDERS, floor(0.5)).set(OFFSET_ROOT, 0.25).cook();
+    assert!((lifted.curves().positions()[0][1] - 0.75).abs() < 1e-6);
+    let skin = laid_down().input(COLLIDERS, floor(-5.0)).input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25).cook();
+    assert!((skin.curves().positions()[0][1] - 0.65).abs() < 1e-6);
+}
+
+#[test]
+fn without_colliders_the_very_arrays_go_through() {
+    let given = goal();
+    let out = bench(&NODE).input(CURVES, given.clone()).input(REST, goal()).cook();
+    let address = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
+    assert_eq!(address(out.curves()), address(given.curves().unwrap()));
+}
+
+#[test]
+fn rest_of_other_curves_is_refused() {
+    let other = bench(&NODE).input(CURVES, goal()).input(REST, curve(&[[0.0; 3]; 3])).input(COLLIDERS, floor(0.0));
+    let expected = "`curves` (1 curve, 2 CVs) and `rest` (1 curve, 3 CVs) are not the same curves";
+    assert_eq!(other.try_cook().unwrap_err().fact, expected);
+}
+
+#[test]
+fn any_number_of_steps_ends() {
+    for steps in [1, 1_000_000] {
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(METHOD, Method::Steps).set(ROTATION_STEPS, steps).cook();
+        assert_eq!(out.metrics["crossings_left"], 0.0, "{steps}");
+    }
+}
+
+#[test]
+fn any_offset_scale_is_finite_and_keeps_lengths() {
+    for scale in [0.0, 1.0, 1e3] {
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(OFFSET_SCALE, scale).cook();
+        assert!(out.curves().positions().as_flattened().iter().all(|x| x.is_finite()));
+        assert!(out.metrics["length_error"] < 1e-6);
+        assert_eq!(out.metrics["crossings_left"], 0.0, "{scale}");
+    }
+}

@@ -1,0 +1,366 @@
+use super::*;
+use engine::testing::{Bench, Tasted, bench, conformance};
+use numerics::gusts::{Shape, outline};
+use numerics::ramp::Interpolation;
+
+fn span(low: f32, high: f32) -> Span {
+    Span { low, high }
+}
+
+fn ramp(keys: &[[f32; 2]]) -> Arc<Ramp> {
+    Arc::new(Ramp::new(keys.to_vec(), Interpolation::Linear).unwrap())
+}
+
+/// A curve along x from `from` to `to`, a CV every 1/32 m.
+fn ruler(from: f32, to: f32) -> Geometry {
+    let cvs = ((to - from) * 32.0) as u32 + 1;
+    Component::curves(vec![cvs], (0..cvs).map(|k| [from + k as f32 / 32.0, 0.0, 0.0]).collect()).unwrap().into()
+}
+
+/// One CV.
+fn dot(x: f32) -> Geometry {
+    Component::curves(vec![1], vec![[x, 0.0, 0.0]]).unwrap().into()
+}
+
+/// A field of upright curves, 0.1 m apart.
+fn field(n: usize) -> Geometry {
+    let cv = |i: usize, k: usize| [0.1 * (i % n) as f32, 0.05 * k as f32, 0.1 * (i / n) as f32];
+    Component::curves(vec![5; n * n], (0..n * n).flat_map(|i| (0..5).map(move |k| cv(i, k))).collect()).unwrap().into()
+}
+
+/// One round gust of 1 m radius at 2 m/s, that starts at frame 12 and lasts.
+fn single(curves: Geometry) -> Bench {
+    bench(&NODE)
+        .input(CURVES, curves)
+        .set(NUM_GUSTS, 1)
+        .set(RADIUS_RANGE, span(1.0, 1.0))
+        .set(RADIUS_NOISE_RANGE, span(0.0, 0.0))
+        .set(SPEED_RANGE, span(2.0, 2.0))
+        .set(START_FRAME_RANGE, span(12.0, 12.0))
+        .set(LIFE_RANGE, span(1000.0, 1000.0))
+}
+
+fn envelope(out: &Tasted) -> &[f32] {
+    out.curves().get(ENVELOPE).unwrap()
+}
+
+/// Where along a ruler a gust of `falloff` 1…0 over 1 m has its centre.
+fn centre(out: &Tasted) -> f64 {
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (p, value) in out.curves().positions().iter().zip(envelope(out)) {
+        sum += f64::from(p[0] * value);
+        weight += f64::from(*value);
+    }
+    sum / weight
+}
+
+fn bits(out: &Tasted) -> Vec<u8> {
+    out.curves().table(Owner::Point).column("envelope").unwrap().to_bytes()
+}
+
+/// A Gust_Control as it comes along a wire: a ball or cubes about `centre`.
+fn control(shape: Shape, centre: [f32; 3], radius: f32, strength: f32) -> Component {
+    let points = outline(shape, 2.0, 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
+    let falling = ramp(&[[0.0, 1.0], [1.0, 0.0]]);
+    gust_control::component(points, shape, 2.0, strength, &falling).unwrap()
+}
+
+/// What the suite hangs on `controls`, made a control: its place from the points, its numbers from the attributes, which
+/// are random where they are there.
+fn as_control(given: Geometry) -> Geometry {
+    let points = given.points().unwrap();
+    let Some((shapes, keys)) = points.get(gust_control::SHAPE).zip(points.get(gust_control::RAMP)) else {
+        return given;
+    };
+    let (Some(first), Some(_)) = (points.positions().get(1), points.get(gust_control::POINTS)) else { return given };
+    let shape = [Shape::Sphere, Shape::Cubes][shapes[0] as usize % 2];
+    let mut made = control(shape, [first[0], 0.1, first[2]], 0.1, 1.0);
+    let rows = made.point_count();
+    let number = |attribute: Attr<f32>| points.get(attribute).map_or(1.0, |values| values[0]);
+    made.set(gust_control::STRENGTH, vec![number(gust_control::STRENGTH); rows]).unwrap();
+    made.set(gust_control::OUTER, vec![1.0 + number(gust_control::OUTER); rows]).unwrap();
+    made.set(gust_control::RAMP, (0..rows).map(|row| [[0.0, keys[0][1], 0.0], [1.0, 0.0, 0.0]][row.min(1)]).collect())
+        .unwrap();
+    made.into()
+}
+
+#[test]
+fn conforms_to_its_declaration() {
+    // The suite's curves are small: gusts of the default size fill them or miss them.
+    let small = |bench: Bench| {
+        bench
+            .changed(CONTROLS, as_control)
+            .set(NUM_GUSTS, 30)
+            .set(RADIUS_RANGE, span(0.05, 0.1))
+            .set(SPEED_RANGE, span(0.02, 0.2))
+            .set(START_FRAME_RANGE, span(-40.0, 30.0))
+            .set(LIFE_RANGE, span(5.0, 200.0))
+    };
+    conformance(&NODE).with(|bench| bench.changed(CONTROLS, as_control)).with(small).run();
+}
+
+#[test]
+fn a_gust_peaks_at_its_start_plus_distance_over_speed() {
+    // Launched 3 m upwind of the one CV, at frame 12, at 2 m/s: there after 1.5 s, at frame 48. W5: 1 at its centre, 0 at
+    // its boundary, half a second, 12 frames, either way.
+    let gust = single(dot(5.0)).set(DISTANCE, 3.0);
+    let at = |frame: f64| envelope(&gust.clone().at(frame).cook())[0];
+    assert!((at(48.0) - 1.0).abs() < 1e-5);
+    assert!(at(47.0) < at(48.0) && at(49.0) < at(48.0));
+    // A quarter of the radius away: 1 − (3/16 − 2/64).
+    assert!((at(45.0) - 0.84375).abs() < 1e-5 && (at(51.0) - 0.84375).abs() < 1e-5);
+    assert!((at(42.0) - 0.5).abs() < 1e-5 && (at(54.0) - 0.5).abs() < 1e-5);
+    for outside in [1.0, 36.0, 35.9, 60.0, 60.1, 90.0] {
+        assert!(at(outside) < 1e-5, "frame {outside}");
+    }
+}
+
+#[test]
+fn without_a_distance_a_gust_starts_upwind_by_the_largest_radius() {
+    // The ruler begins at 0: at its start the gust touches it, 12 frames later its centre is there.
+    let gust = single(ruler(0.0, 4.0));
+    assert_eq!(gust.clone().at(12.0).cook().metrics["reached_points"], 0.0);
+    assert!((f64::from(envelope(&gust.at(24.0).cook())[0]) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn gusts_add_up_to_base_and_scale_what_came_in() {
+    let mut curves = dot(5.0);
+    curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5]).unwrap();
+    let gust = single(curves).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]]));
+    let at = |bench: Bench, frame: f64| envelope(&bench.at(frame).cook())[0];
+    assert_eq!(at(gust.clone(), 48.0), 0.125);
+    assert_eq!(at(gust.clone().set(BASE, 0.5), 48.0), 0.375);
+    assert_eq!(at(gust.clone().set(BASE, 0.5), 1.0), 0.25);
+    assert_eq!(at(gust.clone().set(BASE, 0.9), 48.0), 0.5, "the sum is clamped to 1");
+    assert_eq!(at(gust.set(NUM_GUSTS, 0).set(BASE, 0.5), 48.0), 0.25);
+}
+
+#[test]
+fn after_its_life_a_gust_dies_down_while_it_travels() {
+    let gust = single(ruler(-8.0, 20.0)).set(LIFE_RANGE, span(24.0, 24.0)).set(DECAY_RANGE, span(12.0, 12.0));
+    let at = |frame: f64| gust.clone().at(frame).cook();
+    let most = |out: &Tasted| envelope(out).iter().copied().fold(0.0, f32::max);
+    let [living, dying, gone] = [36.0, 42.0, 48.0].map(at);
+    assert!((most(&dying) / most(&living) - 0.5).abs() < 1e-2);
+    assert_eq!((most(&gone), gone.metrics["active_gusts"]), (0.0, 0.0));
+    assert_eq!((living.metrics["active_gusts"], dying.metrics["active_gusts"]), (1.0, 1.0));
+    let (a, b) = (at(43.0), at(47.0));
+    assert!((centre(&b) - centre(&a) - 4.0 * 2.0 / 24.0).abs() < 1e-2);
+}
+
+#[test]
+fn a_keyed_speed_and_wind_move_gusts_without_a_jump() {
+    // 2 m/s up to frame 20, then up to 26 m/s at frame 44: v = 2 + (f − 20). ∫ from 12: 16 + 2n + n²/2 frames·m/s.
+    let keys = [(20.0, span(2.0, 2.0)), (44.0, span(26.0, 26.0))];
+    let gust = single(ruler(-4.0, 30.0)).set(DISTANCE, 2.0).keyed(SPEED_RANGE, &keys);
+    for frame in [31.0, 33.5, 40.0, 44.0] {
+        let n = frame - 20.0;
+        let way = (16.0 + 2.0 * n + 0.5 * n * n) / 24.0;
+        let found = centre(&gust.clone().at(frame).cook());
+        assert!((found - (way - 6.0)).abs() < 1e-3, "frame {frame}: {found} for {}", way - 6.0);
+    }
+    // Wind that turns about at frame 36, where it has come 4 m: its way back begins there.
+    let keys = [(35.0, [1.0, 0.0, 0.0]), (36.0, [1.0, 0.0, 0.0]), (37.0, [-1.0, 0.0, 0.0])];
+    let gust = single(ruler(-4.0, 30.0)).set(SPEED_RANGE, span(4.0, 4.0)).keyed(WIND_DIR, &keys);
+    let at = |frame: f64| centre(&gust.clone().at(frame).cook());
+    assert!((at(36.0) - at(37.0)).abs() < 0.2);
+    assert!((at(42.0) - at(46.0) - 4.0 / 6.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_turning_wind_gives_each_gust_the_plane_of_its_start() {
+    // By frame 100 the wind has turned to z; a gust that starts then comes along z, one that started before turned with
+    // the wind and keeps its plane.
+    let keys = [(60.0, [1.0, 0.0, 0.0]), (80.0, [0.0, 0.0, 1.0])];
+    let gust = |start: f32| {
+        single(dot(0.0)).set(DISTANCE, 3.0).set(START_FRAME_RANGE, span(start, start)).keyed(WIND_DIR, &keys)
+    };
+    let reached = |bench: &Bench, frame: f64| envelope(&bench.clone().at(frame).cook())[0];
+    assert!((reached(&gust(12.0), 48.0) - 1.0).abs() < 1e-5);
+    assert!((reached(&gust(100.0), 136.0) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn a_start_between_frames_is_met_and_a_start_before_the_scene_too() {
+    let at = |start: f32, frame: f64| {
+        let gust = single(dot(0.0)).set(DISTANCE, 3.0).set(START_FRAME_RANGE, span(start, start));
+        envelope(&gust.at(frame).cook())[0]
+    };
+    assert!((at(12.5, 48.5) - 1.0).abs() < 1e-5);
+    assert!((at(-34.25, 1.75) - 1.0).abs() < 1e-5);
+    assert!((at(-60.0, -24.0) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn repeated_gusts_come_again_at_any_frame_there_is() {
+    let gust = single(dot(0.0)).set(DISTANCE, 3.0).set(LIFE_RANGE, span(60.0, 60.0)).set(REPEAT_EVERY, 100.0);
+    for round in [-3.0, 0.0, 1.0, 12_345.0] {
+        let out = gust.clone().at(48.0 + 100.0 * round).cook();
+        assert!((envelope(&out)[0] - 1.0).abs() < 1e-5, "round {round}");
+        assert_eq!(out.metrics["active_gusts"], 1.0);
+    }
+    // Six rounds alive at once, and a flood of them bounded.
+    let crowd = gust.clone().set(LIFE_RANGE, span(590.0, 590.0)).set(DECAY_RANGE, span(0.0, 0.0)).at(1000.0).cook();
+    assert_eq!((crowd.metrics["active_gusts"], crowd.metrics["dropped_gusts"]), (6.0, 0.0));
+    let flood = gust.set(LIFE_RANGE, span(1e9, 1e9)).set(REPEAT_EVERY, 0.5).cook();
+    assert!(flood.metrics["dropped_gusts"] > 1e8);
+}
+
+#[test]
+fn any_frame_alone_has_the_bits_it_has_in_order() {
+    let gusts = bench(&NODE)
+        .input(CURVES, field(20))
+        .input(CONTROLS, control(Shape::Cubes, [1.0, 0.0, 1.0], 0.4, -0.5))
+        .set(NUM_GUSTS, 30)
+        .set(REPEAT_EVERY, 20.0)
+        .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
+        .keyed(SPEED_RANGE, &[(1.0, span(0.5, 1.0)), (20.0, span(2.0, 9.0))]);
+    let in_order = gusts.frames(1..=20);
+    let mut reversed = gusts.frames((1..=20).rev());
+    reversed.reverse();
+    assert!(in_order.iter().zip(&reversed).all(|(a, b)| bits(a) == bits(b)));
+    assert!(in_order.iter().all(|out| out.metrics["reached_points"] > 0.0));
+    for frame in [20_i64, 7, 13, 1] {
+        for threads in [1, 7] {
+            let alone = gusts.clone().threads(threads).at(frame as f64).cook();
+            assert_eq!(bits(&alone), bits(&in_order[frame as usize - 1]), "frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn the_plane_stays_where_the_first_frames_curves_put_it() {
+    // The curves run away downwind as fast as the gust: it never gets nearer.
+    let moving = |frame: Frame| dot(0.0 + 2.0 * (frame.number() - 1.0) as f32 / 24.0);
+    let gust = single(dot(0.0));
+    let with = |frame: f64| {
+        let mut gust = bench(&NODE).moving(CURVES, moving);
+        for (param, value) in [(RADIUS_RANGE, 1.0), (RADIUS_NOISE_RANGE, 0.0), (SPEED_RANGE, 2.0)] {
+            gust = gust.set(param, span(value, value));
+        }
+        gust = gust.set(NUM_GUSTS, 1).set(START_FRAME_RANGE, span(1.0, 1.0)).set(LIFE_RANGE, span(1e3, 1e3));
+        envelope(&gust.set(DISTANCE, 0.5).at(frame).cook())[0]
+    };
+    assert!((with(2.0) - 0.5).abs() < 1e-5 && (with(200.0) - 0.5).abs() < 1e-5);
+    assert_eq!(envelope(&gust.at(200.0).cook()), [0.0]);
+}
+
+#[test]
+fn controls_add_their_ramp_and_may_take_away() {
+    let with = |controls: &[Component], base: f32| {
+        let bench = bench(&NODE).input(CURVES, ruler(0.0, 4.0)).set(NUM_GUSTS, 0).set(BASE, base);
+        let bench = controls.iter().fold(bench, |bench, control| bench.input(CONTROLS, control.clone()));
+        let out = bench.cook();
+        [0, 32, 48, 64, 96].map(|cv| envelope(&out)[cv])
+    };
+    let ball = control(Shape::Sphere, [1.0, 0.0, 0.0], 1.0, 1.0);
+    assert_eq!(with(std::slice::from_ref(&ball), 0.0), [0.0, 1.0, 0.5, 0.0, 0.0]);
+    let calm = control(Shape::Sphere, [1.5, 0.0, 0.0], 1.0, -0.5);
+    assert_eq!(with(&[ball.clone(), calm.clone()], 0.0), [0.0, 0.75, 0.0, 0.0, 0.0]);
+    assert_eq!(with(std::slice::from_ref(&calm), 1.0), [1.0, 0.75, 0.5, 0.75, 1.0]);
+    // Merged on one wire they are the same.
+    assert_eq!(with(&[ball.concat(&calm).unwrap()], 0.25), with(&[ball, calm], 0.25));
+}
+
+#[test]
+fn points_that_are_no_control_are_refused() {
+    let with = |points: Component| {
+        let bench = bench(&NODE).input(CURVES, dot(0.0)).input(CONTROLS, control(Shape::Sphere, [0.0; 3], 1.0, 1.0));
+        bench.input(CONTROLS, points).try_cook().unwrap_err()
+    };
+    let error = with(Component::points(vec![[0.0; 3]; 9]));
+    assert_eq!(error.fact, "wire 1 of `controls` is no Gust_Control: its points have no `gust_points`");
+    assert!(error.hint.unwrap().contains("Gust_Control"));
+    let ball = control(Shape::Sphere, [0.0; 3], 1.0, 1.0);
+    let strangers = ball.concat(&Component::points(vec![[0.0; 3]; 2])).unwrap();
+    let fact = format!("point {} of wire 1 of `controls` belongs to no whole Gust_Control", ball.point_count());
+    assert_eq!(with(strangers).fact, fact);
+    let mut odd = ball.clone();
+    odd.set(gust_control::SHAPE, vec![7; ball.point_count()]).unwrap();
+    assert_eq!(with(odd).fact, "`gust_shape` of point 0 of wire 1 of `controls` is 7, expected 0 or 1");
+    let mut odd = ball.clone();
+    odd.set(gust_control::RAMP, (0..ball.point_count()).map(|k| [-(k as f32), 0.0, 0.0]).collect()).unwrap();
+    assert!(with(odd).fact.contains("is no ramp: ramp key 1 has x -1"));
+    let mut odd = ball;
+    odd.set(Attr::<f32>::point("gust_shape"), vec![0.0; odd.point_count()]).unwrap();
+    assert_eq!(with(odd).fact, "wire 1 of `controls` is no Gust_Control: its `gust_…` attributes have other types");
+}
+
+#[test]
+fn a_base_of_1_leaves_the_very_array_alone_and_a_missing_one_becomes_1() {
+    let mut curves = field(3);
+    let out = single(curves.clone()).set(BASE, 1.0).at(20.0).cook();
+    assert_eq!((envelope(&out), out.metrics["active_gusts"]), (&[1.0; 45][..], 0.0));
+    curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5; 45]).unwrap();
+    let out = single(curves.clone()).set(BASE, 1.0).at(20.0).cook();
+    let column = |part: &Component| part.table(Owner::Point).column("envelope").unwrap().address();
+    assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
+}
+
+#[test]
+fn nothing_divides_by_nothing() {
+    let gust = single(field(3)).set(START_FRAME_RANGE, span(-8.0, -8.0));
+    let calm = |bench: Bench| {
+        let out = bench.cook();
+        assert_eq!((envelope(&out), out.metrics["reached_points"]), (&[0.0; 45][..], 0.0));
+    };
+    calm(gust.clone().set(NUM_GUSTS, 0));
+    calm(gust.clone().set(RADIUS_RANGE, span(0.0, 0.0)));
+    calm(gust.clone().set(LIFE_RANGE, span(0.0, 0.0)).set(DECAY_RANGE, span(0.0, 0.0)));
+    calm(gust.clone().set(FALLOFF, ramp(&[[0.0, 0.0]])));
+    let still = gust.clone().set(SPEED_RANGE, span(0.0, 0.0)).set(DISTANCE, 0.5).cook();
+    assert!(still.metrics["reached_points"] > 0.0, "a gust may stand still");
+    let none = Geometry::from(Component::curves(Vec::new(), Vec::new()).unwrap());
+    assert_eq!(single(none).at(20.0).cook().curves().point_count(), 0);
+}
+
+#[test]
+fn ranges_below_0_and_backwards_are_refused() {
+    let fact = |param: Param<Span>, low: f32, high: f32| {
+        single(dot(0.0)).set(param, span(low, high)).try_cook().unwrap_err().to_string()
+    };
+    assert_eq!(fact(RADIUS_RANGE, -1.0, 1.0), "`radius_range` is [-1, 1]; expected at least 0 m");
+    assert_eq!(
+        fact(SPEED_RANGE, 3.0, 1.0),
+        "`speed_range` is [3, 1], which runs backwards; write the smaller number first"
+    );
+    assert!(fact(LIFE_RANGE, -5.0, 5.0).contains("expected 0…1000000000 frames"));
+    assert!(fact(RADIUS_NOISE_RANGE, 0.0, 1.5).contains("expected 0…1"));
+    let error = single(dot(0.0)).set(WIND_DIR, [0.0; 3]).try_cook().unwrap_err();
+    assert_eq!(error.fact, "`wind_dir` is [0, 0, 0], which has no direction");
+}
+
+#[test]
+fn scaled_with_its_scene_it_is_the_same() {
+    let at = |scale: f32| {
+        let mut curves = field(12);
+        curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap().iter_mut().for_each(|p| *p = p.map(|x| x * scale));
+        let out = bench(&NODE)
+            .input(CURVES, curves)
+            .set(RADIUS_RANGE, span(0.3 * scale, 0.6 * scale))
+            .set(SPEED_RANGE, span(scale, 3.0 * scale))
+            .at(30.0)
+            .cook();
+        envelope(&out).to_vec()
+    };
+    let here = at(1.0);
+    assert!(here.iter().any(|x| *x > 0.5));
+    for scale in [1e-3, 1e3, 1e-6, 1e6] {
+        assert!(here.iter().zip(at(scale)).all(|(a, b)| (a - b).abs() < 1e-4), "{scale}");
+    }
+}
+
+#[test]
+fn ten_thousand_gusts_end() {
+    let out = bench(&NODE)
+        .input(CURVES, field(100))
+        .set(NUM_GUSTS, 10_000)
+        .set(RADIUS_RANGE, span(3.0, 9.0))
+        .set(DISTANCE, 0.1)
+        .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (60.0, [1.0, 0.1, 1.0])])
+        .at(60.0)
+        .cook();
+    assert!(out.metrics["active_gusts"] > 3000.0);
+    assert!(envelope(&out).iter().all(|x| *x == 1.0));
+}

@@ -1,0 +1,186 @@
+//! Gust_Control: a gust of wind placed by hand.
+//!
+//! W5, "the manual method": spheres, or an inner and an outer cube, moved, turned, scaled and keyed by the artist; a ramp
+//! sets the influence "within and from the boundary". It comes out as the points that draw it; `shared/gust_control.rs`
+//! says what stands on them.
+//!
+//! Departures:
+//! * W says neither how influence runs between two cubes nor what the ramp is over. Here it runs along the ramp from the
+//!   centre (0) over the inner boundary (0.5) to the outer (1), on nested cubes; a sphere has one boundary, at 1.
+//! * `strength` may be negative: a place of calm within a gust.
+
+use crate::shared::gust_control;
+use engine::prelude::*;
+use numerics::affine::Affine;
+use numerics::gusts::{self, outline};
+use numerics::ramp::Ramp;
+use std::sync::Arc;
+
+choice! {
+    /// What a control looks like.
+    pub enum Shape {
+        Sphere = "sphere": "a ball, an ellipsoid where it is scaled by different numbers",
+        Cubes = "cubes": "a cube within a cube: full inside the inner one, as the default ramp has it, and fading to the \
+                outer one",
+    }
+}
+
+params! { PARAMS:
+    SHAPE: Param<Shape> = Param::choice("shape", Shape::Sphere, "What the region looks like.");
+    TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Where its centre is.").unit(Unit::Metres);
+    ROTATE: Param<Turn> = Param::rotation("rotate",
+        "Turns it about x, then y, then z, through its centre. Between keys it turns about one axis.");
+    SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
+        "The sphere's radius, or half the size of the inner cube, along its own x, y and z. A 0 leaves no region at all.")
+        .unit(Unit::Metres).soft(0.01, 100.0);
+    OUTER: Param<f32> = Param::float("outer", 2.0,
+        "How many times as large the outer cube is as the inner one. 1 ends the influence at the inner cube.")
+        .at_least(1.0).soft(1.0, 10.0).when(|params| params.get(SHAPE) == Shape::Cubes);
+    RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 1.0], [0.5, 1.0], [1.0, 0.0]],
+        "How much wind it lets in, from its centre (0) to its boundary (1). For cubes the inner boundary is at 0.5. \
+         Beyond the boundary it does nothing.");
+    STRENGTH: Param<f32> = Param::float("strength", 1.0,
+        "Multiplies its influence. 0 turns it off, below 0 it takes wind away.").soft(-1.0, 1.0);
+}
+
+const CONTROL: Output =
+    Output::new("control", &[Kind::Points], "Points that draw the region, for `controls` of Curve_Wind_Gusts.");
+
+/// See the module.
+pub static NODE: Node = Node::new(
+    "Gust_Control",
+    1,
+    "Places a gust of wind by hand, as a sphere or as a cube within a cube. Key its place, turn and size to send it where \
+     the shot needs it, and wire it into `controls` of Curve_Wind_Gusts. Transform and Merge may come between: the points \
+     that draw it are the region.",
+    Cook::Pure(cook),
+)
+.params(PARAMS)
+.outputs(&[&CONTROL])
+.writes(&[
+    &P,
+    &gust_control::POINTS,
+    &gust_control::SHAPE,
+    &gust_control::OUTER,
+    &gust_control::STRENGTH,
+    &gust_control::RAMP,
+])
+.changes_topology();
+
+fn cook(cx: &Cx) -> Result<Outputs> {
+    let shape = match cx.get(SHAPE) {
+        Shape::Sphere => gusts::Shape::Sphere,
+        Shape::Cubes => gusts::Shape::Cubes,
+    };
+    let (outer, ramp) = (cx.get(OUTER), cx.get(RAMP));
+    let mut outline = outline(shape, f64::from(outer), ramp.keys().len());
+    Affine::new(cx.get(SCALE), cx.get(ROTATE).0, [0.0; 3], cx.get(TRANSLATE)).points(&mut outline);
+    let points = gust_control::component(outline, shape, outer, cx.get(STRENGTH), &ramp)?;
+    Ok(CONTROL.with(Geometry::from(points)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use engine::param::{Source, Value};
+    use engine::testing::{Bench, Tasted, bench, conforms};
+    use numerics::gusts::{Gusts, feel};
+    use numerics::ramp::Interpolation;
+
+    fn degrees(x: f64, y: f64, z: f64) -> Turn {
+        let Value::Turn(turn) = engine::param::euler_to_turn([x, y, z]) else { panic!("a rotation") };
+        Turn(turn)
+    }
+
+    /// What points feel of the controls that came out.
+    fn felt(out: &Tasted, points: &[[f32; 3]]) -> Vec<f32> {
+        let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
+        let none = Ramp::constant(0.0);
+        feel(points, &Gusts { base: 0.0, falloff: &none, spheres: &[], controls: &controls, incoming: None }).values
+    }
+
+    fn linear(bench: Bench) -> Bench {
+        bench.set(RAMP, Arc::new(Ramp::new(vec![[0.0, 1.0], [1.0, 0.0]], Interpolation::Linear).unwrap()))
+    }
+
+    fn close(a: &[f32], b: &[f32]) -> bool {
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5)
+    }
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        conforms(&NODE);
+    }
+
+    #[test]
+    fn by_default_a_sphere_is_full_to_half_its_radius_and_fades_to_its_boundary() {
+        let points = [[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.75, 0.0], [0.0, 0.0, 1.0], [0.0, 2.0, 0.0]];
+        assert!(close(&felt(&bench(&NODE).cook(), &points), &[1.0, 1.0, 0.5, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn cubes_are_nested_from_the_centre_over_the_inner_to_the_outer_boundary() {
+        let out = linear(bench(&NODE)).set(SHAPE, Shape::Cubes).set(OUTER, 3.0).cook();
+        let points = [[0.5, 0.4, -0.5], [1.0, 0.0, 1.0], [0.0, -2.0, 1.9], [2.9999, 0.0, 0.0], [3.001, 0.0, 0.0]];
+        let felt = felt(&out, &points);
+        assert!(close(&felt[..3], &[0.75, 0.5, 0.25]) && felt[3] < 1e-4 && felt[4] == 0.0);
+    }
+
+    #[test]
+    fn it_is_scaled_then_turned_then_moved() {
+        let out = linear(bench(&NODE))
+            .set(SCALE, [4.0, 1.0, 1.0])
+            .set(ROTATE, degrees(0.0, 0.0, 90.0))
+            .set(TRANSLATE, [10.0, 0.0, 0.0])
+            .cook();
+        let points = [[10.0, 2.0, 0.0], [10.5, 0.0, 0.0], [10.0, 0.0, -0.5], [12.0, 0.0, 0.0]];
+        assert!(close(&felt(&out, &points), &[0.5, 0.5, 0.5, 0.0]));
+    }
+
+    #[test]
+    fn keyed_rotation_turns_about_one_axis_and_keeps_the_size() {
+        let out = linear(bench(&NODE))
+            .set(SCALE, [4.0, 1.0, 1.0])
+            .source("rotate", {
+                let keys = vec![(1.0, Value::Vec3([0.0; 3])), (3.0, Value::Vec3([0.0, 0.0, 180.0]))];
+                let keys = engine::param::Keyframes { keys, interpolation: Interpolation::Linear };
+                Source::Keys(Arc::new(keys), engine::param::Shape::Turn)
+            })
+            .at(2.0)
+            .cook();
+        assert!(close(&felt(&out, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0]]), &[0.5, 0.0]));
+    }
+
+    #[test]
+    fn every_key_of_a_ramp_of_any_kind_arrives() {
+        for kind in [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant] {
+            for count in [1, 2, 7, 900] {
+                let keys = (0..count).map(|k| [k as f32 / count as f32, (k % 3) as f32]).collect();
+                let ramp = Arc::new(Ramp::new(keys, kind).unwrap());
+                for shape in [Shape::Sphere, Shape::Cubes] {
+                    let out = bench(&NODE).set(SHAPE, shape).set(RAMP, ramp.clone()).cook();
+                    let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
+                    let expected = gusts::Control::new(
+                        [gusts::Shape::Sphere, gusts::Shape::Cubes][usize::from(shape == Shape::Cubes)],
+                        [0.0; 3],
+                        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                        2.0,
+                        (*ramp).clone(),
+                        1.0,
+                    );
+                    assert_eq!(controls, [expected], "{kind:?} {count}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn flat_ones_touch_nothing_and_far_ones_are_refused() {
+        for scale in [[1.0, 0.0, 1.0], [0.0; 3]] {
+            assert_eq!(felt(&bench(&NODE).set(SCALE, scale).cook(), &[[0.0; 3], [0.1, 0.0, 0.1]]), [0.0, 0.0]);
+        }
+        let error = bench(&NODE).set(TRANSLATE, [1e39, 0.0, 0.0]).try_cook().unwrap_err();
+        assert_eq!(error.kind, ErrorKind::NotFinite);
+        assert!(bench(&NODE).set(OUTER, 0.5).set(SHAPE, Shape::Cubes).try_cook().is_err());
+    }
+}

@@ -1,0 +1,108 @@
+//! How a Gust_Control travels along a wire: as points that draw it, and attributes that say what it does.
+//!
+//! A control is a run of points. Its first four are its centre and the ends of its own x, y and z axis, so whatever
+//! moves the points moves the control: a Transform turns, stretches and shears it, a Merge puts several on one wire. On
+//! each point of a run stand `gust_points` (points of the run), `gust_shape` (0 sphere, 1 cubes), `gust_outer` (outer ÷
+//! inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one a point from the run's first on: x, y, and what
+//! joins them (0 linear, 1 smooth, 2 constant). Once the keys are through, points repeat the last.
+
+use engine::prelude::*;
+use numerics::gusts::{AXIS_ROWS, Control, Shape};
+use numerics::ramp::{Interpolation, Ramp};
+
+pub(crate) const POINTS: Attr<i32> = Attr::point("gust_points");
+pub(crate) const SHAPE: Attr<i32> = Attr::point("gust_shape");
+pub(crate) const OUTER: Attr<f32> = Attr::point("gust_outer");
+pub(crate) const STRENGTH: Attr<f32> = Attr::point("gust_strength");
+pub(crate) const RAMP: Attr<[f32; 3]> = Attr::point("gust_ramp");
+
+const SHAPES: [Shape; 2] = [Shape::Sphere, Shape::Cubes];
+const INTERPOLATIONS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant];
+
+/// The points of one control: its outline, at least as many as the ramp has keys, and what it does.
+///
+/// # Errors
+/// Where there are more points than an i32 counts.
+pub(crate) fn component(
+    outline: Vec<[f32; 3]>,
+    shape: Shape,
+    outer: f32,
+    strength: f32,
+    ramp: &Ramp,
+) -> Result<Component> {
+    let count = outline.len();
+    let run = i32::try_from(count).map_err(|_| Error::refused(format!("its outline has {count} points")))?;
+    let shape = SHAPES.iter().position(|known| *known == shape).unwrap_or(0) as i32;
+    let joined = INTERPOLATIONS.iter().position(|known| *known == ramp.interpolation()).unwrap_or(0) as f32;
+    let keys = ramp.keys();
+    let key = |row: usize| {
+        let [x, y] = keys[row.min(keys.len() - 1)];
+        [x, y, joined]
+    };
+    let mut points = Component::points(outline);
+    points.set(POINTS, vec![run; count])?;
+    points.set(SHAPE, vec![shape; count])?;
+    points.set(OUTER, vec![outer; count])?;
+    points.set(STRENGTH, vec![strength; count])?;
+    points.set(RAMP, (0..count).map(key).collect())?;
+    Ok(points)
+}
+
+/// The controls among the points of the wire at `place`, in order.
+///
+/// # Errors
+/// Where any of the points belongs to no control.
+pub(crate) fn controls(points: &Component, place: usize) -> Result<Vec<Control>> {
+    let foreign =
+        |fact: String| Error::refused(fact).hint("wire the output of a Gust_Control, moved or merged as you like");
+    let columns = (points.get(POINTS), points.get(SHAPE), points.get(OUTER), points.get(STRENGTH), points.get(RAMP));
+    let (Some(runs), Some(shapes), Some(outers), Some(strengths), Some(keys)) = columns else {
+        let lacks = [POINTS.name, SHAPE.name, OUTER.name, STRENGTH.name, RAMP.name]
+            .into_iter()
+            .find(|name| points.table(Owner::Point).column(name).is_none());
+        let fact = match lacks {
+            Some(name) => format!("wire {place} of `controls` is no Gust_Control: its points have no `{name}`"),
+            None => format!("wire {place} of `controls` is no Gust_Control: its `gust_…` attributes have other types"),
+        };
+        return Err(foreign(fact));
+    };
+    let at = points.positions();
+    let mut controls = Vec::new();
+    let mut first = 0;
+    while first < at.len() {
+        let count = usize::try_from(runs[first]).unwrap_or(0);
+        if count < AXIS_ROWS
+            || count > at.len() - first
+            || runs[first..first + count].iter().any(|run| *run != runs[first])
+        {
+            return Err(foreign(format!(
+                "point {first} of wire {place} of `controls` belongs to no whole Gust_Control"
+            )));
+        }
+        let shape = usize::try_from(shapes[first]).ok().and_then(|shape| SHAPES.get(shape).copied());
+        let shape = shape.ok_or_else(|| {
+            foreign(format!(
+                "`gust_shape` of point {first} of wire {place} of `controls` is {}, expected 0 or 1",
+                shapes[first]
+            ))
+        })?;
+        let ramp = ramp(&keys[first..first + count]).map_err(|error| {
+            foreign(format!("`gust_ramp` from point {first} of wire {place} of `controls` is no ramp: {error}"))
+        })?;
+        let centre = at[first].map(f64::from);
+        let axes = [1, 2, 3].map(|axis| {
+            let end = at[first + axis].map(f64::from);
+            [0, 1, 2].map(|k| end[k] - centre[k])
+        });
+        controls.push(Control::new(shape, centre, axes, f64::from(outers[first]), ramp, strengths[first]));
+        first += count;
+    }
+    Ok(controls)
+}
+
+/// The ramp whose keys stand on a run of points.
+fn ramp(rows: &[[f32; 3]]) -> std::result::Result<Ramp, numerics::ramp::RampError> {
+    let padding = rows.windows(2).position(|pair| pair[0] == pair[1]).map_or(rows.len(), |row| row + 1);
+    let joined = INTERPOLATIONS.get(rows[0][2] as usize).copied().unwrap_or_default();
+    Ramp::new(rows[..padding].iter().map(|[x, y, _]| [*x, *y]).collect(), joined)
+}

@@ -1,0 +1,36 @@
+//! A mesh as something to meet: its triangles in a tree, its normals. Computed once for a still mesh.
+
+use std::sync::Arc;
+
+use engine::geometry::{Component, Triangles};
+use numerics::collide::{Skin, normals};
+use numerics::tree::TriangleTree;
+
+/// The tree of a mesh's triangles.
+pub(crate) fn tree(mesh: &Component) -> Arc<TriangleTree> {
+    mesh.derived(|mesh| TriangleTree::build(mesh.positions(), &mesh.triangles().corners))
+}
+
+/// A mesh that curves grow on.
+pub(crate) struct Surface {
+    tree: Arc<TriangleTree>,
+    triangles: Arc<Triangles>,
+    normals: Arc<Normals>,
+}
+
+/// Outward normals of a mesh's points.
+struct Normals(Vec<[f32; 3]>);
+
+impl Surface {
+    /// The surface of a mesh.
+    pub(crate) fn of(mesh: &Component) -> Self {
+        let triangles = mesh.triangles();
+        let normals = mesh.derived(|mesh| Normals(normals(mesh.positions(), &triangles.corners)));
+        Self { tree: tree(mesh), triangles, normals }
+    }
+
+    /// What the kernel takes.
+    pub(crate) fn skin(&self) -> Skin<'_> {
+        Skin { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
+    }
+}

@@ -1,0 +1,215 @@
+//! The sector that a segment sweeps when it turns about its pivot, and where a triangle blocks it.
+//!
+//! A triangle cuts the sector's plane in a straight piece; on the part of it inside the circle the angle seen from the
+//! pivot runs one way, so that part blocks one interval of angles and its ends give it in closed form. A thick segment
+//! is a slab: the triangle's part between two planes, whose outline is up to five such pieces.
+//!
+//! All in f64, relative to the pivot: exact but for f64 rounding. Angles in radians, lengths in metres.
+
+use nalgebra::Vector3;
+
+/// A vector of the kernel.
+pub(super) type V3 = Vector3<f64>;
+
+/// A segment about to turn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sector {
+    /// About which it turns.
+    pub(super) pivot: V3,
+    /// Unit: where it points.
+    pub(super) u: V3,
+    /// Unit, perpendicular to `u`: which way it turns.
+    pub(super) v: V3,
+    /// u × v.
+    pub(super) n: V3,
+    /// Length of the segment, and how much farther obstacles count.
+    pub(super) reach: f64,
+    /// Obstacles nearer to the pivot do not count.
+    pub(super) inner: f64,
+    /// Half the thickness across the plane; 0 is the plane itself.
+    pub(super) half: f64,
+    /// Arc kept from what is met.
+    pub(super) back: f64,
+}
+
+/// Angles at which a triangle is in the way: lo ≤ hi, lo in −π…π; and how far from the pivot its ends are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Blocked {
+    pub(super) lo: f64,
+    pub(super) hi: f64,
+    pub(super) lo_radius: f64,
+    pub(super) hi_radius: f64,
+}
+
+/// A point of the plane, along u and v.
+type P2 = [f64; 2];
+
+impl Sector {
+    /// Where it points after a turn by `angle`.
+    pub(super) fn direction(&self, angle: f64) -> V3 {
+        if angle == 0.0 {
+            return self.u;
+        }
+        let (sine, cosine) = libm::sincos(angle);
+        self.u * cosine + self.v * sine
+    }
+
+    /// Calls `found` with each interval of angles at which the triangle is in the way.
+    pub(super) fn blocked_by(&self, corners: &[V3; 3], mut found: impl FnMut(Blocked)) {
+        let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
+        let flat = |k: usize| {
+            let arm = corners[k] - self.pivot;
+            [self.u.dot(&arm), self.v.dot(&arm)]
+        };
+        if self.half == 0.0 {
+            if let Some(piece) = slice(&heights, 0.0, flat) {
+                self.within_reach(piece, &mut found);
+            }
+            return;
+        }
+        let low = heights.iter().fold(f64::INFINITY, |low, h| low.min(*h));
+        let high = heights.iter().fold(f64::NEG_INFINITY, |high, h| high.max(*h));
+        if low > self.half || high < -self.half {
+            return;
+        }
+        self.blocked_in_slab(
+            &heights,
+            corners.each_ref().map(|corner| {
+                let arm = *corner - self.pivot;
+                [self.u.dot(&arm), self.v.dot(&arm)]
+            }),
+            found,
+        );
+    }
+
+    /// As [`Sector::blocked_by`] for a thick segment.
+    fn blocked_in_slab(&self, heights: &[f64; 3], flat: [P2; 3], mut found: impl FnMut(Blocked)) {
+        let mut intervals: [Option<Blocked>; 10] = [None; 10];
+        let mut count = 0;
+        let mut add = |blocked: Blocked| {
+            intervals[count] = Some(blocked);
+            count += 1;
+        };
+        for level in [-self.half, self.half] {
+            if let Some(piece) = slice(heights, level, |k| flat[k]) {
+                self.within_reach(piece, &mut add);
+            }
+        }
+        for k in 0..3 {
+            let (a, b) = (k, (k + 1) % 3);
+            if let Some(piece) = between_levels([flat[a], flat[b]], [heights[a], heights[b]], self.half) {
+                self.within_reach(piece, &mut add);
+            }
+        }
+        // The outline is one curve: seen from a pivot outside of it, its pieces make one interval.
+        let pieces = || intervals.iter().flatten();
+        let Some(first) = pieces().next() else { return };
+        let all = pieces().fold(*first, |all, piece| {
+            let turns = if piece.lo - all.lo > std::f64::consts::PI {
+                -std::f64::consts::TAU
+            } else if all.lo - piece.lo > std::f64::consts::PI {
+                std::f64::consts::TAU
+            } else {
+                0.0
+            };
+            let piece = Blocked { lo: piece.lo + turns, hi: piece.hi + turns, ..*piece };
+            let (lo, lo_radius) = if piece.lo < all.lo { (piece.lo, piece.lo_radius) } else { (all.lo, all.lo_radius) };
+            let (hi, hi_radius) = if piece.hi > all.hi { (piece.hi, piece.hi_radius) } else { (all.hi, all.hi_radius) };
+            Blocked { lo, hi, lo_radius, hi_radius }
+        });
+        if all.hi - all.lo > std::f64::consts::PI {
+            pieces().copied().for_each(found);
+        } else if all.lo < 0.0 && all.hi >= 0.0 {
+            // It touches the thick segment as it stands: which way it lies is what its middle says.
+            if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
+                self.within_reach(piece, &mut found);
+            }
+        } else {
+            found(all);
+        }
+    }
+
+    /// The parts of a straight piece inside the circle of `reach` and outside that of `inner`.
+    fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(Blocked)) {
+        let Some([from, to]) = inside_circle(p, q, self.reach) else { return };
+        let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
+        let mut part = |from: f64, to: f64| {
+            if from <= to {
+                found(Blocked::between(at(from), at(to)));
+            }
+        };
+        match inside_circle(p, q, self.inner) {
+            Some([near, far]) if self.inner > 0.0 => {
+                if near > from {
+                    part(from, near.min(to));
+                }
+                if far < to {
+                    part(far.max(from), to);
+                }
+            }
+            _ => part(from, to),
+        }
+    }
+}
+
+impl Blocked {
+    /// The angles of a straight piece between two points, neither at the pivot.
+    fn between(p: P2, q: P2) -> Self {
+        let left = p[0] * q[1] - p[1] * q[0] >= 0.0;
+        let (first, last) = if left { (p, q) } else { (q, p) };
+        let angle = |p: P2| libm::atan2(p[1], p[0]);
+        let radius = |p: P2| (p[0] * p[0] + p[1] * p[1]).sqrt();
+        let (lo, hi) = (angle(first), angle(last));
+        // One that ends beyond the far side goes on past π.
+        let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
+        Self { lo, hi, lo_radius: radius(first), hi_radius: radius(last) }
+    }
+}
+
+/// Where the plane at `level` cuts a triangle of corners at these heights. A corner at the level counts as above it, in
+/// every triangle it is part of, so that a closed surface is cut in a closed line.
+fn slice(heights: &[f64; 3], level: f64, flat: impl Fn(usize) -> P2) -> Option<[P2; 2]> {
+    let above = heights.map(|height| height >= level);
+    let alone = match above {
+        [a, b, c] if a == b && b == c => return None,
+        [a, b, c] if b == c && a != b => 0,
+        [a, b, c] if a == c && b != c => 1,
+        _ => 2,
+    };
+    let cut = |other: usize| {
+        let share = (level - heights[alone]) / (heights[other] - heights[alone]);
+        let (from, to) = (flat(alone), flat(other));
+        [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
+    };
+    Some([cut((alone + 1) % 3), cut((alone + 2) % 3)])
+}
+
+/// The part of an edge between the levels −half and half.
+fn between_levels([p, q]: [P2; 2], [a, b]: [f64; 2], half: f64) -> Option<[P2; 2]> {
+    if a.max(b) < -half || a.min(b) > half {
+        return None;
+    }
+    let rise = b - a;
+    let at = |level: f64| ((level - a) / rise).clamp(0.0, 1.0);
+    let (from, to) = if rise == 0.0 { (0.0, 1.0) } else { (at(-half).min(at(half)), at(-half).max(at(half))) };
+    let point = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
+    Some([point(from), point(to)])
+}
+
+/// The share of the way from p to q at which it enters the circle about the origin, and at which it leaves.
+fn inside_circle(p: P2, q: P2, radius: f64) -> Option<[f64; 2]> {
+    let way = [q[0] - p[0], q[1] - p[1]];
+    let square = way[0] * way[0] + way[1] * way[1];
+    let along = p[0] * way[0] + p[1] * way[1];
+    let outside = p[0] * p[0] + p[1] * p[1] - radius * radius;
+    if square == 0.0 {
+        return (outside <= 0.0).then_some([0.0, 0.0]);
+    }
+    let under = along * along - square * outside;
+    if under < 0.0 {
+        return None;
+    }
+    let root = under.sqrt();
+    let (from, to) = (((-along - root) / square).max(0.0), ((-along + root) / square).min(1.0));
+    (from <= to).then_some([from, to])
+}

@@ -1,0 +1,131 @@
+//! One sector and one triangle.
+
+use super::*;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
+
+fn sector(u: V3, v: V3, reach: f64) -> Sector {
+    Sector { pivot: V3::zeros(), u, v, n: u.cross(&v), reach, inner: 0.0, half: 0.0, back: 0.0 }
+}
+
+fn first(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
+    let mut least = None;
+    sector.blocked_by(corners, |blocked| {
+        let angle = if blocked.lo <= 0.0 && blocked.hi >= 0.0 { 0.0 } else { blocked.lo };
+        if angle >= 0.0 {
+            least = Some(least.map_or(angle, |least: f64| least.min(angle)));
+        }
+    });
+    least
+}
+
+/// First contact by its two kinds of event: the tip's circle meets the triangle's plane inside of it, or one of its
+/// edges meets the sector's plane within reach. Angles 0…π.
+fn first_by_events(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
+    let mut angles = Vec::new();
+    let [p, q, r] = corners;
+    let normal = (q - p).cross(&(r - p));
+    let inside = |x: &V3| {
+        let side = |a: &V3, b: &V3| normal.dot(&(b - a).cross(&(x - a)));
+        side(p, q) >= 0.0 && side(q, r) >= 0.0 && side(r, p) >= 0.0
+    };
+    // normal · (reach (u cos φ + v sin φ) − p) = 0.
+    let (a, b) = (sector.reach * normal.dot(&sector.u), sector.reach * normal.dot(&sector.v));
+    let share = normal.dot(p) / libm::hypot(a, b);
+    if share.abs() <= 1.0 {
+        let middle = libm::atan2(b, a);
+        for angle in [middle - libm::acos(share), middle + libm::acos(share)] {
+            let angle = angle.rem_euclid(2.0 * PI);
+            let tip = (sector.u * libm::cos(angle) + sector.v * libm::sin(angle)) * sector.reach;
+            if angle <= PI && inside(&tip) {
+                angles.push(angle);
+            }
+        }
+    }
+    for (a, b) in [(p, q), (q, r), (r, p)] {
+        let (above, below) = (sector.n.dot(a), sector.n.dot(b));
+        if above * below < 0.0 {
+            let x = a + (b - a) * (above / (above - below));
+            let angle = libm::atan2(sector.v.dot(&x), sector.u.dot(&x));
+            if x.norm() <= sector.reach && angle >= 0.0 {
+                angles.push(angle);
+            }
+        }
+    }
+    // What it stands in from the start is met at once.
+    if crosses(&V3::zeros(), &(sector.u * sector.reach), corners) {
+        angles.push(0.0);
+    }
+    angles.into_iter().reduce(f64::min)
+}
+
+#[test]
+fn a_level_segment_meets_a_floor_at_the_arcsine_of_its_height() {
+    // Pivot half a length over the floor: sin φ = ½.
+    let floor = [V3::new(-9.0, -0.5, -9.0), V3::new(-9.0, -0.5, 9.0), V3::new(20.0, -0.5, 0.0)];
+    let down = sector(V3::x(), -V3::y(), 1.0);
+    assert!((first(&down, &floor).unwrap() - FRAC_PI_6).abs() < 1e-12);
+    assert_eq!(first(&sector(V3::x(), V3::y(), 1.0), &floor), Some(PI + FRAC_PI_6).filter(|angle| *angle <= PI));
+    assert_eq!(first(&sector(V3::x(), -V3::y(), 0.4), &floor), None);
+}
+
+#[test]
+fn a_needle_is_met_where_it_stands() {
+    // An upright sliver at 30° from the start, half way out.
+    let at = V3::new(0.5 * libm::cos(FRAC_PI_6), 0.5 * libm::sin(FRAC_PI_6), 0.0);
+    let needle = [at + V3::new(0.0, 0.0, -1.0), at + V3::new(1e-7, 0.0, 1.0), at + V3::new(0.0, 1e-7, 1.0)];
+    let found = first(&sector(V3::x(), V3::y(), 1.0), &needle).unwrap();
+    assert!((found - FRAC_PI_6).abs() < 1e-6, "{found}");
+}
+
+#[test]
+fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
+    let (mut met, mut missed) = (0, 0);
+    for k in 0..1_000_000 {
+        let key = Key::new(11).of(k);
+        let u = unit(key.of(0));
+        let Some(v) = (unit(key.of(1)) - u * u.dot(&unit(key.of(1)))).try_normalize(0.01) else { continue };
+        let mut corners = [2, 3, 4].map(|corner| vector(key.of(corner)));
+        match k % 4 {
+            // A needle, and a blade, and one almost in the sector's plane.
+            1 => corners[1] = corners[0] + vector(key.of(5)) * 1e-3,
+            2 => corners[2] = corners[0] + (corners[1] - corners[0]) * 0.5 + vector(key.of(5)) * 1e-4,
+            3 => {
+                let n = u.cross(&v);
+                corners = corners.map(|corner| corner - n * (n.dot(&corner) * 0.999));
+            }
+            _ => {}
+        }
+        let sector = sector(u, v, 0.9);
+        // Beyond half a turn the two disagree on what is asked, not on where it is.
+        let found = first(&sector, &corners).filter(|angle| *angle < PI - 1e-9);
+        let expected = first_by_events(&sector, &corners).filter(|angle| *angle < PI - 1e-9);
+        match (found, expected) {
+            (Some(a), Some(b)) => {
+                met += 1;
+                assert!((a - b).abs() < 1e-6, "{k}: {a} {b}");
+            }
+            (None, None) => missed += 1,
+            _ => {
+                // One of them grazes: a hair's breadth more or less of reach decides.
+                let with = |reach: f64| first(&Sector { reach, ..sector }, &corners);
+                let (less, more) = (with(0.9 - 1e-6), with(0.9 + 1e-6));
+                assert!(
+                    less.is_none() != more.is_none() || found.or(expected).unwrap() < 1e-6,
+                    "{k}: {found:?} {expected:?}"
+                );
+            }
+        }
+    }
+    assert!(met > 100_000 && missed > 100_000, "{met} met, {missed} missed");
+}
+
+#[test]
+fn a_thick_segment_is_stopped_by_what_is_beside_its_plane() {
+    // The plane of the turn passes 0.01 beside a sheet that stands across it further out.
+    let beside = [V3::new(0.5, 0.5, 0.01), V3::new(0.6, 0.4, 0.5), V3::new(0.4, 0.6, 0.5)];
+    let thin = sector(V3::x(), V3::y(), 1.0);
+    assert_eq!(first(&thin, &beside), None);
+    let thick = Sector { half: 0.02, ..thin };
+    let found = first(&thick, &beside).unwrap();
+    assert!((found - FRAC_PI_2 / 2.0).abs() < 0.03, "{found}");
+}

@@ -1,0 +1,124 @@
+//! Which blocks a part of space meets.
+
+use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
+use crate::vec3::Vec3;
+
+/// A part of space that asks which boxes it meets.
+pub trait Region {
+    /// A bit for each lane whose box has a part in the region, or more; none for blank lanes. To be
+    /// `#[inline(always)]`, and so without closures, where a kernel walks by it.
+    fn meeting(&self, boxes: &Boxes) -> u16;
+}
+
+/// A box, its faces included; a point or a piece of an axis where it has no width. One with a
+/// coordinate that is no number meets nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    /// The least of each coordinate.
+    pub low: Vec3,
+    /// The largest of each coordinate.
+    pub high: Vec3,
+}
+
+impl Region for Cuboid {
+    #[inline(always)]
+    fn meeting(&self, boxes: &Boxes) -> u16 {
+        let mut mask = 0;
+        for lane in 0..LANES {
+            let mut meets = true;
+            for axis in 0..3 {
+                meets &= boxes.low[axis].0[lane] <= self.high[axis];
+                meets &= boxes.high[axis].0[lane] >= self.low[axis];
+            }
+            mask |= u16::from(meets) << lane;
+        }
+        mask
+    }
+}
+
+impl TriangleTree {
+    /// The places in [`TriangleTree::blocks`] of all blocks that have a triangle whose box meets `region`,
+    /// rising, each with a bit for each lane of such a triangle.
+    ///
+    /// In a kernel this, rather than a visit with a closure: what closures do is not compiled for the
+    /// kernel's path.
+    #[inline(always)]
+    pub fn walk<R: Region>(&self, region: R) -> Walk<'_, R> {
+        let top = self.levels.len();
+        let mut walk = Walk { tree: self, region, open: [0; MOST_LEVELS], lanes: [0; MOST_LEVELS], level: top };
+        if top > 0 {
+            walk.level = top - 1;
+            walk.lanes[walk.level] = walk.region.meeting(&self.levels[walk.level][0]);
+        }
+        walk
+    }
+
+    /// Calls `visit` with each block that has a triangle whose box meets `low`…`high` (ends included),
+    /// in the order of [`TriangleTree::blocks`], and with a bit for each lane of such a triangle.
+    #[inline(always)]
+    pub fn visit_box<'t>(&'t self, low: Vec3, high: Vec3, mut visit: impl FnMut(&'t Block, u16)) {
+        for (block, lanes) in self.walk(Cuboid { low, high }) {
+            visit(&self.blocks[block], lanes);
+        }
+    }
+}
+
+/// See [`TriangleTree::walk`].
+pub struct Walk<'a, R> {
+    tree: &'a TriangleTree,
+    region: R,
+    /// At each level the box that is open, and its lanes still to be entered.
+    open: [usize; MOST_LEVELS],
+    lanes: [u16; MOST_LEVELS],
+    /// Where it is; above the last at the end.
+    level: usize,
+}
+
+impl<R> Walk<'_, R> {
+    /// The region, which may shrink on the way.
+    #[inline(always)]
+    pub fn region(&mut self) -> &mut R {
+        &mut self.region
+    }
+}
+
+impl<R: Region> Iterator for Walk<'_, R> {
+    type Item = (usize, u16);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, u16)> {
+        while self.level < self.tree.levels.len() {
+            let lanes = self.lanes[self.level];
+            if lanes == 0 {
+                self.level += 1;
+                continue;
+            }
+            let child = self.open[self.level] * LANES + lanes.trailing_zeros() as usize;
+            self.lanes[self.level] = lanes & (lanes - 1);
+            if self.level > 0 {
+                self.level -= 1;
+                self.open[self.level] = child;
+                self.lanes[self.level] = self.region.meeting(&self.tree.levels[self.level][child]);
+                continue;
+            }
+            let block = &self.tree.blocks[child];
+            let lanes = self.region.meeting(&block.boxes()) & block.filled();
+            if lanes != 0 {
+                return Some((child, lanes));
+            }
+        }
+        None
+    }
+}
+
+impl Block {
+    /// A bit for each lane that has a triangle.
+    #[inline(always)]
+    pub fn filled(&self) -> u16 {
+        let mut mask = 0;
+        for lane in 0..LANES {
+            mask |= u16::from(self.triangle[lane] != NONE) << lane;
+        }
+        mask
+    }
+}

@@ -1,0 +1,84 @@
+//! How shelter changes from frame to frame on the bear, as the wind turns slowly: the figures of Curve_Wind_Shielding.
+
+#![allow(clippy::unwrap_used, reason = "a test's helpers")]
+
+use std::convert::Infallible;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use engine::cook::{Delivered, Engine, Settings};
+use engine::geometry::SHIELDED;
+use engine::graph::{Graph, probe};
+use engine::plan::Request;
+use engine::time::Frame;
+
+/// The share of each curve at each of `frames` degrees.
+fn turning(smooth: f32, frames: i64) -> Vec<Vec<f32>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/bear_wind");
+    assert!(fs::exists(folder.join("../assets/bear.obj")).unwrap());
+    let text = format!(
+        r#"{{
+            "convect": 1,
+            "scene": {{ "frames": [1, {frames}] }},
+            "nodes": {{
+                "fur": {{ "type": "Curve_In", "params": {{ "file": "../assets/fur_bear_10k_curves.obj" }} }},
+                "skin": {{ "type": "Mesh_In", "params": {{ "file": "../assets/bear.obj" }} }},
+                "lee": {{
+                    "type": "Curve_Wind_Shielding",
+                    "inputs": {{ "curves": "fur", "colliders": ["skin"] }},
+                    "params": {{
+                        "smooth": {smooth},
+                        "wind_dir": {{ "expr": ["cos(frame*pi/180)", "0", "sin(frame*pi/180)"] }}
+                    }}
+                }}
+            }},
+            "outputs": {{ "lee": "lee" }}
+        }}"#
+    );
+    let graph =
+        Graph::load(&text, &folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
+    let engine = Engine::new(&Settings::default()).unwrap();
+    let request = Request { outputs: vec![0], frames: (1..=frames).map(Frame::whole).collect() };
+    let mut found = vec![Vec::new(); frames as usize];
+    let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
+        for one in finished {
+            let shares = one.geometry.curves().unwrap().get(SHIELDED).unwrap();
+            found[one.frame.number() as usize - 1] = shares.to_vec();
+        }
+        Ok(())
+    };
+    let report = engine.cook(&graph, &request, None, &AtomicBool::new(false), &mut sink).unwrap();
+    assert!(report.errors.is_empty(), "{}", report.errors[0].1);
+    found
+}
+
+/// The largest change of a curve's share from a frame to the next, the share of curves that change by more than a tenth
+/// in a frame, and the mean share.
+fn changes(frames: &[Vec<f32>]) -> [f64; 3] {
+    let (mut largest, mut jumps, mut pairs) = (0.0_f64, 0, 0);
+    for (before, after) in frames.iter().zip(&frames[1..]) {
+        for (before, after) in before.iter().zip(after) {
+            let change = f64::from((after - before).abs());
+            largest = largest.max(change);
+            jumps += u32::from(change > 0.1);
+            pairs += 1;
+        }
+    }
+    let mean = frames.iter().flatten().map(|share| f64::from(*share)).sum::<f64>();
+    [largest, f64::from(jumps) / f64::from(pairs), mean / frames.iter().map(Vec::len).sum::<usize>() as f64]
+}
+
+#[test]
+fn smooth_shelter_does_not_pop_as_the_wind_turns() {
+    let figures = [0.0, 0.5, 1.0].map(|smooth| (smooth, changes(&turning(smooth, 60))));
+    for (smooth, [largest, jumps, mean]) in figures {
+        println!(
+            "smooth {smooth}: largest change {largest:.3}, more than 0.1 in {:.3} %, mean {mean:.4}",
+            100.0 * jumps
+        );
+    }
+    let [hard, .., soft] = figures.map(|(_, changes)| changes);
+    assert!(soft[0] < 0.2 && soft[1] < 0.05 * hard[1], "{soft:?} against {hard:?}");
+    assert!((soft[2] - hard[2]).abs() < 0.02, "the mean shelter is kept: {} and {}", soft[2], hard[2]);
+}
