@@ -142,7 +142,7 @@ fn code_reads_the_controls_and_its_faults_stand_where_they_are() {
     assert_eq!([tip(1), tip(2), tip(3)], [json!(2.0), json!(4.0), json!(6.0)]);
     bench.write("g.json", &graph.replace("gain*h", "gan*h + "));
     let expected =
-        "g.json:8:61: nodes.code.params.code: expected a value, found the end, at line 2, column 15 of the code\n";
+        "g.json:8:63: nodes.code.params.code: expected a value, found the end, at line 2, column 15 of the code\n";
     assert_eq!(bench.run(&["check", "g.json"]).stderr, expected);
 }
 
