@@ -3,7 +3,7 @@
 use engine::geometry::{Geometry, ID, Kind, V};
 
 use crate::net::{Cooked, Net, at, engine, row};
-use crate::nodes::{CLOCK, FOLLOW, SOURCE};
+use crate::nodes::{ADD, CLOCK, FOLLOW, SOURCE};
 
 /// x = f².
 fn squares() -> Net {
@@ -58,11 +58,13 @@ fn velocities_alone_have_the_bits_they_have_among_others() {
     }
 }
 
-/// Given points that change at frame 3, with velocities.
+/// Given points that change at frame 3, with velocities and nothing else.
 fn changing(at: impl Fn(bool) -> Geometry + Send + Sync + 'static) -> Cooked {
     let mut net = Net::new(1, 5);
     let given = net.given("given", move |frame| at(frame.number() >= 3.0));
-    net.output(given).v = true;
+    let add = net.add("add", &ADD).wire("points", given).done();
+    let output = net.output(add);
+    (output.v, output.attributes) = (true, Some(Vec::new()));
     net.cook(1..=5)
 }
 
@@ -71,7 +73,7 @@ fn where_points_come_and_go_there_are_no_velocities_and_elsewhere_there_are() {
     let cooked = changing(|later| row(if later { &[0.0, 1.0, 2.0] } else { &[0.0, 1.0] }));
     let fact = "the points have 2 points half a frame before, 3 now and 3 after";
     let hint = "velocities need points that stay; leave out `v` of the output";
-    assert_eq!(cooked.error(), format!("`given` (given) at frame 3: {fact}; {hint}"));
+    assert_eq!(cooked.error(), format!("`add` (Add) at frame 3: {fact}; {hint}"));
     assert_eq!(cooked.found.keys().map(|(_, frame)| frame.number()).collect::<Vec<_>>(), [1.0, 2.0, 4.0, 5.0]);
 }
 
