@@ -11,7 +11,7 @@ use formats::usd::{Flavour, UsdWriter};
 use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
-use crate::failure::{Exit, Failure, cancelled_by_ctrl_c};
+use crate::failure::{Exit, Failure, cancelled_by_signal};
 use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
 use crate::output::{failed, usd_failed, write_whole};
 
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if folder_of(&args.to).is_dir() {
         sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
     }
-    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_ctrl_c() };
+    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_signal() };
     let written = match &to {
         Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,

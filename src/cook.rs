@@ -14,7 +14,7 @@ use formats::atomic::{AtomicFile, FileError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, Setting, Size, half_of_memory};
-use crate::failure::{Exit, Failure, cancelled_by_ctrl_c, exit_of_error};
+use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
 use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
 use crate::{load, report};
@@ -117,7 +117,7 @@ fn cook(
     writers.spare(&inputs, &request.frames)?;
     // Before the cook, so that a path that cannot be written costs no cooking.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
-    let cancel = cancelled_by_ctrl_c();
+    let cancel = cancelled_by_signal();
     let progress = progress(args, request);
     let mut writing = Duration::ZERO;
     let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {

@@ -54,18 +54,21 @@ fn ctrl_c_leaves_whole_frames_and_no_temporary() {
 }
 
 #[test]
-fn being_asked_to_end_is_like_ctrl_c() {
-    for name in ["TERM", "HUP"] {
-        let bench = Bench::new();
-        let child = start(&bench, &["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass"]);
-        wait_for(5, &bench.path("out"));
-        signal(name, &child);
-        let ran = ended(child);
-        assert_eq!(ran.code, Some(130), "{name}: {}", ran.stderr);
-        let expected: Vec<String> =
-            (1..=bench.names("out").len()).map(|frame| format!("grass.{frame:04}.json")).collect();
-        assert_eq!(bench.names("out"), expected, "frames without a gap, and nothing hidden");
-    }
+fn being_asked_to_end_is_like_ctrl_c_and_nohup_outlives_its_terminal() {
+    let bench = Bench::new();
+    let cook = bench.command(&["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass"]);
+    let mut nohup = Command::new("nohup");
+    nohup.arg(cook.get_program()).args(cook.get_args()).current_dir(bench.path("")).stdin(Stdio::null());
+    let child = nohup.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(5, &bench.path("out"));
+    signal("HUP", &child);
+    wait_for(bench.names("out").len() + 20, &bench.path("out"));
+    signal("TERM", &child);
+    let ran = ended(child);
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    let files = bench.names("out");
+    let expected: Vec<String> = (1..=files.len()).map(|frame| format!("grass.{frame:04}.json")).collect();
+    assert_eq!(files, expected, "frames without a gap, and nothing hidden");
 }
 
 #[test]
