@@ -97,8 +97,13 @@ impl Files {
     }
 }
 
-/// Opens a file to be read, without ever waiting for one: folders, pipes and devices are refused, but what the program
-/// was started with (`/dev/stdin`, `/dev/fd/3`) has its writer already.
+/// Whether that is what the program was started with, such as `/dev/stdin` and `/dev/fd/3`: it is in no folder of its own.
+pub fn is_handed_over(path: &Path) -> bool {
+    path == Path::new("/dev/stdin") || path.starts_with("/dev/fd")
+}
+
+/// Opens a file to be read, without ever waiting for one: folders, pipes and devices are refused, but what is handed over
+/// has its writer already.
 ///
 /// # Errors
 /// Where it is no file, does not exist or may not be read.
@@ -107,8 +112,7 @@ pub fn open(path: &Path) -> io::Result<fs::File> {
     if about.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
     }
-    let is_handed_over = path == Path::new("/dev/stdin") || path.starts_with("/dev/fd");
-    if !about.is_file() && !is_handed_over {
+    if !about.is_file() && !is_handed_over(path) {
         return Err(io::Error::other("it is a pipe or a device, not a file"));
     }
     fs::File::open(path)
