@@ -124,18 +124,6 @@ impl Sweep<'_, '_, '_> {
         Ok(state)
     }
 
-    pub(super) fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
-        for (name, value) in metrics {
-            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, *value);
-        }
-    }
-
-    /// What a node published at a frame.
-    pub(super) fn published(&self, node: usize, frame: Frame) -> Vec<(&'static str, f64)> {
-        let metrics = &self.report.nodes[node].metrics;
-        metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
-    }
-
     pub(super) fn chain_output(
         &mut self,
         node: usize,

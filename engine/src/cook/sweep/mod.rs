@@ -2,6 +2,7 @@
 
 mod chains;
 mod close;
+mod metrics;
 mod notes;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +13,6 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::call::{Call, Returned};
-use super::disk::KeptMetric;
 use super::history::Integrals;
 use super::store::Cooked;
 use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, deliver};
@@ -278,45 +278,6 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.end_slice();
         self.forget_windows_left_behind();
         finished
-    }
-
-    /// The results that went into a finished frame and have metrics: node, frame, key.
-    fn measured(&mut self, output: usize, frame: Frame) -> Vec<(usize, Frame, Key)> {
-        let plan = self.plan;
-        let mut found = Vec::new();
-        for node in plan.ancestors(plan.graph.outputs[output].from.node) {
-            if plan.graph.nodes[node].node().is_none_or(|declared| declared.metrics.is_empty()) {
-                continue;
-            }
-            let mut frames: Vec<Frame> =
-                self.samples(output, frame).into_iter().map(|at| plan.canonical(node, at)).collect();
-            frames.dedup();
-            for at in frames {
-                found.extend(self.keys.spot(node, at).ok().map(|spot| (node, at, spot.key)));
-            }
-        }
-        found
-    }
-
-    /// The metrics to keep with a finished frame.
-    fn metrics_to_keep(&mut self, output: usize, frame: Frame) -> Vec<KeptMetric> {
-        let measured = self.measured(output, frame).into_iter();
-        let of = |(node, at, key): (usize, Frame, Key)| {
-            self.published(node, at).into_iter().map(move |(name, value)| (key, name.to_owned(), value))
-        };
-        measured.flat_map(of).collect()
-    }
-
-    /// Publishes what was kept with a finished frame.
-    fn publish_kept(&mut self, output: usize, frame: Frame, kept: &[KeptMetric]) {
-        for (node, at, key) in self.measured(output, frame) {
-            let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
-            let of_key = kept.iter().filter(|(of, _, _)| *of == key);
-            let metrics: Vec<(&'static str, f64)> = of_key
-                .filter_map(|(_, name, value)| Some((declared.iter().find(|metric| metric.name == name)?.name, *value)))
-                .collect();
-            self.publish(node, at, &metrics);
-        }
     }
 
     fn note_error(&mut self, output: usize, error: Arc<CookError>) {
