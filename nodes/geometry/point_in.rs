@@ -8,7 +8,8 @@ use std::sync::Arc;
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "An obj, ply or json file with points. A run of `#` in its name stands for the frame number: `drops.####.ply`.");
-    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
+    FRAME: Param<i64> = Param::int("frame", 0,
+        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
