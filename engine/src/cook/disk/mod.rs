@@ -3,14 +3,15 @@
 //! Every file is written beside its name and renamed, carries its format and a checksum, and is ignored where either does
 //! not fit: whatever a cache holds, a cook's results are those of a cook without it.
 
+mod bytes;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::SystemTime;
 
-use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
+use crate::geometry::Geometry;
 use crate::key::Key;
 
 /// Changes whenever files of an older convect can no longer be used.
@@ -128,19 +129,14 @@ impl DiskCache {
 
     /// A finished frame of an output, and the metrics that were kept with it.
     pub(crate) fn frame(&self, key: Key) -> Option<(Geometry, Vec<KeptMetric>)> {
-        let bytes = read_entry(&self.path("frame", key), key)?;
-        let mut reader = Reader(&bytes);
-        let metrics = reader.metrics()?;
-        Some((decode(reader.0)?, metrics))
+        bytes::decode(&read_entry(&self.path("frame", key), key)?)
     }
 
     /// Keeps a finished frame of an output, and the metrics of what went into it.
     pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry, metrics: &[KeptMetric]) {
         let path = self.path("frame", key);
         self.keep(|cache| {
-            let mut bytes = encode_metrics(metrics);
-            bytes.extend(encode(geometry));
-            write_entry(&path, key, &bytes)?;
+            write_entry(&path, key, &bytes::encode(geometry, metrics))?;
             cache.trim()
         });
     }
@@ -224,162 +220,10 @@ fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(&part, bytes).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
 }
 
-fn encode_metrics(metrics: &[KeptMetric]) -> Vec<u8> {
-    let mut out = (metrics.len() as u64).to_le_bytes().to_vec();
-    for (key, name, value) in metrics {
-        out.extend(key.0);
-        out.extend((name.len() as u64).to_le_bytes());
-        out.extend(name.as_bytes());
-        out.extend(value.to_le_bytes());
-    }
-    out
-}
-
-/// A geometry as bytes, every bit of it.
-fn encode(geometry: &Geometry) -> Vec<u8> {
-    let mut out = Vec::new();
-    let put = |out: &mut Vec<u8>, bytes: &[u8]| {
-        out.extend((bytes.len() as u64).to_le_bytes());
-        out.extend(bytes);
-    };
-    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
-    for part in geometry.parts() {
-        out.push(part.kind() as u8);
-        match part.topology() {
-            Topology::Curves(runs) => put(&mut out, &words(runs.starts())),
-            Topology::Mesh(faces) => {
-                put(&mut out, &words(faces.runs.starts()));
-                put(&mut out, &words(&faces.corners));
-            }
-            Topology::Points => {}
-            Topology::Tets(tets) => put(&mut out, &words(tets.as_flattened())),
-        }
-        for owner in Owner::ALL {
-            encode_table(&mut out, part.table(owner));
-        }
-    }
-    if let Some(volume) = geometry.volume() {
-        out.push(Kind::Volume as u8);
-        let grid = volume.grid();
-        for x in grid.origin.iter().chain([&grid.cell]) {
-            out.extend(x.to_le_bytes());
-        }
-        for n in grid.size {
-            out.extend(n.to_le_bytes());
-        }
-        for field in std::iter::once(volume.level_set()).chain(volume.velocity()) {
-            put(&mut out, &field.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
-        }
-        encode_table(&mut out, volume.once());
-    }
-    out
-}
-
-fn encode_table(out: &mut Vec<u8>, table: &Table) {
-    out.extend((table.rows() as u64).to_le_bytes());
-    out.extend((table.iter().count() as u64).to_le_bytes());
-    for (name, column) in table.iter() {
-        for bytes in [name.as_bytes(), &[column.kind() as u8], &column.to_bytes()] {
-            out.extend((bytes.len() as u64).to_le_bytes());
-            out.extend(bytes);
-        }
-    }
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (head, rest) = self.0.split_at_checked(n)?;
-        self.0 = rest;
-        Some(head)
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
-    }
-
-    fn piece(&mut self) -> Option<&'a [u8]> {
-        let n = self.count()?;
-        self.take(n)
-    }
-
-    fn metrics(&mut self) -> Option<Vec<KeptMetric>> {
-        let mut metrics = Vec::new();
-        for _ in 0..self.count()? {
-            let key = Key(self.take(16)?.try_into().ok()?);
-            let name = std::str::from_utf8(self.piece()?).ok()?.to_owned();
-            metrics.push((key, name, f64::from_le_bytes(self.take(8)?.try_into().ok()?)));
-        }
-        Some(metrics)
-    }
-
-    fn words(&mut self) -> Option<Vec<u32>> {
-        Some(self.piece()?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect())
-    }
-
-    fn word(&mut self) -> Option<u32> {
-        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
-    }
-
-    fn floats(&mut self) -> Option<Vec<f32>> {
-        Some(self.words()?.into_iter().map(f32::from_bits).collect())
-    }
-
-    fn runs(&mut self) -> Option<Runs> {
-        let starts = self.words()?;
-        Runs::from_counts(starts.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]))).ok()
-    }
-
-    fn table(&mut self) -> Option<Table> {
-        const TYPES: [ColumnType; 6] =
-            [ColumnType::F1, ColumnType::F3, ColumnType::F4, ColumnType::I1, ColumnType::I3, ColumnType::I4];
-        let mut table = Table::new(self.count()?);
-        for _ in 0..self.count()? {
-            let name = std::str::from_utf8(self.piece()?).ok()?;
-            let kind = TYPES.into_iter().find(|kind| Some(&[*kind as u8][..]) == self.0.get(8..9))?;
-            self.piece()?;
-            table.set(name, Column::from_bytes(kind, self.piece()?)?).ok()?;
-        }
-        Some(table)
-    }
-}
-
-fn decode(bytes: &[u8]) -> Option<Geometry> {
-    let mut reader = Reader(bytes);
-    let mut geometry = Geometry::default();
-    while let Some(kind) = reader.take(1) {
-        let topology = match kind[0] {
-            k if k == Kind::Curves as u8 => Topology::Curves(Arc::new(reader.runs()?)),
-            k if k == Kind::Mesh as u8 => {
-                let runs = reader.runs()?;
-                Topology::Mesh(Arc::new(crate::geometry::Faces { runs, corners: reader.words()? }))
-            }
-            k if k == Kind::Points as u8 => Topology::Points,
-            k if k == Kind::Tets as u8 => Topology::Tets(Arc::new(reader.words()?.as_chunks::<4>().0.to_vec())),
-            k if k == Kind::Volume as u8 => {
-                let floats = [reader.word()?, reader.word()?, reader.word()?, reader.word()?].map(f32::from_bits);
-                let size = [reader.word()?, reader.word()?, reader.word()?];
-                let grid = Grid { origin: [floats[0], floats[1], floats[2]], cell: floats[3], size };
-                let level_set = reader.floats()?;
-                let velocity = [reader.floats()?, reader.floats()?, reader.floats()?];
-                let mut volume = Volume::new(grid, level_set, velocity).ok()?;
-                *volume.once_mut() = reader.table()?;
-                geometry.put_volume(volume);
-                continue;
-            }
-            _ => return None,
-        };
-        let tables = [reader.table()?, reader.table()?, reader.table()?];
-        geometry.put(Component::from_tables(topology, tables).ok()?);
-    }
-    Some(geometry)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{ENVELOPE, SHIELDED};
+    use crate::geometry::{Column, Component, ENVELOPE, Grid, Owner, SHIELDED, Volume};
 
     fn sample() -> Geometry {
         let mut curves = Component::curves(vec![2, 1], vec![[0.1, -0.0, 1e-40], [1.0; 3], [2.0; 3]]).unwrap();
@@ -398,10 +242,10 @@ mod tests {
     #[test]
     fn a_geometry_comes_back_bit_for_bit() {
         let geometry = sample();
-        let bytes = encode(&geometry);
-        let back = decode(&bytes).unwrap();
+        let bytes = bytes::encode(&geometry, &[]);
+        let (back, _) = bytes::decode(&bytes).unwrap();
         assert_eq!(back, geometry);
-        assert_eq!(encode(&back), bytes);
+        assert_eq!(bytes::encode(&back, &[]), bytes);
     }
 
     #[test]
