@@ -17,13 +17,13 @@ fn signal(name: &str, child: &Child) {
 
 /// Waits until `folder` holds at least `count` files, hidden ones too.
 fn wait_for(count: usize, folder: &Path) {
-    for _ in 0..2000 {
+    for _ in 0..12_000 {
         if names(folder).len() >= count {
             return;
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    panic!("{} has only {:?} after ten seconds", folder.display(), names(folder));
+    panic!("{} has only {:?} after a minute", folder.display(), names(folder));
 }
 
 fn start(bench: &Bench, args: &[&str]) -> Child {
