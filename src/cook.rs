@@ -14,7 +14,7 @@ use formats::atomic::{AtomicFile, FileError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, Setting, Size, half_of_memory};
-use crate::failure::{Exit, Failure, cancelled_by_ctrl_c, exit_of_error};
+use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
 use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
 use crate::{load, report};
@@ -24,7 +24,7 @@ use crate::{load, report};
 pub struct Args {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5; all of the scene's by default
+    /// Frames: 1-48, 1-48x2, 10, 10.5, or several of these: 1-4,10,20-24; all of the scene's by default
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
     /// Cook only this output; may be given several times
@@ -68,7 +68,7 @@ pub struct Args {
 /// Cooks.
 ///
 /// # Errors
-/// Where the graph is wrong, a file cannot be written, a node cannot cook, or someone pressed Ctrl-C.
+/// Where the graph is wrong, a file cannot be written, a node cannot cook, or someone interrupted it.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
@@ -117,7 +117,7 @@ fn cook(
     writers.spare(&inputs, &request.frames)?;
     // Before the cook, so that a path that cannot be written costs no cooking.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
-    let cancel = cancelled_by_ctrl_c();
+    let cancel = cancelled_by_signal();
     let progress = progress(args, request);
     let mut writing = Duration::ZERO;
     let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
@@ -132,17 +132,14 @@ fn cook(
     };
     let cooked = engine.cook(graph, request, disk.as_mut(), &cancel, &mut sink);
     progress.finish_and_clear();
-    let report = cooked.map_err(|stopped| match stopped {
+    let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
         Stopped::Sink(failure) => failure,
-        Stopped::Cache(error) => {
-            let folder = args.cache.clone().unwrap_or_default();
-            failed(&FileError::new(folder, "written as a cache", error))
-        }
     })?;
     let watch = Stopwatch::start();
     let spoiled: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
     let written = writers.finish(&spoiled)?;
+    report.notes.extend(left_out(graph, &written, format));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write())?;
     writing += watch.wall();
     if let Some(file) = report_file {
@@ -162,6 +159,16 @@ fn cook(
         tell(&report, &written, &drawn, args.verbose);
     }
     ended(graph, &report, &written)
+}
+
+/// A note for each output of which the format could not hold everything.
+fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<String> {
+    let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
+    let note = |(output, written): &(usize, Written)| {
+        let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
+        format!("output `{name}` is without {lost}: {format} cannot hold it; usdc and json can")
+    };
+    lossy.map(note).collect()
 }
 
 /// What was written and how fast, on stderr.
@@ -205,7 +212,11 @@ fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result
     for (output, error, frames) in &report.errors {
         let text = error.to_string();
         if !told.contains(&text) {
-            let more = if *frames > 1 { format!(" (and at {} more frames)", frames - 1) } else { String::new() };
+            let more = match frames - 1 {
+                0 => String::new(),
+                1 => " (and at 1 more frame)".into(),
+                more => format!(" (and at {more} more frames)"),
+            };
             lines.push(format!("{text}{more}"));
             told.push(text);
         }
@@ -220,7 +231,8 @@ fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result
     }
     if report.cancelled {
         let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
-        lines.push(format!("interrupted; {frames} whole frames were written"));
+        let frames = if frames == 1 { "1 whole frame was".into() } else { format!("{frames} whole frames were") };
+        lines.push(format!("interrupted; {frames} written"));
         exit = Some(exit.map_or(Exit::Interrupted, |exit| exit.min(Exit::Interrupted)));
     }
     match exit {

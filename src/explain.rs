@@ -18,7 +18,7 @@ use crate::report::NOT_NEEDED;
 pub struct Args {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5; all of the scene's by default
+    /// Frames: 1-48, 1-48x2, 10, 10.5, or several of these: 1-4,10,20-24; all of the scene's by default
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
     /// Only this output; may be given several times

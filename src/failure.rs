@@ -3,11 +3,13 @@
 use std::io;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use engine::cook::CookError;
 use engine::error::ErrorKind;
 use engine::graph::{Fault, FaultClass};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 /// Exit codes, as documented for scripts. Of two that fit, the lowest is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -23,7 +25,7 @@ pub enum Exit {
     Graph = 3,
     /// A node could not cook.
     Cook = 4,
-    /// Ctrl-C.
+    /// Ctrl-C, or SIGTERM.
     Interrupted = 130,
 }
 
@@ -87,15 +89,14 @@ pub fn exit_of_error(error: &CookError) -> Exit {
     }
 }
 
-/// A flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
-pub fn cancelled_by_ctrl_c() -> Arc<AtomicBool> {
+/// A flag that Ctrl-C and SIGTERM set; a second one ends the program at once. SIGHUP is left alone, for `nohup`.
+pub fn cancelled_by_signal() -> Arc<AtomicBool> {
     let cancel = Arc::new(AtomicBool::new(false));
-    let flag = cancel.clone();
-    // Without a handler Ctrl-C still ends the program, only less politely.
-    let _ = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(Exit::Interrupted as i32);
-        }
-    });
+    for signal in [SIGINT, SIGTERM] {
+        // In this order, so that it is the signal before which decides. Without a handler a signal still ends the program,
+        // only less politely.
+        let _ = flag::register_conditional_shutdown(signal, Exit::Interrupted as i32, cancel.clone());
+        let _ = flag::register(signal, cancel.clone());
+    }
     cancel
 }

@@ -4,7 +4,7 @@
 //! graph. The limit: a file is read whole, and USD is not read at all.
 
 use std::fs;
-use std::io;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use engine::geometry::Geometry;
@@ -31,12 +31,13 @@ pub struct GeometryFile {
 /// Where it cannot be read or is not what its ending says.
 pub fn read(path: &Path) -> Result<GeometryFile, Failure> {
     let unread = |error: io::Error| Failure::file(FileError::new(path, "read", error).to_string());
-    if fs::metadata(path).map_err(unread)?.is_dir() {
-        return Err(unread(io::ErrorKind::IsADirectory.into()));
-    }
+    let mut file = engine::files::open(path).map_err(unread)?;
     let refused = |error| refused(path, &error);
     let format = Format::of_path(path).map_err(refused)?;
-    let bytes = if format.is_read() { fs::read(path).map_err(unread)? } else { Vec::new() };
+    let mut bytes = Vec::new();
+    if format.is_read() {
+        file.read_to_end(&mut bytes).map_err(unread)?;
+    }
     let geometry = formats::read(format, &bytes).map_err(refused)?;
     Ok(GeometryFile { format, bytes: bytes.len() as u64, geometry })
 }

@@ -4,7 +4,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use engine::cook::{Engine, Settings};
-use engine::files::unreadable;
+use engine::files::{is_handed_over, unreadable};
 use engine::graph::{Fault, FaultClass, Graph, Part, probe};
 use formats::Format;
 
@@ -21,13 +21,13 @@ const LARGEST_GRAPH: u64 = 256 << 20;
 /// Where the file cannot be read, or its faults.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
+    let file = engine::files::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
     if bytes.len() as u64 > LARGEST_GRAPH {
         let fact = format!("the graph `{}` has more than {} MiB", path.display(), LARGEST_GRAPH >> 20);
         return Err(Failure::file(format!("{fact}; put geometry into files of its own")));
     }
-    let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+    let folder = path.parent().filter(|_| !is_handed_over(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
     Ok(Graph::load_bytes(&bytes, &folder, CATALOGUE, &set, &probe))
 }

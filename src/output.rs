@@ -23,6 +23,8 @@ pub struct Written {
     pub bytes: u64,
     /// Frames in them.
     pub frames: Vec<Frame>,
+    /// What the format dropped.
+    pub lost: Vec<String>,
 }
 
 enum Target {
@@ -90,6 +92,11 @@ impl<'g> Writers<'g> {
         for (output, target, written) in &mut self.outputs {
             let mine: Vec<&Delivered> = finished.iter().filter(|one| one.output == *output).collect();
             let name = &graph.outputs[*output].name;
+            for lost in mine.iter().flat_map(|one| formats::lost(format, &one.geometry)) {
+                if !written.lost.contains(&lost) {
+                    written.lost.push(lost);
+                }
+            }
             match target {
                 Target::Sequence { flavour, writer } => {
                     for one in mine {

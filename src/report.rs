@@ -99,6 +99,7 @@ fn node_to_json(node: &NodeReport) -> Value {
         "varies": node.varies,
         "cooks": node.cooks,
         "from_cache": node.from_cache,
+        "from_disk": node.from_disk,
         "left_out": left_out,
         "wall_ms": ms(node.wall),
         "cpu_ms": ms(node.cpu),

@@ -29,12 +29,14 @@ pub struct Error {
     pub fact: String,
     /// What to do about it.
     pub hint: Option<String>,
+    /// The param that is to blame, where it is one.
+    pub param: Option<&'static str>,
 }
 
 impl Error {
     /// An error of any kind.
     pub fn new(kind: ErrorKind, fact: impl Into<String>) -> Self {
-        Self { kind, fact: fact.into(), hint: None }
+        Self { kind, fact: fact.into(), hint: None, param: None }
     }
 
     /// The node refuses what it was given.
@@ -50,6 +52,13 @@ impl Error {
     /// The node broke its declaration.
     pub fn contract(fact: impl Into<String>) -> Self {
         Self::new(ErrorKind::Contract, fact)
+    }
+
+    /// Of a param: in a graph file the fault stands there.
+    #[must_use]
+    pub fn of(mut self, param: &'static str) -> Self {
+        self.param = Some(param);
+        self
     }
 
     /// With a hint.

@@ -1,6 +1,8 @@
 //! Files a graph reads. The engine reads them, so that the bytes that were hashed are the bytes a node gets.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -84,13 +86,36 @@ impl Files {
         if let Some(loaded) = bytes.get(path) {
             return Ok(loaded.clone());
         }
-        let read = std::fs::read(path).map_err(|error| unreadable(path, &error))?;
+        let mut read = Vec::new();
+        let file = open(path).and_then(|mut file| file.read_to_end(&mut read));
+        file.map_err(|error| unreadable(path, &error))?;
         let key = Key::of(&read);
         let loaded = (Arc::from(read), key);
         bytes.insert(path.to_owned(), loaded.clone());
         self.keys.lock().unwrap_or_else(PoisonError::into_inner).entry(path.to_owned()).or_insert(key);
         Ok(loaded)
     }
+}
+
+/// Whether that is what the program was started with, such as `/dev/stdin` and `/dev/fd/3`: it is in no folder of its own.
+pub fn is_handed_over(path: &Path) -> bool {
+    path == Path::new("/dev/stdin") || path.starts_with("/dev/fd")
+}
+
+/// Opens a file to be read, without ever waiting for one: folders, pipes and devices are refused, but what is handed over
+/// has its writer already.
+///
+/// # Errors
+/// Where it is no file, does not exist or may not be read.
+pub fn open(path: &Path) -> io::Result<fs::File> {
+    let about = fs::metadata(path)?;
+    if about.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    if !about.is_file() && !is_handed_over(path) {
+        return Err(io::Error::other("it is a pipe or a device, not a file"));
+    }
+    fs::File::open(path)
 }
 
 /// The error of a file that cannot be read, with what to do about the commonest causes.
@@ -130,5 +155,9 @@ mod tests {
         let error = files.open(&folder.path().join("none.obj")).unwrap_err();
         assert!(error.fact.ends_with("none.obj` does not exist"), "{error}");
         assert!(files.open(folder.path()).unwrap_err().fact.ends_with("is a folder, expected a file"));
+        if cfg!(unix) {
+            let error = files.open(Path::new("/dev/null")).unwrap_err();
+            assert_eq!(error.fact, "`/dev/null` could not be read: it is a pipe or a device, not a file");
+        }
     }
 }

@@ -20,14 +20,14 @@ pub use error::{Error, ErrorKind, Result};
 pub mod prelude {
     pub use crate::error::{Error, ErrorKind, Result};
     pub use crate::geometry::{
-        Attr, Column, Component, ENVELOPE, Faces, Geometry, ID, Item, Kind, N, Name, ORIENT, Owner, P, PREF, Runs,
-        SHIELDED, THICKNESS, Topology, UVW, V, Volume, WIDTH,
+        Attr, CURVE_ID, Column, Component, ENVELOPE, Faces, Geometry, ID, Item, Kind, N, Name, ORIENT, Owner, P, PREF,
+        Runs, SHIELDED, THICKNESS, Topology, UVW, V, Volume, WIDTH,
     };
     pub use crate::node::{
         AttrDecl, AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past,
         StepCx, Times, Wires,
     };
-    pub use crate::param::{Clock, Masked, Param, Params, Seed, Span, Turn, Unit};
+    pub use crate::param::{Clock, Code, Masked, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;
     pub use crate::{choice, inputs, params};
 }

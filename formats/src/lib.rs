@@ -10,6 +10,7 @@ pub mod atomic;
 mod error;
 mod format;
 mod json;
+mod lost;
 mod obj;
 mod out;
 mod ply;
@@ -22,6 +23,7 @@ use engine::geometry::{Geometry, Kind};
 
 pub use error::{FormatError, Place};
 pub use format::Format;
+pub use lost::lost;
 
 /// Which frame a file shows.
 #[derive(Clone, Copy, Debug, PartialEq)]

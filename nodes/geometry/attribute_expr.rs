@@ -5,8 +5,7 @@
 //! that changes nothing (`envelope` 1, `width` 0, `v` 0, `orient` no turn, `Pref` the position), so that code runs on
 //! raw curves. `rand` and `noise` hang on `seed`, and `seed` in the code is the node's, the scene's mixed in.
 
-use crate::shared::neutral;
-use engine::expr::{Env, ExprError, Program, RunError, Scope};
+use engine::expr::{Env, ExprError, Program, RunError};
 use engine::prelude::*;
 
 inputs! { INPUTS:
@@ -32,12 +31,13 @@ choice! {
 }
 
 params! { PARAMS:
-    CODE: Param<Name> = Param::text("code", "",
+    CODE: Param<Code> = Param::code("code",
         "One assignment a line: `envelope = clamp(envelope*P.y, 0, 1)`, `P.y += 0.1*sin(time)`, `let h = P.y*2`. A new \
          name makes an attribute, a number or a vector as its value is. Known are attributes by name, `.x .y .z .w`, \
-         `frame time fps seed pi`, `i` (the row, from 0) and `count`; `+ - * / % ^`, comparisons, `&& || !`, `a ? b : \
+         `frame time fps seed pi`, `i` (the row, from 0), `count`, and the graph's controls, before attributes of the same \
+         name: those are `@name`; `+ - * / % ^`, comparisons, `&& || !`, `a ? b : \
          c`; sin cos tan sqrt exp log pow abs floor ceil min max clamp mix smoothstep noise rand vec length dot cross \
-         normalize and others. Angles are radians. Empty, it does nothing.").fixed();
+         normalize and others. Angles are radians. Empty, it does nothing.");
     COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "What it runs on.");
     OVER: Param<Over> = Param::choice("over", Over::Points, "What a row is.");
     SEED: Param<Seed> = Param::seed("Other numbers give other `rand` and `noise`.");
@@ -61,8 +61,8 @@ pub static NODE: Node = Node::new(
 .outputs(&[&CHANGED])
 .attributes(attributes)
 .metrics(&[&ROWS])
-.checks(|params| checked_program(params).map(drop))
-.leaves_out(|params, _| match program(params) {
+.checks(|params| checked_program(&params.get(CODE), params).map(drop))
+.leaves_out(|params, _| match program(&params.get(CODE)) {
     Ok(program) if program.writes().is_empty() => vec![LeftOut::new("code", "it assigns nothing")],
     _ => Vec::new(),
 });
@@ -71,11 +71,12 @@ pub static NODE: Node = Node::new(
 ///
 /// # Errors
 /// Every line's fault, with its line and column; the hint is the first's.
-fn program(params: &Params) -> Result<Program> {
-    Program::parse(&params.get(CODE), &Scope::default()).map_err(|faults| {
+fn program(code: &Code) -> Result<&Program> {
+    code.program().map_err(|faults| {
         let place = |fault: &ExprError| format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
         let facts: Vec<String> = faults.iter().map(place).collect();
-        Error { hint: faults.into_iter().find_map(|fault| fault.hint), ..Error::refused(facts.join("; ")) }
+        let hint = faults.iter().find_map(|fault| fault.hint.clone());
+        Error { hint, ..Error::refused(facts.join("; ")).of(CODE.name()) }
     })
 }
 
@@ -83,8 +84,8 @@ fn program(params: &Params) -> Result<Program> {
 ///
 /// # Errors
 /// Those of the code; rows that no geometry has.
-fn checked_program(params: &Params) -> Result<Program> {
-    let program = program(params)?;
+fn checked_program<'c>(code: &'c Code, params: &Params) -> Result<&'c Program> {
+    let program = program(code)?;
     let elements = params.get(OVER) == Over::Elements;
     let fact = match params.get(COMPONENT) {
         Part::Points if elements => "loose points have no elements",
@@ -98,7 +99,7 @@ fn checked_program(params: &Params) -> Result<Program> {
 
 /// The frame rate counts as the clock: it is the scene's, not a param.
 fn reads_clock(params: &Params) -> bool {
-    program(params).is_ok_and(|program| program.uses().time || program.uses().fps)
+    program(&params.get(CODE)).is_ok_and(|program| program.uses().time || program.uses().fps)
 }
 
 /// What is written is read too: points and elements of other components may have an attribute of that name.
@@ -106,14 +107,15 @@ fn attributes(params: &Params) -> [AttrNames; 2] {
     let names = |lists: &[&[String]]| {
         AttrNames::These(lists.iter().flat_map(|list| list.iter()).map(|name| Name::from(name.as_str())).collect())
     };
-    match program(params) {
+    match program(&params.get(CODE)) {
         Ok(program) => [names(&[program.reads(), program.writes()]), names(&[program.writes()])],
         Err(_) => [names(&[]), names(&[])],
     }
 }
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
-    let program = checked_program(cx.params())?;
+    let code = cx.get(CODE);
+    let program = checked_program(&code, cx.params())?;
     let mut geometry = cx.input(GEOMETRY).clone();
     if program.writes().is_empty() {
         return Ok(CHANGED.with(geometry));
@@ -123,7 +125,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         Over::Points => Owner::Point,
         Over::Elements => Owner::Element,
     };
-    let written = run(&program, &env(cx), part, owner)?;
+    let written = run(program, &env(cx, &code), part, owner)?;
     cx.publish(ROWS, part.table(owner).rows() as f64);
     for (name, column) in written {
         part.set_column(owner, name, column)?;
@@ -131,9 +133,9 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     Ok(CHANGED.with(geometry))
 }
 
-fn env(cx: &FrameCx) -> Env<'static> {
+fn env<'c>(cx: &FrameCx, code: &'c Code) -> Env<'c> {
     let seed = f64::from(cx.get(SEED).0);
-    Env { frame: cx.frame().number(), time: cx.seconds(), fps: cx.fps(), seed, controls: &[] }
+    Env { frame: cx.frame().number(), time: cx.seconds(), fps: cx.fps(), seed, controls: code.controls() }
 }
 
 fn part(geometry: &mut Geometry, component: Part) -> Result<&mut Component> {
@@ -178,7 +180,7 @@ fn lent(part: &Component, owner: Owner, name: &str) -> Option<Column> {
             Some(column.gather(&rows))
         }
         (_, Some(_)) => None,
-        (_, None) => neutral::column(part, owner, name),
+        (_, None) => part.neutral(owner, name),
     }
 }
 

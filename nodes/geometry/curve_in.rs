@@ -8,7 +8,8 @@ use std::sync::Arc;
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "An obj, ply or json file with curves. A run of `#` in its name stands for the frame number: `fur.####.obj`.");
-    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read.")
+    FRAME: Param<i64> = Param::int("frame", 0,
+        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "CVs written into the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);
@@ -19,7 +20,7 @@ params! { PARAMS:
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
         "Attributes added to the curves, a row a curve.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, widths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
     WIDTH_PARAM: Param<f32> = Param::float("width", 0.0,
         "Width of every curve. 0 keeps what the file says.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
 }
@@ -29,7 +30,7 @@ const CURVES: Output = Output::new("curves", &[Kind::Curves], "The curves.");
 /// See the module.
 pub static NODE: Node = Node::new(
     "Curve_In",
-    1,
+    2,
     "Curves from a file, or written into the graph: fur, grass, fibres. Other geometry in the file is left; Mesh_In reads \
      its polygons.",
     Cook::Pure(cook),
@@ -46,7 +47,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         None => inline(cx)?,
     };
     Inline { points: cx.get(ATTRIBUTES), elements: cx.get(ELEMENT_ATTRIBUTES) }.add_to(&mut curves)?;
-    source::scale(&mut curves, cx.get(SCALE));
+    curves.scale_lengths(cx.get(SCALE));
     let width = cx.get(WIDTH_PARAM);
     if width > 0.0 {
         curves.set(WIDTH, vec![width; curves.point_count()])?;
@@ -59,9 +60,9 @@ fn inline(cx: &Cx) -> Result<Component> {
     let counts = match cx.get(COUNTS).as_slice() {
         [] if points.is_empty() => Vec::new(),
         [] => vec![points.len() as u32],
-        counts => counts.iter().map(|count| u32::try_from(*count).unwrap_or(0)).collect(),
+        counts => source::wholes(COUNTS, counts, 1)?,
     };
-    Ok(Component::curves(counts, points)?)
+    Component::curves(counts, points).map_err(|error| source::explained(error, POINTS.name()))
 }
 
 #[cfg(test)]
@@ -119,9 +120,9 @@ mod tests {
     fn counts_that_do_not_add_up_are_refused() {
         let two = bench(&NODE).set(POINTS, points(&[[0.0; 3]; 2]));
         let error = two.clone().set(COUNTS, Arc::new(vec![3])).try_cook().unwrap_err();
-        assert_eq!(error.fact, "the counts add up to 3 CVs, but there are 2 points");
+        assert_eq!(error.fact, "`counts` adds up to 3 CVs, but `points` has 2");
         let error = two.clone().set(COUNTS, Arc::new(vec![2, -1])).try_cook().unwrap_err();
-        assert_eq!(error.fact, "curve 1 has no CV, expected at least 1");
+        assert_eq!(error.to_string(), "`counts` has -1 at place 1, counted from 0; expected at least 1");
         let wrong = Arc::new(vec![("mask".into(), Column::new(vec![1.0_f32]))]);
         assert_eq!(two.set(ATTRIBUTES, wrong).try_cook().unwrap_err().fact, "`mask` has 1 row, expected 2");
     }

@@ -45,9 +45,6 @@ const CURVES: Output = Output::new(
     "The hairs, root first, with `Pref`, `curve_id` and what their guides have.",
 );
 
-/// Which of the endless list of hairs each is.
-const CURVE_ID: Attr<i32> = Attr::element("curve_id");
-
 const GROWN: Metric = Metric::new("curves", Unit::None, "Hairs that grew.");
 const LENGTH_ERROR: Metric = Metric::new(
     "length_error",

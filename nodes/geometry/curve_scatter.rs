@@ -40,9 +40,6 @@ const CURVES: Output = Output::new(
     "The curves, root first, with `Pref`, `curve_id` and, where the skin has it, the `uvw` of the root.",
 );
 
-/// Which of the endless list of curves each is.
-const CURVE_ID: Attr<i32> = Attr::element("curve_id");
-
 const GROWN: Metric = Metric::new("curves", Unit::None, "Curves that grew.");
 
 /// See the module.

@@ -5,7 +5,6 @@
 //! they are. A volume cannot be joined with another: two are refused. What stands once for a whole component is the
 //! first wire's that has it.
 
-use crate::shared::neutral;
 use engine::geometry::ColumnType;
 use engine::prelude::*;
 
@@ -96,7 +95,7 @@ fn completed(part: &Component, names: &[(Owner, Name)]) -> Result<Component> {
     let mut part = part.clone();
     for (owner, name) in names {
         if part.table(*owner).column(name).is_none()
-            && let Some(column) = neutral::column(&part, *owner, name)
+            && let Some(column) = part.neutral(*owner, name)
         {
             part.set_column(*owner, name.clone(), column)?;
         }

@@ -8,7 +8,8 @@ use std::sync::Arc;
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "An obj, ply or json file with polygons. A run of `#` in its name stands for the frame number: `skin.####.obj`.");
-    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read.")
+    FRAME: Param<i64> = Param::int("frame", 0,
+        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Vertices written into the graph instead of a file.").unit(Unit::Metres);
@@ -20,7 +21,7 @@ params! { PARAMS:
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
         "Attributes added to the mesh, a row a face.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, widths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The mesh.");
@@ -28,7 +29,7 @@ const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The mesh.");
 /// See the module.
 pub static NODE: Node = Node::new(
     "Mesh_In",
-    1,
+    2,
     "A mesh from a file, or written into the graph: skins, colliders, bowls. Other geometry in the file is left.",
     Cook::Pure(cook),
 )
@@ -44,19 +45,22 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         None => inline(cx)?,
     };
     Inline { points: cx.get(ATTRIBUTES), elements: cx.get(ELEMENT_ATTRIBUTES) }.add_to(&mut mesh)?;
-    source::scale(&mut mesh, cx.get(SCALE));
+    mesh.scale_lengths(cx.get(SCALE));
     Ok(MESH.with(Geometry::from(mesh)))
 }
 
 fn inline(cx: &Cx) -> Result<Component> {
-    // A negative number is no row: it becomes one that no mesh has, and is refused as such.
-    let whole = |number: &i32| u32::try_from(*number).unwrap_or(u32::MAX);
-    let indices: Vec<u32> = cx.get(INDICES).iter().map(whole).collect();
+    let indices = source::wholes(INDICES, &cx.get(INDICES), 0)?;
     let counts = match cx.get(COUNTS).as_slice() {
-        [] => vec![3; indices.len().div_ceil(3)],
-        counts => counts.iter().map(|count| u32::try_from(*count).unwrap_or(0)).collect(),
+        [] if !indices.len().is_multiple_of(3) => {
+            let fact = format!("`indices` has {} numbers, which is no whole number of triangles", indices.len());
+            return Err(Error::refused(fact).hint("write `counts` where faces have more than three corners"));
+        }
+        [] => vec![3; indices.len() / 3],
+        counts => source::wholes(COUNTS, counts, 3)?,
     };
-    Ok(Component::mesh(counts, indices, cx.get(POINTS).unwrap_or_default().to_vec())?)
+    let mesh = Component::mesh(counts, indices, cx.get(POINTS).unwrap_or_default().to_vec());
+    mesh.map_err(|error| source::explained(error, INDICES.name()))
 }
 
 #[cfg(test)]
@@ -98,8 +102,17 @@ mod tests {
     #[test]
     fn corners_that_are_no_vertex_are_refused() {
         let error = |indices: Vec<i32>| square().set(INDICES, Arc::new(indices)).try_cook().unwrap_err().fact;
-        assert_eq!(error(vec![0, 1, 4]), "index 4 (corner 2) is out of range: there are 4 points, counted from 0");
-        assert_eq!(error(vec![0, 1]), "the counts add up to 3 corners, but there are 2 indices");
-        assert!(error(vec![0, 1, -1]).ends_with("is out of range: there are 4 points, counted from 0"));
+        assert_eq!(error(vec![0, 1, 4]), "`indices` has 4 as number 2, but there are 4 `points`");
+        assert_eq!(error(vec![0, 1]), "`indices` has 2 numbers, which is no whole number of triangles");
+        assert_eq!(error(vec![0, 1, -1]), "`indices` has -1 at place 2, counted from 0");
+    }
+
+    #[test]
+    fn counts_that_are_no_faces_are_refused() {
+        let three = square().set(INDICES, Arc::new(vec![0, 2, 1]));
+        let error = |counts: Vec<i32>| three.clone().set(COUNTS, Arc::new(counts)).try_cook().unwrap_err().fact;
+        assert_eq!(error(vec![-3]), "`counts` has -3 at place 0, counted from 0");
+        assert_eq!(error(vec![2]), "`counts` has 2 at place 0, counted from 0");
+        assert_eq!(error(vec![4]), "`counts` adds up to 4 corners, but `indices` has 3");
     }
 }

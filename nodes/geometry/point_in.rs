@@ -8,13 +8,14 @@ use std::sync::Arc;
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "An obj, ply or json file with points. A run of `#` in its name stands for the frame number: `drops.####.ply`.");
-    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read.")
+    FRAME: Param<i64> = Param::int("frame", 0,
+        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added, a row a point.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, widths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("points", &[Kind::Points], "The points.");
@@ -22,7 +23,7 @@ const OUT: Output = Output::new("points", &[Kind::Points], "The points.");
 /// See the module.
 pub static NODE: Node = Node::new(
     "Point_In",
-    1,
+    2,
     "Loose points from a file, or written into the graph: particles, pins. Other geometry in the file is left.",
     Cook::Pure(cook),
 )
@@ -38,7 +39,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         None => Component::points(cx.get(POINTS).unwrap_or_default().to_vec()),
     };
     Inline { points: cx.get(ATTRIBUTES), elements: Arc::default() }.add_to(&mut points)?;
-    source::scale(&mut points, cx.get(SCALE));
+    points.scale_lengths(cx.get(SCALE));
     Ok(OUT.with(Geometry::from(points)))
 }
 

@@ -8,7 +8,8 @@ use std::sync::Arc;
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "A json file with tets. A run of `#` in its name stands for the frame number: `dough.####.json`.");
-    FRAME: Param<i64> = Param::int("frame", 0, "Which file of a numbered sequence is read.")
+    FRAME: Param<i64> = Param::int("frame", 0,
+        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
@@ -18,7 +19,7 @@ params! { PARAMS:
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
         "Attributes added, a row a tet.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, widths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
@@ -26,7 +27,7 @@ const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
 /// See the module.
 pub static NODE: Node = Node::new(
     "Tet_In",
-    1,
+    2,
     "Tets from a file, or written into the graph: soft bodies made elsewhere. Other geometry in the file is left.",
     Cook::Pure(cook),
 )
@@ -39,10 +40,11 @@ pub static NODE: Node = Node::new(
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut tets = match cx.get(FILE) {
         Some(file) => source::from_file(&file, Kind::Tets)?,
-        None => Component::tets(cx.get(TETS).to_vec(), cx.get(POINTS).unwrap_or_default().to_vec())?,
+        None => Component::tets(cx.get(TETS).to_vec(), cx.get(POINTS).unwrap_or_default().to_vec())
+            .map_err(|error| source::explained(error, TETS.name()))?,
     };
     Inline { points: cx.get(ATTRIBUTES), elements: cx.get(ELEMENT_ATTRIBUTES) }.add_to(&mut tets)?;
-    source::scale(&mut tets, cx.get(SCALE));
+    tets.scale_lengths(cx.get(SCALE));
     Ok(OUT.with(Geometry::from(tets)))
 }
 
@@ -75,6 +77,6 @@ mod tests {
         let one = bench(&NODE).set(POINTS, Some(Arc::new((0..4).map(corner).collect())));
         assert_eq!(one.clone().set(TETS, Arc::new(vec![[0, 1, 2, 3]])).cook().part(Kind::Tets).element_count(), 1);
         let error = one.set(TETS, Arc::new(vec![[0, 1, 2, 4]])).try_cook().unwrap_err();
-        assert_eq!(error.fact, "index 4 (corner 3) is out of range: there are 4 points, counted from 0");
+        assert_eq!(error.fact, "`tets` has 4 as number 3, but there are 4 `points`");
     }
 }

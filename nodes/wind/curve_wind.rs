@@ -319,8 +319,15 @@ mod tests {
         let masked = Masked { value: 0.5, attribute: Some("soft".into()) };
         let out = calm(curves).set(GLOBAL_ROTATE, masked.clone()).cook();
         assert!((angles(&out)[0] - RIGHT * 0.75).abs() < 1e-6);
-        let error = calm(upright(1)).set(GLOBAL_ROTATE, masked).try_cook().unwrap_err();
-        assert_eq!(error.fact, "`global_rotate` is masked by `soft`, which is not there");
+        let error = calm(upright(1)).set(GLOBAL_ROTATE, masked.clone()).try_cook().unwrap_err();
+        assert_eq!(error.fact, "`global_rotate` is masked by `soft`, which the curves do not have");
+        let mut curves = upright(1);
+        curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::element("soft"), vec![0.5]).unwrap();
+        let error = calm(curves).set(GLOBAL_ROTATE, masked).try_cook().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "`global_rotate` is masked by `soft`, which is one float for each curve; expected one float for each CV"
+        );
     }
 
     #[test]

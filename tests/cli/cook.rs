@@ -122,3 +122,41 @@ fn files_that_were_there_are_replaced() {
     assert_eq!(bench.names("out"), ["grass.usdc", "other.txt"]);
     assert!(fs::read(bench.path("out/grass.usdc")).unwrap().starts_with(b"PXR-USDC"));
 }
+
+#[test]
+fn code_reads_the_controls_and_its_faults_stand_where_they_are() {
+    let graph = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 3] },
+  "controls": { "gain": { "keyframes": [[1, 1], [3, 3]] } },
+  "nodes": {
+    "one": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 2, 0]] } },
+    "code": { "type": "Attribute_Expr", "inputs": { "geometry": "one" },
+              "params": { "code": "let h = P.y\nP.x = gain*h" } }
+  },
+  "outputs": { "o": "code" }
+}"#;
+    let bench = Bench::with_graph(graph);
+    bench.done(&["cook", "g.json", "--format", "json"]);
+    let tip = |frame: u32| bench.read_json(&format!("out/o.000{frame}.json"))["curves"]["points"][1][0].clone();
+    assert_eq!([tip(1), tip(2), tip(3)], [json!(2.0), json!(4.0), json!(6.0)]);
+    bench.write("g.json", &graph.replace("gain*h", "gan*h + "));
+    let expected =
+        "g.json:8:63: nodes.code.params.code: expected a value, found the end, at line 2, column 15 of the code\n";
+    assert_eq!(bench.run(&["check", "g.json"]).stderr, expected);
+}
+
+#[test]
+fn curves_on_a_moving_skin_have_velocities() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 3], "fps": 10}, "nodes": {
+        "ground": {"type": "Mesh_Primitive", "params": {"shape": "grid", "size": [1, 1, 1]}},
+        "moved": {"type": "Transform", "inputs": {"geometry": "ground"},
+                  "params": {"translate": {"keyframes": [[1, [0, 0, 0]], [3, [2, 0, 0]]]}}},
+        "hair": {"type": "Curve_Scatter", "inputs": {"skin": "moved"}, "params": {"density": 10}}
+        }, "outputs": {"o": {"from": "hair", "v": true}}}"#,
+    );
+    bench.done(&["cook", "g.json", "--format", "json"]);
+    let v = bench.read_json("out/o.0002.json")["curves"]["point_attributes"]["v"][0].clone();
+    assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m a frame, 10 frames a second: {v}");
+}

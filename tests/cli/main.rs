@@ -6,11 +6,13 @@
 
 mod bench;
 mod catalogue;
+mod check;
 mod convert;
 mod cook;
 mod diff;
 mod exits;
 mod messages;
+mod notes;
 mod same_bits;
 mod stats;
 #[cfg(unix)]

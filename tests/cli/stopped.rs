@@ -17,13 +17,13 @@ fn signal(name: &str, child: &Child) {
 
 /// Waits until `folder` holds at least `count` files, hidden ones too.
 fn wait_for(count: usize, folder: &Path) {
-    for _ in 0..2000 {
+    for _ in 0..12_000 {
         if names(folder).len() >= count {
             return;
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    panic!("{} has only {:?} after ten seconds", folder.display(), names(folder));
+    panic!("{} has only {:?} after a minute", folder.display(), names(folder));
 }
 
 fn start(bench: &Bench, args: &[&str]) -> Child {
@@ -51,6 +51,24 @@ fn ctrl_c_leaves_whole_frames_and_no_temporary() {
     }
     assert!(ran.stderr.contains(&format!("interrupted; {} whole frames were written", files.len())), "{}", ran.stderr);
     assert_eq!(bench.read_json("report.json")["total"]["interrupted"], true);
+}
+
+#[test]
+fn being_asked_to_end_is_like_ctrl_c_and_nohup_outlives_its_terminal() {
+    let bench = Bench::new();
+    let cook = bench.command(&["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass"]);
+    let mut nohup = Command::new("nohup");
+    nohup.arg(cook.get_program()).args(cook.get_args()).current_dir(bench.path("")).stdin(Stdio::null());
+    let child = nohup.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(5, &bench.path("out"));
+    signal("HUP", &child);
+    wait_for(bench.names("out").len() + 20, &bench.path("out"));
+    signal("TERM", &child);
+    let ran = ended(child);
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    let files = bench.names("out");
+    let expected: Vec<String> = (1..=files.len()).map(|frame| format!("grass.{frame:04}.json")).collect();
+    assert_eq!(files, expected, "frames without a gap, and nothing hidden");
 }
 
 #[test]
@@ -175,6 +193,30 @@ fn a_full_disk_is_told_and_holds_nothing_half_written() {
             fs::remove_file(disk.join(name)).unwrap();
         }
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_under_the_cache_is_told_once_and_does_not_stop_the_cook() {
+    let bench = Bench::new();
+    let disk = bench.path("disk");
+    let Some(_mounted) = TinyDisk::at(&disk) else {
+        eprintln!("skipped: this user may not mount a small disk");
+        return;
+    };
+    let args = ["cook", "g.json", "--frames", "1-40", "--format", "json", "--cache", "disk", "--output", "grass"];
+    for _ in 0..2 {
+        let ran = bench.run(&args);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let note = "note: the cache `disk` could not be written: the disk is full; the cook goes on without it\n";
+        assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
+        assert_eq!(bench.names("out").len(), 40);
+        assert!(bench.names("disk").iter().all(|name| !name.ends_with(".part")), "{:?}", bench.names("disk"));
+    }
+    fs::write(disk.join("filler"), vec![0; 1 << 16]).unwrap_err();
+    let ran = bench.run(&[&args[..7], &["disk/new", "--output", "grass"]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the disk is full; the cook goes on without it"), "{}", ran.stderr);
 }
 
 #[test]

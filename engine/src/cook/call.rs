@@ -31,6 +31,8 @@ pub(crate) struct Returned {
     pub(crate) metrics: Vec<(&'static str, f64)>,
     /// Bytes of arrays that no input holds.
     pub(crate) new_bytes: usize,
+    /// Names of attributes that nobody takes.
+    pub(crate) stripped: Vec<Name>,
 }
 
 impl<'a> Call<'a> {
@@ -91,6 +93,7 @@ impl Finished<'_> {
         }
         known.sort_unstable();
         let mut new_bytes = 0;
+        let mut stripped = Vec::new();
         let mut cooked = Vec::with_capacity(node.outputs.len());
         for declared in node.outputs {
             let found = outputs.0.iter().find(|(name, _)| *name == declared.name);
@@ -102,12 +105,12 @@ impl Finished<'_> {
             let fresh = geometry.arrays().into_iter().filter(|(address, _)| known.binary_search(address).is_err());
             new_bytes += fresh.map(|(_, bytes)| bytes).sum::<usize>();
             cooked.push(match self.cx.live {
-                Some(live) => stripped(geometry, live),
+                Some(live) => without_dead(geometry, live, &mut stripped),
                 None => geometry.clone(),
             });
         }
         let metrics = self.cx.published.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Returned { cooked: cooked.into(), metrics, new_bytes })
+        Ok(Returned { cooked: cooked.into(), metrics, new_bytes, stripped })
     }
 
     /// What a step of a chain published.
@@ -165,8 +168,8 @@ pub(super) fn check_finite(geometry: &Geometry, known: &[usize]) -> Result<()> {
     Ok(())
 }
 
-/// The geometry without attributes nobody takes; the same pointer where there is none.
-fn stripped(geometry: &Arc<Geometry>, live: &[Name]) -> Arc<Geometry> {
+/// The geometry without attributes nobody takes, their names put to `stripped`; the same pointer where there is none.
+fn without_dead(geometry: &Arc<Geometry>, live: &[Name], stripped: &mut Vec<Name>) -> Arc<Geometry> {
     let dead: Vec<(Kind, Owner, Name)> = geometry
         .parts()
         .flat_map(|part| part.columns().map(move |(owner, name, _)| (part.kind(), owner, name)))
@@ -181,6 +184,7 @@ fn stripped(geometry: &Arc<Geometry>, live: &[Name]) -> Arc<Geometry> {
         if let Some(part) = geometry.part_mut(kind) {
             part.remove(owner, &name);
         }
+        stripped.push(name);
     }
     Arc::new(geometry)
 }

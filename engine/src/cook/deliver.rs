@@ -1,7 +1,7 @@
 //! From a node's result to what an output asks for: attributes picked, velocities added.
 
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Name, Owner, P, V};
+use crate::geometry::{CURVE_ID, Component, Geometry, ID, Name, Owner, P, V};
 use crate::graph::{GraphOutput, Scene};
 use crate::node::Node;
 use crate::time::Frame;
@@ -61,16 +61,34 @@ fn add_velocity(result: &mut Geometry, [before, after]: [&Geometry; 2], seconds:
     let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
     for kind in kinds {
         let Some(part) = result.part_mut(kind) else { continue };
-        let rows = |geometry: &'_ Geometry| geometry.part(kind).map(|part| part.positions().to_vec());
-        let (Some(a), Some(b)) = (rows(before), rows(after)) else { continue };
-        if a.len() != part.point_count() || b.len() != a.len() {
-            let fact = format!("the {kind} have {} points half a frame before and {} after", a.len(), b.len());
-            return Err(Error::refused(fact).hint("velocities need points that stay; leave out `v` of the output"));
-        }
+        let (before, after) = match (before.part(kind), after.part(kind)) {
+            (Some(before), Some(after)) if stays(before, part) && stays(part, after) => (before, after),
+            (before, after) => {
+                let counts = [before, after].map(|part| part.map_or(0, |part| part.point_count()));
+                let now = part.point_count();
+                let fact = match counts {
+                    [a, b] if a == now && b == now => format!("the {kind} are not the same half a frame away"),
+                    [a, b] => format!("the {kind} have {a} points half a frame before, {now} now and {b} after"),
+                };
+                return Err(Error::refused(fact).hint("velocities need points that stay; leave out `v` of the output"));
+            }
+        };
+        let (a, b) = (before.positions(), after.positions());
         let rate = 1.0 / seconds;
         let v =
-            a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|k| ((f64::from(b[k]) - f64::from(a[k])) * rate) as f32));
+            a.iter().zip(b).map(|(a, b)| std::array::from_fn(|k| ((f64::from(b[k]) - f64::from(a[k])) * rate) as f32));
         part.set(V, v.collect())?;
     }
     Ok(())
+}
+
+/// Whether points of `a` go on in `b`: as many, joined alike, and the same where they say who they are.
+fn stays(a: &Component, b: &Component) -> bool {
+    let joined_alike = a.topology().same(b.topology()) || a.topology() == b.topology();
+    let known = [(ID.owner, ID.name), (CURVE_ID.owner, CURVE_ID.name)];
+    let same_ids = |(owner, name): (Owner, &str)| match (a.table(owner).column(name), b.table(owner).column(name)) {
+        (Some(a), Some(b)) => a.same(b) || a == b,
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    a.point_count() == b.point_count() && joined_alike && known.into_iter().all(same_ids)
 }

@@ -82,8 +82,6 @@ pub enum Stopped<E> {
     Asked(Arc<CookError>),
     /// The sink refused a frame.
     Sink(E),
-    /// The cache on disk could not be written.
-    Cache(std::io::Error),
 }
 
 /// Cooks graphs, and remembers between cooks what stood still.
@@ -123,7 +121,7 @@ impl Engine {
     /// it, and nothing else: [`Report::errors`] says what was lost. `cancel` ends the cook between two nodes.
     ///
     /// # Errors
-    /// Where the request cannot be cooked at all, or the sink or the cache on disk refuses.
+    /// Where the request cannot be cooked at all, or the sink refuses.
     pub fn cook<E: Send>(
         &self,
         graph: &Graph,
@@ -170,7 +168,7 @@ impl Engine {
         match sweep::Sweep::new(&fresh, &plan, None, &cancel, true).run(&mut nothing) {
             Ok(report) => Ok(report),
             Err(Stopped::Asked(error)) => Err(error),
-            Err(Stopped::Sink(_) | Stopped::Cache(_)) => unreachable!("a rehearsal delivers nothing"),
+            Err(Stopped::Sink(_)) => unreachable!("a rehearsal delivers nothing"),
         }
     }
 

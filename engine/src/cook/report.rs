@@ -27,8 +27,10 @@ pub struct NodeReport {
     pub cooks: u64,
     /// Of a window: how far back it goes, and every how many frames its state starts anew.
     pub window: Option<Window>,
-    /// Results taken from memory or disk instead.
+    /// Results taken from memory instead, and states of solvers from disk.
     pub from_cache: u64,
+    /// Frames for which a finished frame on disk, that this node has a part in, was taken.
+    pub from_disk: u64,
     /// Stages that could not matter.
     pub left_out: Vec<LeftOut>,
     /// Wall time.

@@ -1,52 +1,84 @@
-//! What can be found out about a loaded graph before it cooks: params that do not go together, files that are no geometry.
+//! What can be found out about a loaded graph before it cooks: params that do not go together, geometry that is none,
+//! params that leave their range and files that are missing at some frame.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::sweep::Sweep;
 use super::{CookError, Delivered, Engine, Stopped};
 use crate::error::{Error, ErrorKind};
+use crate::files::unreadable;
 use crate::geometry::Name;
+use crate::graph::fault::code;
 use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part};
-use crate::param::{Shape, Source};
-use crate::plan::{Plan, Request};
+use crate::param::{ParamSpec, Shape, Source};
+use crate::plan::{Plan, Request, Resolver};
+use crate::time::Frame;
+
+/// Frames that are looked through at most, so that a check takes no time worth speaking of: what comes later, a cook
+/// tells.
+const MOST_FRAMES: usize = 10_000;
 
 impl Engine {
-    /// Faults of the params of every node together, and of the files that sources read: each source is cooked once, at
-    /// the scene's first frame, and what stands still is not cooked again by a cook that follows. With `needed_by`, only
-    /// the files of what that request depends on are read.
+    /// Faults of the params of every node together, of the geometry that sources read or have in them, and of files of a
+    /// sequence that are not there. Each source is cooked once, at the first frame, and what stands still is not cooked
+    /// again by a cook that follows.
+    ///
+    /// With `needed_by`, only what that request depends on is read, at its frames. Without, everything is looked through,
+    /// and moving params at all frames of the scene too: a cook leaves out the frames at which they are refused.
     pub fn verify(&self, graph: &Graph, needed_by: Option<&Request>) -> Vec<Fault> {
         let everything = Request { outputs: (0..graph.outputs.len()).collect(), frames: vec![graph.scene.start()] };
         let plan = match self.plan(graph, needed_by.unwrap_or(&everything)) {
             Ok(plan) => plan,
             Err(_) => return Vec::new(),
         };
+        let frames: Vec<Frame> = match needed_by {
+            Some(request) => request.frames.iter().copied().take(MOST_FRAMES).collect(),
+            None => (graph.scene.first..=graph.scene.last).map(Frame::whole).take(MOST_FRAMES).collect(),
+        };
         let mut faults = Vec::new();
         let mut sources = Vec::new();
         for (place, node) in graph.nodes.iter().enumerate() {
-            let Body::Node { node: declared, params, .. } = &node.body else { continue };
-            let error = match plan.nodes[place].resolver.at(graph.scene.start()) {
-                // A moving param may be refused at frames that nobody asks for: the cook will tell.
-                Err(_) if plan.nodes[place].resolver.is_animated() => None,
+            let Body::Node { node: declared, specs, params, .. } = &node.body else { continue };
+            let own;
+            let resolver = match (plan.nodes[place].needed, needed_by) {
+                (false, None) => {
+                    own = Resolver::new(node, graph, self.files());
+                    &own
+                }
+                _ => &plan.nodes[place].resolver,
+            };
+            let before = faults.len();
+            let reads_sequence = params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
+            if resolver.is_animated() && (reads_sequence || needed_by.is_none()) {
+                let through = ThroughTime::look(resolver, &frames);
+                let missing = through.missing.map(|error| fault(graph, place, error));
+                faults.extend(missing.map(|fault| Fault { code: code::FILE_MISSING, ..fault }));
+                let left = through.refused.filter(|_| needed_by.is_none());
+                faults.extend(left.map(|error| fault(graph, place, error)));
+            }
+            let error = match resolver.at(graph.scene.start()) {
+                // Told above, or at a frame that nobody asks for.
+                Err(_) if resolver.is_animated() => None,
                 Err(error) => Some(error),
                 Ok(params) => declared.checks.and_then(|checks| checks(&params).err()),
             };
-            let reads_file = params.iter().any(|source| matches!(source, Source::File { .. }));
-            match error {
-                Some(error) => faults.push(fault(graph, &node.id, params_part(graph, place, &error), error)),
-                None if reads_file && (plan.nodes[place].needed || needed_by.is_none()) => sources.push(place),
-                None => {}
+            faults.extend(error.map(|error| fault(graph, place, error)));
+            let asked = plan.nodes[place].needed || needed_by.is_none();
+            if faults.len() == before && asked && declared.inputs.is_empty() && holds_data(specs, params) {
+                sources.push(place);
             }
         }
-        for (place, error) in self.cook_sources(&plan, &sources) {
-            let part = params_part(graph, place, &error.error);
-            faults.push(fault(graph, &error.node, part, error.error.clone()));
+        let first = frames.iter().min().copied().unwrap_or(graph.scene.start());
+        for (place, error) in self.cook_sources(&plan, &sources, first) {
+            faults.push(fault(graph, place, error.error.clone()));
         }
         faults.sort_by_key(|fault| (fault.line, fault.column));
         faults
     }
 
-    fn cook_sources(&self, plan: &Plan, sources: &[usize]) -> Vec<(usize, Arc<CookError>)> {
+    fn cook_sources(&self, plan: &Plan, sources: &[usize], frame: Frame) -> Vec<(usize, Arc<CookError>)> {
         let mut graph = plan.graph.clone();
         graph.outputs = sources
             .iter()
@@ -57,8 +89,7 @@ impl Engine {
                 v: false,
             })
             .collect();
-        let frames = vec![graph.scene.start()];
-        let request = Request { outputs: (0..sources.len()).collect(), frames };
+        let request = Request { outputs: (0..sources.len()).collect(), frames: vec![frame] };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         let cancel = AtomicBool::new(false);
         let Ok(plan) = self.plan(&graph, &request) else { return Vec::new() };
@@ -69,27 +100,84 @@ impl Engine {
         });
         match cooked {
             Ok(report) => report.errors.into_iter().map(|(output, error, _)| (sources[output], error)).collect(),
-            Err(Stopped::Asked(_) | Stopped::Sink(_) | Stopped::Cache(_)) => Vec::new(),
+            Err(Stopped::Asked(_) | Stopped::Sink(_)) => Vec::new(),
         }
     }
 }
 
+/// Whether a source reads a file, or has geometry written into it.
+fn holds_data(specs: &[ParamSpec], params: &[Source]) -> bool {
+    let is_data = |shape| matches!(shape, Shape::Vec3s | Shape::Ints | Shape::Tets | Shape::Columns);
+    specs.iter().zip(params).any(|(spec, source)| match source {
+        Source::File { .. } => true,
+        Source::Constant(value) => is_data(spec.shape) && *value != spec.default,
+        _ => false,
+    })
+}
+
+/// What is wrong with a node's params at some of its frames: the first of each kind, and how often.
+struct ThroughTime {
+    /// A value that is refused.
+    refused: Option<Error>,
+    /// A file of a sequence that is not there.
+    missing: Option<Error>,
+}
+
+impl ThroughTime {
+    fn look(resolver: &Resolver, frames: &[Frame]) -> Self {
+        let mut refused: Option<(Error, Frame, usize)> = None;
+        let mut missing: Option<(Error, Frame, usize)> = None;
+        let note = |found: &mut Option<(Error, Frame, usize)>, frame: Frame, error: &dyn Fn() -> Error| match found {
+            Some((_, _, more)) => *more += 1,
+            None => *found = Some((error(), frame, 0)),
+        };
+        // Several frames may read the same file.
+        let mut there: Option<PathBuf> = None;
+        for frame in frames {
+            match resolver.unopened(*frame) {
+                Err(error) => note(&mut refused, *frame, &|| error.clone()),
+                Ok(params) => {
+                    for (param, path) in resolver.sequence_files(&params) {
+                        if there.as_ref() == Some(&path) {
+                            continue;
+                        }
+                        match std::fs::metadata(&path) {
+                            Ok(_) => there = Some(path),
+                            Err(error) => note(&mut missing, *frame, &|| unreadable(&path, &error).of(param)),
+                        }
+                    }
+                }
+            }
+        }
+        let with_frames = |(error, frame, more): (Error, Frame, usize)| {
+            let more = match more {
+                0 => String::new(),
+                1 => " and at 1 more frame".into(),
+                more => format!(" and at {more} more frames"),
+            };
+            Error { fact: format!("{}, at frame {frame}{more}", error.fact), ..error }
+        };
+        Self { refused: refused.map(with_frames), missing: missing.map(with_frames) }
+    }
+}
+
 /// The param a fault belongs to, if it belongs to one: that of the file, where the file is the trouble.
-fn params_part(graph: &Graph, node: usize, error: &Error) -> Option<&'static str> {
+fn param_of(graph: &Graph, node: usize, error: &Error) -> Option<&'static str> {
     let Body::Node { specs, .. } = &graph.nodes[node].body else { return None };
     let file = specs.iter().find(|spec| spec.shape == Shape::File).filter(|_| error.kind == ErrorKind::File);
     let named = || specs.iter().find(|spec| error.fact.starts_with(&format!("`{}`", spec.name)));
-    file.or_else(named).map(|spec| spec.name)
+    error.param.or_else(|| file.or_else(named).map(|spec| spec.name))
 }
 
-fn fault(graph: &Graph, node: &Name, param: Option<&'static str>, error: Error) -> Fault {
+fn fault(graph: &Graph, node: usize, error: Error) -> Fault {
     let (code, class) = match error.kind {
         ErrorKind::File => ("file-content", FaultClass::File),
-        _ => ("illegal-value", FaultClass::Graph),
+        _ => (code::ILLEGAL_VALUE, FaultClass::Graph),
     };
-    let part = match param {
-        Some(param) => Part::Param(node, param),
-        None => Part::Node(node),
+    let id: &Name = &graph.nodes[node].id;
+    let part = match param_of(graph, node, &error) {
+        Some(param) => Part::Param(id, param),
+        None => Part::Node(id),
     };
     let fault = graph.fault_at(part, code, class, error.fact);
     match error.hint {

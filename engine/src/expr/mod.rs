@@ -42,6 +42,7 @@ use std::fmt;
 
 pub use error::ExprError;
 pub use help::HELP;
+pub use parser::RESERVED;
 pub use program::{BadValue, Program, RunError};
 
 use crate::geometry::ColumnType;

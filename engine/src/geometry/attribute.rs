@@ -80,6 +80,9 @@ pub const ORIENT: Attr<[f32; 4]> = Attr::point("orient");
 /// Identity of a point through time.
 pub const ID: Attr<i32> = Attr::point("id");
 
+/// Identity of a curve through time.
+pub const CURVE_ID: Attr<i32> = Attr::element("curve_id");
+
 /// The type a well-known name must have; `None` for a free name.
 pub fn fixed_type(name: &str) -> Option<ColumnType> {
     match name {

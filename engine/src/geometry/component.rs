@@ -166,6 +166,12 @@ impl Component {
         }
     }
 
+    /// What the attribute of that name is, whatever its type and whoever owns a row: `one float for each curve`.
+    pub fn describe(&self, name: &str) -> Option<String> {
+        let found = self.columns().find(|(_, known, _)| ***known == *name);
+        found.map(|(owner, _, column)| self.kind().rows_text(owner, column.kind()))
+    }
+
     /// The rows of an attribute, where it is there.
     pub fn get<T: Item>(&self, attr: Attr<T>) -> Option<&[T]> {
         self.table(attr.owner).get(attr.name)

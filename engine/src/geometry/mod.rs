@@ -8,13 +8,17 @@ mod column;
 mod component;
 mod derived;
 mod kept;
+mod lengths;
+mod neutral;
 mod topology;
 mod triangles;
 mod volume;
 
 use std::sync::Arc;
 
-pub use attribute::{Attr, ENVELOPE, ID, N, ORIENT, Owner, P, PREF, SHIELDED, THICKNESS, UVW, V, WIDTH, fixed_type};
+pub use attribute::{
+    Attr, CURVE_ID, ENVELOPE, ID, N, ORIENT, Owner, P, PREF, SHIELDED, THICKNESS, UVW, V, WIDTH, fixed_type,
+};
 pub use column::{Column, ColumnType, Item, Name, Table};
 pub use component::Component;
 pub use topology::{Faces, Runs, Topology};
@@ -49,6 +53,21 @@ impl Kind {
             Self::Tets => "tets",
             Self::Volume => "volume",
         }
+    }
+
+    /// An attribute of a component of this kind in words: `one float for each curve`, `one int3 for all`.
+    pub fn rows_text(self, owner: Owner, rows: ColumnType) -> String {
+        let row = match (owner, self) {
+            (Owner::Once, _) => return format!("one {rows} for all"),
+            (Owner::Point, Self::Curves) => "CV",
+            (Owner::Point, Self::Mesh) => "vertex",
+            (Owner::Point, Self::Points | Self::Tets | Self::Volume) => "point",
+            (Owner::Element, Self::Curves) => "curve",
+            (Owner::Element, Self::Mesh) => "face",
+            (Owner::Element, Self::Tets) => "tet",
+            (Owner::Element, Self::Points | Self::Volume) => "element",
+        };
+        format!("one {rows} for each {row}")
     }
 }
 

@@ -57,6 +57,15 @@ impl Volume {
         Ok(Self { grid, level_set: Arc::new(level_set), velocity: velocity.map(Arc::new), once: Table::new(1) })
     }
 
+    /// This volume with every length in it, speeds included, put through `length`.
+    pub(super) fn with_lengths(&self, length: impl Fn(f32) -> f32) -> Self {
+        let Grid { origin, cell, size } = self.grid;
+        let grid = Grid { origin: origin.map(&length), cell: length(cell), size };
+        let field = |field: &Arc<Vec<f32>>| Arc::new(field.iter().copied().map(&length).collect());
+        let velocity = self.velocity.each_ref().map(field);
+        Self { grid, level_set: field(&self.level_set), velocity, once: self.once.clone() }
+    }
+
     /// The grid.
     pub fn grid(&self) -> Grid {
         self.grid

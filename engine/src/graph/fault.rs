@@ -131,6 +131,8 @@ pub mod code {
         SCENE = "scene";
         /// An id or name with other characters than ids have.
         BAD_NAME = "bad-name";
+        /// A control with a name that expressions read as something else.
+        RESERVED_NAME = "reserved-name";
         /// No such type of node.
         UNKNOWN_TYPE = "unknown-type";
         /// The type has no such param.
@@ -175,8 +177,6 @@ pub mod code {
         WRONG_COMPONENT = "wrong-component";
         /// Nothing to cook.
         NO_OUTPUTS = "no-outputs";
-        /// Velocities asked for where points come and go.
-        NO_VELOCITY = "no-velocity";
         /// A file that is not there.
         FILE_MISSING = "file-missing";
         /// A file that cannot be read.

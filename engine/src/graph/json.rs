@@ -61,7 +61,14 @@ pub(super) fn is_name(name: &str) -> bool {
 /// A user's text as messages show it: short, and without characters that a terminal obeys.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 60;
-    let mut short: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    let mut short = String::new();
+    for c in text.chars().take(LONGEST) {
+        match c {
+            // They harm no terminal, and a path or a pattern full of them would be unreadable escaped.
+            '\\' | '"' | '\'' => short.push(c),
+            _ => short.extend(c.escape_debug()),
+        }
+    }
     if text.chars().nth(LONGEST).is_some() {
         short.push('…');
     }
@@ -228,16 +235,10 @@ impl<'a> Json<'a> {
     pub(super) fn whole(&self, expected: &str) -> Result<i64, Fault> {
         let x = self.number(expected)?;
         let Value::NumberLit(number) = self.value else { return Err(self.unexpected(expected)) };
-        if let Ok(whole) = number.value.parse() {
-            return Ok(whole);
-        }
-        if x.fract() != 0.0 {
-            return Err(self.unexpected(expected).hint(format!("the nearest is {}", x.round())));
-        }
-        // Below 2⁵³ every whole number is exact, so 3e2 and 300.0 are what they look like.
-        match x.abs() < 9_007_199_254_740_992.0 {
-            true => Ok(x as i64),
-            false => Err(self
+        match exact_whole(number.value) {
+            Some(whole) => Ok(whole),
+            None if x.fract() != 0.0 => Err(self.unexpected(expected).hint(format!("the nearest is {}", x.round()))),
+            None => Err(self
                 .fault(code::NUMBER_SIZE, format!("{} is too large for a whole number", shown(number.value)))
                 .hint("expected a whole number within ±9.2e18")),
         }
@@ -269,6 +270,22 @@ impl<'a> Json<'a> {
     }
 }
 
+/// The whole number that a JSON number is, digit by digit: `300`, `300.0`, `3e2`, `1e18`.
+fn exact_whole(text: &str) -> Option<i64> {
+    let (plain, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let (whole, fraction) = plain.split_once('.').unwrap_or((plain, ""));
+    let fraction = fraction.trim_end_matches('0');
+    let exponent = exponent.parse::<i32>().ok()?.checked_sub(i32::try_from(fraction.len()).ok()?)?;
+    let digits: i128 = format!("{whole}{fraction}").parse().ok()?;
+    let scale = 10_i128.checked_pow(exponent.unsigned_abs());
+    match (digits, scale) {
+        (0, _) => Some(0),
+        (_, Some(scale)) if exponent >= 0 => digits.checked_mul(scale)?.try_into().ok(),
+        (_, Some(scale)) if digits % scale == 0 => (digits / scale).try_into().ok(),
+        _ => None,
+    }
+}
+
 /// Puts a fault for every entry whose name is none of `known`; `what` names the known ones: `keys of a node`.
 pub(super) fn refuse_unknown(entries: &[Entry<'_>], known: &[&str], what: &str, faults: &mut Vec<Fault>) {
     for entry in entries.iter().filter(|entry| !known.contains(&entry.name)) {
@@ -292,4 +309,23 @@ pub(super) fn find<'e, 'a>(entries: &'e [Entry<'a>], name: &str) -> Option<&'e E
 /// Keeps what was read, puts away what was wrong.
 pub(super) fn keep<T>(read: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     read.map_err(|fault| faults.push(fault)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_are_exact_however_they_are_written() {
+        let wholes = ["3", "-3.0", "3e2", "1.5E1", "1e18", "9.223372036854775807e18", "30e-1", "0e99999", "-0"];
+        let expected = [3, -3, 300, 15, 1_000_000_000_000_000_000, i64::MAX, 3, 0, 0];
+        assert_eq!(wholes.map(exact_whole), expected.map(Some));
+        assert_eq!(["0.5", "1e19", "9223372036854775808", "15e-1", "1e99999999999"].map(exact_whole), [None; 5]);
+    }
+
+    #[test]
+    fn what_is_shown_is_readable_and_harmless() {
+        assert_eq!(shown(r#"C:\fur\"a"'s.obj"#), r#"C:\fur\"a"'s.obj"#);
+        assert_eq!(shown("\u{1b}[2J\n\u{202e}"), r"\u{1b}[2J\n\u{202e}");
+    }
 }

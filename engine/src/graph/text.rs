@@ -80,12 +80,25 @@ fn places(content: &str, start: Place) -> impl Iterator<Item = (usize, Place)> {
     })
 }
 
+/// How files begin that are packed, and what they are called.
+const PACKED: [(&[u8], &str); 5] = [
+    (b"\x1f\x8b", "gzip"),
+    (b"PK\x03\x04", "zip"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
+    (b"\xfd7zXZ\0", "xz"),
+    (b"BZh", "bzip2"),
+];
+
 /// The text of a file's bytes: UTF-8, a byte order mark before it is left out.
 ///
 /// # Errors
 /// Where the bytes are something else.
 pub(super) fn decode(bytes: &[u8]) -> Result<&str, Fault> {
     let whole = |fact: &str| Text::new("", None).fault(0, "", code::ENCODING, fact).hint("save it as UTF-8");
+    if let Some((_, name)) = PACKED.iter().find(|(start, _)| bytes.starts_with(start)) {
+        let fact = format!("the file looks like {name}, expected a text");
+        return Err(Text::new("", None).fault(0, "", code::ENCODING, fact).hint("unpack it first"));
+    }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     // In UTF-16, either way round, one of the first two bytes of `{` or a blank is zero.
     if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, _, ..] | [_, 0, ..]) {
@@ -118,6 +131,13 @@ mod tests {
         assert_eq!(text.place(9_000), Place { line: 1, column: 4_501 });
         assert_eq!(text.place(10_001 + 2_999), Place { line: 2, column: 3_000 });
         assert_eq!(text.place(content.len()), Place { line: 2, column: 3_001 });
+    }
+
+    #[test]
+    fn packed_files_are_called_by_their_name() {
+        let fault = decode(b"\x1f\x8b\x08\0\0\0\0\0").unwrap_err();
+        assert_eq!(fault.to_string(), "1:1: the file looks like gzip, expected a text; unpack it first");
+        assert_eq!(decode(b"PK\x03\x04").unwrap_err().fact, "the file looks like zip, expected a text");
     }
 
     #[test]

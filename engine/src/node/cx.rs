@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Metric, Node, Output};
 use crate::error::{Error, ErrorKind, Result};
-use crate::geometry::{Attr, Component, Geometry, Item, Name, Owner};
+use crate::geometry::{Attr, ColumnType, Component, Geometry, Item, Name, Owner};
 use crate::param::{Clock, Masked, Param, ParamType, Params};
 use crate::time::Frame;
 
@@ -62,16 +62,16 @@ impl Cx<'_> {
         let name = param.name();
         let Masked { value, attribute } = self.get(param);
         let Some(attribute) = attribute else { return Ok((value, None)) };
-        let missing =
-            |fact: String| Error::refused(fact).hint(format!("the {} need a float a point of that name", part.kind()));
-        let table = part.table(Owner::Point);
-        match (table.get(&attribute), table.column(&attribute)) {
-            (Some(mask), _) => Ok((value, Some(mask))),
-            (None, Some(column)) => {
-                Err(missing(format!("`{name}` is masked by `{attribute}`, which is {}", column.kind())))
-            }
-            (None, None) => Err(missing(format!("`{name}` is masked by `{attribute}`, which is not there"))),
+        if let Some(mask) = part.table(Owner::Point).get(&attribute) {
+            return Ok((value, Some(mask)));
         }
+        let kind = part.kind();
+        let what = match part.describe(&attribute) {
+            Some(found) => format!("which is {found}"),
+            None => format!("which the {kind} do not have"),
+        };
+        let expected = kind.rows_text(Owner::Point, ColumnType::F1);
+        Err(Error::refused(format!("`{name}` is masked by `{attribute}`, {what}")).hint(format!("expected {expected}")))
     }
 
     /// Whether anything downstream, or a file, takes that attribute of this node's result.

@@ -1,6 +1,7 @@
 //! Typed handles of params. A handle is the one place where a param's name, default, ranges, unit and help stand;
 //! help, schema, validation and conformance derive from it.
 
+use super::code::Code;
 use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
 use super::unit::Unit;
 use super::value::{Masked, Seed, Span, Turn, Value};
@@ -157,6 +158,8 @@ types! {
         |seed: Self| Value::Int(i64::from(seed.0));
     Name, &'static str, Shape::Text, |text: &str| Value::Text(text.into()), Value::Text(text) => text.clone(),
         Value::Text;
+    Code, &'static str, Shape::Code, |text: &str| Value::Code(Code::new(text)), Value::Code(code) => code.clone(),
+        Value::Code;
     Arc<Vec<Name>>, &'static [&'static str], Shape::Texts,
         |texts: &[&str]| Value::Texts(Arc::new(texts.iter().map(|text| (*text).into()).collect())),
         Value::Texts(texts) => texts.clone(), Value::Texts;
@@ -321,6 +324,13 @@ impl Param<Name> {
     /// A text.
     pub const fn text(name: &'static str, default: &'static str, help: &'static str) -> Self {
         Self::new(name, default, help)
+    }
+}
+
+impl Param<Code> {
+    /// Assignments that run over points or elements; they may name the graph's controls. None by default.
+    pub const fn code(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, "", help)
     }
 }
 

@@ -4,6 +4,7 @@
 //! from a [`Source`] (a literal, keyframes, an expression) at each time they are read.
 
 mod choice;
+mod code;
 mod handle;
 mod source;
 mod spec;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use choice::{Choice, ChoiceOption};
+pub use code::{Code, CodeSource};
 pub use handle::{Param, ParamDecl, ParamType, RampDefault};
 pub(crate) use source::mixed_seed;
 pub use source::{Clock, Keyframe, Keyframes, Source};

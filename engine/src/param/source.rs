@@ -6,6 +6,7 @@ use std::sync::Arc;
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 
+use super::code::CodeSource;
 use super::spec::Shape;
 use super::turn::{self, euler_to_turn};
 use super::value::Value;
@@ -42,6 +43,8 @@ pub enum Source {
     Keys(Arc<Keyframes>, Shape),
     /// As many expressions as the shape has numbers, and the controls (numbers and vectors) they may name.
     Exprs(Arc<Vec<Expr>>, Shape, Arc<Vec<Source>>),
+    /// Code, and the controls it may name.
+    Code(CodeSource),
     /// The current frame, rounded down.
     CurrentFrame,
     /// A file; `####` in its path stands for the frame number when `numbered`. Opened when the params are resolved.
@@ -65,6 +68,7 @@ impl Source {
                 let uses = expr.uses();
                 uses.time || uses.controls.iter().any(|control| controls[*control].is_animated())
             }),
+            Self::Code(code) => code.is_animated(),
             Self::CurrentFrame => true,
             // A numbered path follows the node's `frame`, which is animated or not by itself.
             Self::File { .. } => false,
@@ -78,29 +82,30 @@ impl Source {
             Self::Constant(value) => value.clone(),
             Self::Keys(keys, shape) => keys.at(frame, *shape),
             Self::Exprs(exprs, shape, controls) => {
-                let mut numbers = Vec::new();
-                for control in controls.iter() {
-                    match control.at(frame, clock) {
-                        Value::Vec3(v) => numbers.extend(v),
-                        value => numbers.push(value.number()),
-                    }
-                }
+                let read = |control| exprs.iter().any(|expr| expr.controls().contains(&control));
+                let numbers = control_numbers(controls, frame, clock, read);
                 let env =
                     Env { frame, time: frame / clock.fps, fps: clock.fps, seed: clock.seed as f64, controls: &numbers };
                 let x = |k: usize| exprs[k].eval(&env);
                 match shape {
-                    Shape::Int => Value::Int(whole(x(0))),
-                    Shape::Seed => Value::Int(mixed_seed(clock.seed, whole(x(0)))),
+                    Shape::Int => whole(x(0)).map_or(Value::Float(x(0)), Value::Int),
+                    Shape::Seed => {
+                        whole(x(0)).map_or(Value::Float(x(0)), |own| Value::Int(mixed_seed(clock.seed, own)))
+                    }
                     Shape::Bool => Value::Bool(x(0) != 0.0),
                     Shape::Vec2 => Value::Vec2([x(0), x(1)]),
                     Shape::Span => Value::Span([x(0), x(1)]),
                     Shape::Vec3 => Value::Vec3([x(0), x(1), x(2)]),
-                    Shape::Int3 => Value::Int3([x(0), x(1), x(2)].map(whole)),
+                    Shape::Int3 => match [x(0), x(1), x(2)].map(whole) {
+                        [Some(a), Some(b), Some(c)] => Value::Int3([a, b, c]),
+                        _ => Value::Vec3([x(0), x(1), x(2)]),
+                    },
                     Shape::Turn => euler_to_turn([x(0), x(1), x(2)]),
                     Shape::Masked => Value::Masked(x(0), None),
                     _ => Value::Float(x(0)),
                 }
             }
+            Self::Code(code) => Value::Code(code.at(frame, clock)),
             Self::CurrentFrame => Value::Int(frame.floor() as i64),
             Self::File { .. } => Value::File(None),
             Self::Masked(value, attribute) => Value::Masked(value.at(frame, clock).number(), Some(attribute.clone())),
@@ -108,14 +113,32 @@ impl Source {
     }
 }
 
+/// All numbers of all controls in a row, as expressions read them; 0 for those that are not `read`.
+pub(super) fn control_numbers(controls: &[Source], frame: f64, clock: Clock, read: impl Fn(usize) -> bool) -> Vec<f64> {
+    let mut numbers = Vec::new();
+    for (place, control) in controls.iter().enumerate() {
+        match control.at(frame, clock) {
+            Value::Vec3(v) if read(place) => numbers.extend(v),
+            Value::Vec3(_) => numbers.extend([0.0; 3]),
+            value => numbers.push(if read(place) { value.number() } else { 0.0 }),
+        }
+    }
+    numbers
+}
+
 /// The seed that a node gets: a param's own and the scene's, mixed. Always within u32.
 pub(crate) fn mixed_seed(scene: i64, own: i64) -> i64 {
     i64::from(Key::new(scene as u64).of(own as u64).u32())
 }
 
-/// The nearest whole number; saturates where it does not fit, and NaN becomes the least, which every range refuses.
-fn whole(x: f64) -> i64 {
-    if x.is_nan() { i64::MIN } else { x.round() as i64 }
+/// The whole number that an expression gives, up to the rounding of its own arithmetic; what is none is handed on as it
+/// is, and refused as any value of another shape.
+fn whole(x: f64) -> Option<i64> {
+    /// Of the number: enough for 0.1*30 to be 3 and for frame/24*24 to be the frame.
+    const ROUNDING: f64 = 1e-12;
+    let nearest = x.round();
+    let fits = nearest.abs() < 9.2e18 && (x - nearest).abs() <= ROUNDING * nearest.abs().max(1.0);
+    fits.then_some(nearest as i64)
 }
 
 impl Value {

@@ -46,6 +46,8 @@ pub enum Shape {
     Tets,
     /// `{"name": [numbers], …}`
     Columns,
+    /// Assignments, a text.
+    Code,
 }
 
 impl Shape {
@@ -73,6 +75,7 @@ impl Shape {
             Self::Ints => "a list of whole numbers".into(),
             Self::Tets => "a list of tets [[a, b, c, d], …]".into(),
             Self::Columns => "attributes {\"name\": [numbers], …}".into(),
+            Self::Code => "assignments, a text".into(),
         }
     }
 
@@ -187,14 +190,17 @@ impl ParamSpec {
         let (name, hard) = (self.name, self.facts.hard);
         let range = || format!("expected {hard}{}", self.unit_text());
         let outside = |shown: String| Some((format!("`{name}` is {shown}"), range()));
+        let is_whole = matches!(self.shape, Shape::Int | Shape::Int3 | Shape::Seed);
+        if is_whole && matches!(value, Value::Float(_) | Value::Vec3(_)) {
+            let hint = format!("expected {}; floor(…), ceil(…) or round(…) makes one", self.shape.describe());
+            return Some((format!("`{name}` is {value}"), hint));
+        }
         let numbers: &[f64] = match value {
             Value::Float(x) | Value::Masked(x, _) => std::slice::from_ref(x),
             Value::Vec2(v) => v,
             Value::Vec3(v) => v,
             Value::Span(v) => v,
             Value::Turn(v) => v,
-            // What an expression makes of NaN.
-            Value::Int(i64::MIN) => return outside("not a number".into()),
             Value::Int(i) => return (!hard.hold(*i as f64)).then(|| outside(i.to_string()))?,
             Value::Int3(v) => return (!v.iter().all(|i| hard.hold(*i as f64))).then(|| outside(value.to_string()))?,
             Value::Ramp(ramp) => {

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use numerics::ramp::Ramp;
+use numerics::ramp::{Interpolation, Ramp};
 
+use super::code::Code;
 use crate::files::File;
 use crate::geometry::{Column, Name};
 use crate::key::Hasher;
@@ -82,6 +83,8 @@ pub enum Value {
     Tets(Arc<Vec<[u32; 4]>>),
     /// Named attributes.
     Columns(Arc<Vec<(Name, Column)>>),
+    /// Assignments, and the controls they read.
+    Code(Code),
 }
 
 impl Value {
@@ -128,6 +131,7 @@ impl Value {
                     key.text(name).i64(column.kind() as i64).i64(column.len() as i64).bytes(&column.to_bytes())
                 })
             }
+            Self::Code(code) => code.add_to(key.tag(21)),
         };
     }
 }
@@ -153,7 +157,12 @@ impl std::fmt::Display for Value {
             Self::Choice(i) => write!(f, "{i}"),
             Self::Ramp(ramp) => {
                 let keys: Vec<String> = ramp.keys().iter().map(|[x, y]| format!("[{x}, {y}]")).collect();
-                write!(f, "[{}]", keys.join(", "))
+                let between = match ramp.interpolation() {
+                    Interpolation::Linear => "",
+                    Interpolation::Smooth => r#", "interpolation": "smooth""#,
+                    Interpolation::Constant => r#", "interpolation": "constant""#,
+                };
+                write!(f, r#"{{"ramp": [{}]{between}}}"#, keys.join(", "))
             }
             Self::Text(text) => write!(f, "{text:?}"),
             Self::Texts(texts) => list(f, &texts.iter().map(|text| format!("{text:?}")).collect::<Vec<_>>()),
@@ -163,6 +172,7 @@ impl std::fmt::Display for Value {
             Self::Ints(rows) => write!(f, "{} whole numbers", rows.len()),
             Self::Tets(rows) => write!(f, "{} tets", rows.len()),
             Self::Columns(columns) => write!(f, "{} attributes", columns.len()),
+            Self::Code(code) => write!(f, "{code}"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{Planned, Request};
-use crate::geometry::{Name, P, V};
+use crate::geometry::{CURVE_ID, ID, Name, P, V};
 use crate::graph::{Body, Graph};
 use crate::node::AttrNames;
 use crate::param::{Source, Value};
@@ -16,8 +16,9 @@ pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [Planned]) {
     let mut taken: Vec<Taken> = vec![Some(BTreeSet::new()); graph.nodes.len()];
     for output in request.outputs.iter().map(|place| &graph.outputs[*place]) {
         let asked = output.attributes.as_ref().map(|names| {
-            let own = [P.name, V.name].map(Name::from);
-            names.iter().cloned().chain(own).collect()
+            // Of points that are not the same any more there are no velocities: their ids tell.
+            let ids = [ID.name, CURVE_ID.name].into_iter().filter(|_| output.v);
+            names.iter().cloned().chain([P.name, V.name].into_iter().chain(ids).map(Name::from)).collect()
         });
         add(&mut taken[output.from.node], asked);
     }

@@ -223,6 +223,18 @@ impl<'g> Plan<'g> {
         vec![floor - 1, floor, floor + 1, after]
     }
 
+    /// A node and all that it depends on, in the order of the graph.
+    pub(crate) fn ancestors(&self, node: usize) -> Vec<usize> {
+        let mut above = vec![false; node + 1];
+        above[node] = true;
+        for place in (0..=node).rev() {
+            if above[place] {
+                self.graph.nodes[place].inputs().iter().flatten().for_each(|link| above[link.node] = true);
+            }
+        }
+        (0..=node).filter(|place| above[*place]).collect()
+    }
+
     /// The wires of an input.
     pub(crate) fn links(&self, node: usize, input: usize) -> &[Link] {
         &self.graph.nodes[node].inputs()[input]

@@ -94,20 +94,37 @@ impl Resolver {
         self.evaluate(frame, true)
     }
 
+    /// The params at `frame`, its files not opened: cheap enough to be asked for every frame of a scene.
+    pub(crate) fn unopened(&self, frame: Frame) -> Result<Params> {
+        self.values(frame.number(), false)
+    }
+
+    /// The numbered files of a sequence that `params` mean.
+    pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = (&'static str, PathBuf)> {
+        let frame = self.file_frame(params);
+        self.specs.iter().zip(&self.sources).filter_map(move |(spec, source)| match source {
+            Source::File { path, numbered: true } => Some((spec.name, numbered_path(path, frame))),
+            _ => None,
+        })
+    }
+
     fn evaluate(&self, frame: f64, past: bool) -> Result<Params> {
+        self.with_files(self.values(frame, past)?)
+    }
+
+    fn values(&self, frame: f64, past: bool) -> Result<Params> {
         let mut values = Vec::with_capacity(self.sources.len());
         for (spec, source) in self.specs.iter().zip(&self.sources) {
             let value = source.at(frame, self.clock);
             // Integrals over the past read those params alone: what the others were then refuses nothing now.
             let matters = !past || spec.facts.history || spec.facts.fixed;
             if let Some((fact, hint)) = spec.refuses(&value).filter(|_| matters) {
-                return Err(Error::refused(fact).hint(hint));
+                return Err(Error::refused(fact).hint(hint).of(spec.name));
             }
             values.push(value);
         }
         let params = Params { specs: self.specs.clone(), values: values.into(), log: self.log.clone() };
-        let params = self.without_unread(params, past);
-        self.with_files(params)
+        Ok(self.without_unread(params, past))
     }
 
     fn without_unread(&self, mut params: Params, past: bool) -> Params {

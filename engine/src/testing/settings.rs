@@ -41,6 +41,7 @@ pub(super) fn candidates(spec: &ParamSpec) -> Vec<Value> {
             [vec![], vec!["uvw".into()], vec![MASK.into(), "id".into()]].map(|t| Value::Texts(Arc::new(t))).to_vec()
         }
         Shape::File => Vec::new(),
+        Shape::Code => ["", "made = 1", "P.x += 0.1*i"].map(|text| Value::Code(text.into())).to_vec(),
         Shape::Masked => {
             let mask = Some(MASK.into());
             vec![

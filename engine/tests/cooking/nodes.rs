@@ -225,7 +225,10 @@ pub(crate) static SPREAD: Node = Node::new(
 .params(SPREAD_PARAMS)
 .outputs(&[&OUT])
 .integrates(|params| [f64::from(params.get(SPREAD_SPEED)), 0.0, 0.0])
-.integrates(|params| [0.0, f64::from(params.get(SPREAD_SPEED)).powi(2), 0.0])
+.integrates(|params| {
+    let speed = f64::from(params.get(SPREAD_SPEED));
+    [0.0, speed * speed, 0.0]
+})
 .writes(&[&P]);
 
 params! { FROM_START_PARAMS: FROM_START_PROBE: Param<i64> = PROBE; }

@@ -1,9 +1,9 @@
 //! Velocities of outputs, where the node has none of its own.
 
-use engine::geometry::V;
+use engine::geometry::{Geometry, ID, Kind, V};
 
-use crate::net::{Cooked, Net, at, engine};
-use crate::nodes::{CLOCK, FOLLOW, SOURCE};
+use crate::net::{Cooked, Net, at, engine, row};
+use crate::nodes::{ADD, CLOCK, FOLLOW, SOURCE};
 
 /// x = f².
 fn squares() -> Net {
@@ -56,4 +56,34 @@ fn velocities_alone_have_the_bits_they_have_among_others() {
         let alone = net.cook_with(&engine(1, 1 << 30), &[at(frame)], None);
         assert_eq!(v(&alone, frame).to_bits(), v(&together, frame).to_bits(), "frame {frame}");
     }
+}
+
+/// Given points that change at frame 3, with velocities and nothing else.
+fn changing(at: impl Fn(bool) -> Geometry + Send + Sync + 'static) -> Cooked {
+    let mut net = Net::new(1, 5);
+    let given = net.given("given", move |frame| at(frame.number() >= 3.0));
+    let add = net.add("add", &ADD).wire("points", given).done();
+    let output = net.output(add);
+    (output.v, output.attributes) = (true, Some(Vec::new()));
+    net.cook(1..=5)
+}
+
+#[test]
+fn where_points_come_and_go_there_are_no_velocities_and_elsewhere_there_are() {
+    let cooked = changing(|later| row(if later { &[0.0, 1.0, 2.0] } else { &[0.0, 1.0] }));
+    let fact = "the points have 2 points half a frame before, 3 now and 3 after";
+    let hint = "velocities need points that stay; leave out `v` of the output";
+    assert_eq!(cooked.error(), format!("`add` (Add) at frame 3: {fact}; {hint}"));
+    assert_eq!(cooked.found.keys().map(|(_, frame)| frame.number()).collect::<Vec<_>>(), [1.0, 2.0, 4.0, 5.0]);
+}
+
+#[test]
+fn as_many_points_with_other_ids_are_not_the_same_points() {
+    let with_ids = |ids: [i32; 2]| {
+        let mut geometry = row(&[0.0, 1.0]);
+        geometry.part_mut(Kind::Points).unwrap().set(ID, ids.to_vec()).unwrap();
+        geometry
+    };
+    let cooked = changing(move |later| with_ids(if later { [2, 3] } else { [1, 2] }));
+    assert!(cooked.error().contains("the points are not the same half a frame away"), "{}", cooked.error());
 }

@@ -143,9 +143,9 @@ fn a_mask_thins_in_proportion() {
 #[test]
 fn a_mask_that_is_not_there_or_no_number_is_refused() {
     let error = meadow(square(1.0)).set(MASK, "lawn".into()).try_cook().unwrap_err();
-    assert_eq!(error.to_string(), "`mask` is `lawn`, which `skin` does not have; expected a float a point of the skin");
+    assert_eq!(error.to_string(), "`mask` is `lawn`, which `skin` does not have; expected one float for each vertex");
     let error = meadow(square(1.0)).set(MASK, "P".into()).try_cook().unwrap_err();
-    assert_eq!(error.fact, "`mask` is `P`, which is float3");
+    assert_eq!(error.fact, "`mask` is `P`, which is one float3 for each vertex");
 }
 
 /// The square turned by a quarter about z a frame and lifted.

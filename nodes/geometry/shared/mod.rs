@@ -2,6 +2,5 @@
 
 pub(crate) mod faces;
 pub(crate) mod kept;
-pub(crate) mod neutral;
 pub(crate) mod planting;
 pub(crate) mod source;

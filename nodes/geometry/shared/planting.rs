@@ -69,15 +69,11 @@ pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f3
     if name.is_empty() {
         return Ok(None);
     }
-    let table = skin.table(Owner::Point);
-    match (table.get(name), table.column(name)) {
-        (Some(mask), _) => Ok(Some(mask)),
-        (None, found) => {
-            let what =
-                found.map_or("which `skin` does not have".into(), |column| format!("which is {}", column.kind()));
-            Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected a float a point of the skin"))
-        }
+    if let Some(mask) = skin.table(Owner::Point).get(name) {
+        return Ok(Some(mask));
     }
+    let what = skin.describe(name).map_or("which `skin` does not have".into(), |found| format!("which is {found}"));
+    Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected one float for each vertex"))
 }
 
 /// The skin at the scene's first frame, whose faces it must have kept.

@@ -1,6 +1,7 @@
 //! What the file sources share: one component of a file, or written into the graph itself, scaled.
 
 use engine::files::File;
+use engine::geometry::GeometryError;
 use engine::prelude::*;
 use formats::{Format, FormatError};
 use std::sync::Arc;
@@ -39,28 +40,45 @@ impl Inline {
     /// # Errors
     /// Where one has the wrong number of rows or type.
     pub(crate) fn add_to(self, component: &mut Component) -> Result<()> {
-        for (owner, columns) in [(Owner::Point, &self.points), (Owner::Element, &self.elements)] {
+        let lists =
+            [(Owner::Point, &self.points, "attributes"), (Owner::Element, &self.elements, "element_attributes")];
+        for (owner, columns, param) in lists {
             for (name, column) in columns.iter() {
-                component.set_column(owner, name.clone(), column.clone())?;
+                let set = component.set_column(owner, name.clone(), column.clone());
+                set.map_err(|error| Error::from(error).of(param))?;
             }
         }
         Ok(())
     }
 }
 
-/// Multiplies positions, rest positions, velocities and widths by `scale`; 1 touches nothing.
-pub(crate) fn scale(component: &mut Component, scale: f64) {
-    if scale.to_bits() == 1.0_f64.to_bits() {
-        return;
+/// Whole numbers that are written into the graph.
+///
+/// # Errors
+/// Where one of them is below `least`.
+pub(crate) fn wholes(param: Param<Arc<Vec<i32>>>, numbers: &[i32], least: i32) -> Result<Vec<u32>> {
+    if let Some(place) = numbers.iter().position(|number| *number < least) {
+        let fact = format!("`{}` has {} at place {place}, counted from 0", param.name(), numbers[place]);
+        return Err(Error::refused(fact).hint(format!("expected at least {least}")).of(param.name()));
     }
-    let scaled = |x: f32| (f64::from(x) * scale) as f32;
-    for attribute in [P, PREF, V] {
-        for row in component.edit(attribute).into_iter().flatten() {
-            *row = row.map(scaled);
+    Ok(numbers.iter().map(|number| number.unsigned_abs()).collect())
+}
+
+/// The error of geometry that is written into the graph, in the words of its params; `indices` names the param with
+/// the elements' points.
+pub(crate) fn explained(error: GeometryError, indices: &'static str) -> Error {
+    match error {
+        GeometryError::Counts { sum, points } => {
+            Error::refused(format!("`counts` adds up to {sum} CVs, but `points` has {points}")).of("counts")
         }
-    }
-    for row in component.edit(WIDTH).into_iter().flatten() {
-        *row = scaled(*row);
+        GeometryError::Corners { sum, corners } => {
+            Error::refused(format!("`counts` adds up to {sum} corners, but `indices` has {corners}")).of("counts")
+        }
+        GeometryError::Index { corner, index, points } => {
+            let fact = format!("`{indices}` has {index} as number {corner}, but there are {points} `points`");
+            Error::refused(fact).hint("points and numbers are counted from 0").of(indices)
+        }
+        other => other.into(),
     }
 }
 

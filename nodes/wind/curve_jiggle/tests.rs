@@ -292,7 +292,7 @@ fn masks_swing_point_by_point_and_say_when_they_are_missing() {
         // Windows differ, for a mask may be ¼ elsewhere; both reach the scene's start here.
         assert_eq!(bits(&scaled.set(TOLERANCE, 1e-9).cook()), bits(&plainly.set(TOLERANCE, 1e-9).cook()));
         let error = jiggled().source(param, constant(by(0.5))).at(3.0).try_cook().unwrap_err();
-        assert_eq!(error.fact, format!("`{param}` is masked by `mask`, which is not there"));
+        assert_eq!(error.fact, format!("`{param}` is masked by `mask`, which the curves do not have"));
     }
     let window = |value: Masked| with(1.0).set(FREQUENCY, value).cook().metrics["window_frames"];
     assert_eq!(window(by(2.0)), window(plain(0.5)));

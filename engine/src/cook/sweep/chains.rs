@@ -1,6 +1,14 @@
 //! Chains: states that start, step, put out and are saved along the way.
 
-use super::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{Advance, Outcome, Reading, Running, Sweep};
+use crate::cook::store::Cooked;
+use crate::cook::{CookError, between};
+use crate::node::{ChainFns, FrameCx, Node, SolverFns, StateBox};
+use crate::plan::Stretch;
+use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
     /// Moves a chain along its stretches, and takes its outputs on the way.
@@ -11,7 +19,7 @@ impl Sweep<'_, '_, '_> {
         chain: ChainFns,
         solver: Option<SolverFns>,
         advance: BTreeMap<Stretch, Advance>,
-    ) -> std::io::Result<()> {
+    ) {
         for (stretch, advance) in advance {
             let mut running = self.running[node].remove(&stretch);
             if let Some(at) = running.as_ref().map(|running| running.at).filter(|at| advance.outputs.contains(at)) {
@@ -20,7 +28,7 @@ impl Sweep<'_, '_, '_> {
             let next = running.as_ref().map_or(stretch.start, |running| running.at + 1);
             for frame in next..=advance.goal {
                 if self.cancelled() {
-                    return Ok(());
+                    return;
                 }
                 let state = match running.take() {
                     None => self.chain_start(node, declared, chain, frame),
@@ -32,7 +40,7 @@ impl Sweep<'_, '_, '_> {
                     None => state,
                     Some(solver) => state.and_then(|state| self.reloaded(node, frame, solver, &state)),
                 };
-                self.save_state(node, stretch, frame, solver, state.as_ref().ok())?;
+                self.save_state(node, stretch, frame, solver, state.as_ref().ok());
                 running = Some(Running { at: frame, state, moved: self.slices });
                 if advance.outputs.contains(&frame) {
                     self.chain_output(node, declared, chain, running.as_ref(), frame);
@@ -42,7 +50,6 @@ impl Sweep<'_, '_, '_> {
                 self.running[node].insert(stretch, running);
             }
         }
-        Ok(())
     }
 
     /// The state as a checkpoint would give it back.
@@ -66,13 +73,12 @@ impl Sweep<'_, '_, '_> {
         frame: i64,
         solver: Option<SolverFns>,
         state: Option<&StateBox>,
-    ) -> std::io::Result<()> {
-        let (Some(solver), Some(state)) = (solver, state) else { return Ok(()) };
-        let Some(disk) = self.disk.as_mut() else { return Ok(()) };
-        let Ok(key) = self.keys.state_key(node, stretch, frame) else { return Ok(()) };
-        match (solver.save)(state) {
-            Some(bytes) => disk.save_checkpoint(&self.plan.graph.nodes[node].id, frame, key, &bytes),
-            None => Ok(()),
+    ) {
+        let (Some(solver), Some(state)) = (solver, state) else { return };
+        let Some(disk) = self.disk.as_mut() else { return };
+        let Ok(key) = self.keys.state_key(node, stretch, frame) else { return };
+        if let Some(bytes) = (solver.save)(state) {
+            disk.save_checkpoint(&self.plan.graph.nodes[node].id, frame, key, &bytes);
         }
     }
 
@@ -116,18 +122,6 @@ impl Sweep<'_, '_, '_> {
         let metrics = stepped.map_err(fail)?.metrics();
         self.publish(node, at, &metrics);
         Ok(state)
-    }
-
-    pub(super) fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
-        for (name, value) in metrics {
-            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, *value);
-        }
-    }
-
-    /// What a node published at a frame.
-    pub(super) fn published(&self, node: usize, frame: Frame) -> Vec<(&'static str, f64)> {
-        let metrics = &self.report.nodes[node].metrics;
-        metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
     }
 
     pub(super) fn chain_output(

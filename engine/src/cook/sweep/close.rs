@@ -1,6 +1,13 @@
 //! From what is asked upwards: everything a slice must have and has not.
 
-use super::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Advance, LONGEST, Reach, Running, Silent, Slice, Sweep};
+use crate::graph::{Body, Link};
+use crate::key::Key;
+use crate::node::Cook;
+use crate::plan::Stretch;
+use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
     /// From the targets upwards: everything the slice must have and has not.

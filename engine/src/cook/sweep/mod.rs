@@ -2,6 +2,8 @@
 
 mod chains;
 mod close;
+mod metrics;
+mod notes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,15 +15,16 @@ use rayon::prelude::*;
 use super::call::{Call, Returned};
 use super::history::Integrals;
 use super::store::Cooked;
-use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, between, deliver};
+use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, deliver};
 use crate::clock::Stopwatch;
 use crate::geometry::Geometry;
 use crate::graph::{Body, Link};
 use crate::key::{Hasher, Key};
-use crate::node::{ChainFns, Cook, FrameCx, History, InputData, Node, Outputs, SolverFns, StateBox};
+use crate::node::{Cook, FrameCx, History, InputData, Node, Outputs, StateBox};
 use crate::param::Params;
 use crate::plan::{Keys, Plan, Stretch};
 use crate::time::Frame;
+use notes::Asked;
 
 /// A result, or what spoiled it.
 type Outcome = Result<Cooked, Arc<CookError>>;
@@ -98,6 +101,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     /// Keys of results this cook has made or found.
     own: BTreeSet<Key>,
     report: Report,
+    /// What outputs ask for and what there is, for notes.
+    asked: Asked,
     /// Bytes of the slice's results, by node and in all.
     node_bytes: Vec<usize>,
     live_bytes: usize,
@@ -132,8 +137,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             declared.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene))
         });
         let integrals = integrals.collect();
-        let mut report = Report { nodes: nodes.collect(), ..Report::default() };
-        report.notes.extend(disk.as_ref().and_then(|disk| disk.note()).map(str::to_owned));
+        let report = Report { nodes: nodes.collect(), ..Report::default() };
         Self {
             engine,
             plan,
@@ -151,6 +155,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             pace: vec![Duration::MAX; count],
             held: vec![None; count],
             own: BTreeSet::new(),
+            asked: Asked::of(plan),
             report,
             node_bytes: vec![0; count],
             live_bytes: 0,
@@ -182,7 +187,6 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 self.report.cancelled = true;
                 break;
             }
-            let finished = finished.map_err(Stopped::Cache)?;
             sink(&finished).map_err(Stopped::Sink)?;
             for delivered in &finished {
                 *self.report.delivered.entry(delivered.output).or_default() += 1;
@@ -192,6 +196,8 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         for (node, report) in self.report.nodes.iter_mut().enumerate() {
             report.window = self.keys.window(node);
         }
+        self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()).cloned());
+        self.note_unseen();
         self.report.wall = watch.wall();
         self.report.cpu = watch.cpu();
         Ok(self.report)
@@ -217,17 +223,22 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     }
 
     /// Cooks some frames of all outputs.
-    fn slice(&mut self, frames: &[Frame]) -> std::io::Result<Vec<Delivered>> {
+    fn slice(&mut self, frames: &[Frame]) -> Vec<Delivered> {
         let mut finished = Vec::new();
         let mut asked: Vec<(usize, Frame, Option<Key>)> = Vec::new();
         let mut targets: Vec<(usize, Frame)> = Vec::new();
+        let plan = self.plan;
         for frame in frames {
-            for place in &self.plan.request.outputs {
+            // What a frame on disk stands for, each node once.
+            let mut stood_for: BTreeSet<usize> = BTreeSet::new();
+            for place in &plan.request.outputs {
                 let key = self.disk.is_some().then(|| self.output_key(*place, *frame)).flatten();
                 let found = key.and_then(|key| self.disk.as_ref().and_then(|disk| disk.frame(key)));
                 match found {
-                    Some(geometry) => {
+                    Some((geometry, metrics)) => {
                         self.report.from_disk += 1;
+                        self.publish_kept(*place, *frame, &metrics);
+                        stood_for.extend(plan.ancestors(plan.graph.outputs[*place].from.node));
                         finished.push(Delivered { output: *place, frame: *frame, geometry: Arc::new(geometry) });
                     }
                     None => {
@@ -236,12 +247,13 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     }
                 }
             }
+            stood_for.into_iter().for_each(|node| self.report.nodes[node].from_disk += 1);
         }
-        self.run_up(&targets)?;
+        self.run_up(&targets);
         let slice = self.close(&targets, &[], Reach::Whole);
-        let peak = self.cook_slice(slice, &targets)?;
+        let peak = self.cook_slice(slice, &targets);
         if self.cancelled() {
-            return Ok(finished);
+            return finished;
         }
         self.frame_bytes = self.frame_bytes.max(peak / frames.len().max(1));
         if !self.dry {
@@ -249,8 +261,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             for ((place, frame, key), result) in asked.into_iter().zip(made) {
                 match result {
                     Ok(geometry) => {
-                        if let (Some(disk), Some(key)) = (self.disk.as_mut(), key) {
-                            disk.save_frame(key, &geometry)?;
+                        if let Some(key) = key {
+                            let metrics = self.metrics_to_keep(place, frame);
+                            if let Some(disk) = self.disk.as_mut() {
+                                disk.save_frame(key, &geometry, &metrics);
+                            }
                         }
                         finished.push(Delivered { output: place, frame, geometry });
                     }
@@ -259,9 +274,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
         }
         finished.sort_by_key(|delivered| (delivered.frame, delivered.output));
+        finished.iter().for_each(|delivered| self.see(delivered));
         self.end_slice();
         self.forget_windows_left_behind();
-        Ok(finished)
+        finished
     }
 
     fn note_error(&mut self, output: usize, error: Arc<CookError>) {
@@ -332,7 +348,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     }
 
     /// Moves chains that are far behind, a slice at a time, without keeping what they put out on the way.
-    fn run_up(&mut self, targets: &[(usize, Frame)]) -> std::io::Result<()> {
+    fn run_up(&mut self, targets: &[(usize, Frame)]) {
         loop {
             let slice = self.close(targets, &[], Reach::Near);
             let mut behind: Vec<Silent> = Vec::new();
@@ -348,7 +364,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     }
                 }
             }
-            let Some(until) = behind.iter().map(|silent| silent.goal).min() else { return Ok(()) };
+            let Some(until) = behind.iter().map(|silent| silent.goal).min() else { return };
             let silent: Vec<Silent> = behind
                 .into_iter()
                 .zip(begins)
@@ -357,16 +373,16 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 .collect();
             self.forget_results();
             let slice = self.close(&[], &silent, Reach::Whole);
-            self.cook_slice(slice, &[])?;
+            self.cook_slice(slice, &[]);
             self.end_slice();
             if self.cancelled() {
-                return Ok(());
+                return;
             }
         }
     }
 
     /// Cooks what a slice needs, node by node. Returns the greatest size of results held at once.
-    fn cook_slice(&mut self, slice: Slice, targets: &[(usize, Frame)]) -> std::io::Result<usize> {
+    fn cook_slice(&mut self, slice: Slice, targets: &[(usize, Frame)]) -> usize {
         let plan = self.plan;
         let mut left: Vec<usize> = plan.nodes.iter().map(|planned| planned.readers.len()).collect();
         for (node, _) in targets {
@@ -379,14 +395,15 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 continue;
             }
             if self.cancelled() {
-                return Ok(peak);
+                return peak;
             }
             if !need.is_empty() || !advance.is_empty() {
                 let watch = Stopwatch::start();
-                self.cook_node(node, need, advance)?;
+                self.cook_node(node, need, advance);
                 let report = &mut self.report.nodes[node];
                 report.wall += watch.wall();
                 report.cpu += watch.cpu();
+                self.note_misread(node);
             }
             self.keep(node);
             peak = peak.max(self.live_bytes);
@@ -403,15 +420,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 }
             }
         }
-        Ok(peak)
+        peak
     }
 
-    fn cook_node(
-        &mut self,
-        node: usize,
-        need: BTreeSet<Frame>,
-        advance: BTreeMap<Stretch, Advance>,
-    ) -> std::io::Result<()> {
+    fn cook_node(&mut self, node: usize, need: BTreeSet<Frame>, advance: BTreeMap<Stretch, Advance>) {
         let declared = match &self.plan.graph.nodes[node].body {
             Body::Given { at, .. } => {
                 for frame in need {
@@ -422,21 +434,20 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     self.results[node].insert(frame, outcome);
                     self.report.nodes[node].cooks += 1;
                 }
-                return Ok(());
+                return;
             }
             Body::Node { node, .. } => *node,
         };
         match declared.cook {
             Cook::Pure(cook) => self.cook_frames(node, declared, &need, |cx| cook(cx)),
             Cook::Frame { cook, .. } => self.cook_frames(node, declared, &need, cook),
-            Cook::Window(chain, _) => self.move_chain(node, declared, chain, None, advance)?,
-            Cook::Solver(chain, solver) => self.move_chain(node, declared, chain, Some(solver), advance)?,
+            Cook::Window(chain, _) => self.move_chain(node, declared, chain, None, advance),
+            Cook::Solver(chain, solver) => self.move_chain(node, declared, chain, Some(solver), advance),
         }
         // Cancelled on its way, a chain has not been everywhere.
         if declared.cook.is_chain() && !self.cancelled() {
             self.finish_chain(node, declared, &need);
         }
-        Ok(())
     }
 
     /// What a program gave, refused where it is not finite: no node need ask.
@@ -505,6 +516,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.live_bytes += returned.new_bytes;
         self.node_bytes[node] += returned.new_bytes;
         self.publish(node, frame, &returned.metrics);
+        self.asked.there.extend(returned.stripped);
         Ok(returned.cooked)
     }
 
@@ -519,7 +531,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     ) -> Result<Returned, Arc<CookError>> {
         if self.dry {
             let cooked = declared.outputs.iter().map(|_| Arc::new(Geometry::default())).collect();
-            return Ok(Returned { cooked, metrics: Vec::new(), new_bytes: 0 });
+            return Ok(Returned { cooked, metrics: Vec::new(), new_bytes: 0, stripped: Vec::new() });
         }
         let inputs = self.inputs(node, declared, frame, params, Reading::Frame)?;
         let work = |cx: &FrameCx<'_>| cook(cx);

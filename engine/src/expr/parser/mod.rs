@@ -16,6 +16,7 @@ use super::code::Unary;
 use super::error::{ExprError, Place};
 use super::functions;
 use super::lexer::{Lexer, Symbol, Token, TokenKind};
+pub use names::RESERVED;
 use names::{check_count, unexpected};
 use operators::{CONDITION, EQUALITY, LOOSEST, ORDER, POWER, Power, SIGN, infix, is_assignment};
 

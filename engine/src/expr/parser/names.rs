@@ -9,8 +9,8 @@ use super::super::suggest::listed;
 use super::{Language, Parser};
 use crate::geometry::fixed_type;
 
-/// Names with a meaning of their own, which neither controls nor `let` nor plain attributes take.
-pub(super) const RESERVED: [&str; 8] = ["frame", "time", "fps", "seed", "pi", "i", "count", "let"];
+/// Names with a meaning of their own in the language, which neither controls nor `let` nor plain attributes take.
+pub const RESERVED: [&str; 8] = ["frame", "time", "fps", "seed", "pi", "i", "count", "let"];
 
 impl<'a> Parser<'a> {
     /// What a bare name means: the language's own names before `let`, controls, attributes.

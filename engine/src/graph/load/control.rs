@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jsonc_parser::ast::Value as Ast;
 
 use super::keyframes::{Keys, keys};
-use crate::expr::Width;
+use crate::expr::{RESERVED, Width};
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
 use crate::param::{Keyframes, Shape, Source, Value};
@@ -41,8 +41,13 @@ impl<'a> Controls<'a> {
     /// Reads the controls as far as that needs no reader: what a reader makes of a literal is its own to check.
     pub(super) fn read(entries: &[Entry<'a>], faults: &mut Vec<Fault>) -> Self {
         let (mut all, mut scope, mut sources) = (Vec::new(), Vec::new(), Vec::new());
-        for Entry { name, json, .. } in entries {
+        for entry in entries {
+            let Entry { name, json, .. } = entry;
             let before = faults.len();
+            if RESERVED.contains(name) {
+                let fact = format!("`{name}` has a meaning of its own in expressions, so no control can be called so");
+                faults.push(entry.fault(code::RESERVED_NAME, fact).hint(format!("call it `my_{name}`, for example")));
+            }
             let numeric = numeric(json, faults);
             let (sound, is_numeric) = (faults.len() == before, numeric.is_some());
             all.push(Control { name, json: json.clone(), sound, is_numeric });

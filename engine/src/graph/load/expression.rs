@@ -1,13 +1,14 @@
-//! `{"expr": …}`: as many expressions as a param has numbers. What hangs on no time becomes a constant at once.
+//! `{"expr": …}`: as many expressions as a param has numbers. What hangs on no time becomes a constant at once. And
+//! code, which is assignments in the same language.
 
 use std::sync::Arc;
 
 use super::control::Controls;
-use crate::expr::{Expr, ExprError, Scope};
+use crate::expr::{Expr, ExprError, Program, Scope};
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, keep, shown};
-use crate::param::{ParamSpec, Shape, Source, Value};
+use crate::param::{CodeSource, ParamSpec, Shape, Source, Value};
 
 /// The source that a param's expressions make; constant where they hang on no time. `None` after a fault, and for a shape
 /// that no expression gives.
@@ -39,6 +40,21 @@ pub(super) fn read(
     sound.then_some(source)
 }
 
+/// The source that code makes: a text of assignments, with the controls in scope. `None` after a fault.
+pub(super) fn code(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fault>) -> Option<Source> {
+    let Some(text) = json.string() else {
+        faults.push(json.unexpected(&Shape::Code.describe()));
+        return None;
+    };
+    match Program::parse(text, &Scope { controls: &controls.scope }) {
+        Ok(program) => Some(Source::Code(CodeSource::new(text, program, controls.sources.clone()))),
+        Err(errors) => {
+            faults.extend(errors.into_iter().map(|error| explain(json, text, "code", controls, error)));
+            None
+        }
+    }
+}
+
 /// The expressions as they stand in the file.
 fn texts<'a>(json: &Json<'a>, count: usize, faults: &mut Vec<Fault>) -> Option<Vec<Json<'a>>> {
     if count == 1 {
@@ -62,11 +78,11 @@ fn texts<'a>(json: &Json<'a>, count: usize, faults: &mut Vec<Fault>) -> Option<V
 fn parse(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fault>) -> Option<Expr> {
     let text = json.string()?;
     let parsed = Expr::parse(text, &Scope { controls: &controls.scope });
-    keep(parsed.map_err(|error| explain(json, text, controls, error)), faults)
+    keep(parsed.map_err(|error| explain(json, text, "expression", controls, error)), faults)
 }
 
-/// The fault of a text that is no expression, at the character where it goes wrong.
-fn explain(json: &Json<'_>, text: &str, controls: &Controls<'_>, error: ExprError) -> Fault {
+/// The fault of a text that is no expression or code (`noun`), at the character where it goes wrong.
+fn explain(json: &Json<'_>, text: &str, noun: &str, controls: &Controls<'_>, error: ExprError) -> Fault {
     let ExprError { line, column, fact, hint } = error;
     let skipped: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(|line| line.chars().count()).sum();
     let offset = json.offset_in_string(skipped + column.saturating_sub(1));
@@ -80,5 +96,5 @@ fn explain(json: &Json<'_>, text: &str, controls: &Controls<'_>, error: ExprErro
         }
         None => hint,
     };
-    Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {place} of the expression")) }
+    Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {place} of the {noun}")) }
 }

@@ -44,8 +44,8 @@ pub(super) fn literal(shape: Shape, json: &Json<'_>, faults: &mut Vec<Fault>) ->
             Value::Tets(Arc::new(list(json, &expected, |item| row(item, "a tet [a, b, c, d]", corner), faults)?))
         }
         Shape::Columns => Value::Columns(Arc::new(columns(json, &expected, faults)?)),
-        // `param` has read it.
-        Shape::File => return None,
+        // `param` has read them.
+        Shape::File | Shape::Code => return None,
     })
 }
 
@@ -64,15 +64,18 @@ fn text(json: &Json<'_>, expected: &str) -> Result<Name, Fault> {
 }
 
 fn integer(json: &Json<'_>) -> Result<i32, Fault> {
-    json.whole("a whole number")?.try_into().map_err(|_| too_large(json, "±2147483647"))
+    let whole = json.whole("a whole number")?;
+    whole.try_into().map_err(|_| too_large(json, whole, "±2147483647"))
 }
 
 fn corner(json: &Json<'_>) -> Result<u32, Fault> {
-    json.whole("the number of a point, from 0")?.try_into().map_err(|_| too_large(json, "0…4294967295"))
+    let whole = json.whole("the number of a point, from 0")?;
+    whole.try_into().map_err(|_| too_large(json, whole, "0…4294967295"))
 }
 
-fn too_large(json: &Json<'_>, range: &str) -> Fault {
-    json.fault(code::NUMBER_SIZE, "the whole number does not fit").hint(format!("expected one within {range}"))
+fn too_large(json: &Json<'_>, whole: i64, range: &str) -> Fault {
+    json.fault(code::NUMBER_SIZE, format!("the whole number {whole} does not fit"))
+        .hint(format!("expected one within {range}"))
 }
 
 /// `N` items, with a fault for each that is wrong.

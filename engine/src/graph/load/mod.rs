@@ -47,14 +47,9 @@ pub type FileProbe = dyn Fn(&Path) -> std::io::Result<()>;
 /// Whether the file at `path` can be read, without reading it.
 ///
 /// # Errors
-/// Where it does not exist, is a folder or may not be read.
+/// Where it does not exist, is no file or may not be read.
 pub fn probe(path: &Path) -> std::io::Result<()> {
-    let about = std::fs::metadata(path)?;
-    if about.is_dir() {
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    // A pipe would wait here for someone to write.
-    if about.is_file() { std::fs::File::open(path).map(drop) } else { Ok(()) }
+    crate::files::open(path).map(drop)
 }
 
 impl Graph {
@@ -143,7 +138,7 @@ fn load(
     wires::refuse_cycles(&drafts, &order, faults);
     let components = Components::along(&drafts, &order);
     components.refuse_misfits(&drafts, catalogue, faults);
-    let outputs = outputs::read(document.outputs.as_ref(), &drafts, &order, faults);
+    let outputs = outputs::read(document.outputs.as_ref(), &drafts, faults);
     if !document.nodes_are_known {
         faults.retain(|fault| fault.code != code::UNKNOWN_NODE);
     }

@@ -2,13 +2,10 @@
 
 use super::Draft as NodeDraft;
 use super::document::{check_name, missing};
-use super::order::Order;
 use super::wires::{Nodes, Wire};
-use crate::geometry::{Name, V};
+use crate::geometry::Name;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, find, keep, refuse_unknown, shown};
-use crate::node::Cook;
-use crate::param::{Source, Unset};
+use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
 
 /// An output as far as it could be read.
 pub(super) struct Draft {
@@ -23,7 +20,6 @@ pub(super) struct Draft {
 pub(super) fn read<'a>(
     json: Option<&Json<'a>>,
     drafts: &[NodeDraft<'a>],
-    order: &Order,
     faults: &mut Vec<Fault>,
 ) -> Option<Vec<Draft>> {
     let json = json?;
@@ -33,11 +29,11 @@ pub(super) fn read<'a>(
         let fault = json.fault(code::NO_OUTPUTS, "there are no outputs, so nothing would be cooked");
         faults.push(fault.hint("name what is to come out: {\"name\": \"node\"}"));
     }
-    let (nodes, motion) = (Nodes::of(drafts), Motion::along(drafts, order));
-    Some(entries.iter().filter_map(|entry| output(entry, &nodes, &motion, faults)).collect())
+    let nodes = Nodes::of(drafts);
+    Some(entries.iter().filter_map(|entry| output(entry, &nodes, faults)).collect())
 }
 
-fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, motion: &Motion, faults: &mut Vec<Fault>) -> Option<Draft> {
+fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -> Option<Draft> {
     check_name(entry, "an output", faults);
     let name: Name = entry.name.into();
     if entry.json.string().is_some() {
@@ -48,20 +44,12 @@ fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, motion: &Motion, faults:
     let entries = keep(members, faults)?;
     refuse_unknown(&entries, &["from", "attributes", "v"], "keys of an output", faults);
     let attributes = find(&entries, "attributes").map(|entry| attributes(&entry.json, faults));
-    let v = find(&entries, "v").map(|entry| (keep(entry.json.bool(), faults).unwrap_or(false), &entry.json));
+    let v = find(&entries, "v").is_some_and(|entry| keep(entry.json.bool(), faults).unwrap_or(false));
     let Some(from) = find(&entries, "from") else {
         faults.push(missing(&entry.json, "from", "it names the node: {\"from\": \"id\"}"));
         return None;
     };
     let Wire { node, port, .. } = nodes.follow(&from.json, faults)?;
-    if let Some((true, json)) = v
-        && let Some(culprit) = motion.without_velocity(node, nodes.drafts)
-    {
-        let id = shown(nodes.drafts[culprit].text.entry.name);
-        let fact = format!("there are no velocities where points come and go, as they may at `{id}`");
-        faults.push(json.fault(code::NO_VELOCITY, fact).hint("leave `v` out, or take the output before that node"));
-    }
-    let v = v.is_some_and(|(v, _)| v);
     Some(Draft { name, node, port, attributes: attributes.flatten(), v })
 }
 
@@ -79,46 +67,4 @@ fn attributes(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Name>> {
         }
     }
     Some(names)
-}
-
-/// Which nodes may give something else at another frame.
-struct Motion {
-    moves: Vec<bool>,
-    /// Nearest node upstream, itself included, whose points may come and go.
-    comes_and_goes: Vec<Option<usize>>,
-}
-
-impl Motion {
-    fn along(drafts: &[NodeDraft<'_>], order: &Order) -> Self {
-        let mut motion = Self { moves: vec![false; drafts.len()], comes_and_goes: vec![None; drafts.len()] };
-        for node in &order.nodes {
-            let draft = &drafts[*node];
-            let Some(declared) = draft.node else { continue };
-            let sources = || draft.wires.iter().flatten().map(|wire| wire.node);
-            let moves = !matches!(declared.cook, Cook::Pure(_))
-                || params_move(draft)
-                || sources().any(|source| motion.moves[source]);
-            let upstream = sources().find_map(|source| motion.comes_and_goes[source]);
-            motion.comes_and_goes[*node] = if declared.changes_topology && moves { Some(*node) } else { upstream };
-            motion.moves[*node] = moves;
-        }
-        motion
-    }
-
-    /// The node that leaves `node` without velocities; `None` where it writes its own, or no points come and go.
-    fn without_velocity(&self, node: usize, drafts: &[NodeDraft<'_>]) -> Option<usize> {
-        let writes = drafts[node].node.map(|declared| declared.writes).unwrap_or_default();
-        if writes.iter().any(|attribute| attribute.spec().0 == V.name) {
-            return None;
-        }
-        self.comes_and_goes[node]
-    }
-}
-
-/// Whether any param that is read moves. One that is the current frame unless set says which file of a sequence is
-/// meant: without a sequence it means nothing.
-fn params_move(draft: &NodeDraft<'_>) -> bool {
-    let sequence = draft.params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
-    let mut params = draft.specs.iter().zip(&draft.params);
-    params.any(|(spec, source)| source.is_animated() && (sequence || spec.facts.unset != Unset::CurrentFrame))
 }

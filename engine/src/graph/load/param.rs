@@ -111,6 +111,7 @@ impl<'a> Reader<'a, '_> {
         match (json.value, spec.shape) {
             (_, Shape::Columns) => self.constant(spec, json),
             (Ast::Object(_), _) => self.form(spec, json, within),
+            (_, Shape::Code) => expression::code(json, self.controls, self.faults),
             (_, Shape::File) => self.file(json),
             (Ast::Array(_) | Ast::NumberLit(_), Shape::Ramp) => {
                 self.faults.push(bare_ramp(json));
@@ -346,7 +347,7 @@ impl<'a> Reader<'a, '_> {
 /// Whether a param of that shape may be written in a form there.
 fn may_be(shape: Shape, form: &str, within: Within) -> bool {
     match form {
-        "keyframes" => shape != Shape::File && within != Within::Key,
+        "keyframes" => !matches!(shape, Shape::File | Shape::Code) && within != Within::Key,
         "ramp" => shape == Shape::Ramp,
         "value" => shape == Shape::Masked && within == Within::Param,
         "expr" => shape.expressions().is_some() && matches!(within, Within::Param | Within::Mask),

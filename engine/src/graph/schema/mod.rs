@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 
 use self::param::{any_of, described};
 use super::Catalogue;
+use crate::expr::RESERVED;
 use crate::node::{Arity, InputSpec, Node};
 use crate::time::Frame;
 
@@ -38,7 +39,7 @@ pub fn schema(catalogue: Catalogue) -> Value {
             "controls": {
                 "description": "Values with a name, which params and expressions read.",
                 "type": "object",
-                "propertyNames": {"pattern": NAME},
+                "propertyNames": {"pattern": NAME, "not": {"enum": RESERVED}},
                 "additionalProperties": {"$ref": "#/$defs/control-value"},
             },
             "nodes": {

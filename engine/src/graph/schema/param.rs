@@ -56,7 +56,7 @@ pub(super) fn param(spec: &ParamSpec) -> Json {
 /// The literal and the forms that may stand instead of it.
 fn with_forms(spec: &ParamSpec, literal: Json) -> Vec<Json> {
     let mut moving = Vec::new();
-    if !spec.facts.fixed && spec.shape != Shape::File {
+    if !spec.facts.fixed && !matches!(spec.shape, Shape::File | Shape::Code) {
         let value = match spec.shape {
             Shape::Ramp => any_of(vec![json!({"$ref": "#/$defs/ramp-keys"}), literal.clone()]),
             _ => literal.clone(),
@@ -124,7 +124,7 @@ fn literal(spec: &ParamSpec) -> Json {
             json!({"oneOf": words})
         }
         Shape::Ramp => json!({"$ref": "#/$defs/ramp"}),
-        Shape::Text => json!({"type": "string"}),
+        Shape::Text | Shape::Code => json!({"type": "string"}),
         Shape::Texts => list(json!({"type": "string"})),
         Shape::File => json!({"type": "string", "minLength": 1}),
         Shape::Vec3s => list(tuple(json!({"type": "number"}), 3)),
@@ -165,6 +165,7 @@ fn default(spec: &ParamSpec) -> Option<Json> {
         (Value::Choice(place), Shape::Choice(options)) => json!(options.get(*place)?.word),
         (Value::Text(text), _) => json!(&**text),
         (Value::Texts(list), _) => texts(list),
+        (Value::Code(code), _) => json!(code.text()),
         (Value::Ramp(ramp), _) => {
             let keys = ramp.keys().iter().map(|key| numbers(&key.map(shortest)));
             json!({"ramp": Json::from_iter(keys), "interpolation": interpolation_word(ramp.interpolation())})

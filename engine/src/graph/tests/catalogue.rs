@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::geometry::{Attr, Column, Kind, Name, V};
 use crate::graph::Catalogue;
 use crate::node::{Cook, Cx, FrameCx, Input, Many, Node, Opt, Output, Outputs};
-use crate::param::{Masked, Param, Seed, Span, Turn, Unit};
+use crate::param::{Code, Masked, Param, Seed, Span, Turn, Unit};
 use crate::{Error, Result, choice, files::File, inputs, params};
 use numerics::ramp::Ramp;
 
@@ -124,6 +124,7 @@ params! { SHAPES:
     TETS: Param<Arc<Vec<[u32; 4]>>> = Param::inline("tets", "Tets.");
     COLUMNS: Param<Arc<Vec<(Name, Column)>>> = Param::inline("columns", "Attributes.");
     MASKED: Param<Masked> = Param::masked("masked", 1.0, "A masked number.");
+    CODE: Param<Code> = Param::code("code", "Assignments.");
     CHANCE: Param<Seed> = Param::seed("A seed.");
 }
 static EVERY_SHAPE: Node =

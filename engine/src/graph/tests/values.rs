@@ -126,11 +126,11 @@ fn keys_of_one_value_do_not_move() {
 fn expressions_that_hang_on_no_time_are_constants() {
     let graph = shapes(
         r#""gain": 2, "dir": [1, 2, 3], "on": true, "moving": {"keyframes": [[10, 0], [20, 10]]}"#,
-        r#""float": {"expr": "gain*dir.y + on"}, "int": {"expr": "7/2"}, "vec3": {"expr": ["dir.x", "fps", "0"]},
+        r#""float": {"expr": "gain*dir.y + on"}, "int": {"expr": "floor(7/2)"}, "vec3": {"expr": ["dir.x", "fps", "0"]},
            "rotate": {"expr": ["0", "45*gain", "0"]}, "double": {"expr": "moving + time"}, "fixed": {"expr": "1 + 1"}"#,
     );
     assert_eq!(constant(&graph, "float"), Value::Float(5.0));
-    assert_eq!(constant(&graph, "int"), Value::Int(4), "rounded, halves away from zero");
+    assert_eq!(constant(&graph, "int"), Value::Int(3));
     assert_eq!(constant(&graph, "vec3"), Value::Vec3([1.0, 24.0, 0.0]));
     assert_eq!(constant(&graph, "rotate"), euler_to_turn([0.0, 90.0, 0.0]));
     assert_eq!(constant(&graph, "fixed"), Value::Float(2.0));
@@ -201,24 +201,6 @@ fn sets_replace_add_and_mend() {
 }
 
 #[test]
-fn velocities_are_refused_only_where_points_come_and_go() {
-    let v = |nodes: &str| {
-        let text = format!(r#"{{"convect": 1, "nodes": {{{nodes}}}, "outputs": {{"o": {{"from": "o", "v": true}}}}}}"#);
-        load_with(&text, &[]).is_ok()
-    };
-    let scatter = |skin: &str, count: &str| {
-        format!(r#""s": {skin}, "o": {{"type": "Scatter", "inputs": {{"skin": "s"}}, "params": {{"count": {count}}}}}"#)
-    };
-    let still = r#"{"type": "Mesh_In", "params": {"file": "a.obj"}}"#;
-    let numbered = r#"{"type": "Mesh_In", "params": {"file": "a.####.obj"}}"#;
-    assert!(v(&scatter(still, "10")));
-    assert!(!v(&scatter(still, r#"{"expr": "frame"}"#)));
-    assert!(!v(&scatter(numbered, "10")));
-    assert!(v(&format!(r#""o": {numbered}"#)), "a sequence may have one topology");
-    assert!(v(&format!(r#""m": {still}, "o": {{"type": "Softbody", "inputs": {{"bodies": "m"}}}}"#)), "it writes `v`");
-}
-
-#[test]
 fn the_probe_tells_files_from_folders_and_from_nothing() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let file = folder.path().join("a.obj");
@@ -227,4 +209,18 @@ fn the_probe_tells_files_from_folders_and_from_nothing() {
     std::fs::write(&file, "v 0 0 0").expect("the file can be written");
     assert_eq!(kind(&file), Ok(()));
     assert_eq!(kind(folder.path()), Err(ErrorKind::IsADirectory));
+}
+
+#[test]
+fn code_may_name_the_controls_and_moves_with_those_that_it_reads() {
+    let code = |controls: &str, code: &str| {
+        let graph = shapes(controls, &format!(r#""code": "{code}""#));
+        let source = source(&graph, "all", "code");
+        let Value::Code(at_5) = at(&graph, "code", 5.0) else { panic!("no code") };
+        (source.is_animated(), at_5.controls().to_vec(), at_5.program().is_ok())
+    };
+    let controls = r#""gain": {"keyframes": [[0, 0], [10, 1]]}, "dir": [1, 2, 3], "word": "perlin""#;
+    assert_eq!(code(controls, "a = gain*P.y"), (true, vec![0.5, 0.0, 0.0, 0.0], true));
+    assert_eq!(code(controls, "a = dir.z"), (false, vec![0.0, 1.0, 2.0, 3.0], true));
+    assert_eq!(code("", "a = gain*P.y"), (false, vec![], true), "what is no control is an attribute");
 }

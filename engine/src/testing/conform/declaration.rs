@@ -152,7 +152,8 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
         let read = read_by(specs, |params| {
             attributes(params);
         });
-        for spec in read.iter().filter(|spec| !fixed(spec)) {
+        // Of code only the controls in it move; which attributes it names does not.
+        for spec in read.iter().filter(|spec| !fixed(spec) && spec.shape != Shape::Code) {
             findings.add(format!("its attributes hang on `{}`, which may be animated; declare it `fixed`", spec.name));
         }
     }

@@ -1,7 +1,5 @@
 //! `convect convert`: geometry files from one format to another, one or a numbered sequence.
 
-mod scale;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,10 +11,9 @@ use formats::usd::{Flavour, UsdWriter};
 use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
-use crate::failure::{Exit, Failure, cancelled_by_ctrl_c};
+use crate::failure::{Exit, Failure, cancelled_by_signal};
 use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
 use crate::output::{failed, usd_failed, write_whole};
-use scale::scaled;
 
 /// What `convert` takes.
 #[derive(Debug, clap::Args)]
@@ -63,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if folder_of(&args.to).is_dir() {
         sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
     }
-    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_ctrl_c() };
+    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_signal() };
     let written = match &to {
         Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
@@ -95,7 +92,7 @@ struct Written {
     files: Vec<PathBuf>,
     frames: usize,
     bytes: u64,
-    /// What the format dropped of the first file.
+    /// What the format dropped.
     lost: Vec<String>,
 }
 
@@ -129,30 +126,31 @@ impl Conversion {
         to: impl Fn(Frame) -> PathBuf + Sync,
         name: &str,
     ) -> Result<Written, Failure> {
-        let convert = |(place, from): (usize, &(Frame, PathBuf))| {
+        let convert = |from: &(Frame, PathBuf)| {
             let to = to(from.0);
             match self.format.is_sequence() {
                 true => self.one_file(std::slice::from_ref(from), &to, name),
-                false => self.one_frame(from, to, place == 0),
+                false => self.one_frame(from, to),
             }
         };
-        let converted: Vec<_> = files.par_iter().enumerate().map(convert).collect();
+        let converted: Vec<_> = files.par_iter().map(convert).collect();
         converted.into_iter().try_fold(Written::default(), |mut all, one| {
             let one = one?;
             all.files.extend(one.files);
             all.frames += one.frames;
             all.bytes += one.bytes;
-            all.lost.extend(one.lost);
+            let new = one.lost.into_iter().filter(|lost| !all.lost.contains(lost)).collect::<Vec<_>>();
+            all.lost.extend(new);
             Ok(all)
         })
     }
 
-    fn one_frame(&self, (frame, from): &(Frame, PathBuf), to: PathBuf, look_back: bool) -> Result<Written, Failure> {
+    fn one_frame(&self, (frame, from): &(Frame, PathBuf), to: PathBuf) -> Result<Written, Failure> {
         let geometry = self.read(from)?;
         let stamp = FrameStamp { frame: frame.number(), seconds: frame.seconds(self.fps) };
         let mut bytes = Vec::new();
         formats::write(self.format, &geometry, &stamp, &mut bytes).map_err(|error| refused(&to, &error))?;
-        let lost = if look_back { self.lost(&geometry, &bytes) } else { Vec::new() };
+        let lost = formats::lost(self.format, &geometry);
         write_whole(&to, &bytes)?;
         Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost })
     }
@@ -162,26 +160,21 @@ impl Conversion {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Failure::new(Exit::Interrupted, "interrupted; what is there is whole"));
         }
-        let geometry = read(path)?.geometry;
+        let mut geometry = read(path)?.geometry;
         if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {
             return Err(refused(path, &FormatError::CannotHold { format: self.format, kind }));
         }
-        scaled(geometry, self.scale).map_err(|fact| Failure::file(format!("`{}`: {fact}", path.display())))
-    }
-
-    /// Names of what is in `geometry` and not in the file that was made of it.
-    fn lost(&self, geometry: &Geometry, bytes: &[u8]) -> Vec<String> {
-        // A file that cannot be read back loses nothing that could be named.
-        let Ok(back) = formats::read(self.format, bytes) else { return Vec::new() };
-        let mut lost = Vec::new();
-        for part in geometry.parts() {
-            let Some(back) = back.part(part.kind()) else {
-                lost.push(format!("the {}", part.kind()));
-                continue;
-            };
-            let gone = part.columns().filter(|(owner, name, _)| back.table(*owner).column(name).is_none());
-            lost.extend(gone.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
+        geometry.scale_lengths(self.scale);
+        let grown = geometry.parts().find_map(|part| {
+            let found = part.columns().find(|(.., column)| column.first_not_finite().is_some());
+            found.map(|(_, name, _)| format!("`{name}` of {}", part.kind()))
+        });
+        match grown {
+            Some(what) => {
+                let fact = format!("{what} times {:?} is more than an f32 holds", self.scale);
+                Err(Failure::file(format!("`{}`: {fact}", path.display())))
+            }
+            None => Ok(geometry),
         }
-        lost
     }
 }

@@ -3,18 +3,19 @@
 //! Every file is written beside its name and renamed, carries its format and a checksum, and is ignored where either does
 //! not fit: whatever a cache holds, a cook's results are those of a cook without it.
 
+mod bytes;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::SystemTime;
 
-use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
+use crate::geometry::Geometry;
 use crate::key::Key;
 
 /// Changes whenever files of an older convect can no longer be used.
-const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 2");
+const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 3");
 
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
@@ -25,39 +26,79 @@ pub struct DiskCache {
     limit: u64,
     /// Recent checkpoints of each node, oldest first.
     recent: BTreeMap<String, Vec<(i64, PathBuf)>>,
-    note: Option<String>,
+    /// Whether it could not be written: nothing more is kept then, but what is there is still taken.
+    is_broken: bool,
+    notes: Vec<String>,
 }
 
+/// A metric that belongs to a finished frame: the key of the result it was published with, its name and value.
+pub(crate) type KeptMetric = (Key, String, f64);
+
 impl DiskCache {
-    /// Opens a cache, making the folder where it is missing. One that another version made is emptied, with a note.
+    /// Opens a cache, making the folder where it is missing. One that another version made is emptied, and on a full disk
+    /// nothing is kept, with a note.
     ///
     /// # Errors
     /// Where the folder cannot be made, read or written.
     pub fn open(folder: &Path, limit: u64) -> io::Result<Self> {
-        fs::create_dir_all(folder)?;
-        let mark = folder.join("version");
-        let mut note = None;
-        match fs::read_to_string(&mark) {
-            Ok(text) if text == FORMAT => {}
-            Ok(_) => {
-                note = Some(format!("the cache `{}` was made by another version and is not used", folder.display()));
-                for (path, _, _) in files(folder)? {
-                    fs::remove_file(path)?;
-                }
+        let recent = BTreeMap::new();
+        let mut cache = Self { folder: folder.to_owned(), limit, recent, is_broken: false, notes: Vec::new() };
+        match cache.prepare() {
+            Err(error) if matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+                cache.give_up(&error);
             }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(error),
+            prepared => prepared?,
         }
-        write_whole(&mark, FORMAT.as_bytes())?;
-        sweep(folder)?;
-        let mut cache = Self { folder: folder.to_owned(), limit, recent: BTreeMap::new(), note };
-        cache.trim()?;
         Ok(cache)
     }
 
-    /// What is worth telling about the cache that was found.
-    pub fn note(&self) -> Option<&str> {
-        self.note.as_deref()
+    fn prepare(&mut self) -> io::Result<()> {
+        let folder = &self.folder;
+        fs::create_dir_all(folder)?;
+        let mark = folder.join("version");
+        let is_ours = match fs::read_to_string(&mark) {
+            Ok(text) if text == FORMAT => true,
+            Ok(_) => {
+                let note = format!("the cache `{}` was made by another version and is not used", folder.display());
+                self.notes.push(note);
+                for (path, _, _) in files(folder)? {
+                    fs::remove_file(path)?;
+                }
+                false
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
+            Err(error) => return Err(error),
+        };
+        sweep(folder)?;
+        if !is_ours {
+            write_whole(&mark, FORMAT.as_bytes())?;
+        }
+        self.trim()
+    }
+
+    /// What is worth telling: about the cache that was found, and whether it could be written.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Keeps nothing more. A cook can do without its cache.
+    fn give_up(&mut self, error: &io::Error) {
+        let folder = self.folder.display();
+        let why = match error.kind() {
+            io::ErrorKind::StorageFull => "the disk is full".to_owned(),
+            _ => error.to_string(),
+        };
+        self.notes.push(format!("the cache `{folder}` could not be written: {why}; the cook goes on without it"));
+        self.is_broken = true;
+    }
+
+    /// Writes, unless that failed before.
+    fn keep(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) {
+        if !self.is_broken
+            && let Err(error) = write(self)
+        {
+            self.give_up(&error);
+        }
     }
 
     fn path(&self, kind: &str, key: Key) -> PathBuf {
@@ -70,29 +111,34 @@ impl DiskCache {
     }
 
     /// Saves a solver's state, and removes older ones that need not stay.
-    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: Key, state: &[u8]) -> io::Result<()> {
+    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: Key, state: &[u8]) {
         let path = self.path("checkpoint", key);
-        write_entry(&path, key, state)?;
-        let recent = self.recent.entry(node.to_owned()).or_default();
-        recent.push((frame, path));
-        if recent.len() > 2 {
-            let (frame, path) = recent.remove(0);
-            if frame % EVERY != 0 {
-                remove_if_there(&path)?;
+        self.keep(|cache| {
+            write_entry(&path, key, state)?;
+            let recent = cache.recent.entry(node.to_owned()).or_default();
+            recent.push((frame, path));
+            if recent.len() > 2 {
+                let (frame, path) = recent.remove(0);
+                if frame % EVERY != 0 {
+                    remove_if_there(&path)?;
+                }
             }
-        }
-        self.trim()
+            cache.trim()
+        });
     }
 
-    /// A finished frame of an output.
-    pub(crate) fn frame(&self, key: Key) -> Option<Geometry> {
-        decode(&read_entry(&self.path("frame", key), key)?)
+    /// A finished frame of an output, and the metrics that were kept with it.
+    pub(crate) fn frame(&self, key: Key) -> Option<(Geometry, Vec<KeptMetric>)> {
+        bytes::decode(&read_entry(&self.path("frame", key), key)?)
     }
 
-    /// Keeps a finished frame of an output.
-    pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry) -> io::Result<()> {
-        write_entry(&self.path("frame", key), key, &encode(geometry))?;
-        self.trim()
+    /// Keeps a finished frame of an output, and the metrics of what went into it.
+    pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry, metrics: &[KeptMetric]) {
+        let path = self.path("frame", key);
+        self.keep(|cache| {
+            write_entry(&path, key, &bytes::encode(geometry, metrics))?;
+            cache.trim()
+        });
     }
 
     /// Removes the oldest files while there are more bytes than the limit.
@@ -174,141 +220,10 @@ fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(&part, bytes).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
 }
 
-/// A geometry as bytes, every bit of it.
-fn encode(geometry: &Geometry) -> Vec<u8> {
-    let mut out = Vec::new();
-    let put = |out: &mut Vec<u8>, bytes: &[u8]| {
-        out.extend((bytes.len() as u64).to_le_bytes());
-        out.extend(bytes);
-    };
-    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
-    for part in geometry.parts() {
-        out.push(part.kind() as u8);
-        match part.topology() {
-            Topology::Curves(runs) => put(&mut out, &words(runs.starts())),
-            Topology::Mesh(faces) => {
-                put(&mut out, &words(faces.runs.starts()));
-                put(&mut out, &words(&faces.corners));
-            }
-            Topology::Points => {}
-            Topology::Tets(tets) => put(&mut out, &words(tets.as_flattened())),
-        }
-        for owner in Owner::ALL {
-            encode_table(&mut out, part.table(owner));
-        }
-    }
-    if let Some(volume) = geometry.volume() {
-        out.push(Kind::Volume as u8);
-        let grid = volume.grid();
-        for x in grid.origin.iter().chain([&grid.cell]) {
-            out.extend(x.to_le_bytes());
-        }
-        for n in grid.size {
-            out.extend(n.to_le_bytes());
-        }
-        for field in std::iter::once(volume.level_set()).chain(volume.velocity()) {
-            put(&mut out, &field.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
-        }
-        encode_table(&mut out, volume.once());
-    }
-    out
-}
-
-fn encode_table(out: &mut Vec<u8>, table: &Table) {
-    out.extend((table.rows() as u64).to_le_bytes());
-    out.extend((table.iter().count() as u64).to_le_bytes());
-    for (name, column) in table.iter() {
-        for bytes in [name.as_bytes(), &[column.kind() as u8], &column.to_bytes()] {
-            out.extend((bytes.len() as u64).to_le_bytes());
-            out.extend(bytes);
-        }
-    }
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (head, rest) = self.0.split_at_checked(n)?;
-        self.0 = rest;
-        Some(head)
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
-    }
-
-    fn piece(&mut self) -> Option<&'a [u8]> {
-        let n = self.count()?;
-        self.take(n)
-    }
-
-    fn words(&mut self) -> Option<Vec<u32>> {
-        Some(self.piece()?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect())
-    }
-
-    fn word(&mut self) -> Option<u32> {
-        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
-    }
-
-    fn floats(&mut self) -> Option<Vec<f32>> {
-        Some(self.words()?.into_iter().map(f32::from_bits).collect())
-    }
-
-    fn runs(&mut self) -> Option<Runs> {
-        let starts = self.words()?;
-        Runs::from_counts(starts.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]))).ok()
-    }
-
-    fn table(&mut self) -> Option<Table> {
-        const TYPES: [ColumnType; 6] =
-            [ColumnType::F1, ColumnType::F3, ColumnType::F4, ColumnType::I1, ColumnType::I3, ColumnType::I4];
-        let mut table = Table::new(self.count()?);
-        for _ in 0..self.count()? {
-            let name = std::str::from_utf8(self.piece()?).ok()?;
-            let kind = TYPES.into_iter().find(|kind| Some(&[*kind as u8][..]) == self.0.get(8..9))?;
-            self.piece()?;
-            table.set(name, Column::from_bytes(kind, self.piece()?)?).ok()?;
-        }
-        Some(table)
-    }
-}
-
-fn decode(bytes: &[u8]) -> Option<Geometry> {
-    let mut reader = Reader(bytes);
-    let mut geometry = Geometry::default();
-    while let Some(kind) = reader.take(1) {
-        let topology = match kind[0] {
-            k if k == Kind::Curves as u8 => Topology::Curves(Arc::new(reader.runs()?)),
-            k if k == Kind::Mesh as u8 => {
-                let runs = reader.runs()?;
-                Topology::Mesh(Arc::new(crate::geometry::Faces { runs, corners: reader.words()? }))
-            }
-            k if k == Kind::Points as u8 => Topology::Points,
-            k if k == Kind::Tets as u8 => Topology::Tets(Arc::new(reader.words()?.as_chunks::<4>().0.to_vec())),
-            k if k == Kind::Volume as u8 => {
-                let floats = [reader.word()?, reader.word()?, reader.word()?, reader.word()?].map(f32::from_bits);
-                let size = [reader.word()?, reader.word()?, reader.word()?];
-                let grid = Grid { origin: [floats[0], floats[1], floats[2]], cell: floats[3], size };
-                let level_set = reader.floats()?;
-                let velocity = [reader.floats()?, reader.floats()?, reader.floats()?];
-                let mut volume = Volume::new(grid, level_set, velocity).ok()?;
-                *volume.once_mut() = reader.table()?;
-                geometry.put_volume(volume);
-                continue;
-            }
-            _ => return None,
-        };
-        let tables = [reader.table()?, reader.table()?, reader.table()?];
-        geometry.put(Component::from_tables(topology, tables).ok()?);
-    }
-    Some(geometry)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{ENVELOPE, SHIELDED};
+    use crate::geometry::{Column, Component, ENVELOPE, Grid, Owner, SHIELDED, Volume};
 
     fn sample() -> Geometry {
         let mut curves = Component::curves(vec![2, 1], vec![[0.1, -0.0, 1e-40], [1.0; 3], [2.0; 3]]).unwrap();
@@ -327,10 +242,10 @@ mod tests {
     #[test]
     fn a_geometry_comes_back_bit_for_bit() {
         let geometry = sample();
-        let bytes = encode(&geometry);
-        let back = decode(&bytes).unwrap();
+        let bytes = bytes::encode(&geometry, &[]);
+        let (back, _) = bytes::decode(&bytes).unwrap();
         assert_eq!(back, geometry);
-        assert_eq!(encode(&back), bytes);
+        assert_eq!(bytes::encode(&back, &[]), bytes);
     }
 
     #[test]
@@ -338,10 +253,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
         let key = Key::of(b"a");
-        cache.save_frame(key, &sample()).unwrap();
+        let metrics = [(Key::of(b"node"), "max_angle".to_owned(), 0.1)];
+        cache.save_frame(key, &sample(), &metrics);
         let path = cache.path("frame", key);
         let whole = fs::read(&path).unwrap();
-        assert_eq!(cache.frame(key).unwrap(), sample());
+        assert_eq!(cache.frame(key).unwrap(), (sample(), metrics.to_vec()));
         for length in 0..whole.len() {
             fs::write(&path, &whole[..length]).unwrap();
             assert!(cache.frame(key).is_none(), "{length} bytes");
@@ -353,7 +269,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
         let (a, b) = (Key::of(b"a"), Key::of(b"b"));
-        cache.save_frame(a, &sample()).unwrap();
+        cache.save_frame(a, &sample(), &[]);
         fs::rename(cache.path("frame", a), cache.path("frame", b)).unwrap();
         assert!(cache.frame(b).is_none());
     }
@@ -364,7 +280,7 @@ mod tests {
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
         let key = |frame: i64| Key::of(&frame.to_le_bytes());
         for frame in 1..=20 {
-            cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]).unwrap();
+            cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]);
         }
         let stay: Vec<i64> = (1..=20).filter(|frame| cache.checkpoint(key(*frame)).is_some()).collect();
         assert_eq!(stay, [8, 16, 19, 20]);
@@ -375,7 +291,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), 3 * 132).unwrap();
         for frame in 0..10_i64 {
-            cache.save_checkpoint("body", frame * 8, Key::of(&frame.to_le_bytes()), &[0; 100]).unwrap();
+            cache.save_checkpoint("body", frame * 8, Key::of(&frame.to_le_bytes()), &[0; 100]);
         }
         let left = files(folder.path()).unwrap();
         assert!(left.len() <= 3 && !left.is_empty(), "{}", left.len());
@@ -385,10 +301,27 @@ mod tests {
     fn a_cache_of_another_version_is_not_used_and_said() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        cache.save_frame(Key::of(b"a"), &sample()).unwrap();
+        cache.save_frame(Key::of(b"a"), &sample(), &[]);
         fs::write(folder.path().join("version"), "convect 0.0.1 cache 0").unwrap();
         let cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        assert!(cache.note().unwrap().ends_with("was made by another version and is not used"));
+        assert!(cache.notes()[0].ends_with("was made by another version and is not used"));
         assert!(cache.frame(Key::of(b"a")).is_none());
+    }
+
+    #[test]
+    fn a_cache_that_cannot_be_written_is_given_up_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("cache");
+        let mut cache = DiskCache::open(&place, u64::MAX).unwrap();
+        cache.save_frame(Key::of(b"a"), &sample(), &[]);
+        fs::rename(&place, folder.path().join("gone")).unwrap();
+        for key in [b"b", b"c"] {
+            cache.save_frame(Key::of(key), &sample(), &[]);
+            cache.save_checkpoint("body", 1, Key::of(key), &[1]);
+        }
+        assert_eq!(cache.notes().len(), 1, "{:?}", cache.notes());
+        assert!(cache.notes()[0].contains("could not be written"), "{:?}", cache.notes());
+        fs::rename(folder.path().join("gone"), &place).unwrap();
+        assert!(cache.frame(Key::of(b"a")).is_some() && cache.frame(Key::of(b"b")).is_none());
     }
 }

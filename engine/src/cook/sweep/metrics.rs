@@ -1,0 +1,60 @@
+//! Metrics: what nodes publish goes to the report, and with a finished frame to the disk and back.
+
+use super::Sweep;
+use crate::cook::disk::KeptMetric;
+use crate::key::Key;
+use crate::time::Frame;
+
+impl Sweep<'_, '_, '_> {
+    /// Puts what a node published at a frame to the report.
+    pub(super) fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
+        for (name, value) in metrics {
+            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, *value);
+        }
+    }
+
+    /// What a node published at a frame.
+    pub(super) fn published(&self, node: usize, frame: Frame) -> Vec<(&'static str, f64)> {
+        let metrics = &self.report.nodes[node].metrics;
+        metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
+    }
+
+    /// The results that went into a finished frame and have metrics: node, frame, key.
+    fn measured(&mut self, output: usize, frame: Frame) -> Vec<(usize, Frame, Key)> {
+        let plan = self.plan;
+        let mut found = Vec::new();
+        for node in plan.ancestors(plan.graph.outputs[output].from.node) {
+            if plan.graph.nodes[node].node().is_none_or(|declared| declared.metrics.is_empty()) {
+                continue;
+            }
+            let mut frames: Vec<Frame> =
+                self.samples(output, frame).into_iter().map(|at| plan.canonical(node, at)).collect();
+            frames.dedup();
+            for at in frames {
+                found.extend(self.keys.spot(node, at).ok().map(|spot| (node, at, spot.key)));
+            }
+        }
+        found
+    }
+
+    /// The metrics to keep with a finished frame.
+    pub(super) fn metrics_to_keep(&mut self, output: usize, frame: Frame) -> Vec<KeptMetric> {
+        let measured = self.measured(output, frame).into_iter();
+        let of = |(node, at, key): (usize, Frame, Key)| {
+            self.published(node, at).into_iter().map(move |(name, value)| (key, name.to_owned(), value))
+        };
+        measured.flat_map(of).collect()
+    }
+
+    /// Publishes what was kept with a finished frame.
+    pub(super) fn publish_kept(&mut self, output: usize, frame: Frame, kept: &[KeptMetric]) {
+        for (node, at, key) in self.measured(output, frame) {
+            let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
+            let of_key = kept.iter().filter(|(of, _, _)| *of == key);
+            let metrics: Vec<(&'static str, f64)> = of_key
+                .filter_map(|(_, name, value)| Some((declared.iter().find(|metric| metric.name == name)?.name, *value)))
+                .collect();
+            self.publish(node, at, &metrics);
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Code: assignments that a node runs over points or elements, with the graph's controls in scope.
+
+use std::sync::Arc;
+
+use super::source::{Clock, Source, control_numbers};
+use crate::expr::{ExprError, Program, Scope};
+use crate::geometry::Name;
+use crate::key::Hasher;
+
+/// A program of assignments (see [`crate::expr`]) and the numbers of the controls that it reads.
+#[derive(Clone, Debug)]
+pub struct Code {
+    text: Name,
+    program: Arc<Result<Program, Vec<ExprError>>>,
+    /// As [`crate::expr::Env::controls`] has them; 0 for controls that the program does not read.
+    numbers: Arc<[f64]>,
+}
+
+impl Code {
+    /// The code of a text that knows no controls.
+    pub fn new(text: &str) -> Self {
+        let program = Program::parse(text, &Scope::default());
+        Self { text: text.into(), program: Arc::new(program), numbers: Arc::from([]) }
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The program.
+    ///
+    /// # Errors
+    /// The faults of the text. A graph that was loaded has none.
+    pub fn program(&self) -> Result<&Program, &[ExprError]> {
+        self.program.as_ref().as_ref().map_err(Vec::as_slice)
+    }
+
+    /// The numbers of the controls, as [`crate::expr::Env::controls`] has them.
+    pub fn controls(&self) -> &[f64] {
+        &self.numbers
+    }
+
+    /// Places of the controls that it reads.
+    fn reads(&self) -> &[usize] {
+        self.program().map_or(&[], |program| &program.uses().controls)
+    }
+
+    pub(super) fn add_to<'h>(&self, key: &'h mut Hasher) -> &'h mut Hasher {
+        let key = key.text(&self.text).i64(self.reads().len() as i64);
+        // A name that no control had may be an attribute's: which ones are controls is part of what the text says.
+        let key = self.reads().iter().fold(key, |key, control| key.i64(*control as i64));
+        self.numbers.iter().fold(key.i64(self.numbers.len() as i64), |key, x| key.f64(*x))
+    }
+}
+
+impl PartialEq for Code {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text && self.reads() == other.reads() && self.numbers == other.numbers
+    }
+}
+
+impl From<&str> for Code {
+    fn from(text: &str) -> Self {
+        Self::new(text)
+    }
+}
+
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.text)
+    }
+}
+
+/// Where code comes from: its program, and the controls it may read.
+#[derive(Clone, Debug)]
+pub struct CodeSource {
+    text: Name,
+    program: Arc<Result<Program, Vec<ExprError>>>,
+    controls: Arc<Vec<Source>>,
+}
+
+impl CodeSource {
+    /// The source of a text that was parsed with `controls` in scope.
+    pub(crate) fn new(text: &str, program: Program, controls: Arc<Vec<Source>>) -> Self {
+        Self { text: text.into(), program: Arc::new(Ok(program)), controls }
+    }
+
+    fn reads(&self, control: usize) -> bool {
+        self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
+    }
+
+    /// Whether a control that it reads moves. The clock that the code itself reads is the node's to declare.
+    pub(super) fn is_animated(&self) -> bool {
+        self.controls.iter().enumerate().any(|(place, control)| self.reads(place) && control.is_animated())
+    }
+
+    pub(super) fn at(&self, frame: f64, clock: Clock) -> Code {
+        let numbers = control_numbers(&self.controls, frame, clock, |control| self.reads(control));
+        Code { text: self.text.clone(), program: self.program.clone(), numbers: numbers.into() }
+    }
+}

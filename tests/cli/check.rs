@@ -1,0 +1,141 @@
+//! What `check` finds without cooking: geometry written into the graph, files of a sequence, params that move.
+
+use crate::bench::{Bench, CALM_AT_2, Ran};
+
+fn check(bench: &Bench) -> Ran {
+    bench.run(&["check", "g.json"])
+}
+
+/// What `check` says of one node with these params.
+fn said(kind: &str, params: &str) -> (Option<i32>, String) {
+    let graph = format!(
+        r#"{{"convect": 1, "nodes": {{"a": {{"type": "{kind}", "params": {{{params}}}}}}}, "outputs": {{"o": "a"}}}}"#
+    );
+    let ran = check(&Bench::with_graph(&graph));
+    let line = ran.stderr.lines().next().unwrap_or_default();
+    (ran.code, line.split_once(": ").map_or("", |(_, rest)| rest).to_owned())
+}
+
+#[test]
+fn geometry_written_into_the_graph_is_looked_at() {
+    let curve = r#""points": [[0, 0, 0], [0, 1, 0]]"#;
+    let square = r#""points": [[0, 0, 0], [1, 0, 0], [1, 0, 1]]"#;
+    let tet = r#""points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"#;
+    for (kind, params, expected) in [
+        (
+            "Curve_In",
+            format!(r#"{curve}, "counts": [2, -1]"#),
+            "nodes.a.params.counts: `counts` has -1 at place 1, counted from 0; expected at least 1",
+        ),
+        (
+            "Curve_In",
+            format!(r#"{curve}, "counts": [3]"#),
+            "nodes.a.params.counts: `counts` adds up to 3 CVs, but `points` has 2",
+        ),
+        (
+            "Curve_In",
+            format!(r#"{curve}, "attributes": {{"mask": [0.5]}}"#),
+            "nodes.a.params.attributes: `mask` has 1 row, expected 2",
+        ),
+        (
+            "Mesh_In",
+            format!(r#"{square}, "indices": [0, 1, -1]"#),
+            "nodes.a.params.indices: `indices` has -1 at place 2, counted from 0; expected at least 0",
+        ),
+        (
+            "Mesh_In",
+            format!(r#"{square}, "indices": [0, 1, 3]"#),
+            "nodes.a.params.indices: `indices` has 3 as number 2, but there are 3 `points`; points and numbers are \
+             counted from 0",
+        ),
+        (
+            "Tet_In",
+            format!(r#"{tet}, "tets": [[0, 1, 2, 7]]"#),
+            "nodes.a.params.tets: `tets` has 7 as number 3, but there are 4 `points`; points and numbers are counted \
+             from 0",
+        ),
+        (
+            "Point_In",
+            format!(r#"{curve}, "attributes": {{"id": [1, 2, 3]}}"#),
+            "nodes.a.params.attributes: `id` has 3 rows, expected 2",
+        ),
+    ] {
+        assert_eq!(said(kind, &params), (Some(3), expected.to_owned()), "{kind} {params}");
+    }
+    assert_eq!(said("Tet_In", &format!(r#"{tet}, "tets": [[0, 1, 2, 3]]"#)).0, Some(0));
+}
+
+#[test]
+fn a_gap_in_a_sequence_is_found_before_anything_cooks() {
+    let graph = r#"{"convect": 1, "scene": {"frames": [1, 6]},
+"nodes": {"a": {"type": "Curve_In", "params": {"file": "in.####.obj"}}}, "outputs": {"o": "a"}}"#;
+    let bench = Bench::with_graph(graph);
+    for frame in [1, 2, 5, 6] {
+        bench.write(&format!("in.000{frame}.obj"), "v 0 0 0\nv 0 1 0\nl 1 2\n");
+    }
+    let expected = "g.json:2:56: nodes.a.params.file: `in.0003.obj` does not exist, at frame 3 and at 1 more frame; \
+                    paths are relative to the graph file\n";
+    let ran = check(&bench);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
+    let ran = bench.run(&["cook", "g.json"]);
+    assert_eq!((ran.code, ran.stderr.as_str(), bench.names("out").len()), (Some(1), expected, 0));
+    bench.done(&["cook", "g.json", "--frames", "5-6", "--format", "json"]);
+    assert_eq!(bench.names("out").len(), 2, "files of frames that nobody asks for may be missing");
+}
+
+#[test]
+fn params_that_leave_their_range_on_the_way_are_found() {
+    let bench = Bench::with_graph(CALM_AT_2);
+    let ran = check(&bench);
+    let expected = "g.json:8:31: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction, \
+                    at frame 2; give a vector that is not zero, such as [1, 0, 0]\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), expected));
+    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1"]).code, Some(0), "a cook asks for its frames only");
+
+    let graph = CALM_AT_2.replace(r#""keyframes": [[1, [1, 0, 0]], [3, [-1, 0, 0]]]"#, r#""expr": ["1", "0", "0"]"#);
+    let octaves =
+        graph.replace(r#""params": { "wind_dir""#, r#""params": { "octaves": {"expr": "frame/2"}, "wind_dir""#);
+    let ran = check(&Bench::with_graph(&octaves));
+    let line = "nodes.wind.params.octaves: `octaves` is 0.5, at frame 1 and at 1 more frame; expected a whole number; \
+                floor(…), ceil(…) or round(…) makes one\n";
+    assert!(ran.stderr.ends_with(line), "{}", ran.stderr);
+    let floored = octaves.replace("frame/2", "1 + floor(frame/2)");
+    assert_eq!(check(&Bench::with_graph(&floored)).stderr, "");
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused_without_waiting() {
+    let bench = Bench::new();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("pipe")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        eprintln!("skipped: there is no mkfifo");
+        return;
+    }
+    for verb in ["check", "cook", "explain"] {
+        let ran = bench.run(&[verb, "pipe"]);
+        let expected = "the graph `pipe` could not be read: it is a pipe or a device, not a file\n";
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected), "{verb}");
+    }
+    bench.write("g.json", &crate::bench::GRAPH.replace("grass.obj", "pipe"));
+    let ran = check(&bench);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.contains("`pipe` could not be read: it is a pipe or a device, not a file"), "{}", ran.stderr);
+    assert_eq!(bench.run(&["stats", "pipe"]).code, Some(1));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_graph_may_come_from_stdin_and_its_paths_start_where_the_program_does() {
+    let bench = Bench::new();
+    let graph = std::fs::File::open(bench.path("g.json")).unwrap();
+    let output = bench.command(&["check", "/dev/stdin"]).stdin(graph).output().unwrap();
+    assert_eq!(Ran::of(&output).code, Some(0), "{output:?}");
+}
+
+#[test]
+fn a_packed_graph_is_called_so() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("g.json"), b"\x1f\x8b\x08\0\0\0\0\0\0\x03").unwrap();
+    assert_eq!(check(&bench).stderr, "g.json:1:1: the file looks like gzip, expected a text; unpack it first\n");
+}
