@@ -64,7 +64,8 @@ fn apart(a: &[Point], b: &[Point]) -> f64 {
 }
 
 fn length(a: Point, b: Point) -> f64 {
-    (0..3).map(|k| (f64::from(b[k]) - f64::from(a[k])).powi(2)).sum::<f64>().sqrt()
+    let along = [0, 1, 2].map(|k| f64::from(b[k]) - f64::from(a[k]));
+    along.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[test]

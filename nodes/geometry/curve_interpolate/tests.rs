@@ -145,7 +145,10 @@ fn one_guide_each_makes_clumps() {
     // Each hair then has the length of some guide, to rounding.
     let guides = scattered(ball(), 20.0);
     let whole = |cvs: &[Point]| -> f64 {
-        let step = |pair: &[Point]| (0..3).map(|k| f64::from(pair[1][k] - pair[0][k]).powi(2)).sum::<f64>().sqrt();
+        let step = |pair: &[Point]| {
+            let along = [0, 1, 2].map(|k| f64::from(pair[1][k] - pair[0][k]));
+            along.iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
         cvs.windows(2).map(step).sum()
     };
     let lengths: Vec<f64> = guides.positions().chunks(5).map(whole).collect();

@@ -240,7 +240,8 @@ fn a_scene_of_any_size_and_place_gives_the_same() {
     let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * y * z, y - 0.3 * x, 1.2 * z];
     let roots = skin.roots(100, 0.05);
     let expected = skin.bind(&roots).carry(&skin.moved(bent));
-    for size in [2_f32.powi(-60), 2_f32.powi(-20), 2_f32.powi(20), 2_f32.powi(100)] {
+    // 2⁻⁶⁰, 2⁻²⁰, 2²⁰ and 2¹⁰⁰.
+    for size in [1.0 / f32::from_bits(187 << 23), 1.0 / 1_048_576.0, 1_048_576.0, f32::from_bits(227 << 23)] {
         let sized = |points: &[Point]| points.iter().map(|p| p.map(|x| x * size)).collect::<Vec<_>>();
         let large = Skin { points: sized(&skin.points), triangles: skin.triangles.clone() };
         let poses = large.bind(&sized(&roots)).carry(&sized(&skin.moved(bent)));

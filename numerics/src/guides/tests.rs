@@ -110,7 +110,8 @@ fn the_nearest_are_those_that_measuring_all_finds() {
             let mut all: Vec<(f64, u32)> = guides.iter().map(apart).zip(0..).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
             let beyond = all[count].0;
-            let raw = |d: f64| ((beyond - d) / (beyond * d)).powi(2);
+            let share = |d: f64| (beyond - d) / (beyond * d);
+            let raw = |d: f64| share(d) * share(d);
             let sum: f64 = all[..count].iter().map(|(d, _)| raw(*d)).sum();
             let shares = mixed.of(hair);
             assert_eq!(shares.len(), count);
