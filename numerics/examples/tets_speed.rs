@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 use numerics::random::Key;
 use numerics::tets::{delaunay, lattice::Place};
-use std::time::Instant;
+use cpu_time::ThreadTime as Instant;
 
 fn main() {
     let random = |n: u64| -> Vec<Place> {

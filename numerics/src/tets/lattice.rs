@@ -45,6 +45,11 @@ impl Lattice {
         Some(if fits(&fine) { fine } else { at(exponent - 23) })
     }
 
+    /// The lattice of nothing.
+    pub(super) fn unit() -> Self {
+        Self { low: [0.0; 3], step: 1.0 }
+    }
+
     fn settled(mut self, low: [f64; 3]) -> Self {
         self.low = low.map(|x| (x / self.step).round_ties_even());
         self
