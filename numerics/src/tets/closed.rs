@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::cross::crossing;
+use super::edges::edges;
 use super::fault::Fault;
 use super::lattice::{Lattice, Place};
 use super::repair::{Changes, Polygons, Surface, in_order};
@@ -51,8 +52,7 @@ impl Closed {
             return Err(Fault::NotFinite { point: point as u32 });
         }
         let lattice = Lattice::around(surface.points).unwrap_or_else(Lattice::unit);
-        let places: Vec<Place> =
-            surface.points.par_iter().map(|point| lattice.place(point.map(f64::from))).collect();
+        let places: Vec<Place> = surface.points.par_iter().map(|point| lattice.place(point.map(f64::from))).collect();
         let (polygons, mut changes) = in_order(surface, &places, repair)?;
         let mut pieces = pieces(&polygons, repair)?;
         let mut shells = Shells::outward(&polygons, &mut pieces, surface.points, &places)?;
@@ -114,15 +114,7 @@ impl Closed {
 
     /// Every edge once, its lower point first, sorted.
     pub fn edges(&self) -> Vec<[u32; 2]> {
-        let of_face = |face: usize| {
-            let corners = self.face(face);
-            (0..corners.len()).map(|k| (corners[k], corners[(k + 1) % corners.len()]))
-        };
-        // An edge has two faces, which run along it in opposite directions.
-        let rising = (0..self.source_faces.len()).flat_map(of_face).filter(|(from, to)| from < to);
-        let mut edges: Vec<[u32; 2]> = rising.map(|(from, to)| [from, to]).collect();
-        edges.sort_unstable();
-        edges
+        edges(&self.starts, &self.corners)
     }
 
     /// Mean length of the edges, metres; 0 without one.
@@ -130,6 +122,16 @@ impl Closed {
         let edges = self.edges();
         let length = |[a, b]: &[u32; 2]| distance(self.points[*a as usize], self.points[*b as usize]);
         edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64
+    }
+
+    /// Longest side of a triangle, steps of the lattice.
+    pub(super) fn longest_side(&self, triangle: u32) -> f64 {
+        let corners = self.shells.triangles[triangle as usize].map(|corner| self.places[corner as usize]);
+        let square = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            [0, 1, 2].map(|axis| f64::from(a[axis] - b[axis])).iter().map(|d| d * d).sum::<f64>()
+        };
+        square(0).max(square(1)).max(square(2)).sqrt()
     }
 
     /// Volume between the faces, m³.

@@ -111,10 +111,10 @@ pub enum Fault {
         /// Pairs of triangles that cross.
         count: usize,
     },
-    /// Shells that share a part of space and whose faces cross in edges alone.
-    #[error("two shells overlap near {at:?}")]
+    /// A part of space that the surface is around more than once, where its faces cross in edges alone.
+    #[error("the surface overlaps itself near {at:?}")]
     Overlap {
-        /// A point in both, metres.
+        /// A point of that part, metres.
         at: [f32; 3],
     },
     /// More interior points than memory is for.

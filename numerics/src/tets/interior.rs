@@ -17,9 +17,12 @@ pub(super) const SIDE_BY_EDGE: f64 = 14.0 / (4.0 * 1.732_050_807_568_877_2 + 6.0
 /// Points a cube.
 pub(super) const POINTS_A_CUBE: f64 = 2.0;
 
-/// How far points stay from the surface, by the mean length of edges: nearer, tets at the surface become flat; farther,
-/// long.
+/// How far points stay from the surface, by the mean length of their edges or the longest side of the nearest triangle:
+/// nearer, tets at the surface become flat and the triangle may no longer be a face of theirs; farther, they become long.
 const CLEAR: f64 = 0.5;
+
+/// Triangles longer than this many mean edges count as this long: what has few faces is filled too.
+const LONGEST: f64 = 2.0;
 
 /// How far a point is moved along each axis at most, by the side of a cube.
 const MOVE: f64 = 0.05;
@@ -38,6 +41,9 @@ pub(super) struct Inner {
 
 /// All points of the lattice with edges `spacing` (steps) long on average that are inside of a body.
 pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<Inner> {
+    if closed.places.is_empty() {
+        return Vec::new();
+    }
     let side = SIDE_BY_EDGE * spacing;
     let (low, high) = closed.places.iter().fold(([SIDE; 3], [0; 3]), |(low, high): (Place, Place), place| {
         ([0, 1, 2].map(|k| low[k].min(place[k])), [0, 1, 2].map(|k| high[k].max(place[k])))
@@ -62,13 +68,25 @@ pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<
                 winding.around(place.map(i64::from), 1, &mut tally);
                 let Some(body) = closed.body(&tally) else { continue };
                 let point = place.map(|x| x as f32);
-                let nearest = closed.tree.closest(point, side as f32).map_or(side as f32, |found| found.distance);
-                if f64::from(nearest) >= CLEAR * spacing {
-                    found.push(Inner { place, clear: nearest, body });
+                let (clear, needed) = clearance(closed, place, spacing);
+                if clear >= needed {
+                    found.push(Inner { place, clear: clear as f32, body });
                 }
             }
         }
         found
     };
     (-reach[2]..reach[2] + 1).into_par_iter().flat_map_iter(layer).collect()
+}
+
+/// Distance of a place from the surface, as far as it matters, and how much it should be. Steps.
+fn clearance(closed: &Closed, place: Place, spacing: f64) -> (f64, f64) {
+    let reach = SIDE_BY_EDGE.max(CLEAR * LONGEST) * spacing;
+    match closed.tree.closest(place.map(|x| x as f32), reach as f32) {
+        None => (reach, CLEAR * spacing),
+        Some(found) => {
+            let side = closed.longest_side(found.triangle);
+            (f64::from(found.distance), CLEAR * side.clamp(spacing, LONGEST * spacing))
+        }
+    }
 }

@@ -22,9 +22,7 @@ pub(super) fn measure(corners: &Corners) -> Measure {
     let six = dot(b, cross(c, d));
     let areas = normals.map(|n| dot(n, n).sqrt());
     // Outer radius: |b|² c×d + |c|² d×b + |d|² b×c, ÷ 12 V. Inner: 3 V ÷ area.
-    let centre = [0, 1, 2].map(|k| {
-        dot(b, b) * normals[1][k] + dot(c, c) * normals[2][k] + dot(d, d) * normals[3][k]
-    });
+    let centre = [0, 1, 2].map(|k| dot(b, b) * normals[1][k] + dot(c, c) * normals[2][k] + dot(d, d) * normals[3][k]);
     let outer = dot(centre, centre).sqrt();
     let area: f64 = areas.iter().sum();
     let quality = if area > 0.0 && outer > 0.0 { 6.0 * six * six / (outer * area) } else { 0.0 };

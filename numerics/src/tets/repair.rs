@@ -77,11 +77,7 @@ impl Polygons {
             let corners = self.get(polygon);
             for (k, &from) in corners.iter().enumerate() {
                 let to = corners[(k + 1) % corners.len()];
-                sides.push(Side {
-                    ends: [from.min(to), from.max(to)],
-                    polygon: polygon as u32,
-                    rises: from < to,
-                });
+                sides.push(Side { ends: [from.min(to), from.max(to)], polygon: polygon as u32, rises: from < to });
             }
         }
         sides.sort_unstable();
@@ -208,9 +204,12 @@ fn once_each(polygons: Polygons) -> (Polygons, Vec<[u32; 2]>) {
         corners
     };
     let sums: Vec<u64> = (0..polygons.len())
-        .map(|polygon| polygons.get(polygon).iter().fold(0, |sum: u64, corner| {
-            sum.wrapping_add(crate::random::Key::new(u64::from(*corner)).u64())
-        }))
+        .map(|polygon| {
+            polygons
+                .get(polygon)
+                .iter()
+                .fold(0, |sum: u64, corner| sum.wrapping_add(crate::random::Key::new(u64::from(*corner)).u64()))
+        })
         .collect();
     let mut order: Vec<u32> = (0..polygons.len() as u32).collect();
     order.sort_unstable_by_key(|polygon| (sums[*polygon as usize], *polygon));

@@ -86,8 +86,7 @@ impl Shells {
             let at: Vec<[f32; 3]> = corners.iter().map(|corner| points[*corner as usize]).collect();
             triangulate(&at).into_iter().map(move |ear| (ear.map(|k| corners[k as usize]), polygon as u32))
         };
-        let (triangles, polygon_of): (Vec<_>, Vec<_>) =
-            (0..polygons.len()).into_par_iter().flat_map_iter(cut).unzip();
+        let (triangles, polygon_of): (Vec<_>, Vec<_>) = (0..polygons.len()).into_par_iter().flat_map_iter(cut).unzip();
         let count = pieces.iter().map(|(shell, _)| *shell as usize + 1).max().unwrap_or(0);
         let mut shells = Self {
             shell_of: polygon_of.iter().map(|polygon: &u32| pieces[*polygon as usize].0).collect(),

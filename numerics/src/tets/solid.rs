@@ -1,16 +1,17 @@
 //! Tets of what is inside of a closed surface.
 
-use std::collections::BTreeMap;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::closed::Closed;
+use super::delaunay;
+use super::edges::Around;
 use super::fault::Fault;
 use super::interior::{Inner, POINTS_A_CUBE, SIDE_BY_EDGE, interior};
 use super::lattice::Place;
 use super::quality::{Measure, measure};
 use super::winding::{Tally, Winding};
-use super::{Delaunay, delaunay};
 
 /// How to fill a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,9 +79,6 @@ const MOST_POINTS: f64 = (1 << 22) as f64;
 /// Lattice points that may be looked at for it.
 const MOST_TRIED: f64 = (1 << 27) as f64;
 
-/// The tet is in no body.
-const OUTSIDE: u32 = u32::MAX;
-
 impl Closed {
     /// The surface's inside as tets, Delaunay in its points and, where asked for, points inside.
     ///
@@ -89,15 +87,15 @@ impl Closed {
     pub fn fill(&self, fill: &Fill) -> Result<Solid, Fault> {
         let winding = Winding::new(&self.places, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
-        let mut places = self.places.clone();
-        places.extend(inner.iter().map(|inner| inner.place));
-        let Delaunay { tets, doubled, .. } = delaunay(&places);
-        let carved = Carved { closed: self, winding: &winding, inner: &inner, places: &places };
-        let mut bodies = carved.bodies(&tets)?;
-        let mut tets: Vec<[u32; 4]> = keep(tets, &bodies);
-        bodies.retain(|body| *body != OUTSIDE);
-        carved.part(&mut tets, &mut bodies, &doubled);
-        Ok(self.solid(&inner, tets, bodies))
+        let carved = Carved { closed: self, winding: &winding, inner: &inner };
+        let bodies: Vec<Vec<[u32; 4]>> = carved
+            .members()
+            .into_par_iter()
+            .enumerate()
+            .map(|(body, points)| carved.body(body as u32, &points))
+            .collect::<Result<_, _>>()?;
+        let of = bodies.iter().enumerate().flat_map(|(body, tets)| std::iter::repeat_n(body as u32, tets.len()));
+        Ok(self.solid(&inner, bodies.concat(), of.collect()))
     }
 
     /// The spacing in steps of the lattice.
@@ -135,8 +133,7 @@ impl Closed {
         // In steps, so that no square of a length is too large or too small.
         let step = self.lattice.step();
         let steps = |corner: &u32| points[*corner as usize].map(|x| f64::from(x) / step);
-        let measures: Vec<Measure> =
-            tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
+        let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
         let slivers: Vec<bool> = measures.iter().map(|tet| !(tet.volume > 0.0 && tet.quality >= SLIVER)).collect();
         let volume = measures.iter().map(|tet| tet.volume).sum::<f64>() * step * step * step;
         let sharpest = measures.iter().zip(&slivers).filter(|(_, sliver)| !**sliver);
@@ -156,138 +153,88 @@ impl Closed {
     /// Counts what tets lack of the surface.
     fn compare(&self, tets: &[[u32; 4]], measured: &mut Measured) {
         let around = Around::new(self.points.len(), tets);
-        let has = |points: &[u32]| around.of(points[0]).iter().any(|tet| {
-            points.iter().all(|point| tets[*tet as usize].contains(point))
-        });
-        measured.missing_edges = self.edges().par_iter().filter(|edge| !has(*edge)).count();
+        measured.missing_edges = self.edges().par_iter().filter(|edge| !around.has(*edge)).count();
         measured.bare_points = (0..self.points.len() as u32).filter(|point| around.of(*point).is_empty()).count();
         let mut first = 0;
-        let runs: Vec<std::ops::Range<usize>> = self
-            .shells
-            .polygons
-            .chunk_by(|a, b| a == b)
-            .map(|run| {
-                first += run.len();
-                first - run.len()..first
-            })
-            .collect();
-        let covered = |run: &std::ops::Range<usize>| {
-            let cut = run.clone().all(|triangle| has(&self.shells.triangles[triangle]));
-            // A quad may be cut along its other diagonal.
-            let other = || match *self.face(self.shells.polygons[run.start] as usize) {
-                [a, b, c, d] => [[a, b, c], [c, d, a], [b, c, d], [d, a, b]].map(|triangle| has(&triangle)),
-                _ => [false; 4],
-            };
-            cut || matches!(other(), [true, true, ..] | [.., true, true])
+        let runs = self.shells.polygons.chunk_by(|a, b| a == b).map(|run| {
+            first += run.len();
+            first - run.len()..first
+        });
+        let runs: Vec<Range<usize>> = runs.collect();
+        let cut_as_here = |run: &Range<usize>| run.clone().all(|triangle| around.has(&self.shells.triangles[triangle]));
+        // A quad may be cut along either diagonal.
+        let cut_otherwise = |run: &Range<usize>| match *self.face(self.shells.polygons[run.start] as usize) {
+            [a, b, c, d] => {
+                let both = |faces: [[u32; 3]; 2]| faces.iter().all(|face| around.has(face));
+                both([[a, b, c], [c, d, a]]) || both([[b, c, d], [d, a, b]])
+            }
+            _ => false,
         };
-        measured.missing_faces = runs.par_iter().filter(|run| !covered(run)).count();
+        measured.missing_faces = runs.par_iter().filter(|run| !cut_as_here(run) && !cut_otherwise(run)).count();
     }
 }
 
-/// The tets around each of the first points.
-struct Around {
-    starts: Vec<u32>,
-    tets: Vec<u32>,
-}
-
-impl Around {
-    fn new(points: usize, tets: &[[u32; 4]]) -> Self {
-        let mut starts = vec![0_u32; points + 1];
-        let corners = || {
-            let numbered = tets.iter().enumerate();
-            numbered.flat_map(|(tet, corners)| corners.map(|corner| (tet as u32, corner as usize)))
-        };
-        let corners = || corners().filter(|(_, corner)| *corner < points);
-        corners().for_each(|(_, corner)| starts[corner + 1] += 1);
-        (0..points).for_each(|point| starts[point + 1] += starts[point]);
-        let mut next = starts.clone();
-        let mut around = vec![0; starts[points] as usize];
-        for (tet, corner) in corners() {
-            around[next[corner] as usize] = tet;
-            next[corner] += 1;
-        }
-        Self { starts, tets: around }
-    }
-
-    fn of(&self, point: u32) -> &[u32] {
-        &self.tets[self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize]
-    }
-}
-
-/// What carving a body out of its convex hull needs to know.
+/// What carving bodies out of their convex hulls needs to know.
 struct Carved<'a> {
     closed: &'a Closed,
     winding: &'a Winding<'a>,
     inner: &'a [Inner],
-    /// Of the surface's points, then of those inside.
-    places: &'a [Place],
 }
 
 impl Carved<'_> {
-    /// The body of each tet, by where its middle is.
-    fn bodies(&self, tets: &[[u32; 4]]) -> Result<Vec<u32>, Fault> {
-        let overlap = |middle: [i64; 3]| {
-            let at = self.closed.lattice.point(middle.map(|x| 0.25 * x as f64)).map(|x| x as f32);
-            Fault::Overlap { at }
-        };
-        let classified = tets.par_iter().map_init(Vec::new, |tally, tet| {
-            let corners = tet.map(|corner| self.places[corner as usize].map(i64::from));
-            let middle = [0, 1, 2].map(|k| corners[0][k] + corners[1][k] + corners[2][k] + corners[3][k]);
+    /// The points of each body, rising.
+    fn members(&self) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.closed.bodies];
+        let on_surface = self.closed.shell_of.iter().map(|shell| self.closed.shells.all[*shell as usize].body);
+        for (point, body) in on_surface.chain(self.inner.iter().map(|inner| inner.body)).enumerate() {
+            members[body as usize].push(point as u32);
+        }
+        members
+    }
+
+    /// Tets of a body: those of its points alone, so what comes near it has no part in it. Cut out of their hull by
+    /// where the middle of each tet is.
+    fn body(&self, body: u32, points: &[u32]) -> Result<Vec<[u32; 4]>, Fault> {
+        let inner = |point: u32| (point as usize).checked_sub(self.closed.points.len()).map(|k| &self.inner[k]);
+        let place =
+            |point: &u32| inner(*point).map_or_else(|| self.closed.places[*point as usize], |inner| inner.place);
+        let places: Vec<Place> = points.iter().map(place).collect();
+        let mut tets = delaunay(&places).tets;
+        let is_inside = |tally: &mut Tally, tet: &[u32; 4]| {
+            let corners = tet.map(|corner| places[corner as usize].map(i64::from));
+            let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<i64>());
             // No surface is between an interior point and what is nearer to it than the surface.
-            for (corner, at) in tet.iter().zip(corners) {
-                let Some(inner) = (*corner as usize).checked_sub(self.closed.points.len()) else { continue };
-                let inner = &self.inner[inner];
-                let away = [0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64);
-                let clear = 4.0 * f64::from(inner.clear) * CLEAR_FOR_SURE;
-                if away[0] * away[0] + away[1] * away[1] + away[2] * away[2] < clear * clear {
-                    return Ok(inner.body);
-                }
+            let near = |(corner, at): (&u32, &[i64; 3])| {
+                inner(points[*corner as usize]).is_some_and(|inner| {
+                    let away = [0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64);
+                    let clear = 4.0 * f64::from(inner.clear) * CLEAR_FOR_SURE;
+                    away[0] * away[0] + away[1] * away[1] + away[2] * away[2] < clear * clear
+                })
+            };
+            if tet.iter().zip(&corners).any(near) {
+                return Ok(true);
             }
             self.winding.around(middle, 4, tally);
             match tally.iter().map(|(_, times)| times).sum() {
-                0 => Ok(OUTSIDE),
-                1 => Ok(self.closed.body(tally).unwrap_or(OUTSIDE)),
-                _ => Err(overlap(middle)),
-            }
-        });
-        classified.collect::<Vec<_>>().into_iter().collect()
-    }
-
-    /// Gives each body its own of the points at one place, and takes tets out that would join two bodies.
-    fn part(&self, tets: &mut Vec<[u32; 4]>, bodies: &mut Vec<u32>, doubled: &[[u32; 2]]) {
-        let mut twins: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for [twin, of] in doubled {
-            twins.entry(*of).or_default().push(*twin);
-        }
-        let body_of = |point: u32| match self.closed.shell_of.get(point as usize) {
-            Some(shell) => self.closed.shells.all[*shell as usize].body,
-            None => self.inner[point as usize - self.closed.points.len()].body,
-        };
-        let mut kept = Vec::with_capacity(tets.len());
-        for (tet, body) in tets.iter_mut().zip(bodies.iter()) {
-            let mut own = true;
-            for corner in tet.iter_mut().filter(|corner| body_of(**corner) != *body) {
-                let others = twins.get(corner).into_iter().flatten();
-                match others.copied().find(|twin| body_of(*twin) == *body) {
-                    Some(twin) => *corner = twin,
-                    None => own = false,
+                0 => Ok(false),
+                1 => Ok(self.closed.body(tally) == Some(body)),
+                _ => {
+                    let at = self.closed.lattice.point(middle.map(|x| 0.25 * x as f64));
+                    Err(Fault::Overlap { at: at.map(|x| x as f32) })
                 }
             }
-            kept.push(if own { *body } else { OUTSIDE });
-        }
-        *tets = keep(std::mem::take(tets), &kept);
-        kept.retain(|body| *body != OUTSIDE);
-        *bodies = kept;
+        };
+        let inside: Vec<Result<bool, Fault>> = tets.par_iter().map_init(Vec::new, is_inside).collect();
+        let inside: Vec<bool> = inside.into_iter().collect::<Result<_, _>>()?;
+        let mut next = inside.iter();
+        tets.retain(|_| *next.next().expect("one answer a tet"));
+        tets.iter_mut().for_each(|tet| *tet = tet.map(|corner| points[corner as usize]));
+        Ok(tets)
     }
 }
 
 /// A clearance is rounded to f32: this share of it is sure.
 const CLEAR_FOR_SURE: f64 = 0.999;
-
-/// The tets that are in a body.
-fn keep(tets: Vec<[u32; 4]>, bodies: &[u32]) -> Vec<[u32; 4]> {
-    tets.into_iter().zip(bodies).filter(|(_, body)| **body != OUTSIDE).map(|(tet, _)| tet).collect()
-}
 
 fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
