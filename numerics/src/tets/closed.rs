@@ -65,46 +65,22 @@ impl Closed {
         }
         shells.nest(&mut pieces, &places);
         turned(&polygons, &pieces, &shells, repair, &mut changes)?;
-        Ok(Self::with(surface, lattice, &places, &polygons, &pieces, changes, shells, tree))
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "it puts the parts of `of` together")]
-    fn with(
-        surface: &Surface,
-        lattice: Lattice,
-        places: &[Place],
-        polygons: &Polygons,
-        pieces: &[(u32, bool)],
-        changes: Changes,
-        mut shells: Shells,
-        tree: TriangleTree,
-    ) -> Self {
-        let mut used = vec![false; places.len()];
-        polygons.corners.iter().for_each(|corner| used[*corner as usize] = true);
-        let source_points: Vec<u32> = (0..places.len() as u32).filter(|point| used[*point as usize]).collect();
-        let mut name = vec![u32::MAX; places.len()];
-        source_points.iter().enumerate().for_each(|(new, old)| name[*old as usize] = new as u32);
-        let mut corners: Vec<u32> = polygons.corners.iter().map(|corner| name[*corner as usize]).collect();
-        for (polygon, _) in pieces.iter().enumerate().filter(|(_, (_, turned))| *turned) {
-            // The first corner stays the first.
-            corners[polygons.starts[polygon] as usize + 1..polygons.starts[polygon + 1] as usize].reverse();
-        }
+        let (source_points, name) = kept(&polygons, places.len());
         shells.triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner = name[*corner as usize]);
-        let of_kept = |point: &u32| surface.points[*point as usize];
-        Self {
-            points: source_points.iter().map(of_kept).collect(),
+        Ok(Self {
+            points: source_points.iter().map(|point| surface.points[*point as usize]).collect(),
             places: source_points.iter().map(|point| places[*point as usize]).collect(),
             shell_of: shells.of_points(source_points.len()),
             source_points,
-            source_faces: polygons.faces.clone(),
-            starts: polygons.starts.clone(),
-            corners,
+            corners: corners(&polygons, &pieces, &name),
+            source_faces: polygons.faces,
+            starts: polygons.starts,
             changes,
             bodies: shells.bodies,
             lattice,
             shells,
             tree,
-        }
+        })
     }
 
     /// Points of a face, in order.
@@ -147,6 +123,24 @@ impl Closed {
         };
         self.shells.triangles.iter().map(six).sum::<f64>() / 6.0
     }
+}
+
+/// The points that polygons have, and the number of each among those.
+fn kept(polygons: &Polygons, points: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut name = vec![u32::MAX; points];
+    polygons.corners.iter().for_each(|corner| name[*corner as usize] = 0);
+    let kept: Vec<u32> = (0..points as u32).filter(|point| name[*point as usize] == 0).collect();
+    kept.iter().enumerate().for_each(|(new, old)| name[*old as usize] = new as u32);
+    (kept, name)
+}
+
+/// Corners by their points' new names, turned where they are to be; the first corner stays the first.
+fn corners(polygons: &Polygons, pieces: &[(u32, bool)], name: &[u32]) -> Vec<u32> {
+    let mut corners: Vec<u32> = polygons.corners.iter().map(|corner| name[*corner as usize]).collect();
+    for (run, _) in polygons.starts.windows(2).zip(pieces).filter(|(_, (_, turned))| *turned) {
+        corners[run[0] as usize + 1..run[1] as usize].reverse();
+    }
+    corners
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {

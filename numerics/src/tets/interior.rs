@@ -67,7 +67,6 @@ pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<
                 let place = at.map(|x| x.round_ties_even() as i32);
                 winding.around(place.map(i64::from), 1, &mut tally);
                 let Some(body) = closed.body(&tally) else { continue };
-                let point = place.map(|x| x as f32);
                 let (clear, needed) = clearance(closed, place, spacing);
                 if clear >= needed {
                     found.push(Inner { place, clear: clear as f32, body });

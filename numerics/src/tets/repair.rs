@@ -40,6 +40,11 @@ impl Changes {
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
+
+    /// All of them together.
+    pub fn count(&self) -> usize {
+        self.joined_points + self.loose_points + self.dropped_faces + self.trimmed_faces + self.turned_faces
+    }
 }
 
 /// Polygons on the way to a closed surface, with the points that came in.
@@ -100,6 +105,7 @@ pub(super) fn in_order(surface: &Surface, places: &[Place], safe: bool) -> Resul
         polygons.push(&surface.corners[run[0] as usize..run[1] as usize], face as u32);
     }
     let mut changes = Changes::default();
+    polygons = tidied(polygons, safe, &mut changes)?;
     if let Some(onto) = joins(&polygons, places) {
         let moved: Vec<u32> = (0..places.len() as u32).filter(|point| onto[*point as usize] != *point).collect();
         if let Some(&point) = moved.first().filter(|_| !safe) {
@@ -107,17 +113,8 @@ pub(super) fn in_order(surface: &Surface, places: &[Place], safe: bool) -> Resul
         }
         changes.joined_points = moved.len();
         polygons.corners.iter_mut().for_each(|corner| *corner = onto[*corner as usize]);
+        polygons = tidied(polygons, safe, &mut changes)?;
     }
-    let (polygons, dropped, trimmed) = trimmed(&polygons);
-    if let Some(&face) = dropped.first().filter(|_| !safe) {
-        return Err(Fault::Degenerate { face, count: dropped.len() });
-    }
-    changes.trimmed_faces = trimmed;
-    let (polygons, pairs) = once_each(polygons);
-    if let Some(&faces) = pairs.first().filter(|_| !safe) {
-        return Err(Fault::Twice { faces, count: pairs.len() });
-    }
-    changes.dropped_faces = dropped.len() + pairs.len();
     let mut used = vec![false; places.len()];
     polygons.corners.iter().for_each(|corner| used[*corner as usize] = true);
     let loose = used.iter().filter(|used| !**used).count() - changes.joined_points;
@@ -126,6 +123,22 @@ pub(super) fn in_order(surface: &Surface, places: &[Place], safe: bool) -> Resul
     }
     changes.loose_points = loose;
     Ok((polygons, changes))
+}
+
+/// Polygons of three points or more, none on another's points.
+fn tidied(polygons: Polygons, safe: bool, changes: &mut Changes) -> Result<Polygons, Fault> {
+    let before = polygons.len();
+    let (polygons, trimmed) = trimmed(polygons);
+    if let Some(&face) = trimmed.first().filter(|_| !safe) {
+        return Err(Fault::Degenerate { face, count: trimmed.len() });
+    }
+    changes.trimmed_faces += trimmed.len() - (before - polygons.len());
+    let (polygons, pairs) = once_each(polygons);
+    if let Some(&faces) = pairs.first().filter(|_| !safe) {
+        return Err(Fault::Twice { faces, count: pairs.len() });
+    }
+    changes.dropped_faces += before - polygons.len();
+    Ok(polygons)
 }
 
 /// Which point each is joined to; `None` where no two are at one place.
@@ -162,37 +175,41 @@ fn joins(polygons: &Polygons, places: &[Place]) -> Option<Vec<u32>> {
     Some(onto)
 }
 
-/// Polygons without what goes to a point and straight back; the faces dropped for it, and how many others lost a corner.
-fn trimmed(polygons: &Polygons) -> (Polygons, Vec<u32>, usize) {
-    let (mut kept, mut dropped, mut changed) = (Polygons::empty(), Vec::new(), 0);
+/// Polygons without what goes to a point and straight back, and the faces that had such a thing.
+fn trimmed(polygons: Polygons) -> (Polygons, Vec<u32>) {
     let mut left: Vec<u32> = Vec::new();
-    for polygon in 0..polygons.len() {
+    let mut trim = |polygon: usize| {
         left.clear();
         left.extend_from_slice(polygons.get(polygon));
-        let before = left.len();
         let mut k = 0;
         while left.len() > 2 && k < left.len() {
-            let after = |steps: usize| (k + steps) % left.len();
-            if left[k] == left[after(1)] {
-                left.remove(after(1));
+            let [next, after] = [1, 2].map(|steps| (k + steps) % left.len());
+            if left[k] == left[next] {
+                left.remove(next);
                 k = 0;
-            } else if left[k] == left[after(2)] {
-                let [a, b] = [after(1), after(2)];
-                left.remove(a.max(b));
-                left.remove(a.min(b));
+            } else if left[k] == left[after] {
+                left.remove(next.max(after));
+                left.remove(next.min(after));
                 k = 0;
             } else {
                 k += 1;
             }
         }
-        if left.len() < 3 {
-            dropped.push(polygons.faces[polygon]);
-        } else {
-            changed += usize::from(left.len() < before);
-            kept.push(&left, polygons.faces[polygon]);
+        left.clone()
+    };
+    let touched: Vec<usize> = (0..polygons.len()).filter(|p| trim(*p).len() < polygons.get(*p).len().max(3)).collect();
+    if touched.is_empty() {
+        return (polygons, Vec::new());
+    }
+    let mut kept = Polygons::empty();
+    for polygon in 0..polygons.len() {
+        let corners = trim(polygon);
+        if corners.len() > 2 {
+            kept.push(&corners, polygons.faces[polygon]);
         }
     }
-    (kept, dropped, changed)
+    let touched = touched.into_iter().map(|polygon| polygons.faces[polygon]).collect();
+    (kept, touched)
 }
 
 /// The first of all polygons that have the same corners in the same or the opposite order; and each pair of the first
