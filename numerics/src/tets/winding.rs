@@ -75,7 +75,7 @@ impl<'a> Winding<'a> {
     /// How often each shell winds around the point `sum` ÷ `parts`, a sum of up to 4 places.
     pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut Tally) {
         tally.clear();
-        let square = |axis: usize| (sum[axis] / parts >> self.shift) as usize;
+        let square = |axis: usize| ((sum[axis] / parts) >> self.shift) as usize;
         let square = square(1) * self.across() + square(0);
         for member in &self.members[self.starts[square] as usize..self.starts[square + 1] as usize] {
             let corners = self.triangles[*member as usize].map(|corner| self.places[corner as usize]);

@@ -80,6 +80,16 @@ impl Mesh {
         Self { counts: shape.counts, corners: shape.corners, points }
     }
 
+    /// Each face cut from its first corner.
+    fn of_triangles(mesh: &Self) -> Self {
+        let mut cut = Self { points: mesh.points.clone(), ..Self::default() };
+        for run in mesh.starts().windows(2) {
+            let corners = &mesh.corners[run[0] as usize..run[1] as usize];
+            corners[1..].windows(2).for_each(|pair| cut.face(&[corners[0], pair[0], pair[1]]));
+        }
+        cut
+    }
+
     fn starts(&self) -> Vec<u32> {
         let ends = self.counts.iter().scan(0, |end, count| {
             *end += count;

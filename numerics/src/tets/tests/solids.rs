@@ -2,6 +2,7 @@
 
 use super::super::{Closed, Fault, Fill, Side, Solid, Surface};
 use super::{Mesh, ball, block, joined, turned_block};
+use crate::random::Key;
 
 fn closed(mesh: &Mesh) -> Closed {
     let starts = mesh.starts();
@@ -240,4 +241,70 @@ fn nothing_is_filled_with_nothing() {
     let solid = closed(&Mesh::default()).fill(&Fill { spacing: 0.0, interior: true }).unwrap();
     assert!(solid.tets.is_empty() && solid.points.is_empty());
     assert_eq!(solid.measured, super::super::Measured::default());
+}
+
+/// A mesh of the example graphs.
+fn asset(text: &str) -> Mesh {
+    let mut mesh = Mesh::default();
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => mesh.points.push([0; 3].map(|_| words.next().unwrap().parse().unwrap())),
+            Some("f") => {
+                let corner = |word: &str| word.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
+                mesh.face(&words.map(corner).collect::<Vec<_>>());
+            }
+            _ => {}
+        }
+    }
+    mesh
+}
+
+#[test]
+fn a_lump_of_dough_is_whole_and_of_good_tets() {
+    let lump = asset(include_str!("../../../../graphs/assets/blobby_4k_watertight.obj"));
+    let (_, solid) = fill(&lump, 0.0, true);
+    let measured = solid.measured;
+    assert!(measured.quality_median > 0.9 && measured.volume_error < 1e-12, "{measured:?}");
+    assert_eq!((measured.missing_faces, measured.missing_edges, measured.bare_points), (0, 0, 0));
+    assert!(measured.slivers < 10, "{measured:?}");
+    // TetGen, made to keep every face and to add no point, makes as many tets.
+    let (_, solid) = fill(&lump, 0.0, false);
+    assert_eq!((solid.tets.len(), solid.measured.missing_faces), (6371, 0));
+    assert!((0.1..0.15).contains(&solid.measured.quality_median));
+}
+
+#[test]
+fn nothing_done_to_a_ball_makes_it_panic() {
+    let ball = Mesh::of_triangles(&ball(3, 1.0));
+    let (mut filled, mut refused) = (0, 0);
+    for trial in 0..400 {
+        let key = Key::new(77).of(trial);
+        let mut mesh = ball.clone();
+        let any = |draw: u64, below: usize| (key.of(draw).u64() % below as u64) as usize;
+        for change in 0..1 + trial % 5 {
+            let draw = |k: u64| 10 * change + k;
+            let (point, other) = (any(draw(1), mesh.points.len()), any(draw(2), mesh.points.len()));
+            let face = any(draw(3), mesh.counts.len());
+            match any(draw(4), 7) {
+                0 => mesh.points[point] = mesh.points[other],
+                1 => mesh.points[point] = [0, 1, 2].map(|axis| key.of(draw(5)).of(axis).f32() - 0.5),
+                2 => mesh.points[point][1] = 0.0,
+                3 => mesh.corners[3 * face..3 * face + 3].reverse(),
+                4 => mesh.corners[3 * face] = other as u32,
+                5 => mesh.corners.extend_from_within(3 * face..3 * face + 3),
+                _ => mesh.points.iter_mut().for_each(|p| p[2] *= 1e-6),
+            }
+        }
+        let starts: Vec<u32> = (0..=mesh.corners.len() as u32).step_by(3).collect();
+        let surface = Surface { starts: &starts, corners: &mesh.corners, points: &mesh.points };
+        let solid = Closed::of(&surface, true).and_then(|closed| {
+            let solid = closed.fill(&Fill { spacing: 0.3, interior: true })?;
+            sound(&closed, &solid);
+            Ok(solid)
+        });
+        filled += usize::from(solid.is_ok());
+        refused += usize::from(solid.is_err());
+    }
+    assert!(filled > 50 && refused > 50, "{filled} {refused}");
 }

@@ -148,8 +148,8 @@ fn what_has_no_inside_is_refused() {
     refused(&flat, "the shell with face 0 encloses no volume");
     // A grid of n × n quads whose ends are joined, one pair of them turned: Klein's bottle.
     let n = 5;
-    let mut bottle = Mesh::default();
-    bottle.points = (0..n * n).map(|k| [k as f32, (k * k % 17) as f32, (k * k * k % 23) as f32]).collect();
+    let points = (0..n * n).map(|k| [k as f32, (k * k % 17) as f32, (k * k * k % 23) as f32]).collect();
+    let mut bottle = Mesh { points, ..Mesh::default() };
     let at = |i: u32, j: u32| {
         let j = if i < n { j % n } else { (2 * n - j) % n };
         (i % n) * n + j
