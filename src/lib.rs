@@ -38,6 +38,8 @@ pub static CATALOGUE: Catalogue = Catalogue(FAMILIES);
 
 static FAMILIES: &[&[&Node]] = &[
     geometry::NODES,
+    #[cfg(feature = "softbody")]
+    softbody::NODES,
     #[cfg(feature = "wind")]
     wind::NODES,
 ];

@@ -55,6 +55,9 @@ fn key(geometry: &Geometry) -> Key {
         for corner in part.faces().iter().flat_map(|faces| &faces.corners) {
             hasher.i64(i64::from(*corner));
         }
+        for corner in part.tet_corners().as_flattened() {
+            hasher.i64(i64::from(*corner));
+        }
         for (owner, name, column) in part.columns() {
             hasher.i64(owner as i64).text(name).bytes(&column.to_bytes());
         }

@@ -26,6 +26,7 @@ pub mod scatter;
 pub mod shapes;
 pub mod shield;
 pub mod simd;
+pub mod tets;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

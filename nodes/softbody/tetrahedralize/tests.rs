@@ -1,0 +1,165 @@
+use super::*;
+use engine::testing::{Bench, Tasted, bench, conformance};
+use numerics::shapes;
+
+fn mesh(shape: &shapes::Polygons) -> Component {
+    let points = shape.points.iter().map(|point| point.map(|x| x as f32)).collect();
+    Component::mesh(shape.counts.clone(), shape.corners.clone(), points).unwrap()
+}
+
+fn ball(n: usize, size: f64) -> Component {
+    mesh(&shapes::sphere([size; 3], n))
+}
+
+fn filling(surface: impl Into<Geometry>) -> Bench {
+    bench(&NODE).input(SURFACE, surface)
+}
+
+fn tets(out: &Tasted) -> &Component {
+    out.part(Kind::Tets)
+}
+
+fn volume(tets: &Component, which: impl Fn(usize) -> bool) -> f64 {
+    let at = |corner: u32| tets.positions()[corner as usize].map(f64::from);
+    let one = |corners: &[u32; 4]| {
+        let [a, b, c, d] = corners.map(at);
+        let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+        (b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0]))
+            / 6.0
+    };
+    tets.tet_corners().iter().enumerate().filter(|(tet, _)| which(*tet)).map(|(_, corners)| one(corners)).sum()
+}
+
+/// Faces the other way round.
+fn inside_out(given: Geometry) -> Geometry {
+    let mesh = given.mesh().unwrap();
+    let faces = mesh.faces().unwrap();
+    let turned =
+        Faces { runs: faces.runs.clone(), corners: faces.iter().flat_map(|face| face.iter().rev().copied()).collect() };
+    let tables = Owner::ALL.map(|owner| mesh.table(owner).clone());
+    let turned = Component::from_tables(Topology::Mesh(turned.into()), tables).unwrap();
+    given.with(turned)
+}
+
+#[test]
+fn it_conforms() {
+    conformance(&NODE).with(|bench| bench).with(|bench| bench.changed(SURFACE, inside_out)).run();
+}
+
+#[test]
+fn a_cube_is_five_or_six_tets_of_its_volume_and_rides_along() {
+    let cube = mesh(&shapes::block([2.0, 1.0, 1.0], [1; 3]));
+    let out = filling(cube.clone()).set(INTERIOR, false).cook();
+    assert!((5..=6).contains(&tets(&out).element_count()));
+    assert!((volume(tets(&out), |_| true) - 2.0).abs() < 1e-14);
+    assert_eq!(tets(&out).positions(), cube.positions());
+    let address = |mesh: &Component| mesh.table(Owner::Point).column("P").unwrap().address();
+    assert_eq!(address(out.mesh()), address(&cube), "the surface is the very one that came in");
+    assert_eq!(tets(&out).get(SURFACE_POINT).unwrap(), [0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(tets(&out).get(SIDE).unwrap(), [1; 8]);
+    assert_eq!((out.metrics["missing_faces"], out.metrics["repairs"]), (0.0, 0.0));
+    assert!(out.metrics["volume_error"] < 1e-14);
+}
+
+#[test]
+fn points_inside_are_marked_and_make_good_tets() {
+    let ball = ball(8, 0.2);
+    let n = ball.point_count();
+    let out = filling(ball).cook();
+    let tets = tets(&out);
+    assert!(tets.point_count() > 2 * n);
+    assert!(tets.get(SURFACE_POINT).unwrap()[n..].iter().all(|point| *point == -1));
+    assert!(tets.get(SIDE).unwrap()[n..].iter().all(|side| *side == 0));
+    assert_eq!(tets.get(SLIVER).unwrap().iter().sum::<i32>(), out.metrics["slivers"] as i32);
+    assert!(out.metrics["quality_median"] > 0.7 && out.metrics["volume_error"] < 1e-6, "{:?}", out.metrics);
+    assert!(out.metrics["min_dihedral"] > 0.01);
+    let fine = filling(self::ball(8, 0.2)).set(SPACING, 0.01).cook();
+    assert!(fine.metrics["tets"] > out.metrics["tets"]);
+}
+
+#[test]
+fn an_egg_is_a_white_around_a_yolk() {
+    let egg = ball(8, 0.06).concat(&ball(6, 0.03)).unwrap().concat(&ball(6, 0.0298)).unwrap();
+    let out = filling(egg).cook();
+    assert_eq!(out.metrics["bodies"], 2.0);
+    assert!(out.metrics["repairs"] > 0.0, "the wall of the cavity looked outwards");
+    let body = tets(&out).get(BODY).unwrap();
+    let (white, yolk) = (volume(tets(&out), |tet| body[tet] == 0), volume(tets(&out), |tet| body[tet] == 1));
+    let all = |n: usize, size: f64| volume(tets(&filling(ball(n, size)).cook()), |_| true);
+    assert!((white / (all(8, 0.06) - all(6, 0.03)) - 1.0).abs() < 1e-5);
+    assert!((yolk / all(6, 0.0298) - 1.0).abs() < 1e-5);
+    let sides = tets(&out).get(SIDE).unwrap();
+    let points = |side: i32| sides.iter().filter(|other| **other == side).count();
+    assert_eq!(
+        (points(1), points(2)),
+        (ball(8, 1.0).point_count() + ball(6, 1.0).point_count(), ball(6, 1.0).point_count(),)
+    );
+}
+
+/// A cube whose faces each have points of their own, with a stray point before them, a face twice, and inside out.
+fn untidy() -> Component {
+    let cube = mesh(&shapes::block([1.0; 3], [1; 3]));
+    let mut points = vec![[7.0, 8.0, 9.0]];
+    points.extend(cube.faces().unwrap().corners.iter().rev().map(|corner| cube.positions()[*corner as usize]));
+    let corners: Vec<u32> = (1..=24).chain(1..=4).collect();
+    let mut untidy = Component::mesh(vec![4; 7], corners, points).unwrap();
+    untidy.set(Attr::<f32>::point("heat"), (0..25).map(|k| k as f32).collect()).unwrap();
+    untidy.set(Attr::<i32>::element("paint"), (0..7).collect()).unwrap();
+    untidy.set(Attr::<f32>::once("made"), vec![1.5]).unwrap();
+    untidy
+}
+
+#[test]
+fn repairs_keep_attributes_with_their_points_and_faces() {
+    let out = filling(untidy()).cook();
+    let mesh = out.mesh();
+    assert_eq!((mesh.point_count(), mesh.element_count()), (8, 6));
+    assert_eq!(tets(&out).positions()[..8], *mesh.positions());
+    let heat = mesh.get(Attr::<f32>::point("heat")).unwrap();
+    for (heat, point) in heat.iter().zip(mesh.positions()) {
+        assert_eq!(untidy().positions()[*heat as usize], *point);
+    }
+    assert_eq!(mesh.get(Attr::<i32>::element("paint")).unwrap(), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(mesh.get(Attr::<f32>::once("made")).unwrap(), [1.5]);
+    assert!((volume(tets(&out), |_| true) - 1.0).abs() < 1e-12);
+    // 16 points joined and 1 dropped, 1 face dropped and 6 turned.
+    assert_eq!(out.metrics["repairs"], 24.0);
+}
+
+#[test]
+fn what_cannot_be_repaired_or_must_not_be_is_refused_with_its_place() {
+    let fact = |bench: Bench| bench.try_cook().unwrap_err().to_string();
+    assert_eq!(
+        fact(filling(untidy()).set(REPAIR, Repair::None)),
+        "faces 0 and 6 have the same points; `repair` \"safe\" takes them out"
+    );
+    let sheet = mesh(&shapes::grid([1.0; 2], 1));
+    assert_eq!(
+        fact(filling(sheet)),
+        "the surface is open: the edge of face 0 between points 0 and 1 has no other face (4 such edges in all); only \
+         closed surfaces can be filled: close the hole, or give a thin wall a thickness"
+    );
+    let fine = fact(filling(ball(4, 1.0)).set(SPACING, 1e-4));
+    assert!(fine.starts_with("a spacing of 0.0001 m would make about 7"), "{fine}");
+    assert!(fine.ends_with("e11 points, expected at most 4.19e6; make `spacing` larger"), "{fine}");
+}
+
+#[test]
+fn nothing_is_no_body() {
+    let none = Component::mesh(Vec::new(), Vec::new(), Vec::new()).unwrap();
+    let out = filling(none).cook();
+    assert_eq!((tets(&out).element_count(), out.mesh().element_count(), out.metrics["tets"]), (0, 0, 0.0));
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let pair = ball(8, 0.2).concat(&ball(5, 0.1)).unwrap();
+    let bits = |threads: usize| {
+        let out = filling(pair.clone()).threads(threads).cook();
+        let table =
+            |owner: Owner| tets(&out).table(owner).iter().map(|(_, column)| column.to_bytes()).collect::<Vec<_>>();
+        (tets(&out).tet_corners().to_vec(), table(Owner::Point), table(Owner::Element))
+    };
+    let one = bits(1);
+    assert!(one == bits(2) && one == bits(7));
+}

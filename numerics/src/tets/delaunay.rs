@@ -1,0 +1,350 @@
+//! Delaunay tets of places on the lattice: incremental insertion (Bowyer 1981, Watson 1981).
+//!
+//! Promise: every tet is positive, and no place lies strictly inside the sphere around one, by exact predicates; the tets
+//! fill the convex hull. The same places in the same order give the same tets. Where more than four places lie on one
+//! sphere and none in it, the order of insertion, which is fixed, picks one of the ways to cut them. Limit: one thread;
+//! fewer than 2³⁰ tets.
+//!
+//! The outside is tets too: each hull face has one whose fourth corner is [`GHOST`]. A new place takes out all tets whose
+//! sphere it is strictly inside of (of a ghost: whose face it is strictly beyond, or on whose plane and in whose circle);
+//! they are one piece, and its boundary sees the place and, spheres being open, lies with no face on a plane with it, so
+//! joined to it makes positive tets.
+
+use super::lattice::Place;
+use super::order::insertion_order;
+use super::predicates::{At, in_sphere, orient};
+
+/// What [`delaunay`] returns.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Delaunay {
+    /// Indices of the places of each tet: (b−a)×(c−a)·(d−a) > 0. None where all places lie on a plane.
+    pub tets: Vec<[u32; 4]>,
+    /// The tet across from each corner of each tet; [`NONE`] beyond the hull.
+    pub across: Vec<[u32; 4]>,
+    /// Places that are on an earlier one: theirs and its index. No tet has them.
+    pub doubled: Vec<[u32; 2]>,
+}
+
+/// No tet.
+pub const NONE: u32 = u32::MAX;
+
+/// The Delaunay tets of `places`, whose coordinates lie from 0 to [`super::lattice::SIDE`].
+pub fn delaunay(places: &[Place]) -> Delaunay {
+    let mut order = insertion_order(places);
+    let Some(first) = first_tet(places, &order) else { return Delaunay::default() };
+    // The first tet's corners are inserted before all else.
+    for (k, place) in first.into_iter().enumerate() {
+        let found = order.iter().position(|index| *index == place).expect("the corners are places");
+        order[k..=found].rotate_right(1);
+    }
+    let mut complex = Complex::of(places, &order);
+    let mut doubled = Vec::new();
+    for vertex in 5..=order.len() as u32 {
+        if let Some(earlier) = complex.insert(vertex) {
+            doubled.push([order[vertex as usize - 1], order[earlier as usize - 1]]);
+        }
+    }
+    complex.finish(&order, doubled)
+}
+
+/// Four places that are the corners of a positive tet, the earliest that are in `order`.
+fn first_tet(places: &[Place], order: &[u32]) -> Option<[u32; 4]> {
+    let at = |index: &u32| places[*index as usize].map(f64::from);
+    let mut rest = order.iter();
+    let a = rest.next()?;
+    let b = rest.find(|b| at(b) != at(a))?;
+    // On a line with a and b: below all three planes through it along an axis, so all minors are exactly 0.
+    let on_line = |c: &u32| {
+        let (u, v) = (sub(at(b), at(a)), sub(at(c), at(a)));
+        [(0, 1), (1, 2), (2, 0)].iter().all(|(i, j)| u[*i] * v[*j] == u[*j] * v[*i])
+    };
+    let c = rest.find(|c| !on_line(c))?;
+    let d = rest.find(|d| orient(&at(a), &at(b), &at(c), &at(d)) != 0.0)?;
+    let positive = orient(&at(a), &at(b), &at(c), &at(d)) > 0.0;
+    Some(if positive { [*a, *b, *c, *d] } else { [*a, *c, *b, *d] })
+}
+
+fn sub(a: At, b: At) -> At {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The vertex at infinity; places are vertices from 1 on, in the order of insertion.
+const GHOST: u32 = 0;
+
+/// The corner of a dead tet.
+const DEAD: u32 = u32::MAX;
+
+/// The other corners of a tet in such an order that, after the first, they make an even permutation.
+const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// A face of a tet: four times the tet, plus the corner it is across from.
+type Face = u32;
+
+/// A cavity with more vertices than this is joined by sorting its edges.
+const MOST_LOCAL: usize = 64;
+
+/// A face of the cavity: the tet that the new place makes of it, the place's corner there, and the face beyond.
+struct Rim {
+    corners: [u32; 4],
+    corner: u32,
+    beyond: Face,
+}
+
+struct Complex {
+    at: Vec<At>,
+    corners: Vec<[u32; 4]>,
+    across: Vec<[Face; 4]>,
+    /// Of each tet: `stamp` where the place being inserted takes it out, `stamp` + 1 where it does not, less before.
+    seen: Vec<u32>,
+    stamp: u32,
+    /// Places of dead tets, to be used again.
+    free: Vec<u32>,
+    /// Where the next walk starts: a tet that was made last.
+    last: u32,
+    cavity: Vec<u32>,
+    rim: Vec<Rim>,
+    /// Of each vertex: for which place it was numbered among the rim's vertices, and how.
+    local: Vec<[u32; 2]>,
+    /// At local vertices u and v: the face of a new tet that has the rim's edge from u to v.
+    table: Vec<Face>,
+    edges: Vec<(u64, Face)>,
+}
+
+impl Complex {
+    /// The tet of the first four places, and its four ghosts.
+    fn of(places: &[Place], order: &[u32]) -> Self {
+        let mut at = vec![[0.0; 3]];
+        at.extend(order.iter().map(|index| places[*index as usize].map(f64::from)));
+        let vertices = at.len();
+        let mut complex = Self {
+            at,
+            corners: Vec::with_capacity(7 * vertices),
+            across: Vec::with_capacity(7 * vertices),
+            seen: Vec::with_capacity(7 * vertices),
+            stamp: 0,
+            free: Vec::new(),
+            last: 0,
+            cavity: Vec::new(),
+            rim: Vec::new(),
+            local: vec![[0; 2]; vertices],
+            table: vec![0; MOST_LOCAL * MOST_LOCAL],
+            edges: Vec::new(),
+        };
+        let first = [1, 2, 3, 4];
+        complex.push(first);
+        // Ghost k lies across from corner k: its corner there is the ghost, and two others trade places.
+        for k in 0..4 {
+            let mut ghost = first;
+            ghost[k] = GHOST;
+            ghost.swap(OTHERS[k][0], OTHERS[k][1]);
+            complex.push(ghost);
+        }
+        for tet in 0..5 {
+            for corner in 0..4 {
+                let face = complex.face(tet, corner);
+                complex.across[tet][corner] = (0..20)
+                    .find(|other| {
+                        *other as usize / 4 != tet && complex.face(*other as usize / 4, *other as usize % 4) == face
+                    })
+                    .expect("five tets around four vertices and infinity close up");
+            }
+        }
+        complex
+    }
+
+    fn push(&mut self, corners: [u32; 4]) -> u32 {
+        self.corners.push(corners);
+        self.across.push([0; 4]);
+        self.seen.push(0);
+        self.corners.len() as u32 - 1
+    }
+
+    /// The vertices of a face, sorted.
+    fn face(&self, tet: usize, corner: usize) -> [u32; 3] {
+        let mut face = OTHERS[corner].map(|other| self.corners[tet][other]);
+        face.sort_unstable();
+        face
+    }
+
+    #[inline(always)]
+    fn of_vertices(&self, [a, b, c, d]: [u32; 4]) -> [&At; 4] {
+        [a, b, c, d].map(|vertex| &self.at[vertex as usize])
+    }
+
+    /// Whether the place `p` takes a tet out.
+    #[inline(always)]
+    fn conflicts(&self, tet: u32, p: &At) -> bool {
+        let corners = self.corners[tet as usize];
+        let Some(ghost) = corners.iter().position(|vertex| *vertex == GHOST) else {
+            let [a, b, c, d] = self.of_vertices(corners);
+            return in_sphere(a, b, c, d, p) > 0.0;
+        };
+        let beyond = side(self.of_vertices(corners), ghost, p);
+        if beyond != 0.0 {
+            return beyond > 0.0;
+        }
+        // On the face's plane, the sphere of the tet behind it cuts the face's circle out.
+        let behind = self.corners[(self.across[tet as usize][ghost] / 4) as usize];
+        let [a, b, c, d] = self.of_vertices(behind);
+        in_sphere(a, b, c, d, p) > 0.0
+    }
+
+    /// The tet that has `p` in it or on its boundary, or a ghost whose face it is strictly beyond. Towards `p`, through
+    /// faces that it is beyond: in Delaunay tets no such walk returns (Edelsbrunner 1990).
+    fn locate(&self, p: &At) -> u32 {
+        let mut tet = self.last;
+        if let Some(ghost) = self.corners[tet as usize].iter().position(|vertex| *vertex == GHOST) {
+            tet = self.across[tet as usize][ghost] / 4;
+        }
+        let mut entered = 4;
+        loop {
+            let corners = self.corners[tet as usize];
+            let places = self.of_vertices(corners);
+            let through = (0..4).find(|corner| *corner != entered && side(places, *corner, p) < 0.0);
+            let Some(corner) = through else { return tet };
+            let face = self.across[tet as usize][corner];
+            (tet, entered) = (face / 4, face as usize % 4);
+            if self.corners[tet as usize].contains(&GHOST) {
+                return tet;
+            }
+        }
+    }
+
+    /// Inserts the place of a vertex, or says which vertex is on it already.
+    fn insert(&mut self, vertex: u32) -> Option<u32> {
+        let p = self.at[vertex as usize];
+        let start = self.locate(&p);
+        let on = |corner: &&u32| **corner != GHOST && self.at[**corner as usize] == p;
+        if let Some(earlier) = self.corners[start as usize].iter().find(on) {
+            return Some(*earlier);
+        }
+        self.dig(start, vertex, &p);
+        self.fill();
+        None
+    }
+
+    /// Finds all tets that `vertex` at `p` takes out, and the rim around them.
+    fn dig(&mut self, start: u32, vertex: u32, p: &At) {
+        self.stamp += 2;
+        self.cavity.clear();
+        self.rim.clear();
+        self.cavity.push(start);
+        self.seen[start as usize] = self.stamp;
+        let mut next = 0;
+        while let Some(&tet) = self.cavity.get(next) {
+            next += 1;
+            for corner in 0..4 {
+                let beyond = self.across[tet as usize][corner];
+                let other = beyond / 4;
+                if self.seen[other as usize] == self.stamp {
+                    continue;
+                }
+                if self.seen[other as usize] < self.stamp && self.conflicts(other, p) {
+                    self.seen[other as usize] = self.stamp;
+                    self.cavity.push(other);
+                    continue;
+                }
+                self.seen[other as usize] = self.stamp + 1;
+                let mut corners = self.corners[tet as usize];
+                corners[corner] = vertex;
+                self.rim.push(Rim { corners, corner: corner as u32, beyond });
+            }
+        }
+    }
+
+    /// Puts a tet on each face of the rim, in the places of those taken out.
+    fn fill(&mut self) {
+        let rim = std::mem::take(&mut self.rim);
+        let before = self.free.len();
+        self.free.append(&mut self.cavity);
+        let small = self.number(&rim);
+        self.edges.clear();
+        for Rim { corners, corner, beyond } in &rim {
+            let tet = match self.free.pop() {
+                Some(tet) => {
+                    self.corners[tet as usize] = *corners;
+                    tet
+                }
+                None => self.push(*corners),
+            };
+            self.cavity.push(tet);
+            self.across[tet as usize][*corner as usize] = *beyond;
+            self.across[(beyond / 4) as usize][(beyond % 4) as usize] = 4 * tet + corner;
+            for [from, to, across] in edges(*corner as usize) {
+                let face = 4 * tet + across as u32;
+                let [from, to] = [from, to].map(|corner| self.local[corners[corner] as usize][1] as usize);
+                if small {
+                    self.table[from * MOST_LOCAL + to] = face;
+                } else {
+                    self.edges.push(((from as u64) << 32 | to as u64, face));
+                }
+            }
+        }
+        self.edges.sort_unstable();
+        for (Rim { corners, corner, .. }, tet) in rim.iter().zip(&self.cavity) {
+            for [from, to, across] in edges(*corner as usize) {
+                let [from, to] = [from, to].map(|corner| self.local[corners[corner] as usize][1] as usize);
+                // The rim is a closed surface: its other face at this edge runs along it from `to` to `from`.
+                self.across[*tet as usize][across] = if small {
+                    self.table[to * MOST_LOCAL + from]
+                } else {
+                    let key = (to as u64) << 32 | from as u64;
+                    self.edges[self.edges.partition_point(|(edge, _)| *edge < key)].1
+                };
+            }
+        }
+        self.last = *self.cavity.last().expect("a place takes out a tet, so there is a rim");
+        for tet in self.free.iter().skip(before) {
+            self.corners[*tet as usize] = [DEAD; 4];
+        }
+        self.rim = rim;
+    }
+
+    /// Numbers the vertices of the rim; whether they are few.
+    fn number(&mut self, rim: &[Rim]) -> bool {
+        let mut count = 0;
+        for Rim { corners, corner, .. } in rim {
+            for other in OTHERS[*corner as usize] {
+                let local = &mut self.local[corners[other] as usize];
+                if local[0] != self.stamp {
+                    *local = [self.stamp, count];
+                    count += 1;
+                }
+            }
+        }
+        count as usize <= MOST_LOCAL
+    }
+
+    /// The tets that are no ghosts, by the places' own indices.
+    fn finish(self, order: &[u32], doubled: Vec<[u32; 2]>) -> Delaunay {
+        let lives = |corners: &[u32; 4]| corners[0] != DEAD && !corners.contains(&GHOST);
+        let mut named = vec![NONE; self.corners.len()];
+        let mut count = 0;
+        for (name, _) in named.iter_mut().zip(&self.corners).filter(|(_, corners)| lives(corners)) {
+            *name = count;
+            count += 1;
+        }
+        let mut result =
+            Delaunay { tets: Vec::with_capacity(count as usize), across: Vec::with_capacity(count as usize), doubled };
+        for (corners, across) in self.corners.iter().zip(&self.across).filter(|(corners, _)| lives(corners)) {
+            result.tets.push(corners.map(|vertex| order[vertex as usize - 1]));
+            result.across.push(across.map(|face| named[(face / 4) as usize]));
+        }
+        result
+    }
+}
+
+/// The orientation of a tet with `p` at one of its corners.
+#[inline(always)]
+fn side<'a>(mut tet: [&'a At; 4], corner: usize, p: &'a At) -> f64 {
+    tet[corner] = p;
+    orient(tet[0], tet[1], tet[2], tet[3])
+}
+
+/// The edges of the face across from a corner: from, to, and the third corner, which the new tets' faces at the edge are
+/// across from.
+#[inline(always)]
+fn edges(corner: usize) -> [[usize; 3]; 3] {
+    let [a, b, c] = OTHERS[corner];
+    [[a, b, c], [b, c, a], [c, a, b]]
+}

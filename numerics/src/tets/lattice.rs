@@ -1,0 +1,119 @@
+//! The lattice that points are brought to, so that predicates are exact.
+//!
+//! Promise: the step is a power of two and the lattice's planes pass through the world's origin, so a coordinate that is
+//! a multiple of the step stays what it is, and scaling by a power of two changes no place. Limit: any other point moves
+//! by up to half a step, between 2⁻²⁵ and 2⁻²⁴ of the longest side of all bounds.
+
+/// A place on the lattice: three numbers from 0 to [`SIDE`].
+pub type Place = [i32; 3];
+
+/// The largest coordinate of a place.
+pub const SIDE: i32 = 1 << 24;
+
+/// Where places lie in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// Lowest place, in steps from the world's origin.
+    low: [f64; 3],
+    /// Metres.
+    step: f64,
+}
+
+impl Lattice {
+    /// The finest lattice that holds all points. `None` where one is not finite, or none is there.
+    pub fn around(points: &[[f32; 3]]) -> Option<Self> {
+        let (first, rest) = points.split_first()?;
+        let wide = |p: &[f32; 3]| p.map(f64::from);
+        let (mut low, mut high) = (wide(first), wide(first));
+        for point in rest {
+            for (axis, x) in wide(point).into_iter().enumerate() {
+                low[axis] = low[axis].min(x);
+                high[axis] = high[axis].max(x);
+            }
+        }
+        if !points.as_flattened().iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        if longest == 0.0 {
+            return Some(Self { low, step: 1.0 }.settled(low));
+        }
+        let exponent = (longest.to_bits() >> 52) as i64 - 1023;
+        let fits = |lattice: &Self| lattice.steps(high).iter().all(|steps| *steps <= f64::from(SIDE));
+        let at = |exponent: i64| Self { low, step: power_of_two(exponent) }.settled(low);
+        let fine = at(exponent - 24);
+        Some(if fits(&fine) { fine } else { at(exponent - 23) })
+    }
+
+    /// The lattice of nothing.
+    pub(super) fn unit() -> Self {
+        Self { low: [0.0; 3], step: 1.0 }
+    }
+
+    fn settled(mut self, low: [f64; 3]) -> Self {
+        self.low = low.map(|x| (x / self.step).round_ties_even());
+        self
+    }
+
+    /// Steps from the lowest place, rounded.
+    fn steps(&self, p: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| (p[axis] / self.step).round_ties_even() - self.low[axis])
+    }
+
+    /// The place nearest to a point; one of the sides where the point is beyond.
+    pub fn place(&self, point: [f64; 3]) -> Place {
+        self.steps(point).map(|steps| steps.clamp(0.0, f64::from(SIDE)) as i32)
+    }
+
+    /// Where a place is, metres.
+    pub fn point(&self, place: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| (self.low[axis] + place[axis]) * self.step)
+    }
+
+    /// Metres from a place to the next.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+}
+
+/// 2 to the `exponent`, a normal number: points are f32, so it lies between −180 and 130.
+fn power_of_two(exponent: i64) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_of_a_power_of_two_has_all_24_bits_and_exact_places() {
+        let lattice = Lattice::around(&[[0.0; 3], [1.0; 3]]).unwrap();
+        assert_eq!(lattice.step(), 1.0 / f64::from(SIDE));
+        assert_eq!(lattice.place([1.0, 0.5, 0.0]), [SIDE, SIDE / 2, 0]);
+        assert_eq!(lattice.point([f64::from(SIDE), 1.0, 0.0]), [1.0, lattice.step(), 0.0]);
+    }
+
+    #[test]
+    fn places_fit_and_are_within_half_a_step_whatever_the_scale() {
+        for scale in [1e-44_f32, 1e-38, 1e-6, 1.0, 1e6, 3e38] {
+            let points = [[-0.3 * scale, 0.1 * scale, 0.7 * scale], [0.9 * scale, 0.11 * scale, 0.0]];
+            let lattice = Lattice::around(&points).unwrap();
+            for point in points {
+                let point = point.map(f64::from);
+                let place = lattice.place(point);
+                assert!(place.iter().all(|x| (0..=SIDE).contains(x)), "{scale}: {place:?}");
+                let back = lattice.point(place.map(f64::from));
+                assert!((0..3).all(|k| (back[k] - point[k]).abs() <= 0.5 * lattice.step()), "{scale}");
+            }
+            assert!(lattice.step() * f64::from(SIDE) <= 4.0 * f64::from(1.2 * scale), "{scale}: it is fine enough");
+        }
+    }
+
+    #[test]
+    fn one_point_or_a_heap_has_a_lattice_and_no_point_or_a_nan_has_none() {
+        assert_eq!(Lattice::around(&[[5.0, 0.0, -1.0]; 3]).unwrap().place([5.0, 0.0, -1.0]), [0; 3]);
+        assert_eq!(Lattice::around(&[]), None);
+        assert_eq!(Lattice::around(&[[0.0; 3], [0.0, f32::NAN, 0.0]]), None);
+        assert_eq!(Lattice::around(&[[0.0; 3], [0.0, f32::INFINITY, 0.0]]), None);
+    }
+}

@@ -1,0 +1,80 @@
+//! On which side of a plane, in or out of a sphere: exact on the lattice.
+//!
+//! Promise: the sign of what is returned is exact for places as f64 (whole numbers from 0 to 2²⁴); its magnitude is
+//! approximate. Differences of places have 24 bits, 2 × 2 minors 49 and squared distances 50, all exact in f64; what is
+//! rounded after them is bounded, and where the bound decides nothing, whole numbers of 128 bits do.
+
+/// A place as f64.
+pub(crate) type At = [f64; 3];
+
+/// Above the rounding of [`orient`]: three products below 2⁷³ and two sums below 2⁷⁵, each off by 2⁻⁵³ of itself.
+const ORIENT_ROUNDING: f64 = (1_u64 << 24) as f64;
+
+/// Above the rounding of [`in_sphere`] for differences of up to 2²⁴: minors off by 2²⁴ times squares below 2⁵⁰, and
+/// products and sums below 2¹²⁷ off by 2⁻⁵³ of themselves.
+const SPHERE_ROUNDING: f64 = (1_u128 << 77) as f64;
+
+/// The same for differences of up to m, as a share of m⁵: the determinant is of degree 5.
+const SPHERE_SHARE: f64 = SPHERE_ROUNDING / (1_u128 << 120) as f64;
+
+#[inline(always)]
+fn sub(a: &At, b: &At) -> At {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// (b−a)×(c−a)·(d−a): six times the volume of a tet, positive where `d` sees `abc` clockwise.
+#[inline(always)]
+pub(crate) fn orient(a: &At, b: &At, c: &At, d: &At) -> f64 {
+    let (b, c, d) = (sub(b, a), sub(c, a), sub(d, a));
+    let det =
+        b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0]);
+    if det.abs() > ORIENT_ROUNDING { det } else { orient_exactly(b, c, d) }
+}
+
+#[cold]
+fn orient_exactly(b: At, c: At, d: At) -> f64 {
+    let [b, c, d] = [b, c, d].map(whole);
+    let minor = |i: usize, j: usize| i128::from(c[i] * d[j] - c[j] * d[i]);
+    let term = |i: usize, j: usize, k: usize| i128::from(b[i]) * minor(j, k);
+    (term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)) as f64
+}
+
+/// Positive where `e` is inside the sphere around the positive tet `abcd`, 0 on it.
+#[inline(always)]
+pub(crate) fn in_sphere(a: &At, b: &At, c: &At, d: &At, e: &At) -> f64 {
+    let rows = [sub(a, e), sub(b, e), sub(c, e), sub(d, e)];
+    let [a, b, c, d] = &rows;
+    let minor = |p: &At, q: &At| p[0] * q[1] - q[0] * p[1];
+    let (ab, bc, cd, da, ac, bd) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a), minor(a, c), minor(b, d));
+    let abc = a[2] * bc - b[2] * ac + c[2] * ab;
+    let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
+    let cda = c[2] * da + d[2] * ac + a[2] * cd;
+    let dab = d[2] * ab + a[2] * bd + b[2] * da;
+    let square = |p: &At| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+    let det = (square(a) * bcd - square(b) * cda) + (square(c) * dab - square(d) * abc);
+    if det.abs() > SPHERE_ROUNDING { det } else { in_small_sphere(&rows, det) }
+}
+
+/// A bound that fits the size of the differences; else the exact sum.
+#[inline(never)]
+fn in_small_sphere(rows: &[At; 4], det: f64) -> f64 {
+    let m = rows.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if det.abs() > SPHERE_SHARE * (m * m) * (m * m) * m { det } else { in_sphere_exactly(rows) }
+}
+
+#[cold]
+fn in_sphere_exactly(rows: &[At; 4]) -> f64 {
+    let [a, b, c, d] = rows.map(whole);
+    let minor = |p: &[i64; 3], q: &[i64; 3]| i128::from(p[0] * q[1] - q[0] * p[1]);
+    let volume = |p: &[i64; 3], q: &[i64; 3], r: &[i64; 3]| {
+        i128::from(p[2]) * minor(q, r) - i128::from(q[2]) * minor(p, r) + i128::from(r[2]) * minor(p, q)
+    };
+    let square = |p: &[i64; 3]| i128::from(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    let det = square(&a) * volume(&b, &c, &d) - square(&b) * volume(&a, &c, &d) + square(&c) * volume(&a, &b, &d)
+        - square(&d) * volume(&a, &b, &c);
+    det as f64
+}
+
+fn whole(p: At) -> [i64; 3] {
+    p.map(|x| x as i64)
+}

@@ -1,0 +1,242 @@
+//! Tets of what is inside of a closed surface.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::closed::Closed;
+use super::delaunay;
+use super::edges::Around;
+use super::fault::Fault;
+use super::interior::{Inner, POINTS_A_CUBE, SIDE_BY_EDGE, interior};
+use super::lattice::Place;
+use super::quality::{Measure, measure};
+use super::winding::{Tally, Winding};
+
+/// How to fill a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fill {
+    /// Mean length of edges between interior points, metres; 0 for the surface's own.
+    pub spacing: f64,
+    /// Whether there are interior points.
+    pub interior: bool,
+}
+
+/// On which kind of shell a point is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// None: inside a body.
+    Interior,
+    /// The outside of a body.
+    Outer,
+    /// The wall of a cavity.
+    Inner,
+}
+
+/// Bodies of tets.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// The surface's points, in their order, then the interior ones. Metres.
+    pub points: Vec<[f32; 3]>,
+    /// Where each point is.
+    pub sides: Vec<Side>,
+    /// Points of each tet, so that its face across from a corner, seen from outside, runs the way its neighbour's does
+    /// not: (b−a)×(c−a)·(d−a) > 0, but for slivers, which rounding to f32 may have turned over.
+    pub tets: Vec<[u32; 4]>,
+    /// Body of each tet.
+    pub bodies: Vec<u32>,
+    /// Whether each tet is too flat to say anything of volume: quality below [`SLIVER`].
+    pub slivers: Vec<bool>,
+    /// What was measured.
+    pub measured: Measured,
+}
+
+/// What was measured of a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Smallest angle between two faces of a tet that is no sliver, radians; 0 without tets.
+    pub min_dihedral: f64,
+    /// Median quality of all tets: 3 × inner radius ÷ outer radius, 1 for regular ones; 0 without tets.
+    pub quality_median: f64,
+    /// How much the tets' volume differs from the surface's, as a share of the latter.
+    pub volume_error: f64,
+    /// Faces of the surface that are not faces of tets.
+    pub missing_faces: usize,
+    /// Edges of the surface that are no edge of a tet.
+    pub missing_edges: usize,
+    /// Points of the surface that no tet has.
+    pub bare_points: usize,
+    /// Tets that are slivers.
+    pub slivers: usize,
+}
+
+/// Tets of lower quality are slivers.
+pub const SLIVER: f64 = 0.02;
+
+/// Interior points there may be: some 25 million tets, 2 gigabytes while they are made.
+const MOST_POINTS: f64 = (1 << 22) as f64;
+
+/// Lattice points that may be looked at for it.
+const MOST_TRIED: f64 = (1 << 27) as f64;
+
+impl Closed {
+    /// The surface's inside as tets, Delaunay in its points and, where asked for, points inside.
+    ///
+    /// # Errors
+    /// Where the spacing would make more points than memory is for, or two shells overlap.
+    pub fn fill(&self, fill: &Fill) -> Result<Solid, Fault> {
+        let winding = Winding::new(&self.places, &self.shells.triangles, &self.shells.shell_of);
+        let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
+        let carved = Carved { closed: self, winding: &winding, inner: &inner };
+        let bodies: Vec<Vec<[u32; 4]>> = carved
+            .members()
+            .into_par_iter()
+            .enumerate()
+            .map(|(body, points)| carved.body(body as u32, &points))
+            .collect::<Result<_, _>>()?;
+        let of = bodies.iter().enumerate().flat_map(|(body, tets)| std::iter::repeat_n(body as u32, tets.len()));
+        Ok(self.solid(&inner, bodies.concat(), of.collect()))
+    }
+
+    /// The spacing in steps of the lattice.
+    fn spacing(&self, asked: f64) -> Result<f64, Fault> {
+        let spacing = if asked > 0.0 { asked } else { self.mean_edge() };
+        let side = SIDE_BY_EDGE * spacing;
+        let cubes = |volume: f64| POINTS_A_CUBE * volume / (side * side * side);
+        let extent = |k: usize| {
+            let (low, high) = self.places.iter().fold((i32::MAX, 0), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+            f64::from(high - low.min(high)) * self.lattice.step()
+        };
+        let (points, tried) = (cubes(self.volume()), cubes(extent(0) * extent(1) * extent(2)));
+        match points > MOST_POINTS || tried > MOST_TRIED {
+            true => Err(Fault::TooMany { spacing, points, most: MOST_POINTS }),
+            false => Ok(spacing / self.lattice.step()),
+        }
+    }
+
+    /// The body around a point, given how shells wind around it. `None` outside and in cavities.
+    pub(super) fn body(&self, tally: &Tally) -> Option<u32> {
+        let depth = |shell: &u32| self.shells.all[*shell as usize].depth;
+        let deepest = tally.iter().map(|(shell, _)| *shell).max_by_key(depth)?;
+        (depth(&deepest) % 2 == 0).then(|| self.shells.all[deepest as usize].body)
+    }
+
+    fn solid(&self, inner: &[Inner], tets: Vec<[u32; 4]>, bodies: Vec<u32>) -> Solid {
+        let mut points = self.points.clone();
+        let outward = |shell: &u32| match self.shells.all[*shell as usize].depth % 2 {
+            0 => Side::Outer,
+            _ => Side::Inner,
+        };
+        let mut sides: Vec<Side> = self.shell_of.iter().map(outward).collect();
+        points.extend(inner.iter().map(|inner| self.lattice.point(inner.place.map(f64::from)).map(|x| x as f32)));
+        sides.resize(points.len(), Side::Interior);
+        // In steps, so that no square of a length is too large or too small.
+        let step = self.lattice.step();
+        let steps = |corner: &u32| points[*corner as usize].map(|x| f64::from(x) / step);
+        let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
+        let slivers: Vec<bool> = measures.iter().map(|tet| !(tet.volume > 0.0 && tet.quality >= SLIVER)).collect();
+        let volume = measures.iter().map(|tet| tet.volume).sum::<f64>() * step * step * step;
+        let sharpest = measures.iter().zip(&slivers).filter(|(_, sliver)| !**sliver);
+        let sharpest = sharpest.map(|(tet, _)| tet.sharpest).fold(-1.0, f64::max);
+        let all = self.volume();
+        let mut measured = Measured {
+            min_dihedral: if sharpest > -1.0 { libm::acos(sharpest) } else { 0.0 },
+            quality_median: median(measures.iter().map(|tet| tet.quality).collect()),
+            volume_error: if all > 0.0 { (volume - all).abs() / all } else { 0.0 },
+            slivers: slivers.iter().filter(|sliver| **sliver).count(),
+            ..Measured::default()
+        };
+        self.compare(&tets, &mut measured);
+        Solid { points, sides, tets, bodies, slivers, measured }
+    }
+
+    /// Counts what tets lack of the surface.
+    fn compare(&self, tets: &[[u32; 4]], measured: &mut Measured) {
+        let around = Around::new(self.points.len(), tets);
+        measured.missing_edges = self.edges().par_iter().filter(|edge| !around.has(*edge)).count();
+        measured.bare_points = (0..self.points.len() as u32).filter(|point| around.of(*point).is_empty()).count();
+        let mut first = 0;
+        let runs = self.shells.polygons.chunk_by(|a, b| a == b).map(|run| {
+            first += run.len();
+            first - run.len()..first
+        });
+        let runs: Vec<Range<usize>> = runs.collect();
+        let cut_as_here = |run: &Range<usize>| run.clone().all(|triangle| around.has(&self.shells.triangles[triangle]));
+        // A quad may be cut along either diagonal.
+        let cut_otherwise = |run: &Range<usize>| match *self.face(self.shells.polygons[run.start] as usize) {
+            [a, b, c, d] => {
+                let both = |faces: [[u32; 3]; 2]| faces.iter().all(|face| around.has(face));
+                both([[a, b, c], [c, d, a]]) || both([[b, c, d], [d, a, b]])
+            }
+            _ => false,
+        };
+        measured.missing_faces = runs.par_iter().filter(|run| !cut_as_here(run) && !cut_otherwise(run)).count();
+    }
+}
+
+/// What carving bodies out of their convex hulls needs to know.
+struct Carved<'a> {
+    closed: &'a Closed,
+    winding: &'a Winding<'a>,
+    inner: &'a [Inner],
+}
+
+impl Carved<'_> {
+    /// The points of each body, rising.
+    fn members(&self) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.closed.bodies];
+        let on_surface = self.closed.shell_of.iter().map(|shell| self.closed.shells.all[*shell as usize].body);
+        for (point, body) in on_surface.chain(self.inner.iter().map(|inner| inner.body)).enumerate() {
+            members[body as usize].push(point as u32);
+        }
+        members
+    }
+
+    /// Tets of a body: those of its points alone, so what comes near it has no part in it. Cut out of their hull by
+    /// where the middle of each tet is.
+    fn body(&self, body: u32, points: &[u32]) -> Result<Vec<[u32; 4]>, Fault> {
+        let inner = |point: u32| (point as usize).checked_sub(self.closed.points.len()).map(|k| &self.inner[k]);
+        let place =
+            |point: &u32| inner(*point).map_or_else(|| self.closed.places[*point as usize], |inner| inner.place);
+        let places: Vec<Place> = points.iter().map(place).collect();
+        let mut tets = delaunay(&places).tets;
+        let is_inside = |tally: &mut Tally, tet: &[u32; 4]| {
+            let corners = tet.map(|corner| places[corner as usize].map(i64::from));
+            let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<i64>());
+            // No surface is between an interior point and what is nearer to it than the surface.
+            let near = |(corner, at): (&u32, &[i64; 3])| {
+                inner(points[*corner as usize]).is_some_and(|inner| {
+                    let away = [0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64);
+                    let clear = 4.0 * f64::from(inner.clear) * CLEAR_FOR_SURE;
+                    away[0] * away[0] + away[1] * away[1] + away[2] * away[2] < clear * clear
+                })
+            };
+            if tet.iter().zip(&corners).any(near) {
+                return Ok(true);
+            }
+            self.winding.around(middle, 4, tally);
+            match tally.iter().map(|(_, times)| times).sum() {
+                0 => Ok(false),
+                1 => Ok(self.closed.body(tally) == Some(body)),
+                _ => {
+                    let at = self.closed.lattice.point(middle.map(|x| 0.25 * x as f64));
+                    Err(Fault::Overlap { at: at.map(|x| x as f32) })
+                }
+            }
+        };
+        let inside: Vec<Result<bool, Fault>> = tets.par_iter().map_init(Vec::new, is_inside).collect();
+        let inside: Vec<bool> = inside.into_iter().collect::<Result<_, _>>()?;
+        let mut next = inside.iter();
+        tets.retain(|_| *next.next().expect("one answer a tet"));
+        tets.iter_mut().for_each(|tet| *tet = tet.map(|corner| points[corner as usize]));
+        Ok(tets)
+    }
+}
+
+/// A clearance is rounded to f32: this share of it is sure.
+const CLEAR_FOR_SURE: f64 = 0.999;
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}

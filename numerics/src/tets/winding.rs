@@ -1,0 +1,118 @@
+//! How often shells wind around a point: once around what is inside.
+//!
+//! Promise: exact for closed shells on the lattice and for points at fractions of it; a point on a shell is counted as
+//! one beside it. Along the ray from the point towards +z, each triangle passed counts one, up or down as it looks. All
+//! sums are of whole numbers; a ray through an edge passes one of its two triangles, as if it stood a little to the +x
+//! and still less to the +y.
+
+use super::lattice::{Place, SIDE};
+
+/// Triangles by the squares in x and y that they cover.
+pub(super) struct Winding<'a> {
+    places: &'a [Place],
+    triangles: &'a [[u32; 3]],
+    /// Shell of each triangle.
+    shells: &'a [u32],
+    /// A square is 2^shift wide.
+    shift: u32,
+    /// First entry in `members` of each square, row by row, and their number at the end.
+    starts: Vec<u32>,
+    members: Vec<u32>,
+}
+
+/// The shells that wind around a point, and how often.
+pub(super) type Tally = Vec<(u32, i32)>;
+
+/// Squares may hold this many entries a triangle in all.
+const MOST_ENTRIES: usize = 8;
+
+impl<'a> Winding<'a> {
+    pub(super) fn new(places: &'a [Place], triangles: &'a [[u32; 3]], shells: &'a [u32]) -> Self {
+        // About a square a triangle, wider where triangles are many squares wide.
+        let mut bits = (usize::BITS - triangles.len().leading_zeros()) / 2;
+        let mut new = Self { places, triangles, shells, shift: 0, starts: Vec::new(), members: Vec::new() };
+        loop {
+            new.shift = SIDE.trailing_zeros() - bits;
+            let entries: usize = triangles.iter().map(|triangle| new.squares(*triangle).count()).sum();
+            if entries <= MOST_ENTRIES * triangles.len() || bits == 0 {
+                break;
+            }
+            bits -= 1;
+        }
+        let mut starts = vec![0_u32; new.across() * new.across() + 1];
+        for triangle in triangles {
+            new.squares(*triangle).for_each(|square| starts[square + 1] += 1);
+        }
+        (1..starts.len()).for_each(|square| starts[square] += starts[square - 1]);
+        let mut next = starts.clone();
+        new.members = vec![0; starts[starts.len() - 1] as usize];
+        for (index, triangle) in triangles.iter().enumerate() {
+            for square in new.squares(*triangle) {
+                new.members[next[square] as usize] = index as u32;
+                next[square] += 1;
+            }
+        }
+        new.starts = starts;
+        new
+    }
+
+    /// Squares in a row.
+    fn across(&self) -> usize {
+        (SIDE >> self.shift) as usize + 1
+    }
+
+    /// The squares of a triangle's bounds; none of one that is upright, which no ray towards z passes.
+    fn squares(&self, triangle: [u32; 3]) -> impl Iterator<Item = usize> + use<> {
+        let [a, b, c] = triangle.map(|corner| self.places[corner as usize].map(i64::from));
+        let upright = (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
+        let low = |axis: usize| (a[axis].min(b[axis]).min(c[axis]) >> self.shift) as usize;
+        let high = |axis: usize| (a[axis].max(b[axis]).max(c[axis]) >> self.shift) as usize;
+        let (columns, rows) = (low(0)..high(0) + 1, if upright { 0..0 } else { low(1)..high(1) + 1 });
+        let across = self.across();
+        rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
+    }
+
+    /// How often each shell winds around the point `sum` ÷ `parts`, a sum of up to 4 places.
+    pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut Tally) {
+        tally.clear();
+        let square = |axis: usize| ((sum[axis] / parts) >> self.shift) as usize;
+        let square = square(1) * self.across() + square(0);
+        for member in &self.members[self.starts[square] as usize..self.starts[square + 1] as usize] {
+            let corners = self.triangles[*member as usize].map(|corner| self.places[corner as usize]);
+            let passed = passed(corners, sum, parts);
+            if passed != 0 {
+                let shell = self.shells[*member as usize];
+                match tally.iter_mut().find(|(other, _)| *other == shell) {
+                    Some((_, count)) => *count += passed,
+                    None => tally.push((shell, passed)),
+                }
+            }
+        }
+        tally.retain(|(_, count)| *count != 0);
+    }
+}
+
+/// 1 where the ray from `sum` ÷ `parts` towards +z passes the triangle from behind, −1 from before, 0 past it.
+fn passed(corners: [Place; 3], sum: [i64; 3], parts: i64) -> i32 {
+    // From each corner to the point, times `parts`.
+    let to = corners.map(|corner| [0, 1, 2].map(|axis| sum[axis] - parts * i64::from(corner[axis])));
+    let mut turn = 0;
+    for k in 0..3 {
+        let (from, next) = (to[k], to[(k + 1) % 3]);
+        // Both ends are up to the point's height or above it: the side does not cross that height.
+        if (from[1] >= 0) == (next[1] >= 0) {
+            continue;
+        }
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let left = i64::from(b[0] - a[0]) * from[1] - i64::from(b[1] - a[1]) * from[0];
+        turn += if from[1] >= 0 { i32::from(left > 0) } else { -i32::from(left < 0) };
+    }
+    if turn == 0 {
+        return 0;
+    }
+    let [a, b, c] = corners.map(|corner| corner.map(i64::from));
+    let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+    let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let before: i128 = (0..3).map(|k| i128::from(normal[k]) * i128::from(to[0][k])).sum();
+    if i128::from(turn) * before < 0 { turn } else { 0 }
+}
