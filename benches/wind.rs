@@ -118,7 +118,7 @@ fn work_and_precision(engine: &Engine) {
     for steps in [4, 16, 64, 256, 1024, 4096] {
         let (tips, time) = run(&format!(r#""gap": 1e-9, "method": "steps", "rotation_steps": {steps}"#));
         let found = error(&tips);
-        let slope = before.map_or(String::new(), |before| format!("slope {:.2}", (found / before).log2() / 2.0));
+        let slope = before.map_or(String::new(), |before| format!("slope {:.2}", libm::log2(found / before) / 2.0));
         println!("{steps:<5} steps  {found:>10.2e} {time:>9.2}  {:>7.1} × exact  {slope}", time / exact);
         before = Some(found);
     }
