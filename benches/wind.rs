@@ -162,8 +162,8 @@ fn graph(chain: Chain, fur: Fur, last: i64) -> Graph {
     if chain.shielding.is_some() {
         add("Curve_Wind_Shielding", r#", "colliders": ["skin"]"#, &format!(r#""wind_dir": {wind}"#));
     }
-    add("Curve_Wind_Gusts", "", &format!(r#""wind_dir": {wind}, "num_gusts": 20, "base": 0.2"#));
-    add("Curve_Wind", "", &format!(r#""wind_dir": {wind}, "global_rotate": 0.5"#));
+    add("Curve_Wind_Gusts", "", &format!(r#""wind_dir": {wind}, "num_gusts": 20, "base": 0.5"#));
+    add("Curve_Wind", "", &format!(r#""wind_dir": {wind}, "global_rotate": 0.8"#));
     add("Curve_Jiggle", "", r#""frequency": 4, "damping": 0.3"#);
     if let Some(params) = chain.collision {
         add("Curve_Wind_Collision", r#", "rest": "fur", "colliders": ["skin"]"#, params);

@@ -25,17 +25,28 @@ pub struct Args {
     #[arg(long)]
     preview: bool,
     /// Draw these frames instead, a PNG each: DIR/preview.0024.png
-    #[arg(long, value_name = "FRAMES", requires = "preview", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     preview_frames: Option<Frames>,
-    /// Width and height of a panel in pixels
-    #[arg(long, value_name = "WxH", requires = "preview", default_value = "640x480")]
-    preview_size: String,
+    /// Width and height of a panel in pixels [default: 640x480]
+    #[arg(long, value_name = "WxH")]
+    preview_size: Option<String>,
     /// Where to look from: eye=1,2,3 target=0,0,0 fov=35; framed automatically by default
-    #[arg(long, value_name = "CAMERA", requires = "preview")]
+    #[arg(long, value_name = "CAMERA")]
     camera: Option<String>,
     /// Attribute drawn as colour
-    #[arg(long, value_name = "ATTRIBUTE", requires = "preview")]
+    #[arg(long, value_name = "ATTRIBUTE")]
     color_by: Option<String>,
+}
+
+impl Args {
+    /// Each of them does, so that none is given in vain.
+    fn asks_for_pictures(&self) -> bool {
+        self.preview
+            || self.preview_frames.is_some()
+            || self.preview_size.is_some()
+            || self.camera.is_some()
+            || self.color_by.is_some()
+    }
 }
 
 /// Frames of a contact sheet.
@@ -60,12 +71,13 @@ impl Pictures {
     /// # Errors
     /// Where size or camera make no sense, or a frame is asked that is not cooked.
     pub fn new(args: &Args, graph: &Graph, request: &Request, folder: &Path) -> Result<Option<Self>, Failure> {
-        if !args.preview {
+        if !args.asks_for_pictures() {
             return Ok(None);
         }
         let wrong = |text: String| Failure::new(Exit::CommandLine, text);
-        let (width, height) = size(&args.preview_size)
-            .ok_or_else(|| wrong(format!("`{}` is not a size in pixels; write 640x480", args.preview_size)))?;
+        let asked = args.preview_size.as_deref().unwrap_or("640x480");
+        let (width, height) =
+            size(asked).ok_or_else(|| wrong(format!("`{asked}` is not a size in pixels; write 640x480")))?;
         let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let frames = match &args.preview_frames {

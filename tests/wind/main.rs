@@ -5,5 +5,6 @@
 
 mod coherence;
 mod cooked;
+mod pictures;
 mod shelter;
 mod storm;

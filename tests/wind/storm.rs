@@ -17,13 +17,13 @@ fn vector(p: [f32; 3]) -> Vector {
     Vector::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
-fn skin(mesh: &Component) -> TriMesh {
+pub(crate) fn skin(mesh: &Component) -> TriMesh {
     let points = mesh.positions().iter().map(|p| vector(*p)).collect();
     TriMesh::with_flags(points, mesh.triangles().corners.clone(), TriMeshFlags::ORIENTED).unwrap()
 }
 
 /// Segments of a groom that pass through the skin.
-fn crossings(curves: &Component, skin: &TriMesh) -> usize {
+pub(crate) fn crossings(curves: &Component, skin: &TriMesh) -> usize {
     let mut count = 0;
     for cvs in curves.runs().ranges() {
         for ends in curves.positions()[cvs].windows(2) {
