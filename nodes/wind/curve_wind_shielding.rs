@@ -13,8 +13,14 @@
 //!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5 and
 //!   0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 % (tests/shielding.rs).
 
+use std::sync::Arc;
+
+use engine::geometry::Triangles;
 use engine::prelude::*;
-use numerics::shield::{Collider, Shield, shield};
+use numerics::shield::{Collider, Neighbours, Shield, shield};
+use numerics::tree::TriangleTree;
+
+use crate::shared::surface::tree;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves,
@@ -94,19 +100,38 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 
 /// The share of each curve's CVs that the meshes shelter.
 fn sheltered(cx: &Cx, curves: &Component, meshes: &[&Component]) -> Vec<f32> {
-    let triangles: Vec<_> = meshes.iter().map(|mesh| mesh.triangles()).collect();
-    let colliders: Vec<Collider> = meshes
-        .iter()
-        .zip(&triangles)
-        .map(|(mesh, triangles)| Collider { points: mesh.positions(), triangles: &triangles.corners })
-        .collect();
+    let smooth = cx.get(SMOOTH);
+    let walls: Vec<Wall> = meshes.iter().map(|mesh| Wall::of(mesh, smooth > 0.0)).collect();
+    let colliders: Vec<Collider> = walls.iter().map(Wall::collider).collect();
     let how = Shield {
         wind: cx.get(WIND_DIR),
         offset: cx.get(OFFSET),
-        cone: WIDEST_CONE * cx.get(SMOOTH),
+        cone: WIDEST_CONE * smooth,
         skin_gap: cx.get(SKIN_GAP),
     };
     shield(curves.runs().starts(), curves.positions(), &colliders, &how)
+}
+
+/// A collider, and what is known of it while it stands still.
+struct Wall<'m> {
+    points: &'m [[f32; 3]],
+    triangles: Arc<Triangles>,
+    tree: Arc<TriangleTree>,
+    neighbours: Option<Arc<Neighbours>>,
+}
+
+impl<'m> Wall<'m> {
+    fn of(mesh: &'m Component, with_neighbours: bool) -> Self {
+        let triangles = mesh.triangles();
+        let neighbours = || mesh.derived(|mesh| Neighbours::of(mesh.positions(), &triangles.corners));
+        let neighbours = with_neighbours.then(neighbours);
+        Self { points: mesh.positions(), tree: tree(mesh), neighbours, triangles }
+    }
+
+    fn collider(&self) -> Collider<'_> {
+        let (tree, neighbours) = (Some(&*self.tree), self.neighbours.as_deref());
+        Collider { points: self.points, triangles: &self.triangles.corners, tree, neighbours }
+    }
 }
 
 /// The envelope with each curve's shelter taken off; 1 where there was none.

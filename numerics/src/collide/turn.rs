@@ -283,19 +283,19 @@ impl Sector {
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
             let (u, v) = (self.u[axis], self.v[axis]);
-            let mut reached = [0.0_f64.min(u).min(end[axis]), 0.0_f64.max(u).max(end[axis])];
-            // The farthest point of the whole circle along this axis lies at (u, v)/|(u, v)|, and one opposite.
-            let farthest = (u * u + v * v).sqrt();
-            for (k, sign) in [(1, 1.0), (0, -1.0)] {
-                let (x, y) = (sign * u, sign * v);
-                // Inside the sector: turned forwards from u, and not farther than the end.
-                if y >= 0.0 && x * sine - y * cosine >= 0.0 {
-                    reached[k] = sign * farthest;
-                }
+            let (mut least, mut most) = (0.0_f64.min(u).min(end[axis]), 0.0_f64.max(u).max(end[axis]));
+            // The farthest points of the whole circle along this axis lie at ±(u, v)/|(u, v)|; one counts where the
+            // sector turns past it: forwards from u, and not farther than the end.
+            let past = u * sine - v * cosine;
+            if v >= 0.0 && past >= 0.0 {
+                most = (u * u + v * v).sqrt();
+            }
+            if v <= 0.0 && past <= 0.0 {
+                least = -(u * u + v * v).sqrt();
             }
             let slack = self.half + self.back + 1e-6 * (self.reach + self.pivot[axis].abs());
-            low[axis] = (self.pivot[axis] + reached[0] * self.reach - slack) as f32;
-            high[axis] = (self.pivot[axis] + reached[1] * self.reach + slack) as f32;
+            low[axis] = (self.pivot[axis] + least * self.reach - slack) as f32;
+            high[axis] = (self.pivot[axis] + most * self.reach + slack) as f32;
         }
         (low, high)
     }

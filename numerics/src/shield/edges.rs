@@ -21,11 +21,24 @@ struct Side {
     side: u8,
 }
 
-impl Edges {
+/// For each side of each triangle the point that its neighbour adds, or the side's own first.
+#[derive(Clone, Debug)]
+pub struct Neighbours(Vec<[u32; 3]>);
+
+impl Neighbours {
     /// Two triangles are neighbours where they run along two points in opposite ways, as faces that are
-    /// wound alike do; where more than two meet, they are paired in order and the rest stay alone.
-    pub(super) fn of(tree: &TriangleTree, points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let thirds = thirds(points, triangles);
+    /// wound alike do; where more than two meet, they are paired in order and the rest stay alone. Of the points it
+    /// matters which are finite alone.
+    ///
+    /// # Panics
+    /// Where an index is out of range.
+    pub fn of(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        Self(thirds(points, triangles))
+    }
+}
+
+impl Edges {
+    pub(super) fn of(tree: &TriangleTree, points: &[Vec3], Neighbours(thirds): &Neighbours) -> Self {
         let of_block = |block: &crate::tree::Block| {
             let mut third = block.corners;
             for (lane, triangle) in block.triangle.iter().enumerate().filter(|(_, triangle)| **triangle != NONE) {
@@ -44,7 +57,6 @@ impl Edges {
     }
 }
 
-/// For each side of each triangle the point that its neighbour adds, or the side's own first.
 fn thirds(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let finite = |point: u32| points[point as usize].iter().all(|x| x.is_finite());
     let has_sides = |[a, b, c]: [u32; 3]| a != b && b != c && c != a && finite(a) && finite(b) && finite(c);

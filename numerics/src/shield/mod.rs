@@ -25,6 +25,7 @@ use crate::simd::Path;
 use crate::tree::{Block, TriangleTree};
 use crate::vec3::{self, Vec3};
 use edges::Edges;
+pub use edges::Neighbours;
 use frame::Frame;
 use rayon::prelude::*;
 use views::Views;
@@ -36,6 +37,17 @@ pub struct Collider<'a> {
     pub points: &'a [Vec3],
     /// Three indices of `points` each; which way round does not matter for rays.
     pub triangles: &'a [[u32; 3]],
+    /// A tree over them, where there is one: saves building another.
+    pub tree: Option<&'a TriangleTree>,
+    /// What [`Neighbours::of`] gives for them, where it is known: saves cones looking for them.
+    pub neighbours: Option<&'a Neighbours>,
+}
+
+impl<'a> Collider<'a> {
+    /// One of which nothing else is known.
+    pub fn of(points: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Self {
+        Self { points, triangles, tree: None, neighbours: None }
+    }
 }
 
 /// How the wind is stopped.
@@ -149,7 +161,10 @@ impl Obstacle {
     /// A collider turned into the frame.
     fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
         let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
-        let tree = TriangleTree::build(&points, collider.triangles);
+        let tree = match collider.tree {
+            Some(tree) => tree.moved(&points),
+            None => TriangleTree::build(&points, collider.triangles),
+        };
         let area = |block: &Block| {
             let [a, b, c] = &block.corners;
             F32x16::from_fn(|lane| {
@@ -160,7 +175,10 @@ impl Obstacle {
         let areas = tree.blocks().par_iter().with_min_len(TASK_GROUPS).map(area).collect();
         let (low, high) = tree.bounds();
         let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
-        let edges = with_edges.then(|| Edges::of(&tree, &points, collider.triangles));
+        let edges = with_edges.then(|| match collider.neighbours {
+            Some(neighbours) => Edges::of(&tree, &points, neighbours),
+            None => Edges::of(&tree, &points, &Neighbours::of(&points, collider.triangles)),
+        });
         Self { tree, areas, edges, size }
     }
 }

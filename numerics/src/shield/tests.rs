@@ -17,7 +17,7 @@ const STILL: Shield = Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, cone: 0.0, s
 
 /// The share of each point on its own.
 fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
-    shield(&lone(points), points, &[Collider { points: &mesh.0, triangles: &mesh.1 }], how)
+    shield(&lone(points), points, &[Collider::of(&mesh.0, &mesh.1)], how)
 }
 
 /// A wall across x at `x`, two units high and wide.
@@ -29,7 +29,7 @@ fn wall(x: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 fn half_a_curve_behind_a_wall_is_half_sheltered() {
     let points = [[0.5, 0.0, 0.0], [0.5, 0.9, 0.0], [0.5, 1.1, 0.0], [0.5, 3.0, 0.0], [-0.5, 0.0, 0.0]];
     let (wall, triangles) = wall(0.0);
-    let colliders = [Collider { points: &wall, triangles: &triangles }];
+    let colliders = [Collider::of(&wall, &triangles)];
     assert_eq!(shield(&[0, 4, 5], &points, &colliders, &STILL), [0.5, 0.0]);
     assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.49, ..STILL }), [0.0, 0.0]);
     assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { wind: [-3.0, 0.0, 0.0], ..STILL }), [0.0, 1.0]);
@@ -42,7 +42,7 @@ fn two_walls_shelter_what_either_shelters() {
     let (low, triangles) = wall(0.0);
     let high: Vec<Vec3> = low.iter().map(|[x, y, z]| [x - 1.0, y + 2.5, *z]).collect();
     let points = [[0.5, 0.0, 0.0], [0.5, 2.0, 0.0], [0.5, 1.2, 0.0]];
-    let colliders = [&low, &high].map(|points| Collider { points, triangles: &triangles });
+    let colliders = [&low, &high].map(|points| Collider::of(points, &triangles));
     assert_eq!(shield(&lone(&points), &points, &colliders, &STILL), [1.0, 1.0, 0.0]);
 }
 
@@ -119,9 +119,9 @@ fn turning_the_wind_round_mirrors_the_shelter() {
     let mirrored: Vec<Vec3> = curves.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
     let mirror: Vec<Vec3> = points.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
     let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
-    let one = shield(&starts, &curves, &[Collider { points: &points, triangles: &triangles }], &STILL);
+    let one = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &STILL);
     let back = Shield { wind: [-1.0, 0.0, 0.0], ..STILL };
-    let other = shield(&starts, &mirrored, &[Collider { points: &mirror, triangles: &triangles }], &back);
+    let other = shield(&starts, &mirrored, &[Collider::of(&mirror, &triangles)], &back);
     assert_eq!(one, other);
     assert!(one.iter().any(|share| *share > 0.3 && *share < 0.9));
 }
@@ -166,13 +166,13 @@ fn shelter_is_the_same_at_any_scale_and_far_from_the_origin() {
     let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
     for cone in [0.0, 0.1] {
         let how = Shield { wind: [0.5, 0.4, 0.8], offset: 8.0, cone, skin_gap: 0.0 };
-        let expected = shield(&starts, &curves, &[Collider { points: &points, triangles: &triangles }], &how);
+        let expected = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
         for power in [-40, -10, 20, 100] {
             let scale = libm::scalbnf(1.0, power);
             let [points, curves] =
                 [&points, &curves].map(|all| -> Vec<Vec3> { all.iter().map(|p| p.map(|x| x * scale)).collect() });
             let how = Shield { offset: how.offset * scale, ..how };
-            let found = shield(&starts, &curves, &[Collider { points: &points, triangles: &triangles }], &how);
+            let found = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
             assert_eq!(found, expected, "{scale}");
         }
     }
@@ -187,14 +187,14 @@ fn any_input_gives_a_share() {
         for offset in [1e-45, 10.0, f32::MAX] {
             let how = Shield { offset, cone, ..STILL };
             for mesh in [wall.clone(), vec![[0.0; 3]; 4], vec![[f32::NAN; 3]; 4], vec![[3e38, -3e38, 3e38]; 4]] {
-                let colliders = [Collider { points: &mesh, triangles: &triangles }];
+                let colliders = [Collider::of(&mesh, &triangles)];
                 let found = shield(&[0, 3, 3, 5], &points, &colliders, &how);
                 assert!(found.len() == 3 && found.iter().all(|share| (0.0..=1.0).contains(share)), "{found:?}");
             }
         }
     }
     wall.clear();
-    let nothing = [Collider { points: &wall, triangles: &[] }];
+    let nothing = [Collider::of(&wall, &[])];
     assert_eq!(shield(&[0, 1], &points[4..], &nothing, &STILL), [0.0]);
     assert!(shield(&[], &[], &nothing, &STILL).is_empty());
     assert!(shield(&[0], &[], &nothing, &STILL).is_empty());
@@ -206,7 +206,7 @@ fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
     let curves: Vec<Vec3> =
         (0..3000u64).map(|i| [0, 1, 2].map(|axis| Key::new(6).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
     let starts: Vec<u32> = (0..=600).map(|curve| 5 * curve).collect();
-    let colliders = [Collider { points: &points, triangles: &triangles }];
+    let colliders = [Collider::of(&points, &triangles)];
     for cone in [0.0, 0.07] {
         let how = Shield { wind: [0.5, 0.4, 0.8], cone, ..STILL };
         let expected = shield_on(Path::BASELINE, &starts, &curves, &colliders, &how);

@@ -82,6 +82,17 @@ impl TriangleTree {
         tree
     }
 
+    /// A tree over the same triangles, in the same order, where `points` are now.
+    ///
+    /// # Panics
+    /// As [`TriangleTree::refit`].
+    #[must_use]
+    pub fn moved(&self, points: &[Vec3]) -> Self {
+        let mut tree = Self { members: self.members.clone(), ..Self::default() };
+        tree.refit(points);
+        tree
+    }
+
     /// Moves the triangles to where `points` are now; their order in the tree stays as it was built.
     ///
     /// # Panics
