@@ -5,6 +5,7 @@ pub mod curve_attach;
 pub mod curve_in;
 pub mod curve_interpolate;
 pub mod curve_scatter;
+pub mod lattice_deform;
 pub mod merge;
 pub mod mesh_in;
 pub mod mesh_primitive;
@@ -22,6 +23,7 @@ pub static NODES: &[&Node] = &[
     &curve_in::NODE,
     &curve_interpolate::NODE,
     &curve_scatter::NODE,
+    &lattice_deform::NODE,
     &merge::NODE,
     &mesh_in::NODE,
     &mesh_primitive::NODE,

@@ -1,8 +1,11 @@
 //! The softbody family: dough and eggs (paper R).
 
+mod shared;
+pub mod softbody_goal;
+pub mod softbody_pin;
 pub mod tetrahedralize;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&tetrahedralize::NODE];
+pub static NODES: &[&Node] = &[&softbody_goal::NODE, &softbody_pin::NODE, &tetrahedralize::NODE];

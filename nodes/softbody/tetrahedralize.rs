@@ -16,6 +16,8 @@
 use engine::prelude::*;
 use numerics::tets::{Closed, Fault, Fill, Side, Solid, Surface};
 
+use crate::shared::attributes::SURFACE_POINT;
+
 choice! {
     /// What is done about a surface that is not in order.
     pub enum Repair {
@@ -47,8 +49,6 @@ const TETS: Output = Output::new(
     "The tets, and the repaired surface. The first points of the tets are the surface's, in its order.",
 );
 
-/// The surface's point that each point is; −1 inside.
-const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
 /// 0 inside, 1 on the outside of a body, 2 on the wall of a cavity.
 const SIDE: Attr<i32> = Attr::point("side");
 /// Which body a tet is part of, from 0 in the order of their first faces.

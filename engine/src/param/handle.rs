@@ -367,6 +367,13 @@ impl Param<Arc<Ramp>> {
     }
 }
 
+impl Param<Arc<Vec<[f32; 3]>>> {
+    /// A list of vectors, empty by default. Keys of equally long lists run from one to the next.
+    pub const fn vec3s(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help)
+    }
+}
+
 impl<T: Choice> Param<T> {
     /// One of a few words.
     pub const fn choice(name: &'static str, default: T, help: &'static str) -> Self {

@@ -1,0 +1,151 @@
+use super::*;
+use engine::testing::{Bench, bench, conformance};
+use numerics::shapes::{self, Polygons};
+use numerics::tets::{Closed, Fill, Surface};
+
+type Map = fn([f64; 3]) -> [f64; 3];
+
+fn mesh(shape: &Polygons) -> Component {
+    let points = shape.points.iter().map(|p| p.map(|x| x as f32)).collect();
+    Component::mesh(shape.counts.clone(), shape.corners.clone(), points).unwrap()
+}
+
+fn ball() -> Component {
+    mesh(&shapes::sphere([1.0; 3], 5))
+}
+
+/// The ball filled: tets, and the surface along.
+fn body() -> Geometry {
+    let ball = ball();
+    let faces = ball.faces().unwrap();
+    let surface = Surface { starts: faces.runs.starts(), corners: &faces.corners, points: ball.positions() };
+    let solid = Closed::of(&surface, false).unwrap().fill(&Fill { spacing: 0.0, interior: true }).unwrap();
+    let skin = ball.point_count() as i32;
+    let mut tets = Component::tets(solid.tets, solid.points).unwrap();
+    let rows = (0..tets.point_count() as i32).map(|k| if k < skin { k } else { -1 }).collect();
+    tets.set(SURFACE_POINT, rows).unwrap();
+    Geometry::from(tets).with(ball)
+}
+
+fn moved(mut part: Component, map: Map) -> Component {
+    part.edit(P).unwrap().iter_mut().for_each(|p| *p = map(p.map(f64::from)).map(|x| x as f32));
+    part
+}
+
+fn making(body: impl Into<Geometry>, shape: Component) -> Bench {
+    bench(&NODE).input(BODY, body).input(SHAPE, shape)
+}
+
+/// The samples' bodies name the rows 0 to 3 of their surface at random: a shape of four points fits.
+fn four_points(given: Geometry) -> Geometry {
+    let points = given.mesh().unwrap().positions();
+    if points.len() < 4 {
+        return given;
+    }
+    Component::mesh(vec![3; 4], vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3], points[..4].to_vec()).unwrap().into()
+}
+
+#[test]
+fn it_conforms() {
+    conformance(&NODE).with(|bench| bench.changed(SHAPE, four_points)).with(|bench| bench).run();
+}
+
+#[test]
+fn the_inside_goes_along_with_an_affine_shape() {
+    let map: Map = |[x, y, z]| [1.0 + 0.5 * x - y, 0.25 * z + 2.0 * y, 0.75 * z + 0.125 * x];
+    let out = making(body(), moved(ball(), map)).set(FRAME, 24.0).set(STRENGTH, 50.0).set(HOLD, 3.0).cook();
+    let goal = out.part(Kind::Tets);
+    for (rest, point) in body().tets().unwrap().positions().iter().zip(goal.positions()) {
+        let at = map(rest.map(f64::from));
+        assert!((0..3).all(|k| (f64::from(point[k]) - at[k]).abs() < 1e-6), "{rest:?}");
+    }
+    let once = |attribute| goal.get::<f32>(attribute).unwrap()[0];
+    assert_eq!((once(GOAL_FRAME), once(GOAL_STRENGTH), once(GOAL_HOLD)), (24.0, 50.0, 3.0));
+    // The determinant of [[1/2, −1, 0], [0, 2, 1/4], [1/8, 0, 3/4]] is 3/4 − 1/32.
+    assert!((out.metrics["volume_ratio"] - 0.71875).abs() < 1e-6);
+    assert_eq!((out.metrics["inverted_tets"], out.metrics["loose_points"]), (0.0, 0.0));
+}
+
+#[test]
+fn the_surface_is_where_the_shape_is_to_the_bit() {
+    let shape = moved(ball(), |[x, y, z]| [x + 0.3 * y * y, 0.6 * y, z - 0.4 * x * y]);
+    let out = making(body(), shape.clone()).cook();
+    assert_eq!(out.part(Kind::Tets).positions()[..shape.point_count()], *shape.positions());
+    assert!(out.metrics["residual"] <= 1.1e-10 && out.metrics["cg"] > 0.0, "{:?}", out.metrics);
+}
+
+#[test]
+fn the_shape_at_rest_keeps_every_bit_and_all_else_is_shared() {
+    let body = body();
+    let out = making(body.clone(), ball()).cook();
+    let (goal, rest) = (out.part(Kind::Tets), body.tets().unwrap());
+    assert_eq!(goal.positions(), rest.positions());
+    assert!(goal.topology().same(rest.topology()));
+    let rows = |part: &Component| part.table(Owner::Point).column("surface_point").unwrap().address();
+    assert_eq!(rows(goal), rows(rest));
+    assert!(out.geometry.mesh().is_none(), "a goal is tets alone");
+}
+
+#[test]
+fn a_shape_that_crosses_itself_is_told() {
+    let out = making(body(), moved(ball(), |[x, y, z]| [x, if y > 0.0 { -2.0 * y } else { y }, z])).cook();
+    assert!(out.metrics["inverted_tets"] > 50.0, "{:?}", out.metrics);
+}
+
+#[test]
+fn a_shape_of_another_surface_is_refused_with_both() {
+    let refused = |body: Geometry, shape: Component| making(body, shape).try_cook().unwrap_err().fact;
+    let other = mesh(&shapes::sphere([1.0; 3], 4));
+    let own = format!("{} faces and {} points", ball().element_count(), ball().point_count());
+    let (faces, points) = (other.element_count(), other.point_count());
+    let fact = format!(
+        "`shape` has {faces} faces and {points} points, the surface of `body` {own}, or they are joined otherwise"
+    );
+    assert_eq!(refused(body(), other.clone()), fact);
+    let mut alone = body();
+    alone.remove(Kind::Mesh);
+    let fact = format!("`shape` has {points} points, the surface of `body` {}", ball().point_count());
+    assert_eq!(refused(alone.clone(), other), fact);
+    assert!(making(alone, ball()).try_cook().is_ok());
+
+    let mut flipped = ball();
+    let mut corners = flipped.faces().unwrap().corners.clone();
+    corners.swap(0, 1);
+    flipped = Component::mesh(flipped.faces().unwrap().runs.counts().collect(), corners, flipped.positions().to_vec())
+        .unwrap();
+    assert_eq!(
+        refused(body(), flipped),
+        format!("`shape` has {own}, the surface of `body` {own}, or they are joined otherwise")
+    );
+}
+
+#[test]
+fn a_body_that_does_not_know_its_surface_is_refused() {
+    let with = |change: fn(&mut Component)| {
+        let mut body = body();
+        change(body.part_mut(Kind::Tets).unwrap());
+        making(body, ball()).try_cook().unwrap_err().fact
+    };
+    let missing = with(|tets| drop(tets.remove(Owner::Point, "surface_point")));
+    assert_eq!(missing, "`body` needs `surface_point`, which it does not have");
+    let numbers = with(|tets| {
+        let column = Column::new(vec![0.0_f32; tets.point_count()]);
+        tets.set_column(Owner::Point, "surface_point", column).unwrap();
+    });
+    assert_eq!(numbers, "`body` needs `surface_point`, which is one float for each point");
+    let none = with(|tets| tets.edit(SURFACE_POINT).unwrap().fill(-1));
+    assert_eq!(none, "`surface_point` of `body` is below 0 everywhere: it has no surface");
+    let far = with(|tets| tets.edit(SURFACE_POINT).unwrap()[0] = 7000);
+    assert!(far.starts_with("`surface_point` of `body` goes up to 7000, and its surface has "));
+}
+
+#[test]
+fn a_keyed_strength_changes_the_strength_alone() {
+    let shape = moved(ball(), |[x, y, z]| [x + 0.3 * y * y, y, z]);
+    let keyed = making(body(), shape).keyed(STRENGTH, &[(1.0, 10.0), (5.0, 30.0)]);
+    let frames = keyed.frames([1, 3]);
+    let strength = |k: usize| frames[k].part(Kind::Tets).get(GOAL_STRENGTH).unwrap()[0];
+    assert_eq!((strength(0), strength(1)), (10.0, 20.0));
+    assert_eq!(frames[0].part(Kind::Tets).positions(), frames[1].part(Kind::Tets).positions());
+    assert_eq!(frames[0].metrics["cg"], frames[1].metrics["cg"]);
+}

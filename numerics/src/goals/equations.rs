@@ -1,0 +1,179 @@
+//! The forces between points of a body: linear finite elements on its tets, one row a free point.
+//!
+//! Corner k of a tet of volume V lies across from a face whose outward normal nₖ is twice its area long, and its hat has
+//! the gradient −nₖ ÷ 6V. So corners k and l are joined by the weight −nₖ·nₗ ÷ 36 V, and the weights on a tet are the
+//! products of one vector a corner: their matrix has no negative eigenvalue, whatever the volume is taken to be.
+
+use super::FLAT;
+use rayon::prelude::*;
+
+type Vec3 = [f64; 3];
+
+/// Rows that a thread takes at a time.
+pub(super) const CHUNK: usize = 1024;
+
+/// Symmetric, none of its eigenvalues negative.
+pub(super) struct Equations {
+    /// The row of each point that is free.
+    pub(super) free: Vec<Option<u32>>,
+    /// First entry of each row, and the number of entries.
+    starts: Vec<u32>,
+    /// Row at the other end, and its weight.
+    entries: Vec<(u32, f64)>,
+    pub(super) diagonal: Vec<f64>,
+    /// What held points exert on each row.
+    pub(super) forces: Vec<Vec3>,
+}
+
+impl Equations {
+    /// Of points that are moved by `held_by` or free.
+    pub(super) fn of(points: &[[f32; 3]], tets: &[[u32; 4]], held_by: &[Option<Vec3>]) -> Self {
+        let mut rows = 0_u32;
+        let number = |held: &Option<Vec3>| {
+            held.is_none().then(|| {
+                rows += 1;
+                rows - 1
+            })
+        };
+        let free: Vec<Option<u32>> = held_by.iter().map(number).collect();
+        let edges = edges(points, tets, &free);
+        let rows = rows as usize;
+        let mut starts = vec![0_u32; rows + 1];
+        let ends = |[a, b]: [u32; 2]| [(a, b), (b, a)].map(|(from, to)| (free[from as usize], to));
+        for (edge, _) in &edges {
+            if let [(Some(a), _), (Some(b), _)] = ends(*edge) {
+                starts[a as usize + 1] += 1;
+                starts[b as usize + 1] += 1;
+            }
+        }
+        (0..rows).for_each(|row| starts[row + 1] += starts[row]);
+        let mut next = starts.clone();
+        let mut entries = vec![(0, 0.0); starts[rows] as usize];
+        let (mut diagonal, mut forces) = (vec![0.0; rows], vec![[0.0; 3]; rows]);
+        for (edge, weight) in edges {
+            for (row, other) in ends(edge) {
+                let Some(row) = row.map(|row| row as usize) else { continue };
+                diagonal[row] += weight;
+                match (free[other as usize], held_by[other as usize]) {
+                    (Some(other), _) => {
+                        entries[next[row] as usize] = (other, weight);
+                        next[row] += 1;
+                    }
+                    (None, by) => {
+                        let by = by.unwrap_or_default();
+                        (0..3).for_each(|k| forces[row][k] += weight * by[k]);
+                    }
+                }
+            }
+        }
+        Self { free, starts, entries, diagonal, forces }
+    }
+
+    /// The matrix times `x`.
+    pub(super) fn times(&self, x: &[Vec3], out: &mut [Vec3]) {
+        out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+            for (place, out) in out.iter_mut().enumerate() {
+                let row = chunk * CHUNK + place;
+                let mut sum = x[row].map(|x| self.diagonal[row] * x);
+                for (other, weight) in &self.entries[self.starts[row] as usize..self.starts[row + 1] as usize] {
+                    let other = &x[*other as usize];
+                    (0..3).for_each(|k| sum[k] -= weight * other[k]);
+                }
+                *out = sum;
+            }
+        });
+    }
+}
+
+/// Weights of the edges with a free end, each edge once, sorted; those of its tets are added up in their order.
+fn edges(points: &[[f32; 3]], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
+    const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let of_tet = |tet: &[u32; 4]| {
+        let weights = weights(&tet.map(|corner| points[corner as usize]));
+        EDGES.map(|[k, l]| ([tet[k].min(tet[l]), tet[k].max(tet[l])], weights[k][l]))
+    };
+    let has_free = |(edge, _): &([u32; 2], f64)| edge[0] != edge[1] && edge.iter().any(|p| free[*p as usize].is_some());
+    let mut parts: Vec<([u32; 2], f64)> = tets.par_iter().flat_map_iter(of_tet).filter(has_free).collect();
+    parts.par_sort_by_key(|(edge, _)| *edge);
+    let mut edges: Vec<([u32; 2], f64)> = Vec::with_capacity(parts.len() / 4);
+    for (edge, weight) in parts {
+        match edges.last_mut() {
+            Some((last, sum)) if *last == edge => *sum += weight,
+            _ => edges.push((edge, weight)),
+        }
+    }
+    edges
+}
+
+/// What joins the corners of a tet, two by two; 0 where all lie on one spot.
+fn weights(corners: &[[f32; 3]; 4]) -> [[f64; 4]; 4] {
+    let edge = longest_edge(corners);
+    if edge == 0.0 {
+        return [[0.0; 4]; 4];
+    }
+    // A unit of an edge, so that no power of a length is too small or too large.
+    let [a, b, c, d] = corners.map(|p| [0, 1, 2].map(|k| (f64::from(p[k]) - f64::from(corners[0][k])) / edge));
+    let normals = [
+        cross(sub(d, b), sub(c, b)),
+        cross(sub(c, a), sub(d, a)),
+        cross(sub(d, a), sub(b, a)),
+        cross(sub(b, a), sub(c, a)),
+    ];
+    let six_volumes = dot(sub(b, a), normals[1]).abs().max(FLAT);
+    let weight = |k: usize, l: usize| -dot(normals[k], normals[l]) / (6.0 * six_volumes) * edge;
+    std::array::from_fn(|k| std::array::from_fn(|l| weight(k, l)))
+}
+
+/// The length of a tet's longest edge.
+pub(super) fn longest_edge(corners: &[[f32; 3]; 4]) -> f64 {
+    let wide = corners.map(|p| p.map(f64::from));
+    let mut longest = 0.0_f64;
+    for k in 1..4 {
+        for l in 0..k {
+            let edge = sub(wide[k], wide[l]);
+            longest = longest.max(dot(edge, edge));
+        }
+    }
+    longest.sqrt()
+}
+
+fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_corner_of_a_cube_is_joined_by_a_sixth_to_each_side_and_those_not_to_each_other() {
+        // Gradients of the hats: (−1, −1, −1), x, y, z; volume 1/6. Size 2 doubles it.
+        let corners = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+        let weights = weights(&corners);
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
+        (1..4).for_each(|k| close(weights[0][k], 2.0 / 6.0));
+        close(weights[1][2], 0.0);
+        close(weights[2][3], 0.0);
+        close(weights[0][0], -1.0);
+    }
+
+    #[test]
+    fn a_flat_tet_has_finite_weights_that_add_up_to_nothing() {
+        for z in [0.0, 1e-9, 1e-3] {
+            let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.7, 0.7, z]];
+            for row in weights(&corners) {
+                assert!(row.iter().all(|x| x.is_finite()));
+                assert!(row.iter().sum::<f64>().abs() <= 1e-14 / FLAT);
+            }
+        }
+        assert_eq!(weights(&[[3.0; 3]; 4]), [[0.0; 4]; 4]);
+    }
+}
