@@ -185,14 +185,20 @@ fn turn(part: &mut Component, owner: Owner, jacobians: &[Matrix]) {
     };
     // Asked first: what is edited is copied.
     let there = |part: &Component, name: &str| part.table(owner).column(name).is_some();
-    if there(part, V.name) {
-        part.edit(v).map(|rows| turn_vectors(rows, jacobians));
+    if there(part, V.name)
+        && let Some(rows) = part.edit(v)
+    {
+        turn_vectors(rows, jacobians);
     }
-    if there(part, N.name) {
-        part.edit(n).map(|rows| turn_normals(rows, jacobians));
+    if there(part, N.name)
+        && let Some(rows) = part.edit(n)
+    {
+        turn_normals(rows, jacobians);
     }
-    if there(part, ORIENT.name) {
-        part.edit(orient).map(|rows| turn_orientations(rows, jacobians));
+    if there(part, ORIENT.name)
+        && let Some(rows) = part.edit(orient)
+    {
+        turn_orientations(rows, jacobians);
     }
 }
 
