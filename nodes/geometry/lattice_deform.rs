@@ -186,13 +186,13 @@ fn turn(part: &mut Component, owner: Owner, jacobians: &[Matrix]) {
     // Asked first: what is edited is copied.
     let there = |part: &Component, name: &str| part.table(owner).column(name).is_some();
     if there(part, V.name) {
-        part.edit(v).map(|rows| turn_vectors(rows, jacobians));
+        part.edit(v).into_iter().for_each(|rows| turn_vectors(rows, jacobians));
     }
     if there(part, N.name) {
-        part.edit(n).map(|rows| turn_normals(rows, jacobians));
+        part.edit(n).into_iter().for_each(|rows| turn_normals(rows, jacobians));
     }
     if there(part, ORIENT.name) {
-        part.edit(orient).map(|rows| turn_orientations(rows, jacobians));
+        part.edit(orient).into_iter().for_each(|rows| turn_orientations(rows, jacobians));
     }
 }
 
