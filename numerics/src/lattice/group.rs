@@ -96,7 +96,7 @@ fn move_body(lattice: &Lattice<'_>, scratch: &mut Scratch, group: &mut Group) {
             Basis::Bernstein => bernstein(lattice.divisions[axis], &inside, shares),
         }
         for share in shares.iter_mut() {
-            outside(lattice, axis, &beyond, share);
+            outside(lattice, axis, &group.at[axis], &beyond, share);
         }
     }
     let [shares_x, shares_y, shares_z] = &scratch.shares;
@@ -183,16 +183,22 @@ fn bernstein(degree: usize, place: &Lane, shares: &mut Vec<Share>) {
     }
 }
 
+/// Of a point's distance from the origin and the box's extent: what rounding puts so far outside still has the box's own
+/// slopes. A box around an object is as large as it, and f32 rounds by a sixteenth of this.
+const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
+
 /// Makes a share that of the points outside, too, and its slope one a metre.
 #[inline(always)]
-fn outside(lattice: &Lattice<'_>, axis: usize, beyond: &Lane, share: &mut Share) {
+fn outside(lattice: &Lattice<'_>, axis: usize, at: &Lane, beyond: &Lane, share: &mut Share) {
     let extends = if lattice.outside == Outside::Extend { 1.0 } else { 0.0 };
+    let extent = lattice.extent[axis];
     for lane in 0..LANES {
         let beyond = beyond.0[lane];
         let slope = share.slope.0[lane];
         share.value.0[lane] += extends * slope * beyond;
-        let kept = if beyond == 0.0 { 1.0 } else { extends };
-        share.slope.0[lane] = kept * slope / lattice.extent[axis];
+        let inside = beyond.abs() * extent <= ROUNDING * (at.0[lane].abs() + extent);
+        let kept = if inside { 1.0 } else { extends };
+        share.slope.0[lane] = kept * slope / extent;
     }
 }
 

@@ -114,6 +114,19 @@ fn held_points_outside_move_as_the_nearest_of_the_box() {
 }
 
 #[test]
+fn what_rounding_puts_outside_has_the_slopes_of_the_box() {
+    // Mirrored along x and z, in a box that ends where what is in it does: 0.36 is more in f32 than in f64.
+    let corners = [[0.24, 0.0, 0.0], [0.36, 1.0, 1.0]];
+    let turned = offsets([1; 3], |[x, _, z]| [-1.12 * x, 0.0, -2.0 * z]);
+    for basis in BASES {
+        let lattice = Lattice::new(corners, [1; 3], &turned, basis, Outside::Hold).unwrap();
+        let jacobians = lattice.deform(&[[0.36, 0.5, 0.5], [0.3, 0.5, 0.5], [0.37, 0.5, 0.5]], true).jacobians;
+        assert!((jacobians[0][0][0] - jacobians[1][0][0]).abs() < 1e-6 && jacobians[0][0][0] < -8.0);
+        assert_eq!(jacobians[2][0][0], 1.0);
+    }
+}
+
+#[test]
 fn no_offset_keeps_every_bit() {
     let points = [[-0.0, 0.1, 1e-40], [0.3, -0.0, 7e20]];
     for basis in BASES {
