@@ -28,6 +28,26 @@ impl F32x16 {
         }
         out
     }
+
+    /// The lesser of each lane; `other`'s where one is no number.
+    #[inline(always)]
+    pub fn least(&self, other: &Self) -> Self {
+        let mut out = *other;
+        for lane in 0..LANES {
+            out.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        out
+    }
+
+    /// The larger of each lane; `other`'s where one is no number.
+    #[inline(always)]
+    pub fn most(&self, other: &Self) -> Self {
+        let mut out = *other;
+        for lane in 0..LANES {
+            out.0[lane] = if self.0[lane] > other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        out
+    }
 }
 
 /// A vector or a quaternion a lane, a component an array.

@@ -42,7 +42,7 @@ pub(super) struct Blocked {
 }
 
 /// A point of the plane, along u and v.
-type P2 = [f64; 2];
+pub(super) type P2 = [f64; 2];
 
 impl Sector {
     /// Where it points after a turn by `angle`.
@@ -54,8 +54,28 @@ impl Sector {
         self.u * cosine + self.v * sine
     }
 
+    /// Calls `found` with each interval of angles at which the triangle is in the way; may leave out those that lie
+    /// behind it, or stop no turn before the direction `until`.
+    pub(super) fn blocked_before(&self, until: P2, corners: &[V3; 3], mut found: impl FnMut(Blocked)) {
+        // A point that lies over the ray at an angle α by `back`, a radius r out, is by asin(back/r) ≥ back/r past α.
+        let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
+        let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
+            [true, true] => false,
+            [false, false] => !(over(p) && over(q)),
+            // From behind to the front it passes the start or, left of it, the far side.
+            [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
+            [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
+        };
+        self.blocked(corners, counts, &mut found);
+    }
+
     /// Calls `found` with each interval of angles at which the triangle is in the way.
     pub(super) fn blocked_by(&self, corners: &[V3; 3], mut found: impl FnMut(Blocked)) {
+        self.blocked(corners, |_, _| true, &mut found);
+    }
+
+    /// As [`Sector::blocked_by`]; of a plane only by straight pieces that count.
+    fn blocked(&self, corners: &[V3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
         let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
         let flat = |k: usize| {
             let arm = corners[k] - self.pivot;
@@ -63,7 +83,11 @@ impl Sector {
         };
         if self.half == 0.0 {
             if let Some(piece) = slice(&heights, 0.0, flat) {
-                self.within_reach(piece, &mut found);
+                self.within_reach(piece, |p, q| {
+                    if counts(p, q) {
+                        found(Blocked::between(p, q));
+                    }
+                });
             }
             return;
         }
@@ -92,13 +116,13 @@ impl Sector {
         };
         for level in [-self.half, self.half] {
             if let Some(piece) = slice(heights, level, |k| flat[k]) {
-                self.within_reach(piece, &mut add);
+                self.within_reach(piece, |p, q| add(Blocked::between(p, q)));
             }
         }
         for k in 0..3 {
             let (a, b) = (k, (k + 1) % 3);
             if let Some(piece) = between_levels([flat[a], flat[b]], [heights[a], heights[b]], self.half) {
-                self.within_reach(piece, &mut add);
+                self.within_reach(piece, |p, q| add(Blocked::between(p, q)));
             }
         }
         // The outline is one curve: seen from a pivot outside of it, its pieces make one interval.
@@ -122,20 +146,21 @@ impl Sector {
         } else if all.lo < 0.0 && all.hi >= 0.0 {
             // It touches the thick segment as it stands: which way it lies is what its middle says.
             if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
-                self.within_reach(piece, &mut found);
+                self.within_reach(piece, |p, q| found(Blocked::between(p, q)));
             }
         } else {
             found(all);
         }
     }
 
-    /// The parts of a straight piece inside the circle of `reach` and outside that of `inner`.
-    fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(Blocked)) {
+    /// Calls `found` with the ends of each part of a straight piece inside the circle of `reach` and outside that of
+    /// `inner`.
+    fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(P2, P2)) {
         let Some([from, to]) = inside_circle(p, q, self.reach) else { return };
         let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
         let mut part = |from: f64, to: f64| {
             if from <= to {
-                found(Blocked::between(at(from), at(to)));
+                found(at(from), at(to));
             }
         };
         match inside_circle(p, q, self.inner) {

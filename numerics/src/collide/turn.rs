@@ -199,7 +199,8 @@ enum Stop {
 /// How far the sector may turn towards the unit vector `to` of its plane.
 #[inline(always)]
 fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
-    let mut wedge = Wedge::new(sector, [sector.u.dot(to), sector.v.dot(to).max(0.0)]);
+    let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
+    let mut wedge = Wedge::new(sector, until);
     let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
@@ -209,7 +210,7 @@ fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
             lanes &= lanes - 1;
             let mut stuck = false;
             let mut next = None;
-            sector.blocked_by(&corners(block, lane), |blocked| {
+            sector.blocked_before(until, &corners(block, lane), |blocked| {
                 stuck |= blocked.holds_start();
                 if blocked.lo > 0.0 {
                     let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
@@ -222,7 +223,8 @@ fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
             let Some(next) = next.filter(|next| *next < stop.unwrap_or_else(|| sector.angle_of(to))) else { continue };
             stop = Some(next);
             let (sine, cosine) = libm::sincos(next);
-            wedge = Wedge::new(sector, [cosine, sine]);
+            until = [cosine, sine];
+            wedge = Wedge::new(sector, until);
             lanes &= wedge.may_meet(block);
         }
     }

@@ -175,16 +175,10 @@ impl Block {
     /// The box of each lane's triangle; a blank lane has that of the one it repeats.
     #[inline(always)]
     pub fn boxes(&self) -> Boxes {
-        let blank = F32x16::splat(0.0);
-        let mut boxes = Boxes { low: [blank; 3], high: [blank; 3] };
-        for axis in 0..3 {
-            let [a, b, c] = [&self.corners[0][axis], &self.corners[1][axis], &self.corners[2][axis]];
-            for lane in 0..LANES {
-                boxes.low[axis].0[lane] = least(least(a.0[lane], b.0[lane]), c.0[lane]);
-                boxes.high[axis].0[lane] = most(most(a.0[lane], b.0[lane]), c.0[lane]);
-            }
-        }
-        boxes
+        let [a, b, c] = &self.corners;
+        let low = |axis: usize| a[axis].least(&b[axis]).least(&c[axis]);
+        let high = |axis: usize| a[axis].most(&b[axis]).most(&c[axis]);
+        Boxes { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
     }
 }
 
