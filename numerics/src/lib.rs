@@ -24,6 +24,7 @@ pub mod scatter;
 pub mod shapes;
 pub mod shield;
 pub mod simd;
+pub mod soft;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

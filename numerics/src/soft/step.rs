@@ -1,0 +1,263 @@
+//! One step: TR-BDF2, or implicit Euler.
+//!
+//! TR-BDF2 (Bank et al. 1985) goes by the trapezoidal rule to γ = 2 − √2 of the step and by the second backward
+//! difference from there: order 2, L-stable, and both stages are the same equation M(x − y) = a²f(x, (x − z)/a) with
+//! a = γh/2. Its error estimate is Hosea & Shampine's (1996). Implicit Euler is that equation once, with a = h.
+//!
+//! A step that begins off balance (turned tetrahedra, an impact, or the caller says so) is implicit Euler with line search,
+//! which calms what TR-BDF2 would carry on; so is one whose TR-BDF2 turned out bad, again from the start.
+
+use super::V3;
+use super::body::Body;
+use super::contact::{Contact, Query, Touching, arrest};
+use super::energy::measure;
+use super::frame::{Frame, Integrator};
+use super::stage::{Newton, Setting, Solved, Stage, Work};
+use super::state::Warm;
+use super::volume::inventory;
+
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+/// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
+const MOST: u32 = 4;
+/// Newton iterations a stage has in accurate mode.
+const MOST_ACCURATE: u32 = 12;
+/// Share of the tolerance at which Newton's method stops in accurate mode.
+const NEWTON_SHARE: f64 = 0.1;
+/// Share of the energy at hand that a step may gain before it is done again with implicit Euler.
+const GAIN: f64 = 0.1;
+/// Share of the kinetic energy above which what impacts take makes a step begin off balance.
+const IMPACT: f64 = 0.02;
+
+/// Positions and velocities, the solver's order.
+#[derive(Clone, Debug)]
+pub(super) struct Moving {
+    pub(super) x: Vec<V3>,
+    pub(super) v: Vec<V3>,
+    /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
+    pub(super) trend: Vec<V3>,
+}
+
+/// What a step took and reached.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stepped {
+    pub(super) solved: Solved,
+    /// Largest estimated error of a particle, metres.
+    pub(super) estimate: f64,
+    pub(super) euler: bool,
+    /// Joules taken out.
+    pub(super) shed: f64,
+    pub(super) contacts: u32,
+    pub(super) overlap: f64,
+    pub(super) stopped: u32,
+}
+
+/// What steps are made with.
+pub(super) struct Stepper<'a> {
+    pub(super) work: &'a mut Work,
+    pub(super) setting: Setting<'a>,
+    pub(super) frame: &'a Frame<'a>,
+    /// Of the frame.
+    pub(super) seconds: f64,
+    pub(super) warm: &'a mut Warm,
+}
+
+impl Stepper<'_> {
+    /// From one of `times`, shares of the frame, to the other; `tolerance` in metres where Newton's method is to converge.
+    pub(super) fn step(&mut self, moving: &mut Moving, times: [f64; 2], tolerance: Option<f64>) -> Stepped {
+        let h = (times[1] - times[0]) * self.seconds;
+        let body = self.setting.body;
+        let start = moving.clone();
+        let before = measure(self.work, &self.setting, times[0], &start);
+        let mut stepped = Stepped::default();
+
+        let ahead = |share: f64| -> Vec<V3> { start.x.iter().zip(&start.v).map(|(x, v)| x + v * (share * h)).collect() };
+        let firmness = self.frame.contacts.map_or_else(Vec::new, |_| firmness(body));
+        let full = self.contacts(&start.x, &ahead(1.0), times, &firmness);
+        let taken = arrest(&full, body, &self.setting.drive.held, &start.x, &mut moving.v, h);
+        let turned = self.frame.volume > 0.0 && inventory(body, &start.x, self.setting.volumes).0 > 0;
+        let rough = self.frame.rough || turned || taken > IMPACT * before.kinetic || !before.scale().is_finite();
+        if rough || self.frame.integrator == Integrator::Euler {
+            moving.v.clone_from(&start.v);
+            stepped.solved = self.euler(moving, times, &full);
+            stepped.euler = true;
+        } else {
+            stepped.shed += taken;
+            (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &firmness, tolerance);
+            let after = measure(self.work, &self.setting, times[1], moving);
+            let gained = after.sum() - before.sum() > GAIN * before.scale().max(after.kinetic - before.kinetic) && self.undriven();
+            if stepped.solved.failed || gained || !after.sum().is_finite() {
+                moving.clone_from(&start);
+                let again = self.euler(moving, times, &full);
+                stepped = Stepped { solved: sum(stepped.solved, again), euler: true, ..Stepped::default() };
+            }
+        }
+        (stepped.contacts, stepped.overlap) = self.work.touching();
+        let touches = stepped.euler || stepped.contacts > 0;
+        let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
+        moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
+        self.keep_finite(&start, moving, &mut stepped);
+        if self.undriven() {
+            stepped.shed += self.shed(&before, times[1], moving);
+        }
+        stepped
+    }
+
+    /// Whether nothing from outside does work but gravity and goals that stand still.
+    fn undriven(&self) -> bool {
+        !self.setting.drive.moves() && self.frame.contacts.is_none()
+    }
+
+    fn contacts(&self, from: &[V3], to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+        let Some(contacts) = self.frame.contacts else { return Vec::new() };
+        let body = self.setting.body;
+        let outwards = |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
+        let mut found: Vec<Contact> = Vec::new();
+        contacts.find(&Query { from: &outwards(from), to: &outwards(to), times }, &mut found);
+        found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness)).collect()
+    }
+
+    fn newton(&self, tolerance: Option<f64>) -> Newton {
+        match tolerance {
+            Some(tolerance) => {
+                Newton { least: 1, most: MOST_ACCURATE, tolerance: NEWTON_SHARE * tolerance, search: false }
+            }
+            None => Newton { least: 1, most: MOST, tolerance: 0.0, search: false },
+        }
+    }
+
+    fn euler(&mut self, moving: &mut Moving, times: [f64; 2], contacts: &[Touching]) -> Solved {
+        let h = (times[1] - times[0]) * self.seconds;
+        let mut z = moving.x.clone();
+        let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
+        let mut x = moving.x.clone();
+        self.pin(&mut x, &mut z, times[1], h);
+        let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, index: 0 };
+        let newton = Newton { least: MOST, most: MOST, tolerance: 0.0, search: true };
+        let solved = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
+        moving.v = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
+        moving.x = x;
+        solved
+    }
+
+    fn tr_bdf2(&mut self, moving: &mut Moving, times: [f64; 2], firmness: &[f64], tolerance: Option<f64>) -> (Solved, f64) {
+        let body = self.setting.body;
+        let h = (times[1] - times[0]) * self.seconds;
+        let a = 0.5 * GAMMA * h;
+        let middle = times[0] + GAMMA * (times[1] - times[0]);
+        let newton = self.newton(tolerance);
+
+        let mut x: Vec<V3> = (0..body.len())
+            .map(|place| moving.x[place] + (moving.v[place] + moving.trend[place] * a) * (2.0 * a))
+            .collect();
+        let contacts = self.contacts(&moving.x, &x, [times[0], middle], firmness);
+        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts: &contacts, index: 0 };
+        let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v, 2.0 * a);
+        let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
+        let y: Vec<V3> = (0..x.len())
+            .map(|place| z[place] + moving.v[place] * a + force[place] * (a * a / body.mass[place]))
+            .collect();
+        self.pin(&mut x, &mut z, middle, a);
+        (stage.y, stage.z, stage.time) = (&y, &z, middle);
+        let first = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
+        let v_middle: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        let x_middle = x;
+
+        // Of the second backward difference: what the middle and the start count.
+        let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
+        let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
+        let mix = |middle: &[V3], start: &[V3]| -> Vec<V3> {
+            middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
+        };
+        let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
+        let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
+        let mut x: Vec<V3> = (0..body.len())
+            .map(|place| {
+                let (start, pace) = (moving.x[place], moving.v[place] * h);
+                start + pace + (x_middle[place] - start - pace * GAMMA) / (GAMMA * GAMMA)
+            })
+            .collect();
+        let contacts = self.contacts(&x_middle, &x, [middle, times[1]], firmness);
+        self.pin(&mut x, &mut z, times[1], a);
+        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts: &contacts, index: 1 };
+        let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
+        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+
+        let scale = 2.0 * h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
+        let raw = |place: usize| {
+            let bent = moving.v[place] / GAMMA - v_middle[place] / (GAMMA * (1.0 - GAMMA)) + v[place] / (1.0 - GAMMA);
+            if self.setting.drive.held[place] { V3::zeros() } else { bent * (scale * body.mass[place]) }
+        };
+        let mut error: Vec<V3> = (0..x.len()).map(raw).collect();
+        let mut solved = sum(first, second);
+        if tolerance.is_some() {
+            let reached = self.work.filter(body, self.warm, &mut error);
+            solved.cg += reached.iterations;
+        } else {
+            self.work.smooth(body, self.warm, &mut error);
+        }
+        let estimate = error.iter().map(V3::norm_squared).fold(0.0, f64::max).sqrt();
+        (moving.x, moving.v) = (x, v);
+        (solved, estimate)
+    }
+
+    /// Puts held particles where they are at `time`, and where (x − z)/a is their velocity.
+    fn pin(&self, x: &mut [V3], z: &mut [V3], time: f64, a: f64) {
+        self.setting.drive.hold(time, x, z, a);
+    }
+
+    /// Particles that are nowhere stay where they were.
+    fn keep_finite(&self, start: &Moving, moving: &mut Moving, stepped: &mut Stepped) {
+        for place in 0..moving.x.len() {
+            if !moving.x[place].iter().chain(moving.v[place].iter()).all(|x| x.is_finite()) {
+                (moving.x[place], moving.v[place]) = (start.x[place], V3::zeros());
+                moving.trend[place] = V3::zeros();
+                stepped.stopped += 1;
+            }
+        }
+    }
+
+    /// Slows all particles against their mean where the step made energy; returns how much that took.
+    fn shed(&mut self, before: &super::energy::Energies, time: f64, moving: &mut Moving) -> f64 {
+        /// Share of the energy that is rounding.
+        const ROUNDING: f64 = 1e-9;
+        let after = measure(self.work, &self.setting, time, moving);
+        let gained = after.sum() - before.sum();
+        let scale = before.scale().max(after.scale());
+        if !(gained > ROUNDING * scale) {
+            return 0.0;
+        }
+        let body = self.setting.body;
+        let mass: f64 = body.mass.iter().sum();
+        let mean = moving.v.iter().zip(&body.mass).map(|(v, m)| v * *m).sum::<V3>() / mass;
+        let inner = after.kinetic - 0.5 * mass * mean.norm_squared();
+        if !(inner > 0.0) {
+            return 0.0;
+        }
+        let keep = ((inner - gained) / inner).max(0.0).sqrt();
+        for (v, held) in moving.v.iter_mut().zip(&self.setting.drive.held) {
+            if !held {
+                *v = mean + (*v - mean) * keep;
+            }
+        }
+        gained.min(inner)
+    }
+}
+
+/// Σk of the springs at each particle, N/m.
+fn firmness(body: &Body) -> Vec<f64> {
+    let of = |place: usize| {
+        let mine = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
+        mine.iter().map(|hung| body.stiffness[hung.spring as usize]).sum()
+    };
+    (0..body.len()).map(of).collect()
+}
+
+fn sum(a: Solved, b: Solved) -> Solved {
+    Solved {
+        newton: a.newton + b.newton,
+        cg: a.cg + b.cg,
+        caps: a.caps + b.caps,
+        residual: a.residual.max(b.residual),
+        failed: a.failed || b.failed,
+    }
+}

@@ -1,0 +1,147 @@
+//! What keeps a body's volume: a pressure in each region, and a push against tetrahedra that are about to turn over.
+//!
+//! Region: ½κ(V − V₀)²/V₀, so that lost volume is fought by κ against the springs' own bulk modulus. Tetrahedron: below
+//! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
+//! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
+
+use super::V3;
+use super::body::{Body, volume};
+use super::parts::{Parts, Several};
+use super::rows::Rows;
+
+/// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
+const SPRINGS: f64 = 2.0 / 3.0;
+/// Share of the springs' loss that is left where all of it is fought: what conjugate gradients still do level.
+const LEFT: f64 = 0.06;
+/// Volume ÷ volume at rest below which a tetrahedron is pushed open.
+const THIN: f64 = 0.2;
+/// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
+const OPENING: f64 = 4.0;
+
+/// The terms of one frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Volumes {
+    /// κ ÷ V₀ of each region.
+    stiffness: Vec<f64>,
+    /// V₀.
+    rest: Vec<f64>,
+    /// Share fought.
+    share: f64,
+    /// Regions in parts.
+    parts: Option<Parts>,
+    /// How each region's volume changes with its particles.
+    pub(super) gradients: Vec<V3>,
+    /// Pressure each region has, Pa.
+    pub(super) pressures: Vec<f64>,
+}
+
+/// A tetrahedron that is thin or turned over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Thin {
+    pub(super) corners: [u32; 4],
+    /// How its volume changes with its corners.
+    pub(super) gradient: [V3; 4],
+    /// μ ÷ V₀, and what that opens it with, Pa.
+    pub(super) stiffness: f64,
+    pub(super) pressure: f64,
+    pub(super) energy: f64,
+}
+
+impl Volumes {
+    /// Fights `share` of what tetrahedra lose of `rest`, their volumes.
+    pub(super) fn new(body: &Body, share: f64, rest: &[f64], rows: &mut Rows) -> Self {
+        let share = share.clamp(0.0, 1.0);
+        let regions = &body.regions;
+        if !(share > 0.0) || regions.len() == 0 {
+            rows.set_topology(0, &[], &[], Parts::even(0, 1, 1));
+            return Self::default();
+        }
+        let parts = regions.parts();
+        rows.set_topology(body.len(), &regions.starts, &regions.particles, parts.clone());
+        let rest_sums = regions.sums(|tet| rest[tet]);
+        let factor = SPRINGS * share / (1.0 - share + LEFT * share);
+        let stiffness = regions.energy.iter().zip(&rest_sums).map(|(energy, volume)| {
+            let k = factor * energy / (volume * volume);
+            if k.is_finite() { k } else { 0.0 }
+        });
+        Self {
+            stiffness: stiffness.collect(),
+            rest: rest_sums,
+            share,
+            parts: Some(parts),
+            gradients: vec![V3::zeros(); regions.particles.len()],
+            pressures: vec![0.0; regions.len()],
+        }
+    }
+
+    /// Whether nothing is fought.
+    pub(super) fn is_off(&self) -> bool {
+        self.parts.is_none()
+    }
+
+    /// Measures pressures and gradients; returns the energy for steps of `a` (0: what is stored).
+    pub(super) fn measure(&mut self, body: &Body, x: &[V3], v: &[V3], a: f64) -> f64 {
+        let Some(parts) = &self.parts else { return 0.0 };
+        let (regions, stiffness, rest) = (&body.regions, &self.stiffness, &self.rest);
+        let gradients = Several::new(&regions.starts, &mut self.gradients);
+        parts.sum((&mut self.pressures[..], gradients), |part, (pressures, mut gradients)| {
+            let mut energy = 0.0;
+            for ((region, pressure), mine) in parts.range(part).zip(pressures).zip(gradients.iter_mut()) {
+                let particles = &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
+                let lost = regions.measure(region, x, mine) - rest[region];
+                let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
+                let (k, c) = (stiffness[region], stiffness[region] * regions.damping[region]);
+                *pressure = k * lost + c * pace;
+                energy += 0.5 * k * lost * lost + 0.5 * a * c * pace * pace;
+            }
+            energy
+        })
+    }
+
+    /// What each region resists for steps of `a`.
+    pub(super) fn weights(&self, body: &Body, a: f64) -> Vec<f64> {
+        let damped = |(k, beta): (&f64, &f64)| k * (a * a + a * beta);
+        self.stiffness.iter().zip(&body.regions.damping).map(damped).collect()
+    }
+
+    /// The tetrahedra that are thin, by index.
+    pub(super) fn thin(&self, body: &Body, x: &[V3], rest: &[f64]) -> Vec<Thin> {
+        if self.is_off() {
+            return Vec::new();
+        }
+        let parts = body.tet_parts.map((), |part, ()| {
+            let of = |tet: usize| {
+                let corners = body.tets[tet];
+                let at = corners.map(|corner| x[corner as usize]);
+                let left = THIN * rest[tet] - volume(at);
+                (left > 0.0).then(|| {
+                    let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
+                    let pressure = stiffness * left;
+                    Thin { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left }
+                })
+            };
+            body.tet_parts.range(part).filter_map(of).collect::<Vec<_>>()
+        });
+        parts.into_iter().flatten().filter(|thin| thin.pressure.is_finite()).collect()
+    }
+}
+
+/// How a tetrahedron's volume changes with each corner.
+pub(super) fn opening([a, b, c, d]: [V3; 4]) -> [V3; 4] {
+    let (ab, ac, ad) = (b - a, c - a, d - a);
+    let [b, c, d] = [ac.cross(&ad) / 6.0, ad.cross(&ab) / 6.0, ab.cross(&ac) / 6.0];
+    [-(b + c + d), b, c, d]
+}
+
+/// Tetrahedra inside out, and all volume ÷ all at rest.
+pub(super) fn inventory(body: &Body, x: &[V3], rest: &[f64]) -> (u32, f64) {
+    let parts = body.tet_parts.map((), |part, ()| {
+        body.tet_parts.range(part).fold((0u32, 0.0, 0.0), |(turned, now, before), tet| {
+            let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
+            (turned + u32::from(volume < 0.0), now + volume, before + rest[tet])
+        })
+    });
+    let (turned, now, before) =
+        parts.into_iter().fold((0, 0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1, sum.2 + part.2));
+    (turned, if before > 0.0 { now / before } else { 1.0 })
+}
