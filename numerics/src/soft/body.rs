@@ -211,6 +211,11 @@ impl Body {
         &self.lengths
     }
 
+    /// How many springs the mesh has; those given as such come after them.
+    pub fn meshed(&self) -> usize {
+        self.meshed
+    }
+
     /// Mass of each particle, by the caller's index, kilograms.
     pub fn masses(&self) -> Vec<f64> {
         self.order.places.iter().map(|place| self.mass[*place as usize]).collect()
@@ -249,7 +254,7 @@ impl Body {
             let length = self.lengths[spring].max(shortest);
             let k = if length > 0.0 { stored[spring] / (length * length) } else { 0.0 };
             let ends = self.ends[spring].map(|end| self.order.callers[end as usize]);
-            self.stiffness[spring] = number("stiffness", spring, k)?;
+            self.stiffness[spring] = stiffness(spring, k)?;
             self.damping[spring] = number("damping", spring, material.damping.over(ends) * k)?;
         }
         self.moduli = self.kept.iter().map(|tet| material.stiffness.over(self.given[*tet as usize].corners)).collect();
@@ -281,7 +286,7 @@ impl Body {
         mesh.missing.iter().enumerate().try_for_each(|(index, ends)| distinct("spring", index, ends, count))?;
         for (index, spring) in joints.iter().enumerate() {
             distinct("spring", index, &spring.ends, count)?;
-            number("stiffness", index, spring.stiffness)?;
+            stiffness(index, spring.stiffness)?;
             number("damping", index, spring.damping)?;
             number("length", index, spring.length)?;
         }
@@ -315,7 +320,7 @@ impl Body {
         let regions = Regions::new(&rest, &tets);
         let zeros = std::iter::repeat_n(0.0, meshed);
         Ok(Self {
-            stiffness: zeros.clone().chain(joints.iter().map(|spring| spring.stiffness)).collect(),
+            stiffness: zeros.clone().chain(joints.iter().map(|spring| f64::from(spring.stiffness as f32))).collect(),
             damping: zeros.chain(joints.iter().map(|spring| spring.damping)).collect(),
             spring_parts: Parts::even(ends.len(), 2048, 1),
             tet_parts: Parts::even(tets.len(), 2048, 1),
@@ -350,6 +355,11 @@ fn mean(values: &[f64]) -> f64 {
 
 fn number(what: &'static str, index: usize, value: f64) -> Result<f64, BodyError> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number { what, index, value }) }
+}
+
+/// A stiffness as forces have it, in f32, so that energies are of the same springs.
+fn stiffness(index: usize, k: f64) -> Result<f64, BodyError> {
+    number("stiffness", index, f64::from(k as f32))
 }
 
 fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -> Result<(), BodyError> {

@@ -29,11 +29,15 @@ impl Energies {
     }
 }
 
-/// At `time`, a share of the frame.
-pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Moving) -> Energies {
+/// At `time`, a share of the frame; `looked` where volumes were last measured there.
+pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Moving, looked: bool) -> Energies {
     let (body, x, v) = (on.body, &moving.x, &moving.v);
-    let stored = work.volumes.measure(body, x, v, 0.0);
-    let thin: f64 = work.volumes.thin(body, x, on.volumes).iter().map(|thin| thin.energy).sum();
+    if !looked {
+        work.volumes.measure(body, x, v, 0.0);
+    }
+    let watched = &work.inventory.watched;
+    let thin: f64 = work.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
+    let stored = work.volumes.stored;
     let springs = body.spring_parts.sum((), |part, ()| {
         body.spring_parts.range(part).map(|at| springs::energy(body, &on.rest, x, at)).sum()
     });

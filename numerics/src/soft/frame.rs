@@ -5,11 +5,11 @@ use super::body::Body;
 use super::contact::Contacts;
 use super::drive::{Drive, Goal, Pin};
 use super::energy::{Energies, measure};
-use super::springs::Rest;
+use super::springs::{self, Rest};
 use super::stage::{Setting, Work};
 use super::state::State;
 use super::step::{Moving, Stepper, Stepped};
-use super::volume::{Volumes, inventory};
+use super::volume::{Inventory, Volumes};
 
 /// Steps that a frame is cut into, at most, where halving is what helps.
 const MOST_STEPS: u32 = 1024;
@@ -136,16 +136,19 @@ impl Solver {
         let lengths = state.rest_lengths();
         let rest = Rest { lengths: &lengths, torn: &state.torn };
         self.work.volumes = Volumes::new(body, frame.volume, &state.volumes, &mut self.work.system.regions);
+        springs::links(body, &rest, &mut self.work.links);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
         let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
         let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend };
         let mut report = Report::default();
+        self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
+        let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
         if seconds > 0.0 && !body.is_empty() {
             let mut stepper = Stepper { work: &mut self.work, setting, frame, seconds, warm: &mut state.warm };
-            run(&mut stepper, &mut moving, &mut report);
+            run(&mut stepper, &mut moving, &mut energies, &mut report);
         }
-        let energies = measure(&mut self.work, &setting, 1.0, &moving);
+        (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
         describe(&mut report, &setting, &energies, &moving);
         state.trend.resize(body.len(), [0.0; 3]);
         for (caller, place) in body.order.places.iter().enumerate() {
@@ -158,24 +161,31 @@ impl Solver {
 }
 
 /// The steps of a frame.
-fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, report: &mut Report) {
+fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report) {
     let accurate = match stepper.frame.integrator {
         Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.setting.body.size),
         Integrator::Default | Integrator::Euler => None,
     };
     if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
-        return adapt(stepper, moving, report, tolerance);
+        return adapt(stepper, moving, energies, report, tolerance);
     }
     let steps = stepper.frame.substeps.clamp(1, MOST_STEPS);
     for step in 0..steps {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(moving, times, None);
+        let stepped = stepper.step(moving, times, energies, None);
+        *energies = stepped.after;
         add(report, &stepped);
     }
 }
 
 /// Steps whose estimated error a second stays within `tolerance` metres a frame.
-fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, report: &mut Report, tolerance: f64) {
+fn adapt(
+    stepper: &mut Stepper<'_>,
+    moving: &mut Moving,
+    energies: &mut Energies,
+    report: &mut Report,
+    tolerance: f64,
+) {
     /// Most and least that a step is changed by, and what is kept in reserve.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
@@ -186,7 +196,7 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, report: &mut Report, to
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
         let before = moving.clone();
-        let stepped = stepper.step(moving, [time, end], Some(tolerance));
+        let stepped = stepper.step(moving, [time, end], energies, Some(tolerance));
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 1.5 / f64::from(MOST_STEPS);
         let fits = stepped.estimate <= allowed || stepped.euler;
@@ -195,12 +205,14 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, report: &mut Report, to
         share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).min(1.0);
         if fits || smallest {
             report.caps_hit += u32::from(!fits);
+            *energies = stepped.after;
             time = end;
         } else {
             // The work counts, the result does not.
             report.error_estimate -= stepped.estimate;
             report.substeps -= 1;
             *moving = before;
+            stepper.look(moving);
         }
     }
 }
@@ -221,6 +233,5 @@ fn add(report: &mut Report, stepped: &Stepped) {
 fn describe(report: &mut Report, on: &Setting<'_>, energies: &Energies, moving: &Moving) {
     (report.kinetic, report.elastic) = (energies.kinetic, energies.springs);
     (report.volume_energy, report.goal_energy) = (energies.volumes, energies.goals);
-    (report.inverted_tets, report.volume_ratio) = inventory(on.body, &moving.x, on.volumes);
     report.worst_stretch = super::energy::worst_stretch(on, &moving.x);
 }

@@ -20,6 +20,7 @@ mod energy;
 mod frame;
 mod order;
 mod parts;
+mod plastic;
 mod regions;
 mod rows;
 mod springs;
@@ -33,6 +34,10 @@ pub use body::{Body, BodyError, LIGHTEST, Material, Mesh, SHORTEST, Scaled, Spri
 pub use contact::{Contact, Contacts, Query};
 pub use drive::{Goal, Pin};
 pub use frame::{Frame, Integrator, Report, Solver};
+pub use plastic::{Plasticity, flow, reset, tear};
 pub use state::State;
 
 type V3 = nalgebra::Vector3<f64>;
+
+#[cfg(test)]
+mod tests;

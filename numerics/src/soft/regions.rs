@@ -1,16 +1,18 @@
 //! Regions: clusters of tetrahedra whose volume is kept as one.
 //!
 //! One pressure for each tetrahedron would leave particles no freedom (there are five to six times as many tetrahedra as
-//! particles: the body locks). One for some fifty tetrahedra, with particles on every face between two regions, is the
-//! stable pair of piecewise linear displacement on a finer mesh than the constant pressure (P1-iso-P2/P0). Only particles on
-//! a region's boundary change its volume, so it costs a third of what single tetrahedra would.
+//! particles: the body locks). One for many, with particles inside of every face between two regions, is a stable pair:
+//! piecewise linear displacement on a finer mesh than the constant pressure. Only particles on a region's boundary change
+//! its volume, so it costs a fraction of what single tetrahedra would. Limit: within a region volume may move about; there
+//! springs resist, and what keeps single tetrahedra from turning over.
 
 use super::V3;
 use super::order::{pieces, split};
 use super::parts::Parts;
 
-/// Tetrahedra in a region: eight cells of six. Fewer lock, more let parts of a region trade volume.
-const TETS: usize = 48;
+/// Tetrahedra in a region: some 27 cells of six. With 48 conjugate gradients need a fifth more iterations, with 400 a
+/// pinch a few cells wide goes unnoticed.
+const TETS: usize = 160;
 
 /// Closed surfaces around clusters of tetrahedra.
 #[derive(Clone, Debug, Default)]

@@ -8,6 +8,7 @@
 
 use super::V3;
 use super::body::Body;
+use super::parts::Several;
 use crate::random::Key;
 
 /// Largest a²k a record holds: α, β and products with displacements stay far inside of f32.
@@ -43,37 +44,66 @@ impl Rest<'_> {
     }
 }
 
-/// A spring seen from one end.
+/// A spring as one end sees it, with all that its force hangs on: read in order, once a look.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Link {
+    other: u32,
+    spring: u32,
+    k: f32,
+    c: f32,
+    rest: f64,
+}
+
+/// The springs at each particle, as in [`Body::hung`]; torn ones neither pull nor resist.
+pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
+    out.resize(body.hung.len(), Link::default());
+    let links = Several::new(&body.starts, out);
+    body.order.clusters.each(links, |cluster, mut links| {
+        for (place, links) in body.order.clusters.range(cluster).zip(links.iter_mut()) {
+            let hung = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
+            for (link, hung) in links.iter_mut().zip(hung) {
+                let at = hung.spring as usize;
+                let holds = if rest.holds(hung.spring) { 1.0 } else { 0.0 };
+                *link = Link {
+                    other: hung.other,
+                    spring: hung.spring,
+                    k: body.stiffness[at] as f32 * holds,
+                    c: body.damping[at] as f32 * holds,
+                    rest: rest.lengths[at],
+                };
+            }
+        }
+    });
+}
+
+/// A spring seen from one end: the way there from the other, its length, and 1 ÷ that.
 #[derive(Clone, Copy)]
 struct Seen {
-    /// Away from the other end.
     way: V3,
     length: f64,
-    k: f64,
-    c: f64,
-    rest: f64,
+    inverse: f64,
 }
 
 impl Seen {
     #[inline(always)]
-    fn from(body: &Body, rest: &Rest<'_>, place: u32, other: u32, spring: u32, x: &[V3]) -> Self {
-        let d = x[place as usize] - x[other as usize];
+    fn from(link: &Link, place: usize, x: &[V3]) -> Self {
+        let d = x[place] - x[link.other as usize];
         let squared = d.norm_squared();
-        let length = squared.sqrt();
         // Outside of these a square has lost its digits, or the length is none.
-        let (way, length) = if squared > 1e-280 && squared < 1e280 {
-            (d / length, length)
+        if squared > 1e-280 && squared < 1e280 {
+            let length = squared.sqrt();
+            let inverse = 1.0 / length;
+            Self { way: d * inverse, length, inverse }
         } else {
-            unusual(d, spring, place < other)
-        };
-        let at = spring as usize;
-        Self { way, length, k: body.stiffness[at], c: body.damping[at], rest: rest.lengths[at] }
+            let (way, length) = unusual(d, link.spring, place < link.other as usize);
+            Self { way, length, inverse: 1.0 / length }
+        }
     }
 
     /// What pulls the ends together, newtons.
     #[inline(always)]
-    fn tension(&self, dv: V3) -> f64 {
-        self.k * (self.length - self.rest) + self.c * self.way.dot(&dv)
+    fn tension(&self, link: &Link, dv: V3) -> f64 {
+        f64::from(link.k) * (self.length - link.rest) + f64::from(link.c) * self.way.dot(&dv)
     }
 }
 
@@ -92,15 +122,13 @@ fn unusual(d: V3, spring: u32, first: bool) -> (V3, f64) {
     (if first { way } else { -way }, 0.0)
 }
 
-/// The springs' force on the particle at `place`, newtons.
+/// The force of its springs on the particle at `place`, newtons.
 #[inline(always)]
-pub(super) fn force(body: &Body, rest: &Rest<'_>, motion: &Motion<'_>, place: usize) -> V3 {
+pub(super) fn force(links: &[Link], motion: &Motion<'_>, place: usize) -> V3 {
     let mut sum = V3::zeros();
-    for hung in &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize] {
-        if rest.holds(hung.spring) {
-            let seen = Seen::from(body, rest, place as u32, hung.other, hung.spring, motion.x);
-            sum -= seen.way * seen.tension(motion.v[place] - motion.v[hung.other as usize]);
-        }
+    for link in links {
+        let seen = Seen::from(link, place, motion.x);
+        sum -= seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize]);
     }
     sum
 }
@@ -108,33 +136,27 @@ pub(super) fn force(body: &Body, rest: &Rest<'_>, motion: &Motion<'_>, place: us
 /// The force, the records of the particle's springs for steps of `a`, and the sum of their H.
 #[inline(always)]
 pub(super) fn linearise(
-    body: &Body,
-    rest: &Rest<'_>,
+    links: &[Link],
     motion: &Motion<'_>,
     a: f64,
     place: usize,
     records: &mut [Record],
 ) -> (V3, [f64; 6]) {
     let (mut sum, mut block) = (V3::zeros(), [0.0; 6]);
-    let mine = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
-    for (hung, record) in mine.iter().zip(records) {
-        if !rest.holds(hung.spring) {
-            *record = Record { other: hung.other, alpha: 0.0, w: [0.0; 3] };
-            continue;
-        }
-        let seen = Seen::from(body, rest, place as u32, hung.other, hung.spring, motion.x);
-        sum -= seen.way * seen.tension(motion.v[place] - motion.v[hung.other as usize]);
-        let k = (a * a * seen.k).min(STIFFEST);
-        let along = (k + a * seen.c).min(2.0 * STIFFEST);
+    for (link, record) in links.iter().zip(records) {
+        let seen = Seen::from(link, place, motion.x);
+        sum -= seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize]);
+        let k = (a * a * f64::from(link.k)).min(STIFFEST);
+        let along = (k + a * f64::from(link.c)).min(2.0 * STIFFEST);
         let alpha = if seen.length > 0.0 {
-            k * (1.0 - seen.rest / seen.length).max(0.0)
-        } else if seen.rest > 0.0 {
+            k * (1.0 - link.rest * seen.inverse).max(0.0)
+        } else if link.rest > 0.0 {
             0.0
         } else {
             k
         };
         let w = seen.way * (along - alpha).max(0.0).sqrt();
-        *record = Record { other: hung.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
+        *record = Record { other: link.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
         block[0] += alpha + w.x * w.x;
         block[1] += w.x * w.y;
         block[2] += w.x * w.z;

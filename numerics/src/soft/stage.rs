@@ -12,10 +12,10 @@ use super::contact::{Mode, Touch, Touching};
 use super::drive::Drive;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
-use super::springs::{self, Motion, Record, Rest};
+use super::springs::{self, Link, Motion, Record, Rest};
 use super::state::Warm;
 use super::system::{System, halfway, smoother};
-use super::volume::{Thin, Volumes};
+use super::volume::{Inventory, Thin, Volumes};
 
 /// Share of the first residual that linear equations may leave.
 const CG_SHARE: f64 = 0.1;
@@ -86,7 +86,11 @@ pub(super) struct Work {
     pub(super) system: System,
     pub(super) layout: Layout,
     pub(super) volumes: Volumes,
+    /// Tetrahedra as the step began.
+    pub(super) inventory: Inventory,
     pub(super) arms: Vec<[f32; 3]>,
+    /// The springs as the frame has them.
+    pub(super) links: Vec<Link>,
     scratch: cg::Scratch,
     /// Velocities at the positions looked at.
     v: Vec<V3>,
@@ -94,7 +98,7 @@ pub(super) struct Work {
     r: Vec<V3>,
     dx: Vec<V3>,
     trial: Vec<V3>,
-    thin: Vec<Thin>,
+    pub(super) thin: Vec<Thin>,
     touches: Vec<Touch>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
     extra: Vec<V3>,
@@ -123,7 +127,7 @@ impl Work {
         let motion = Motion { x, v };
         body.order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
             for (place, out) in body.order.clusters.range(cluster).zip(out) {
-                *out = springs::force(body, &on.rest, &motion, place) + work.own_force(on, stage.time, place, &motion);
+                *out = springs::force(work.links(body, place), &motion, place) + work.own_force(on, stage.time, place, &motion);
             }
         });
         out
@@ -200,10 +204,10 @@ impl Work {
     }
 
     /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
-    pub(super) fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3], seconds: f64) -> f64 {
+    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3], seconds: f64) {
         let body = on.body;
-        let energy = self.volumes.measure(body, x, v, 0.0);
-        self.thin = self.volumes.thin(body, x, on.volumes);
+        self.volumes.measure(body, x, v, 0.0);
+        self.thin = self.volumes.thin(body, x, on.volumes, &self.inventory.watched);
         self.touches.clear();
         self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, seconds, body.size)));
         self.extra.clear();
@@ -220,7 +224,11 @@ impl Work {
                 }
             }
         }
-        energy
+    }
+
+    #[inline(always)]
+    fn links(&self, body: &Body, place: usize) -> &[Link] {
+        &self.links[body.starts[place] as usize..body.starts[place + 1] as usize]
     }
 
     /// All but springs.
@@ -260,7 +268,7 @@ impl Work {
             clusters.each(parts, |cluster, (r, inertia, smooth, mut records)| {
                 let places = clusters.range(cluster).zip(r).zip(inertia).zip(smooth).zip(records.iter_mut());
                 for ((((place, r), inertia), smooth), records) in places {
-                    let (pull, mut block) = springs::linearise(body, &on.rest, &motion, a, place, records);
+                    let (pull, mut block) = springs::linearise(work.links(body, place), &motion, a, place, records);
                     let mass = body.mass[place];
                     let mut own = on.drive.force(place, mass, stage.time, x[place], v[place]);
                     if !regions.is_empty() {
@@ -288,7 +296,7 @@ impl Work {
                     *r = if work.system.held[place] {
                         V3::zeros()
                     } else {
-                        let force = springs::force(body, &on.rest, &motion, place)
+                        let force = springs::force(work.links(body, place), &motion, place)
                             + work.own_force(on, stage.time, place, &motion);
                         force * (a * a) - (x[place] - stage.y[place]) * body.mass[place]
                     };
@@ -452,8 +460,10 @@ impl Work {
         let (body, a) = (on.body, stage.a);
         let mut v = std::mem::take(&mut self.v);
         velocities(&body.order.clusters, x, stage, &mut v);
-        let stored = self.volumes.measure(body, x, &v, a);
-        let thin: f64 = self.volumes.thin(body, x, on.volumes).iter().map(|thin| thin.energy).sum();
+        let damped = self.volumes.measure(body, x, &v, a);
+        let stored = self.volumes.stored + damped;
+        let watched = &self.inventory.watched;
+        let thin: f64 = self.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
         let mut contact = 0.0;
         for (index, touching) in stage.contacts.iter().enumerate() {
             let touch = touching.at(x, &v, 0.0, body.size);

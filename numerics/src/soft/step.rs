@@ -10,11 +10,11 @@
 use super::V3;
 use super::body::Body;
 use super::contact::{Contact, Query, Touching, arrest};
-use super::energy::measure;
+use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
 use super::stage::{Newton, Setting, Solved, Stage, Work};
 use super::state::Warm;
-use super::volume::inventory;
+use super::volume::Inventory;
 
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 /// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
@@ -46,6 +46,7 @@ pub(super) struct Stepped {
     pub(super) euler: bool,
     /// Joules taken out.
     pub(super) shed: f64,
+    pub(super) after: Energies,
     pub(super) contacts: u32,
     pub(super) overlap: f64,
     pub(super) stopped: u32,
@@ -63,19 +64,26 @@ pub(super) struct Stepper<'a> {
 
 impl Stepper<'_> {
     /// From one of `times`, shares of the frame, to the other; `tolerance` in metres where Newton's method is to converge.
-    pub(super) fn step(&mut self, moving: &mut Moving, times: [f64; 2], tolerance: Option<f64>) -> Stepped {
+    /// `before` are the energies there.
+    pub(super) fn step(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        before: &Energies,
+        tolerance: Option<f64>,
+    ) -> Stepped {
         let h = (times[1] - times[0]) * self.seconds;
         let body = self.setting.body;
         let start = moving.clone();
-        let before = measure(self.work, &self.setting, times[0], &start);
         let mut stepped = Stepped::default();
 
         let ahead = |share: f64| -> Vec<V3> { start.x.iter().zip(&start.v).map(|(x, v)| x + v * (share * h)).collect() };
         let firmness = self.frame.contacts.map_or_else(Vec::new, |_| firmness(body));
         let full = self.contacts(&start.x, &ahead(1.0), times, &firmness);
         let taken = arrest(&full, body, &self.setting.drive.held, &start.x, &mut moving.v, h);
-        let turned = self.frame.volume > 0.0 && inventory(body, &start.x, self.setting.volumes).0 > 0;
-        let rough = self.frame.rough || turned || taken > IMPACT * before.kinetic || !before.scale().is_finite();
+        let turned = self.frame.volume > 0.0 && self.work.inventory.turned > 0;
+        let rough = self.frame.rough || turned || taken > IMPACT * kinetic(body, &start.v);
+        let mut after = None;
         if rough || self.frame.integrator == Integrator::Euler {
             moving.v.clone_from(&start.v);
             stepped.solved = self.euler(moving, times, &full);
@@ -83,12 +91,15 @@ impl Stepper<'_> {
         } else {
             stepped.shed += taken;
             (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &firmness, tolerance);
-            let after = measure(self.work, &self.setting, times[1], moving);
-            let gained = after.sum() - before.sum() > GAIN * before.scale().max(after.kinetic - before.kinetic) && self.undriven();
-            if stepped.solved.failed || gained || !after.sum().is_finite() {
+            let energies = measure(self.work, &self.setting, times[1], moving, true);
+            let gain = energies.sum() - before.sum();
+            let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+            after = Some(energies);
+            if stepped.solved.failed || gained || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let again = self.euler(moving, times, &full);
                 stepped = Stepped { solved: sum(stepped.solved, again), euler: true, ..Stepped::default() };
+                after = None;
             }
         }
         (stepped.contacts, stepped.overlap) = self.work.touching();
@@ -96,10 +107,20 @@ impl Stepper<'_> {
         let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
         self.keep_finite(&start, moving, &mut stepped);
+        stepped.after = match after.filter(|_| stepped.stopped == 0) {
+            Some(energies) => energies,
+            None => measure(self.work, &self.setting, times[1], moving, false),
+        };
+        self.look(moving);
         if self.undriven() {
-            stepped.shed += self.shed(&before, times[1], moving);
+            self.shed(before, moving, &mut stepped);
         }
         stepped
+    }
+
+    /// Looks the tetrahedra over.
+    pub(super) fn look(&mut self, moving: &Moving) {
+        self.work.inventory = Inventory::new(self.setting.body, &moving.x, self.setting.volumes);
     }
 
     /// Whether nothing from outside does work but gravity and goals that stand still.
@@ -216,22 +237,21 @@ impl Stepper<'_> {
         }
     }
 
-    /// Slows all particles against their mean where the step made energy; returns how much that took.
-    fn shed(&mut self, before: &super::energy::Energies, time: f64, moving: &mut Moving) -> f64 {
+    /// Slows all particles against their mean where the step made energy.
+    fn shed(&self, before: &Energies, moving: &mut Moving, stepped: &mut Stepped) {
         /// Share of the energy that is rounding.
         const ROUNDING: f64 = 1e-9;
-        let after = measure(self.work, &self.setting, time, moving);
+        let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
-        let scale = before.scale().max(after.scale());
-        if !(gained > ROUNDING * scale) {
-            return 0.0;
+        if !(gained > ROUNDING * before.scale().max(after.scale())) {
+            return;
         }
         let body = self.setting.body;
         let mass: f64 = body.mass.iter().sum();
         let mean = moving.v.iter().zip(&body.mass).map(|(v, m)| v * *m).sum::<V3>() / mass;
         let inner = after.kinetic - 0.5 * mass * mean.norm_squared();
         if !(inner > 0.0) {
-            return 0.0;
+            return;
         }
         let keep = ((inner - gained) / inner).max(0.0).sqrt();
         for (v, held) in moving.v.iter_mut().zip(&self.setting.drive.held) {
@@ -239,8 +259,15 @@ impl Stepper<'_> {
                 *v = mean + (*v - mean) * keep;
             }
         }
-        gained.min(inner)
+        let kinetic = kinetic(body, &moving.v);
+        stepped.shed += after.kinetic - kinetic;
+        after.kinetic = kinetic;
     }
+}
+
+/// Joules.
+fn kinetic(body: &Body, v: &[V3]) -> f64 {
+    v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
 }
 
 /// Σk of the springs at each particle, N/m.

@@ -12,9 +12,11 @@ use super::rows::Rows;
 /// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
 /// Share of the springs' loss that is left where all of it is fought: what conjugate gradients still do level.
-const LEFT: f64 = 0.06;
+const LEFT: f64 = 0.1;
 /// Volume ÷ volume at rest below which a tetrahedron is pushed open.
 const THIN: f64 = 0.2;
+/// Volume ÷ volume at rest below which it is watched within a step: one that gets thin from above is so for the next step.
+const WATCHED: f64 = 0.5;
 /// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
 const OPENING: f64 = 4.0;
 
@@ -33,6 +35,8 @@ pub(super) struct Volumes {
     pub(super) gradients: Vec<V3>,
     /// Pressure each region has, Pa.
     pub(super) pressures: Vec<f64>,
+    /// What they stored when last measured, joules.
+    pub(super) stored: f64,
 }
 
 /// A tetrahedron that is thin or turned over.
@@ -71,6 +75,7 @@ impl Volumes {
             parts: Some(parts),
             gradients: vec![V3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
+            stored: 0.0,
         }
     }
 
@@ -79,23 +84,27 @@ impl Volumes {
         self.parts.is_none()
     }
 
-    /// Measures pressures and gradients; returns the energy for steps of `a` (0: what is stored).
+    /// Measures pressures, gradients and what is stored; returns what dashpots count for steps of `a` in a line search.
     pub(super) fn measure(&mut self, body: &Body, x: &[V3], v: &[V3], a: f64) -> f64 {
         let Some(parts) = &self.parts else { return 0.0 };
         let (regions, stiffness, rest) = (&body.regions, &self.stiffness, &self.rest);
         let gradients = Several::new(&regions.starts, &mut self.gradients);
-        parts.sum((&mut self.pressures[..], gradients), |part, (pressures, mut gradients)| {
-            let mut energy = 0.0;
+        let sums = parts.map((&mut self.pressures[..], gradients), |part, (pressures, mut gradients)| {
+            let (mut stored, mut damped) = (0.0, 0.0);
             for ((region, pressure), mine) in parts.range(part).zip(pressures).zip(gradients.iter_mut()) {
                 let particles = &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
                 let lost = regions.measure(region, x, mine) - rest[region];
                 let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
                 let (k, c) = (stiffness[region], stiffness[region] * regions.damping[region]);
                 *pressure = k * lost + c * pace;
-                energy += 0.5 * k * lost * lost + 0.5 * a * c * pace * pace;
+                stored += 0.5 * k * lost * lost;
+                damped += 0.5 * a * c * pace * pace;
             }
-            energy
-        })
+            (stored, damped)
+        });
+        let (stored, damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        self.stored = stored;
+        damped
     }
 
     /// What each region resists for steps of `a`.
@@ -104,25 +113,22 @@ impl Volumes {
         self.stiffness.iter().zip(&body.regions.damping).map(damped).collect()
     }
 
-    /// The tetrahedra that are thin, by index.
-    pub(super) fn thin(&self, body: &Body, x: &[V3], rest: &[f64]) -> Vec<Thin> {
+    /// Those of the `watched` tetrahedra that are thin.
+    pub(super) fn thin(&self, body: &Body, x: &[V3], rest: &[f64], watched: &[u32]) -> Vec<Thin> {
         if self.is_off() {
             return Vec::new();
         }
-        let parts = body.tet_parts.map((), |part, ()| {
-            let of = |tet: usize| {
-                let corners = body.tets[tet];
-                let at = corners.map(|corner| x[corner as usize]);
-                let left = THIN * rest[tet] - volume(at);
-                (left > 0.0).then(|| {
-                    let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
-                    let pressure = stiffness * left;
-                    Thin { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left }
-                })
-            };
-            body.tet_parts.range(part).filter_map(of).collect::<Vec<_>>()
-        });
-        parts.into_iter().flatten().filter(|thin| thin.pressure.is_finite()).collect()
+        let of = |tet: &u32| {
+            let tet = *tet as usize;
+            let corners = body.tets[tet];
+            let at = corners.map(|corner| x[corner as usize]);
+            let left = THIN * rest[tet] - volume(at);
+            let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
+            let pressure = stiffness * left;
+            let thin = Thin { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left };
+            (left > 0.0 && thin.energy.is_finite()).then_some(thin)
+        };
+        watched.iter().filter_map(of).collect()
     }
 }
 
@@ -133,15 +139,41 @@ pub(super) fn opening([a, b, c, d]: [V3; 4]) -> [V3; 4] {
     [-(b + c + d), b, c, d]
 }
 
-/// Tetrahedra inside out, and all volume ÷ all at rest.
-pub(super) fn inventory(body: &Body, x: &[V3], rest: &[f64]) -> (u32, f64) {
-    let parts = body.tet_parts.map((), |part, ()| {
-        body.tet_parts.range(part).fold((0u32, 0.0, 0.0), |(turned, now, before), tet| {
-            let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
-            (turned + u32::from(volume < 0.0), now + volume, before + rest[tet])
-        })
-    });
-    let (turned, now, before) =
-        parts.into_iter().fold((0, 0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1, sum.2 + part.2));
-    (turned, if before > 0.0 { now / before } else { 1.0 })
+/// The tetrahedra of a body, looked over once a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Inventory {
+    /// How many are inside out.
+    pub(super) turned: u32,
+    /// All volume ÷ all at rest.
+    pub(super) ratio: f64,
+    /// Those that may be thin before the next look.
+    pub(super) watched: Vec<u32>,
+}
+
+impl Inventory {
+    /// With particles at `x`.
+    pub(super) fn new(body: &Body, x: &[V3], rest: &[f64]) -> Self {
+        let parts = body.tet_parts.map((), |part, ()| {
+            let (mut turned, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
+            for tet in body.tet_parts.range(part) {
+                let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
+                turned += u32::from(volume < 0.0);
+                if !(volume > WATCHED * rest[tet]) {
+                    watched.push(tet as u32);
+                }
+                now += volume;
+                before += rest[tet];
+            }
+            (turned, now, before, watched)
+        });
+        let (mut all, mut now, mut before) = (Self::default(), 0.0, 0.0);
+        for (turned, volume, rest, watched) in parts {
+            all.turned += turned;
+            all.watched.extend(watched);
+            now += volume;
+            before += rest;
+        }
+        all.ratio = if before > 0.0 { now / before } else { 1.0 };
+        all
+    }
 }
