@@ -211,6 +211,11 @@ impl Body {
         &self.lengths
     }
 
+    /// Where a particle is at rest, by the caller's index, metres.
+    pub fn rest_point(&self, particle: usize) -> [f64; 3] {
+        self.rest[self.order.places[particle] as usize].into()
+    }
+
     /// How many springs the mesh has; those given as such come after them.
     pub fn meshed(&self) -> usize {
         self.meshed

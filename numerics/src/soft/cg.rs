@@ -9,11 +9,16 @@ use super::body::Body;
 use super::coarse::{self, Layout, lever, moved};
 use super::system::{System, halfway, rest_of_the_way};
 
+/// Least share of a residual that is worth asking for where its square has a bound of its own.
+const FINEST: f64 = 1e-4;
+
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     /// Residual at the end ÷ at the start.
     pub(super) share: f64,
+    /// The residual's square is to be this small too, as far as [`FINEST`] of the start allows.
+    pub(super) square: f64,
     /// Most iterations.
     pub(super) cap: u32,
 }
@@ -107,7 +112,8 @@ pub(super) fn solve(
         return reached;
     }
     let (mut rz, mut beta) = (start, 0.0);
-    let enough = limits.share * limits.share * start;
+    let asked = limits.share * limits.share * start;
+    let enough = asked.min(limits.square).max(asked.min(FINEST * FINEST * start));
     loop {
         let smoother = &system.smoother;
         clusters.each(&mut p[..], |cluster, mine: &mut [V3]| {

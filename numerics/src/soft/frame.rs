@@ -12,7 +12,7 @@ use super::step::{Moving, Stepper, Stepped};
 use super::volume::{Inventory, Volumes};
 
 /// Steps that a frame is cut into, at most, where halving is what helps.
-const MOST_STEPS: u32 = 1024;
+const MOST_STEPS: u32 = 256;
 
 /// How time is stepped through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,7 +145,7 @@ impl Solver {
         self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
         let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
         if seconds > 0.0 && !body.is_empty() {
-            let mut stepper = Stepper { work: &mut self.work, setting, frame, seconds, warm: &mut state.warm };
+            let mut stepper = Stepper { work: &mut self.work, setting, frame, seconds, warm: &mut state.warm, reserve: &mut state.reserve };
             run(&mut stepper, &mut moving, &mut energies, &mut report);
         }
         (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
@@ -172,7 +172,7 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
     let steps = stepper.frame.substeps.clamp(1, MOST_STEPS);
     for step in 0..steps {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(moving, times, energies, None);
+        let stepped = stepper.step(moving, times, energies, None, false);
         *energies = stepped.after;
         add(report, &stepped);
     }
@@ -189,22 +189,24 @@ fn adapt(
     /// Most and least that a step is changed by, and what is kept in reserve.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
-    let (mut time, mut share) = (0.0, 1.0_f64);
+    let (mut time, mut share, mut calm) = (0.0, 1.0_f64, false);
     while time < 1.0 {
         // Equal steps to the end, so that no sliver is left there.
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let before = moving.clone();
-        let stepped = stepper.step(moving, [time, end], energies, Some(tolerance));
+        let (before, reserve) = (moving.clone(), *stepper.reserve);
+        let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
         let allowed = tolerance * (end - time);
-        let smallest = end - time <= 1.5 / f64::from(MOST_STEPS);
+        let smallest = end - time <= 2.0 / f64::from(MOST_STEPS);
         let fits = stepped.estimate <= allowed || stepped.euler;
         add(report, &stepped);
         let change = if stepped.estimate > 0.0 { RESERVE * (allowed / stepped.estimate).sqrt() } else { CHANGE[1] };
-        share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).min(1.0);
-        if fits || smallest {
-            report.caps_hit += u32::from(!fits);
+        share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
+        // No step is small enough: what is left of it is calmed.
+        calm = !fits && smallest;
+        if fits {
+            report.caps_hit += u32::from(smallest && stepped.euler);
             *energies = stepped.after;
             time = end;
         } else {
@@ -212,6 +214,7 @@ fn adapt(
             report.error_estimate -= stepped.estimate;
             report.substeps -= 1;
             *moving = before;
+            *stepper.reserve = reserve;
             stepper.look(moving);
         }
     }

@@ -18,6 +18,7 @@ mod contact;
 mod drive;
 mod energy;
 mod frame;
+mod guess;
 mod order;
 mod parts;
 mod plastic;

@@ -10,21 +10,27 @@ use super::cg::{self, Coarse, Limits};
 use super::coarse::{self, Layout};
 use super::contact::{Mode, Touch, Touching};
 use super::drive::Drive;
+use super::guess::Turn;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
 use super::springs::{self, Link, Motion, Record, Rest};
 use super::state::Warm;
 use super::system::{System, halfway, smoother};
 use super::volume::{Inventory, Thin, Volumes};
+use nalgebra::Matrix3;
 
 /// Share of the first residual that linear equations may leave.
 const CG_SHARE: f64 = 0.1;
+/// Share of the energy that turns free pieces which a linear solve may leave as noise: it would slow them.
+const NOISE: f64 = 1e-8;
 /// Iterations a linear solve has at most.
 const CG_CAP: u32 = 300;
 /// Times as many iterations as when it was new, at which the coarse factor is made again.
 const STALE: f64 = 1.5;
 /// Share of the first residual above which what the derivative did not foresee asks for another iteration.
 const UNFORESEEN: f64 = 0.5;
+/// Times as large as before that a residual's square may be after an iteration without line search.
+const RISE: f64 = 100.0;
 /// Iterations a stage may have where contacts change.
 const CONTACT_ITERATIONS: u32 = 6;
 /// Halvings of a step that a line search tries.
@@ -42,6 +48,8 @@ pub(super) struct Stage<'a> {
     /// Share of the frame passed at its end.
     pub(super) time: f64,
     pub(super) contacts: &'a [Touching],
+    /// Energy that turns free pieces, joules.
+    pub(super) spinning: f64,
     /// Which of a step's stages, for the count of iterations.
     pub(super) index: usize,
 }
@@ -142,6 +150,7 @@ impl Work {
         warm: &mut Warm,
         x: &mut Vec<V3>,
     ) -> Solved {
+        let body = on.body;
         self.find_free(on, stage);
         let mut solved = Solved::default();
         let mut first = 0.0;
@@ -168,6 +177,10 @@ impl Work {
             self.assemble(on, stage, x, false);
             let after = self.square();
             let unforeseen = share == 1.0 && self.distance(&foreseen) > UNFORESEEN * UNFORESEEN * before;
+            if !newton.search && !(after <= RISE * before) {
+                solved.failed = true;
+                return solved;
+            }
             solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
             let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
             let changed = self.touches.iter().zip(&modes).any(|(touch, mode)| touch.mode != *mode);
@@ -175,7 +188,8 @@ impl Work {
             let done = longest <= newton.tolerance && !changed;
             let wanted = solved.newton < newton.least || changed || unforeseen || newton.tolerance > 0.0;
             if done || !wanted || solved.newton >= most || share == 0.0 {
-                solved.failed |= !after.is_finite() || (unforeseen && !newton.search && after > 4.0 * first);
+                solved.failed |= !after.is_finite();
+                self.turn(body, x);
                 return solved;
             }
         }
@@ -190,7 +204,7 @@ impl Work {
     /// A⁻¹r, by conjugate gradients.
     pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<V3>) -> cg::Reached {
         let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
-        let limits = Limits { share: CG_SHARE, cap: CG_CAP };
+        let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![V3::zeros(); r.len()];
         let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
         *r = out;
@@ -359,13 +373,14 @@ impl Work {
         }
         let fresh = &mut warm.fresh[stage.index];
         let bound = if *fresh == 0 { CG_CAP } else { (3 * *fresh).max(*fresh + 10) };
-        let limits = Limits { share: CG_SHARE, cap: bound.min(CG_CAP) };
+        let square = if stage.spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * stage.spinning } else { f64::INFINITY };
+        let limits = Limits { share: CG_SHARE, square, cap: bound.min(CG_CAP) };
         let mut reached = self.iterate(body, warm, limits);
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // Stale past use: go on with a new one.
             self.renew(body, warm);
-            let limits = Limits { share: (CG_SHARE / reached.share.max(CG_SHARE)).min(1.0), cap: CG_CAP };
+            let limits = Limits { share: (CG_SHARE / reached.share.max(CG_SHARE)).min(1.0), square, cap: CG_CAP };
             reached = self.iterate(body, warm, limits);
             solved.cg += reached.iterations;
         }
@@ -436,6 +451,34 @@ impl Work {
                     self.dx[place] += by;
                     self.r[place] -= by * self.system.inertia[place];
                 }
+            }
+        }
+    }
+
+    /// Turns each free piece as a whole so that it has the angular momentum of the stage's equation, whatever linear solves
+    /// left: springs and volumes do not feel it.
+    fn turn(&self, body: &Body, x: &mut [V3]) {
+        /// Share of a piece's inertia below which it has none about an axis.
+        const NOTHING: f64 = 1e-9;
+        let clusters = &body.order.clusters;
+        let inertia = &self.system.inertia;
+        for (_, piece) in body.order.pieces.iter().enumerate().filter(|(index, _)| self.free[*index]) {
+            let places = clusters.range(piece.start).start..clusters.range(piece.end - 1).end;
+            let (sum, mass) = places
+                .clone()
+                .fold((V3::zeros(), 0.0), |(sum, mass), place| (sum + x[place] * inertia[place], mass + inertia[place]));
+            let middle = sum / mass;
+            let (mut torque, mut tensor) = (V3::zeros(), Matrix3::zeros());
+            for place in places.clone() {
+                let arm = x[place] - middle;
+                torque += arm.cross(&self.r[place]);
+                tensor += (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * inertia[place];
+            }
+            tensor += Matrix3::identity() * (NOTHING * tensor.trace());
+            let Some(angle) = tensor.try_inverse().map(|inverse| inverse * torque) else { continue };
+            if angle.iter().all(|x| x.is_finite()) {
+                let turn = Turn::by(angle);
+                x[places].iter_mut().for_each(|x| *x = middle + turn.apply(*x - middle));
             }
         }
     }

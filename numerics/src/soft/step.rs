@@ -12,6 +12,7 @@ use super::body::Body;
 use super::contact::{Contact, Query, Touching, arrest};
 use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
+use super::guess::{Guess, Rigid};
 use super::stage::{Newton, Setting, Solved, Stage, Work};
 use super::state::Warm;
 use super::volume::Inventory;
@@ -60,17 +61,20 @@ pub(super) struct Stepper<'a> {
     /// Of the frame.
     pub(super) seconds: f64,
     pub(super) warm: &'a mut Warm,
+    /// Energy that steps have lost so far and that rounding of others may bring back, joules.
+    pub(super) reserve: &'a mut f64,
 }
 
 impl Stepper<'_> {
     /// From one of `times`, shares of the frame, to the other; `tolerance` in metres where Newton's method is to converge.
-    /// `before` are the energies there.
+    /// `before` are the energies there; `calm` asks for implicit Euler.
     pub(super) fn step(
         &mut self,
         moving: &mut Moving,
         times: [f64; 2],
         before: &Energies,
         tolerance: Option<f64>,
+        calm: bool,
     ) -> Stepped {
         let h = (times[1] - times[0]) * self.seconds;
         let body = self.setting.body;
@@ -82,7 +86,7 @@ impl Stepper<'_> {
         let full = self.contacts(&start.x, &ahead(1.0), times, &firmness);
         let taken = arrest(&full, body, &self.setting.drive.held, &start.x, &mut moving.v, h);
         let turned = self.frame.volume > 0.0 && self.work.inventory.turned > 0;
-        let rough = self.frame.rough || turned || taken > IMPACT * kinetic(body, &start.v);
+        let rough = calm || self.frame.rough || turned || taken > IMPACT * kinetic(body, &start.v);
         let mut after = None;
         if rough || self.frame.integrator == Integrator::Euler {
             moving.v.clone_from(&start.v);
@@ -114,6 +118,8 @@ impl Stepper<'_> {
         self.look(moving);
         if self.undriven() {
             self.shed(before, moving, &mut stepped);
+        } else {
+            *self.reserve = 0.0;
         }
         stepped
     }
@@ -152,7 +158,7 @@ impl Stepper<'_> {
         let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = moving.x.clone();
         self.pin(&mut x, &mut z, times[1], h);
-        let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, index: 0 };
+        let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, spinning: 0.0, index: 0 };
         let newton = Newton { least: MOST, most: MOST, tolerance: 0.0, search: true };
         let solved = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
         moving.v = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
@@ -167,11 +173,11 @@ impl Stepper<'_> {
         let middle = times[0] + GAMMA * (times[1] - times[0]);
         let newton = self.newton(tolerance);
 
-        let mut x: Vec<V3> = (0..body.len())
-            .map(|place| moving.x[place] + (moving.v[place] + moving.trend[place] * a) * (2.0 * a))
-            .collect();
+        let start = moving.clone();
+        let guess = Guess::new(body, &self.setting.drive.held, &start.x, &start.v, &start.trend, h);
+        let mut x = guess.at(2.0 * a);
         let contacts = self.contacts(&moving.x, &x, [times[0], middle], firmness);
-        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts: &contacts, index: 0 };
+        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts: &contacts, spinning: guess.spinning(), index: 0 };
         let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v, 2.0 * a);
         let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
         let y: Vec<V3> = (0..x.len())
@@ -191,15 +197,10 @@ impl Stepper<'_> {
         };
         let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
         let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
-        let mut x: Vec<V3> = (0..body.len())
-            .map(|place| {
-                let (start, pace) = (moving.x[place], moving.v[place] * h);
-                start + pace + (x_middle[place] - start - pace * GAMMA) / (GAMMA * GAMMA)
-            })
-            .collect();
+        let mut x = guess.past(h, GAMMA, &x_middle, body);
         let contacts = self.contacts(&x_middle, &x, [middle, times[1]], firmness);
         self.pin(&mut x, &mut z, times[1], a);
-        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts: &contacts, index: 1 };
+        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts: &contacts, spinning: guess.spinning(), index: 1 };
         let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
         let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
 
@@ -238,30 +239,43 @@ impl Stepper<'_> {
     }
 
     /// Slows all particles against their mean where the step made energy.
-    fn shed(&self, before: &Energies, moving: &mut Moving, stepped: &mut Stepped) {
+    fn shed(&mut self, before: &Energies, moving: &mut Moving, stepped: &mut Stepped) {
         /// Share of the energy that is rounding.
         const ROUNDING: f64 = 1e-9;
         let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
-        if !(gained > ROUNDING * before.scale().max(after.scale())) {
+        *self.reserve -= gained;
+        if *self.reserve >= -ROUNDING * before.scale().max(after.scale()) {
             return;
         }
         let body = self.setting.body;
-        let mass: f64 = body.mass.iter().sum();
-        let mean = moving.v.iter().zip(&body.mass).map(|(v, m)| v * *m).sum::<V3>() / mass;
-        let inner = after.kinetic - 0.5 * mass * mean.norm_squared();
-        if !(inner > 0.0) {
-            return;
-        }
-        let keep = ((inner - gained) / inner).max(0.0).sqrt();
-        for (v, held) in moving.v.iter_mut().zip(&self.setting.drive.held) {
-            if !held {
-                *v = mean + (*v - mean) * keep;
+        let held = &self.setting.drive.held;
+        // What bends a piece pays first, then all that is not a shift of it: momentum is not to pay.
+        for turning in [true, false] {
+            let gained = -*self.reserve;
+            let mut moved = moving.v.clone();
+            for piece in &body.order.pieces {
+                let rigid = Rigid::new(body, held, piece, &moving.x, &moving.v, &moving.trend);
+                let rigid = if turning { rigid } else { rigid.shift() };
+                for place in rigid.places.clone() {
+                    moved[place] = rigid.velocity(moving.x[place]);
+                }
             }
+            let own = |v: &[V3], place: usize| v[place] - moved[place];
+            let inner: f64 =
+                (0..body.len()).map(|place| 0.5 * body.mass[place] * own(&moving.v, place).norm_squared()).sum();
+            if !(gained > 0.0 && inner > 0.0) {
+                continue;
+            }
+            let keep = ((inner - gained) / inner).max(0.0).sqrt();
+            for place in (0..body.len()).filter(|place| !held[*place]) {
+                moving.v[place] = moved[place] + own(&moving.v, place) * keep;
+            }
+            let kinetic = kinetic(body, &moving.v);
+            *self.reserve += after.kinetic - kinetic;
+            stepped.shed += after.kinetic - kinetic;
+            after.kinetic = kinetic;
         }
-        let kinetic = kinetic(body, &moving.v);
-        stepped.shed += after.kinetic - kinetic;
-        after.kinetic = kinetic;
     }
 }
 

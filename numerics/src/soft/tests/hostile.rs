@@ -87,9 +87,9 @@ fn turned_and_flat_tetrahedra_open_again() {
         let mut state = State::at_rest(&body);
         scramble(&mut state, 1.5);
         let mut solver = Solver::new(&body);
-        let frame = Frame { integrator, ..BARE };
+        let frame = Frame { integrator, volume: 1.0, ..BARE };
         let first = solver.step(&body, &mut state, &frame);
-        assert!(first.inverted_tets > 20);
+        assert!(first.volume_energy > 1.0, "{first:?}");
         let mut report = first;
         for _ in 0..120 {
             report = solver.step(&body, &mut state, &frame);
@@ -127,7 +127,7 @@ fn springs_of_no_length_and_particles_in_one_place() {
         let springs = [spring(0, 1, 0.0), spring(1, 2, 0.5), spring(2, 3, 0.5), spring(1, 3, 0.5)];
         let body = Body::of_springs(&points, &[1.0; 4], &springs).unwrap();
         let mut state = State::at_rest(&body);
-        let report = survives(&body, &mut state, &Frame { integrator, ..BARE }, 2.0);
+        let report = survives(&body, &mut state, &Frame { integrator, ..BARE }, 5.0);
         let length = (V3::from(state.positions[1]) - V3::from(state.positions[2])).norm();
         assert!(report.kinetic.is_finite() && length > 0.3, "doubled particles part: {length}");
         let tight = (V3::from(state.positions[0]) - V3::from(state.positions[1])).norm();
@@ -169,6 +169,7 @@ fn pins_pulled_a_hundred_lengths_in_a_frame_and_back() {
                 let pins: Vec<Pin> =
                     held.iter().map(|i| Pin { particle: *i as u32, between: [place(i, x), place(i, to)] }).collect();
                 let report = solver.step(&body, &mut state, &Frame { pins: &pins, integrator, ..Frame::default() });
+                eprintln!("{integrator:?} {stiffness:e} {frame} {report:?}");
                 assert!(is_finite(&state) && report.stopped == 0, "frame {frame}");
                 assert!(pins.iter().all(|pin| state.positions[pin.particle as usize] == pin.between[1]));
                 x = to;
