@@ -143,6 +143,8 @@ pub struct Body {
     means: Vec<Vec<u32>>,
     /// Longest side of the box of the points at rest, metres.
     pub(super) size: f64,
+    /// Mean length of its springs at rest, metres.
+    pub(super) spacing: f64,
 }
 
 /// A spring as one of its ends sees it.
@@ -231,6 +233,12 @@ impl Body {
         self.size
     }
 
+    /// Where the particles of a piece are.
+    pub(super) fn places(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let clusters = &self.order.clusters;
+        clusters.range(piece.start).start..clusters.range(piece.end - 1).end
+    }
+
     /// Brings values a particle, by the caller's index, into the solver's order.
     pub(super) fn inwards<T: Copy>(&self, values: &[T]) -> Vec<T> {
         self.order.callers.iter().map(|caller| values[*caller as usize]).collect()
@@ -304,7 +312,8 @@ impl Body {
         let order = Order::new(&points, ends.iter().copied());
 
         let length = |ends: &[u32; 2]| (points[ends[0] as usize] - points[ends[1] as usize]).norm();
-        let lengths = ends[..meshed].iter().map(length).chain(joints.iter().map(|spring| spring.length)).collect();
+        let lengths: Vec<f64> = ends[..meshed].iter().map(length).chain(joints.iter().map(|spring| spring.length)).collect();
+        let spacing = mean(&lengths);
         let given: Vec<Given> = mesh
             .tets
             .iter()
@@ -345,6 +354,7 @@ impl Body {
             kept,
             means,
             meshed,
+            spacing,
         })
     }
 }

@@ -2,8 +2,7 @@
 //!
 //! The solver asks a [`Contacts`] once a stage for all that may touch, and treats each as a spring that only pushes and only
 //! below the distance kept, without limit where the surfaces meet: N = κδ ÷ (1 − δ/gap), implicit like every other force.
-//! Friction is Coulomb's with N, sticking to a creep of [`CREEP`] body lengths a second, implicit too; N in it is that of the
-//! Newton iteration before.
+//! Friction is Coulomb's, sticking to a creep of [`CREEP`] body lengths a second, implicit too, with N as the step begins.
 //!
 //! Limit: the surfaces a contact was found for are planes within the stage.
 
@@ -14,8 +13,12 @@ use super::rows::add_square;
 /// κ ÷ what the particles put up against being moved: springs and inertia together. More holds the gap better in one
 /// iteration, less converges faster.
 const FIRM: f64 = 30.0;
+/// Most that sticking resists a slip of a frame ÷ κ: beyond, frictions like 1e6 would only be noise.
+const HOLD: f64 = 1e4;
 /// Share of the gap from where on the push grows straight on: its slope is 1/(1 − that)² of the first.
 const STRAIGHT: f64 = 0.9;
+/// Share of its gap below which a contact is too deep to leave it there.
+const DEEP: f64 = 0.92;
 /// Body lengths a second at which friction is all of μN; below it creeps in proportion.
 const CREEP: f64 = 2e-5;
 
@@ -68,6 +71,12 @@ pub(super) struct Touching {
     friction: f64,
     /// κ, N/m.
     firm: f64,
+    /// Most that sticking resists slip with, N·s/m.
+    hold: f64,
+    /// N that friction counts, newtons.
+    load: f64,
+    /// What it is taken to do throughout a step.
+    frozen: Option<Touch>,
 }
 
 /// What a contact does.
@@ -76,9 +85,11 @@ pub(super) enum Mode {
     /// Nothing.
     #[default]
     Apart,
-    /// Pushes, and its surfaces stick.
+    /// Pushes, without friction.
+    Pushes,
+    /// Its surfaces stick.
     Sticks,
-    /// Pushes, and its surfaces slide.
+    /// Its surfaces slide.
     Slides,
 }
 
@@ -99,6 +110,13 @@ pub(super) struct Touch {
     pub(super) energy: f64,
 }
 
+impl Touch {
+    /// What Newton's method asks whether it has changed.
+    pub(super) fn state(&self) -> (Mode, bool) {
+        (self.mode, self.push > 0.0)
+    }
+}
+
 impl Touching {
     /// A contact as found, for frames of `seconds`; `firmness` is each particle's Σk.
     pub(super) fn new(body: &Body, contact: &Contact, seconds: f64, firmness: &[f64]) -> Option<Self> {
@@ -116,6 +134,9 @@ impl Touching {
             velocity: V3::from(contact.velocity),
             friction: contact.friction.max(0.0),
             firm: 0.0,
+            hold: 0.0,
+            load: 0.0,
+            frozen: None,
         };
         let mut yielding = 0.0;
         for k in 0..4 {
@@ -127,6 +148,7 @@ impl Touching {
             }
         }
         touching.firm = FIRM / yielding;
+        touching.hold = HOLD * touching.firm * seconds;
         (yielding > 0.0 && touching.firm.is_finite()).then_some(touching)
     }
 
@@ -134,6 +156,17 @@ impl Touching {
     pub(super) fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
         let sides: [(usize, f64); 4] = std::array::from_fn(|k| (self.places[k] as usize, self.weights[k]));
         sides.into_iter().filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// Share of the gap that a depth takes up.
+    fn taken(&self, depth: f64) -> f64 {
+        if self.gap > 0.0 { depth / self.gap } else { 0.0 }
+    }
+
+    /// Whether it is deeper than it may stay.
+    pub(super) fn too_near(&self, x: &[V3]) -> bool {
+        let depth = -self.clearance(x, 0.0);
+        depth > 0.0 && self.taken(depth) > DEEP
     }
 
     /// Whether one particle alone is in it.
@@ -153,14 +186,48 @@ impl Touching {
         self.normal.dot(&self.between(x)) - offset - self.gap
     }
 
-    /// How fast the surfaces part, m/s.
-    pub(super) fn parting(&self, v: &[V3]) -> f64 {
-        self.normal.dot(&(self.between(v) - self.velocity))
+    /// Takes it to go on as at `x` and `v`, `seconds` before the time it was found for: to push or not, stick or slide, with
+    /// the push a straight line of the depth. A step that only pushes one way is no step of order 2; one that goes on is.
+    pub(super) fn frozen(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Self {
+        Self { frozen: Some(self.at(x, v, seconds, size)), ..*self }
+    }
+
+    /// Whether what a frozen contact was taken to do is what it does at `x` and `v`.
+    pub(super) fn goes_on(&self, x: &[V3], v: &[V3]) -> bool {
+        let Some(then) = self.frozen else { return true };
+        let depth = -self.clearance(x, 0.0);
+        let push = then.push + then.slope * (depth - then.depth);
+        let slip = self.slip(v);
+        let stays = depth > 0.0 && self.taken(depth) < STRAIGHT;
+        match then.mode {
+            Mode::Apart => depth <= 0.0,
+            Mode::Pushes => stays,
+            Mode::Sticks => stays && slip.norm() * then.grip <= self.friction * push.max(0.0),
+            Mode::Slides => stays && slip.dot(&then.slip) >= 0.0,
+        }
+    }
+
+    /// How fast the surfaces slip.
+    fn slip(&self, v: &[V3]) -> V3 {
+        let pace = self.between(v) - self.velocity;
+        pace - self.normal * self.normal.dot(&pace)
     }
 
     /// What it does at `x` and `v`, `seconds` before the time it was found for; `size` is the body's.
     pub(super) fn at(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Touch {
         let depth = -self.clearance(x, seconds);
+        if let Some(then) = self.frozen {
+            let push = then.push + then.slope * (depth - then.depth);
+            let drag = match then.mode {
+                Mode::Apart | Mode::Pushes => V3::zeros(),
+                Mode::Sticks => self.slip(v) * then.grip,
+                Mode::Slides => then.slip * (self.friction * self.load),
+            };
+            let force = if then.mode == Mode::Apart { V3::zeros() } else { self.normal * push - drag };
+            // Sliding goes on whatever its speed: nothing resists across it either.
+            let grip = if then.mode == Mode::Slides { 0.0 } else { then.grip };
+            return Touch { depth, push, force, grip, ..then };
+        }
         let mut touch = Touch {
             mode: Mode::Apart,
             force: V3::zeros(),
@@ -171,19 +238,17 @@ impl Touching {
             slip: V3::zeros(),
             energy: 0.0,
         };
-        if !(depth > 0.0) {
-            return touch;
+        if depth > 0.0 {
+            touch.mode = Mode::Pushes;
+            (touch.push, touch.slope, touch.energy) = self.spring(depth);
+            touch.force = self.normal * touch.push;
         }
-        let (push, slope, energy) = self.spring(depth);
-        touch.mode = Mode::Sticks;
-        (touch.push, touch.slope, touch.energy) = (push, slope, energy);
-        touch.force = self.normal * push;
-        let most = self.friction * push;
-        let creep = (CREEP * size).max(f64::MIN_POSITIVE);
+        // A load goes on through the step, as otherwise friction would begin and end with a jump.
+        let most = self.friction * self.load;
         if most > 0.0 {
-            let slip = self.between(v) - self.velocity;
-            let slip = slip - self.normal * self.normal.dot(&slip);
-            let speed = slip.norm();
+            let slip = self.slip(v);
+            let (speed, creep) = (slip.norm(), creep(size).max(most / self.hold));
+            touch.mode = Mode::Sticks;
             if speed <= creep {
                 touch.grip = most / creep;
             } else {
@@ -194,6 +259,15 @@ impl Touching {
             touch.force -= slip * touch.grip;
         }
         touch
+    }
+
+    /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
+    /// of its own, and what is solved stays convex. A contact that begins has none yet.
+    pub(super) fn loaded(&self, x: &[V3], seconds: f64) -> Self {
+        let depth = -self.clearance(x, seconds);
+        // Where surfaces are through each other the push is no load but a way out.
+        let deepest = if self.gap > 0.0 { STRAIGHT * self.gap } else { f64::INFINITY };
+        Self { load: if depth > 0.0 { self.spring(depth.min(deepest)).0 } else { 0.0 }, ..*self }
     }
 
     /// The push at a depth > 0, its slope, and the energy it stores.
@@ -215,65 +289,45 @@ impl Touching {
         (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
     }
 
-    /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does and N stays `push`.
-    pub(super) fn friction_energy(&self, push: f64, v: &[V3], a: f64, size: f64) -> f64 {
-        let most = self.friction * push;
-        let creep = (CREEP * size).max(f64::MIN_POSITIVE);
-        let slip = self.between(v) - self.velocity;
-        let speed = (slip - self.normal * self.normal.dot(&slip)).norm();
+    /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does.
+    pub(super) fn friction_energy(&self, v: &[V3], a: f64, size: f64) -> f64 {
+        let most = self.friction * self.load;
+        let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.hold));
         let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
         a * most * held
     }
 
-    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness.
-    pub(super) fn resisted(&self, touch: &Touch, a: f64) -> ([V3; 3], usize) {
+    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness. Sliding surfaces
+    /// do not resist faster or slower sliding, which is exact; a `careful` answer has them resist like slower ones would,
+    /// which never overshoots.
+    pub(super) fn resisted(&self, touch: &Touch, a: f64, careful: bool) -> ([V3; 3], usize) {
         let n = self.normal;
         let mut out = [n * (a * a * touch.slope).max(0.0).sqrt(), V3::zeros(), V3::zeros()];
         let grip = (a * touch.grip).max(0.0).sqrt();
         match touch.mode {
             Mode::Apart => (out, 0),
-            Mode::Sticks if grip > 0.0 => {
+            Mode::Pushes => (out, 1),
+            Mode::Sticks => {
                 let across = n.cross(&if n.x.abs() < 0.7 { V3::x() } else { V3::y() }).normalize();
                 out[1] = across * grip;
                 out[2] = n.cross(&across) * grip;
                 (out, 3)
             }
-            Mode::Sticks => (out, 1),
             Mode::Slides => {
                 out[1] = n.cross(&touch.slip) * grip;
-                (out, 2)
+                out[2] = touch.slip * grip;
+                (out, if careful { 3 } else { 2 })
             }
         }
     }
 
     /// That, as the block of a particle alone in it.
-    pub(super) fn add_block(&self, touch: &Touch, a: f64, weight: f64, block: &mut [f64; 6]) {
-        let (directions, count) = self.resisted(touch, a);
-        directions[..count].iter().for_each(|way| add_square(block, *way, weight * weight));
+    pub(super) fn add_block(&self, resisted: &([V3; 3], usize), weight: f64, block: &mut [f64; 6]) {
+        resisted.0[..resisted.1].iter().for_each(|way| add_square(block, *way, weight * weight));
     }
 }
 
-/// Contacts whose surfaces would meet within `seconds` lose, as a whole, the speed beyond what brings them there in that
-/// time: the inelastic impact of their particles. Returns the energy it takes, joules.
-pub(super) fn arrest(touching: &[Touching], body: &Body, held: &[bool], x: &[V3], v: &mut [V3], seconds: f64) -> f64 {
-    /// Sweeps over contacts that share particles.
-    const SWEEPS: usize = 4;
-    let mut taken = 0.0;
-    for _ in 0..SWEEPS {
-        for contact in touching {
-            let allowed = -contact.clearance(x, seconds).max(0.0) / seconds;
-            let excess = allowed - contact.parting(v);
-            let yielding: f64 =
-                contact.sides().filter(|side| !held[side.0]).map(|(place, w)| w * w / body.mass[place]).sum();
-            if excess > 0.0 && yielding > 0.0 {
-                let impulse = excess / yielding;
-                for (place, weight) in contact.sides().filter(|side| !held[side.0]) {
-                    let change = contact.normal * (weight * impulse / body.mass[place]);
-                    taken -= body.mass[place] * change.dot(&(v[place] + change * 0.5));
-                    v[place] += change;
-                }
-            }
-        }
-    }
-    taken
+/// Slip at which friction is all of μN, m/s.
+fn creep(size: f64) -> f64 {
+    (CREEP * size).max(f64::MIN_POSITIVE)
 }

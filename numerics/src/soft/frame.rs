@@ -92,7 +92,7 @@ pub struct Report {
     pub volume_energy: f64,
     /// In goals, joules.
     pub goal_energy: f64,
-    /// Taken by impacts, or because a step would have made energy, joules.
+    /// Taken because a step would have made energy, joules.
     pub energy_shed: f64,
     /// Volume ÷ volume at rest.
     pub volume_ratio: f64,
@@ -145,7 +145,15 @@ impl Solver {
         self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
         let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
         if seconds > 0.0 && !body.is_empty() {
-            let mut stepper = Stepper { work: &mut self.work, setting, frame, seconds, warm: &mut state.warm, reserve: &mut state.reserve };
+            let mut stepper = Stepper {
+                work: &mut self.work,
+                setting,
+                frame,
+                seconds,
+                warm: &mut state.warm,
+                unsettled: &mut state.unsettled,
+                reserve: &mut state.reserve,
+            };
             run(&mut stepper, &mut moving, &mut energies, &mut report);
         }
         (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);

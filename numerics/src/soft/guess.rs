@@ -29,8 +29,7 @@ pub(super) struct Rigid {
 impl Rigid {
     /// The rigid motion with the momenta of a piece; rest where it has `held` particles.
     pub(super) fn new(body: &Body, held: &[bool], piece: &Range<usize>, x: &[V3], v: &[V3], trend: &[V3]) -> Self {
-        let clusters = &body.order.clusters;
-        let places = clusters.range(piece.start).start..clusters.range(piece.end - 1).end;
+        let places = body.places(piece);
         let [middle, pace, spin] = [V3::zeros(); 3];
         let still = Self { places: places.clone(), middle, pace, spin, trend: V3::zeros(), energy: 0.0 };
         if held[places.clone()].contains(&true) {

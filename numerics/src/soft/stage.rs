@@ -11,6 +11,7 @@ use super::coarse::{self, Layout};
 use super::contact::{Mode, Touch, Touching};
 use super::drive::Drive;
 use super::guess::Turn;
+use super::order::pieces;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
 use super::springs::{self, Link, Motion, Record, Rest};
@@ -32,7 +33,9 @@ const UNFORESEEN: f64 = 0.5;
 /// Times as large as before that a residual's square may be after an iteration without line search.
 const RISE: f64 = 100.0;
 /// Iterations a stage may have where contacts change.
-const CONTACT_ITERATIONS: u32 = 6;
+const CONTACT_ITERATIONS: u32 = 20;
+/// Share of a step that a line search takes where friction is made linear with more care from then on.
+const CAREFUL: f64 = 0.3;
 /// Halvings of a step that a line search tries.
 const HALVINGS: u32 = 8;
 /// Share of the objective that is rounding: a smaller decrease is not searched for.
@@ -48,6 +51,8 @@ pub(super) struct Stage<'a> {
     /// Share of the frame passed at its end.
     pub(super) time: f64,
     pub(super) contacts: &'a [Touching],
+    /// Seconds from there to the time that contacts were found for.
+    pub(super) early: f64,
     /// Energy that turns free pieces, joules.
     pub(super) spinning: f64,
     /// Which of a step's stages, for the count of iterations.
@@ -67,13 +72,21 @@ pub(super) struct Setting<'a> {
 /// When Newton's method stops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newton {
-    /// Iterations at least and at most.
-    pub(super) least: u32,
+    /// Iterations at most; contacts that change get [`CONTACT_ITERATIONS`].
     pub(super) most: u32,
+    /// With a line search, the share of the first residual that ends it.
+    pub(super) share: f64,
     /// A step this short ends it, metres.
     pub(super) tolerance: f64,
     /// Whether the objective may not rise.
     pub(super) search: bool,
+}
+
+/// How sliding contacts resist in the linear system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Friction {
+    Exact,
+    Careful,
 }
 
 /// What a stage took and reached.
@@ -110,8 +123,9 @@ pub(super) struct Work {
     touches: Vec<Touch>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
     extra: Vec<V3>,
-    /// Pieces whose momentum nothing outside but gravity changes.
-    free: Vec<bool>,
+    /// The group of each piece whose momentum nothing outside but gravity changes, and pieces that nothing touches.
+    groups: Vec<Option<u32>>,
+    turns: Vec<bool>,
 }
 
 impl Work {
@@ -127,9 +141,9 @@ impl Work {
         Self { system, layout: Layout::new(&body.order), r: vec![V3::zeros(); count], ..Self::default() }
     }
 
-    /// The force on each particle at `x` and `v`, `seconds` before the time that contacts were found for.
-    pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3], seconds: f64) -> Vec<V3> {
-        self.loose_forces(on, stage, x, v, seconds);
+    /// The force on each particle at `x` and `v`.
+    pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) -> Vec<V3> {
+        self.loose_forces(on, stage, x, v);
         let mut out = vec![V3::zeros(); x.len()];
         let (body, work) = (on.body, &*self);
         let motion = Motion { x, v };
@@ -154,14 +168,15 @@ impl Work {
         self.find_free(on, stage);
         let mut solved = Solved::default();
         let mut first = 0.0;
+        let mut friction = Friction::Exact;
         loop {
-            self.assemble(on, stage, x, true);
+            self.assemble(on, stage, x, Some(friction));
             let before = self.square();
             if solved.newton == 0 {
                 first = before;
             }
-            let modes: Vec<Mode> = self.touches.iter().map(|touch| touch.mode).collect();
-            let base = if newton.search { self.objective(on, stage, x, None) } else { 0.0 };
+            let modes: Vec<(Mode, bool)> = self.touches.iter().map(Touch::state).collect();
+            let base = if newton.search { self.objective(on, stage, x) } else { 0.0 };
             self.direction(on, stage, warm, x, &mut solved);
             solved.newton += 1;
             let foreseen = std::mem::take(&mut self.r);
@@ -174,20 +189,29 @@ impl Work {
             self.dx.iter_mut().for_each(|d| *d *= share);
             x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d);
             self.r = vec![V3::zeros(); x.len()];
-            self.assemble(on, stage, x, false);
+            self.assemble(on, stage, x, None);
             let after = self.square();
-            let unforeseen = share == 1.0 && self.distance(&foreseen) > UNFORESEEN * UNFORESEEN * before;
             if !newton.search && !(after <= RISE * before) {
                 solved.failed = true;
                 return solved;
             }
             solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
             let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
-            let changed = self.touches.iter().zip(&modes).any(|(touch, mode)| touch.mode != *mode);
-            let most = if changed { newton.most.max(CONTACT_ITERATIONS) } else { newton.most };
-            let done = longest <= newton.tolerance && !changed;
-            let wanted = solved.newton < newton.least || changed || unforeseen || newton.tolerance > 0.0;
-            if done || !wanted || solved.newton >= most || share == 0.0 {
+            let unforeseen = share == 1.0 && self.distance(&foreseen) > UNFORESEEN * UNFORESEEN * before;
+            let changed = self.touches.iter().zip(&modes).any(|(touch, state)| touch.state() != *state);
+            let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
+            let stuck = share < CAREFUL && friction == Friction::Exact && !self.touches.is_empty();
+            friction = if share < CAREFUL { Friction::Careful } else { Friction::Exact };
+            let most = if changed || deep || stuck { CONTACT_ITERATIONS } else { newton.most };
+            let wanted = if newton.search {
+                solved.residual > newton.share
+            } else if newton.tolerance > 0.0 {
+                longest > newton.tolerance
+            } else {
+                unforeseen
+            };
+            let wanted = (wanted && share > 0.0) || stuck || ((changed || deep) && share > 0.0);
+            if !wanted || solved.newton >= most {
                 solved.failed |= !after.is_finite();
                 self.turn(body, x);
                 return solved;
@@ -213,17 +237,17 @@ impl Work {
 
     /// Contacts that push, and the deepest of them, metres below its gap.
     pub(super) fn touching(&self) -> (u32, f64) {
-        let pushing = self.touches.iter().filter(|touch| touch.mode != Mode::Apart);
+        let pushing = self.touches.iter().filter(|touch| touch.push > 0.0);
         pushing.fold((0, 0.0), |(count, deepest), touch| (count + 1, touch.depth.max(deepest)))
     }
 
     /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
-    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3], seconds: f64) {
+    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) {
         let body = on.body;
         self.volumes.measure(body, x, v, 0.0);
         self.thin = self.volumes.thin(body, x, on.volumes, &self.inventory.watched);
         self.touches.clear();
-        self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, seconds, body.size)));
+        self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, stage.early, body.size)));
         self.extra.clear();
         if !self.thin.is_empty() || !self.touches.is_empty() {
             self.extra.resize(x.len(), V3::zeros());
@@ -259,16 +283,16 @@ impl Work {
     }
 
     /// The residual at `x`, and where `linear` the system there.
-    fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: bool) {
+    fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: Option<Friction>) {
         let (body, a) = (on.body, stage.a);
         let clusters = &body.order.clusters;
         let mut v = std::mem::take(&mut self.v);
         velocities(clusters, x, stage, &mut v);
-        self.loose_forces(on, stage, x, &v, 0.0);
+        self.loose_forces(on, stage, x, &v);
         let motion = Motion { x, v: &v };
         let mut r = std::mem::take(&mut self.r);
-        if linear {
-            self.set_rows(on, stage);
+        if let Some(friction) = linear {
+            self.set_rows(on, stage, friction == Friction::Careful);
             let mut system = std::mem::take(&mut self.system);
             let (held, blocks, regions, loose) = (&system.held, &system.blocks, &system.regions, &system.loose);
             let parts = (
@@ -322,11 +346,11 @@ impl Work {
     }
 
     /// What volumes, thin tetrahedra and contacts resist.
-    fn set_rows(&mut self, on: &Setting<'_>, stage: &Stage<'_>) {
+    fn set_rows(&mut self, on: &Setting<'_>, stage: &Stage<'_>, careful: bool) {
         let (body, a) = (on.body, stage.a);
         let clusters = &body.order.clusters;
         if !self.volumes.is_off() {
-            let weights = self.volumes.weights(body, a);
+            let weights = self.volumes.weights(a);
             self.system.regions.set(&weights, &self.volumes.gradients, clusters);
         }
         self.system.blocks.clear();
@@ -338,14 +362,15 @@ impl Work {
             starts.push(places.len() as u32);
         }
         for (contact, touch) in stage.contacts.iter().zip(&self.touches).filter(|pair| pair.1.mode != Mode::Apart) {
+            let resisted = contact.resisted(touch, a, careful);
             if let Some((place, weight)) = contact.alone() {
                 if self.system.blocks.is_empty() {
                     self.system.blocks.resize(body.len(), [0.0; 6]);
                 }
-                contact.add_block(touch, a, weight, &mut self.system.blocks[place]);
+                contact.add_block(&resisted, weight, &mut self.system.blocks[place]);
                 continue;
             }
-            let (directions, count) = contact.resisted(touch, a);
+            let (directions, count) = resisted;
             for direction in &directions[..count] {
                 for (place, weight) in contact.sides() {
                     places.push(place as u32);
@@ -405,49 +430,66 @@ impl Work {
         warm.fresh = [0; 2];
     }
 
-    /// Which pieces nothing but gravity, drag and goals acts on from outside.
+    /// Which pieces, joined by contacts with each other, nothing but gravity, drag and goals acts on from outside; and which
+    /// of them are in no contact.
     fn find_free(&mut self, on: &Setting<'_>, stage: &Stage<'_>) {
         let order = &on.body.order;
         let piece_of = |place: usize| {
             let cluster = self.layout.cluster[place] as usize;
             order.pieces.partition_point(|piece| piece.end <= cluster)
         };
-        let mut free = vec![true; order.pieces.len()];
         self.system.held.clone_from(&on.drive.held);
+        let mut bound = vec![false; order.pieces.len()];
+        let mut turns = vec![true; order.pieces.len()];
         for place in (0..on.body.len()).filter(|place| on.drive.held[*place]) {
-            free[piece_of(place)] = false;
+            bound[piece_of(place)] = true;
         }
-        for (place, _) in stage.contacts.iter().flat_map(Touching::sides) {
-            free[piece_of(place)] = false;
+        let mut links = Vec::new();
+        for contact in stage.contacts {
+            let first = contact.places[0] as usize;
+            for (place, _) in contact.sides() {
+                turns[piece_of(place)] = false;
+                links.push([piece_of(first) as u32, piece_of(place) as u32]);
+                bound[piece_of(place)] |= contact.alone().is_some();
+            }
         }
-        self.free = free;
+        let groups = pieces(order.pieces.len(), links.into_iter());
+        let mut free = vec![true; order.pieces.len()];
+        for (piece, group) in groups.iter().enumerate() {
+            free[*group as usize] &= !bound[piece];
+        }
+        self.turns = turns.iter().zip(&bound).map(|(turns, bound)| *turns && !bound).collect();
+        self.groups = groups.iter().map(|group| free[*group as usize].then_some(*group)).collect();
     }
 
-    /// For each piece the sum of residuals and of inertia.
+    /// For each group of pieces the sum of residuals and of inertia.
     fn momenta(&self, body: &Body) -> Vec<(V3, f64)> {
-        let clusters = &body.order.clusters;
-        let sums = clusters.map((), |cluster, ()| {
-            clusters.range(cluster).fold((V3::zeros(), 0.0), |(force, inertia), place| {
-                (force + self.r[place], inertia + self.system.inertia[place])
-            })
-        });
-        let piece = |piece: &std::ops::Range<usize>| {
-            sums[piece.clone()].iter().fold((V3::zeros(), 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1))
-        };
-        body.order.pieces.iter().map(piece).collect()
+        self.sums(body, |place| (self.r[place], self.system.inertia[place]))
     }
 
-    /// Shifts each free piece as a whole so that `dx` gives it the momentum `wanted`, and takes it from `r`.
-    fn shift(&mut self, body: &Body, wanted: &[(V3, f64)]) {
+    fn sums(&self, body: &Body, of: impl Fn(usize) -> (V3, f64) + Sync) -> Vec<(V3, f64)> {
         let clusters = &body.order.clusters;
-        for (index, piece) in body.order.pieces.iter().enumerate().filter(|(index, _)| self.free[*index]) {
-            let (force, inertia) = wanted[index];
-            let places = clusters.range(piece.start).start..clusters.range(piece.end - 1).end;
-            let given =
-                places.clone().fold(V3::zeros(), |sum, place| sum + self.dx[place] * self.system.inertia[place]);
-            let by = (force - given) / inertia;
+        let add = |sum: (V3, f64), part: (V3, f64)| (sum.0 + part.0, sum.1 + part.1);
+        let sums =
+            clusters.map((), |cluster, ()| clusters.range(cluster).map(&of).fold((V3::zeros(), 0.0), add));
+        let mut groups = vec![(V3::zeros(), 0.0); body.order.pieces.len()];
+        for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
+            if let Some(group) = group {
+                let slot = &mut groups[*group as usize];
+                *slot = sums[piece.clone()].iter().copied().fold(*slot, add);
+            }
+        }
+        groups
+    }
+
+    /// Shifts each free group as a whole so that `dx` gives it the momentum `wanted`, and takes it from `r`.
+    fn shift(&mut self, body: &Body, wanted: &[(V3, f64)]) {
+        let given = self.sums(body, |place| (self.dx[place] * self.system.inertia[place], 0.0));
+        for (index, piece) in body.order.pieces.iter().enumerate() {
+            let Some(group) = self.groups[index].map(|group| group as usize) else { continue };
+            let by = (wanted[group].0 - given[group].0) / wanted[group].1;
             if by.iter().all(|by| by.is_finite()) {
-                for place in places {
+                for place in body.places(piece) {
                     self.dx[place] += by;
                     self.r[place] -= by * self.system.inertia[place];
                 }
@@ -460,10 +502,9 @@ impl Work {
     fn turn(&self, body: &Body, x: &mut [V3]) {
         /// Share of a piece's inertia below which it has none about an axis.
         const NOTHING: f64 = 1e-9;
-        let clusters = &body.order.clusters;
         let inertia = &self.system.inertia;
-        for (_, piece) in body.order.pieces.iter().enumerate().filter(|(index, _)| self.free[*index]) {
-            let places = clusters.range(piece.start).start..clusters.range(piece.end - 1).end;
+        for (_, piece) in body.order.pieces.iter().enumerate().filter(|(index, _)| self.turns[*index]) {
+            let places = body.places(piece);
             let (sum, mass) = places
                 .clone()
                 .fold((V3::zeros(), 0.0), |(sum, mass), place| (sum + x[place] * inertia[place], mass + inertia[place]));
@@ -498,8 +539,8 @@ impl Work {
         each.fold(0.0, |sum, ((w, r), other)| sum + halfway(w, *r - *other).norm_squared())
     }
 
-    /// What the stage makes least: ½(x − y)ᵀM(x − y) + a²·(energies), friction with the push of the last look.
-    fn objective(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], pushes: Option<&[f64]>) -> f64 {
+    /// What the stage makes least: ½(x − y)ᵀM(x − y) + a²·(energies).
+    fn objective(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
         let (body, a) = (on.body, stage.a);
         let mut v = std::mem::take(&mut self.v);
         velocities(&body.order.clusters, x, stage, &mut v);
@@ -508,10 +549,9 @@ impl Work {
         let watched = &self.inventory.watched;
         let thin: f64 = self.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
         let mut contact = 0.0;
-        for (index, touching) in stage.contacts.iter().enumerate() {
-            let touch = touching.at(x, &v, 0.0, body.size);
-            let push = pushes.map_or(touch.push, |pushes| pushes[index]);
-            contact += touch.energy + touching.friction_energy(push, &v, a, body.size);
+        for touching in stage.contacts {
+            let touch = touching.at(x, &v, stage.early, body.size);
+            contact += touch.energy + touching.friction_energy(&v, a, body.size);
         }
         let springs = body.spring_parts.sum((), |part, ()| {
             let of = |at| springs::energy(body, &on.rest, x, at) + springs::dissipation(body, &on.rest, x, &v, at, a);
@@ -535,13 +575,12 @@ impl Work {
 
     /// The share of `dx` that lowers the objective from `base`: 1, ½, ¼ …; 0 where none does.
     fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> f64 {
-        let pushes: Vec<f64> = self.touches.iter().map(|touch| touch.push).collect();
         let mut trial = std::mem::take(&mut self.trial);
         let mut share = 1.0;
         for _ in 0..HALVINGS {
             trial.clear();
             trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
-            let value = self.objective(on, stage, &trial, Some(&pushes));
+            let value = self.objective(on, stage, &trial);
             if value <= base + ROUNDING * base.abs() {
                 self.trial = trial;
                 return share;

@@ -1,6 +1,7 @@
 //! What keeps a body's volume: a pressure in each region, and a push against tetrahedra that are about to turn over.
 //!
-//! Region: ½κ(V − V₀)²/V₀, so that lost volume is fought by κ against the springs' own bulk modulus. Tetrahedron: below
+//! Region: ½κ(V − V₀)²/V₀ and a fourth power, so that lost volume is fought by κ against the springs' own bulk modulus, and
+//! much of it much harder: cheap where there is little to fight. Tetrahedron: below
 //! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
 //! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
 
@@ -11,14 +12,17 @@ use super::rows::Rows;
 
 /// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
-/// Share of the springs' loss that is left where all of it is fought: what conjugate gradients still do level.
+/// Share of the springs' loss that is left where all of a small one is fought: what conjugate gradients do nearly level.
 const LEFT: f64 = 0.1;
+/// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (23 times).
+const SLIGHT: f64 = 0.015;
+const MUCH: f64 = 0.04;
 /// Volume ÷ volume at rest below which a tetrahedron is pushed open.
-const THIN: f64 = 0.2;
+const THIN: f64 = 0.3;
 /// Volume ÷ volume at rest below which it is watched within a step: one that gets thin from above is so for the next step.
-const WATCHED: f64 = 0.5;
+const WATCHED: f64 = 0.7;
 /// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
-const OPENING: f64 = 4.0;
+const OPENING: f64 = 8.0;
 
 /// The terms of one frame.
 #[derive(Clone, Debug, Default)]
@@ -35,6 +39,8 @@ pub(super) struct Volumes {
     pub(super) gradients: Vec<V3>,
     /// Pressure each region has, Pa.
     pub(super) pressures: Vec<f64>,
+    /// How each region's pressure grows with its volume, Pa/m³, and with how fast that changes.
+    slopes: Vec<[f64; 2]>,
     /// What they stored when last measured, joules.
     pub(super) stored: f64,
 }
@@ -75,6 +81,7 @@ impl Volumes {
             parts: Some(parts),
             gradients: vec![V3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
+            slopes: vec![[0.0; 2]; regions.len()],
             stored: 0.0,
         }
     }
@@ -89,15 +96,20 @@ impl Volumes {
         let Some(parts) = &self.parts else { return 0.0 };
         let (regions, stiffness, rest) = (&body.regions, &self.stiffness, &self.rest);
         let gradients = Several::new(&regions.starts, &mut self.gradients);
-        let sums = parts.map((&mut self.pressures[..], gradients), |part, (pressures, mut gradients)| {
+        let out = (&mut self.pressures[..], &mut self.slopes[..], gradients);
+        let sums = parts.map(out, |part, (pressures, slopes, mut gradients)| {
             let (mut stored, mut damped) = (0.0, 0.0);
-            for ((region, pressure), mine) in parts.range(part).zip(pressures).zip(gradients.iter_mut()) {
+            let regions_here = parts.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
+            for (((region, pressure), slope), mine) in regions_here {
                 let particles = &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
                 let lost = regions.measure(region, x, mine) - rest[region];
                 let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
-                let (k, c) = (stiffness[region], stiffness[region] * regions.damping[region]);
-                *pressure = k * lost + c * pace;
-                stored += 0.5 * k * lost * lost;
+                let k = stiffness[region];
+                let (push, steep, energy) = stiffened(lost, rest[region]);
+                let c = k * regions.damping[region];
+                *pressure = k * push + c * pace;
+                *slope = [k * steep, c];
+                stored += k * energy;
                 damped += 0.5 * a * c * pace * pace;
             }
             (stored, damped)
@@ -107,10 +119,9 @@ impl Volumes {
         damped
     }
 
-    /// What each region resists for steps of `a`.
-    pub(super) fn weights(&self, body: &Body, a: f64) -> Vec<f64> {
-        let damped = |(k, beta): (&f64, &f64)| k * (a * a + a * beta);
-        self.stiffness.iter().zip(&body.regions.damping).map(damped).collect()
+    /// What each region resists for steps of `a`, where last measured.
+    pub(super) fn weights(&self, a: f64) -> Vec<f64> {
+        self.slopes.iter().map(|[k, c]| k * a * a + c * a).collect()
     }
 
     /// Those of the `watched` tetrahedra that are thin.
@@ -130,6 +141,23 @@ impl Volumes {
         };
         watched.iter().filter_map(of).collect()
     }
+}
+
+/// What a lost (or won) volume is fought with, ÷ κ/V₀: the volume itself near rest, more and more from [`SLIGHT`] on, in a
+/// straight line again from [`MUCH`] on. Its slope, and its integral.
+fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
+    let soft = 1.0 / (SLIGHT * rest * SLIGHT * rest);
+    let curved = |lost: f64| {
+        let square = lost * lost * soft;
+        (lost * (1.0 + square), 1.0 + 3.0 * square, lost * lost * (0.5 + 0.25 * square))
+    };
+    let edge = MUCH * rest;
+    if !(rest > 0.0) || lost.abs() <= edge {
+        return if rest > 0.0 { curved(lost) } else { (0.0, 0.0, 0.0) };
+    }
+    let (push, slope, energy) = curved(edge);
+    let more = lost.abs() - edge;
+    ((push + slope * more).copysign(lost), slope, energy + push * more + 0.5 * slope * more * more)
 }
 
 /// How a tetrahedron's volume changes with each corner.
