@@ -16,9 +16,9 @@ const FIRM: f64 = 30.0;
 /// Most that sticking resists a slip of a frame ÷ κ: beyond, frictions like 1e6 would only be noise.
 const HOLD: f64 = 1e4;
 /// Share of the gap from where on the push grows straight on: its slope is 1/(1 − that)² of the first.
-const STRAIGHT: f64 = 0.9;
+const STRAIGHT: f64 = 0.95;
 /// Share of its gap below which a contact is too deep to leave it there.
-const DEEP: f64 = 0.92;
+const DEEP: f64 = 0.96;
 /// Body lengths a second at which friction is all of μN; below it creeps in proportion.
 const CREEP: f64 = 2e-5;
 

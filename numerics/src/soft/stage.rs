@@ -37,7 +37,7 @@ const CONTACT_ITERATIONS: u32 = 20;
 /// Share of a step that a line search takes where friction is made linear with more care from then on.
 const CAREFUL: f64 = 0.3;
 /// Halvings of a step that a line search tries.
-const HALVINGS: u32 = 8;
+const HALVINGS: u32 = 16;
 /// Share of the objective that is rounding: a smaller decrease is not searched for.
 const ROUNDING: f64 = 1e-12;
 

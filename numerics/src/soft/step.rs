@@ -224,8 +224,9 @@ impl Stepper<'_> {
         let mut out = y.to_vec();
         for contact in contacts {
             let Some((place, weight)) = contact.alone() else { continue };
-            let missing = contact.clearance(x, h).min(0.0) - contact.clearance(&out, 0.0);
-            if missing > 0.0 && missing < NUDGE * self.setting.body.spacing {
+            let before = contact.clearance(x, h);
+            let missing = before.min(0.0) - contact.clearance(&out, 0.0);
+            if (missing > 0.0 || before < 0.0) && missing.abs() < NUDGE * self.setting.body.spacing {
                 out[place] += contact.normal * (missing / weight);
             }
         }

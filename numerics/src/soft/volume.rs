@@ -15,14 +15,14 @@ const SPRINGS: f64 = 2.0 / 3.0;
 /// Share of the springs' loss that is left where all of a small one is fought: what conjugate gradients do nearly level.
 const LEFT: f64 = 0.1;
 /// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (23 times).
-const SLIGHT: f64 = 0.015;
+const SLIGHT: f64 = 0.012;
 const MUCH: f64 = 0.04;
 /// Volume ÷ volume at rest below which a tetrahedron is pushed open.
 const THIN: f64 = 0.3;
 /// Volume ÷ volume at rest below which it is watched within a step: one that gets thin from above is so for the next step.
 const WATCHED: f64 = 0.7;
 /// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
-const OPENING: f64 = 8.0;
+const OPENING: f64 = 16.0;
 
 /// The terms of one frame.
 #[derive(Clone, Debug, Default)]

@@ -36,7 +36,7 @@ fn ground(friction: f64) -> Planes {
 }
 
 /// A cylinder along z that rolls: axis at the frame's start and end, radius, radians a second.
-struct Pin_ {
+struct RollingPin {
     axis: [[f64; 2]; 2],
     radius: f64,
     spin: f64,
@@ -44,7 +44,7 @@ struct Pin_ {
     seconds: f64,
 }
 
-impl Contacts for Pin_ {
+impl Contacts for RollingPin {
     fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
         let time = query.times[1];
         let axis: [f64; 2] = std::array::from_fn(|k| self.axis[0][k] + (self.axis[1][k] - self.axis[0][k]) * time);
@@ -102,16 +102,15 @@ fn centre(body: &Body, state: &State) -> V3 {
 fn a_block_dropped_on_the_ground_comes_to_rest_there() {
     let ground = ground(0.5);
     for (stiffness, volume) in [(5e4, 0.0), (5e4, 1.0), (1e7, 1.0)] {
-        let body = block_body([4, 4, 4], 0.1, &material(1000.0, stiffness, 0.01));
+        let body = block_body([4, 4, 4], 0.1, &material(1000.0, stiffness, 2e3 / stiffness));
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|x| x[1] += 0.2);
-        let frame = Frame { contacts: Some(&ground), volume, integrator: if std::env::var("EU").is_ok() { Integrator::Euler } else { Integrator::Default }, ..Frame::default() };
+        let frame = Frame { contacts: Some(&ground), volume, ..Frame::default() };
         let mut solver = Solver::new(&body);
         let mut newton = 0;
         for number in 0..240 {
             let report = solver.step(&body, &mut state, &frame);
             newton += report.newton;
-            if number % 40 < 6 { eprintln!("{number} kin {:.3e} n {} cg {} res {:.2e} eul {} con {} deep {:.3e} fast {:.3e} inv {} low {:.4e}", report.kinetic, report.newton, report.cg, report.residual, report.euler_steps, report.contacts, report.deepest_overlap, fastest(&state), report.inverted_tets, lowest(&state)); }
             assert!(lowest(&state) > 0.0, "E {stiffness}, frame {number}: {} {report:?}", lowest(&state));
             // It may not bounce higher than it fell from.
             assert!(centre(&body, &state).y < 0.41, "frame {number}");
@@ -138,9 +137,8 @@ fn on_a_slope_it_sticks_below_the_friction_angle_and_slides_above() {
         let frame = Frame { gravity, contacts: Some(&ground), ..Frame::default() };
         let mut solver = Solver::new(&body);
         let mut run = |state: &mut State, frames: usize| {
-            for f in 0..frames {
-                let report = solver.step(&body, state, &frame);
-                if friction == 1e6 { eprintln!("{f} v {:.4} n {} cg {} res {:.2e} eul {} con {} deep {:.3e} est {:.2e}", momentum(&body, state).x / 32.0, report.newton, report.cg, report.residual, report.euler_steps, report.contacts, report.deepest_overlap, report.error_estimate); }
+            for _ in 0..frames {
+                let _ = solver.step(&body, state, &frame);
             }
         };
         run(&mut state, 24);
@@ -192,7 +190,7 @@ fn pressed_to_half_its_height_a_block_keeps_its_volume_and_bulges_evenly() {
     let top = |frame: usize| 0.6 + 2.0 * THICKNESS - 0.3 * (frame.min(48) as f64 / 48.0);
     for number in 0..96 {
         let plates = Planes(
-            vec![([0.0, 1.0, 0.0], [0.0, 0.0], 0.0), ([0.0, -1.0, 0.0], [-top(number), -top(number + 1)], 0.0)],
+            vec![([0.0, 1.0, 0.0], [0.0, 0.0], 0.5), ([0.0, -1.0, 0.0], [-top(number), -top(number + 1)], 0.5)],
             1.0 / 24.0,
         );
         let frame = Frame { gravity: [0.0; 3], contacts: Some(&plates), ..Frame::default() };
@@ -201,9 +199,12 @@ fn pressed_to_half_its_height_a_block_keeps_its_volume_and_bulges_evenly() {
         assert!(lowest(&state) > 0.0 && highest < top(number + 1), "frame {number}: {highest} {report:?}");
     }
     assert_eq!(report.inverted_tets, 0);
-    assert!((report.volume_ratio - 1.0).abs() < 0.04, "{report:?}");
-    let reach = |axis: usize| state.positions.iter().map(|x| (x[axis] - 0.3).abs()).fold(0.0, f64::max);
-    assert!((reach(0) / reach(2) - 1.0).abs() < 0.02 && reach(0) > 0.36, "{} {}", reach(0), reach(2));
+    assert!((report.volume_ratio - 1.0).abs() < 0.025, "{report:?}");
+    let wide = |axis: usize| {
+        let along = || state.positions.iter().map(|x| x[axis]);
+        along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+    };
+    assert!((wide(0) / wide(2) - 1.0).abs() < 0.05 && wide(0) > 0.75, "{} {}", wide(0), wide(2));
 }
 
 #[test]
@@ -215,7 +216,7 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
     let mut solver = Solver::new(&body);
     for number in 0..48 {
         let along = |frame: usize| [0.05 + 0.4 * frame as f64 / 48.0, 0.16 + 0.05 * (1.0 - (frame as f64 / 12.0).min(1.0))];
-        let pin = Pin_ { axis: [along(number), along(number + 1)], radius: 0.1, spin: -2.0, friction: 0.8, seconds: 1.0 / 24.0 };
+        let pin = RollingPin { axis: [along(number), along(number + 1)], radius: 0.1, spin: -2.0, friction: 0.8, seconds: 1.0 / 24.0 };
         let both = Both(&ground, &pin);
         let report = solver.step(&body, &mut state, &Frame { contacts: Some(&both), ..Frame::default() });
         let axis = along(number + 1);
@@ -277,7 +278,7 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
     points.extend(above.iter().map(|x| [x[0] + 0.013, x[1] + 0.32, x[2] + 0.021]));
     tets.extend(more.iter().map(|tet| tet.map(|corner| corner + lower)));
     let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
-    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.01), &[]).unwrap();
+    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.03), &[]).unwrap();
     let stack = Stack { lower, side: 0.1, cells: 3 };
 
     let mut state = State::at_rest(&body);
