@@ -71,8 +71,16 @@ struct Run {
 fn run(beam: &Beam, frames: usize, frame: &Frame<'_>) -> Run {
     let mut state = State::at_rest(&beam.body);
     let mut solver = Solver::new(&beam.body);
-    let mut out =
-        Run { tips: Vec::new(), wall: 0.0, cpu: 0.0, newton: 0, cg: 0, caps: 0, estimate: 0.0, last: Report::default() };
+    let mut out = Run {
+        tips: Vec::new(),
+        wall: 0.0,
+        cpu: 0.0,
+        newton: 0,
+        cg: 0,
+        caps: 0,
+        estimate: 0.0,
+        last: Report::default(),
+    };
     for _ in 0..frames {
         let (wall, cpu) = (Instant::now(), ProcessTime::now());
         let report = solver.step(&beam.body, &mut state, frame);
@@ -90,7 +98,8 @@ fn run(beam: &Beam, frames: usize, frame: &Frame<'_>) -> Run {
 }
 
 fn error(run: &Run, reference: &Run) -> f64 {
-    let distance = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>();
+    let distance =
+        |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>();
     let squares: f64 = run.tips.iter().zip(&reference.tips).map(distance).sum();
     (squares / run.tips.len() as f64).sqrt() / SIZE[0]
 }
@@ -100,7 +109,9 @@ fn main() {
     let quick = asked.iter().any(|word| word == "quick");
     let sizes_asked: Vec<&String> = asked.iter().filter(|word| *word != "quick").collect();
     let sizes = [("small", [32, 8, 8], 24, 64), ("large", [70, 17, 17], 6, 32), ("huge", [96, 24, 24], 6, 16)];
-    println!("beam      stiffness volume  integrator      steps     ms    cpu ms  newton  cg/solve caps  err/L    estimate/L  tip z");
+    println!(
+        "beam      stiffness volume  integrator      steps     ms    cpu ms  newton  cg/solve caps  err/L    estimate/L  tip z"
+    );
     for (name, cells, frames, fine) in sizes {
         if !sizes_asked.is_empty() && !sizes_asked.iter().any(|word| *word == name) {
             continue;
@@ -112,7 +123,11 @@ fn main() {
                 let accurate = Integrator::Accurate { tolerance: 1e-6 };
                 let fine = if quick { 1 } else { fine };
                 let reference = run(&beam, frames, &Frame { substeps: fine, integrator: accurate, ..frame });
-                let mut cases = vec![("default", Integrator::Default, 0), ("default", Integrator::Default, 2), ("euler", Integrator::Euler, 0)];
+                let mut cases = vec![
+                    ("default", Integrator::Default, 0),
+                    ("default", Integrator::Default, 2),
+                    ("euler", Integrator::Euler, 0),
+                ];
                 if quick {
                     cases.truncate(1);
                 } else if name == "small" {
@@ -128,9 +143,16 @@ fn main() {
                     let one = &runs[0];
                     println!(
                         "{name:6} {:6} {times:6.0e} {volume:6}  {integrator:10} {substeps:3}/{:4} {:8.2} {:8.2} {:6.1} {:8.1} {:5} {:9.1e} {:9.1e} {:9.4}",
-                        beam.body.len(), one.last.substeps, least(|run| run.wall), least(|run| run.cpu),
-                        f64::from(one.newton) / frames as f64, f64::from(one.cg) / f64::from(one.newton), one.caps,
-                        error(one, &reference), one.estimate / SIZE[0], one.tips[frames - 1][1],
+                        beam.body.len(),
+                        one.last.substeps,
+                        least(|run| run.wall),
+                        least(|run| run.cpu),
+                        f64::from(one.newton) / frames as f64,
+                        f64::from(one.cg) / f64::from(one.newton),
+                        one.caps,
+                        error(one, &reference),
+                        one.estimate / SIZE[0],
+                        one.tips[frames - 1][1],
                     );
                 }
             }

@@ -64,7 +64,11 @@ impl Coarse<'_> {
     /// What the clusters' motions do to a particle.
     #[inline(always)]
     fn moved(&self, modes: &[f64], cluster: usize, place: usize) -> V3 {
-        if modes.is_empty() { V3::zeros() } else { moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place])) }
+        if modes.is_empty() {
+            V3::zeros()
+        } else {
+            moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place]))
+        }
     }
 
     /// A particle's share of the force on its cluster, added to `sums`.

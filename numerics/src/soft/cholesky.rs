@@ -115,7 +115,9 @@ mod tests {
     fn matrix(n: usize, s: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
         let b = |i: usize, j: usize| Key::new(3).of((i * n + j) as u64).f64() - 0.5;
         let full: Vec<Vec<f64>> = (0..n)
-            .map(|i| (0..n).map(|j| (0..n).map(|k| b(i, k) * b(j, k)).sum::<f64>() + if i == j { s } else { 0.0 }).collect())
+            .map(|i| {
+                (0..n).map(|j| (0..n).map(|k| b(i, k) * b(j, k)).sum::<f64>() + if i == j { s } else { 0.0 }).collect()
+            })
             .collect();
         ((0..n).flat_map(|i| full[i][..=i].to_vec()).collect(), full)
     }

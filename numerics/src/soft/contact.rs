@@ -274,7 +274,7 @@ impl Touching {
     fn spring(&self, depth: f64) -> (f64, f64, f64) {
         let (k, gap) = (self.firm, self.gap);
         let edge = STRAIGHT * gap;
-        if !(gap > 0.0) {
+        if gap <= 0.0 {
             return (k * depth, k, 0.5 * k * depth * depth);
         }
         let curved = |depth: f64| {

@@ -38,9 +38,9 @@ pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Mov
     let watched = &work.inventory.watched;
     let thin: f64 = work.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
     let stored = work.volumes.stored;
-    let springs = body.spring_parts.sum((), |part, ()| {
-        body.spring_parts.range(part).map(|at| springs::energy(body, &on.rest, x, at)).sum()
-    });
+    let springs = body
+        .spring_parts
+        .sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &on.rest, x, at)).sum());
     let clusters = &body.order.clusters;
     let own = clusters.map((), |cluster, ()| {
         clusters.range(cluster).fold([0.0; 3], |[kinetic, goals, height], place| {
@@ -61,7 +61,8 @@ pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Mov
 pub(super) fn worst_stretch(on: &Setting<'_>, x: &[V3]) -> f64 {
     let body = on.body;
     let worst = body.spring_parts.map((), |part, ()| {
-        let springs = body.spring_parts.range(part).filter(|at| on.rest.holds(*at as u32) && on.rest.lengths[*at] > 0.0);
+        let springs =
+            body.spring_parts.range(part).filter(|at| on.rest.holds(*at as u32) && on.rest.lengths[*at] > 0.0);
         let stretch = springs.map(|at| springs::length(body, x, at) / on.rest.lengths[at]);
         stretch.map(|stretch| stretch.max(1.0 / stretch)).fold(1.0, f64::max)
     });

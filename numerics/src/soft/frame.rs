@@ -8,7 +8,7 @@ use super::energy::{Energies, measure};
 use super::springs::{self, Rest};
 use super::stage::{Setting, Work};
 use super::state::State;
-use super::step::{Moving, Stepper, Stepped};
+use super::step::{Moving, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
 
 /// Steps that a frame is cut into, at most, where halving is what helps.
@@ -135,7 +135,8 @@ impl Solver {
         let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
         let lengths = state.rest_lengths();
         let rest = Rest { lengths: &lengths, torn: &state.torn };
-        self.work.volumes = Volumes::new(body, frame.volume, &state.volumes, &mut self.work.system.regions);
+        self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
+        self.work.system.regions.idle = self.work.volumes.is_off();
         springs::links(body, &rest, &mut self.work.links);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
@@ -187,13 +188,7 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
 }
 
 /// Steps whose estimated error a second stays within `tolerance` metres a frame.
-fn adapt(
-    stepper: &mut Stepper<'_>,
-    moving: &mut Moving,
-    energies: &mut Energies,
-    report: &mut Report,
-    tolerance: f64,
-) {
+fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report, tolerance: f64) {
     /// Most and least that a step is changed by, and what is kept in reserve.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;

@@ -56,6 +56,12 @@ impl Rigid {
         }
     }
 
+    /// The mean of its particles' places by mass.
+    fn centre(&self, body: &Body, x: &[V3]) -> V3 {
+        let mass: f64 = body.mass[self.places.clone()].iter().sum();
+        self.places.clone().map(|place| x[place] * body.mass[place]).sum::<V3>() / mass
+    }
+
     /// Without its turning.
     pub(super) fn shift(self) -> Self {
         Self { spin: V3::zeros(), ..self }
@@ -70,6 +76,7 @@ impl Rigid {
 /// The motion of all pieces from some positions on.
 #[derive(Clone, Debug)]
 pub(super) struct Guess<'a> {
+    body: &'a Body,
     pieces: Vec<Rigid>,
     x: &'a [V3],
     v: &'a [V3],
@@ -81,9 +88,9 @@ pub(super) struct Guess<'a> {
 impl<'a> Guess<'a> {
     /// From `x`, `v` and the change of velocity in the step of `before` seconds that led there. Pieces with `held` particles
     /// are not rigid.
-    pub(super) fn new(body: &Body, held: &[bool], x: &'a [V3], v: &'a [V3], trend: &'a [V3], before: f64) -> Self {
+    pub(super) fn new(body: &'a Body, held: &[bool], x: &'a [V3], v: &'a [V3], trend: &'a [V3], before: f64) -> Self {
         let rigid = |piece: &Range<usize>| Rigid::new(body, held, piece, x, v, trend);
-        Self { pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
+        Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
     }
 
     /// The energy that turns pieces, joules.
@@ -93,43 +100,46 @@ impl<'a> Guess<'a> {
 
     /// Positions after `seconds`.
     pub(super) fn at(&self, seconds: f64) -> Vec<V3> {
-        let mut out = vec![V3::zeros(); self.x.len()];
-        for piece in &self.pieces {
-            let back = Turn::by(piece.spin * (-0.5 * self.before));
-            let turn = Turn::by(piece.spin * seconds);
-            for place in piece.places.clone() {
-                let arm = self.x[place] - piece.middle;
-                let drift = self.v[place] - piece.pace - piece.spin.cross(&arm);
-                // The trend as it was half a step before, without what turning makes of it.
-                let earlier = back.apply(arm);
-                let bent = self.trend[place] - piece.trend - piece.spin.cross(&piece.spin.cross(&earlier));
-                let bent = back.undo(bent);
-                let own = arm + (drift + bent * (0.5 * seconds)) * seconds;
-                out[place] = piece.middle + (piece.pace + piece.trend * (0.5 * seconds)) * seconds + turn.apply(own);
-            }
-        }
-        out
+        let each: Vec<[Turn; 2]> =
+            self.pieces.iter().map(|p| [Turn::by(p.spin * (-0.5 * self.before)), Turn::by(p.spin * seconds)]).collect();
+        self.map(|index, place| {
+            let (piece, [back, turn]) = (&self.pieces[index], &each[index]);
+            let arm = self.x[place] - piece.middle;
+            let drift = self.v[place] - piece.velocity(self.x[place]);
+            // The trend as it was half a step before, without what turning makes of it.
+            let bent = self.trend[place] - piece.trend - piece.spin.cross(&piece.spin.cross(&back.apply(arm)));
+            let own = arm + (drift + back.undo(bent) * (0.5 * seconds)) * seconds;
+            piece.middle + (piece.pace + piece.trend * (0.5 * seconds)) * seconds + turn.apply(own)
+        })
     }
 
     /// Positions after `seconds`, given where particles were at `share` of that time.
-    pub(super) fn past(&self, seconds: f64, share: f64, middle: &[V3], body: &Body) -> Vec<V3> {
-        let mut out = vec![V3::zeros(); self.x.len()];
+    pub(super) fn past(&self, seconds: f64, share: f64, middle: &[V3]) -> Vec<V3> {
         let early = share * seconds;
-        for piece in &self.pieces {
-            let mass: f64 = piece.places.clone().map(|place| body.mass[place]).sum();
-            let sum = |values: &[V3]| piece.places.clone().map(|place| values[place] * body.mass[place]).sum::<V3>();
-            let centre = if piece.spin == V3::zeros() { piece.middle } else { sum(middle) / mass };
-            // A parabola through both places and the first velocity; for the whole as for the deformation.
-            let on = |start: V3, pace: V3, at: V3| start + pace * seconds + (at - start - pace * early) / (share * share);
-            let (halfway, turn) = (Turn::by(piece.spin * early), Turn::by(piece.spin * seconds));
-            let whole = on(piece.middle, piece.pace, centre);
-            for place in piece.places.clone() {
-                let arm = self.x[place] - piece.middle;
-                let drift = self.v[place] - piece.pace - piece.spin.cross(&arm);
-                let own = on(arm, drift, halfway.undo(middle[place] - centre));
-                out[place] = whole + turn.apply(own);
-            }
-        }
+        // A parabola through both places and the first velocity; for the whole as for the deformation.
+        let on = |start: V3, pace: V3, at: V3| start + pace * seconds + (at - start - pace * early) / (share * share);
+        let whole = |piece: &Rigid| {
+            let centre = if piece.spin == V3::zeros() { piece.middle } else { piece.centre(self.body, middle) };
+            let turns = [Turn::by(piece.spin * early), Turn::by(piece.spin * seconds)];
+            (centre, on(piece.middle, piece.pace, centre), turns)
+        };
+        let each: Vec<(V3, V3, [Turn; 2])> = self.pieces.iter().map(whole).collect();
+        self.map(|index, place| {
+            let (piece, (centre, whole, [halfway, turn])) = (&self.pieces[index], &each[index]);
+            let arm = self.x[place] - piece.middle;
+            let drift = self.v[place] - piece.velocity(self.x[place]);
+            whole + turn.apply(on(arm, drift, halfway.undo(middle[place] - centre)))
+        })
+    }
+
+    /// What `of` gives for each particle and its piece.
+    fn map(&self, of: impl Fn(usize, usize) -> V3 + Sync) -> Vec<V3> {
+        let order = &self.body.order;
+        let mut out = vec![V3::zeros(); self.x.len()];
+        order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
+            let piece = order.pieces.partition_point(|piece| piece.end <= cluster);
+            order.clusters.range(cluster).zip(out).for_each(|(place, out)| *out = of(piece, place));
+        });
         out
     }
 }

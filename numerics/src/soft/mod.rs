@@ -10,20 +10,24 @@
 //! resolve is damped; angular momentum is kept to the order of the method; f32 records hold forces to 1e-7 of the stiffest
 //! spring at a particle. Everything is f64; metres, seconds, kilograms.
 
+mod assemble;
 mod body;
 mod cg;
 mod cholesky;
 mod coarse;
 mod contact;
 mod drive;
+mod edges;
 mod energy;
 mod frame;
 mod guess;
+mod momentum;
 mod order;
 mod parts;
 mod plastic;
 mod regions;
 mod rows;
+mod search;
 mod springs;
 mod stage;
 mod state;

@@ -94,5 +94,6 @@ fn elastic(body: &Body, state: &State) -> f64 {
     let lengths = state.rest_lengths();
     let rest = Rest { lengths: &lengths, torn: &state.torn };
     let x = places(body, &state.positions);
-    body.spring_parts.sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
+    body.spring_parts
+        .sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
 }

@@ -36,7 +36,8 @@ pub(super) struct Regions {
 impl Regions {
     /// Of `tets`, corners by place among the particles `rest`.
     pub(super) fn new(rest: &[V3], tets: &[[u32; 4]]) -> Self {
-        let centres: Vec<V3> = tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<V3>() * 0.25).collect();
+        let centres: Vec<V3> =
+            tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<V3>() * 0.25).collect();
         let joined = tets.iter().flat_map(|[a, b, c, d]| [[*a, *b], [*a, *c], [*a, *d]]);
         let piece = pieces(rest.len(), joined);
         let piece_of = |tet: &u32| piece[tets[*tet as usize][0] as usize];
@@ -49,8 +50,7 @@ impl Regions {
             halve(&centres, &mut members[first..first + count], count.div_ceil(TETS), first, &mut tet_starts);
             first += count;
         }
-        let mut regions =
-            Self { tet_starts, tets: members, starts: vec![0], face_starts: vec![0], ..Self::default() };
+        let mut regions = Self { tet_starts, tets: members, starts: vec![0], face_starts: vec![0], ..Self::default() };
         for region in 0..regions.tet_starts.len() - 1 {
             let mine = regions.tet_starts[region] as usize..regions.tet_starts[region + 1] as usize;
             let faces = boundary(regions.tets[mine].iter().map(|tet| tets[*tet as usize]));
@@ -131,8 +131,7 @@ fn boundary(tets: impl Iterator<Item = [u32; 4]>) -> Vec<[u32; 3]> {
         face
     };
     let outwards = |[a, b, c, d]: [u32; 4]| [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
-    let mut faces: Vec<([u32; 3], [u32; 3])> =
-        tets.flat_map(outwards).map(|face| (sorted(face), face)).collect();
+    let mut faces: Vec<([u32; 3], [u32; 3])> = tets.flat_map(outwards).map(|face| (sorted(face), face)).collect();
     faces.sort_unstable();
     faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() % 2 == 1).map(|same| same[0].1).collect()
 }

@@ -10,6 +10,8 @@ use super::parts::{Parts, Several};
 /// Rows by row and by particle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
+    /// Whether they count for nothing.
+    pub(super) idle: bool,
     /// Where each row's entries begin.
     starts: Vec<u32>,
     /// Particle of each entry, by place.
@@ -68,9 +70,9 @@ impl Rows {
         self.parts = Some(parts);
     }
 
-    /// Whether there is no row.
+    /// Whether there is no row that counts.
     pub(super) fn is_empty(&self) -> bool {
-        self.at_starts.is_empty()
+        self.idle || self.at_starts.is_empty()
     }
 
     /// How many rows.
@@ -93,12 +95,17 @@ impl Rows {
         if self.is_empty() {
             return;
         }
-        for row in 0..self.len() {
-            let root = weights[row].max(0.0).sqrt();
-            for entry in self.row(row) {
-                let scaled = gradients[entry] * root;
-                self.along[entry] = [scaled.x as f32, scaled.y as f32, scaled.z as f32];
-            }
+        if let Some(parts) = &self.parts {
+            let starts = &self.starts;
+            parts.each(Several::new(starts, &mut self.along), |part, mut along| {
+                for (row, along) in parts.range(part).zip(along.iter_mut()) {
+                    let root = weights[row].max(0.0).sqrt();
+                    for (entry, along) in (starts[row] as usize..).zip(along) {
+                        let scaled = gradients[entry] * root;
+                        *along = [scaled.x as f32, scaled.y as f32, scaled.z as f32];
+                    }
+                }
+            });
         }
         let along = &self.along;
         clusters.each(Several::new(&self.at_starts, &mut self.at), |_, mut mine| {
@@ -108,7 +115,7 @@ impl Rows {
 
     /// Measures how `p` changes each row; [`Rows::push`] then gives what that does.
     pub(super) fn measure(&mut self, p: &[V3]) {
-        let Some(parts) = self.parts.as_ref().filter(|_| !self.at_starts.is_empty()) else { return };
+        let Some(parts) = self.parts.as_ref().filter(|_| !self.is_empty()) else { return };
         let (starts, particles, along) = (&self.starts, &self.particles, &self.along);
         parts.each(&mut self.change[..], |part, mine: &mut [f64]| {
             for (row, change) in parts.range(part).zip(mine) {

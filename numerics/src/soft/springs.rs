@@ -192,7 +192,7 @@ pub(super) fn dissipation(body: &Body, rest: &Rest<'_>, x: &[V3], v: &[V3], at: 
     let [first, second] = body.ends[at].map(|end| end as usize);
     let d = x[first] - x[second];
     let squared = d.norm_squared();
-    if !(squared > 0.0) || !rest.holds(at as u32) {
+    if squared == 0.0 || !rest.holds(at as u32) {
         return 0.0;
     }
     let pace = d.dot(&(v[first] - v[second]));

@@ -91,9 +91,14 @@ impl Stepper<'_> {
         let start = moving.clone();
         let mut stepped = Stepped::default();
 
-        let ahead = |share: f64| -> Vec<V3> { start.x.iter().zip(&start.v).map(|(x, v)| x + v * (share * h)).collect() };
         let firmness = self.frame.contacts.map_or_else(Vec::new, |_| firmness(body));
-        let mut full = self.contacts(&start.x, &ahead(1.0), times, &firmness);
+        let mut full = match self.frame.contacts {
+            Some(_) => {
+                let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+                self.contacts(&start.x, &ahead, times, &firmness)
+            }
+            None => Vec::new(),
+        };
         let turned = self.frame.volume > 0.0 && self.work.inventory.turned > 0;
         let rough = calm || *self.unsettled > 0 || self.frame.rough || turned;
         *self.unsettled = self.unsettled.saturating_sub(1);
@@ -157,7 +162,8 @@ impl Stepper<'_> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.setting.body;
-        let outwards = |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
+        let outwards =
+            |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
         let mut found: Vec<Contact> = Vec::new();
         contacts.find(&Query { from: &outwards(from), to: &outwards(to), times }, &mut found);
         let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
@@ -233,7 +239,13 @@ impl Stepper<'_> {
         out
     }
 
-    fn tr_bdf2(&mut self, moving: &mut Moving, times: [f64; 2], contacts: &[Touching], tolerance: Option<f64>) -> (Solved, f64) {
+    fn tr_bdf2(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        contacts: &[Touching],
+        tolerance: Option<f64>,
+    ) -> (Solved, f64) {
         let body = self.setting.body;
         let h = (times[1] - times[0]) * self.seconds;
         let a = 0.5 * GAMMA * h;
@@ -264,7 +276,7 @@ impl Stepper<'_> {
         };
         let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
         let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
-        let mut x = guess.past(h, GAMMA, &x_middle, body);
+        let mut x = guess.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
         let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning, index: 1 };
         let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);

@@ -8,7 +8,6 @@
 use super::V3;
 use super::body::{Body, volume};
 use super::parts::{Parts, Several};
-use super::rows::Rows;
 
 /// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
@@ -59,15 +58,13 @@ pub(super) struct Thin {
 
 impl Volumes {
     /// Fights `share` of what tetrahedra lose of `rest`, their volumes.
-    pub(super) fn new(body: &Body, share: f64, rest: &[f64], rows: &mut Rows) -> Self {
-        let share = share.clamp(0.0, 1.0);
+    pub(super) fn new(body: &Body, share: f64, rest: &[f64]) -> Self {
+        let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
         let regions = &body.regions;
-        if !(share > 0.0) || regions.len() == 0 {
-            rows.set_topology(0, &[], &[], Parts::even(0, 1, 1));
+        if share == 0.0 || regions.len() == 0 {
             return Self::default();
         }
         let parts = regions.parts();
-        rows.set_topology(body.len(), &regions.starts, &regions.particles, parts.clone());
         let rest_sums = regions.sums(|tet| rest[tet]);
         let factor = SPRINGS * share / (1.0 - share + LEFT * share);
         let stiffness = regions.energy.iter().zip(&rest_sums).map(|(energy, volume)| {
@@ -101,7 +98,8 @@ impl Volumes {
             let (mut stored, mut damped) = (0.0, 0.0);
             let regions_here = parts.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
             for (((region, pressure), slope), mine) in regions_here {
-                let particles = &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
+                let particles =
+                    &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
                 let lost = regions.measure(region, x, mine) - rest[region];
                 let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
                 let k = stiffness[region];
@@ -152,8 +150,11 @@ fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
         (lost * (1.0 + square), 1.0 + 3.0 * square, lost * lost * (0.5 + 0.25 * square))
     };
     let edge = MUCH * rest;
-    if !(rest > 0.0) || lost.abs() <= edge {
-        return if rest > 0.0 { curved(lost) } else { (0.0, 0.0, 0.0) };
+    if rest <= 0.0 {
+        return (0.0, 0.0, 0.0);
+    }
+    if lost.abs() <= edge {
+        return curved(lost);
     }
     let (push, slope, energy) = curved(edge);
     let more = lost.abs() - edge;
@@ -186,7 +187,7 @@ impl Inventory {
             for tet in body.tet_parts.range(part) {
                 let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
                 turned += u32::from(volume < 0.0);
-                if !(volume > WATCHED * rest[tet]) {
+                if volume <= WATCHED * rest[tet] {
                     watched.push(tet as u32);
                 }
                 now += volume;

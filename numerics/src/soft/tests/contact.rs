@@ -14,7 +14,8 @@ impl Contacts for Planes {
             let at = |time: f64| heights[0] + (heights[1] - heights[0]) * time;
             let offset = at(query.times[1]);
             for (particle, to) in query.to.iter().enumerate() {
-                let nearest = (n.dot(&V3::from(*to)) - offset).min(n.dot(&V3::from(query.from[particle])) - at(query.times[0]));
+                let nearest =
+                    (n.dot(&V3::from(*to)) - offset).min(n.dot(&V3::from(query.from[particle])) - at(query.times[0]));
                 if nearest < 2.0 * THICKNESS {
                     out.push(Contact {
                         particles: [particle as u32, 0, 0, 0],
@@ -215,8 +216,15 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
     let ground = ground(1.0);
     let mut solver = Solver::new(&body);
     for number in 0..48 {
-        let along = |frame: usize| [0.05 + 0.4 * frame as f64 / 48.0, 0.16 + 0.05 * (1.0 - (frame as f64 / 12.0).min(1.0))];
-        let pin = RollingPin { axis: [along(number), along(number + 1)], radius: 0.1, spin: -2.0, friction: 0.8, seconds: 1.0 / 24.0 };
+        let along =
+            |frame: usize| [0.05 + 0.4 * frame as f64 / 48.0, 0.16 + 0.05 * (1.0 - (frame as f64 / 12.0).min(1.0))];
+        let pin = RollingPin {
+            axis: [along(number), along(number + 1)],
+            radius: 0.1,
+            spin: -2.0,
+            friction: 0.8,
+            seconds: 1.0 / 24.0,
+        };
         let both = Both(&ground, &pin);
         let report = solver.step(&body, &mut state, &Frame { contacts: Some(&both), ..Frame::default() });
         let axis = along(number + 1);
@@ -225,7 +233,11 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
             .iter()
             .map(|x| ((x[0] - axis[0]) * (x[0] - axis[0]) + (x[1] - axis[1]) * (x[1] - axis[1])).sqrt() - 0.1)
             .fold(f64::INFINITY, f64::min);
-        assert!(deepest > -0.3 * THICKNESS && lowest(&state) > -0.1 * THICKNESS, "frame {number}: {deepest} {} {report:?}", lowest(&state));
+        assert!(
+            deepest > -0.3 * THICKNESS && lowest(&state) > -0.1 * THICKNESS,
+            "frame {number}: {deepest} {} {report:?}",
+            lowest(&state)
+        );
         assert!(fastest(&state) < 3.0, "frame {number}: {}", fastest(&state));
     }
 }

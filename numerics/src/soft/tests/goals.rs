@@ -66,9 +66,8 @@ fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
     state.dents.iter_mut().for_each(|dent| *dent = 0.9);
     let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| x.map(|x| 2.0 * x)).collect();
     let energy = |state: &State| {
-        let length = |[a, b]: [u32; 2]| {
-            (V3::from(state.positions[a as usize]) - V3::from(state.positions[b as usize])).norm()
-        };
+        let length =
+            |[a, b]: [u32; 2]| (V3::from(state.positions[a as usize]) - V3::from(state.positions[b as usize])).norm();
         let each = body.springs().into_iter().enumerate();
         each.map(|(i, ends)| {
             let strain = length(ends) - state.lengths[i] * state.dents[i];

@@ -3,18 +3,23 @@
 
 use super::*;
 
-const HOW: [Integrator; 3] =
-    [Integrator::Default, Integrator::Euler, Integrator::Accurate { tolerance: 1e-2 }];
+const HOW: [Integrator; 3] = [Integrator::Default, Integrator::Euler, Integrator::Accurate { tolerance: 1e-2 }];
 
 /// A block with its springs scaled one by one, and masses too.
 fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> Body {
     let (points, tets) = block([5, 3, 3], 0.1);
-    let shape = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1.0, 1.0, 0.0), &[]).unwrap();
+    let shape =
+        Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1.0, 1.0, 0.0), &[]).unwrap();
     let springs: Vec<Spring> = shape
         .springs()
         .into_iter()
         .enumerate()
-        .map(|(i, ends)| Spring { ends, stiffness: stiffness(i), damping: 1e-4 * stiffness(i), length: shape.lengths()[i] })
+        .map(|(i, ends)| Spring {
+            ends,
+            stiffness: stiffness(i),
+            damping: 1e-4 * stiffness(i),
+            length: shape.lengths()[i],
+        })
         .collect();
     let masses: Vec<f64> = (0..points.len()).map(mass).collect();
     Body::of_springs(&points, &masses, &springs).unwrap()
