@@ -28,6 +28,7 @@ pub mod scatter;
 pub mod shapes;
 pub mod shield;
 pub mod simd;
+pub mod soft;
 pub mod tets;
 pub mod tree;
 pub mod triangulate;

@@ -1,0 +1,199 @@
+//! Forces, residual and linear system of a stage at some positions.
+
+use super::V3;
+use super::body::Body;
+use super::contact::Mode;
+use super::parts::{Parts, Several};
+use super::rows::Rows;
+use super::springs::{self, Link, Motion};
+use super::stage::{Friction, Setting, Stage, Work};
+use super::system::{halfway, smoother};
+
+impl Work {
+    /// The force on each particle at `x` and `v`.
+    pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) -> Vec<V3> {
+        self.loose_forces(on, stage, x, v);
+        let mut out = vec![V3::zeros(); x.len()];
+        let (body, work) = (on.body, &*self);
+        let motion = Motion { x, v };
+        body.order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
+            for (place, out) in body.order.clusters.range(cluster).zip(out) {
+                *out = springs::force(work.links(body, place), &motion, place)
+                    + work.own_force(on, stage.time, place, &motion);
+            }
+        });
+        out
+    }
+
+    /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
+    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) {
+        let body = on.body;
+        self.volumes.measure(body, x, v, 0.0);
+        self.thin = self.volumes.thin(body, x, on.volumes, &self.inventory.watched);
+        self.touches.clear();
+        self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, stage.early, body.size)));
+        self.extra.clear();
+        if !self.thin.is_empty() || !self.touches.is_empty() {
+            self.extra.resize(x.len(), V3::zeros());
+            for thin in &self.thin {
+                for (corner, gradient) in thin.corners.iter().zip(&thin.gradient) {
+                    self.extra[*corner as usize] += gradient * thin.pressure;
+                }
+            }
+            for (contact, touch) in stage.contacts.iter().zip(&self.touches).filter(|pair| pair.1.mode != Mode::Apart) {
+                for (place, weight) in contact.sides() {
+                    self.extra[place] += touch.force * weight;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn links(&self, body: &Body, place: usize) -> &[Link] {
+        &self.links[body.starts[place] as usize..body.starts[place + 1] as usize]
+    }
+
+    /// All but springs.
+    #[inline(always)]
+    fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, motion: &Motion<'_>) -> V3 {
+        let mut sum = on.drive.force(place, on.body.mass[place], time, motion.x[place], motion.v[place]);
+        if !self.volumes.is_off() {
+            sum -= self.system.regions.gather(place, &self.volumes.pressures, &self.volumes.gradients);
+        }
+        if let Some(extra) = self.extra.get(place) {
+            sum += extra;
+        }
+        sum
+    }
+
+    /// The residual at `x`, and where `linear` the system there.
+    pub(super) fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: Option<Friction>) {
+        let (body, a) = (on.body, stage.a);
+        let clusters = &body.order.clusters;
+        let mut v = std::mem::take(&mut self.v);
+        velocities(clusters, x, stage, &mut v);
+        self.loose_forces(on, stage, x, &v);
+        let motion = Motion { x, v: &v };
+        let mut r = std::mem::take(&mut self.r);
+        if let Some(friction) = linear {
+            self.set_rows(on, stage, friction == Friction::Careful);
+            let mut system = std::mem::take(&mut self.system);
+            let (held, blocks, regions, loose) = (&system.held, &system.blocks, &system.regions, &system.loose);
+            let parts = (
+                &mut r[..],
+                &mut system.inertia[..],
+                &mut system.smoother[..],
+                Several::new(&body.starts, &mut system.records),
+            );
+            // `own_force` reads the regions' entries, which have moved out of `self` with the system.
+            let work = &*self;
+            clusters.each(parts, |cluster, (r, inertia, smooth, mut records)| {
+                let places = clusters.range(cluster).zip(r).zip(inertia).zip(smooth).zip(records.iter_mut());
+                for ((((place, r), inertia), smooth), records) in places {
+                    let (pull, mut block) = springs::linearise(work.links(body, place), &motion, a, place, records);
+                    let mass = body.mass[place];
+                    let mut own = on.drive.force(place, mass, stage.time, x[place], v[place]);
+                    if !regions.is_empty() {
+                        own -= regions.gather(place, &work.volumes.pressures, &work.volumes.gradients);
+                        regions.add_block(place, &mut block);
+                    }
+                    own += work.extra.get(place).copied().unwrap_or_default();
+                    if !loose.is_empty() {
+                        loose.add_block(place, &mut block);
+                    }
+                    if let Some(extra) = blocks.get(place) {
+                        block.iter_mut().zip(extra).for_each(|(sum, extra)| *sum += extra);
+                    }
+                    *inertia = mass + on.drive.inertia(place, mass, a);
+                    [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
+                    *r = if held[place] {
+                        V3::zeros()
+                    } else {
+                        (own + pull) * (a * a) - (x[place] - stage.y[place]) * mass
+                    };
+                    *smooth = if held[place] { [0.0; 6] } else { smoother(&block) };
+                }
+            });
+            self.system = system;
+        } else {
+            let work = &*self;
+            clusters.each(&mut r[..], |cluster, r: &mut [V3]| {
+                for (place, r) in clusters.range(cluster).zip(r) {
+                    *r = if work.system.held[place] {
+                        V3::zeros()
+                    } else {
+                        let force = springs::force(work.links(body, place), &motion, place)
+                            + work.own_force(on, stage.time, place, &motion);
+                        force * (a * a) - (x[place] - stage.y[place]) * body.mass[place]
+                    };
+                }
+            });
+        }
+        self.r = r;
+        self.v = v;
+    }
+
+    /// What volumes, thin tetrahedra and contacts resist.
+    fn set_rows(&mut self, on: &Setting<'_>, stage: &Stage<'_>, careful: bool) {
+        let (body, a) = (on.body, stage.a);
+        let clusters = &body.order.clusters;
+        if !self.volumes.is_off() {
+            let weights = self.volumes.weights(a);
+            self.system.regions.set(&weights, &self.volumes.gradients, clusters);
+        }
+        self.system.blocks.clear();
+        let (mut starts, mut places, mut along) = (vec![0u32], Vec::new(), Vec::new());
+        for thin in &self.thin {
+            let root = (a * a * thin.stiffness).sqrt();
+            places.extend(thin.corners);
+            along.extend(thin.gradient.iter().map(|g| g * root));
+            starts.push(places.len() as u32);
+        }
+        for (contact, touch) in stage.contacts.iter().zip(&self.touches).filter(|pair| pair.1.mode != Mode::Apart) {
+            let resisted = contact.resisted(touch, a, careful);
+            if let Some((place, weight)) = contact.alone() {
+                if self.system.blocks.is_empty() {
+                    self.system.blocks.resize(body.len(), [0.0; 6]);
+                }
+                contact.add_block(&resisted, weight, &mut self.system.blocks[place]);
+                continue;
+            }
+            let (directions, count) = resisted;
+            for direction in &directions[..count] {
+                for (place, weight) in contact.sides() {
+                    places.push(place as u32);
+                    along.push(direction * weight);
+                }
+                starts.push(places.len() as u32);
+            }
+        }
+        let parts = Parts::even(starts.len() - 1, 512, 1);
+        let loose: &mut Rows = &mut self.system.loose;
+        loose.set_topology(body.len(), &starts, &places, parts);
+        loose.set(&vec![1.0; starts.len() - 1], &along, clusters);
+    }
+
+    /// The residual's square in the norm of the particles' own blocks.
+    pub(super) fn square(&self, clusters: &Parts) -> f64 {
+        clusters.sum((), |cluster, ()| {
+            let places = clusters.range(cluster);
+            places.map(|place| halfway(&self.system.smoother[place], self.r[place]).norm_squared()).sum()
+        })
+    }
+
+    /// That of its difference to another.
+    pub(super) fn distance(&self, clusters: &Parts, other: &[V3]) -> f64 {
+        let own = |place: usize| halfway(&self.system.smoother[place], self.r[place] - other[place]).norm_squared();
+        clusters.sum((), |cluster, ()| clusters.range(cluster).map(own).sum())
+    }
+}
+
+/// (x − z)/a.
+pub(super) fn velocities(clusters: &Parts, x: &[V3], stage: &Stage<'_>, v: &mut Vec<V3>) {
+    v.resize(x.len(), V3::zeros());
+    clusters.each(&mut v[..], |cluster, v: &mut [V3]| {
+        for (place, v) in clusters.range(cluster).zip(v) {
+            *v = (x[place] - stage.z[place]) / stage.a;
+        }
+    });
+}

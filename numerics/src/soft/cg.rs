@@ -1,0 +1,189 @@
+//! Conjugate gradients on the linear system, preconditioned on two levels: each particle's own 3×3 block, plus the motions
+//! of clusters (see [`super::coarse`]).
+//!
+//! Promise: at most the given iterations; what was reached is returned, measured in the preconditioner's norm; the same
+//! bits for any number of threads. Sums run by cluster, in order.
+
+use super::V3;
+use super::body::Body;
+use super::coarse::{self, Layout, lever, moved};
+use super::system::{System, halfway, rest_of_the_way};
+
+/// Least share of a residual that is worth asking for where its square has a bound of its own.
+const FINEST: f64 = 1e-4;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Residual at the end ÷ at the start.
+    pub(super) share: f64,
+    /// The residual's square is to be this small too, as far as [`FINEST`] of the start allows.
+    pub(super) square: f64,
+    /// Most iterations.
+    pub(super) cap: u32,
+}
+
+/// What a solve reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Reached {
+    pub(super) iterations: u32,
+    /// Residual at the end ÷ at the start.
+    pub(super) share: f64,
+    /// Whether `share` is what was asked.
+    pub(super) met: bool,
+}
+
+/// Vectors that solves use again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    p: Vec<V3>,
+    ap: Vec<V3>,
+    modes: Vec<f64>,
+}
+
+/// Both levels of the preconditioner: `system.smoother` is the other half of it.
+#[derive(Clone, Copy)]
+pub(super) struct Coarse<'a> {
+    pub(super) layout: &'a Layout,
+    pub(super) factor: &'a [f64],
+    pub(super) arms: &'a [[f32; 3]],
+}
+
+impl Coarse<'_> {
+    /// The clusters' motions for the forces on them, and what they gain: cᵀ·(PᵀAP)⁻¹·c.
+    fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
+        modes.clear();
+        if self.factor.is_empty() {
+            return 0.0;
+        }
+        modes.extend(forces.iter().flatten());
+        coarse::solve(self.layout, self.factor, modes);
+        forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
+    }
+
+    /// What the clusters' motions do to a particle.
+    #[inline(always)]
+    fn moved(&self, modes: &[f64], cluster: usize, place: usize) -> V3 {
+        if modes.is_empty() {
+            V3::zeros()
+        } else {
+            moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place]))
+        }
+    }
+
+    /// A particle's share of the force on its cluster, added to `sums`.
+    #[inline(always)]
+    fn restrict(&self, place: usize, r: V3, sums: &mut [f64; 6]) {
+        let torque = lever(self.arms[place]).cross(&r);
+        for axis in 0..3 {
+            sums[axis] += r[axis];
+            sums[3 + axis] += torque[axis];
+        }
+    }
+}
+
+/// Moves `x` towards A⁻¹ of the residual `r`, which it keeps; `r` is 0 at held particles and stays so.
+pub(super) fn solve(
+    system: &mut System,
+    body: &Body,
+    coarse: Coarse<'_>,
+    limits: Limits,
+    scratch: &mut Scratch,
+    x: &mut [V3],
+    r: &mut [V3],
+) -> Reached {
+    let clusters = &body.order.clusters;
+    let Scratch { p, ap, modes } = scratch;
+    p.clear();
+    p.resize(r.len(), V3::zeros());
+    ap.resize(r.len(), V3::zeros());
+
+    // A residual's square in the preconditioner's norm, and the forces on clusters.
+    let smoother = &system.smoother;
+    let first = clusters.map((), |cluster, ()| {
+        let (mut square, mut sums) = (0.0, [0.0; 6]);
+        for place in clusters.range(cluster) {
+            square += halfway(&smoother[place], r[place]).norm_squared();
+            coarse.restrict(place, r[place], &mut sums);
+        }
+        (square, sums)
+    });
+    let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = first.into_iter().unzip();
+    let start = squares.iter().sum::<f64>() + coarse.solve(&forces, modes);
+    let mut reached = Reached { iterations: 0, share: 0.0, met: true };
+    if !(start > f64::MIN_POSITIVE && start.is_finite()) {
+        reached.met = start.is_finite();
+        return reached;
+    }
+    let (mut rz, mut beta) = (start, 0.0);
+    let asked = limits.share * limits.share * start;
+    let enough = asked.min(limits.square).max(asked.min(FINEST * FINEST * start));
+    loop {
+        let smoother = &system.smoother;
+        clusters.each(&mut p[..], |cluster, mine: &mut [V3]| {
+            for (place, p) in clusters.range(cluster).zip(mine) {
+                if !system.held[place] {
+                    let fine = rest_of_the_way(&smoother[place], halfway(&smoother[place], r[place]));
+                    *p = fine + coarse.moved(modes, cluster, place) + *p * beta;
+                }
+            }
+        });
+        let curvature = system.apply(body, clusters, p, ap);
+        reached.iterations += 1;
+        if !(curvature > 0.0 && curvature.is_finite()) {
+            reached.met = false;
+            break;
+        }
+        let alpha = rz / curvature;
+        let smoother = &system.smoother;
+        let next = clusters.map((&mut x[..], &mut r[..]), |cluster, (x, r): (&mut [V3], &mut [V3])| {
+            let (mut square, mut sums) = (0.0, [0.0; 6]);
+            for ((place, x), r) in clusters.range(cluster).zip(x).zip(r) {
+                *x += p[place] * alpha;
+                *r -= ap[place] * alpha;
+                square += halfway(&smoother[place], *r).norm_squared();
+                coarse.restrict(place, *r, &mut sums);
+            }
+            (square, sums)
+        });
+        let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = next.into_iter().unzip();
+        let after = squares.iter().sum::<f64>() + coarse.solve(&forces, modes);
+        if !(after.is_finite() && after >= 0.0) {
+            reached.met = false;
+            break;
+        }
+        beta = after / rz;
+        rz = after;
+        if rz <= enough {
+            break;
+        }
+        if reached.iterations >= limits.cap {
+            reached.met = false;
+            break;
+        }
+    }
+    reached.share = (rz / start).sqrt();
+    reached
+}
+
+/// Replaces `r` by the preconditioner's answer to it: near A⁻¹r, in one go.
+pub(super) fn precondition(system: &System, body: &Body, coarse: Coarse<'_>, r: &mut [V3]) {
+    let clusters = &body.order.clusters;
+    let forces = {
+        let r = &*r;
+        clusters.map((), |cluster, ()| {
+            let mut sums = [0.0; 6];
+            clusters.range(cluster).for_each(|place| coarse.restrict(place, r[place], &mut sums));
+            sums
+        })
+    };
+    let mut modes = Vec::new();
+    coarse.solve(&forces, &mut modes);
+    clusters.each(r, |cluster, r: &mut [V3]| {
+        for (place, r) in clusters.range(cluster).zip(r) {
+            let w = &system.smoother[place];
+            let fine = rest_of_the_way(w, halfway(w, *r));
+            *r = if system.held[place] { V3::zeros() } else { fine + coarse.moved(&modes, cluster, place) };
+        }
+    });
+}

@@ -1,0 +1,333 @@
+//! Contact and friction: who finds contacts, what they push with, how it is made linear.
+//!
+//! The solver asks a [`Contacts`] once a stage for all that may touch, and treats each as a spring that only pushes and only
+//! below the distance kept, without limit where the surfaces meet: N = κδ ÷ (1 − δ/gap), implicit like every other force.
+//! Friction is Coulomb's, sticking to a creep of [`CREEP`] body lengths a second, implicit too, with N as the step begins.
+//!
+//! Limit: the surfaces a contact was found for are planes within the stage.
+
+use super::V3;
+use super::body::Body;
+use super::rows::add_square;
+
+/// κ ÷ what the particles put up against being moved: springs and inertia together. More holds the gap better in one
+/// iteration, less converges faster.
+const FIRM: f64 = 30.0;
+/// Most that sticking resists a slip of a frame ÷ κ: beyond, frictions like 1e6 would only be noise.
+const HOLD: f64 = 1e4;
+/// Share of the gap from where on the push grows straight on: its slope is 1/(1 − that)² of the first.
+const STRAIGHT: f64 = 0.95;
+/// Share of its gap below which a contact is too deep to leave it there.
+const DEEP: f64 = 0.96;
+/// Body lengths a second at which friction is all of μN; below it creeps in proportion.
+const CREEP: f64 = 2e-5;
+
+/// Two surfaces that may touch: u = Σ wᵢxᵢ is how far the first is from the second, along `normal` once `offset` is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// The particles; those of weight 0 are none.
+    pub particles: [u32; 4],
+    /// Vertex against an obstacle: 1. Vertex against a face: 1 and −barycentric. Edge against edge: both, the second negative.
+    pub weights: [f64; 4],
+    /// Unit, from the second surface (or the obstacle) towards the first.
+    pub normal: [f64; 3],
+    /// n·u where the surfaces touch, at the time asked for; 0 between two bodies. Metres.
+    pub offset: f64,
+    /// Distance kept between them, metres.
+    pub gap: f64,
+    /// The obstacle's velocity there, m/s; 0 between two bodies.
+    pub velocity: [f64; 3],
+    /// Coulomb's μ.
+    pub friction: f64,
+}
+
+/// What may touch what while particles go straight `from` here `to` there.
+#[derive(Clone, Copy, Debug)]
+pub struct Query<'a> {
+    /// Where particles are at the first of `times`, by the caller's index.
+    pub from: &'a [[f64; 3]],
+    /// Where they are expected at the second: contacts hold for then.
+    pub to: &'a [[f64; 3]],
+    /// Shares of the frame that have passed.
+    pub times: [f64; 2],
+}
+
+/// Finds contacts.
+pub trait Contacts: Sync {
+    /// Adds all contacts that may act to `out`: those that touch, and those that come closer than twice the gap on the way.
+    /// In a fixed order.
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>);
+}
+
+/// A contact in the solver's order.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touching {
+    pub(super) places: [u32; 4],
+    pub(super) weights: [f64; 4],
+    pub(super) normal: V3,
+    offset: f64,
+    gap: f64,
+    pub(super) velocity: V3,
+    friction: f64,
+    /// κ, N/m.
+    firm: f64,
+    /// Most that sticking resists slip with, N·s/m.
+    hold: f64,
+    /// N that friction counts, newtons.
+    load: f64,
+    /// What it is taken to do throughout a step.
+    frozen: Option<Touch>,
+}
+
+/// What a contact does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// Nothing.
+    #[default]
+    Apart,
+    /// Pushes, without friction.
+    Pushes,
+    /// Its surfaces stick.
+    Sticks,
+    /// Its surfaces slide.
+    Slides,
+}
+
+/// A contact at some positions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touch {
+    pub(super) mode: Mode,
+    /// On the first surface, newtons.
+    pub(super) force: V3,
+    /// How far below the gap, metres.
+    pub(super) depth: f64,
+    /// N, and its slope with the depth.
+    pub(super) push: f64,
+    slope: f64,
+    /// Resistance to slip, N·s/m, and the slip's direction where it slides.
+    grip: f64,
+    slip: V3,
+    pub(super) energy: f64,
+}
+
+impl Touch {
+    /// What Newton's method asks whether it has changed.
+    pub(super) fn state(&self) -> (Mode, bool) {
+        (self.mode, self.push > 0.0)
+    }
+}
+
+impl Touching {
+    /// A contact as found, for frames of `seconds`; `firmness` is each particle's Σk.
+    pub(super) fn new(body: &Body, contact: &Contact, seconds: f64, firmness: &[f64]) -> Option<Self> {
+        let finite = contact.weights.iter().chain(&contact.normal).chain(&contact.velocity).all(|x| x.is_finite());
+        let normal = V3::from(contact.normal).try_normalize(1e-12)?;
+        if !finite || !contact.offset.is_finite() || !contact.gap.is_finite() {
+            return None;
+        }
+        let mut touching = Self {
+            places: [0; 4],
+            weights: contact.weights,
+            normal,
+            offset: contact.offset,
+            gap: contact.gap.max(0.0),
+            velocity: V3::from(contact.velocity),
+            friction: contact.friction.max(0.0),
+            firm: 0.0,
+            hold: 0.0,
+            load: 0.0,
+            frozen: None,
+        };
+        let mut yielding = 0.0;
+        for k in 0..4 {
+            if contact.weights[k] != 0.0 {
+                let place = *body.order.places.get(contact.particles[k] as usize)?;
+                touching.places[k] = place;
+                let stiff = 4.0 * body.mass[place as usize] / (seconds * seconds) + firmness[place as usize] / 3.0;
+                yielding += contact.weights[k] * contact.weights[k] / stiff;
+            }
+        }
+        touching.firm = FIRM / yielding;
+        touching.hold = HOLD * touching.firm * seconds;
+        (yielding > 0.0 && touching.firm.is_finite()).then_some(touching)
+    }
+
+    /// The particles, with their weights.
+    pub(super) fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
+        let sides: [(usize, f64); 4] = std::array::from_fn(|k| (self.places[k] as usize, self.weights[k]));
+        sides.into_iter().filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// Share of the gap that a depth takes up.
+    fn taken(&self, depth: f64) -> f64 {
+        if self.gap > 0.0 { depth / self.gap } else { 0.0 }
+    }
+
+    /// Whether it is deeper than it may stay.
+    pub(super) fn too_near(&self, x: &[V3]) -> bool {
+        let depth = -self.clearance(x, 0.0);
+        depth > 0.0 && self.taken(depth) > DEEP
+    }
+
+    /// Whether one particle alone is in it.
+    pub(super) fn alone(&self) -> Option<(usize, f64)> {
+        let mut sides = self.sides();
+        sides.next().filter(|_| sides.next().is_none())
+    }
+
+    /// Σ w·values.
+    fn between(&self, values: &[V3]) -> V3 {
+        self.sides().fold(V3::zeros(), |sum, (place, weight)| sum + values[place] * weight)
+    }
+
+    /// Distance above the gap, `seconds` before the time it was found for.
+    pub(super) fn clearance(&self, x: &[V3], seconds: f64) -> f64 {
+        let offset = self.offset - self.normal.dot(&self.velocity) * seconds;
+        self.normal.dot(&self.between(x)) - offset - self.gap
+    }
+
+    /// Takes it to go on as at `x` and `v`, `seconds` before the time it was found for: to push or not, stick or slide, with
+    /// the push a straight line of the depth. A step that only pushes one way is no step of order 2; one that goes on is.
+    pub(super) fn frozen(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Self {
+        Self { frozen: Some(self.at(x, v, seconds, size)), ..*self }
+    }
+
+    /// Whether what a frozen contact was taken to do is what it does at `x` and `v`.
+    pub(super) fn goes_on(&self, x: &[V3], v: &[V3]) -> bool {
+        let Some(then) = self.frozen else { return true };
+        let depth = -self.clearance(x, 0.0);
+        let push = then.push + then.slope * (depth - then.depth);
+        let slip = self.slip(v);
+        let stays = depth > 0.0 && self.taken(depth) < STRAIGHT;
+        match then.mode {
+            Mode::Apart => depth <= 0.0,
+            Mode::Pushes => stays,
+            Mode::Sticks => stays && slip.norm() * then.grip <= self.friction * push.max(0.0),
+            Mode::Slides => stays && slip.dot(&then.slip) >= 0.0,
+        }
+    }
+
+    /// How fast the surfaces slip.
+    fn slip(&self, v: &[V3]) -> V3 {
+        let pace = self.between(v) - self.velocity;
+        pace - self.normal * self.normal.dot(&pace)
+    }
+
+    /// What it does at `x` and `v`, `seconds` before the time it was found for; `size` is the body's.
+    pub(super) fn at(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Touch {
+        let depth = -self.clearance(x, seconds);
+        if let Some(then) = self.frozen {
+            let push = then.push + then.slope * (depth - then.depth);
+            let drag = match then.mode {
+                Mode::Apart | Mode::Pushes => V3::zeros(),
+                Mode::Sticks => self.slip(v) * then.grip,
+                Mode::Slides => then.slip * (self.friction * self.load),
+            };
+            let force = if then.mode == Mode::Apart { V3::zeros() } else { self.normal * push - drag };
+            // Sliding goes on whatever its speed: nothing resists across it either.
+            let grip = if then.mode == Mode::Slides { 0.0 } else { then.grip };
+            return Touch { depth, push, force, grip, ..then };
+        }
+        let mut touch = Touch {
+            mode: Mode::Apart,
+            force: V3::zeros(),
+            depth,
+            push: 0.0,
+            slope: 0.0,
+            grip: 0.0,
+            slip: V3::zeros(),
+            energy: 0.0,
+        };
+        if depth > 0.0 {
+            touch.mode = Mode::Pushes;
+            (touch.push, touch.slope, touch.energy) = self.spring(depth);
+            touch.force = self.normal * touch.push;
+        }
+        // A load goes on through the step, as otherwise friction would begin and end with a jump.
+        let most = self.friction * self.load;
+        if most > 0.0 {
+            let slip = self.slip(v);
+            let (speed, creep) = (slip.norm(), creep(size).max(most / self.hold));
+            touch.mode = Mode::Sticks;
+            if speed <= creep {
+                touch.grip = most / creep;
+            } else {
+                touch.mode = Mode::Slides;
+                touch.grip = most / speed;
+                touch.slip = slip / speed;
+            }
+            touch.force -= slip * touch.grip;
+        }
+        touch
+    }
+
+    /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
+    /// of its own, and what is solved stays convex. A contact that begins has none yet.
+    pub(super) fn loaded(&self, x: &[V3], seconds: f64) -> Self {
+        let depth = -self.clearance(x, seconds);
+        // Where surfaces are through each other the push is no load but a way out.
+        let deepest = if self.gap > 0.0 { STRAIGHT * self.gap } else { f64::INFINITY };
+        Self { load: if depth > 0.0 { self.spring(depth.min(deepest)).0 } else { 0.0 }, ..*self }
+    }
+
+    /// The push at a depth > 0, its slope, and the energy it stores.
+    fn spring(&self, depth: f64) -> (f64, f64, f64) {
+        let (k, gap) = (self.firm, self.gap);
+        let edge = STRAIGHT * gap;
+        if gap <= 0.0 {
+            return (k * depth, k, 0.5 * k * depth * depth);
+        }
+        let curved = |depth: f64| {
+            let left = 1.0 - depth / gap;
+            (k * depth / left, k / (left * left), k * gap * (-depth - gap * libm::log(left)))
+        };
+        if depth <= edge {
+            return curved(depth);
+        }
+        let (push, slope, energy) = curved(edge);
+        let more = depth - edge;
+        (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
+    }
+
+    /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does.
+    pub(super) fn friction_energy(&self, v: &[V3], a: f64, size: f64) -> f64 {
+        let most = self.friction * self.load;
+        let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.hold));
+        let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
+        a * most * held
+    }
+
+    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness. Sliding surfaces
+    /// do not resist faster or slower sliding, which is exact; a `careful` answer has them resist like slower ones would,
+    /// which never overshoots.
+    pub(super) fn resisted(&self, touch: &Touch, a: f64, careful: bool) -> ([V3; 3], usize) {
+        let n = self.normal;
+        let mut out = [n * (a * a * touch.slope).max(0.0).sqrt(), V3::zeros(), V3::zeros()];
+        let grip = (a * touch.grip).max(0.0).sqrt();
+        match touch.mode {
+            Mode::Apart => (out, 0),
+            Mode::Pushes => (out, 1),
+            Mode::Sticks => {
+                let across = n.cross(&if n.x.abs() < 0.7 { V3::x() } else { V3::y() }).normalize();
+                out[1] = across * grip;
+                out[2] = n.cross(&across) * grip;
+                (out, 3)
+            }
+            Mode::Slides => {
+                out[1] = n.cross(&touch.slip) * grip;
+                out[2] = touch.slip * grip;
+                (out, if careful { 3 } else { 2 })
+            }
+        }
+    }
+
+    /// That, as the block of a particle alone in it.
+    pub(super) fn add_block(&self, resisted: &([V3; 3], usize), weight: f64, block: &mut [f64; 6]) {
+        resisted.0[..resisted.1].iter().for_each(|way| add_square(block, *way, weight * weight));
+    }
+}
+
+/// Slip at which friction is all of μN, m/s.
+fn creep(size: f64) -> f64 {
+    (CREEP * size).max(f64::MIN_POSITIVE)
+}

@@ -1,0 +1,85 @@
+//! The springs of a body: edges of tetrahedra, each once, and which hang at which particle.
+
+use super::body::{Hung, Mesh};
+
+/// Corners that each of the six edges of a tetrahedron joins.
+pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+/// Corners of its four faces.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// The edges of tetrahedra, each once, by their ends; and the six of each.
+pub(super) fn edges(tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, Vec<[u32; 6]>) {
+    let ends = |tet: &[u32; 4], edge: [usize; 2]| {
+        let [a, b] = edge.map(|corner| tet[corner]);
+        [a.min(b), a.max(b)]
+    };
+    let mut sorted: Vec<([u32; 2], u32)> = Vec::with_capacity(6 * tets.len());
+    for (index, tet) in tets.iter().enumerate() {
+        sorted.extend(EDGES.iter().enumerate().map(|(k, edge)| (ends(tet, *edge), (6 * index + k) as u32)));
+    }
+    sorted.sort_unstable();
+    let mut unique: Vec<[u32; 2]> = Vec::new();
+    let mut springs = vec![[0; 6]; tets.len()];
+    for (ends, at) in sorted {
+        if unique.last() != Some(&ends) {
+            unique.push(ends);
+        }
+        springs[at as usize / 6][at as usize % 6] = unique.len() as u32 - 1;
+    }
+    (unique, springs)
+}
+
+/// For each missing edge the springs on surface edges at its two ends: on faces that one tetrahedron alone has.
+pub(super) fn neighbours_of_missing(mesh: &Mesh<'_>, ends: &[[u32; 2]], tet_springs: &[[u32; 6]]) -> Vec<Vec<u32>> {
+    if mesh.missing.is_empty() {
+        return Vec::new();
+    }
+    let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(4 * mesh.tets.len());
+    for (tet, springs) in mesh.tets.iter().zip(tet_springs) {
+        for face in FACES {
+            let mut corners = face.map(|corner| tet[corner]);
+            corners.sort_unstable();
+            let spring = |a: usize, b: usize| {
+                let edge = [face[a].min(face[b]), face[a].max(face[b])];
+                springs[EDGES.iter().position(|known| *known == edge).unwrap_or(0)]
+            };
+            faces.push((corners, [spring(0, 1), spring(1, 2), spring(0, 2)]));
+        }
+    }
+    faces.sort_unstable();
+    let mut at = vec![Vec::new(); mesh.points.len()];
+    for same in faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1) {
+        for spring in same[0].1 {
+            ends[spring as usize].iter().for_each(|end| at[*end as usize].push(spring));
+        }
+    }
+    let near = |[a, b]: &[u32; 2]| {
+        let mut near: Vec<u32> = at[*a as usize].iter().chain(&at[*b as usize]).copied().collect();
+        near.sort_unstable();
+        near.dedup();
+        near
+    };
+    mesh.missing.iter().map(near).collect()
+}
+
+/// The springs at each particle, by the other end.
+pub(super) fn hang(count: usize, ends: &[[u32; 2]]) -> (Vec<u32>, Vec<Hung>) {
+    let mut starts = vec![0u32; count + 1];
+    ends.iter().flatten().for_each(|end| starts[*end as usize + 1] += 1);
+    for particle in 0..count {
+        starts[particle + 1] += starts[particle];
+    }
+    let mut next = starts.clone();
+    let mut hung = vec![Hung { other: 0, spring: 0 }; 2 * ends.len()];
+    for (spring, [a, b]) in ends.iter().enumerate() {
+        for (end, other) in [(*a, *b), (*b, *a)] {
+            let slot = &mut next[end as usize];
+            hung[*slot as usize] = Hung { other, spring: spring as u32 };
+            *slot += 1;
+        }
+    }
+    for particle in 0..count {
+        hung[starts[particle] as usize..starts[particle + 1] as usize].sort_unstable_by_key(|at| (at.other, at.spring));
+    }
+    (starts, hung)
+}

@@ -1,0 +1,243 @@
+//! One frame of a body: what is asked for, what is reported, and how the steps of a frame are chosen.
+
+use super::V3;
+use super::body::Body;
+use super::contact::Contacts;
+use super::drive::{Drive, Goal, Pin};
+use super::energy::{Energies, measure};
+use super::springs::{self, Rest};
+use super::stage::{Setting, Work};
+use super::state::State;
+use super::step::{Moving, Stepped, Stepper};
+use super::volume::{Inventory, Volumes};
+
+/// Steps that a frame is cut into, at most, where halving is what helps.
+const MOST_STEPS: u32 = 256;
+
+/// How time is stepped through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Integrator {
+    /// TR-BDF2, order 2, one Newton iteration a stage; implicit Euler where a step begins off balance.
+    Default,
+    /// TR-BDF2 with steps chosen so that the estimated error of a frame stays within `tolerance` of the body's size.
+    Accurate {
+        /// Share of the body's size.
+        tolerance: f64,
+    },
+    /// Implicit Euler with line search: order 1, calms everything.
+    Euler,
+}
+
+/// What happens in a frame.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// Its length, seconds; 0 does nothing.
+    pub seconds: f64,
+    /// m/s².
+    pub gravity: [f64; 3],
+    /// Against all motion, 1/s.
+    pub drag: f64,
+    /// Share of lost volume that is fought, 0…1.
+    pub volume: f64,
+    /// Soft targets.
+    pub goals: &'a [Goal],
+    /// Hard ones.
+    pub pins: &'a [Pin],
+    /// Who finds contacts.
+    pub contacts: Option<&'a dyn Contacts>,
+    /// How time is stepped through.
+    pub integrator: Integrator,
+    /// Steps in the frame; 0: as many as needed.
+    pub substeps: u32,
+    /// Whether it begins off balance: rest lengths jumped, say. Then it is stepped through with implicit Euler.
+    pub rough: bool,
+}
+
+impl Default for Frame<'_> {
+    fn default() -> Self {
+        Self {
+            seconds: 1.0 / 24.0,
+            gravity: [0.0, -9.81, 0.0],
+            drag: 0.0,
+            volume: 1.0,
+            goals: &[],
+            pins: &[],
+            contacts: None,
+            integrator: Integrator::Default,
+            substeps: 0,
+            rough: false,
+        }
+    }
+}
+
+/// What a frame took, and where it left the body.
+#[must_use]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Newton iterations.
+    pub newton: u32,
+    /// Iterations of linear solves.
+    pub cg: u32,
+    /// The largest share of a stage's first residual that was left of it.
+    pub residual: f64,
+    /// Solves that stopped short of what was asked.
+    pub caps_hit: u32,
+    /// Estimated error of the positions that the frame added, metres: the sum over its steps of the largest of a particle.
+    pub error_estimate: f64,
+    /// Joules.
+    pub kinetic: f64,
+    /// In the springs, joules.
+    pub elastic: f64,
+    /// In pressures and against turning over, joules.
+    pub volume_energy: f64,
+    /// In goals, joules.
+    pub goal_energy: f64,
+    /// Taken because a step would have made energy, joules.
+    pub energy_shed: f64,
+    /// Volume ÷ volume at rest.
+    pub volume_ratio: f64,
+    /// The largest length ÷ length at rest of a spring, or its reciprocal.
+    pub worst_stretch: f64,
+    /// Tetrahedra inside out.
+    pub inverted_tets: u32,
+    /// Steps taken.
+    pub substeps: u32,
+    /// How many of them were implicit Euler.
+    pub euler_steps: u32,
+    /// Contacts that push.
+    pub contacts: u32,
+    /// How far the worst of them is below its gap, metres.
+    pub deepest_overlap: f64,
+    /// Particles that were stopped where they stood, as nothing finite came out.
+    pub stopped: u32,
+}
+
+/// Steps a body through frames; what it remembers between them is memory to use again, and changes no bit.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    work: Work,
+}
+
+impl Solver {
+    /// For `body`, whose shape stays; its material may change.
+    pub fn new(body: &Body) -> Self {
+        Self { work: Work::new(body) }
+    }
+
+    /// Moves `state` through a frame.
+    ///
+    /// # Panics
+    /// Where `state` does not fit `body`, a goal or pin names no particle, or `body` has not the shape it was made for.
+    pub fn step(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
+        assert!(state.fits(body), "a state of another body");
+        let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
+        let gravity = V3::from(frame.gravity);
+        let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
+        let lengths = state.rest_lengths();
+        let rest = Rest { lengths: &lengths, torn: &state.torn };
+        self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
+        self.work.system.regions.idle = self.work.volumes.is_off();
+        springs::links(body, &rest, &mut self.work.links);
+        let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
+        let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
+        let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
+        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend };
+        let mut report = Report::default();
+        self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
+        let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
+        if seconds > 0.0 && !body.is_empty() {
+            let mut stepper = Stepper {
+                work: &mut self.work,
+                setting,
+                frame,
+                seconds,
+                warm: &mut state.warm,
+                unsettled: &mut state.unsettled,
+                reserve: &mut state.reserve,
+            };
+            run(&mut stepper, &mut moving, &mut energies, &mut report);
+        }
+        (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
+        describe(&mut report, &setting, &energies, &moving);
+        state.trend.resize(body.len(), [0.0; 3]);
+        for (caller, place) in body.order.places.iter().enumerate() {
+            state.positions[caller] = moving.x[*place as usize].into();
+            state.velocities[caller] = moving.v[*place as usize].into();
+            state.trend[caller] = moving.trend[*place as usize].into();
+        }
+        report
+    }
+}
+
+/// The steps of a frame.
+fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report) {
+    let accurate = match stepper.frame.integrator {
+        Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.setting.body.size),
+        Integrator::Default | Integrator::Euler => None,
+    };
+    if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
+        return adapt(stepper, moving, energies, report, tolerance);
+    }
+    let steps = stepper.frame.substeps.clamp(1, MOST_STEPS);
+    for step in 0..steps {
+        let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
+        let stepped = stepper.step(moving, times, energies, None, false);
+        *energies = stepped.after;
+        add(report, &stepped);
+    }
+}
+
+/// Steps whose estimated error a second stays within `tolerance` metres a frame.
+fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report, tolerance: f64) {
+    /// Most and least that a step is changed by, and what is kept in reserve.
+    const CHANGE: [f64; 2] = [0.2, 4.0];
+    const RESERVE: f64 = 0.9;
+    let (mut time, mut share, mut calm) = (0.0, 1.0_f64, false);
+    while time < 1.0 {
+        // Equal steps to the end, so that no sliver is left there.
+        let left = 1.0 - time;
+        let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
+        let end = if count <= 1.0 { 1.0 } else { time + left / count };
+        let (before, reserve) = (moving.clone(), *stepper.reserve);
+        let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
+        let allowed = tolerance * (end - time);
+        let smallest = end - time <= 2.0 / f64::from(MOST_STEPS);
+        let fits = stepped.estimate <= allowed || stepped.euler;
+        add(report, &stepped);
+        let change = if stepped.estimate > 0.0 { RESERVE * (allowed / stepped.estimate).sqrt() } else { CHANGE[1] };
+        share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
+        // No step is small enough: what is left of it is calmed.
+        calm = !fits && smallest;
+        if fits {
+            report.caps_hit += u32::from(smallest && stepped.euler);
+            *energies = stepped.after;
+            time = end;
+        } else {
+            // The work counts, the result does not.
+            report.error_estimate -= stepped.estimate;
+            report.substeps -= 1;
+            *moving = before;
+            *stepper.reserve = reserve;
+            stepper.look(moving);
+        }
+    }
+}
+
+fn add(report: &mut Report, stepped: &Stepped) {
+    report.newton += stepped.solved.newton;
+    report.cg += stepped.solved.cg;
+    report.caps_hit += stepped.solved.caps;
+    report.residual = report.residual.max(stepped.solved.residual);
+    report.error_estimate += stepped.estimate;
+    report.energy_shed += stepped.shed;
+    report.substeps += 1;
+    report.euler_steps += u32::from(stepped.euler);
+    report.stopped = report.stopped.max(stepped.stopped);
+    (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
+}
+
+fn describe(report: &mut Report, on: &Setting<'_>, energies: &Energies, moving: &Moving) {
+    (report.kinetic, report.elastic) = (energies.kinetic, energies.springs);
+    (report.volume_energy, report.goal_energy) = (energies.volumes, energies.goals);
+    report.worst_stretch = super::energy::worst_stretch(on, &moving.x);
+}

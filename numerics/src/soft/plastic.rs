@@ -1,0 +1,99 @@
+//! What changes lengths at rest: dents, goals that become the shape at rest, and tears.
+//!
+//! A spring's length at rest is that of the shape times what dents scale it by, kept apart so that a body takes the shape of
+//! a goal and keeps its dents. Each change says what energy it released or stored.
+
+use super::V3;
+use super::body::{Body, volume};
+use super::springs::{self, Rest};
+use super::state::State;
+
+/// Least and most that dents scale a length by: a spring flows no further.
+const DENTS: [f64; 2] = [0.1, 10.0];
+
+/// How springs give way for good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plasticity {
+    /// Strain above which a spring flows; 0: never.
+    pub yield_strain: f64,
+    /// Share of the strain above it that flows away a second, 1/s.
+    pub creep: f64,
+}
+
+/// Lets springs flow for `seconds`; returns the energy that takes, joules.
+pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64) -> f64 {
+    let flows = plasticity.yield_strain > 0.0 && plasticity.creep > 0.0 && seconds > 0.0;
+    if !flows {
+        return 0.0;
+    }
+    let share = -libm::expm1(-plasticity.creep * seconds);
+    let before = elastic(body, state);
+    let x = places(body, &state.positions);
+    for spring in 0..body.ends.len() {
+        let rest = state.lengths[spring] * state.dents[spring];
+        if rest > 0.0 && !state.torn[spring] {
+            let strain = springs::length(body, &x, spring) / rest - 1.0;
+            let above = (strain.abs() - plasticity.yield_strain).max(0.0).copysign(strain);
+            let dent = state.dents[spring] * (1.0 + share * above).max(0.0);
+            if dent.is_finite() {
+                state.dents[spring] = dent.clamp(DENTS[0], DENTS[1]);
+            }
+        }
+    }
+    before - elastic(body, state)
+}
+
+/// Brings the shape at rest `share` of the way to `shape`, particles by the caller's index; `keep` is the share of dents
+/// that stays (of their logarithm). Lengths of springs given as such, and torn ones, stay. Returns the energy that brings,
+/// joules, below 0 where it frees some.
+pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
+    let before = elastic(body, state);
+    let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
+    let goal = places(body, shape);
+    let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
+    for spring in 0..body.meshed() {
+        let length = springs::length(body, &goal, spring);
+        if length.is_finite() {
+            state.lengths[spring] = blend(state.lengths[spring], length);
+        }
+        if keep < 1.0 {
+            state.dents[spring] = libm::pow(state.dents[spring], 1.0 - share * (1.0 - keep));
+        }
+    }
+    for (tet, corners) in body.tets.iter().enumerate() {
+        let volume = volume(corners.map(|corner| goal[corner as usize]));
+        // A goal that turns a tetrahedron over has no volume to ask of it.
+        if volume.is_finite() && volume > 0.0 {
+            state.volumes[tet] = blend(state.volumes[tet], volume);
+        }
+    }
+    elastic(body, state) - before
+}
+
+/// Tears springs given as such that are longer than `stretch` times their length at rest (or than `reach` metres, where
+/// that is more); returns how many.
+pub fn tear(body: &Body, state: &mut State, stretch: f64, reach: f64) -> u32 {
+    let x = places(body, &state.positions);
+    let mut torn = 0;
+    for spring in body.meshed()..body.ends.len() {
+        let most = (stretch * state.lengths[spring] * state.dents[spring]).max(reach);
+        if !state.torn[spring] && springs::length(body, &x, spring) > most {
+            state.torn[spring] = true;
+            torn += 1;
+        }
+    }
+    torn
+}
+
+fn places(body: &Body, points: &[[f64; 3]]) -> Vec<V3> {
+    body.inwards(points).into_iter().map(V3::from).collect()
+}
+
+/// What springs store, joules.
+fn elastic(body: &Body, state: &State) -> f64 {
+    let lengths = state.rest_lengths();
+    let rest = Rest { lengths: &lengths, torn: &state.torn };
+    let x = places(body, &state.positions);
+    body.spring_parts
+        .sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
+}

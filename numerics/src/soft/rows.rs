@@ -1,0 +1,166 @@
+//! Rows: what resists one direction of motion of several particles at once, H = Σ g gᵀ with a vector g a particle.
+//!
+//! Volumes of regions, tetrahedra about to turn over and contacts of two bodies are rows. Each is read twice a product:
+//! first by row (how fast does it change), then by particle (what does that push), so nothing is scattered and the order of
+//! every sum is fixed. In f32: a row that moves with a body rigidly feels it to 1e-7.
+
+use super::V3;
+use super::parts::{Parts, Several};
+
+/// Rows by row and by particle.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    /// Whether they count for nothing.
+    pub(super) idle: bool,
+    /// Where each row's entries begin.
+    starts: Vec<u32>,
+    /// Particle of each entry, by place.
+    particles: Vec<u32>,
+    /// √weight·gradient of each entry.
+    along: Vec<[f32; 3]>,
+    /// Where each particle's entries begin in `at`; empty where there is no row.
+    at_starts: Vec<u32>,
+    at: Vec<At>,
+    parts: Option<Parts>,
+    /// Each row's change in the last product.
+    change: Vec<f64>,
+}
+
+/// An entry as its particle sees it.
+#[derive(Clone, Copy, Debug, Default)]
+struct At {
+    row: u32,
+    entry: u32,
+    along: [f32; 3],
+}
+
+impl Rows {
+    /// Rows of `particles` that begin at `starts`, among `count` particles.
+    pub(super) fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], parts: Parts) {
+        self.starts.clear();
+        self.particles.clear();
+        self.at_starts.clear();
+        if particles.is_empty() {
+            self.at.clear();
+            self.along.clear();
+            self.change.clear();
+            return;
+        }
+        self.starts.extend_from_slice(starts);
+        self.particles.extend_from_slice(particles);
+        self.at_starts.resize(count + 1, 0);
+        particles.iter().for_each(|place| self.at_starts[*place as usize + 1] += 1);
+        for place in 0..count {
+            self.at_starts[place + 1] += self.at_starts[place];
+        }
+        let mut next = self.at_starts.clone();
+        self.at.clear();
+        self.at.resize(particles.len(), At::default());
+        for row in 0..starts.len() - 1 {
+            for entry in starts[row]..starts[row + 1] {
+                let slot = &mut next[particles[entry as usize] as usize];
+                self.at[*slot as usize] = At { row: row as u32, entry, along: [0.0; 3] };
+                *slot += 1;
+            }
+        }
+        self.along.clear();
+        self.along.resize(particles.len(), [0.0; 3]);
+        self.change.clear();
+        self.change.resize(starts.len() - 1, 0.0);
+        self.parts = Some(parts);
+    }
+
+    /// Whether there is no row that counts.
+    pub(super) fn is_empty(&self) -> bool {
+        self.idle || self.at_starts.is_empty()
+    }
+
+    /// How many rows.
+    pub(super) fn len(&self) -> usize {
+        self.change.len()
+    }
+
+    /// The entries of a row.
+    pub(super) fn row(&self, row: usize) -> std::ops::Range<usize> {
+        self.starts[row] as usize..self.starts[row + 1] as usize
+    }
+
+    /// The entries' particles and vectors.
+    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (u32, V3)> {
+        self.row(row).map(|entry| (self.particles[entry], wide(self.along[entry])))
+    }
+
+    /// Sets what each entry resists: `weight` of the row, times the entry's gradient.
+    pub(super) fn set(&mut self, weights: &[f64], gradients: &[V3], clusters: &Parts) {
+        if self.is_empty() {
+            return;
+        }
+        if let Some(parts) = &self.parts {
+            let starts = &self.starts;
+            parts.each(Several::new(starts, &mut self.along), |part, mut along| {
+                for (row, along) in parts.range(part).zip(along.iter_mut()) {
+                    let root = weights[row].max(0.0).sqrt();
+                    for (entry, along) in (starts[row] as usize..).zip(along) {
+                        let scaled = gradients[entry] * root;
+                        *along = [scaled.x as f32, scaled.y as f32, scaled.z as f32];
+                    }
+                }
+            });
+        }
+        let along = &self.along;
+        clusters.each(Several::new(&self.at_starts, &mut self.at), |_, mut mine| {
+            mine.iter_mut().flatten().for_each(|at| at.along = along[at.entry as usize]);
+        });
+    }
+
+    /// Measures how `p` changes each row; [`Rows::push`] then gives what that does.
+    pub(super) fn measure(&mut self, p: &[V3]) {
+        let Some(parts) = self.parts.as_ref().filter(|_| !self.is_empty()) else { return };
+        let (starts, particles, along) = (&self.starts, &self.particles, &self.along);
+        parts.each(&mut self.change[..], |part, mine: &mut [f64]| {
+            for (row, change) in parts.range(part).zip(mine) {
+                let entries = starts[row] as usize..starts[row + 1] as usize;
+                let each = particles[entries.clone()].iter().zip(&along[entries]);
+                *change = each.fold(0.0, |sum, (place, g)| sum + wide(*g).dot(&p[*place as usize]));
+            }
+        });
+    }
+
+    /// Σ g·(its row's change), of the particle at `place`.
+    #[inline(always)]
+    pub(super) fn push(&self, place: usize) -> V3 {
+        let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
+        mine.iter().fold(V3::zeros(), |sum, at| sum + wide(at.along) * self.change[at.row as usize])
+    }
+
+    /// Σ g gᵀ of the particle at `place`, added to `block`.
+    #[inline(always)]
+    pub(super) fn add_block(&self, place: usize, block: &mut [f64; 6]) {
+        for at in &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize] {
+            add_square(block, wide(at.along), 1.0);
+        }
+    }
+
+    /// Σ of `values`, one a row, times `gradients`, one an entry: a force on the particle at `place`.
+    #[inline(always)]
+    pub(super) fn gather(&self, place: usize, values: &[f64], gradients: &[V3]) -> V3 {
+        let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
+        mine.iter().fold(V3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
+    }
+}
+
+#[inline(always)]
+fn wide(g: [f32; 3]) -> V3 {
+    V3::new(f64::from(g[0]), f64::from(g[1]), f64::from(g[2]))
+}
+
+/// Adds s·v vᵀ to a symmetric block: xx, xy, xz, yy, yz, zz.
+#[inline(always)]
+pub(super) fn add_square(block: &mut [f64; 6], v: V3, s: f64) {
+    block[0] += s * v.x * v.x;
+    block[1] += s * v.x * v.y;
+    block[2] += s * v.x * v.z;
+    block[3] += s * v.y * v.y;
+    block[4] += s * v.y * v.z;
+    block[5] += s * v.z * v.z;
+}

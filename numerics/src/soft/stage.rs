@@ -1,0 +1,269 @@
+//! One implicit stage: M(x − y) = a²·f(x, (x − z)/a), by Newton's method.
+//!
+//! Implicit Euler is one such stage, TR-BDF2 two with the same a. The derivative is made positive semi-definite, so that each
+//! iteration goes downhill; with a line search the objective never rises. One iteration is what a step has by default;
+//! it goes on where contacts change or the force turned out otherwise than its derivative said.
+
+use super::V3;
+use super::body::Body;
+use super::cg::{self, Coarse, Limits};
+use super::coarse::{self, Layout};
+use super::contact::{Mode, Touch, Touching};
+use super::drive::Drive;
+use super::springs::{Link, Record, Rest};
+use super::state::Warm;
+use super::system::System;
+use super::volume::{Inventory, Thin, Volumes};
+
+/// Share of the first residual that linear equations may leave.
+const CG_SHARE: f64 = 0.1;
+/// Share of the energy that turns free pieces which a linear solve may leave as noise: it would slow them.
+const NOISE: f64 = 1e-8;
+/// Iterations a linear solve has at most.
+const CG_CAP: u32 = 300;
+/// Times as many iterations as when it was new, at which the coarse factor is made again.
+const STALE: f64 = 1.5;
+/// Share of the first residual above which what the derivative did not foresee asks for another iteration.
+const UNFORESEEN: f64 = 0.5;
+/// Times as large as before that a residual's square may be after an iteration without line search.
+const RISE: f64 = 100.0;
+/// Iterations a stage may have where contacts change.
+const CONTACT_ITERATIONS: u32 = 20;
+/// Share of a step that a line search takes where friction is made linear with more care from then on.
+const CAREFUL: f64 = 0.3;
+
+/// What a stage is to solve.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a> {
+    pub(super) y: &'a [V3],
+    pub(super) z: &'a [V3],
+    /// Seconds.
+    pub(super) a: f64,
+    /// Share of the frame passed at its end.
+    pub(super) time: f64,
+    pub(super) contacts: &'a [Touching],
+    /// Seconds from there to the time that contacts were found for.
+    pub(super) early: f64,
+    /// Energy that turns free pieces, joules.
+    pub(super) spinning: f64,
+    /// Which of a step's stages, for the count of iterations.
+    pub(super) index: usize,
+}
+
+/// What holds for a whole frame.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    pub(super) body: &'a Body,
+    pub(super) drive: &'a Drive,
+    pub(super) rest: Rest<'a>,
+    /// Volumes of tetrahedra at rest.
+    pub(super) volumes: &'a [f64],
+}
+
+/// When Newton's method stops.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Newton {
+    /// Iterations at most; contacts that change get [`CONTACT_ITERATIONS`].
+    pub(super) most: u32,
+    /// With a line search, the share of the first residual that ends it.
+    pub(super) share: f64,
+    /// A step this short ends it, metres.
+    pub(super) tolerance: f64,
+    /// Whether the objective may not rise.
+    pub(super) search: bool,
+}
+
+/// How sliding contacts resist in the linear system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Friction {
+    Exact,
+    Careful,
+}
+
+/// What a stage took and reached.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Solved {
+    pub(super) newton: u32,
+    pub(super) cg: u32,
+    pub(super) caps: u32,
+    /// Residual at the end ÷ at the start.
+    pub(super) residual: f64,
+    /// Whether the residual rose, or a number is not finite.
+    pub(super) failed: bool,
+}
+
+/// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Work {
+    pub(super) system: System,
+    pub(super) layout: Layout,
+    pub(super) volumes: Volumes,
+    /// Tetrahedra as the step began.
+    pub(super) inventory: Inventory,
+    pub(super) arms: Vec<[f32; 3]>,
+    /// The springs as the frame has them.
+    pub(super) links: Vec<Link>,
+    pub(super) scratch: cg::Scratch,
+    /// Velocities at the positions looked at.
+    pub(super) v: Vec<V3>,
+    /// −(M(x − y) − a²f).
+    pub(super) r: Vec<V3>,
+    pub(super) dx: Vec<V3>,
+    pub(super) trial: Vec<V3>,
+    pub(super) thin: Vec<Thin>,
+    pub(super) touches: Vec<Touch>,
+    /// Contacts' and thin tetrahedra's forces; empty where there are none.
+    pub(super) extra: Vec<V3>,
+    /// The group of each piece whose momentum nothing outside but gravity changes, and pieces that nothing touches.
+    pub(super) groups: Vec<Option<u32>>,
+    pub(super) turns: Vec<bool>,
+}
+
+impl Work {
+    pub(super) fn new(body: &Body) -> Self {
+        let count = body.len();
+        let mut system = System {
+            records: vec![Record::default(); body.hung.len()],
+            inertia: vec![0.0; count],
+            held: vec![false; count],
+            smoother: vec![[0.0; 6]; count],
+            ..System::default()
+        };
+        let regions = &body.regions;
+        system.regions.set_topology(count, &regions.starts, &regions.particles, regions.parts());
+        Self { system, layout: Layout::new(&body.order), r: vec![V3::zeros(); count], ..Self::default() }
+    }
+
+    /// Solves the stage from the guess `x`, whose held particles are where they have to be.
+    pub(super) fn solve(
+        &mut self,
+        on: &Setting<'_>,
+        stage: &Stage<'_>,
+        newton: Newton,
+        warm: &mut Warm,
+        x: &mut [V3],
+    ) -> Solved {
+        let (body, clusters) = (on.body, &on.body.order.clusters);
+        self.find_free(on, stage);
+        let mut solved = Solved::default();
+        let mut first = 0.0;
+        let mut friction = Friction::Exact;
+        loop {
+            self.assemble(on, stage, x, Some(friction));
+            let before = self.square(clusters);
+            if solved.newton == 0 {
+                first = before;
+            }
+            let modes: Vec<(Mode, bool)> = self.touches.iter().map(Touch::state).collect();
+            let base = if newton.search { self.objective(on, stage, x) } else { 0.0 };
+            self.direction(on, stage, warm, x, &mut solved);
+            solved.newton += 1;
+            let foreseen = std::mem::take(&mut self.r);
+            if !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite())) {
+                self.r = foreseen;
+                solved.failed = true;
+                return solved;
+            }
+            let share = if newton.search { self.search(on, stage, x, base) } else { 1.0 };
+            self.dx.iter_mut().for_each(|d| *d *= share);
+            x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d);
+            self.r = vec![V3::zeros(); x.len()];
+            self.assemble(on, stage, x, None);
+            let after = self.square(clusters);
+            let fell = after <= RISE * before;
+            if !newton.search && !fell {
+                solved.failed = true;
+                return solved;
+            }
+            solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
+            let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
+            let unforeseen = share == 1.0 && self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before;
+            let changed = self.touches.iter().zip(&modes).any(|(touch, state)| touch.state() != *state);
+            let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
+            let stuck = share < CAREFUL && friction == Friction::Exact && !self.touches.is_empty();
+            friction = if share < CAREFUL { Friction::Careful } else { Friction::Exact };
+            let most = if changed || deep || stuck { CONTACT_ITERATIONS } else { newton.most };
+            let wanted = if newton.search {
+                solved.residual > newton.share
+            } else if newton.tolerance > 0.0 {
+                longest > newton.tolerance
+            } else {
+                unforeseen
+            };
+            let wanted = (wanted && share > 0.0) || stuck || ((changed || deep) && share > 0.0);
+            if !wanted || solved.newton >= most {
+                solved.failed |= !after.is_finite();
+                self.turn(body, x);
+                return solved;
+            }
+        }
+    }
+
+    /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
+    pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [V3]) {
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+        cg::precondition(&self.system, body, coarse, r);
+    }
+
+    /// A⁻¹r, by conjugate gradients.
+    pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<V3>) -> cg::Reached {
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+        let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
+        let mut out = vec![V3::zeros(); r.len()];
+        let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
+        *r = out;
+        reached
+    }
+
+    /// Contacts that push, and the deepest of them, metres below its gap.
+    pub(super) fn touching(&self) -> (u32, f64) {
+        let pushing = self.touches.iter().filter(|touch| touch.push > 0.0);
+        pushing.fold((0, 0.0), |(count, deepest), touch| (count + 1, touch.depth.max(deepest)))
+    }
+
+    /// The Newton direction `dx` at `x`; `r` becomes what of the residual it leaves.
+    fn direction(&mut self, on: &Setting<'_>, stage: &Stage<'_>, warm: &mut Warm, x: &[V3], solved: &mut Solved) {
+        let body = on.body;
+        self.dx.clear();
+        self.dx.resize(x.len(), V3::zeros());
+        let wanted = self.momenta(body);
+        self.shift(body, &wanted);
+        coarse::arms(&body.order.clusters, x, &mut self.arms);
+        if warm.factor.len() != self.layout.size() {
+            self.renew(body, warm);
+        }
+        let fresh = &mut warm.fresh[stage.index];
+        let bound = if *fresh == 0 { CG_CAP } else { (3 * *fresh).max(*fresh + 10) };
+        let square =
+            if stage.spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * stage.spinning } else { f64::INFINITY };
+        let limits = Limits { share: CG_SHARE, square, cap: bound.min(CG_CAP) };
+        let mut reached = self.iterate(body, warm, limits);
+        solved.cg += reached.iterations;
+        if !reached.met && bound < CG_CAP {
+            // Stale past use: go on with a new one.
+            self.renew(body, warm);
+            let limits = Limits { share: (CG_SHARE / reached.share.max(CG_SHARE)).min(1.0), square, cap: CG_CAP };
+            reached = self.iterate(body, warm, limits);
+            solved.cg += reached.iterations;
+        }
+        let fresh = &mut warm.fresh[stage.index];
+        if *fresh == 0 {
+            *fresh = reached.iterations.max(1);
+        } else if f64::from(reached.iterations) > STALE * f64::from(*fresh) + 1.0 {
+            *warm = Warm::default();
+        }
+        solved.caps += u32::from(!reached.met);
+        // Linear solves leave a share of the residual; momentum they may not touch.
+        self.shift(body, &wanted);
+    }
+
+    fn iterate(&mut self, body: &Body, warm: &Warm, limits: Limits) -> cg::Reached {
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+        cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
+    }
+
+    fn renew(&mut self, body: &Body, warm: &mut Warm) {
+        warm.factor = coarse::factor(&self.layout, body, &self.system, &self.arms);
+        warm.fresh = [0; 2];
+    }
+}

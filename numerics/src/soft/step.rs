@@ -1,0 +1,382 @@
+//! One step: TR-BDF2, or implicit Euler.
+//!
+//! TR-BDF2 (Bank et al. 1985) goes by the trapezoidal rule to γ = 2 − √2 of the step and by the second backward
+//! difference from there: order 2, L-stable, and both stages are the same equation M(x − y) = a²f(x, (x − z)/a) with
+//! a = γh/2. Its error estimate is Hosea & Shampine's (1996). Implicit Euler is that equation once, with a = h.
+//!
+//! A step that begins off balance (turned tetrahedra, contacts that changed in the step before, or the caller says so) is
+//! implicit Euler with line search, which calms what TR-BDF2 would carry on: an impact within its first stage would come
+//! back from it 1.4 times as fast, as any method of order 2 continues forces. So is one in which contacts change or that
+//! turned out bad, again from the start.
+
+use super::V3;
+use super::body::Body;
+use super::contact::{Contact, Query, Touching};
+use super::energy::{Energies, measure};
+use super::frame::{Frame, Integrator};
+use super::guess::{Guess, Rigid};
+use super::stage::{Newton, Setting, Solved, Stage, Work};
+use super::state::Warm;
+use super::volume::Inventory;
+
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+/// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
+const MOST: u32 = 4;
+/// Newton iterations a stage has in accurate mode.
+const MOST_ACCURATE: u32 = 12;
+/// Share of the tolerance at which Newton's method stops in accurate mode.
+const NEWTON_SHARE: f64 = 0.1;
+/// Share of the energy at hand that a step may gain before it is done again with implicit Euler.
+const GAIN: f64 = 0.1;
+/// Times that implicit Euler looks for contacts it has missed.
+const ROUNDS: u32 = 4;
+/// Share of the mean spring that a first guess may move a particle to a surface.
+const NUDGE: f64 = 0.3;
+/// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
+const UNSETTLED: u32 = 4;
+/// Share of the first residual at which implicit Euler stops.
+const EULER_SHARE: f64 = 0.03;
+
+/// Positions and velocities, the solver's order.
+#[derive(Clone, Debug)]
+pub(super) struct Moving {
+    pub(super) x: Vec<V3>,
+    pub(super) v: Vec<V3>,
+    /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
+    pub(super) trend: Vec<V3>,
+}
+
+/// What a step took and reached.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stepped {
+    pub(super) solved: Solved,
+    /// Largest estimated error of a particle, metres.
+    pub(super) estimate: f64,
+    pub(super) euler: bool,
+    /// Joules taken out.
+    pub(super) shed: f64,
+    pub(super) after: Energies,
+    pub(super) contacts: u32,
+    pub(super) overlap: f64,
+    pub(super) stopped: u32,
+}
+
+/// What steps are made with.
+pub(super) struct Stepper<'a> {
+    pub(super) work: &'a mut Work,
+    pub(super) setting: Setting<'a>,
+    pub(super) frame: &'a Frame<'a>,
+    /// Of the frame.
+    pub(super) seconds: f64,
+    pub(super) warm: &'a mut Warm,
+    /// Steps for which contacts are taken to change.
+    pub(super) unsettled: &'a mut u32,
+    /// Energy that steps have lost so far and that rounding of others may bring back, joules.
+    pub(super) reserve: &'a mut f64,
+}
+
+impl Stepper<'_> {
+    /// From one of `times`, shares of the frame, to the other; `tolerance` in metres where Newton's method is to converge.
+    /// `before` are the energies there; `calm` asks for implicit Euler.
+    pub(super) fn step(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        before: &Energies,
+        tolerance: Option<f64>,
+        calm: bool,
+    ) -> Stepped {
+        let h = (times[1] - times[0]) * self.seconds;
+        let body = self.setting.body;
+        let start = moving.clone();
+        let mut stepped = Stepped::default();
+
+        let firmness = self.frame.contacts.map_or_else(Vec::new, |_| firmness(body));
+        let mut full = match self.frame.contacts {
+            Some(_) => {
+                let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+                self.contacts(&start.x, &ahead, times, &firmness)
+            }
+            None => Vec::new(),
+        };
+        let turned = self.frame.volume > 0.0 && self.work.inventory.turned > 0;
+        let rough = calm || *self.unsettled > 0 || self.frame.rough || turned;
+        *self.unsettled = self.unsettled.saturating_sub(1);
+        let mut after = None;
+        if rough || self.frame.integrator == Integrator::Euler {
+            let off = calm || self.frame.rough || turned;
+            (stepped.solved, stepped.estimate) = self.euler(moving, times, &mut full, &firmness, off);
+            stepped.euler = true;
+        } else {
+            let size = body.size;
+            let frozen: Vec<Touching> = full.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
+            (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &frozen, tolerance);
+            let energies = measure(self.work, &self.setting, times[1], moving, true);
+            let gain = energies.sum() - before.sum();
+            let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+            after = Some(energies);
+            let goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v))
+                && self.missed(&full, &start.x, &moving.x, times, &firmness).is_none();
+            if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
+                moving.clone_from(&start);
+                let off = stepped.solved.failed || gained;
+                let (again, estimate) = self.euler(moving, times, &mut full, &firmness, off);
+                stepped = Stepped { solved: sum(stepped.solved, again), estimate, euler: true, ..Stepped::default() };
+                after = None;
+                *self.unsettled = if goes_on { 0 } else { UNSETTLED };
+            }
+        }
+        if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&moving.x, 0.0) < 0.0)) {
+            *self.unsettled = (*self.unsettled).max(1);
+        }
+        (stepped.contacts, stepped.overlap) = self.work.touching();
+        let touches = stepped.euler || stepped.contacts > 0;
+        let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
+        moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
+        self.keep_finite(&start, moving, &mut stepped);
+        stepped.after = match after.filter(|_| stepped.stopped == 0) {
+            Some(energies) => energies,
+            None => measure(self.work, &self.setting, times[1], moving, false),
+        };
+        self.look(moving);
+        if self.undriven() {
+            self.shed(before, moving, &mut stepped);
+        } else {
+            *self.reserve = 0.0;
+        }
+        stepped
+    }
+
+    /// Looks the tetrahedra over.
+    pub(super) fn look(&mut self, moving: &Moving) {
+        self.work.inventory = Inventory::new(self.setting.body, &moving.x, self.setting.volumes);
+    }
+
+    /// Whether nothing from outside does work but gravity and goals that stand still.
+    fn undriven(&self) -> bool {
+        !self.setting.drive.moves() && self.frame.contacts.is_none()
+    }
+
+    /// Contacts on the way `from` here `to` there, with the load they have at its start.
+    fn contacts(&self, from: &[V3], to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+        let h = (times[1] - times[0]) * self.seconds;
+        let Some(contacts) = self.frame.contacts else { return Vec::new() };
+        let body = self.setting.body;
+        let outwards =
+            |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
+        let mut found: Vec<Contact> = Vec::new();
+        contacts.find(&Query { from: &outwards(from), to: &outwards(to), times }, &mut found);
+        let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
+        known.map(|contact| contact.loaded(from, h)).collect()
+    }
+
+    fn newton(&self, tolerance: Option<f64>) -> Newton {
+        match tolerance {
+            Some(tolerance) => {
+                Newton { most: MOST_ACCURATE, share: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
+            }
+            None => Newton { most: MOST, share: 0.0, tolerance: 0.0, search: false },
+        }
+    }
+
+    /// Contacts that `x` has and `known` has not, with all others: what was far may be pushed near, and surfaces bend.
+    fn missed(
+        &self,
+        known: &[Touching],
+        start: &[V3],
+        x: &[V3],
+        times: [f64; 2],
+        firmness: &[f64],
+    ) -> Option<Vec<Touching>> {
+        self.frame.contacts?;
+        let deep = |contacts: &[Touching]| contacts.iter().filter(|c| c.too_near(x)).count();
+        let found = self.contacts(start, x, times, firmness);
+        (deep(&found) > deep(known)).then_some(found)
+    }
+
+    /// Implicit Euler; `off` where it begins off balance by more than its contacts.
+    fn euler(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        contacts: &mut Vec<Touching>,
+        firmness: &[f64],
+        off: bool,
+    ) -> (Solved, f64) {
+        let h = (times[1] - times[0]) * self.seconds;
+        let mut z = moving.x.clone();
+        let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
+        let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
+        self.pin(&mut x, &mut z, times[1], h);
+        let newton = Newton { most: MOST, share: EULER_SHARE, tolerance: 0.0, search: true };
+        let mut solved = Solved::default();
+        for round in 1..=ROUNDS {
+            let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
+            solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
+            match self.missed(contacts, &moving.x, &x, times, firmness) {
+                Some(found) if round < ROUNDS => *contacts = found,
+                _ => break,
+            }
+        }
+        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
+        // What velocities changed by is a whole step late.
+        let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
+        (moving.x, moving.v) = (x, v);
+        (solved, estimate)
+    }
+
+    /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
+    fn slid(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> Vec<V3> {
+        let mut out = y.to_vec();
+        for contact in contacts {
+            let Some((place, weight)) = contact.alone() else { continue };
+            let before = contact.clearance(x, h);
+            let missing = before.min(0.0) - contact.clearance(&out, 0.0);
+            if (missing > 0.0 || before < 0.0) && missing.abs() < NUDGE * self.setting.body.spacing {
+                out[place] += contact.normal * (missing / weight);
+            }
+        }
+        out
+    }
+
+    fn tr_bdf2(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        contacts: &[Touching],
+        tolerance: Option<f64>,
+    ) -> (Solved, f64) {
+        let body = self.setting.body;
+        let h = (times[1] - times[0]) * self.seconds;
+        let a = 0.5 * GAMMA * h;
+        let middle = times[0] + GAMMA * (times[1] - times[0]);
+        let newton = self.newton(tolerance);
+
+        let start = moving.clone();
+        let guess = Guess::new(body, &self.setting.drive.held, &start.x, &start.v, &start.trend, h);
+        let mut x = guess.at(2.0 * a);
+        let spinning = guess.spinning();
+        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning, index: 0 };
+        let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v);
+        let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
+        let y: Vec<V3> = (0..x.len())
+            .map(|place| z[place] + moving.v[place] * a + force[place] * (a * a / body.mass[place]))
+            .collect();
+        self.pin(&mut x, &mut z, middle, a);
+        (stage.y, stage.z, stage.time, stage.early) = (&y, &z, middle, (1.0 - GAMMA) * h);
+        let first = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
+        let v_middle: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        let x_middle = x;
+
+        // Of the second backward difference: what the middle and the start count.
+        let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
+        let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
+        let mix = |middle: &[V3], start: &[V3]| -> Vec<V3> {
+            middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
+        };
+        let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
+        let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
+        let mut x = guess.past(h, GAMMA, &x_middle);
+        self.pin(&mut x, &mut z, times[1], a);
+        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning, index: 1 };
+        let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
+        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+
+        let scale = 2.0 * h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
+        let raw = |place: usize| {
+            let bent = moving.v[place] / GAMMA - v_middle[place] / (GAMMA * (1.0 - GAMMA)) + v[place] / (1.0 - GAMMA);
+            if self.setting.drive.held[place] { V3::zeros() } else { bent * (scale * body.mass[place]) }
+        };
+        let mut error: Vec<V3> = (0..x.len()).map(raw).collect();
+        let mut solved = sum(first, second);
+        if tolerance.is_some() {
+            let reached = self.work.filter(body, self.warm, &mut error);
+            solved.cg += reached.iterations;
+        } else {
+            self.work.smooth(body, self.warm, &mut error);
+        }
+        let estimate = error.iter().map(V3::norm_squared).fold(0.0, f64::max).sqrt();
+        (moving.x, moving.v) = (x, v);
+        (solved, estimate)
+    }
+
+    /// Puts held particles where they are at `time`, and where (x − z)/a is their velocity.
+    fn pin(&self, x: &mut [V3], z: &mut [V3], time: f64, a: f64) {
+        self.setting.drive.hold(time, x, z, a);
+    }
+
+    /// Particles that are nowhere stay where they were.
+    fn keep_finite(&self, start: &Moving, moving: &mut Moving, stepped: &mut Stepped) {
+        for place in 0..moving.x.len() {
+            if !moving.x[place].iter().chain(moving.v[place].iter()).all(|x| x.is_finite()) {
+                (moving.x[place], moving.v[place]) = (start.x[place], V3::zeros());
+                moving.trend[place] = V3::zeros();
+                stepped.stopped += 1;
+            }
+        }
+    }
+
+    /// Slows all particles against their mean where the step made energy.
+    fn shed(&mut self, before: &Energies, moving: &mut Moving, stepped: &mut Stepped) {
+        /// Share of the energy that is rounding.
+        const ROUNDING: f64 = 1e-9;
+        let after = &mut stepped.after;
+        let gained = after.sum() - before.sum();
+        *self.reserve -= gained;
+        if *self.reserve >= -ROUNDING * before.scale().max(after.scale()) {
+            return;
+        }
+        let body = self.setting.body;
+        let held = &self.setting.drive.held;
+        // What bends a piece pays first, then all that is not a shift of it: momentum is not to pay.
+        for turning in [true, false] {
+            let gained = -*self.reserve;
+            let mut moved = moving.v.clone();
+            for piece in &body.order.pieces {
+                let rigid = Rigid::new(body, held, piece, &moving.x, &moving.v, &moving.trend);
+                let rigid = if turning { rigid } else { rigid.shift() };
+                for place in rigid.places.clone() {
+                    moved[place] = rigid.velocity(moving.x[place]);
+                }
+            }
+            let own = |v: &[V3], place: usize| v[place] - moved[place];
+            let inner: f64 =
+                (0..body.len()).map(|place| 0.5 * body.mass[place] * own(&moving.v, place).norm_squared()).sum();
+            if !(gained > 0.0 && inner > 0.0) {
+                continue;
+            }
+            let keep = ((inner - gained) / inner).max(0.0).sqrt();
+            for place in (0..body.len()).filter(|place| !held[*place]) {
+                moving.v[place] = moved[place] + own(&moving.v, place) * keep;
+            }
+            let kinetic = kinetic(body, &moving.v);
+            *self.reserve += after.kinetic - kinetic;
+            stepped.shed += after.kinetic - kinetic;
+            after.kinetic = kinetic;
+        }
+    }
+}
+
+/// Joules.
+fn kinetic(body: &Body, v: &[V3]) -> f64 {
+    v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
+}
+
+/// Σk of the springs at each particle, N/m.
+fn firmness(body: &Body) -> Vec<f64> {
+    let of = |place: usize| {
+        let mine = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
+        mine.iter().map(|hung| body.stiffness[hung.spring as usize]).sum()
+    };
+    (0..body.len()).map(of).collect()
+}
+
+fn sum(a: Solved, b: Solved) -> Solved {
+    Solved {
+        newton: a.newton + b.newton,
+        cg: a.cg + b.cg,
+        caps: a.caps + b.caps,
+        residual: a.residual.max(b.residual),
+        failed: a.failed || b.failed,
+    }
+}

@@ -1,0 +1,114 @@
+//! The linear system of one Newton iteration: M + a²K + aC of springs, volumes, goals and contacts, never written out.
+//!
+//! Springs are records by particle, in f32 and as differences: a rigid motion meets no resistance in any bit, however stiff
+//! the springs are against the masses (an assembled matrix would lose the masses at a²k ÷ m of 1e7). Vectors are f64.
+
+use super::V3;
+use super::body::Body;
+use super::parts::Parts;
+use super::rows::Rows;
+use super::springs::Record;
+
+/// M + a²K + aC around some positions.
+#[derive(Clone, Debug, Default)]
+pub(super) struct System {
+    /// The springs at each particle, as in [`Body::hung`].
+    pub(super) records: Vec<Record>,
+    /// What resists each particle alone in all directions alike: mass, drag, goals. Kilograms.
+    pub(super) inertia: Vec<f64>,
+    /// What resists it in some directions, xx xy xz yy yz zz; empty where nothing does.
+    pub(super) blocks: Vec<[f64; 6]>,
+    /// Particles whose motion is given.
+    pub(super) held: Vec<bool>,
+    /// Volumes of regions.
+    pub(super) regions: Rows,
+    /// Tetrahedra about to turn over, contacts of two bodies.
+    pub(super) loose: Rows,
+    /// Per particle the inverse of the lower factor of its own 3×3 block, rows one after the other.
+    pub(super) smoother: Vec<[f32; 6]>,
+}
+
+impl System {
+    /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at held particles.
+    pub(super) fn apply(&mut self, body: &Body, clusters: &Parts, p: &[V3], out: &mut [V3]) -> f64 {
+        self.regions.measure(p);
+        self.loose.measure(p);
+        let system = &*self;
+        let (regions, loose) = (!system.regions.is_empty(), !system.loose.is_empty());
+        clusters.sum(out, |cluster, out: &mut [V3]| {
+            let mut sum = 0.0;
+            for (place, out) in clusters.range(cluster).zip(out) {
+                if system.held[place] {
+                    *out = V3::zeros();
+                    continue;
+                }
+                let mine = p[place];
+                let mut total = mine * system.inertia[place] + system.pull(body, place, mine, p);
+                if !system.blocks.is_empty() {
+                    total += times(&system.blocks[place], mine);
+                }
+                if regions {
+                    total += system.regions.push(place);
+                }
+                if loose {
+                    total += system.loose.push(place);
+                }
+                *out = total;
+                sum += mine.dot(&total);
+            }
+            sum
+        })
+    }
+
+    /// The springs' part.
+    #[inline(always)]
+    fn pull(&self, body: &Body, place: usize, mine: V3, p: &[V3]) -> V3 {
+        let mut sum = V3::zeros();
+        for record in &self.records[body.starts[place] as usize..body.starts[place + 1] as usize] {
+            let d = mine - p[record.other as usize];
+            let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
+            sum += d * f64::from(record.alpha) + w * w.dot(&d);
+        }
+        sum
+    }
+}
+
+/// A symmetric block times a vector.
+#[inline(always)]
+pub(super) fn times([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: V3) -> V3 {
+    V3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+}
+
+/// The inverse of the lower factor of a symmetric block that is positive definite: l⁻¹ by rows, so that its square is the
+/// block's inverse and stays positive in f32. A pivot that rounding ate counts as its diagonal entry.
+#[inline(always)]
+pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
+    /// Below this share a pivot is rounding.
+    const NOTHING: f64 = 1e-13;
+    let [xx, xy, xz, yy, yz, zz] = *block;
+    let pivot = |left: f64, whole: f64| 1.0 / left.max(NOTHING * whole).sqrt();
+    let a = pivot(xx, xx);
+    let (ba, ca) = (xy * a, xz * a);
+    let b = pivot(yy - ba * ba, yy);
+    let cb = (yz - ca * ba) * b;
+    let c = pivot(zz - ca * ca - cb * cb, zz);
+    // l = [[1/a, 0, 0], [ba, 1/b, 0], [ca, cb, 1/c]].
+    let (low, left) = (-ba * a * b, -cb * b * c);
+    let corner = -(ca * a + cb * low) * c;
+    let all = [a, low, b, corner, left, c];
+    if all.iter().all(|value| value.is_finite()) { all.map(|value| value as f32) } else { [0.0; 6] }
+}
+
+/// W·r, whose square is rᵀ·(block)⁻¹·r.
+#[inline(always)]
+pub(super) fn halfway(w: &[f32; 6], r: V3) -> V3 {
+    let [a, low, b, corner, left, c] = w.map(f64::from);
+    V3::new(a * r.x, low * r.x + b * r.y, corner * r.x + left * r.y + c * r.z)
+}
+
+/// Wᵀ·h.
+#[inline(always)]
+pub(super) fn rest_of_the_way(w: &[f32; 6], h: V3) -> V3 {
+    let [a, low, b, corner, left, c] = w.map(f64::from);
+    V3::new(a * h.x + low * h.y + corner * h.z, b * h.y + left * h.z, c * h.z)
+}

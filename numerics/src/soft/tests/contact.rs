@@ -1,0 +1,341 @@
+//! Contact and friction against ground, plates, a rolling pin and another body.
+
+use super::*;
+
+const THICKNESS: f64 = 1e-3;
+
+/// Half spaces that move: (normal, height of the surface along it at the frame's start and end, friction).
+struct Planes(Vec<([f64; 3], [f64; 2], f64)>, f64);
+
+impl Contacts for Planes {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        for (normal, heights, friction) in &self.0 {
+            let n = V3::from(*normal);
+            let at = |time: f64| heights[0] + (heights[1] - heights[0]) * time;
+            let offset = at(query.times[1]);
+            for (particle, to) in query.to.iter().enumerate() {
+                let nearest =
+                    (n.dot(&V3::from(*to)) - offset).min(n.dot(&V3::from(query.from[particle])) - at(query.times[0]));
+                if nearest < 2.0 * THICKNESS {
+                    out.push(Contact {
+                        particles: [particle as u32, 0, 0, 0],
+                        weights: [1.0, 0.0, 0.0, 0.0],
+                        normal: *normal,
+                        offset,
+                        gap: THICKNESS,
+                        velocity: (n * ((heights[1] - heights[0]) / self.1)).into(),
+                        friction: *friction,
+                    });
+                }
+            }
+        }
+    }
+}
+
+fn ground(friction: f64) -> Planes {
+    Planes(vec![([0.0, 1.0, 0.0], [0.0, 0.0], friction)], 1.0 / 24.0)
+}
+
+/// A cylinder along z that rolls: axis at the frame's start and end, radius, radians a second.
+struct RollingPin {
+    axis: [[f64; 2]; 2],
+    radius: f64,
+    spin: f64,
+    friction: f64,
+    seconds: f64,
+}
+
+impl Contacts for RollingPin {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        let time = query.times[1];
+        let axis: [f64; 2] = std::array::from_fn(|k| self.axis[0][k] + (self.axis[1][k] - self.axis[0][k]) * time);
+        for (particle, to) in query.to.iter().enumerate() {
+            let from = query.from[particle];
+            let near = |p: &[f64; 3]| V3::new(p[0] - axis[0], p[1] - axis[1], 0.0);
+            let (d, d_from) = (near(to), near(&from));
+            if d.norm().min(d_from.norm()) < self.radius + 2.0 * THICKNESS {
+                // The side it comes from, where it would pass through.
+                let n = if d.dot(&d_from) > 0.0 { d.normalize() } else { d_from.normalize() };
+                let middle = V3::new(axis[0], axis[1], 0.0);
+                let pace = V3::new(
+                    (self.axis[1][0] - self.axis[0][0]) / self.seconds,
+                    (self.axis[1][1] - self.axis[0][1]) / self.seconds,
+                    0.0,
+                );
+                out.push(Contact {
+                    particles: [particle as u32, 0, 0, 0],
+                    weights: [1.0, 0.0, 0.0, 0.0],
+                    normal: n.into(),
+                    offset: n.dot(&middle) + self.radius,
+                    gap: THICKNESS,
+                    velocity: (pace + V3::z().cross(&n) * (self.spin * self.radius)).into(),
+                    friction: self.friction,
+                });
+            }
+        }
+    }
+}
+
+struct Both<'a>(&'a dyn Contacts, &'a dyn Contacts);
+
+impl Contacts for Both<'_> {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        self.0.find(query, out);
+        self.1.find(query, out);
+    }
+}
+
+fn lowest(state: &State) -> f64 {
+    state.positions.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min)
+}
+
+fn fastest(state: &State) -> f64 {
+    state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
+}
+
+fn centre(body: &Body, state: &State) -> V3 {
+    let masses = body.masses();
+    let sum = state.positions.iter().zip(&masses).fold(V3::zeros(), |sum, (x, m)| sum + V3::from(*x) * *m);
+    sum / masses.iter().sum::<f64>()
+}
+
+#[test]
+fn a_block_dropped_on_the_ground_comes_to_rest_there() {
+    let ground = ground(0.5);
+    for (stiffness, volume) in [(5e4, 0.0), (5e4, 1.0), (1e7, 1.0)] {
+        let body = block_body([4, 4, 4], 0.1, &material(1000.0, stiffness, 2e3 / stiffness));
+        let mut state = State::at_rest(&body);
+        state.positions.iter_mut().for_each(|x| x[1] += 0.2);
+        let frame = Frame { contacts: Some(&ground), volume, ..Frame::default() };
+        let mut solver = Solver::new(&body);
+        let mut newton = 0;
+        for number in 0..240 {
+            let report = solver.step(&body, &mut state, &frame);
+            newton += report.newton;
+            assert!(lowest(&state) > 0.0, "E {stiffness}, frame {number}: {} {report:?}", lowest(&state));
+            // It may not bounce higher than it fell from.
+            assert!(centre(&body, &state).y < 0.41, "frame {number}");
+        }
+        assert!(lowest(&state) < THICKNESS);
+        assert!(fastest(&state) < 1e-4 * 9.81 / 24.0, "E {stiffness}, volume {volume}: {}", fastest(&state));
+        assert!(newton < 240 * 6, "{newton} iterations");
+        // Half its own weight presses a cube of height h by ½ρgh²/E, more or less its sides.
+        let sag = 0.2 - centre(&body, &state).y;
+        assert!(sag < 0.4 * 1000.0 * 9.81 * 0.16 / stiffness + THICKNESS, "{sag}");
+    }
+}
+
+#[test]
+fn on_a_slope_it_sticks_below_the_friction_angle_and_slides_above() {
+    let angle = 30.0_f64.to_radians();
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    let gravity = [9.81 * sine, -9.81 * cosine, 0.0];
+    for (friction, sticks) in [(0.0, false), (0.3, false), (0.5, false), (0.7, true), (1.0, true), (1e6, true)] {
+        let ground = ground(friction);
+        let body = block_body([4, 2, 4], 0.1, &material(1000.0, 1e6, 0.005));
+        let mut state = State::at_rest(&body);
+        state.positions.iter_mut().for_each(|x| x[1] += 0.9 * THICKNESS);
+        let frame = Frame { gravity, contacts: Some(&ground), ..Frame::default() };
+        let mut solver = Solver::new(&body);
+        let mut run = |state: &mut State, frames: usize| {
+            for _ in 0..frames {
+                let _ = solver.step(&body, state, &frame);
+            }
+        };
+        run(&mut state, 24);
+        let (before, speed) = (centre(&body, &state).x, momentum(&body, &state).x / 32.0);
+        run(&mut state, 24);
+        let (after, speed_after) = (centre(&body, &state).x, momentum(&body, &state).x / 32.0);
+        if sticks {
+            assert!((after - before).abs() < 1e-4 * 0.4, "μ {friction}: creeps {} a second", after - before);
+        } else {
+            let expected = 9.81 * (sine - friction * cosine);
+            let found = speed_after - speed;
+            assert!((found / expected - 1.0).abs() < 0.01, "μ {friction}: {found} for {expected}");
+        }
+    }
+}
+
+#[test]
+fn contact_holds_under_pins_that_press_ten_thicknesses_a_frame() {
+    let ground = ground(0.5);
+    for integrator in [Integrator::Default, Integrator::Euler] {
+        let body = block_body([4, 4, 4], 0.1, &material(1000.0, 1e5, 0.01));
+        let mut state = State::at_rest(&body);
+        state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
+        let top: Vec<usize> = (0..body.len()).filter(|i| body.rest_point(*i)[1] > 0.399).collect();
+        let mut solver = Solver::new(&body);
+        for number in 0..20 {
+            let pins: Vec<Pin> = top
+                .iter()
+                .map(|i| {
+                    let from = state.positions[*i];
+                    Pin { particle: *i as u32, between: [from, [from[0], from[1] - 10.0 * THICKNESS, from[2]]] }
+                })
+                .collect();
+            let frame = Frame { contacts: Some(&ground), pins: &pins, integrator, ..Frame::default() };
+            let report = solver.step(&body, &mut state, &frame);
+            assert!(lowest(&state) > 0.0, "{integrator:?}, frame {number}: {} {report:?}", lowest(&state));
+            assert_eq!(report.inverted_tets, 0);
+        }
+    }
+}
+
+#[test]
+fn pressed_to_half_its_height_a_block_keeps_its_volume_and_bulges_evenly() {
+    let body = block_body([6, 6, 6], 0.1, &material(1000.0, 1e5, 0.02));
+    let mut state = State::at_rest(&body);
+    state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
+    let mut solver = Solver::new(&body);
+    let mut report = Report::default();
+    let top = |frame: usize| 0.6 + 2.0 * THICKNESS - 0.3 * (frame.min(48) as f64 / 48.0);
+    for number in 0..96 {
+        let plates = Planes(
+            vec![([0.0, 1.0, 0.0], [0.0, 0.0], 0.5), ([0.0, -1.0, 0.0], [-top(number), -top(number + 1)], 0.5)],
+            1.0 / 24.0,
+        );
+        let frame = Frame { gravity: [0.0; 3], contacts: Some(&plates), ..Frame::default() };
+        report = solver.step(&body, &mut state, &frame);
+        let highest = state.positions.iter().map(|x| x[1]).fold(0.0, f64::max);
+        assert!(lowest(&state) > 0.0 && highest < top(number + 1), "frame {number}: {highest} {report:?}");
+    }
+    assert_eq!(report.inverted_tets, 0);
+    assert!((report.volume_ratio - 1.0).abs() < 0.025, "{report:?}");
+    let wide = |axis: usize| {
+        let along = || state.positions.iter().map(|x| x[axis]);
+        along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+    };
+    assert!((wide(0) / wide(2) - 1.0).abs() < 0.05 && wide(0) > 0.75, "{} {}", wide(0), wide(2));
+}
+
+#[test]
+fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
+    let body = block_body([10, 2, 3], 0.05, &material(1000.0, 2e4, 0.02));
+    let mut state = State::at_rest(&body);
+    state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
+    let ground = ground(1.0);
+    let mut solver = Solver::new(&body);
+    for number in 0..48 {
+        let along =
+            |frame: usize| [0.05 + 0.4 * frame as f64 / 48.0, 0.16 + 0.05 * (1.0 - (frame as f64 / 12.0).min(1.0))];
+        let pin = RollingPin {
+            axis: [along(number), along(number + 1)],
+            radius: 0.1,
+            spin: -2.0,
+            friction: 0.8,
+            seconds: 1.0 / 24.0,
+        };
+        let both = Both(&ground, &pin);
+        let report = solver.step(&body, &mut state, &Frame { contacts: Some(&both), ..Frame::default() });
+        let axis = along(number + 1);
+        let deepest = state
+            .positions
+            .iter()
+            .map(|x| ((x[0] - axis[0]) * (x[0] - axis[0]) + (x[1] - axis[1]) * (x[1] - axis[1])).sqrt() - 0.1)
+            .fold(f64::INFINITY, f64::min);
+        assert!(
+            deepest > -0.3 * THICKNESS && lowest(&state) > -0.1 * THICKNESS,
+            "frame {number}: {deepest} {} {report:?}",
+            lowest(&state)
+        );
+        assert!(fastest(&state) < 3.0, "frame {number}: {}", fastest(&state));
+    }
+}
+
+/// Particles of one block against the top of another: a grid of squares, each two triangles.
+struct Stack {
+    lower: u32,
+    side: f64,
+    cells: u32,
+}
+
+impl Contacts for Stack {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        let n = self.cells + 1;
+        let place = |x: u32, z: u32| x + n * (self.cells + n * z);
+        for particle in self.lower as usize..query.to.len() {
+            let to = query.to[particle];
+            let base = query.to[place(0, 0) as usize];
+            let cell = [(to[0] - base[0]) / self.side, (to[2] - base[2]) / self.side];
+            let [i, k] = cell.map(|c| (c.floor().max(0.0) as u32).min(self.cells - 1));
+            let [u, w] = [(cell[0] - f64::from(i)).clamp(0.0, 1.0), (cell[1] - f64::from(k)).clamp(0.0, 1.0)];
+            let (corners, weights) = if u + w <= 1.0 {
+                ([place(i, k), place(i + 1, k), place(i, k + 1)], [1.0 - u - w, u, w])
+            } else {
+                ([place(i + 1, k + 1), place(i, k + 1), place(i + 1, k)], [u + w - 1.0, 1.0 - u, 1.0 - w])
+            };
+            let height = |points: &[[f64; 3]]| {
+                points[particle][1] - (0..3).map(|c| weights[c] * points[corners[c] as usize][1]).sum::<f64>()
+            };
+            if height(query.from) > -0.05 && height(query.to).min(height(query.from)) < 2.0 * THICKNESS {
+                out.push(Contact {
+                    particles: [particle as u32, corners[0], corners[1], corners[2]],
+                    weights: [1.0, -weights[0], -weights[1], -weights[2]],
+                    normal: [0.0, 1.0, 0.0],
+                    offset: 0.0,
+                    gap: THICKNESS,
+                    velocity: [0.0; 3],
+                    friction: 0.5,
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
+    let (mut points, mut tets) = block([3, 3, 3], 0.1);
+    let lower = points.len() as u32;
+    let (above, more) = block([3, 3, 3], 0.1);
+    points.extend(above.iter().map(|x| [x[0] + 0.013, x[1] + 0.32, x[2] + 0.021]));
+    tets.extend(more.iter().map(|tet| tet.map(|corner| corner + lower)));
+    let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
+    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.03), &[]).unwrap();
+    let stack = Stack { lower, side: 0.1, cells: 3 };
+
+    let mut state = State::at_rest(&body);
+    state.velocities[lower as usize..].iter_mut().for_each(|v| *v = [0.0, -1.0, 0.0]);
+    let before = momentum(&body, &state);
+    let mut solver = Solver::new(&body);
+    let frame = Frame { gravity: [0.0; 3], contacts: Some(&stack), ..Frame::default() };
+    let mut touched = 0;
+    let kinetic = 0.5 * before.y * before.y / 27.0;
+    for number in 0..24 {
+        let report = solver.step(&body, &mut state, &frame);
+        touched += report.contacts;
+        assert!(report.kinetic + report.elastic < kinetic * 1.01, "frame {number}: {report:?}");
+    }
+    assert!(touched > 0);
+    let after = momentum(&body, &state);
+    assert!((after - before).norm() < 1e-6 * before.norm(), "{before} became {after}");
+
+    let ground = ground(0.5);
+    let both = Both(&ground, &stack);
+    let mut state = State::at_rest(&body);
+    let frame = Frame { contacts: Some(&both), ..Frame::default() };
+    let report = steps(&body, &mut state, &frame, 240);
+    assert!(lowest(&state) > 0.0 && report.deepest_overlap < THICKNESS, "{report:?}");
+    assert!(fastest(&state) < 1e-3 * 9.81 / 24.0, "{}", fastest(&state));
+    let (low, high) = state.positions.split_at(lower as usize);
+    let mean = |half: &[[f64; 3]]| half.iter().map(|x| x[1]).sum::<f64>() / half.len() as f64;
+    assert!(mean(high) - mean(low) > 0.28, "{} over {}", mean(high), mean(low));
+}
+
+#[test]
+fn frictions_and_obstacles_beyond_reason() {
+    for friction in [0.0, 1.0, 1e6] {
+        for (heights, bound) in [([0.0, 5.0], 200.0), ([0.0, -5.0], 20.0), ([1.0, 1.0], 20.0)] {
+            let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e5, 0.01));
+            let mut state = State::at_rest(&body);
+            let mut solver = Solver::new(&body);
+            for number in 0..10 {
+                let now = if number == 3 { heights } else { [heights[usize::from(number > 3)]; 2] };
+                let ground = Planes(vec![([0.0, 1.0, 0.0], now, friction)], 1.0 / 24.0);
+                let report = solver.step(&body, &mut state, &Frame { contacts: Some(&ground), ..Frame::default() });
+                assert!(is_finite(&state) && report.stopped == 0);
+                let far = state.positions.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
+                assert!(far < bound, "μ {friction}, {heights:?}, frame {number}: {far}");
+            }
+        }
+    }
+}

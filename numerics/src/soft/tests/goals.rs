@@ -1,0 +1,169 @@
+//! Goals, resets of the shape at rest, dents and tears.
+
+use super::*;
+
+/// Where a particle of the 3 × 3 × 3 block of 0.1 m cells is inside.
+fn is_inside(x: &[f64; 3]) -> bool {
+    x.iter().all(|x| (0.05..0.25).contains(x))
+}
+
+/// The block half as high and wider by as much.
+fn flat(x: [f64; 3]) -> [f64; 3] {
+    let wider = std::f64::consts::SQRT_2;
+    [x[0] * wider, x[1] * 0.5, x[2] * wider]
+}
+
+#[test]
+fn a_goal_draws_its_particle_as_a_damped_spring_does() {
+    let body = Body::of_springs(&[[0.0; 3]], &[3.0], &[]).unwrap();
+    let mut state = State::at_rest(&body);
+    let goal = Goal { particle: 0, between: [[1.0, 0.0, 0.0]; 2], strength: 4.0, damping: 4.0 };
+    let goals = [goal];
+    let frame = Frame { seconds: 0.01, goals: &goals, ..BARE };
+    let report = steps(&body, &mut state, &frame, 100);
+    // Critically damped with ω = 2: 1 − (1 + 2t)e^(−2t).
+    let exact = 1.0 - 3.0 * libm::exp(-2.0);
+    assert!((state.positions[0][0] - exact).abs() < 1e-5);
+    assert!((report.goal_energy - 0.5 * 3.0 * 4.0 * (1.0 - exact) * (1.0 - exact)).abs() < 1e-4);
+    // Two goals of one particle add up to one of both strengths.
+    let half = Goal { strength: 2.0, damping: 2.0, ..goal };
+    let mut again = State::at_rest(&body);
+    let _ = steps(&body, &mut again, &Frame { seconds: 0.01, goals: &[half, half], ..BARE }, 100);
+    assert!((again.positions[0][0] - state.positions[0][0]).abs() < 1e-12);
+}
+
+#[test]
+fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
+    let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.2));
+    let mut state = State::at_rest(&body);
+    let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| flat(*x)).collect();
+    let goals: Vec<Goal> = (0..body.len())
+        .filter(|i| is_inside(&state.positions[*i]))
+        .map(|i| Goal { particle: i as u32, between: [shape[i]; 2], strength: 1e4, damping: 100.0 })
+        .collect();
+    assert_eq!(goals.len(), 8);
+    let drawn = Frame { goals: &goals, ..Frame { volume: 1.0, ..BARE } };
+    let mut solver = Solver::new(&body);
+    for number in 0..240 {
+        if (24..28).contains(&number) {
+            // A quarter, a third, a half, all of what is left.
+            let _ = reset(&body, &mut state, &shape, 1.0 / f64::from(28 - number), 1.0);
+        }
+        let rough = (24..28).contains(&number);
+        let _ = solver.step(&body, &mut state, &Frame { rough, ..drawn });
+    }
+    let report = steps(&body, &mut state, &Frame { goals: &[], ..drawn }, 96);
+    for (x, goal) in state.positions.iter().zip(&shape) {
+        assert!((V3::from(*x) - V3::from(*goal)).norm() < 1e-4, "{x:?} for {goal:?}");
+    }
+    assert!(report.elastic < 1e-6 && (report.volume_ratio - 1.0).abs() < 1e-6, "{report:?}");
+}
+
+#[test]
+fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
+    let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e4, 0.02));
+    let mut state = State::at_rest(&body);
+    state.dents.iter_mut().for_each(|dent| *dent = 0.9);
+    let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| x.map(|x| 2.0 * x)).collect();
+    let energy = |state: &State| {
+        let length =
+            |[a, b]: [u32; 2]| (V3::from(state.positions[a as usize]) - V3::from(state.positions[b as usize])).norm();
+        let each = body.springs().into_iter().enumerate();
+        each.map(|(i, ends)| {
+            let strain = length(ends) - state.lengths[i] * state.dents[i];
+            0.5 * body.stiffnesses()[i] * strain * strain
+        })
+        .sum::<f64>()
+    };
+    let before = energy(&state);
+    let brought = reset(&body, &mut state, &shape, 0.5, 1.0);
+    assert!((brought - (energy(&state) - before)).abs() < 1e-9 * brought.abs());
+    for (length, rest) in state.lengths.iter().zip(body.lengths()) {
+        assert!((length / rest - 1.5).abs() < 1e-12);
+    }
+    assert!(state.dents.iter().all(|dent| *dent == 0.9));
+    let _ = reset(&body, &mut state, &shape, 1.0, 0.0);
+    assert!(state.dents.iter().all(|dent| *dent == 1.0));
+    assert!((state.lengths[0] / body.lengths()[0] - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn springs_flow_above_the_yield_strain_alone() {
+    let spring = Spring { ends: [0, 1], stiffness: 100.0, damping: 0.0, length: 1.0 };
+    let body = Body::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[1.0; 2], &[spring]).unwrap();
+    let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
+    let at = |stretch: f64| {
+        let mut state = State::at_rest(&body);
+        state.positions[1][0] = 1.0 + stretch;
+        let freed = flow(&body, &mut state, plasticity, 0.5);
+        (state.dents[0], freed)
+    };
+    assert_eq!(at(0.09), (1.0, 0.0));
+    assert_eq!(at(-0.1 + 1e-12).0, 1.0);
+    // 1 − e^(−1) of the 0.2 above 0.1.
+    let share = 1.0 - libm::exp(-1.0);
+    let (dent, freed) = at(0.3);
+    assert!((dent - (1.0 + 0.2 * share)).abs() < 1e-12);
+    assert!((freed - 50.0 * (0.09 - (1.3 - dent) * (1.3 - dent))).abs() < 1e-9);
+    assert!((at(-0.3).0 - (1.0 - 0.2 * share)).abs() < 1e-12);
+    assert!(at(1e9).0 <= 10.0 && at(-1.0).0 >= 0.1);
+    let mut state = State::at_rest(&body);
+    state.positions[1][0] = 5.0;
+    assert_eq!(flow(&body, &mut state, Plasticity { yield_strain: 0.0, creep: 2.0 }, 1.0), 0.0);
+}
+
+#[test]
+fn a_joint_tears_and_then_neither_pulls_nor_counts() {
+    let spring = |a: u32| Spring { ends: [a, a + 1], stiffness: 100.0, damping: 1.0, length: 1.0 };
+    let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    let body = Body::of_springs(&points, &[1.0; 3], &[spring(0), spring(1)]).unwrap();
+    let mut state = State::at_rest(&body);
+    state.positions[2][0] = 3.5;
+    assert_eq!(tear(&body, &mut state, 3.0, 0.0), 0);
+    assert_eq!(tear(&body, &mut state, 2.0, 0.0), 1);
+    assert_eq!(tear(&body, &mut state, 2.0, 0.0), 0);
+    let report = steps(&body, &mut state, &BARE, 10);
+    assert_eq!((report.elastic, report.kinetic, report.worst_stretch), (0.0, 0.0, 1.0));
+    assert_eq!(state.positions[2], [3.5, 0.0, 0.0]);
+}
+
+#[test]
+fn joined_bodies_keep_the_momentum_of_the_pair() {
+    let (mut points, mut tets) = block([2, 2, 2], 0.1);
+    let lower = points.len() as u32;
+    let (above, more) = block([2, 2, 2], 0.1);
+    points.extend(above.iter().map(|x| [x[0], x[1] + 0.25, x[2]]));
+    tets.extend(more.iter().map(|tet| tet.map(|corner| corner + lower)));
+    let joint = |i: u32| Spring { ends: [i + 6, lower + i], stiffness: 500.0, damping: 1.0, length: 0.05 };
+    let joints: Vec<Spring> = [0, 1, 2, 9, 10, 11, 18, 19, 20].map(joint).into();
+    let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
+    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.01), &joints).unwrap();
+    let mut state = State::at_rest(&body);
+    state.velocities[lower as usize..].iter_mut().for_each(|v| *v = [0.2, 0.3, -0.1]);
+    let before = momentum(&body, &state);
+    let _ = steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 100);
+    assert!((momentum(&body, &state) - before).norm() < 1e-9 * before.norm());
+}
+
+#[test]
+fn a_goal_far_away_and_goals_in_every_frame() {
+    for integrator in [Integrator::Default, Integrator::Euler] {
+        let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.02));
+        let mut state = State::at_rest(&body);
+        let rest = state.positions.clone();
+        let mut solver = Solver::new(&body);
+        for number in 0..24 {
+            let away = if number % 2 == 0 { 1e3 } else { -1e3 };
+            let goals: Vec<Goal> = (0..body.len())
+                .filter(|i| is_inside(&rest[*i]))
+                .map(|i| {
+                    let to = [rest[i][0] + away, rest[i][1], rest[i][2]];
+                    Goal { particle: i as u32, between: [to; 2], strength: 1e4, damping: 0.0 }
+                })
+                .collect();
+            let _ = solver.step(&body, &mut state, &Frame { goals: &goals, integrator, ..Frame::default() });
+            let far = state.positions.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
+            assert!(is_finite(&state) && far < 1e5, "{integrator:?}, frame {number}: {far}");
+        }
+    }
+}

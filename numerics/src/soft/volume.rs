@@ -1,0 +1,208 @@
+//! What keeps a body's volume: a pressure in each region, and a push against tetrahedra that are about to turn over.
+//!
+//! Region: ½κ(V − V₀)²/V₀ and a fourth power, so that lost volume is fought by κ against the springs' own bulk modulus, and
+//! much of it much harder: cheap where there is little to fight. Tetrahedron: below
+//! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
+//! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
+
+use super::V3;
+use super::body::{Body, volume};
+use super::parts::{Parts, Several};
+
+/// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
+const SPRINGS: f64 = 2.0 / 3.0;
+/// Share of the springs' loss that is left where all of a small one is fought: what conjugate gradients do nearly level.
+const LEFT: f64 = 0.1;
+/// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (23 times).
+const SLIGHT: f64 = 0.012;
+const MUCH: f64 = 0.04;
+/// Volume ÷ volume at rest below which a tetrahedron is pushed open.
+const THIN: f64 = 0.3;
+/// Volume ÷ volume at rest below which it is watched within a step: one that gets thin from above is so for the next step.
+const WATCHED: f64 = 0.7;
+/// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
+const OPENING: f64 = 16.0;
+
+/// The terms of one frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Volumes {
+    /// κ ÷ V₀ of each region.
+    stiffness: Vec<f64>,
+    /// V₀.
+    rest: Vec<f64>,
+    /// Share fought.
+    share: f64,
+    /// Regions in parts.
+    parts: Option<Parts>,
+    /// How each region's volume changes with its particles.
+    pub(super) gradients: Vec<V3>,
+    /// Pressure each region has, Pa.
+    pub(super) pressures: Vec<f64>,
+    /// How each region's pressure grows with its volume, Pa/m³, and with how fast that changes.
+    slopes: Vec<[f64; 2]>,
+    /// What they stored when last measured, joules.
+    pub(super) stored: f64,
+}
+
+/// A tetrahedron that is thin or turned over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Thin {
+    pub(super) corners: [u32; 4],
+    /// How its volume changes with its corners.
+    pub(super) gradient: [V3; 4],
+    /// μ ÷ V₀, and what that opens it with, Pa.
+    pub(super) stiffness: f64,
+    pub(super) pressure: f64,
+    pub(super) energy: f64,
+}
+
+impl Volumes {
+    /// Fights `share` of what tetrahedra lose of `rest`, their volumes.
+    pub(super) fn new(body: &Body, share: f64, rest: &[f64]) -> Self {
+        let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
+        let regions = &body.regions;
+        if share == 0.0 || regions.len() == 0 {
+            return Self::default();
+        }
+        let parts = regions.parts();
+        let rest_sums = regions.sums(|tet| rest[tet]);
+        let factor = SPRINGS * share / (1.0 - share + LEFT * share);
+        let stiffness = regions.energy.iter().zip(&rest_sums).map(|(energy, volume)| {
+            let k = factor * energy / (volume * volume);
+            if k.is_finite() { k } else { 0.0 }
+        });
+        Self {
+            stiffness: stiffness.collect(),
+            rest: rest_sums,
+            share,
+            parts: Some(parts),
+            gradients: vec![V3::zeros(); regions.particles.len()],
+            pressures: vec![0.0; regions.len()],
+            slopes: vec![[0.0; 2]; regions.len()],
+            stored: 0.0,
+        }
+    }
+
+    /// Whether nothing is fought.
+    pub(super) fn is_off(&self) -> bool {
+        self.parts.is_none()
+    }
+
+    /// Measures pressures, gradients and what is stored; returns what dashpots count for steps of `a` in a line search.
+    pub(super) fn measure(&mut self, body: &Body, x: &[V3], v: &[V3], a: f64) -> f64 {
+        let Some(parts) = &self.parts else { return 0.0 };
+        let (regions, stiffness, rest) = (&body.regions, &self.stiffness, &self.rest);
+        let gradients = Several::new(&regions.starts, &mut self.gradients);
+        let out = (&mut self.pressures[..], &mut self.slopes[..], gradients);
+        let sums = parts.map(out, |part, (pressures, slopes, mut gradients)| {
+            let (mut stored, mut damped) = (0.0, 0.0);
+            let regions_here = parts.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
+            for (((region, pressure), slope), mine) in regions_here {
+                let particles =
+                    &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
+                let lost = regions.measure(region, x, mine) - rest[region];
+                let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
+                let k = stiffness[region];
+                let (push, steep, energy) = stiffened(lost, rest[region]);
+                let c = k * regions.damping[region];
+                *pressure = k * push + c * pace;
+                *slope = [k * steep, c];
+                stored += k * energy;
+                damped += 0.5 * a * c * pace * pace;
+            }
+            (stored, damped)
+        });
+        let (stored, damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        self.stored = stored;
+        damped
+    }
+
+    /// What each region resists for steps of `a`, where last measured.
+    pub(super) fn weights(&self, a: f64) -> Vec<f64> {
+        self.slopes.iter().map(|[k, c]| k * a * a + c * a).collect()
+    }
+
+    /// Those of the `watched` tetrahedra that are thin.
+    pub(super) fn thin(&self, body: &Body, x: &[V3], rest: &[f64], watched: &[u32]) -> Vec<Thin> {
+        if self.is_off() {
+            return Vec::new();
+        }
+        let of = |tet: &u32| {
+            let tet = *tet as usize;
+            let corners = body.tets[tet];
+            let at = corners.map(|corner| x[corner as usize]);
+            let left = THIN * rest[tet] - volume(at);
+            let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
+            let pressure = stiffness * left;
+            let thin = Thin { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left };
+            (left > 0.0 && thin.energy.is_finite()).then_some(thin)
+        };
+        watched.iter().filter_map(of).collect()
+    }
+}
+
+/// What a lost (or won) volume is fought with, ÷ κ/V₀: the volume itself near rest, more and more from [`SLIGHT`] on, in a
+/// straight line again from [`MUCH`] on. Its slope, and its integral.
+fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
+    let soft = 1.0 / (SLIGHT * rest * SLIGHT * rest);
+    let curved = |lost: f64| {
+        let square = lost * lost * soft;
+        (lost * (1.0 + square), 1.0 + 3.0 * square, lost * lost * (0.5 + 0.25 * square))
+    };
+    let edge = MUCH * rest;
+    if rest <= 0.0 {
+        return (0.0, 0.0, 0.0);
+    }
+    if lost.abs() <= edge {
+        return curved(lost);
+    }
+    let (push, slope, energy) = curved(edge);
+    let more = lost.abs() - edge;
+    ((push + slope * more).copysign(lost), slope, energy + push * more + 0.5 * slope * more * more)
+}
+
+/// How a tetrahedron's volume changes with each corner.
+pub(super) fn opening([a, b, c, d]: [V3; 4]) -> [V3; 4] {
+    let (ab, ac, ad) = (b - a, c - a, d - a);
+    let [b, c, d] = [ac.cross(&ad) / 6.0, ad.cross(&ab) / 6.0, ab.cross(&ac) / 6.0];
+    [-(b + c + d), b, c, d]
+}
+
+/// The tetrahedra of a body, looked over once a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Inventory {
+    /// How many are inside out.
+    pub(super) turned: u32,
+    /// All volume ÷ all at rest.
+    pub(super) ratio: f64,
+    /// Those that may be thin before the next look.
+    pub(super) watched: Vec<u32>,
+}
+
+impl Inventory {
+    /// With particles at `x`.
+    pub(super) fn new(body: &Body, x: &[V3], rest: &[f64]) -> Self {
+        let parts = body.tet_parts.map((), |part, ()| {
+            let (mut turned, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
+            for tet in body.tet_parts.range(part) {
+                let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
+                turned += u32::from(volume < 0.0);
+                if volume <= WATCHED * rest[tet] {
+                    watched.push(tet as u32);
+                }
+                now += volume;
+                before += rest[tet];
+            }
+            (turned, now, before, watched)
+        });
+        let (mut all, mut now, mut before) = (Self::default(), 0.0, 0.0);
+        for (turned, volume, rest, watched) in parts {
+            all.turned += turned;
+            all.watched.extend(watched);
+            now += volume;
+            before += rest;
+        }
+        all.ratio = if before > 0.0 { now / before } else { 1.0 };
+        all
+    }
+}
