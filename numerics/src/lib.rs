@@ -25,6 +25,7 @@ pub mod shapes;
 pub mod shield;
 pub mod simd;
 pub mod soft;
+pub mod touch;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

@@ -1,0 +1,127 @@
+//! When four points that go straight are in one plane: roots of a cubic, each in its own monotone piece. 0 counts as above.
+//!
+//! Promise: every change of sign within the way is found, to rounding of the time. Limit: a plane touched and left again
+//! within rounding may be two or none.
+
+use super::V3;
+
+/// Up to three times in 0…1, rising, and whether the value was above 0 before.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Roots {
+    times: [f64; 3],
+    above: [bool; 3],
+    count: usize,
+}
+
+impl Roots {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, bool)> {
+        self.times.into_iter().zip(self.above).take(self.count)
+    }
+}
+
+fn det(a: &V3, b: &V3, c: &V3) -> f64 {
+    a.cross(b).dot(c)
+}
+
+/// When the determinant of three vectors that go straight from `start` to `end` changes its sign.
+#[inline]
+pub(super) fn sign_changes(start: &[V3; 3], end: &[V3; 3]) -> Roots {
+    let [a, b, c] = start;
+    let [p, q, r] = [end[0] - a, end[1] - b, end[2] - c];
+    let (ab, aq, pb, pq) = (a.cross(b), a.cross(&q), p.cross(b), p.cross(&q));
+    let c0 = ab.dot(c);
+    let c1 = ab.dot(&r) + (aq + pb).dot(c);
+    let c2 = (aq + pb).dot(&r) + pq.dot(c);
+    let c3 = pq.dot(&r);
+    let last = det(&end[0], &end[1], &end[2]);
+    // Of the Bernstein form, within whose values the cubic stays.
+    let held = [c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, last];
+    let mut roots = Roots::default();
+    if held.iter().all(|x| *x > 0.0) || held.iter().all(|x| *x < 0.0) {
+        return roots;
+    }
+    let value = |t: f64| if t >= 1.0 { last } else { c0 + t * (c1 + t * (c2 + t * c3)) };
+    let (turns, count) = turning_points(c1, c2, c3);
+    let mut from = (0.0, c0);
+    for to in turns[..count].iter().copied().chain([1.0]) {
+        let to = (to, value(to));
+        if (from.1 >= 0.0) != (to.1 >= 0.0) {
+            roots.times[roots.count] = root(&value, from, to);
+            roots.above[roots.count] = from.1 >= 0.0;
+            roots.count += 1;
+        }
+        from = to;
+    }
+    roots
+}
+
+/// Where c₁ + 2c₂t + 3c₃t² is 0 within 0…1, rising.
+fn turning_points(c1: f64, c2: f64, c3: f64) -> ([f64; 2], usize) {
+    let (mut out, mut count) = ([0.0; 2], 0);
+    let under = c2 * c2 - 3.0 * c1 * c3;
+    if under > 0.0 {
+        // The larger sum first, so that nothing cancels.
+        let sum = -(c2 + under.sqrt().copysign(c2));
+        for t in [sum / (3.0 * c3), c1 / sum] {
+            if t > 0.0 && t < 1.0 {
+                out[count] = t;
+                count += 1;
+            }
+        }
+    }
+    if count == 2 && out[0] > out[1] {
+        out.swap(0, 1);
+    }
+    (out, count)
+}
+
+/// Where a monotone function changes its sign between two arguments: the false position, halved where one end stays
+/// (Illinois), then halving.
+fn root(value: &impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
+    let above = low.1 >= 0.0;
+    let mut kept = 0;
+    for round in 0..100 {
+        if high.0 - low.0 <= 4.0 * f64::EPSILON * high.0 {
+            break;
+        }
+        let guess = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
+        let middle = 0.5 * (low.0 + high.0);
+        let t = if round < 40 && guess > low.0 && guess < high.0 { guess } else { middle };
+        let now = value(t);
+        if (now >= 0.0) == above {
+            low = (t, now);
+            high.1 *= if kept == 1 { 0.5 } else { 1.0 };
+            kept = 1;
+        } else {
+            high = (t, now);
+            low.1 *= if kept == 2 { 0.5 } else { 1.0 };
+            kept = 2;
+        }
+    }
+    0.5 * (low.0 + high.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// When (t − a)(t − b)(t − c), as the determinant of a diagonal, changes its sign.
+    fn product(roots: [f64; 3]) -> Vec<(f64, bool)> {
+        let at = |t: f64| {
+            let [a, b, c] = roots.map(|root| t - root);
+            [V3::x() * a, V3::y() * b, V3::z() * c]
+        };
+        sign_changes(&at(0.0), &at(1.0)).iter().collect()
+    }
+
+    #[test]
+    fn a_product_of_three_changes_its_sign_at_each() {
+        let found = product([0.2, 0.5, 0.9]);
+        assert_eq!(found.len(), 3);
+        for ((t, above), (want, side)) in found.into_iter().zip([(0.2, false), (0.5, true), (0.9, false)]) {
+            assert!((t - want).abs() < 1e-14 && above == side, "{t} is not {want}");
+        }
+        assert_eq!(product([-1.0, 2.0, 3.0]).len(), 0);
+        assert_eq!(product([0.3, 7.0, -9.0]).len(), 1);
+    }
+}
