@@ -19,6 +19,93 @@ impl Roots {
     }
 }
 
+/// What one direction says about two things that go straight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Apart {
+    /// Never as near as asked.
+    Far,
+    /// Near perhaps, never through each other.
+    Near,
+    /// Nothing.
+    Unknown,
+}
+
+/// What the normal of a triangle where it starts says, and the ways across its sides within its plane: its two sides and
+/// the way to the point from where they meet.
+#[inline]
+pub(super) fn face_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let normal = start[0].cross(&start[1]);
+    let said = face_along(&normal, start, end, reach);
+    if said == Apart::Unknown {
+        for side in [start[0], start[1], start[1] - start[0]] {
+            if face_along(&normal.cross(&side), start, end, reach) == Apart::Far {
+                return Apart::Far;
+            }
+        }
+    }
+    said
+}
+
+/// What `axis` says of a point and a triangle.
+#[inline]
+fn face_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let range = |[b, c, p]: &[V3; 3]| {
+        let (one, two, way) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
+        (way + one.min(two).min(0.0), way + one.max(two).max(0.0))
+    };
+    let (first, last) = (range(start), range(end));
+    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+}
+
+/// What the normal of two edges where they start says, then the ways across each within the plane of both and across how
+/// they pass each other: both edges and the way from the first one's start to the second's.
+///
+/// Edges that stay parallel go through each other nowhere that their ends do not.
+#[inline]
+pub(super) fn edges_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    /// Sine within which edges are parallel.
+    const PARALLEL: f64 = 1e-9;
+    let normal = start[0].cross(&start[1]);
+    let said = edges_along(&normal, start, end, reach);
+    if said != Apart::Unknown {
+        return said;
+    }
+    let pass = end[2] - start[2];
+    let axes = [normal.cross(&start[0]), normal.cross(&start[1]), pass.cross(&start[0]), pass.cross(&start[1])];
+    if axes.iter().any(|axis| edges_along(axis, start, end, reach) == Apart::Far) {
+        return Apart::Far;
+    }
+    let parallel = |[d, e, _]: &[V3; 3]| {
+        d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared()
+    };
+    if parallel(start) && parallel(end) { Apart::Near } else { Apart::Unknown }
+}
+
+/// What `axis` says of two edges.
+#[inline]
+fn edges_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let range = |[d, e, r]: &[V3; 3]| {
+        let (one, two, way) = (-axis.dot(d), axis.dot(e), axis.dot(r));
+        (way + one.min(0.0) + two.min(0.0), way + one.max(0.0) + two.max(0.0))
+    };
+    let (first, last) = (range(start), range(end));
+    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+}
+
+/// Of heights within `low` and `high` times the normal's length.
+#[inline]
+fn verdict(low: f64, high: f64, reach: f64, normal: &V3) -> Apart {
+    let nearest = low.max(-high);
+    let far = reach * (1.0 + 1e-9);
+    if nearest > 0.0 && nearest * nearest > far * far * normal.norm_squared() {
+        Apart::Far
+    } else if nearest > 0.0 {
+        Apart::Near
+    } else {
+        Apart::Unknown
+    }
+}
+
 fn det(a: &V3, b: &V3, c: &V3) -> f64 {
     a.cross(b).dot(c)
 }

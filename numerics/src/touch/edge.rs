@@ -4,7 +4,7 @@
 //! to the other points out of both surfaces and away from the triangles beside the edges.
 
 use super::V3;
-use super::cross::sign_changes;
+use super::cross::{Apart, edges_apart, sign_changes};
 use super::near::along;
 use super::surface::{Edge, Moment, NONE, Surface};
 use super::vertex::{Moving, ON, Rules};
@@ -27,10 +27,19 @@ const LEAN_NEAR: f64 = 0.1;
 /// How `edge` and `other`, each of its surface, meet.
 pub(super) fn hit(first: &Moving<'_>, edge: &Edge, second: &Moving<'_>, other: &Edge, rules: &Rules) -> Option<Hit> {
     let pair = Pair { first: *first, edge, second: *second, other };
-    if let Some(hit) = pair.through() {
-        return Some(hit);
-    }
     let last = first.poses.len() - 1;
+    let mut far = true;
+    for piece in 0..last {
+        let ways = [pair.ways(piece), pair.ways(piece + 1)];
+        let apart = edges_apart(&ways[0], &ways[1], rules.reach);
+        far &= apart == Apart::Far;
+        if apart == Apart::Unknown && let Some(hit) = pair.through(piece, &ways) {
+            return Some(hit);
+        }
+    }
+    if far {
+        return None;
+    }
     pair.near(last, rules.reach).or_else(|| pair.near(0, rules.reach))
 }
 
@@ -49,27 +58,30 @@ impl Pair<'_> {
         ]
     }
 
-    /// Where they went through each other.
-    fn through(&self) -> Option<Hit> {
-        for piece in 0..self.first.poses.len() - 1 {
-            let [start, end] = [piece, piece + 1].map(|pose| {
-                let [[p, q], [a, b]] = self.segments(pose);
-                [q - p, b - a, a - p]
-            });
-            for (t, above) in sign_changes(&start, &end).iter() {
-                let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
-                let size = d.norm().max(e.norm()).max(start[2].norm()).max(end[2].norm());
-                let [s, u] = along([V3::zeros(), d], [r, r + e]);
-                let side = if above { -1.0 } else { 1.0 };
-                let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
-                let time = piece as f64 + t;
-                if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
-                    let [[p, q], [a, b]] = self.segments(self.first.poses.len() - 1);
-                    let last = ((q - p).cross(&(b - a)) * side).try_normalize(1e-12 * d.norm() * e.norm());
-                    // Turned that far they may have passed each other's direction: the way they met holds.
-                    let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
-                    return Some(Hit { shares: [s, u], normal });
-                }
+    /// Both edges and the way from the start of the first to that of the second.
+    #[inline]
+    fn ways(&self, pose: usize) -> [V3; 3] {
+        let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
+        let [p, q] = [V3::from(one[self.edge.ends[0] as usize]), V3::from(one[self.edge.ends[1] as usize])];
+        let [a, b] = [V3::from(two[self.other.ends[0] as usize]), V3::from(two[self.other.ends[1] as usize])];
+        [q - p, b - a, a - p]
+    }
+
+    /// Where they went through each other within a piece of the way.
+    fn through(&self, piece: usize, [start, end]: &[[V3; 3]; 2]) -> Option<Hit> {
+        for (t, above) in sign_changes(start, end).iter() {
+            let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
+            let size = d.norm().max(e.norm()).max(start[2].norm()).max(end[2].norm());
+            let [s, u] = along([V3::zeros(), d], [r, r + e]);
+            let side = if above { -1.0 } else { 1.0 };
+            let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
+            let time = piece as f64 + t;
+            if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
+                let [d, e, _] = self.ways(self.first.poses.len() - 1);
+                let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
+                // Turned that far they may have passed each other's direction: the way they met holds.
+                let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
+                return Some(Hit { shares: [s, u], normal });
             }
         }
         None

@@ -24,7 +24,7 @@ mod swept;
 mod vertex;
 
 use crate::soft::{Contact, Contacts, Query};
-use crate::tree::TriangleTree;
+use crate::tree::{Cuboid, TriangleTree};
 use near::Nearest;
 pub use motion::Pose;
 pub use obstacle::{Ground, Obstacle};
@@ -32,6 +32,7 @@ pub use pair::Rub;
 use rayon::prelude::*;
 pub use skin::Skin;
 use surface::{Moment, Places};
+use swept::BoxTree;
 use vertex::{Moving, Rules};
 
 type V3 = nalgebra::Vector3<f64>;
@@ -147,16 +148,16 @@ impl Scene<'_> {
     pub fn search(&self, query: &Query<'_>, out: &mut Vec<Contact>) -> Found {
         let mut seen = Vec::new();
         self.on_ground(query, &mut seen);
+        let boxes = swept::boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
-            let ways = [query.from, query.to];
             for skin in self.skins {
-                let faces = skin.faces.sweep(&ways, 0.0);
+                let faces = skin.faces.sweep(&boxes, 0.0);
                 for obstacle in self.obstacles {
-                    self.against(query, skin, &faces, obstacle, &mut seen);
+                    self.against(query, skin, &boxes, &faces, obstacle, &mut seen);
                 }
             }
         }
-        self.pairs(query, &mut seen);
+        self.pairs(query, &boxes, &mut seen);
         let mut found = Found { contacts: seen.len() as u32, deepest_overlap: 0.0 };
         for Seen { contact, start } in &seen {
             let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
@@ -200,15 +201,23 @@ impl Scene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// What a skin meets of an obstacle; `faces` are the boxes of the skin's triangles on their way.
-    fn against(&self, query: &Query<'_>, skin: &Skin, faces: &TriangleTree, obstacle: &Obstacle, out: &mut Vec<Seen>) {
+    /// What a skin meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
+    fn against(
+        &self,
+        query: &Query<'_>,
+        skin: &Skin,
+        boxes: &[Cuboid],
+        faces: &BoxTree<'_>,
+        obstacle: &Obstacle,
+        out: &mut Vec<Seen>,
+    ) {
         let rules = Rules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
         let poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
         let poses: Vec<Places<'_>> = poses.iter().map(Vec::as_slice).collect();
-        let tree = obstacle.faces.sweep(&poses, rules.reach);
-        let (low, high) = faces.bounds();
-        if !swept::meet(&crate::tree::Cuboid { low, high }, tree.bounds()) {
+        let still_boxes = swept::boxes(&poses);
+        let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
+        if !swept::meet(&faces.bounds, &tree.bounds) {
             return;
         }
         let between = between(query, &times);
@@ -220,6 +229,7 @@ impl Scene<'_> {
             query,
             skin,
             obstacle,
+            boxes: [boxes, &still_boxes],
             body: Moving { surface: &skin.surface, poses: &ways },
             still: Moving { surface: &obstacle.surface, poses: &poses },
             rules,
@@ -247,21 +257,26 @@ struct Meeting<'a> {
     query: &'a Query<'a>,
     skin: &'a Skin,
     obstacle: &'a Obstacle,
+    /// Of particles and of the obstacle's points, on their way.
+    boxes: [&'a [Cuboid]; 2],
     body: Moving<'a>,
     still: Moving<'a>,
     rules: Rules,
 }
 
-/// Tells what each of `things` meets, in their order, whatever the number of threads.
-fn in_order<T: Sync>(things: &[T], tell: impl Fn(&[T], &mut Vec<Seen>) + Sync, out: &mut Vec<Seen>) {
-    let parts: Vec<Vec<Seen>> = things
-        .par_chunks(TASK)
-        .map(|part| {
-            let mut seen = Vec::new();
-            tell(part, &mut seen);
-            seen
-        })
-        .collect();
+/// Tells what each of `things` meets, in their order, whatever the number of threads; `scratch` is memory to use again.
+fn in_order<T: Sync, S>(
+    things: &[T],
+    scratch: impl Fn() -> S + Sync + Send,
+    tell: impl Fn(&mut S, &[T], &mut Vec<Seen>) + Sync,
+    out: &mut Vec<Seen>,
+) {
+    let part = |scratch: &mut S, part: &[T]| {
+        let mut seen = Vec::new();
+        tell(scratch, part, &mut seen);
+        seen
+    };
+    let parts: Vec<Vec<Seen>> = things.par_chunks(TASK).map_init(scratch, part).collect();
     out.extend(parts.into_iter().flatten());
 }
 
@@ -273,16 +288,15 @@ fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<V3>) {
 
 impl Meeting<'_> {
     /// The skin's vertices against the obstacle's triangles.
-    fn vertices(&self, tree: &TriangleTree, out: &mut Vec<Seen>) {
+    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
         let solid = self.solid();
-        let tell = |vertices: &[u32], out: &mut Vec<Seen>| {
+        let tell = |(): &mut (), vertices: &[u32], out: &mut Vec<Seen>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for vertex in vertices {
-                let region = swept::around(&[*vertex], &[self.query.from, self.query.to], 0.0);
-                if !swept::meet(&region, tree.bounds()) {
+                tree.meeting(&self.boxes[0][*vertex as usize], &mut faces);
+                if faces.is_empty() && solid.is_none() {
                     continue;
                 }
-                swept::meeting(tree, region, &mut faces);
                 path_of(self.body.poses, *vertex, &mut path);
                 let start = path[0];
                 hits.clear();
@@ -295,18 +309,21 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&self.skin.surface.vertices, tell, out);
+        in_order(&self.skin.surface.vertices, || (), tell, out);
     }
 
     /// The obstacle's triangles where the way begins, to look for the nearest of a vertex that may be inside.
     fn solid(&self) -> Option<TriangleTree> {
         let obstacle = self.obstacle;
-        let crate::tree::Cuboid { low, high } = swept::around(&obstacle.surface.vertices, &self.still.poses[..1], 0.0);
+        if !obstacle.surface.closed {
+            return None;
+        }
+        let Cuboid { low, high } = swept::around(&obstacle.surface.vertices, self.boxes[1]);
         let inside = |vertex: &u32| {
             let p = V3::from(self.query.from[*vertex as usize]);
             (0..3).all(|k| f64::from(low[k]) <= p[k] && p[k] <= f64::from(high[k]))
         };
-        if !obstacle.surface.closed || !self.skin.surface.vertices.iter().any(inside) {
+        if !self.skin.surface.vertices.iter().any(inside) {
             return None;
         }
         let mut tree = obstacle.solid.clone();
@@ -326,15 +343,15 @@ impl Meeting<'_> {
     }
 
     /// The obstacle's sharp points against the skin's triangles.
-    fn points(&self, tree: &TriangleTree, out: &mut Vec<Seen>) {
-        let tell = |points: &[u32], out: &mut Vec<Seen>| {
+    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
+        let tell = |(): &mut (), points: &[u32], out: &mut Vec<Seen>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
-                let region = swept::around(&[*point], self.still.poses, self.rules.reach);
-                if !swept::meet(&region, tree.bounds()) {
+                let region = swept::wider(&self.boxes[1][*point as usize], self.rules.reach);
+                tree.meeting(&region, &mut faces);
+                if faces.is_empty() {
                     continue;
                 }
-                swept::meeting(tree, region, &mut faces);
                 path_of(self.still.poses, *point, &mut path);
                 hits.clear();
                 vertex::hits(&path, &self.body, &faces, || None, &self.rules, &mut hits);
@@ -346,22 +363,18 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&self.obstacle.sharp_points, tell, out);
+        in_order(&self.obstacle.sharp_points, || (), tell, out);
     }
 
     /// The skin's edges against the obstacle's sharp ones.
     fn edges(&self, out: &mut Vec<Seen>) {
-        let tree = self.obstacle.edges.sweep(self.still.poses, self.rules.reach);
+        let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let tell = |edges: &[u32], out: &mut Vec<Seen>| {
+        let tell = |(): &mut (), edges: &[u32], out: &mut Vec<Seen>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &self.skin.surface.edges[*index as usize];
-                let region = swept::around(&edge.ends, &[self.query.from, self.query.to], 0.0);
-                if !swept::meet(&region, tree.bounds()) {
-                    continue;
-                }
-                swept::meeting(&tree, region, &mut others);
+                tree.meeting(&swept::around(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {
                     let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
                     if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
@@ -372,7 +385,7 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&indices, tell, out);
+        in_order(&indices, || (), tell, out);
     }
 
     /// A contact of particles with points of the obstacle; none where it would only push into the ground.

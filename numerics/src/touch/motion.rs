@@ -30,7 +30,7 @@ struct Span {
     axis: V3,
     /// Radians.
     angle: f64,
-    /// Of the farthest point about the middle, metres.
+    /// Of the point farthest from the axis, metres.
     radius: f64,
 }
 
@@ -114,19 +114,18 @@ impl Span {
         let mean = |points: &[[f64; 3]]| points.iter().map(|p| V3::from(*p)).sum::<V3>() / (points.len().max(1) as f64);
         let middles = [mean(from), mean(to)];
         let mut spread = Matrix3::zeros();
-        let mut radius = 0.0_f64;
         for (a, b) in from.iter().zip(to) {
-            let (a, b) = (V3::from(*a) - middles[0], V3::from(*b) - middles[1]);
-            spread += a * b.transpose();
-            radius = radius.max(a.norm()).max(b.norm());
+            spread += (V3::from(*a) - middles[0]) * (V3::from(*b) - middles[1]).transpose();
         }
         let [w, x, y, z] = fit(&spread);
         let (axis, length) = (V3::new(x, y, z), V3::new(x, y, z).norm());
         let angle = 2.0 * libm::atan2(length, w.abs());
         if !(angle > 1e-15) {
-            return Self { middles, axis: V3::z(), angle: 0.0, radius };
+            return Self { middles, axis: V3::z(), angle: 0.0, radius: 0.0 };
         }
-        Self { middles, axis: axis * (w.signum() / length), angle, radius }
+        let axis = axis * (w.signum() / length);
+        let radius = from.iter().map(|a| axis.cross(&(V3::from(*a) - middles[0])).norm()).fold(0.0, f64::max);
+        Self { middles, axis, angle, radius }
     }
 
     fn is_still(&self) -> bool {

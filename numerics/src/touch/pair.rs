@@ -2,11 +2,11 @@
 
 use super::edge;
 use super::skin::Skin;
-use super::swept;
+use super::swept::{self, BoxTree};
 use super::vertex::{self, Moving, Rules};
 use super::{REACH, Scene, Seen, V3, in_order};
 use crate::soft::{Contact, Query};
-use crate::tree::TriangleTree;
+use crate::tree::Cuboid;
 
 /// How surfaces of bodies touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +24,8 @@ const JOINED: f64 = 1e-6;
 struct Pair<'a> {
     scene: &'a Scene<'a>,
     query: &'a Query<'a>,
+    /// Boxes of particles on their way.
+    points: &'a [Cuboid],
     skins: [&'a Skin; 2],
     /// Whether both are one.
     own: bool,
@@ -31,23 +33,47 @@ struct Pair<'a> {
     rules: Rules,
 }
 
+/// Which particles are around some: those with the number of the last that asked.
+#[derive(Default)]
+struct Marks {
+    of: Vec<u32>,
+    last: u32,
+}
+
+impl Marks {
+    fn put(&mut self, skin: &Skin, particles: &[u32]) {
+        if self.of.is_empty() || self.last == u32::MAX {
+            self.of = vec![0; skin.particles()];
+            self.last = 0;
+        }
+        self.last += 1;
+        for other in particles.iter().flat_map(|particle| skin.around(*particle)) {
+            self.of[*other as usize] = self.last;
+        }
+    }
+
+    fn have(&self, particles: &[u32]) -> bool {
+        particles.iter().any(|particle| self.of[*particle as usize] == self.last)
+    }
+}
+
 /// Boxes of a skin on its way.
-struct Boxes {
-    faces: TriangleTree,
-    edges: TriangleTree,
+struct Boxes<'a> {
+    faces: BoxTree<'a>,
+    edges: BoxTree<'a>,
 }
 
 impl Scene<'_> {
     /// All pairs of skins, then each with itself.
-    pub(super) fn pairs(&self, query: &Query<'_>, out: &mut Vec<Seen>) {
-        let boxes = |reach: f64| -> Vec<Boxes> {
-            let ways = [query.from, query.to];
-            let of = |skin: &Skin| Boxes { faces: skin.faces.sweep(&ways, reach), edges: skin.edges.sweep(&ways, reach) };
-            self.skins.iter().map(of).collect()
+    pub(super) fn pairs(&self, query: &Query<'_>, points: &[Cuboid], out: &mut Vec<Seen>) {
+        let boxes = |reach: f64| -> Vec<Boxes<'_>> {
+            let faces = self.skins.iter().map(|skin| skin.faces.sweep(points, reach));
+            faces.zip(self.skins).map(|(faces, skin)| Boxes { faces, edges: skin.edges.sweep(points, reach) }).collect()
         };
         let pair = |skins: [usize; 2], own: bool, rub: Rub| Pair {
             scene: self,
             query,
+            points,
             skins: skins.map(|skin| &self.skins[skin]),
             own,
             rub,
@@ -57,8 +83,7 @@ impl Scene<'_> {
             let boxes = boxes(REACH * rub.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
-                    let (low, high) = boxes[first].faces.bounds();
-                    if swept::meet(&crate::tree::Cuboid { low, high }, boxes[second].faces.bounds()) {
+                    if swept::meet(&boxes[first].faces.bounds, &boxes[second].faces.bounds) {
                         pair([first, second], false, rub).vertices(&boxes[second], out);
                         pair([second, first], false, rub).vertices(&boxes[first], out);
                         pair([first, second], false, rub).edges(&boxes[second], out);
@@ -78,17 +103,17 @@ impl Scene<'_> {
 
 impl Pair<'_> {
     /// The first skin's vertices against the second's triangles.
-    fn vertices(&self, boxes: &Boxes, out: &mut Vec<Seen>) {
+    fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<Seen>) {
         let ways = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = Moving { surface: &second.surface, poses: &ways };
-        let tell = |vertices: &[u32], out: &mut Vec<Seen>| {
+        let tell = |marks: &mut Marks, vertices: &[u32], out: &mut Vec<Seen>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
             for vertex in vertices {
-                let region = swept::around(&[*vertex], &ways, 0.0);
-                swept::meeting(&boxes.faces, region, &mut faces);
+                boxes.faces.meeting(&self.points[*vertex as usize], &mut faces);
                 if self.own {
-                    faces.retain(|face| !first.is_around(*vertex, &first.surface.triangles[*face as usize]));
+                    marks.put(first, &[*vertex]);
+                    faces.retain(|face| !marks.have(&first.surface.triangles[*face as usize]));
                 }
                 if faces.is_empty() {
                     continue;
@@ -104,26 +129,26 @@ impl Pair<'_> {
                 }
             }
         };
-        in_order(&first.surface.vertices, tell, out);
+        in_order(&first.surface.vertices, Marks::default, tell, out);
     }
 
     /// The first skin's edges against the second's.
-    fn edges(&self, boxes: &Boxes, out: &mut Vec<Seen>) {
+    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<Seen>) {
         let ways = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| Moving { surface: &skin.surface, poses: &ways });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let tell = |edges: &[u32], out: &mut Vec<Seen>| {
+        let tell = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Seen>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &first.surface.edges[*index as usize];
-                swept::meeting(&boxes.edges, swept::around(&edge.ends, &ways, 0.0), &mut others);
+                boxes.edges.meeting(&swept::around(&edge.ends, self.points), &mut others);
+                if self.own {
+                    marks.put(first, &edge.ends);
+                    others.retain(|other| *other > *index && !marks.have(&first.surface.edges[*other as usize].ends));
+                }
                 for other_index in &others {
                     let other = &second.surface.edges[*other_index as usize];
-                    let skip = || *other_index <= *index || edge.ends.iter().any(|end| first.is_around(*end, &other.ends));
-                    if self.own && skip() {
-                        continue;
-                    }
                     if let Some(hit) = edge::hit(&one, edge, &two, other, &self.rules) {
                         let [s, t] = hit.shares;
                         let ([a, b], [c, d]) = (edge.ends, other.ends);
@@ -133,7 +158,7 @@ impl Pair<'_> {
                 }
             }
         };
-        in_order(&indices, tell, out);
+        in_order(&indices, Marks::default, tell, out);
     }
 
     /// The gap of a pair: no more than how far it is apart `at_rest`, where both are of one body.

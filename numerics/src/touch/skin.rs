@@ -42,11 +42,14 @@ impl Skin {
         })
     }
 
-    /// Whether one of `others` is a neighbour of `particle`, or itself.
-    pub(super) fn is_around(&self, particle: u32, others: &[u32]) -> bool {
-        let range = self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize;
-        let ring = &self.rings[range];
-        others.iter().any(|other| ring.binary_search(other).is_ok())
+    /// Particles, those within the body too.
+    pub(super) fn particles(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// The surface's particles within two links of one of them, itself too.
+    pub(super) fn around(&self, particle: u32) -> &[u32] {
+        &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
     }
 
     /// How far a particle is from a triangle at rest, metres.

@@ -123,8 +123,10 @@ impl Surface {
         self.around[range].iter().map(|edge| &self.edges[*edge as usize])
     }
 
+    #[inline]
     pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [V3; 3] {
-        self.triangles[face as usize].map(|corner| at.place(corner))
+        let [a, b, c] = self.triangles[face as usize];
+        [at.place(a), at.place(b), at.place(c)]
     }
 
     /// Unit; none where there is no area.

@@ -4,7 +4,7 @@
 //! After the first triangle it goes through, only that is what it meets: what else it was near to is judged there.
 
 use super::V3;
-use super::cross::sign_changes;
+use super::cross::{Apart, face_apart, sign_changes};
 use super::near::Nearest;
 use super::surface::{Moment, Places, Settled, Surface};
 
@@ -91,16 +91,22 @@ pub(super) fn hits(
     }
     let mut met = (path.len() - 1) as f64;
     let mut through = 0;
+    let mut near: Vec<u32> = Vec::new();
     for face in faces {
-        if let Some((time, above)) = crossing(path, on, *face) {
-            out.extend(plane(*face, if above { 1.0 } else { -1.0 }, 0.0));
-            met = met.min(time);
-            through += 1;
+        match crossing(path, on, *face, rules.reach) {
+            Way::Far => {}
+            Way::Near => near.push(*face),
+            Way::Through(time, above) => {
+                near.push(*face);
+                out.extend(plane(*face, if above { 1.0 } else { -1.0 }, 0.0));
+                met = met.min(time);
+                through += 1;
+            }
         }
     }
     let at = on.moment(met);
     let here = point_at(path, met);
-    for face in faces {
+    for face in &near {
         let nearest = Nearest::on(*face, here, surface.corners(&at, *face));
         // What it goes through then is its contact already.
         let least = if through > 0 { 1e-6 * rules.reach } else { 0.0 };
@@ -109,7 +115,7 @@ pub(super) fn hits(
         }
     }
     if out.len() == first {
-        let passed = faces.iter().filter(|face| approaches(path, on, **face, rules.reach));
+        let passed = near.iter().filter(|face| approaches(path, on, **face, rules.reach));
         let each = passed.map(|face| Nearest::on(*face, end, surface.corners(&on.end(), *face)));
         let near = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
         if let Some(nearest) = near.filter(|nearest| !surface.closed || !is_behind(surface, &on.end(), nearest, end)) {
@@ -137,23 +143,41 @@ fn is_behind(surface: &Surface, at: &Moment<'_>, nearest: &Nearest, point: V3) -
     surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
 }
 
-/// When the point first goes through a triangle (into it, where closed), and whether from above.
-fn crossing(path: &[V3], on: &Moving<'_>, face: u32) -> Option<(f64, bool)> {
+/// What a point may do with a triangle on its way.
+enum Way {
+    /// Does not come near.
+    Far,
+    /// May come near.
+    Near,
+    /// Goes through it then, first, from above or not; where closed, into it.
+    Through(f64, bool),
+}
+
+fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
+    let [a, b, c] = on.surface.triangles[face as usize];
+    let ways = |pose: usize| {
+        let at = |point: u32| V3::from(on.poses[pose][point as usize]);
+        let origin = at(a);
+        [at(b) - origin, at(c) - origin, path[pose] - origin]
+    };
+    let mut far = true;
+    let mut start = ways(0);
     for piece in 0..path.len() - 1 {
-        let [start, end] = [piece, piece + 1].map(|pose| {
-            let [a, b, c] = on.surface.corners(&Moment::of(on.poses[pose]), face);
-            [b - a, c - a, path[pose] - a]
-        });
-        for (t, above) in sign_changes(&start, &end).iter() {
-            let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
-            let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());
-            let hit = Nearest::on(face, p, [V3::zeros(), b, c]);
-            if hit.distance <= ON * size && (above || !on.surface.closed) {
-                return Some((piece as f64 + t, above));
+        let end = ways(piece + 1);
+        let apart = face_apart(&start, &end, reach);
+        far &= apart == Apart::Far;
+        if apart == Apart::Unknown {
+            for (t, above) in sign_changes(&start, &end).iter().filter(|root| root.1 || !on.surface.closed) {
+                let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
+                let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());
+                if Nearest::on(face, p, [V3::zeros(), b, c]).distance <= ON * size {
+                    return Way::Through(piece as f64 + t, above);
+                }
             }
         }
+        start = end;
     }
-    None
+    if far { Way::Far } else { Way::Near }
 }
 
 /// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
