@@ -30,16 +30,19 @@ pub(super) enum Apart {
     Unknown,
 }
 
-/// What the normal of a triangle where it starts says, and the ways across its sides within its plane: its two sides and
-/// the way to the point from where they meet.
+/// What the normal of a triangle where it starts says, then the ways across its sides within its plane and across how the
+/// point passes them: its two sides and the way to the point from where they meet.
 #[inline]
 pub(super) fn face_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
     let normal = start[0].cross(&start[1]);
     let said = face_along(&normal, start, end, reach);
     if said == Apart::Unknown {
+        let pass = end[2] - start[2];
         for side in [start[0], start[1], start[1] - start[0]] {
-            if face_along(&normal.cross(&side), start, end, reach) == Apart::Far {
-                return Apart::Far;
+            for axis in [normal.cross(&side), pass.cross(&side)] {
+                if face_along(&axis, start, end, reach) == Apart::Far {
+                    return Apart::Far;
+                }
             }
         }
     }

@@ -31,6 +31,7 @@ pub use obstacle::{Ground, Obstacle};
 pub use pair::Rub;
 use rayon::prelude::*;
 pub use skin::Skin;
+use std::sync::OnceLock;
 use surface::{Moment, Places};
 use swept::BoxTree;
 use vertex::{Moving, Rules};
@@ -289,18 +290,21 @@ fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<V3>) {
 impl Meeting<'_> {
     /// The skin's vertices against the obstacle's triangles.
     fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
-        let solid = self.solid();
+        // Of where it is at all, as nothing less is at hand; what is not closed has no inside.
+        let (solid, bounds) = (OnceLock::new(), tree.bounds);
+        let has_inside = self.obstacle.surface.closed;
         let tell = |(): &mut (), vertices: &[u32], out: &mut Vec<Seen>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for vertex in vertices {
                 tree.meeting(&self.boxes[0][*vertex as usize], &mut faces);
-                if faces.is_empty() && solid.is_none() {
+                let own = &self.boxes[0][*vertex as usize];
+                if faces.is_empty() && !(has_inside && swept::meet(own, &bounds)) {
                     continue;
                 }
                 path_of(self.body.poses, *vertex, &mut path);
                 let start = path[0];
                 hits.clear();
-                let sunk = || self.sunk(solid.as_ref()?, start);
+                let sunk = || self.sunk(&solid, &bounds, start);
                 vertex::hits(&path, &self.still, &faces, sunk, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
@@ -312,32 +316,18 @@ impl Meeting<'_> {
         in_order(&self.skin.surface.vertices, || (), tell, out);
     }
 
-    /// The obstacle's triangles where the way begins, to look for the nearest of a vertex that may be inside.
-    fn solid(&self) -> Option<TriangleTree> {
-        let obstacle = self.obstacle;
-        if !obstacle.surface.closed {
-            return None;
-        }
-        let Cuboid { low, high } = swept::around(&obstacle.surface.vertices, self.boxes[1]);
-        let inside = |vertex: &u32| {
-            let p = V3::from(self.query.from[*vertex as usize]);
-            (0..3).all(|k| f64::from(low[k]) <= p[k] && p[k] <= f64::from(high[k]))
-        };
-        if !self.skin.surface.vertices.iter().any(inside) {
-            return None;
-        }
-        let mut tree = obstacle.solid.clone();
-        tree.refit(&obstacle::narrow(self.still.poses[0]));
-        Some(tree)
-    }
-
-    /// The nearest triangle where the way begins, of a vertex within the obstacle's box.
-    fn sunk(&self, solid: &TriangleTree, start: V3) -> Option<Nearest> {
-        let (low, high) = solid.bounds();
+    /// The nearest triangle where the way begins, of a vertex within the obstacle's `bounds`; `solid` are its triangles
+    /// then, put where they are once they are asked.
+    fn sunk(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: V3) -> Option<Nearest> {
         let p = [start.x as f32, start.y as f32, start.z as f32];
-        if !(0..3).all(|k| low[k] <= p[k] && p[k] <= high[k]) {
+        if !swept::meet(&Cuboid { low: p, high: p }, bounds) {
             return None;
         }
+        let solid = solid.get_or_init(|| {
+            let mut tree = self.obstacle.solid.clone();
+            tree.refit(&obstacle::narrow(self.still.poses[0]));
+            tree
+        });
         let face = solid.closest(p, f32::INFINITY)?.triangle;
         Some(Nearest::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
     }

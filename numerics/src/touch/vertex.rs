@@ -79,37 +79,37 @@ pub(super) fn hits(
         let clearance = normal.dot(&(end - nearest.point)) + shift;
         Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })
     };
+    let mut met = (path.len() - 1) as f64;
+    let mut through: Vec<(u32, f64)> = Vec::new();
+    let mut near: Vec<u32> = Vec::new();
+    for face in faces {
+        match crossing(path, on, *face, rules.reach) {
+            Way::Far => continue,
+            Way::Near => {}
+            Way::Through(time, above) => {
+                through.push((*face, if above { 1.0 } else { -1.0 }));
+                met = met.min(time);
+            }
+        }
+        near.push(*face);
+    }
     if surface.closed && rules.push {
         let start = on.start();
-        let each = faces.iter().map(|face| Nearest::on(*face, path[0], surface.corners(&start, *face)));
-        let near = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
-        let nearest = near.filter(|near| near.distance <= rules.reach).or_else(sunk);
+        let each = near.iter().map(|face| Nearest::on(*face, path[0], surface.corners(&start, *face)));
+        let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
+        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(sunk);
         if let Some(nearest) = nearest.filter(|nearest| is_behind(surface, &start, nearest, path[0])) {
             out.extend(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
             return;
         }
     }
-    let mut met = (path.len() - 1) as f64;
-    let mut through = 0;
-    let mut near: Vec<u32> = Vec::new();
-    for face in faces {
-        match crossing(path, on, *face, rules.reach) {
-            Way::Far => {}
-            Way::Near => near.push(*face),
-            Way::Through(time, above) => {
-                near.push(*face);
-                out.extend(plane(*face, if above { 1.0 } else { -1.0 }, 0.0));
-                met = met.min(time);
-                through += 1;
-            }
-        }
-    }
+    out.extend(through.iter().filter_map(|(face, side)| plane(*face, *side, 0.0)));
     let at = on.moment(met);
     let here = point_at(path, met);
     for face in &near {
         let nearest = Nearest::on(*face, here, surface.corners(&at, *face));
         // What it goes through then is its contact already.
-        let least = if through > 0 { 1e-6 * rules.reach } else { 0.0 };
+        let least = if !through.is_empty() { 1e-6 * rules.reach } else { 0.0 };
         if nearest.distance <= rules.reach && nearest.distance >= least {
             out.extend(close(surface, &at, &on.end(), nearest, here, end));
         }

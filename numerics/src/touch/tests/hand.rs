@@ -131,7 +131,7 @@ fn ground_comes_first_and_nothing_pushes_below_it() {
     let tilted = |height: f64| -> Vec<[f64; 3]> {
         points.iter().map(|[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y + height, *z]).collect()
     };
-    let cube = Obstacle::new(&faces, &[pose(0.0, &tilted(0.9)), pose(1.0, &tilted(0.5))], 1.0, 0.01, 0.5).unwrap();
+    let cube = Obstacle::new(&faces, &[pose(0.0, &tilted(0.9)), pose(1.0, &tilted(0.45))], 1.0, 0.01, 0.5).unwrap();
     let still = [[0.2, 0.01, 0.0], [5.0, 0.01, 0.0], [5.0, 0.01, 0.1]];
     let skin = Skin::new(&still, &[[0, 1, 2]], &[]).unwrap();
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: 0.01, friction: 0.3 };
