@@ -78,9 +78,8 @@ pub(super) fn edges_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
     if axes.iter().any(|axis| edges_along(axis, start, end, reach) == Apart::Far) {
         return Apart::Far;
     }
-    let parallel = |[d, e, _]: &[V3; 3]| {
-        d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared()
-    };
+    let parallel =
+        |[d, e, _]: &[V3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
     if parallel(start) && parallel(end) { Apart::Near } else { Apart::Unknown }
 }
 

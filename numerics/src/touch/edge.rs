@@ -33,7 +33,9 @@ pub(super) fn hit(first: &Moving<'_>, edge: &Edge, second: &Moving<'_>, other: &
         let ways = [pair.ways(piece), pair.ways(piece + 1)];
         let apart = edges_apart(&ways[0], &ways[1], rules.reach);
         far &= apart == Apart::Far;
-        if apart == Apart::Unknown && let Some(hit) = pair.through(piece, &ways) {
+        if apart == Apart::Unknown
+            && let Some(hit) = pair.through(piece, &ways)
+        {
             return Some(hit);
         }
     }

@@ -25,8 +25,8 @@ mod vertex;
 
 use crate::soft::{Contact, Contacts, Query};
 use crate::tree::{Cuboid, TriangleTree};
-use near::Nearest;
 pub use motion::Pose;
+use near::Nearest;
 pub use obstacle::{Ground, Obstacle};
 pub use pair::Rub;
 use rayon::prelude::*;

@@ -157,10 +157,22 @@ fn fit(spread: &Matrix3<f64>) -> [f64; 4] {
     let (yz, zx, xy) = (s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
     let (pyz, pzx, pxy) = (s[(1, 2)] + s[(2, 1)], s[(2, 0)] + s[(0, 2)], s[(0, 1)] + s[(1, 0)]);
     let mut m = Matrix4::new(
-        xx + yy + zz + CALM * s.norm(), yz, zx, xy,
-        yz, xx - yy - zz, pxy, pzx,
-        zx, pxy, yy - xx - zz, pyz,
-        xy, pzx, pyz, zz - xx - yy,
+        xx + yy + zz + CALM * s.norm(),
+        yz,
+        zx,
+        xy,
+        yz,
+        xx - yy - zz,
+        pxy,
+        pzx,
+        zx,
+        pxy,
+        yy - xx - zz,
+        pyz,
+        xy,
+        pzx,
+        pyz,
+        zz - xx - yy,
     );
     let mut vectors = Matrix4::identity();
     for _ in 0..SWEEPS {

@@ -1,10 +1,10 @@
 //! The surface of a body: its triangles by particle, and what of it is too near by nature to count as touching.
 
+use super::TouchError;
 use super::near::{Nearest, along};
 use super::obstacle::{check_points, check_triangles};
 use super::surface::{Moment, Surface};
 use super::swept::Elements;
-use super::TouchError;
 
 /// A surface of particles, facing outwards.
 #[derive(Clone, Debug)]
@@ -61,7 +61,8 @@ impl Skin {
     /// How far two edges are apart at rest, metres.
     pub(super) fn rest_between(&self, edge: u32, other: u32) -> f64 {
         let at = Moment::of(&self.rest);
-        let [[p, q], [a, b]] = [edge, other].map(|edge| self.surface.edges[edge as usize].ends.map(|end| at.place(end)));
+        let [[p, q], [a, b]] =
+            [edge, other].map(|edge| self.surface.edges[edge as usize].ends.map(|end| at.place(end)));
         let [s, t] = along([p, q], [a, b]);
         (p.lerp(&q, s) - a.lerp(&b, t)).norm()
     }

@@ -44,7 +44,8 @@ impl<const N: usize> Elements<N> {
     /// Their boxes around the boxes of their points, wider by `reach`.
     pub(super) fn sweep(&self, boxes: &[Cuboid], reach: f64) -> BoxTree<'_> {
         let own = |element: u32| wider(&around(&self.points[element as usize], boxes), reach);
-        let leaf = |lanes: &[u32; LANES]| row(lanes.iter().map(|lane| if *lane == NONE { NOWHERE } else { own(*lane) }));
+        let leaf =
+            |lanes: &[u32; LANES]| row(lanes.iter().map(|lane| if *lane == NONE { NOWHERE } else { own(*lane) }));
         let mut levels: Vec<Vec<Boxes>> = vec![self.order.iter().map(leaf).collect()];
         while levels[levels.len() - 1].len() > 1 {
             let below = &levels[levels.len() - 1];

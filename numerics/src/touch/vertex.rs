@@ -181,14 +181,7 @@ fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
 }
 
 /// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
-fn close(
-    surface: &Surface,
-    at: &Moment<'_>,
-    last: &Moment<'_>,
-    nearest: Nearest,
-    here: V3,
-    end: V3,
-) -> Option<Hit> {
+fn close(surface: &Surface, at: &Moment<'_>, last: &Moment<'_>, nearest: Nearest, here: V3, end: V3) -> Option<Hit> {
     let away = here - nearest.point;
     if (surface.closed && is_behind(surface, at, &nearest, here)) || !surface.is_nearest_around(at, &nearest, &away) {
         return None;
@@ -201,7 +194,9 @@ fn close(
         Some([along, normal.cross(&along), normal])
     };
     let normal = match (away.try_normalize(0.0), frame(at), frame(last)) {
-        (Some(away), Some(then), Some(now)) => (0..3).map(|k| now[k] * then[k].dot(&away)).sum::<V3>().try_normalize(0.0)?,
+        (Some(away), Some(then), Some(now)) => {
+            (0..3).map(|k| now[k] * then[k].dot(&away)).sum::<V3>().try_normalize(0.0)?
+        }
         (Some(away), _, _) => away,
         (None, Some(_), Some(now)) => now[2],
         _ => return None,

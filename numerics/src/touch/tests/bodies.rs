@@ -17,7 +17,8 @@ fn block(cells: [u32; 3], side: f64, at: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 
     for z in 0..cells[2] {
         for y in 0..cells[1] {
             for x in 0..cells[0] {
-                let corner = |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
+                let corner =
+                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
                 for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
                     tets.push([corner(0), corner(a), corner(b), corner(7)]);
                 }
@@ -94,9 +95,7 @@ fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]]) -> f64 {
             (a, (b - a).cross(&(c - a)).normalize())
         })
         .collect();
-    let depth = |p: &[f64; 3]| {
-        -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max)
-    };
+    let depth = |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
     points.iter().map(depth).fold(0.0, f64::max)
 }
 
@@ -137,23 +136,20 @@ fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
 }
 
 #[test]
-fn a_body_under_a_rolling_pin_stays_finite() {
+fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
     let (points, tets, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
     let body = body(&points, &tets, 2e4);
     let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
-    for substeps in [0, 4, 16] {
-        let mut state = State::at_rest(&body);
-        let mut solver = Solver::new(&body);
-        let mut lowest = 0.0_f64;
-        let step = |scene: &Scene<'_>| {
-            let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps, ..Frame::default() };
-            let report = solver.step(&body, &mut state, &frame);
-            assert_eq!(report.stopped, 0);
-            lowest = state.positions.iter().map(|p| p[1]).fold(lowest, f64::min);
-            state.positions.clone()
-        };
-        let worst = rolled_over(30, step, &skins);
-        println!("{substeps}: {worst} {lowest}");
-        assert!(worst.is_finite() && state.positions.iter().flatten().all(|x| x.abs() < 10.0));
-    }
+    let mut state = State::at_rest(&body);
+    let mut solver = Solver::new(&body);
+    // Steps in which the pin moves less than its thickness.
+    let step = |scene: &Scene<'_>| {
+        let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps: 16, ..Frame::default() };
+        let report = solver.step(&body, &mut state, &frame);
+        assert_eq!(report.stopped, 0);
+        assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
+        state.positions.clone()
+    };
+    let worst = rolled_over(30, step, &skins);
+    assert!(worst < THICKNESS, "{worst}");
 }

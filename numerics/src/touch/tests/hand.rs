@@ -17,8 +17,7 @@ fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
     let (from, to) = (speck([0.0, 0.5, 0.0]), speck([0.0, -0.5, 0.0]));
     let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
     let mask = [0.5f32, 1.0, 1.0];
-    let scene =
-        Scene { skins: &[skin], obstacles: &[plate], friction: Some(&mask), ..Scene::default() };
+    let scene = Scene { skins: &[skin], obstacles: &[plate], friction: Some(&mask), ..Scene::default() };
     let (contacts, found) = find(&scene, &from, &to, [0.0, 1.0]);
     assert_eq!(found, Found { contacts: 1, deepest_overlap: 0.0 });
     let contact = contacts[0];
@@ -26,8 +25,10 @@ fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
     assert_eq!((contact.normal, contact.offset, contact.gap), ([0.0, 1.0, 0.0], 0.0, 0.01));
     assert_eq!((contact.velocity, contact.friction), ([0.0; 3], 0.25));
     // From below it is held below.
-    let (contacts, _) = find(&scene, &to.map(|p| [p[0], p[1] - 20.0, p[2]]), &from.map(|p| [p[0], p[1] - 9.0, p[2]]), [0.0, 1.0]);
-    let held: Vec<_> = contacts.iter().filter(|contact| contact.weights[0] == 1.0).map(|contact| contact.normal).collect();
+    let (contacts, _) =
+        find(&scene, &to.map(|p| [p[0], p[1] - 20.0, p[2]]), &from.map(|p| [p[0], p[1] - 9.0, p[2]]), [0.0, 1.0]);
+    let held: Vec<_> =
+        contacts.iter().filter(|contact| contact.weights[0] == 1.0).map(|contact| contact.normal).collect();
     assert!(!held.is_empty() && held.iter().all(|normal| *normal == [0.0, -1.0, 0.0]), "{held:?}");
 }
 
@@ -52,7 +53,8 @@ fn edges_that_cross_push_where_they_cross() {
     let from = [[0.5, 0.2, -0.1], [0.5, 0.2, 0.3], [0.5, 1.0, 0.0]];
     let to = from.map(|[x, y, z]| [x, y - 0.3, z]);
     let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
-    let (contacts, _) = find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
+    let (contacts, _) =
+        find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
     assert_eq!(contacts.len(), 1, "{contacts:?}");
     let Contact { particles, weights, normal, offset, .. } = contacts[0];
     assert_eq!(particles, [0, 1, 0, 0]);
@@ -69,7 +71,8 @@ fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
     assert!(spike.is_closed());
     let sheet = [[-1.0, 0.2, -1.0], [-1.0, 0.2, 2.0], [2.0, 0.2, -1.0]];
     let skin = Skin::new(&sheet, &[[0, 2, 1]], &[]).unwrap();
-    let (contacts, _) = find(&Scene { skins: &[skin], obstacles: &[spike], ..Scene::default() }, &sheet, &sheet, [0.0, 1.0]);
+    let (contacts, _) =
+        find(&Scene { skins: &[skin], obstacles: &[spike], ..Scene::default() }, &sheet, &sheet, [0.0, 1.0]);
     assert_eq!(contacts.len(), 1, "{contacts:?}");
     let Contact { weights, normal, offset, velocity, .. } = contacts[0];
     assert!(weights[..3].iter().all(|weight| (weight - 1.0 / 3.0).abs() < 1e-12) && weights[3] == 0.0);
@@ -171,6 +174,11 @@ fn two_sheets_touch_and_neighbours_do_not() {
     for contact in &contacts {
         assert!(contact.weights.iter().sum::<f64>().abs() < 1e-12);
         let kind = |particle: u32| particle / 2;
-        assert!(contact.particles.iter().any(|p| kind(*p) > kind(contact.particles[0]) + 2 || kind(*p) + 2 < kind(contact.particles[0])));
+        assert!(
+            contact
+                .particles
+                .iter()
+                .any(|p| kind(*p) > kind(contact.particles[0]) + 2 || kind(*p) + 2 < kind(contact.particles[0]))
+        );
     }
 }

@@ -94,7 +94,8 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
         }
     }
     let skin = Skin::new(&from, &triples(COUNT), &[]).unwrap();
-    let (contacts, _) = find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
+    let (contacts, _) =
+        find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
     let mut through = 0;
     for k in 0..COUNT as usize {
         let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(V3::from);
@@ -106,7 +107,8 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
         if x.iter().all(|x| (0.0..=1.0).contains(x)) {
             through += 1;
             let pair = [3 * k as u32, 3 * k as u32 + 1];
-            let mut mine = contacts.iter().filter(|contact| contact.particles[..2] == pair && contact.weights[1] != 0.0);
+            let mut mine =
+                contacts.iter().filter(|contact| contact.particles[..2] == pair && contact.weights[1] != 0.0);
             assert!(
                 mine.any(|contact| V3::from(contact.normal).dot(&way) < 0.0 && (contact.weights[1] - x[0]).abs() < 1e-6),
                 "{k} went through at {x:?}"
@@ -138,7 +140,9 @@ fn any_number_of_threads_finds_the_same_bits() {
     let with = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| spin(1.0));
     let alone = with(1);
     assert!(alone.len() > 1000, "{}", alone.len());
-    assert!(alone.iter().all(|contact| contact.offset.is_finite() && (V3::from(contact.normal).norm() - 1.0).abs() < 1e-9));
+    assert!(
+        alone.iter().all(|contact| contact.offset.is_finite() && (V3::from(contact.normal).norm() - 1.0).abs() < 1e-9)
+    );
     assert_eq!(with(2), alone);
     assert_eq!(with(7), alone);
 }

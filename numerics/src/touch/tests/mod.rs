@@ -1,7 +1,7 @@
 //! Contacts worked by hand, then against all pairs, then bodies that rest and are rolled on.
 
-use super::*;
 use super::surface::Surface;
+use super::*;
 use crate::random::Key;
 
 mod bodies;
