@@ -120,7 +120,7 @@ impl Span {
         let [w, x, y, z] = fit(&spread);
         let (axis, length) = (V3::new(x, y, z), V3::new(x, y, z).norm());
         let angle = 2.0 * libm::atan2(length, w.abs());
-        if !(angle > 1e-15) {
+        if angle <= 1e-15 {
             return Self { middles, axis: V3::z(), angle: 0.0, radius: 0.0 };
         }
         let axis = axis * (w.signum() / length);

@@ -98,7 +98,7 @@ impl Obstacle {
     }
 
     pub(super) fn velocity_of(&self, share: f64, points: &[u32], weights: &[f64]) -> V3 {
-        if !(self.seconds > 0.0) {
+        if self.seconds <= 0.0 {
             return V3::zeros();
         }
         let sides = points.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);

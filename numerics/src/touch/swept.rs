@@ -33,7 +33,7 @@ impl<const N: usize> Elements<N> {
     /// Of elements that are about where they are in `pose`.
     pub(super) fn new(points: Vec<[u32; N]>, pose: Places<'_>) -> Self {
         // A triangle without area from the lowest to the highest corner of each, sorted by the tree of triangles.
-        let boxes: Vec<Cuboid> = pose.iter().map(|p| box_of(p)).collect();
+        let boxes: Vec<Cuboid> = pose.iter().map(box_of).collect();
         let corners: Vec<Vec3> =
             points.iter().map(|element| around(element, &boxes)).flat_map(|own| [own.low, own.high]).collect();
         let members: Vec<[u32; 3]> = (0..points.len() as u32).map(|k| [2 * k, 2 * k + 1, 2 * k]).collect();
@@ -81,7 +81,7 @@ fn bounds(boxes: &Boxes) -> Cuboid {
 
 /// The box of each point in all poses.
 pub(super) fn boxes(poses: &[Places<'_>]) -> Vec<Cuboid> {
-    let mut boxes: Vec<Cuboid> = poses[0].iter().map(|p| box_of(p)).collect();
+    let mut boxes: Vec<Cuboid> = poses[0].iter().map(box_of).collect();
     for pose in &poses[1..] {
         for (own, p) in boxes.iter_mut().zip(*pose) {
             *own = join(own, &box_of(p));

@@ -224,8 +224,8 @@ fn approaches(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> bool {
                 return true;
             }
             time += (distance - reach) / speed;
-            // No speed: infinitely late.
-            if !(time <= 1.0) {
+            // Without speed it is infinitely late.
+            if time > 1.0 || time.is_nan() {
                 decided = true;
                 break;
             }

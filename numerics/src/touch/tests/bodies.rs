@@ -5,8 +5,10 @@ use crate::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
 
 const FRAME: f64 = 1.0 / 24.0;
 
+type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
+
 /// A block of cubes of `side`, its lowest corner at `at`: particles, tetrahedra, and the surface facing outwards.
-fn block(cells: [u32; 3], side: f64, at: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>) {
+fn block(cells: [u32; 3], side: f64, at: [f64; 3]) -> Block {
     let counts = cells.map(|n| n + 1);
     let (mut points, mut tets) = (Vec::new(), Vec::new());
     for z in 0..counts[2] {
