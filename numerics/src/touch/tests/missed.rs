@@ -57,7 +57,7 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
                     n.dot(&(p + way)) - contact.offset > -1e-12 && n.dot(&V3::from(to[vertex])) - contact.offset < 0.0
                 };
                 // It may have come round a corner; then it is inside or past, and held at one side at least.
-                assert!(of[vertex].iter().any(|contact| holds(contact)), "{vertex} went through: {:?}", of[vertex]);
+                assert!(of[vertex].iter().any(holds), "{vertex} went through: {:?}", of[vertex]);
             } else if vertex % 50 == 0 {
                 let distance = |t: f64| {
                     let at = |face: &[u32; 3]| face.map(|corner| V3::from(points[corner as usize]));
