@@ -30,6 +30,7 @@ pub mod shield;
 pub mod simd;
 pub mod soft;
 pub mod tets;
+pub mod touch;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

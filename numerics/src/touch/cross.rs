@@ -1,0 +1,216 @@
+//! When four points that go straight are in one plane: roots of a cubic, each in its own monotone piece. 0 counts as above.
+//!
+//! Promise: every change of sign within the way is found, to rounding of the time. Limit: a plane touched and left again
+//! within rounding may be two or none.
+
+use super::V3;
+
+/// Up to three times in 0…1, rising, and whether the value was above 0 before.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Roots {
+    times: [f64; 3],
+    above: [bool; 3],
+    count: usize,
+}
+
+impl Roots {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, bool)> {
+        self.times.into_iter().zip(self.above).take(self.count)
+    }
+}
+
+/// What one direction says about two things that go straight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Apart {
+    /// Never as near as asked.
+    Far,
+    /// Near perhaps, never through each other.
+    Near,
+    /// Nothing.
+    Unknown,
+}
+
+/// What the normal of a triangle where it starts says, then the ways across its sides within its plane and across how the
+/// point passes them: its two sides and the way to the point from where they meet.
+#[inline]
+pub(super) fn face_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let normal = start[0].cross(&start[1]);
+    let said = face_along(&normal, start, end, reach);
+    if said == Apart::Unknown {
+        let pass = end[2] - start[2];
+        for side in [start[0], start[1], start[1] - start[0]] {
+            for axis in [normal.cross(&side), pass.cross(&side)] {
+                if face_along(&axis, start, end, reach) == Apart::Far {
+                    return Apart::Far;
+                }
+            }
+        }
+    }
+    said
+}
+
+/// What `axis` says of a point and a triangle.
+#[inline]
+fn face_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let range = |[b, c, p]: &[V3; 3]| {
+        let (one, two, way) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
+        (way + one.min(two).min(0.0), way + one.max(two).max(0.0))
+    };
+    let (first, last) = (range(start), range(end));
+    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+}
+
+/// What the normal of two edges where they start says, then the ways across each within the plane of both and across how
+/// they pass each other: both edges and the way from the first one's start to the second's.
+///
+/// Edges that stay parallel go through each other nowhere that their ends do not.
+#[inline]
+pub(super) fn edges_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    /// Sine within which edges are parallel.
+    const PARALLEL: f64 = 1e-9;
+    let normal = start[0].cross(&start[1]);
+    let said = edges_along(&normal, start, end, reach);
+    if said != Apart::Unknown {
+        return said;
+    }
+    let pass = end[2] - start[2];
+    let axes = [normal.cross(&start[0]), normal.cross(&start[1]), pass.cross(&start[0]), pass.cross(&start[1])];
+    if axes.iter().any(|axis| edges_along(axis, start, end, reach) == Apart::Far) {
+        return Apart::Far;
+    }
+    let parallel =
+        |[d, e, _]: &[V3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
+    if parallel(start) && parallel(end) { Apart::Near } else { Apart::Unknown }
+}
+
+/// What `axis` says of two edges.
+#[inline]
+fn edges_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+    let range = |[d, e, r]: &[V3; 3]| {
+        let (one, two, way) = (-axis.dot(d), axis.dot(e), axis.dot(r));
+        (way + one.min(0.0) + two.min(0.0), way + one.max(0.0) + two.max(0.0))
+    };
+    let (first, last) = (range(start), range(end));
+    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+}
+
+/// Of heights within `low` and `high` times the normal's length.
+#[inline]
+fn verdict(low: f64, high: f64, reach: f64, normal: &V3) -> Apart {
+    let nearest = low.max(-high);
+    let far = reach * (1.0 + 1e-9);
+    if nearest > 0.0 && nearest * nearest > far * far * normal.norm_squared() {
+        Apart::Far
+    } else if nearest > 0.0 {
+        Apart::Near
+    } else {
+        Apart::Unknown
+    }
+}
+
+fn det(a: &V3, b: &V3, c: &V3) -> f64 {
+    a.cross(b).dot(c)
+}
+
+/// When the determinant of three vectors that go straight from `start` to `end` changes its sign.
+#[inline]
+pub(super) fn sign_changes(start: &[V3; 3], end: &[V3; 3]) -> Roots {
+    let [a, b, c] = start;
+    let [p, q, r] = [end[0] - a, end[1] - b, end[2] - c];
+    let (ab, aq, pb, pq) = (a.cross(b), a.cross(&q), p.cross(b), p.cross(&q));
+    let c0 = ab.dot(c);
+    let c1 = ab.dot(&r) + (aq + pb).dot(c);
+    let c2 = (aq + pb).dot(&r) + pq.dot(c);
+    let c3 = pq.dot(&r);
+    let last = det(&end[0], &end[1], &end[2]);
+    // Of the Bernstein form, within whose values the cubic stays.
+    let held = [c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, last];
+    let mut roots = Roots::default();
+    if held.iter().all(|x| *x > 0.0) || held.iter().all(|x| *x < 0.0) {
+        return roots;
+    }
+    let value = |t: f64| if t >= 1.0 { last } else { c0 + t * (c1 + t * (c2 + t * c3)) };
+    let (turns, count) = turning_points(c1, c2, c3);
+    let mut from = (0.0, c0);
+    for to in turns[..count].iter().copied().chain([1.0]) {
+        let to = (to, value(to));
+        if (from.1 >= 0.0) != (to.1 >= 0.0) {
+            roots.times[roots.count] = root(&value, from, to);
+            roots.above[roots.count] = from.1 >= 0.0;
+            roots.count += 1;
+        }
+        from = to;
+    }
+    roots
+}
+
+/// Where c₁ + 2c₂t + 3c₃t² is 0 within 0…1, rising.
+fn turning_points(c1: f64, c2: f64, c3: f64) -> ([f64; 2], usize) {
+    let (mut out, mut count) = ([0.0; 2], 0);
+    let under = c2 * c2 - 3.0 * c1 * c3;
+    if under > 0.0 {
+        // The larger sum first, so that nothing cancels.
+        let sum = -(c2 + under.sqrt().copysign(c2));
+        for t in [sum / (3.0 * c3), c1 / sum] {
+            if t > 0.0 && t < 1.0 {
+                out[count] = t;
+                count += 1;
+            }
+        }
+    }
+    if count == 2 && out[0] > out[1] {
+        out.swap(0, 1);
+    }
+    (out, count)
+}
+
+/// Where a monotone function changes its sign between two arguments: the false position, halved where one end stays
+/// (Illinois), then halving.
+fn root(value: &impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
+    let above = low.1 >= 0.0;
+    let mut kept = 0;
+    for round in 0..100 {
+        if high.0 - low.0 <= 4.0 * f64::EPSILON * high.0 {
+            break;
+        }
+        let guess = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);
+        let middle = 0.5 * (low.0 + high.0);
+        let t = if round < 40 && guess > low.0 && guess < high.0 { guess } else { middle };
+        let now = value(t);
+        if (now >= 0.0) == above {
+            low = (t, now);
+            high.1 *= if kept == 1 { 0.5 } else { 1.0 };
+            kept = 1;
+        } else {
+            high = (t, now);
+            low.1 *= if kept == 2 { 0.5 } else { 1.0 };
+            kept = 2;
+        }
+    }
+    0.5 * (low.0 + high.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// When (t − a)(t − b)(t − c), as the determinant of a diagonal, changes its sign.
+    fn product(roots: [f64; 3]) -> Vec<(f64, bool)> {
+        let at = |t: f64| {
+            let [a, b, c] = roots.map(|root| t - root);
+            [V3::x() * a, V3::y() * b, V3::z() * c]
+        };
+        sign_changes(&at(0.0), &at(1.0)).iter().collect()
+    }
+
+    #[test]
+    fn a_product_of_three_changes_its_sign_at_each() {
+        let found = product([0.2, 0.5, 0.9]);
+        assert_eq!(found.len(), 3);
+        for ((t, above), (want, side)) in found.into_iter().zip([(0.2, false), (0.5, true), (0.9, false)]) {
+            assert!((t - want).abs() < 1e-14 && above == side, "{t} is not {want}");
+        }
+        assert_eq!(product([-1.0, 2.0, 3.0]).len(), 0);
+        assert_eq!(product([0.3, 7.0, -9.0]).len(), 1);
+    }
+}

@@ -1,0 +1,134 @@
+//! An edge on its way against an edge of another surface: whether they went through each other, how near they are.
+//!
+//! Two edges touch where each is what its own surface has nearest to the other. So a pair counts where the way from one
+//! to the other points out of both surfaces and away from the triangles beside the edges.
+
+use super::V3;
+use super::cross::{Apart, edges_apart, sign_changes};
+use super::near::along;
+use super::surface::{Edge, Moment, NONE, Surface};
+use super::vertex::{Moving, ON, Rules};
+
+/// Two edges that may touch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hit {
+    /// How far along the first and the second edge, from their first ends.
+    pub(super) shares: [f64; 2],
+    /// Unit, from the second to the first, at the end of the way.
+    pub(super) normal: V3,
+}
+
+/// Sine of the angle by which triangles beside edges that went through each other may lean over: more than a dent that
+/// an edge made in a flat surface.
+const LEAN_THROUGH: f64 = 0.5;
+/// As much for edges that are near.
+const LEAN_NEAR: f64 = 0.1;
+
+/// How `edge` and `other`, each of its surface, meet.
+pub(super) fn hit(first: &Moving<'_>, edge: &Edge, second: &Moving<'_>, other: &Edge, rules: &Rules) -> Option<Hit> {
+    let pair = Pair { first: *first, edge, second: *second, other };
+    let last = first.poses.len() - 1;
+    let mut far = true;
+    for piece in 0..last {
+        let ways = [pair.ways(piece), pair.ways(piece + 1)];
+        let apart = edges_apart(&ways[0], &ways[1], rules.reach);
+        far &= apart == Apart::Far;
+        if apart == Apart::Unknown
+            && let Some(hit) = pair.through(piece, &ways)
+        {
+            return Some(hit);
+        }
+    }
+    if far {
+        return None;
+    }
+    pair.near(last, rules.reach).or_else(|| pair.near(0, rules.reach))
+}
+
+struct Pair<'a> {
+    first: Moving<'a>,
+    edge: &'a Edge,
+    second: Moving<'a>,
+    other: &'a Edge,
+}
+
+impl Pair<'_> {
+    fn segments(&self, pose: usize) -> [[V3; 2]; 2] {
+        [
+            self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).place(end)),
+            self.other.ends.map(|end| Moment::of(self.second.poses[pose]).place(end)),
+        ]
+    }
+
+    /// Both edges and the way from the start of the first to that of the second.
+    #[inline]
+    fn ways(&self, pose: usize) -> [V3; 3] {
+        let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
+        let [p, q] = [V3::from(one[self.edge.ends[0] as usize]), V3::from(one[self.edge.ends[1] as usize])];
+        let [a, b] = [V3::from(two[self.other.ends[0] as usize]), V3::from(two[self.other.ends[1] as usize])];
+        [q - p, b - a, a - p]
+    }
+
+    /// Where they went through each other within a piece of the way.
+    fn through(&self, piece: usize, [start, end]: &[[V3; 3]; 2]) -> Option<Hit> {
+        for (t, above) in sign_changes(start, end).iter() {
+            let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
+            let size = d.norm().max(e.norm()).max(start[2].norm()).max(end[2].norm());
+            let [s, u] = along([V3::zeros(), d], [r, r + e]);
+            let side = if above { -1.0 } else { 1.0 };
+            let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
+            let time = piece as f64 + t;
+            if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
+                let [d, e, _] = self.ways(self.first.poses.len() - 1);
+                let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
+                // Turned that far they may have passed each other's direction: the way they met holds.
+                let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
+                return Some(Hit { shares: [s, u], normal });
+            }
+        }
+        None
+    }
+
+    /// How near they are at a pose, told for the last.
+    fn near(&self, pose: usize, reach: f64) -> Option<Hit> {
+        let inner = |share: f64| share > ON && share < 1.0 - ON;
+        let segments = self.segments(pose);
+        let shares = along(segments[0], segments[1]);
+        let away = between(segments, shares);
+        let distance = away.norm();
+        if !(distance <= reach && distance > 0.0 && shares.into_iter().all(inner)) {
+            return None;
+        }
+        let normal = away / distance;
+        if !self.faces(pose as f64, shares, normal, LEAN_NEAR) {
+            return None;
+        }
+        let last = between(self.segments(self.first.poses.len() - 1), shares);
+        let turned = last.try_normalize(0.0).filter(|last| last.dot(&normal) > 0.0);
+        Some(Hit { shares, normal: turned.unwrap_or(normal) })
+    }
+
+    /// Whether the second edge points out of its surface along `normal`, and the first against it.
+    fn faces(&self, time: f64, [s, u]: [f64; 2], normal: V3, lean: f64) -> bool {
+        is_ridge(self.second.surface, &self.second.moment(time), self.other, u, normal, lean)
+            && is_ridge(self.first.surface, &self.first.moment(time), self.edge, s, -normal, lean)
+    }
+}
+
+fn between([[p, q], [a, b]]: [[V3; 2]; 2], [s, u]: [f64; 2]) -> V3 {
+    p.lerp(&q, s) - a.lerp(&b, u)
+}
+
+/// Whether the triangles at an edge fall away from it, seen along `out`, and have that outside.
+fn is_ridge(surface: &Surface, at: &Moment<'_>, edge: &Edge, share: f64, out: V3, lean: f64) -> bool {
+    let point = at.place(edge.ends[0]).lerp(&at.place(edge.ends[1]), share);
+    let falls = |third: u32| {
+        let way = at.place(third) - point;
+        out.dot(&way) <= lean * way.norm()
+    };
+    if !edge.opposite.into_iter().all(|third| third == NONE || falls(third)) {
+        return false;
+    }
+    let outward = || edge.faces.into_iter().filter_map(|face| surface.normal(at, face)).sum::<V3>();
+    !surface.closed || outward().dot(&out) > 0.0
+}

@@ -1,0 +1,206 @@
+//! How an obstacle moves between the poses it is given: as the rigid body that fits best, and what is left of the way
+//! straight on, in its turning frame.
+//!
+//! Its middle goes straight, and it turns about it at an even pace by the rotation of least squares (Horn 1987). Promise:
+//! poses are met to the bit, and what turns as a whole keeps its size. Limit: between two poses it turns less than half
+//! a turn; a middle that swings goes by the chord.
+
+use super::V3;
+use nalgebra::{Matrix3, Matrix4};
+
+/// Positions at a share of the frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// 0 the frame's start, 1 its end.
+    pub share: f64,
+    /// Metres.
+    pub positions: Vec<[f64; 3]>,
+}
+
+/// Poses in time and how one becomes the next.
+#[derive(Clone, Debug)]
+pub(super) struct Motion {
+    poses: Vec<Pose>,
+    spans: Vec<Span>,
+}
+
+#[derive(Clone, Debug)]
+struct Span {
+    middles: [V3; 2],
+    axis: V3,
+    /// Radians.
+    angle: f64,
+    /// Of the point farthest from the axis, metres.
+    radius: f64,
+}
+
+impl Motion {
+    /// Of poses with rising shares and equally many finite points.
+    pub(super) fn new(poses: &[Pose]) -> Self {
+        let spans = poses.windows(2).map(|pair| Span::between(&pair[0].positions, &pair[1].positions)).collect();
+        Self { poses: poses.to_vec(), spans }
+    }
+
+    /// The span that a share is in, the earlier of two, and how far along it is.
+    fn span(&self, share: f64) -> Option<(usize, f64)> {
+        let last = self.spans.len().checked_sub(1)?;
+        let index = self.poses[1..].iter().position(|pose| share <= pose.share).unwrap_or(last);
+        let (from, to) = (self.poses[index].share, self.poses[index + 1].share);
+        Some((index, ((share - from) / (to - from)).clamp(0.0, 1.0)))
+    }
+
+    /// Where all points are.
+    pub(super) fn at(&self, share: f64) -> Vec<[f64; 3]> {
+        match self.span(share) {
+            None => self.poses[0].positions.clone(),
+            Some((index, 0.0)) => self.poses[index].positions.clone(),
+            Some((index, 1.0)) => self.poses[index + 1].positions.clone(),
+            Some((index, along)) => {
+                let span = &self.spans[index];
+                if span.is_still() {
+                    let ends = self.poses[index].positions.iter().zip(&self.poses[index + 1].positions);
+                    return ends.map(|(a, b)| V3::from(*a).lerp(&V3::from(*b), along).into()).collect();
+                }
+                let middle = span.middles[0].lerp(&span.middles[1], along);
+                let (turn, back) = (span.turn(along), span.turn(1.0).transpose());
+                let point = |(a, b): (&[f64; 3], &[f64; 3])| (middle + turn * span.arm(&back, a, b, along)).into();
+                self.poses[index].positions.iter().zip(&self.poses[index + 1].positions).map(point).collect()
+            }
+        }
+    }
+
+    /// How fast a point is, metres a frame; before the first pose and after the last it stands still.
+    pub(super) fn pace(&self, share: f64, point: u32) -> V3 {
+        let (first, last) = (self.poses[0].share, self.poses[self.poses.len() - 1].share);
+        let Some((index, along)) = self.span(share).filter(|_| first <= share && share <= last) else {
+            return V3::zeros();
+        };
+        let span = &self.spans[index];
+        let [from, to] = [index, index + 1].map(|pose| &self.poses[pose].positions[point as usize]);
+        let back = span.turn(1.0).transpose();
+        let turn = span.turn(along);
+        let left = back * (V3::from(*to) - span.middles[1]) - (V3::from(*from) - span.middles[0]);
+        let spun = span.axis.cross(&(turn * span.arm(&back, from, to, along))) * span.angle;
+        let way = span.middles[1] - span.middles[0] + spun + turn * left;
+        way / (self.poses[index + 1].share - self.poses[index].share)
+    }
+
+    /// Shares from one of `times` to the other, between which no point leaves the straight line by more than `allowed`.
+    pub(super) fn times(&self, times: [f64; 2], allowed: f64) -> Vec<f64> {
+        /// Pieces a span is cut into, at most.
+        const MOST: f64 = 16.0;
+        let mut out = vec![times[0]];
+        for (span, pair) in self.spans.iter().zip(self.poses.windows(2)) {
+            let (from, to) = (pair[0].share.max(times[0]), pair[1].share.min(times[1]));
+            if to > from {
+                let angle = span.angle * (to - from) / (pair[1].share - pair[0].share);
+                let sag = span.radius * angle * angle / 8.0;
+                let pieces = if sag > 0.0 { (sag / allowed).sqrt().ceil().clamp(1.0, MOST) } else { 1.0 };
+                out.extend((1..=pieces as u32).map(|piece| from + (to - from) * (f64::from(piece) / pieces)));
+            }
+        }
+        out.retain(|time| *time < times[1]);
+        out.push(times[1]);
+        out.dedup();
+        if out.len() == 1 {
+            out.push(times[1]);
+        }
+        out
+    }
+}
+
+impl Span {
+    fn between(from: &[[f64; 3]], to: &[[f64; 3]]) -> Self {
+        let mean = |points: &[[f64; 3]]| points.iter().map(|p| V3::from(*p)).sum::<V3>() / (points.len().max(1) as f64);
+        let middles = [mean(from), mean(to)];
+        let mut spread = Matrix3::zeros();
+        for (a, b) in from.iter().zip(to) {
+            spread += (V3::from(*a) - middles[0]) * (V3::from(*b) - middles[1]).transpose();
+        }
+        let [w, x, y, z] = fit(&spread);
+        let (axis, length) = (V3::new(x, y, z), V3::new(x, y, z).norm());
+        let angle = 2.0 * libm::atan2(length, w.abs());
+        if angle <= 1e-15 {
+            return Self { middles, axis: V3::z(), angle: 0.0, radius: 0.0 };
+        }
+        let axis = axis * (w.signum() / length);
+        let radius = from.iter().map(|a| axis.cross(&(V3::from(*a) - middles[0])).norm()).fold(0.0, f64::max);
+        Self { middles, axis, angle, radius }
+    }
+
+    fn is_still(&self) -> bool {
+        self.angle == 0.0
+    }
+
+    /// The turn after a share of the span (Rodrigues).
+    fn turn(&self, along: f64) -> Matrix3<f64> {
+        let (sine, cosine) = libm::sincos(self.angle * along);
+        let cross = self.axis.cross_matrix();
+        Matrix3::identity() + cross * sine + cross * cross * (1.0 - cosine)
+    }
+
+    /// A point about the middle, not turned yet.
+    fn arm(&self, back: &Matrix3<f64>, from: &[f64; 3], to: &[f64; 3], along: f64) -> V3 {
+        (V3::from(*from) - self.middles[0]).lerp(&(back * (V3::from(*to) - self.middles[1])), along)
+    }
+}
+
+/// The quaternion (cosine first) of the rotation that brings the first points of a spread Σ a bᵀ nearest to the second:
+/// the first eigenvector of Horn's matrix, by Jacobi's rotations; no turn where every one does as well.
+fn fit(spread: &Matrix3<f64>) -> [f64; 4] {
+    /// Share of the spread by which no turn is preferred: above rounding of what has no width.
+    const CALM: f64 = 1e-13;
+    /// Sweeps; each squares what is off the diagonal.
+    const SWEEPS: usize = 12;
+    let s = spread;
+    let (xx, yy, zz) = (s[(0, 0)], s[(1, 1)], s[(2, 2)]);
+    let (yz, zx, xy) = (s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
+    let (pyz, pzx, pxy) = (s[(1, 2)] + s[(2, 1)], s[(2, 0)] + s[(0, 2)], s[(0, 1)] + s[(1, 0)]);
+    let mut m = Matrix4::new(
+        xx + yy + zz + CALM * s.norm(),
+        yz,
+        zx,
+        xy,
+        yz,
+        xx - yy - zz,
+        pxy,
+        pzx,
+        zx,
+        pxy,
+        yy - xx - zz,
+        pyz,
+        xy,
+        pzx,
+        pyz,
+        zz - xx - yy,
+    );
+    let mut vectors = Matrix4::identity();
+    for _ in 0..SWEEPS {
+        for p in 0..3 {
+            for q in p + 1..4 {
+                if m[(p, q)] == 0.0 {
+                    continue;
+                }
+                let theta = (m[(q, q)] - m[(p, p)]) / (2.0 * m[(p, q)]);
+                let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+                let sine = tangent * cosine;
+                for k in 0..4 {
+                    let (a, b) = (m[(k, p)], m[(k, q)]);
+                    (m[(k, p)], m[(k, q)]) = (cosine * a - sine * b, sine * a + cosine * b);
+                }
+                for k in 0..4 {
+                    let (a, b) = (m[(p, k)], m[(q, k)]);
+                    (m[(p, k)], m[(q, k)]) = (cosine * a - sine * b, sine * a + cosine * b);
+                }
+                for k in 0..4 {
+                    let (a, b) = (vectors[(k, p)], vectors[(k, q)]);
+                    (vectors[(k, p)], vectors[(k, q)]) = (cosine * a - sine * b, sine * a + cosine * b);
+                }
+            }
+        }
+    }
+    let best = (1..4).fold(0, |best, k| if m[(k, k)] > m[(best, best)] { k } else { best });
+    let quaternion: [f64; 4] = [0, 1, 2, 3].map(|k| vectors[(k, best)]);
+    if quaternion.iter().all(|x| x.is_finite()) { quaternion } else { [1.0, 0.0, 0.0, 0.0] }
+}

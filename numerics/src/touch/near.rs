@@ -1,0 +1,151 @@
+//! Nearest points of triangles and segments, f64.
+
+use super::V3;
+use super::surface::Feature;
+
+/// The nearest point of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    pub(super) face: u32,
+    /// Of the corners, ≥ 0, together 1; exactly 0 off a side or corner.
+    pub(super) weights: [f64; 3],
+    pub(super) point: V3,
+    pub(super) distance: f64,
+}
+
+impl Nearest {
+    /// Of `face` with these corners, to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+    #[inline]
+    pub(super) fn on(face: u32, p: V3, corners: [V3; 3]) -> Self {
+        let weights = weights(p, corners);
+        let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        Self { face, weights, point, distance: (p - point).norm() }
+    }
+
+    pub(super) fn feature(&self) -> Feature {
+        match self.weights.map(|weight| weight > 0.0) {
+            [true, true, true] => Feature::Inside,
+            [false, true, true] => Feature::Side(0),
+            [true, false, true] => Feature::Side(1),
+            [true, true, false] => Feature::Side(2),
+            [true, _, _] => Feature::Corner(0),
+            [_, true, _] => Feature::Corner(1),
+            _ => Feature::Corner(2),
+        }
+    }
+}
+
+fn share(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+#[inline]
+fn weights(p: V3, [a, b, c]: [V3; 3]) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let v = share(d1, d1 - d3);
+        return [1.0 - v, v, 0.0];
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let w = share(d2, d2 - d6);
+        return [1.0 - w, 0.0, w];
+    }
+    let va = d3 * d6 - d5 * d4;
+    let (on_b, on_c) = (d4 - d3, d5 - d6);
+    if va <= 0.0 && on_b >= 0.0 && on_c >= 0.0 {
+        let w = share(on_b, on_b + on_c);
+        return [0.0, 1.0 - w, w];
+    }
+    let sum = va + vb + vc;
+    let (v, w) = (share(vb, sum), share(vc, sum));
+    [(1.0 - v - w).max(0.0), v, w]
+}
+
+/// Weights of the corners where `p` falls on a triangle's plane; negative beyond a side.
+pub(super) fn projected(p: V3, [a, b, c]: [V3; 3], normal: V3) -> [f64; 3] {
+    let area = (b - a).cross(&(c - a)).dot(&normal);
+    let v = (p - a).cross(&(c - a)).dot(&normal) / area;
+    let w = (b - a).cross(&(p - a)).dot(&normal) / area;
+    [1.0 - v - w, v, w]
+}
+
+/// How far along two segments their nearest points are, 0…1 (Ericson, 5.1.9).
+pub(super) fn along([p, q]: [V3; 2], [a, b]: [V3; 2]) -> [f64; 2] {
+    let (d, e, r) = (q - p, b - a, p - a);
+    let (dd, ee, er) = (d.norm_squared(), e.norm_squared(), e.dot(&r));
+    let dr = d.dot(&r);
+    let de = d.dot(&e);
+    let under = dd * ee - de * de;
+    let mut s = if under > 1e-24 * dd * ee { share_signed(de * er - dr * ee, under) } else { 0.0 };
+    let mut t = share_signed(de * s + er, ee);
+    let free = if ee > 0.0 { (de * s + er) / ee } else { 0.0 };
+    if free < 0.0 {
+        (s, t) = (share_signed(-dr, dd), 0.0);
+    } else if free > 1.0 {
+        (s, t) = (share_signed(de - dr, dd), 1.0);
+    }
+    [s, t]
+}
+
+fn share_signed(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Key;
+
+    fn random(seed: u64, k: u64) -> V3 {
+        let key = Key::new(seed).of(k);
+        V3::new(key.of(0).f64(), key.of(1).f64(), key.of(2).f64())
+    }
+
+    #[test]
+    fn nearest_points_beat_a_thousand_others() {
+        for case in 0..300 {
+            let corners = [0, 1, 2].map(|k| random(1, 4 * case + k));
+            let p = random(1, 4 * case + 3) * 3.0 - V3::repeat(1.0);
+            let best = Nearest::on(0, p, corners);
+            assert!((best.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            for k in 0..400 {
+                let [u, v] = [random(2, k).x, random(2, k).y];
+                let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+                let q = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
+                assert!(best.distance <= (p - q).norm() + 1e-12);
+            }
+            let others = [p, random(3, case)];
+            let [s, t] = along([corners[0], corners[1]], others);
+            let gap = |s: f64, t: f64| (corners[0].lerp(&corners[1], s) - others[0].lerp(&others[1], t)).norm();
+            for k in 0..400 {
+                assert!(gap(s, t) <= gap(random(2, k).x, random(2, k).y) + 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_of_no_area_or_length_is_divided_by() {
+        let p = V3::new(1.0, 2.0, 3.0);
+        for corners in [[V3::zeros(); 3], [V3::zeros(), V3::x(), V3::x()], [V3::zeros(), V3::x(), V3::x() * 2.0]] {
+            assert!(Nearest::on(0, p, corners).distance.is_finite());
+        }
+        assert_eq!(along([p, p], [p, p]), [0.0, 0.0]);
+        assert!(along([p, p * 2.0], [p, p * 2.0]).iter().all(|x| x.is_finite()));
+    }
+}

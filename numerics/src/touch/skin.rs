@@ -1,0 +1,100 @@
+//! The surface of a body: its triangles by particle, and what of it is too near by nature to count as touching.
+
+use super::TouchError;
+use super::near::{Nearest, along};
+use super::obstacle::{check_points, check_triangles};
+use super::surface::{Moment, Surface};
+use super::swept::Elements;
+
+/// A surface of particles, facing outwards.
+#[derive(Clone, Debug)]
+pub struct Skin {
+    pub(super) surface: Surface,
+    pub(super) faces: Elements<3>,
+    pub(super) edges: Elements<2>,
+    rest: Vec<[f64; 3]>,
+    /// Particles of the surface within two links of each particle, rising.
+    starts: Vec<u32>,
+    rings: Vec<u32>,
+}
+
+impl Skin {
+    /// Of `triangles` of particles, which are at `rest` where nothing acts; `links` are the springs of the body, which
+    /// say who is whose neighbour beside the triangles' own sides.
+    ///
+    /// # Errors
+    /// Where a triangle or link names no particle, or a coordinate is not finite.
+    pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, TouchError> {
+        check_triangles(rest.len(), triangles)?;
+        check_points(rest)?;
+        if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= rest.len())) {
+            return Err(TouchError::Link { index, ends: links[index], count: rest.len() });
+        }
+        let surface = Surface::new(rest.len(), triangles);
+        let (starts, rings) = rings(&surface, rest.len(), links);
+        Ok(Self {
+            faces: Elements::new(surface.triangles.clone(), rest),
+            edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
+            rest: rest.to_vec(),
+            surface,
+            starts,
+            rings,
+        })
+    }
+
+    /// Particles, those within the body too.
+    pub(super) fn particles(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// The surface's particles within two links of one of them, itself too.
+    pub(super) fn around(&self, particle: u32) -> &[u32] {
+        &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
+    }
+
+    /// How far a particle is from a triangle at rest, metres.
+    pub(super) fn rest_to_face(&self, particle: u32, face: u32) -> f64 {
+        let at = Moment::of(&self.rest);
+        Nearest::on(face, at.place(particle), self.surface.corners(&at, face)).distance
+    }
+
+    /// How far two edges are apart at rest, metres.
+    pub(super) fn rest_between(&self, edge: u32, other: u32) -> f64 {
+        let at = Moment::of(&self.rest);
+        let [[p, q], [a, b]] =
+            [edge, other].map(|edge| self.surface.edges[edge as usize].ends.map(|end| at.place(end)));
+        let [s, t] = along([p, q], [a, b]);
+        (p.lerp(&q, s) - a.lerp(&b, t)).norm()
+    }
+}
+
+/// Lists of the surface's particles within two links of each of them.
+fn rings(surface: &Surface, count: usize, links: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
+    let mut pairs: Vec<[u32; 2]> = links.iter().copied().chain(surface.edges.iter().map(|edge| edge.ends)).collect();
+    pairs.extend(pairs.clone().into_iter().map(|[a, b]| [b, a]));
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut first = vec![0; count + 1];
+    for pair in &pairs {
+        first[pair[0] as usize + 1] += 1;
+    }
+    for particle in 0..count {
+        first[particle + 1] += first[particle];
+    }
+    let near = |particle: u32| pairs[first[particle as usize]..first[particle as usize + 1]].iter().map(|pair| pair[1]);
+    let mut outer = vec![false; count];
+    surface.vertices.iter().for_each(|vertex| outer[*vertex as usize] = true);
+    let (mut starts, mut rings) = (vec![0], Vec::new());
+    for particle in 0..count as u32 {
+        if outer[particle as usize] {
+            let mut ring: Vec<u32> = near(particle).flat_map(|next| near(next).chain([next])).collect();
+            ring.push(particle);
+            ring.retain(|other| outer[*other as usize]);
+            ring.sort_unstable();
+            ring.dedup();
+            rings.extend(ring);
+        }
+        starts.push(rings.len() as u32);
+    }
+    (starts, rings)
+}

@@ -1,0 +1,238 @@
+//! What hangs together in a surface of triangles: edges, neighbours, and which way is out.
+//!
+//! Positions are given at each call, so that one surface serves every pose. An edge with more than two triangles keeps
+//! the first two.
+
+use super::V3;
+use super::near::Nearest;
+
+/// No triangle.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Triangles and what joins them; a triangle that names a point twice has no part in it.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) edges: Vec<Edge>,
+    /// The edges of each triangle, from its corner k to k + 1.
+    sides: Vec<[u32; 3]>,
+    /// Edges at each point.
+    starts: Vec<u32>,
+    around: Vec<u32>,
+    /// The points that triangles have, rising.
+    pub(super) vertices: Vec<u32>,
+    /// Whether every edge has two triangles, which agree on what is out.
+    pub(super) closed: bool,
+}
+
+/// Where two triangles meet, or one ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Edge {
+    pub(super) ends: [u32; 2],
+    /// [`NONE`] for the second where there is one.
+    pub(super) faces: [u32; 2],
+    /// Their third corners.
+    pub(super) opposite: [u32; 2],
+}
+
+/// Positions of points, metres.
+pub(super) type Places<'a> = &'a [[f64; 3]];
+
+/// Positions somewhere on the straight way from one pose to another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment<'a> {
+    pub(super) from: Places<'a>,
+    pub(super) to: Places<'a>,
+    /// Of the way.
+    pub(super) share: f64,
+}
+
+impl<'a> Moment<'a> {
+    /// A pose itself.
+    pub(super) fn of(pose: Places<'a>) -> Self {
+        Self { from: pose, to: pose, share: 1.0 }
+    }
+
+    /// Where a point is.
+    #[inline(always)]
+    pub(super) fn place(&self, point: u32) -> V3 {
+        let to = V3::from(self.to[point as usize]);
+        if self.share >= 1.0 { to } else { V3::from(self.from[point as usize]).lerp(&to, self.share) }
+    }
+}
+
+impl Surface {
+    /// Of `triangles` of `points` points, all of which exist.
+    pub(super) fn new(points: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut halves: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(3 * triangles.len());
+        for (face, corners) in (0u32..).zip(triangles).filter(|(_, [a, b, c])| a != b && b != c && c != a) {
+            for k in 0..3u32 {
+                let (from, to) = (corners[k as usize], corners[(k as usize + 1) % 3]);
+                halves.push(([from.min(to), from.max(to)], face, k));
+            }
+        }
+        halves.sort_unstable();
+        let mut surface = Self {
+            triangles: triangles.to_vec(),
+            edges: Vec::with_capacity(halves.len() / 2),
+            sides: vec![[NONE; 3]; triangles.len()],
+            starts: vec![0; points + 1],
+            around: Vec::new(),
+            vertices: Vec::new(),
+            closed: !halves.is_empty(),
+        };
+        for group in halves.chunk_by(|a, b| a.0 == b.0) {
+            let index = surface.edges.len() as u32;
+            let mut edge = Edge { ends: group[0].0, faces: [NONE; 2], opposite: [NONE; 2] };
+            for (slot, (_, face, k)) in group.iter().take(2).enumerate() {
+                edge.faces[slot] = *face;
+                edge.opposite[slot] = triangles[*face as usize][(*k as usize + 2) % 3];
+            }
+            for (_, face, k) in group {
+                surface.sides[*face as usize][*k as usize] = index;
+            }
+            let forwards = group.iter().filter(|half| triangles[half.1 as usize][half.2 as usize] == edge.ends[0]);
+            surface.closed &= group.len() == 2 && forwards.count() == 1;
+            surface.edges.push(edge);
+        }
+        surface.gather_edges(points);
+        surface
+    }
+
+    fn gather_edges(&mut self, points: usize) {
+        let ends = || self.edges.iter().flat_map(|edge| edge.ends);
+        for end in ends() {
+            self.starts[end as usize + 1] += 1;
+        }
+        self.vertices = (0..points as u32).filter(|point| self.starts[*point as usize + 1] > 0).collect();
+        for point in 0..points {
+            self.starts[point + 1] += self.starts[point];
+        }
+        let mut next = self.starts.clone();
+        let mut around = vec![0; 2 * self.edges.len()];
+        for (index, end) in ends().enumerate() {
+            around[next[end as usize] as usize] = (index / 2) as u32;
+            next[end as usize] += 1;
+        }
+        self.around = around;
+    }
+
+    /// The edges at a point.
+    pub(super) fn edges_at(&self, point: u32) -> impl Iterator<Item = &Edge> {
+        let range = self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize;
+        self.around[range].iter().map(|edge| &self.edges[*edge as usize])
+    }
+
+    #[inline]
+    pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [V3; 3] {
+        let [a, b, c] = self.triangles[face as usize];
+        [at.place(a), at.place(b), at.place(c)]
+    }
+
+    /// Unit; none where there is no area.
+    pub(super) fn normal(&self, at: &Moment<'_>, face: u32) -> Option<V3> {
+        let [a, b, c] = self.corners(at, face);
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(&ac);
+        let length = normal.norm();
+        (length > 1e-12 * ab.norm() * ac.norm()).then(|| normal / length)
+    }
+
+    /// The triangle across the side that faces corner `k`.
+    pub(super) fn across(&self, face: u32, k: usize) -> Option<u32> {
+        let edge = *self.edges.get(self.sides[face as usize][(k + 1) % 3] as usize)?;
+        edge.faces.into_iter().find(|other| *other != face && *other != NONE)
+    }
+
+    /// Which way is out at a point of a triangle: the angle-weighted mean of the triangles there (Bærentzen & Aanæs
+    /// 2005), so that its side is that of any point to which this one is the nearest.
+    pub(super) fn outward(&self, at: &Moment<'_>, nearest: &Nearest) -> V3 {
+        let corners = self.triangles[nearest.face as usize];
+        let normal = |face: u32| if face == NONE { V3::zeros() } else { self.normal(at, face).unwrap_or_default() };
+        match nearest.feature() {
+            Feature::Inside => normal(nearest.face),
+            Feature::Side(k) => match self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize) {
+                Some(edge) => normal(edge.faces[0]) + normal(edge.faces[1]),
+                None => V3::zeros(),
+            },
+            Feature::Corner(k) => {
+                let here = at.place(corners[k]);
+                let mut sum = V3::zeros();
+                for edge in self.edges_at(corners[k]) {
+                    let other = if edge.ends[0] == corners[k] { edge.ends[1] } else { edge.ends[0] };
+                    let along = at.place(other) - here;
+                    for (face, third) in edge.faces.into_iter().zip(edge.opposite).filter(|(face, _)| *face != NONE) {
+                        let side = at.place(third) - here;
+                        sum += normal(face) * libm::atan2(along.cross(&side).norm(), along.dot(&side));
+                    }
+                }
+                sum
+            }
+        }
+    }
+
+    /// Whether no triangle around is nearer than `nearest` to a point that is `away` from it.
+    pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &Nearest, away: &V3) -> bool {
+        /// Sine of the angle by which it may lie on a neighbour's side: above rounding, below any real one.
+        const SLACK: f64 = 1e-9;
+        let corners = self.triangles[nearest.face as usize];
+        let length = away.norm();
+        let behind = |to: u32| {
+            let way = at.place(to) - nearest.point;
+            away.dot(&way) <= SLACK * length * way.norm()
+        };
+        match nearest.feature() {
+            Feature::Inside => true,
+            Feature::Side(k) => {
+                let edge = self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize);
+                edge.is_none_or(|edge| edge.opposite.into_iter().all(|third| third == NONE || behind(third)))
+            }
+            Feature::Corner(k) => {
+                self.edges_at(corners[k]).all(|edge| edge.ends.into_iter().all(|end| end == corners[k] || behind(end)))
+            }
+        }
+    }
+
+    /// Goes from triangle to triangle, over edges that bend little, to one that has `point` above or below it: the plane
+    /// that is the surface for a point that slid on from where it came through.
+    pub(super) fn settle(&self, at: &Moment<'_>, face: u32, point: V3) -> Settled {
+        /// Triangles passed, at most.
+        const MOST: usize = 64;
+        /// Cosine of the angle at an edge beyond which the other triangle is another side.
+        const BEND: f64 = 0.5;
+        let (mut face, mut before) = (face, NONE);
+        let mut normal = self.normal(at, face);
+        for _ in 0..MOST {
+            let Some(here) = normal else { break };
+            let weights = super::near::projected(point, self.corners(at, face), here);
+            let mut sides = [0, 1, 2];
+            sides.sort_by(|a, b| weights[*a].total_cmp(&weights[*b]));
+            let outside = sides.into_iter().filter(|k| weights[*k] < 0.0);
+            let next = outside.filter_map(|k| self.across(face, k)).find_map(|next| {
+                let there = self.normal(at, next)?;
+                (next != before && there.dot(&here) >= BEND).then_some((next, there))
+            });
+            let Some((next, there)) = next else { break };
+            (before, face, normal) = (face, next, Some(there));
+        }
+        Settled { nearest: Nearest::on(face, point, self.corners(at, face)), normal }
+    }
+}
+
+/// Where [`Surface::settle`] came to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Settled {
+    pub(super) nearest: Nearest,
+    pub(super) normal: Option<V3>,
+}
+
+/// Which part of a triangle a point of it is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Feature {
+    /// Within.
+    Inside,
+    /// On the side that faces this corner.
+    Side(usize),
+    /// On this corner.
+    Corner(usize),
+}

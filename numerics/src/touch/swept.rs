@@ -1,0 +1,184 @@
+//! Boxes around what moves, in a tree sixteen wide, f32, rounded outwards: nothing that may meet is left out.
+
+use super::surface::Places;
+use crate::lanes::{F32x16, LANES, set};
+use crate::simd::{Path, kernel};
+use crate::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
+use crate::vec3::Vec3;
+
+/// Levels that 2³² elements need, at most.
+const MOST_LEVELS: usize = 8;
+
+/// Elements of N points each, sixteen that are near each other side by side.
+#[derive(Clone, Debug)]
+pub(super) struct Elements<const N: usize> {
+    points: Vec<[u32; N]>,
+    /// Which element each lane is; [`NONE`] for none.
+    order: Vec<[u32; LANES]>,
+}
+
+/// Their boxes on some way; of the box on lane l of row r the children are the row 16r + l one level down.
+#[derive(Clone, Debug)]
+pub(super) struct BoxTree<'a> {
+    order: &'a [[u32; LANES]],
+    levels: Vec<Vec<Boxes>>,
+    /// Around all.
+    pub(super) bounds: Cuboid,
+}
+
+/// Meets nothing.
+const NOWHERE: Cuboid = Cuboid { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+impl<const N: usize> Elements<N> {
+    /// Of elements that are about where they are in `pose`.
+    pub(super) fn new(points: Vec<[u32; N]>, pose: Places<'_>) -> Self {
+        // A triangle without area from the lowest to the highest corner of each, sorted by the tree of triangles.
+        let boxes: Vec<Cuboid> = pose.iter().map(box_of).collect();
+        let corners: Vec<Vec3> =
+            points.iter().map(|element| around(element, &boxes)).flat_map(|own| [own.low, own.high]).collect();
+        let members: Vec<[u32; 3]> = (0..points.len() as u32).map(|k| [2 * k, 2 * k + 1, 2 * k]).collect();
+        let tree = TriangleTree::build(&corners, &members);
+        Self { order: tree.blocks().iter().map(|block| block.triangle).collect(), points }
+    }
+
+    /// Their boxes around the boxes of their points, wider by `reach`.
+    pub(super) fn sweep(&self, boxes: &[Cuboid], reach: f64) -> BoxTree<'_> {
+        let own = |element: u32| wider(&around(&self.points[element as usize], boxes), reach);
+        let leaf =
+            |lanes: &[u32; LANES]| row(lanes.iter().map(|lane| if *lane == NONE { NOWHERE } else { own(*lane) }));
+        let mut levels: Vec<Vec<Boxes>> = vec![self.order.iter().map(leaf).collect()];
+        while levels[levels.len() - 1].len() > 1 {
+            let below = &levels[levels.len() - 1];
+            let next = below.chunks(LANES).map(|rows| row(rows.iter().map(bounds))).collect();
+            levels.push(next);
+        }
+        let bounds = levels[levels.len() - 1].first().map_or(NOWHERE, bounds);
+        BoxTree { order: &self.order, levels, bounds }
+    }
+}
+
+/// Up to sixteen boxes side by side; those of NaN are nowhere.
+fn row(boxes: impl Iterator<Item = Cuboid>) -> Boxes {
+    let mut out = Boxes { low: NOWHERE.low.map(F32x16::splat), high: NOWHERE.high.map(F32x16::splat) };
+    for (lane, own) in boxes.enumerate().filter(|own| !own.1.low[0].is_nan()) {
+        set(&mut out.low, lane, own.low);
+        set(&mut out.high, lane, own.high);
+    }
+    out
+}
+
+/// The box around sixteen.
+fn bounds(boxes: &Boxes) -> Cuboid {
+    let mut out = NOWHERE;
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            out.low[axis] = out.low[axis].min(boxes.low[axis].0[lane]);
+            out.high[axis] = out.high[axis].max(boxes.high[axis].0[lane]);
+        }
+    }
+    out
+}
+
+/// The box of each point in all poses.
+pub(super) fn boxes(poses: &[Places<'_>]) -> Vec<Cuboid> {
+    let mut boxes: Vec<Cuboid> = poses[0].iter().map(box_of).collect();
+    for pose in &poses[1..] {
+        for (own, p) in boxes.iter_mut().zip(*pose) {
+            *own = join(own, &box_of(p));
+        }
+    }
+    boxes
+}
+
+/// The box of NaN, which meets nothing, where a point is not finite.
+fn box_of(p: &[f64; 3]) -> Cuboid {
+    if !(p[0] + p[1] + p[2]).is_finite() {
+        return Cuboid { low: [f32::NAN; 3], high: [f32::NAN; 3] };
+    }
+    Cuboid { low: [below(p[0]), below(p[1]), below(p[2])], high: [-below(-p[0]), -below(-p[1]), -below(-p[2])] }
+}
+
+/// The box around two; of NaN where one is.
+#[inline(always)]
+fn join(a: &Cuboid, b: &Cuboid) -> Cuboid {
+    if b.low[0].is_nan() {
+        return *b;
+    }
+    let mut out = *a;
+    for axis in 0..3 {
+        out.low[axis] = if b.low[axis] < a.low[axis] { b.low[axis] } else { a.low[axis] };
+        out.high[axis] = if b.high[axis] > a.high[axis] { b.high[axis] } else { a.high[axis] };
+    }
+    out
+}
+
+/// The box around the boxes of some points.
+#[inline]
+pub(super) fn around(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
+    let first = boxes[points[0] as usize];
+    points[1..].iter().fold(first, |all, point| join(&all, &boxes[*point as usize]))
+}
+
+/// A box wider by `reach` on every side.
+#[inline]
+pub(super) fn wider(a: &Cuboid, reach: f64) -> Cuboid {
+    let mut out = *a;
+    for axis in 0..3 {
+        out.low[axis] = below(f64::from(a.low[axis]) - reach);
+        out.high[axis] = -below(-(f64::from(a.high[axis]) + reach));
+    }
+    out
+}
+
+/// The largest f32 that is not above.
+fn below(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x { near.next_down() } else { near }
+}
+
+/// Whether two boxes have a point in common.
+pub(super) fn meet(a: &Cuboid, b: &Cuboid) -> bool {
+    (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
+}
+
+impl BoxTree<'_> {
+    /// Elements whose boxes meet `region`, rising.
+    pub(super) fn meeting(&self, region: &Cuboid, out: &mut Vec<u32>) {
+        out.clear();
+        if meet(region, &self.bounds) {
+            gather(Path::chosen(), self, region, out);
+            out.sort_unstable();
+        }
+    }
+}
+
+kernel! {
+    fn gather(tree: &BoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) = gather_on;
+}
+
+#[inline(always)]
+fn gather_on(tree: &BoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) {
+    let top = tree.levels.len() - 1;
+    let (mut rows, mut lanes) = ([0; MOST_LEVELS], [0u16; MOST_LEVELS]);
+    let mut level = top;
+    lanes[top] = region.meeting(&tree.levels[top][0]);
+    loop {
+        if lanes[level] == 0 {
+            if level == top {
+                return;
+            }
+            level += 1;
+            continue;
+        }
+        let lane = lanes[level].trailing_zeros() as usize;
+        lanes[level] &= lanes[level] - 1;
+        if level > 0 {
+            let row = rows[level] * LANES + lane;
+            level -= 1;
+            rows[level] = row;
+            lanes[level] = region.meeting(&tree.levels[level][row]);
+        } else {
+            out.push(tree.order[rows[0]][lane]);
+        }
+    }
+}

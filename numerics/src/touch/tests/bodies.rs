@@ -1,0 +1,157 @@
+//! Bodies under the solver: what rests, and what is rolled over.
+
+use super::*;
+use crate::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+
+const FRAME: f64 = 1.0 / 24.0;
+
+type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
+
+/// A block of cubes of `side`, its lowest corner at `at`: particles, tetrahedra, and the surface facing outwards.
+fn block(cells: [u32; 3], side: f64, at: [f64; 3]) -> Block {
+    let counts = cells.map(|n| n + 1);
+    let (mut points, mut tets) = (Vec::new(), Vec::new());
+    for z in 0..counts[2] {
+        for y in 0..counts[1] {
+            points.extend((0..counts[0]).map(|x| [0, 1, 2].map(|axis| at[axis] + side * f64::from([x, y, z][axis]))));
+        }
+    }
+    for z in 0..cells[2] {
+        for y in 0..cells[1] {
+            for x in 0..cells[0] {
+                let corner =
+                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
+                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    tets.push([corner(0), corner(a), corner(b), corner(7)]);
+                }
+            }
+        }
+    }
+    let place = |corner: u32| V3::from(points[corner as usize]);
+    let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::new();
+    for [a, b, c, d] in &tets {
+        for ([p, q, r], inner) in [([*a, *b, *c], *d), ([*a, *b, *d], *c), ([*a, *c, *d], *b), ([*b, *c, *d], *a)] {
+            let up = (place(q) - place(p)).cross(&(place(r) - place(p))).dot(&(place(inner) - place(p))) < 0.0;
+            let face = if up { [p, q, r] } else { [p, r, q] };
+            let mut key = face;
+            key.sort_unstable();
+            faces.push((key, face));
+        }
+    }
+    faces.sort_unstable();
+    let outer = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1).map(|group| group[0].1).collect();
+    (points, tets, outer)
+}
+
+fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> Body {
+    let plain = |value| Scaled { value, mask: None };
+    let material = Material { density: plain(1000.0), stiffness: plain(stiffness), damping: plain(0.02) };
+    Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, &[]).unwrap()
+}
+
+#[test]
+fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
+    let thickness = 2e-3;
+    let (points, tets, faces) = block([3, 3, 3], 0.1, [0.03, 0.9 * thickness, 0.05]);
+    let body = body(&points, &tets, 5e4);
+    // Of 8 × 8 squares, askew to the block's own.
+    let mut plate = Vec::new();
+    for z in 0..9 {
+        plate.extend((0..9).map(|x| [0.113 * f64::from(x) - 0.3, 0.0, 0.107 * f64::from(z) - 0.3]));
+    }
+    let squares = (0..64u32).map(|k| (k % 8) + 9 * (k / 8));
+    let triangles: Vec<[u32; 3]> = squares.flat_map(|a| [[a, a + 9, a + 10], [a, a + 10, a + 1]]).collect();
+    let plate = Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, thickness, 0.5).unwrap();
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let own = Some(Rub { thickness, friction: 0.5 });
+    let scene = Scene { skins: &skins, obstacles: &[plate], own, ..Scene::default() };
+    let mut state = State::at_rest(&body);
+    let mut solver = Solver::new(&body);
+    let frame = Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() };
+    for _ in 0..240 {
+        let _ = solver.step(&body, &mut state, &frame);
+        let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+        assert!(lowest > 0.0, "{lowest}");
+    }
+    let speed = state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max);
+    assert!(speed < 1e-4 * 9.81 * FRAME, "{} g·dt", speed / (9.81 * FRAME));
+}
+
+const SIDES: usize = 32;
+const THICKNESS: f64 = 1e-3;
+
+/// A pin that rolls on by ten thicknesses a frame, 1 cm into the block of [`rolled_over`].
+fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (points, triangles) = cylinder(SIDES as u32, 0.05, 0.3);
+    let way = frame * 10.0 * THICKNESS;
+    let (sine, cosine) = libm::sincos(-way / 0.05);
+    let put = |[x, y, z]: &[f64; 3]| [cosine * x - sine * y - 0.08 + way, sine * x + cosine * y + 0.1, z + 0.06];
+    (points.iter().map(put).collect(), triangles)
+}
+
+/// The deepest that any of `points` is in the pin.
+fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]]) -> f64 {
+    let sides: Vec<(V3, V3)> = (0..SIDES)
+        .map(|k| {
+            let [a, b, c] = [2 * k, 2 * ((k + 1) % SIDES), 2 * k + 1].map(|corner| V3::from(pin[corner]));
+            (a, (b - a).cross(&(c - a)).normalize())
+        })
+        .collect();
+    let depth = |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
+    points.iter().map(depth).fold(0.0, f64::max)
+}
+
+/// Frames of a block under the pin, moved on by `step` through each; gives the deepest in any.
+fn rolled_over(frames: u32, mut step: impl FnMut(&Scene<'_>) -> Vec<[f64; 3]>, skins: &[Skin]) -> f64 {
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: -THICKNESS, thickness: THICKNESS, friction: 0.8 });
+    let mut worst = 0.0_f64;
+    for frame in 0..frames {
+        let [(from, faces), (to, _)] = [frame, frame + 1].map(|frame| rolling(f64::from(frame)));
+        let pin = [Obstacle::new(&faces, &[pose(0.0, &from), pose(1.0, &to)], FRAME, THICKNESS, 0.3).unwrap()];
+        let points = step(&Scene { skins, obstacles: &pin, ground, ..Scene::default() });
+        worst = worst.max(deepest(&points, &to));
+    }
+    worst
+}
+
+#[test]
+fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
+    let (points, _, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
+    let skins = [Skin::new(&points, &faces, &[]).unwrap()];
+    let mut now = points.clone();
+    // Vertices that go where their contacts put them and nothing else moves.
+    let put = |scene: &Scene<'_>| {
+        let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
+        contacts.retain(|contact| contact.weights[1] == 0.0);
+        for _ in 0..50 {
+            for contact in &contacts {
+                let (p, n) = (V3::from(now[contact.particles[0] as usize]), V3::from(contact.normal));
+                let lacks = (contact.offset + contact.gap - n.dot(&p)).max(0.0);
+                now[contact.particles[0] as usize] = (p + n * lacks).into();
+            }
+        }
+        assert!(now.iter().all(|p| p[1] > -1e-9));
+        now.clone()
+    };
+    let worst = rolled_over(30, put, &skins);
+    assert!(worst < 0.01 * THICKNESS, "{worst}");
+}
+
+#[test]
+fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
+    let (points, tets, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
+    let body = body(&points, &tets, 2e4);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let mut state = State::at_rest(&body);
+    let mut solver = Solver::new(&body);
+    // Steps in which the pin moves less than its thickness.
+    let step = |scene: &Scene<'_>| {
+        let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps: 16, ..Frame::default() };
+        let report = solver.step(&body, &mut state, &frame);
+        assert_eq!(report.stopped, 0);
+        assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
+        state.positions.clone()
+    };
+    let worst = rolled_over(30, step, &skins);
+    assert!(worst < THICKNESS, "{worst}");
+}

@@ -1,0 +1,184 @@
+//! What can be worked out by hand.
+
+use super::*;
+
+/// A square of two triangles at height 0, open, its normal up.
+const SQUARE: [[f64; 3]; 4] = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
+const TWO: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+/// One triangle of three particles around a point, tiny: its first particle is what tests look at.
+fn speck(at: [f64; 3]) -> [[f64; 3]; 3] {
+    [at, [at[0] + 1e-3, at[1] + 10.0, at[2]], [at[0], at[1] + 10.0, at[2] + 1e-3]]
+}
+
+#[test]
+fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
+    let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE)], 1.0, 0.01, 0.5).unwrap();
+    let (from, to) = (speck([0.0, 0.5, 0.0]), speck([0.0, -0.5, 0.0]));
+    let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
+    let mask = [0.5f32, 1.0, 1.0];
+    let scene = Scene { skins: &[skin], obstacles: &[plate], friction: Some(&mask), ..Scene::default() };
+    let (contacts, found) = find(&scene, &from, &to, [0.0, 1.0]);
+    assert_eq!(found, Found { contacts: 1, deepest_overlap: 0.0 });
+    let contact = contacts[0];
+    assert_eq!((contact.particles, contact.weights), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
+    assert_eq!((contact.normal, contact.offset, contact.gap), ([0.0, 1.0, 0.0], 0.0, 0.01));
+    assert_eq!((contact.velocity, contact.friction), ([0.0; 3], 0.25));
+    // From below it is held below.
+    let (contacts, _) =
+        find(&scene, &to.map(|p| [p[0], p[1] - 20.0, p[2]]), &from.map(|p| [p[0], p[1] - 9.0, p[2]]), [0.0, 1.0]);
+    let held: Vec<_> =
+        contacts.iter().filter(|contact| contact.weights[0] == 1.0).map(|contact| contact.normal).collect();
+    assert!(!held.is_empty() && held.iter().all(|normal| *normal == [0.0, -1.0, 0.0]), "{held:?}");
+}
+
+#[test]
+fn a_plate_that_comes_up_brings_its_height_and_velocity() {
+    let up = SQUARE.map(|[x, _, z]| [x, 0.4, z]);
+    let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE), pose(1.0, &up)], 0.5, 0.01, 0.5).unwrap();
+    let still = speck([0.3, 0.1, 0.2]);
+    let skin = Skin::new(&still, &[[0, 1, 2]], &[]).unwrap();
+    let scene = Scene { skins: &[skin], obstacles: &[plate], ..Scene::default() };
+    let (contacts, _) = find(&scene, &still, &still, [0.0, 0.5]);
+    assert_eq!(contacts.len(), 1);
+    assert!((contacts[0].offset - 0.2).abs() < 1e-15 && (contacts[0].velocity[1] - 0.8).abs() < 1e-15);
+    assert_eq!(contacts[0].normal, [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn edges_that_cross_push_where_they_cross() {
+    // A tent with its ridge along x at height 0, and a triangle whose lower side, along z, comes down on it.
+    let tent = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.4], [0.0, -1.0, -0.4]];
+    let ridge = Obstacle::new(&[[0, 2, 1], [0, 1, 3]], &[pose(0.0, &tent)], 1.0, 0.01, 0.5).unwrap();
+    let from = [[0.5, 0.2, -0.1], [0.5, 0.2, 0.3], [0.5, 1.0, 0.0]];
+    let to = from.map(|[x, y, z]| [x, y - 0.3, z]);
+    let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
+    let (contacts, _) =
+        find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
+    assert_eq!(contacts.len(), 1, "{contacts:?}");
+    let Contact { particles, weights, normal, offset, .. } = contacts[0];
+    assert_eq!(particles, [0, 1, 0, 0]);
+    assert!((weights[0] - 0.75).abs() < 1e-12 && (weights[1] - 0.25).abs() < 1e-12);
+    assert!((V3::from(normal) - V3::y()).norm() < 1e-12 && offset.abs() < 1e-12);
+}
+
+#[test]
+fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
+    let spike = [[0.0, 0.0, 0.0], [0.1, -1.0, 0.0], [-0.1, -1.0, 0.1], [-0.1, -1.0, -0.1]];
+    let risen = spike.map(|[x, y, z]| [x, y + 0.3, z]);
+    let faces = [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]];
+    let spike = Obstacle::new(&faces, &[pose(0.0, &spike), pose(1.0, &risen)], 1.0, 0.01, 0.5).unwrap();
+    assert!(spike.is_closed());
+    let sheet = [[-1.0, 0.2, -1.0], [-1.0, 0.2, 2.0], [2.0, 0.2, -1.0]];
+    let skin = Skin::new(&sheet, &[[0, 2, 1]], &[]).unwrap();
+    let (contacts, _) =
+        find(&Scene { skins: &[skin], obstacles: &[spike], ..Scene::default() }, &sheet, &sheet, [0.0, 1.0]);
+    assert_eq!(contacts.len(), 1, "{contacts:?}");
+    let Contact { weights, normal, offset, velocity, .. } = contacts[0];
+    assert!(weights[..3].iter().all(|weight| (weight - 1.0 / 3.0).abs() < 1e-12) && weights[3] == 0.0);
+    assert!((V3::from(normal) - V3::y()).norm() < 1e-12 && (offset - 0.3).abs() < 1e-12);
+    assert!((V3::from(velocity) - V3::y() * 0.3).norm() < 1e-12);
+}
+
+#[test]
+fn points_of_a_spinning_cylinder_keep_their_radius_and_meet_their_poses() {
+    let (points, faces) = cylinder(32, 0.05, 0.4);
+    let turned = |angle: f64, way: f64| -> Vec<[f64; 3]> {
+        let (sine, cosine) = libm::sincos(angle);
+        points.iter().map(|[x, y, z]| [cosine * x - sine * y + way, sine * x + cosine * y, *z]).collect()
+    };
+    let poses = [pose(0.0, &points), pose(0.5, &turned(2.5, 0.1)), pose(1.0, &turned(3.0, 0.1))];
+    let pin = Obstacle::new(&faces, &poses, 0.04, 1e-3, 0.5).unwrap();
+    for pose in &poses {
+        assert_eq!(pin.at(pose.share), pose.positions);
+    }
+    for share in [0.1, 0.25, 0.4, 0.7] {
+        let middle = 0.1_f64.min(0.2 * share);
+        for ([x, y, _], [x0, y0, _]) in pin.at(share).into_iter().zip(&points) {
+            let radius = |x: f64, y: f64| (x * x + y * y).sqrt();
+            assert!((radius(x - middle, y) - radius(*x0, *y0)).abs() < 1e-9);
+        }
+        // The velocity is what positions change by.
+        let step = 1e-6;
+        let [before, after] = [share - step, share + step].map(|share| V3::from(pin.at(share)[0]));
+        let change = (after - before) / (2.0 * step * 0.04);
+        let weights = faces[0].map(|corner| if corner == 0 { 1.0 } else { 0.0 });
+        assert!((V3::from(pin.velocity(share, 0, weights)) - change).norm() < 1e-6 * change.norm());
+    }
+    assert_eq!(pin.at(-1.0), poses[0].positions);
+    assert_eq!(pin.velocity(2.0, 0, [1.0, 0.0, 0.0]), [0.0; 3]);
+}
+
+#[test]
+fn what_starts_inside_is_pushed_out_by_the_nearest_side_not_at_once() {
+    let (points, faces) = cuboid([1.0; 3]);
+    let cube = Obstacle::new(&faces, &[pose(0.0, &points)], 1.0, 0.01, 0.5).unwrap();
+    let within = |depth: f64| [[0.1, 0.5 - depth, 0.2], [0.1, 9.0, 0.2], [0.1, 9.0, 0.3]];
+    let skin = Skin::new(&within(0.0), &[[0, 1, 2]], &[]).unwrap();
+    let scene = Scene { skins: &[skin], obstacles: &[cube], ..Scene::default() };
+    for (depth, offset) in [(0.005, 0.5), (0.05, 0.5), (0.25, 0.35)] {
+        let (contacts, found) = find(&scene, &within(depth), &within(depth), [0.0, 1.0]);
+        let mine: Vec<_> = contacts.iter().filter(|contact| contact.weights[0] == 1.0).collect();
+        assert_eq!(mine.len(), 1);
+        assert_eq!(mine[0].normal, [0.0, 1.0, 0.0]);
+        assert!((mine[0].offset - offset).abs() < 1e-12, "{} is not {offset}", mine[0].offset);
+        assert!(found.deepest_overlap > 0.0);
+    }
+}
+
+#[test]
+fn ground_comes_first_and_nothing_pushes_below_it() {
+    let (points, faces) = cuboid([1.0; 3]);
+    // A cube that comes down on a vertex that is on the ground, tilted so that it pushes down and sideways.
+    let (sine, cosine) = libm::sincos(0.5);
+    let tilted = |height: f64| -> Vec<[f64; 3]> {
+        points.iter().map(|[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y + height, *z]).collect()
+    };
+    let cube = Obstacle::new(&faces, &[pose(0.0, &tilted(0.9)), pose(1.0, &tilted(0.45))], 1.0, 0.01, 0.5).unwrap();
+    let still = [[0.2, 0.01, 0.0], [5.0, 0.01, 0.0], [5.0, 0.01, 0.1]];
+    let skin = Skin::new(&still, &[[0, 1, 2]], &[]).unwrap();
+    let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: 0.01, friction: 0.3 };
+    let scene = Scene { skins: &[skin], obstacles: &[cube], ground: Some(ground), ..Scene::default() };
+    let (contacts, _) = find(&scene, &still, &still, [0.0, 1.0]);
+    assert!(contacts.len() > 3, "{contacts:?}");
+    for (particle, contact) in (0..3).zip(&contacts) {
+        assert_eq!((contact.particles[0], contact.normal, contact.friction), (particle, [0.0, 1.0, 0.0], 0.3));
+    }
+    assert!(contacts[3..].iter().all(|contact| contact.normal[1] >= -1e-12), "{contacts:?}");
+}
+
+#[test]
+fn two_sheets_touch_and_neighbours_do_not() {
+    // A strip folded over: its ends face each other, its middle is itself.
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    let mut triangles = Vec::new();
+    for k in 0..=12u32 {
+        let angle = std::f64::consts::PI * f64::from(k) / 12.0;
+        points.extend([0.0, 0.3].map(|z| [libm::cos(angle), libm::sin(angle), z]));
+        if k > 0 {
+            let a = 2 * k - 2;
+            triangles.extend([[a, a + 2, a + 3], [a, a + 3, a + 1]]);
+        }
+    }
+    let skin = Skin::new(&points, &triangles, &[]).unwrap();
+    let own = Some(Rub { thickness: 0.01, friction: 0.5 });
+    let skins = [skin];
+    let scene = Scene { skins: &skins, own, ..Scene::default() };
+    assert_eq!(find(&scene, &points, &points, [0.0, 1.0]).1, Found::default());
+    // Its first end is carried through the last.
+    let mut to = points.clone();
+    to[..2].iter_mut().for_each(|p| p[0] -= 2.2);
+    to[..2].iter_mut().for_each(|p| p[1] += 0.15);
+    let (contacts, _) = find(&scene, &points, &to, [0.0, 1.0]);
+    assert!(contacts.iter().any(|contact| contact.particles[0] < 2 && contact.weights[0] == 1.0), "{contacts:?}");
+    for contact in &contacts {
+        assert!(contact.weights.iter().sum::<f64>().abs() < 1e-12);
+        let kind = |particle: u32| particle / 2;
+        assert!(
+            contact
+                .particles
+                .iter()
+                .any(|p| kind(*p) > kind(contact.particles[0]) + 2 || kind(*p) + 2 < kind(contact.particles[0]))
+        );
+    }
+}

@@ -1,0 +1,255 @@
+//! A point on its way against the triangles of a surface on its own: where it went through, what it is near to.
+//!
+//! What counts is the side it came from. A closed surface is only ever entered from outside; an open one has two sides.
+//! After the first triangle it goes through, only that is what it meets: what else it was near to is judged there.
+
+use super::V3;
+use super::cross::{Apart, face_apart, sign_changes};
+use super::near::Nearest;
+use super::surface::{Moment, Places, Settled, Surface};
+
+/// Share of the lengths involved within which a point is on a triangle's plane: above rounding.
+pub(super) const ON: f64 = 1e-9;
+/// Gaps that a point which starts inside is pushed out by, at most.
+const PUSH: f64 = 10.0;
+
+/// A surface on its way: its poses at a few times, straight between.
+#[derive(Clone, Copy)]
+pub(super) struct Moving<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) poses: &'a [Places<'a>],
+}
+
+impl<'a> Moving<'a> {
+    pub(super) fn start(&self) -> Moment<'a> {
+        Moment::of(self.poses[0])
+    }
+
+    pub(super) fn end(&self) -> Moment<'a> {
+        Moment::of(self.poses[self.poses.len() - 1])
+    }
+
+    /// `time` counts poses.
+    pub(super) fn moment(&self, time: f64) -> Moment<'a> {
+        let piece = (time as usize).min(self.poses.len() - 2);
+        Moment { from: self.poses[piece], to: self.poses[piece + 1], share: time - piece as f64 }
+    }
+}
+
+/// How far things count, and which sides there are.
+#[derive(Clone, Copy)]
+pub(super) struct Rules {
+    /// Distance kept.
+    pub(super) gap: f64,
+    /// What comes nearer counts.
+    pub(super) reach: f64,
+    /// Whether what starts inside is pushed out by the nearest triangle.
+    pub(super) push: bool,
+}
+
+/// A point that may touch a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hit {
+    pub(super) face: u32,
+    /// Of the triangle's corners.
+    pub(super) weights: [f64; 3],
+    /// Unit, from the triangle to the point, at the end of the way.
+    pub(super) normal: V3,
+    /// How much deeper than the triangle's plane it may stay.
+    pub(super) shift: f64,
+    /// Distance at the end.
+    clearance: f64,
+}
+
+/// Adds what the point on `path` (as many places as there are poses) meets among `faces`, which rise; `sunk` is the
+/// nearest triangle at the start where none of them is near then and the point may be inside.
+pub(super) fn hits(
+    path: &[V3],
+    on: &Moving<'_>,
+    faces: &[u32],
+    sunk: impl FnOnce() -> Option<Nearest>,
+    rules: &Rules,
+    out: &mut Vec<Hit>,
+) {
+    let first = out.len();
+    let (surface, end) = (on.surface, path[path.len() - 1]);
+    let plane = |face: u32, side: f64, shift: f64| {
+        let Settled { nearest, normal } = surface.settle(&on.end(), face, end);
+        let normal = normal.or_else(|| surface.normal(&on.start(), face))? * side;
+        let clearance = normal.dot(&(end - nearest.point)) + shift;
+        Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })
+    };
+    let mut met = (path.len() - 1) as f64;
+    let mut through: Vec<(u32, f64)> = Vec::new();
+    let mut near: Vec<u32> = Vec::new();
+    for face in faces {
+        match crossing(path, on, *face, rules.reach) {
+            Way::Far => continue,
+            Way::Near => {}
+            Way::Through(time, above) => {
+                through.push((*face, if above { 1.0 } else { -1.0 }));
+                met = met.min(time);
+            }
+        }
+        near.push(*face);
+    }
+    if surface.closed && rules.push {
+        let start = on.start();
+        let each = near.iter().map(|face| Nearest::on(*face, path[0], surface.corners(&start, *face)));
+        let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
+        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(sunk);
+        if let Some(nearest) = nearest.filter(|nearest| is_behind(surface, &start, nearest, path[0])) {
+            out.extend(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
+            return;
+        }
+    }
+    out.extend(through.iter().filter_map(|(face, side)| plane(*face, *side, 0.0)));
+    let at = on.moment(met);
+    let here = point_at(path, met);
+    for face in &near {
+        let nearest = Nearest::on(*face, here, surface.corners(&at, *face));
+        // What it goes through then is its contact already.
+        let least = if !through.is_empty() { 1e-6 * rules.reach } else { 0.0 };
+        if nearest.distance <= rules.reach && nearest.distance >= least {
+            out.extend(close(surface, &at, &on.end(), nearest, here, end));
+        }
+    }
+    if out.len() == first {
+        let passed = near.iter().filter(|face| approaches(path, on, **face, rules.reach));
+        let each = passed.map(|face| Nearest::on(*face, end, surface.corners(&on.end(), *face)));
+        let near = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
+        if let Some(nearest) = near.filter(|nearest| !surface.closed || !is_behind(surface, &on.end(), nearest, end)) {
+            let normal = (end - nearest.point).try_normalize(0.0).or_else(|| surface.normal(&on.end(), nearest.face));
+            let hit = |normal| Hit {
+                face: nearest.face,
+                weights: nearest.weights,
+                normal,
+                shift: 0.0,
+                clearance: nearest.distance,
+            };
+            out.extend(normal.map(hit));
+        }
+    }
+    merge(out, first);
+}
+
+fn point_at(path: &[V3], time: f64) -> V3 {
+    let piece = (time as usize).min(path.len() - 2);
+    path[piece].lerp(&path[piece + 1], time - piece as f64)
+}
+
+/// Whether a point is inside, seen from its nearest of a closed surface.
+fn is_behind(surface: &Surface, at: &Moment<'_>, nearest: &Nearest, point: V3) -> bool {
+    surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
+}
+
+/// What a point may do with a triangle on its way.
+enum Way {
+    /// Does not come near.
+    Far,
+    /// May come near.
+    Near,
+    /// Goes through it then, first, from above or not; where closed, into it.
+    Through(f64, bool),
+}
+
+fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
+    let [a, b, c] = on.surface.triangles[face as usize];
+    let ways = |pose: usize| {
+        let at = |point: u32| V3::from(on.poses[pose][point as usize]);
+        let origin = at(a);
+        [at(b) - origin, at(c) - origin, path[pose] - origin]
+    };
+    let mut far = true;
+    let mut start = ways(0);
+    for piece in 0..path.len() - 1 {
+        let end = ways(piece + 1);
+        let apart = face_apart(&start, &end, reach);
+        far &= apart == Apart::Far;
+        if apart == Apart::Unknown {
+            for (t, above) in sign_changes(&start, &end).iter().filter(|root| root.1 || !on.surface.closed) {
+                let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
+                let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());
+                if Nearest::on(face, p, [V3::zeros(), b, c]).distance <= ON * size {
+                    return Way::Through(piece as f64 + t, above);
+                }
+            }
+        }
+        start = end;
+    }
+    if far { Way::Far } else { Way::Near }
+}
+
+/// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
+fn close(surface: &Surface, at: &Moment<'_>, last: &Moment<'_>, nearest: Nearest, here: V3, end: V3) -> Option<Hit> {
+    let away = here - nearest.point;
+    if (surface.closed && is_behind(surface, at, &nearest, here)) || !surface.is_nearest_around(at, &nearest, &away) {
+        return None;
+    }
+    let face = nearest.face;
+    let frame = |at: &Moment<'_>| {
+        let [a, b, _] = surface.corners(at, face);
+        let normal = surface.normal(at, face)?;
+        let along = (b - a).try_normalize(0.0)?;
+        Some([along, normal.cross(&along), normal])
+    };
+    let normal = match (away.try_normalize(0.0), frame(at), frame(last)) {
+        (Some(away), Some(then), Some(now)) => {
+            (0..3).map(|k| now[k] * then[k].dot(&away)).sum::<V3>().try_normalize(0.0)?
+        }
+        (Some(away), _, _) => away,
+        (None, Some(_), Some(now)) => now[2],
+        _ => return None,
+    };
+    let corners = surface.corners(last, face);
+    let point: V3 = (0..3).map(|k| corners[k] * nearest.weights[k]).sum();
+    Some(Hit { face, weights: nearest.weights, normal, shift: 0.0, clearance: normal.dot(&(end - point)) })
+}
+
+/// Whether the point comes nearer than `reach` to a triangle: on by what is left of the way at their top speed, which
+/// leaps over nothing.
+fn approaches(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> bool {
+    /// Steps a piece; what is not decided by then counts.
+    const MOST: usize = 64;
+    for piece in 0..path.len() - 1 {
+        let corners = |pose: usize| on.surface.corners(&Moment::of(on.poses[pose]), face);
+        let (from, to) = (corners(piece), corners(piece + 1));
+        let way = path[piece + 1] - path[piece];
+        let speed = (0..3).map(|k| (way - (to[k] - from[k])).norm()).fold(0.0, f64::max);
+        let (mut time, mut decided) = (0.0, false);
+        for _ in 0..MOST {
+            let p = path[piece].lerp(&path[piece + 1], time);
+            let distance = Nearest::on(face, p, [0, 1, 2].map(|k| from[k].lerp(&to[k], time))).distance;
+            if distance <= reach * (1.0 + 1e-6) {
+                return true;
+            }
+            time += (distance - reach) / speed;
+            // Without speed it is infinitely late.
+            if time > 1.0 || time.is_nan() {
+                decided = true;
+                break;
+            }
+        }
+        if !decided {
+            return true;
+        }
+    }
+    false
+}
+
+/// Of hits from `first` on whose normals are about the same the deepest; a few; by triangle.
+fn merge(hits: &mut Vec<Hit>, first: usize) {
+    /// Cosine of the angle within which normals are of one smooth region.
+    const SAME: f64 = 0.99;
+    /// Contacts a point has with one surface, at most.
+    const MOST: usize = 4;
+    let mut mine: Vec<Hit> = hits.drain(first..).collect();
+    mine.sort_by(|a, b| a.clearance.total_cmp(&b.clearance).then(a.face.cmp(&b.face)));
+    for hit in mine {
+        let kept = &hits[first..];
+        if kept.len() < MOST && kept.iter().all(|other| other.normal.dot(&hit.normal) < SAME) {
+            hits.push(hit);
+        }
+    }
+    hits[first..].sort_by_key(|hit| hit.face);
+}
