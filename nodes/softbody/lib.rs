@@ -1,6 +1,7 @@
 //! The softbody family: dough and eggs (paper R).
 
 mod shared;
+pub mod softbody;
 pub mod softbody_goal;
 pub mod softbody_pin;
 pub mod tetrahedralize;
@@ -8,4 +9,4 @@ pub mod tetrahedralize;
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&softbody_goal::NODE, &softbody_pin::NODE, &tetrahedralize::NODE];
+pub static NODES: &[&Node] = &[&softbody::NODE, &softbody_goal::NODE, &softbody_pin::NODE, &tetrahedralize::NODE];

@@ -16,7 +16,7 @@
 use engine::prelude::*;
 use numerics::tets::{Closed, Fault, Fill, Side, Solid, Surface};
 
-use crate::shared::attributes::SURFACE_POINT;
+use crate::shared::attributes::{SLIVER, SURFACE_POINT};
 
 choice! {
     /// What is done about a surface that is not in order.
@@ -53,8 +53,6 @@ const TETS: Output = Output::new(
 const SIDE: Attr<i32> = Attr::point("side");
 /// Which body a tet is part of, from 0 in the order of their first faces.
 const BODY: Attr<i32> = Attr::element("body");
-/// 1 where a tet is too flat for its volume to mean anything, else 0.
-const SLIVER: Attr<i32> = Attr::element("sliver");
 
 const COUNT: Metric = Metric::new("tets", Unit::None, "How many tets there are.");
 const BODIES: Metric = Metric::new("bodies", Unit::None, "How many bodies they make.");

@@ -14,6 +14,7 @@
 pub mod affine;
 pub mod attach;
 pub mod bend;
+pub mod carry;
 pub mod collide;
 pub mod goals;
 pub mod guides;

@@ -4,6 +4,7 @@
 //! its input, and equal addresses prove it. Positions are metres relative to the scene's origin, Y up, right-handed.
 
 mod attribute;
+mod bytes;
 mod column;
 mod component;
 mod derived;

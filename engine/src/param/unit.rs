@@ -41,6 +41,8 @@ pub enum Unit {
     KilogramsPerCubicMetre,
     /// m³/s
     CubicMetresPerSecond,
+    /// J
+    Joules,
 }
 
 impl Unit {
@@ -66,6 +68,7 @@ impl Unit {
             Self::NewtonsPerMetre => "N/m",
             Self::KilogramsPerCubicMetre => "kg/m³",
             Self::CubicMetresPerSecond => "m³/s",
+            Self::Joules => "J",
         }
     }
 
@@ -75,6 +78,7 @@ impl Unit {
         match self {
             Self::Metres | Self::MetresPerSecond | Self::MetresPerSecondSquared => 1,
             Self::CubicMetresPerSecond => 3,
+            Self::Joules => 2,
             Self::PerMetre | Self::Pascal | Self::PascalSeconds => -1,
             Self::PerSquareMetre => -2,
             Self::KilogramsPerCubicMetre => -3,

@@ -42,7 +42,8 @@ pub fn bench(node: &'static Node) -> Bench {
 }
 
 type Moving = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
-type Change = fn(Geometry) -> Geometry;
+/// What comes of what a wire brings, and which wire of the input that is.
+type Change = fn(usize, Geometry) -> Geometry;
 
 /// A node with given inputs and params.
 #[derive(Clone)]
@@ -211,13 +212,13 @@ impl Bench {
         let mut inputs = Vec::new();
         for ((declared, wires), change) in self.node.inputs.iter().zip(&self.inputs).zip(&self.changes) {
             let mut links = Vec::new();
-            for (at, moves) in wires {
+            for (wire, (at, moves)) in wires.iter().enumerate() {
                 links.push(Link { node: nodes.len(), port: 0 });
                 let id = format!("{}{}", declared.spec().name, links.len()).into();
                 let at: Moving = match *change {
                     Some(change) => {
                         let given = at.clone();
-                        Arc::new(move |frame| change(given(frame)))
+                        Arc::new(move |frame| change(wire, given(frame)))
                     }
                     None => at.clone(),
                 };

@@ -4,6 +4,8 @@ use engine::prelude::*;
 
 /// On a body's points: the surface's point that each one is; −1 inside.
 pub(crate) const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
+/// On a body's tets: 1 where one is too flat for its volume to mean anything, else 0.
+pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
 
 /// On a goal: the frame at which the body shall be there.
 pub(crate) const GOAL_FRAME: Attr<f32> = Attr::once("goal_frame");

@@ -37,7 +37,7 @@ fn making(body: impl Into<Geometry>, shape: Component) -> Bench {
 }
 
 /// The samples' bodies name the rows 0 to 3 of their surface at random: a shape of four points fits.
-fn four_points(given: Geometry) -> Geometry {
+fn four_points(_: usize, given: Geometry) -> Geometry {
     let points = given.mesh().unwrap().positions();
     if points.len() < 4 {
         return given;

@@ -31,7 +31,7 @@ fn volume(tets: &Component, which: impl Fn(usize) -> bool) -> f64 {
 }
 
 /// Faces the other way round.
-fn inside_out(given: Geometry) -> Geometry {
+fn inside_out(_: usize, given: Geometry) -> Geometry {
     let mesh = given.mesh().unwrap();
     let faces = mesh.faces().unwrap();
     let turned =

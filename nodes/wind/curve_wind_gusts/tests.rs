@@ -67,7 +67,7 @@ fn control(shape: Shape, centre: [f32; 3], radius: f32, strength: f32) -> Compon
 
 /// What the suite hangs on `controls`, made a control: its place from the points, its numbers from the attributes, which
 /// are random where they are there.
-fn as_control(given: Geometry) -> Geometry {
+fn as_control(_: usize, given: Geometry) -> Geometry {
     let points = given.points().unwrap();
     let Some((shapes, keys)) = points.get(gust_control::SHAPE).zip(points.get(gust_control::RAMP)) else {
         return given;

@@ -44,8 +44,8 @@ pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64
 }
 
 /// Brings the shape at rest `share` of the way to `shape`, particles by the caller's index; `keep` is the share of dents
-/// that stays (of their logarithm). Lengths of springs given as such, and torn ones, stay. Returns the energy that brings,
-/// joules, below 0 where it frees some.
+/// that stays (of their logarithm). Lengths of springs given as such, and torn ones, stay, and all that hangs on a
+/// particle whose place is not finite. Returns the energy that brings, joules, below 0 where it frees some.
 pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
     let before = elastic(body, state);
     let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
@@ -53,9 +53,10 @@ pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, kee
     let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
     for spring in 0..body.meshed() {
         let length = springs::length(body, &goal, spring);
-        if length.is_finite() {
-            state.lengths[spring] = blend(state.lengths[spring], length);
+        if !length.is_finite() {
+            continue;
         }
+        state.lengths[spring] = blend(state.lengths[spring], length);
         if keep < 1.0 {
             state.dents[spring] = libm::pow(state.dents[spring], 1.0 - share * (1.0 - keep));
         }

@@ -13,6 +13,7 @@
 //! are wide) they lack some of its faces and edges: [`Measured`] says how many, what volume it costs, and
 //! [`missing_edges`] which. Details below 2⁻²⁴ of the bounds are lost.
 
+mod boundary;
 mod closed;
 mod cross;
 mod delaunay;
@@ -28,6 +29,7 @@ mod shells;
 mod solid;
 mod winding;
 
+pub use boundary::{Face, boundary};
 pub use closed::Closed;
 pub use delaunay::{Delaunay, NONE, delaunay};
 pub use edges::{edges, missing_edges};

@@ -1,0 +1,178 @@
+//! A geometry as bytes, every bit of it, and back: what the disk cache and the checkpoints of solvers keep.
+
+use std::sync::Arc;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{Column, ColumnType, Component, Faces, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
+
+impl Geometry {
+    /// All of it as bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        encode_geometry(&mut out, self);
+        out
+    }
+
+    /// The inverse of [`Geometry::to_bytes`]; `None` where they are anything else.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        Reader(bytes).geometry()
+    }
+}
+
+impl Serialize for Geometry {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_bytes().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Geometry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let bytes = Vec::<u8>::deserialize(deserializer)?;
+        Self::from_bytes(&bytes).ok_or_else(|| D::Error::custom("these bytes are no geometry"))
+    }
+}
+
+fn encode_geometry(out: &mut Vec<u8>, geometry: &Geometry) {
+    let put = |out: &mut Vec<u8>, bytes: &[u8]| {
+        out.extend((bytes.len() as u64).to_le_bytes());
+        out.extend(bytes);
+    };
+    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
+    for part in geometry.parts() {
+        out.push(part.kind() as u8);
+        match part.topology() {
+            Topology::Curves(runs) => put(out, &words(runs.starts())),
+            Topology::Mesh(faces) => {
+                put(out, &words(faces.runs.starts()));
+                put(out, &words(&faces.corners));
+            }
+            Topology::Points => {}
+            Topology::Tets(tets) => put(out, &words(tets.as_flattened())),
+        }
+        for owner in Owner::ALL {
+            encode_table(out, part.table(owner));
+        }
+    }
+    if let Some(volume) = geometry.volume() {
+        out.push(Kind::Volume as u8);
+        let grid = volume.grid();
+        for x in grid.origin.iter().chain([&grid.cell]) {
+            out.extend(x.to_le_bytes());
+        }
+        for n in grid.size {
+            out.extend(n.to_le_bytes());
+        }
+        for field in std::iter::once(volume.level_set()).chain(volume.velocity()) {
+            put(out, &field.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
+        }
+        encode_table(out, volume.once());
+    }
+}
+
+fn encode_table(out: &mut Vec<u8>, table: &Table) {
+    out.extend((table.rows() as u64).to_le_bytes());
+    out.extend((table.iter().count() as u64).to_le_bytes());
+    for (name, column) in table.iter() {
+        for bytes in [name.as_bytes(), &[column.kind() as u8], &column.to_bytes()] {
+            out.extend((bytes.len() as u64).to_le_bytes());
+            out.extend(bytes);
+        }
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+        let (head, rest) = self.0.split_at_checked(n)?;
+        self.0 = rest;
+        Some(head)
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
+    }
+
+    fn piece(&mut self) -> Option<&'a [u8]> {
+        let n = self.count()?;
+        self.take(n)
+    }
+
+    fn words(&mut self) -> Option<Vec<u32>> {
+        Some(self.piece()?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect())
+    }
+
+    fn word(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    fn floats(&mut self) -> Option<Vec<f32>> {
+        Some(self.words()?.into_iter().map(f32::from_bits).collect())
+    }
+
+    fn runs(&mut self) -> Option<Runs> {
+        let starts = self.words()?;
+        Runs::from_counts(starts.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]))).ok()
+    }
+
+    fn table(&mut self) -> Option<Table> {
+        const TYPES: [ColumnType; 6] =
+            [ColumnType::F1, ColumnType::F3, ColumnType::F4, ColumnType::I1, ColumnType::I3, ColumnType::I4];
+        let mut table = Table::new(self.count()?);
+        for _ in 0..self.count()? {
+            let name = std::str::from_utf8(self.piece()?).ok()?;
+            let kind = TYPES.into_iter().find(|kind| Some(&[*kind as u8][..]) == self.0.get(8..9))?;
+            self.piece()?;
+            table.set(name, Column::from_bytes(kind, self.piece()?)?).ok()?;
+        }
+        Some(table)
+    }
+
+    fn geometry(&mut self) -> Option<Geometry> {
+        let mut geometry = Geometry::default();
+        while let Some(kind) = self.take(1) {
+            let topology = match kind[0] {
+                k if k == Kind::Curves as u8 => Topology::Curves(Arc::new(self.runs()?)),
+                k if k == Kind::Mesh as u8 => {
+                    let runs = self.runs()?;
+                    Topology::Mesh(Arc::new(Faces { runs, corners: self.words()? }))
+                }
+                k if k == Kind::Points as u8 => Topology::Points,
+                k if k == Kind::Tets as u8 => Topology::Tets(Arc::new(self.words()?.as_chunks::<4>().0.to_vec())),
+                k if k == Kind::Volume as u8 => {
+                    let floats = [self.word()?, self.word()?, self.word()?, self.word()?].map(f32::from_bits);
+                    let size = [self.word()?, self.word()?, self.word()?];
+                    let grid = Grid { origin: [floats[0], floats[1], floats[2]], cell: floats[3], size };
+                    let level_set = self.floats()?;
+                    let velocity = [self.floats()?, self.floats()?, self.floats()?];
+                    let mut volume = Volume::new(grid, level_set, velocity).ok()?;
+                    *volume.once_mut() = self.table()?;
+                    geometry.put_volume(volume);
+                    continue;
+                }
+                _ => return None,
+            };
+            let tables = [self.table()?, self.table()?, self.table()?];
+            geometry.put(Component::from_tables(topology, tables).ok()?);
+        }
+        Some(geometry)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_written_is_read_and_nothing_else() {
+        let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.5; 3], [1.0; 3], [-0.0, 2.0, f32::MIN]]).unwrap();
+        let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[1.0; 3]; 4]).unwrap();
+        let geometry = Geometry::from(mesh).with(tets);
+        let bytes = geometry.to_bytes();
+        assert_eq!(Geometry::from_bytes(&bytes), Some(geometry));
+        assert_eq!(Geometry::from_bytes(&bytes[..bytes.len() - 1]), None);
+        assert_eq!(Geometry::from_bytes(&[99]), None);
+    }
+}

@@ -1,0 +1,216 @@
+//! Which goals pull whom when, and when they become the shape at rest.
+//!
+//! A body heads from its start to its first goal, is held there, heads for the next, and after the last is let go.
+
+use std::sync::Arc;
+
+use engine::prelude::*;
+use numerics::soft;
+
+use super::GoalOn;
+use super::made::{Given, Made};
+use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH};
+
+/// A goal of a body.
+struct Aim<'a> {
+    frame: f64,
+    strength: f64,
+    hold: f64,
+    places: &'a [[f32; 3]],
+}
+
+/// The goals of each wire of bodies, by frame.
+pub(super) struct Goals<'a> {
+    of: Vec<Vec<Aim<'a>>>,
+    made: &'a Made,
+    start: f64,
+}
+
+/// Where a body is drawn at a time: a share of the way between two shapes, and how hard.
+struct Drawn<'a> {
+    /// None is the shape at the start.
+    from: Option<&'a [[f32; 3]]>,
+    to: &'a [[f32; 3]],
+    share: f64,
+    strength: f64,
+}
+
+/// What makes motion towards a goal end there without a swing: critical damping, 1/s.
+pub(super) fn damping(strength: f64) -> f64 {
+    2.0 * strength.sqrt()
+}
+
+impl<'a> Goals<'a> {
+    /// Of the geometries that came in at a frame; `start` is the simulation's first.
+    ///
+    /// # Errors
+    /// Where one is of no body, or of two, or lacks what Softbody_Goal writes.
+    pub(super) fn of(given: &Given, made: &'a Made, goals: &'a [Arc<Geometry>], start: f64) -> Result<Self> {
+        let mut of: Vec<Vec<Aim<'a>>> = made.wires.iter().map(|_| Vec::new()).collect();
+        for (index, geometry) in goals.iter().enumerate() {
+            let shape = geometry.tets().expect("the engine refuses a wire without tets");
+            let wire = owner(given, index, shape)?;
+            let number = |attribute: Attr<f32>| {
+                shape.get(attribute).and_then(|rows| rows.first()).map(|x| f64::from(*x)).ok_or_else(|| {
+                    Error::refused(format!("`goals` {index} has no `{}`", attribute.name))
+                        .hint("make goals of shapes by Softbody_Goal")
+                })
+            };
+            let aim = Aim {
+                frame: number(GOAL_FRAME)?,
+                strength: number(GOAL_STRENGTH)?.max(0.0),
+                hold: number(GOAL_HOLD)?.max(0.0),
+                places: shape.positions(),
+            };
+            of[wire].push(aim);
+        }
+        of.iter_mut().for_each(|aims| aims.sort_by(|a, b| a.frame.total_cmp(&b.frame)));
+        Ok(Self { of, made, start })
+    }
+
+    /// Adds what pulls in a step between two frames.
+    pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<soft::Goal>) {
+        for (wire, particles) in self.made.wires.iter().enumerate() {
+            let Some(now) = self.drawn(wire, times[1]) else { continue };
+            let before = self.drawn(wire, times[0]);
+            let damping = damping(now.strength);
+            for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
+            {
+                let to = self.place(&now, particle, point);
+                let from = before.as_ref().map_or(to, |before| self.place(before, particle, point));
+                let between = [from, to];
+                out.push(soft::Goal { particle: particle as u32, between, strength: now.strength, damping });
+            }
+        }
+    }
+
+    fn is_pulled(&self, particle: usize, on: GoalOn) -> bool {
+        match on {
+            GoalOn::Interior => !self.made.outer[particle],
+            GoalOn::Surface => self.made.outer[particle],
+            GoalOn::All => true,
+        }
+    }
+
+    fn place(&self, drawn: &Drawn<'_>, particle: usize, point: usize) -> [f64; 3] {
+        let wide = |shape: &[[f32; 3]]| shape[point].map(f64::from);
+        let from = drawn.from.map_or(self.made.rest[particle], wide);
+        let to = wide(drawn.to);
+        if drawn.share >= 1.0 { to } else { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * drawn.share) }
+    }
+
+    /// Where a wire's body is drawn at a frame; none before it has goals and after it is let go.
+    fn drawn(&self, wire: usize, frame: f64) -> Option<Drawn<'_>> {
+        let aims = &self.of[wire];
+        let next = aims.partition_point(|aim| aim.frame < frame);
+        let share = |from: f64, to: f64| if to > from { ((frame - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+        let before = next.checked_sub(1).map(|index| &aims[index]);
+        match (before, aims.get(next)) {
+            (None, None) => None,
+            (None, Some(to)) => {
+                Some(Drawn { from: None, to: to.places, share: share(self.start, to.frame), strength: to.strength })
+            }
+            (Some(at), None) if frame > at.frame + at.hold => None,
+            (Some(at), None) => Some(Drawn { from: None, to: at.places, share: 1.0, strength: at.strength }),
+            (Some(from), Some(to)) => {
+                let share = share((from.frame + from.hold).min(to.frame), to.frame);
+                let strength = from.strength + (to.strength - from.strength) * share;
+                Some(Drawn { from: Some(from.places), to: to.places, share, strength })
+            }
+        }
+    }
+
+    /// The share of the way from the shape at rest to each goal's that is gone after the step to `frame`; in the caller's
+    /// hands is a shape of all particles, NaN where none is meant. `whole` is how far it goes in `frames`.
+    pub(super) fn resets(&self, frame: f64, whole: f64, frames: f64, mut reset: impl FnMut(&[[f64; 3]], f64)) {
+        for (wire, aim, step) in self.passed(frame) {
+            let Some(share) = share_of_step(step, whole, frames) else { continue };
+            let mut shape = vec![[f64::NAN; 3]; self.made.rest.len()];
+            for (place, at) in shape[self.made.wires[wire].clone()].iter_mut().zip(aim.places) {
+                *place = at.map(f64::from);
+            }
+            reset(&shape, share);
+        }
+    }
+
+    /// Whether the shape at rest was changed by the step to `frame`.
+    pub(super) fn reset_at(&self, frame: f64, whole: f64, frames: f64) -> bool {
+        self.passed(frame).any(|(_, _, step)| share_of_step(step, whole, frames).is_some())
+    }
+
+    /// Goals that are passed at a frame, with how many steps ended since, the one that passed it included.
+    fn passed(&self, frame: f64) -> impl Iterator<Item = (usize, &Aim<'_>, f64)> {
+        let all = self.of.iter().enumerate().flat_map(|(wire, aims)| aims.iter().map(move |aim| (wire, aim)));
+        all.map(move |(wire, aim)| (wire, aim, frame - aim.frame.ceil().max(self.start + 1.0) + 1.0))
+            .filter(|(_, _, step)| *step >= 1.0)
+    }
+
+    /// Mean distance of particles to where they are drawn at a frame, metres; none where none is.
+    pub(super) fn distance(&self, frame: f64, on: GoalOn, places: &[[f64; 3]]) -> Option<f64> {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (wire, particles) in self.made.wires.iter().enumerate() {
+            let Some(now) = self.drawn(wire, frame) else { continue };
+            for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
+            {
+                let to = self.place(&now, particle, point);
+                sum +=
+                    (0..3).map(|k| (to[k] - places[particle][k]) * (to[k] - places[particle][k])).sum::<f64>().sqrt();
+                count += 1.0;
+            }
+        }
+        (count > 0.0).then(|| sum / count)
+    }
+}
+
+/// What a step brings of a way that is gone to `whole` in `frames` equal steps, as a share of what is left; none after that.
+fn share_of_step(step: f64, whole: f64, frames: f64) -> Option<f64> {
+    let frames = frames.max(1.0);
+    if whole <= 0.0 || step > frames {
+        return None;
+    }
+    let gone = whole * (step - 1.0) / frames;
+    Some((whole / frames / (1.0 - gone)).min(1.0))
+}
+
+/// The wire of bodies that has the tets of a goal.
+fn owner(given: &Given, index: usize, shape: &Component) -> Result<usize> {
+    let fits = |geometry: &Arc<Geometry>| {
+        geometry.tets().is_some_and(|body| {
+            body.point_count() == shape.point_count()
+                && (body.topology().same(shape.topology()) || body.topology() == shape.topology())
+        })
+    };
+    let bodies = &given.bodies;
+    let found: Vec<usize> = (0..bodies.len()).filter(|wire| fits(&bodies[*wire])).collect();
+    match found[..] {
+        [wire] => Ok(wire),
+        [] => {
+            let count = |part: &Component| format!("{} tets of {} points", part.element_count(), part.point_count());
+            let has: Vec<String> = bodies.iter().filter_map(|body| body.tets().map(count)).collect();
+            let fact = format!("`goals` {index} has {}, and no body has the same: {}", count(shape), has.join(", "));
+            Err(Error::refused(fact).hint("make goals of the very tets that are simulated, by Softbody_Goal"))
+        }
+        [a, b, ..] => {
+            let fact = format!("`goals` {index} has the tets of both `bodies` {a} and {b}");
+            Err(Error::refused(fact).hint("simulate equal bodies in a node each"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reset_over_frames_goes_equal_parts_of_the_whole_way() {
+        let mut length = 1.0;
+        for step in 1..=4 {
+            let share = share_of_step(f64::from(step), 0.8, 4.0).unwrap();
+            length += (2.0 - length) * share;
+            assert!((length - (1.0 + 0.2 * f64::from(step))).abs() < 1e-12);
+        }
+        assert_eq!(share_of_step(5.0, 0.8, 4.0), None);
+        assert_eq!(share_of_step(1.0, 1.0, 0.0), Some(1.0), "no frames: at once");
+        assert_eq!(share_of_step(1.0, 0.0, 4.0), None);
+    }
+}

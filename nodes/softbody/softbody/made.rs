@@ -1,0 +1,278 @@
+//! What is made of the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
+
+use engine::prelude::*;
+use numerics::carry::{Carrier, carry};
+use numerics::soft::{Body, BodyError, Material, Mesh, Scaled, Spring};
+use numerics::tets::{boundary, edges, missing_edges};
+use numerics::touch::Skin;
+
+use super::joints::{Couple, couple};
+use super::pins::{Hold, holds};
+use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
+use crate::shared::attributes::{SLIVER, SURFACE_POINT};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What came in at the start. A chain sees it once, so it is part of what checkpoints keep.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Given {
+    pub(super) bodies: Vec<Arc<Geometry>>,
+    pub(super) pins: Vec<Arc<Geometry>>,
+}
+
+impl Given {
+    pub(super) fn at(cx: &FrameCx) -> Self {
+        Self { bodies: cx.at_start(BODIES).to_vec(), pins: cx.at_start(PINS).to_vec() }
+    }
+}
+
+/// All bodies as one: their particles in the order of the wires.
+pub(super) struct Made {
+    /// Particles at the start, metres.
+    pub(super) rest: Vec<[f64; 3]>,
+    pub(super) tets: Vec<[u32; 4]>,
+    slivers: Vec<bool>,
+    missing: Vec<[u32; 2]>,
+    joints: Vec<Spring>,
+    /// The particles of each wire.
+    pub(super) wires: Vec<std::ops::Range<usize>>,
+    /// Which particles are on a surface.
+    pub(super) outer: Vec<bool>,
+    /// The surface of each connected body, for contacts.
+    pub(super) skins: Vec<Skin>,
+    pub(super) holds: Vec<Hold>,
+    /// What comes out, but for places.
+    pub(super) surface: Component,
+    pub(super) body: Component,
+    /// What each point of the surface hangs on.
+    pub(super) carriers: Vec<Carrier>,
+}
+
+/// One wire's surface: triangles of its particles, and the mesh that comes out of it with what carries its points.
+struct Surface {
+    triangles: Vec<[u32; 3]>,
+    missing: Vec<[u32; 2]>,
+    mesh: Component,
+    carriers: Vec<Carrier>,
+}
+
+/// What bodies consist of at a frame: numbers, and what scales them particle by particle.
+pub(super) struct Stuff {
+    values: [f32; 3],
+    masks: [Option<Vec<f32>>; 3],
+}
+
+impl Stuff {
+    pub(super) fn at(cx: &Cx, given: &Given) -> Result<Self> {
+        let of = |param: fn() -> Param<Masked>| masked(cx, given, param);
+        let (density, stiffness, damping) = (of(|| DENSITY)?, of(|| STIFFNESS)?, of(|| DAMPING)?);
+        Ok(Self { values: [density.0, stiffness.0, damping.0], masks: [density.1, stiffness.1, damping.1] })
+    }
+
+    pub(super) fn values(&self) -> [f32; 3] {
+        self.values
+    }
+
+    pub(super) fn material(&self) -> Material<'_> {
+        let scaled = |k: usize| Scaled { value: f64::from(self.values[k]), mask: self.masks[k].as_deref() };
+        Material { density: scaled(0), stiffness: scaled(1), damping: scaled(2) }
+    }
+}
+
+/// A masked param over the particles of all bodies.
+///
+/// # Errors
+/// Where a body lacks the attribute.
+pub(super) fn masked(cx: &Cx, given: &Given, param: fn() -> Param<Masked>) -> Result<(f32, Option<Vec<f32>>)> {
+    let (mut value, mut all) = (cx.get(param()).value, None);
+    for geometry in &given.bodies {
+        let (number, mask) = cx.mask(param(), tets(geometry))?;
+        value = number;
+        if let Some(mask) = mask {
+            all.get_or_insert_with(Vec::new).extend_from_slice(mask);
+        }
+    }
+    Ok((value, all))
+}
+
+fn tets(geometry: &Geometry) -> &Component {
+    geometry.tets().expect("the engine refuses a wire without tets")
+}
+
+impl Made {
+    pub(super) fn of(cx: &Cx, given: &Given) -> Result<Self> {
+        let (mut surface, mut body): (Option<Component>, Option<Component>) = (None, None);
+        let (mut rest, mut all, mut slivers, mut missing) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut wires, mut triangles, mut carriers) = (Vec::new(), Vec::new(), Vec::new());
+        let mut outer = Vec::new();
+        for (wire, geometry) in given.bodies.iter().enumerate() {
+            let own = tets(geometry);
+            let first = rest.len() as u32;
+            let found = Surface::of(wire, own, geometry.mesh())?;
+            rest.extend(own.positions().iter().map(|p| p.map(f64::from)));
+            all.extend(own.tet_corners().iter().map(|tet| tet.map(|corner| corner + first)));
+            match own.get(SLIVER) {
+                Some(flat) => slivers.extend(flat.iter().map(|flat| *flat != 0)),
+                None => slivers.resize(all.len(), false),
+            }
+            missing.extend(found.missing.iter().map(|edge| edge.map(|end| end + first)));
+            triangles.extend(found.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+            carriers.extend(
+                found.carriers.iter().map(|carrier| Carrier {
+                    particles: carrier.particles.map(|particle| particle + first),
+                    ..*carrier
+                }),
+            );
+            let surface_points = own.get(SURFACE_POINT);
+            outer.extend((0..own.point_count()).map(|point| surface_points.is_some_and(|rows| rows[point] >= 0)));
+            wires.push(first as usize..rest.len());
+            body = Some(joined(body, own)?);
+            surface = Some(joined(surface, &found.mesh)?);
+        }
+        triangles.iter().flatten().for_each(|corner: &u32| outer[*corner as usize] = true);
+        let parts = parts(rest.len(), &all);
+        let stuff = Stuff::at(cx, given)?;
+        let joints = couple(&Couple {
+            points: &rest,
+            triangles: &triangles,
+            parts: &parts,
+            radius: f64::from(cx.get(COUPLING_RADIUS)),
+            stiffness: f64::from(cx.get(COUPLING_STIFFNESS)),
+            damping: f64::from(cx.get(DAMPING).value),
+        });
+        let mut made = Self {
+            outer,
+            skins: Vec::new(),
+            holds: holds(&given.pins, &rest)?,
+            surface: surface.map_or_else(|| Component::mesh(Vec::new(), Vec::new(), Vec::new()), Ok)?,
+            body: body.map_or_else(|| Component::tets(Vec::new(), Vec::new()), Ok)?,
+            carriers,
+            rest,
+            tets: all,
+            slivers,
+            missing,
+            joints,
+            wires,
+        };
+        let links = made.body(&stuff)?.springs();
+        made.skins = skins(&made.rest, &triangles, &parts, &links)?;
+        Ok(made)
+    }
+
+    /// The body that is solved for.
+    pub(super) fn body(&self, stuff: &Stuff) -> Result<Body> {
+        let mesh = Mesh { points: &self.rest, tets: &self.tets, slivers: &self.slivers, missing: &self.missing };
+        Body::new(&mesh, &stuff.material(), &self.joints).map_err(refusal)
+    }
+
+    /// Springs between bodies.
+    pub(super) fn joints(&self) -> usize {
+        self.joints.len()
+    }
+}
+
+/// What the solver does not take.
+pub(super) fn refusal(error: BodyError) -> Error {
+    let hint = match error {
+        BodyError::Point(_) => "points of `bodies` need finite places",
+        BodyError::NoMass => "give `density` a value above 0 where the bodies have tets with a volume",
+        BodyError::Particles { .. } => "a tet needs four different points",
+        BodyError::Number { .. } => "`density`, `stiffness`, `damping` and their masks need finite numbers",
+    };
+    Error::refused(format!("`bodies`: {error}")).hint(hint)
+}
+
+fn joined(before: Option<Component>, next: &Component) -> Result<Component> {
+    Ok(match before {
+        Some(before) => before.concat(next)?,
+        None => next.clone(),
+    })
+}
+
+impl Surface {
+    fn of(wire: usize, tets: &Component, mesh: Option<&Component>) -> Result<Self> {
+        match mesh.and_then(|mesh| Some((mesh, rows(tets, mesh)?))) {
+            Some((mesh, rows)) => Ok(Self::own(tets, mesh, &rows)),
+            None => Self::around(wire, tets, mesh),
+        }
+    }
+
+    /// The mesh whose points are the tets' own.
+    fn own(tets: &Component, mesh: &Component, rows: &[u32]) -> Self {
+        let particles = |corners: &[u32; 3]| corners.map(|corner| rows[corner as usize]);
+        let faces = mesh.faces().expect("a mesh has faces");
+        let edges: Vec<[u32; 2]> =
+            edges(faces.runs.starts(), &faces.corners).iter().map(|edge| edge.map(|end| rows[end as usize])).collect();
+        Self {
+            triangles: mesh.triangles().corners.iter().map(particles).collect(),
+            missing: missing_edges(&edges, tets.tet_corners()),
+            mesh: mesh.clone(),
+            carriers: rows.iter().map(|row| Carrier::on(*row)).collect(),
+        }
+    }
+
+    /// The tets' own outside; a mesh beside them is carried.
+    fn around(wire: usize, tets: &Component, mesh: Option<&Component>) -> Result<Self> {
+        let (points, corners) = (tets.positions(), tets.tet_corners());
+        let triangles: Vec<[u32; 3]> = boundary(corners, points).iter().map(|face| face.corners).collect();
+        let (mesh, carriers) = match mesh {
+            Some(mesh) => {
+                let carriers = carry(points, corners, mesh.positions());
+                let carriers = carriers.or_else(|| (mesh.point_count() == 0).then(Vec::new)).ok_or_else(|| {
+                    Error::refused(format!(
+                        "no tet of `bodies` {wire} has a volume, so none carries the mesh beside them"
+                    ))
+                    .hint("leave the mesh out, or take the tets that Tetrahedralize makes of it")
+                })?;
+                (mesh.clone(), carriers)
+            }
+            None => {
+                let mut used: Vec<u32> = triangles.as_flattened().to_vec();
+                used.sort_unstable();
+                used.dedup();
+                let row = |corner: &u32| used.partition_point(|point| point < corner) as u32;
+                let places = used.iter().map(|point| points[*point as usize]).collect();
+                let flat = triangles.as_flattened().iter().map(row).collect();
+                let mesh = Component::mesh(vec![3; triangles.len()], flat, places)?;
+                (mesh, used.iter().map(|point| Carrier::on(*point)).collect())
+            }
+        };
+        Ok(Self { triangles, missing: Vec::new(), mesh, carriers })
+    }
+}
+
+/// The tets' point of each of the mesh's points, where they say so and each has one.
+fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
+    let mut rows = vec![u32::MAX; mesh.point_count()];
+    for (point, row) in tets.get(SURFACE_POINT)?.iter().enumerate().filter(|(_, row)| **row >= 0) {
+        *rows.get_mut(*row as usize)? = point as u32;
+    }
+    (!rows.is_empty() && !rows.contains(&u32::MAX)).then_some(rows)
+}
+
+/// The lowest particle that each one hangs together with.
+fn parts(count: usize, tets: &[[u32; 4]]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..count as u32).collect();
+    fn root(parent: &mut [u32], mut at: u32) -> u32 {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+    for tet in tets {
+        for corner in &tet[1..] {
+            let (a, b) = (root(&mut parent, tet[0]), root(&mut parent, *corner));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    (0..count as u32).map(|particle| root(&mut parent, particle)).collect()
+}
+
+fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<Skin>> {
+    let part = |corners: &[u32; 3]| parts[corners[0] as usize];
+    let mut sorted = triangles.to_vec();
+    sorted.sort_by_key(part);
+    let skins = sorted.chunk_by(|a, b| part(a) == part(b)).map(|own| Skin::new(rest, own, links));
+    skins.map(|skin| skin.map_err(|error| Error::refused(format!("`bodies`: {error}")))).collect()
+}

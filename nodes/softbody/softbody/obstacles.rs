@@ -1,0 +1,44 @@
+//! Colliders on their way through a step.
+
+use std::sync::Arc;
+
+use engine::prelude::*;
+use numerics::touch::{Obstacle, Pose};
+
+/// What bodies cannot pass in a step of `seconds` whose `samples` are the wires at rising times.
+///
+/// # Errors
+/// Where a collider changes its points within the step, or one is not finite.
+pub(super) fn obstacles(
+    samples: &[(Frame, Vec<Arc<Geometry>>)],
+    seconds: f64,
+    thickness: f64,
+    friction: f64,
+) -> Result<Vec<Obstacle>> {
+    let Some(((first, wires), (last, _))) = samples.first().zip(samples.last()) else { return Ok(Vec::new()) };
+    let mut obstacles = Vec::with_capacity(wires.len());
+    for wire in 0..wires.len() {
+        let at =
+            |sample: &(Frame, Vec<Arc<Geometry>>)| sample.1.get(wire).and_then(|geometry| geometry.mesh()).cloned();
+        let meshes: Vec<Component> = samples.iter().filter_map(at).collect();
+        let same = |a: &Component, b: &Component| a.topology().same(b.topology()) || a.topology() == b.topology();
+        if let Some(other) = meshes.iter().find(|mesh| !same(mesh, &meshes[0])) {
+            let count = |mesh: &Component| format!("{} faces of {} points", mesh.element_count(), mesh.point_count());
+            let fact = format!("`colliders` {wire} changes from {} to {}", count(&meshes[0]), count(other));
+            return Err(Error::refused(fact).hint("a collider needs the same faces and points at every frame"));
+        }
+        let still =
+            meshes.iter().all(|mesh| mesh.table(Owner::Point).column("P") == meshes[0].table(Owner::Point).column("P"));
+        let span = last.number() - first.number();
+        let share = |frame: Frame| if span > 0.0 { (frame.number() - first.number()) / span } else { 1.0 };
+        let pose = |(sample, mesh): (&(Frame, Vec<Arc<Geometry>>), &Component)| Pose {
+            share: share(sample.0),
+            positions: mesh.positions().iter().map(|p| p.map(f64::from)).collect(),
+        };
+        let poses = samples.iter().zip(&meshes).map(pose).take(if still { 1 } else { samples.len() });
+        let poses: Vec<Pose> = poses.collect();
+        let obstacle = Obstacle::new(&meshes[0].triangles().corners, &poses, seconds, thickness, friction);
+        obstacles.push(obstacle.map_err(|error| Error::refused(format!("`colliders` {wire}: {error}")))?);
+    }
+    Ok(obstacles)
+}

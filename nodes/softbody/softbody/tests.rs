@@ -1,0 +1,240 @@
+use super::*;
+use engine::testing::{Bench, Tasted, bench, conformance};
+
+const G: f64 = 9.81;
+/// Seconds of a frame.
+const H: f64 = 1.0 / 24.0;
+
+/// A block of cubes of six tets each, `count` of them along each axis.
+fn block(count: [usize; 3], low: [f32; 3], size: [f32; 3]) -> Component {
+    let row = |[x, y, z]: [usize; 3]| ((z * (count[1] + 1) + y) * (count[0] + 1) + x) as u32;
+    let (mut points, mut tets) = (Vec::new(), Vec::new());
+    for z in 0..=count[2] {
+        for y in 0..=count[1] {
+            for x in 0..=count[0] {
+                points.push(std::array::from_fn(|k| low[k] + size[k] * [x, y, z][k] as f32 / count[k] as f32));
+                if x == count[0] || y == count[1] || z == count[2] {
+                    continue;
+                }
+                for (place, order) in
+                    [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]].iter().enumerate()
+                {
+                    let mut at = [x, y, z];
+                    let mut corners = [row(at); 4];
+                    for (k, axis) in order.iter().enumerate() {
+                        at[*axis] += 1;
+                        corners[k + 1] = row(at);
+                    }
+                    if place >= 3 {
+                        corners.swap(1, 2);
+                    }
+                    tets.push(corners);
+                }
+            }
+        }
+    }
+    Component::tets(tets, points).unwrap()
+}
+
+fn cube() -> Component {
+    block([2; 3], [0.0; 3], [0.1; 3])
+}
+
+fn simulating(bodies: impl Into<Geometry>) -> Bench {
+    bench(&NODE).input(BODIES, bodies)
+}
+
+fn all(value: f32) -> Masked {
+    Masked { value, attribute: None }
+}
+
+fn height(tasted: &Tasted) -> f32 {
+    tasted.mesh().positions().iter().map(|p| p[1]).fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// Where samples have points, a block with points inside, another for each wire: the suite's own bodies are all surface,
+/// and all the same.
+fn with_inside(wire: usize, given: Geometry) -> Geometry {
+    match given.tets() {
+        Some(tets) if tets.point_count() > 0 => {
+            block([2 + wire, 2, 2], [0.0, 0.12 * wire as f32, 0.0], [0.1; 3]).into()
+        }
+        _ => given,
+    }
+}
+
+/// The same, pressed flat at frame 2.
+fn pressed(wire: usize, given: Geometry) -> Geometry {
+    let mut geometry = with_inside(wire, given);
+    if let Some(tets) = geometry.part_mut(Kind::Tets).filter(|tets| tets.point_count() > 0) {
+        tets.edit(P).unwrap().iter_mut().for_each(|p| *p = [1.3 * p[0], 0.6 * p[1], 1.3 * p[2]]);
+        for (attribute, value) in [(GOAL_FRAME, 2.0), (GOAL_STRENGTH, 2000.0), (GOAL_HOLD, 0.0)] {
+            tets.set(attribute, vec![value]).unwrap();
+        }
+    }
+    geometry
+}
+
+/// Pins at the corners of that cube.
+fn at_corners(_: usize, given: Geometry) -> Geometry {
+    let Some(first) = given.points().and_then(|points| points.positions().first()) else { return given };
+    pins([[0.0; 3], [0.1, 0.0, 0.0]].map(|p| [p[0] + 0.01 * first[0], p[1], p[2]]).to_vec(), 0.02).into()
+}
+
+fn pins(places: Vec<[f32; 3]>, radius: f32) -> Component {
+    let count = places.len();
+    let mut pins = Component::points(places);
+    for (attribute, value) in [(PIN_RADIUS, radius), (PIN_STRENGTH, 0.0), (PIN_RELEASE, 1e9)] {
+        pins.set(attribute, vec![value; count]).unwrap();
+    }
+    pins
+}
+
+#[test]
+fn it_conforms() {
+    let rich = |bench: Bench| bench.changed(BODIES, with_inside).changed(GOALS, pressed).changed(PINS, at_corners);
+    conformance(&NODE)
+        .with(rich)
+        .with(move |bench| rich(bench).set(PLASTIC_YIELD, 0.01).set(PLASTIC_CREEP, 20.0).set(GOAL_ON, GoalOn::All))
+        .with(|bench| bench)
+        .with(move |bench| {
+            let alone = rich(bench).changed(COLLIDERS, |_, _| Component::mesh(vec![], vec![], vec![]).unwrap().into());
+            alone.set(BODY_COLLISION, false).set(SELF_COLLISION, false).set(INTEGRATOR, Stepping::Accurate)
+        })
+        .with(move |bench| rich(bench).set(THICKNESS, 0.09).set(GOAL_ON, GoalOn::All))
+        .run();
+}
+
+#[test]
+fn a_body_falls_as_all_bodies_do() {
+    let frames = simulating(cube()).frames([1, 2, 13]);
+    let rest = frames[0].mesh().positions();
+    for (frame, time) in frames[1..].iter().zip([H, 12.0 * H]) {
+        let fallen = 0.5 * G * time * time;
+        for (p, q) in rest.iter().zip(frame.mesh().positions()) {
+            assert!((f64::from(p[1] - q[1]) - fallen).abs() < 1e-6 * fallen.max(1.0), "{p:?} {q:?}");
+            assert!((p[0] - q[0]).abs() < 1e-7 && (p[2] - q[2]).abs() < 1e-7);
+        }
+    }
+}
+
+#[test]
+fn pinned_particles_are_where_their_pins_are_and_the_rest_hangs_on() {
+    let at = |frame: Frame| {
+        let way = 0.01 * (frame.number() as f32 - 1.0);
+        Geometry::from(pins(vec![[way, 0.1, 0.0], [way, 0.1, 0.1]], 0.06))
+    };
+    let frames = simulating(cube()).moving(PINS, at).frames(1..=12);
+    let rest = frames[0].mesh().positions();
+    // On the upper edge at x = 0, and half-way from there: within 6 cm of one of the pins.
+    let held = |p: &[f32; 3]| [0.0_f32, 0.1].iter().any(|z| p[0].hypot(p[1] - 0.1).hypot(p[2] - z) <= 0.06);
+    assert!((4..14).contains(&rest.iter().filter(|p| held(p)).count()));
+    for (k, frame) in frames.iter().enumerate() {
+        let way = 0.01 * k as f32;
+        for (p, q) in rest.iter().zip(frame.mesh().positions()).filter(|(p, _)| held(p)) {
+            assert!((q[0] - (p[0] + way)).abs() < 1e-7 && q[1] == p[1] && q[2] == p[2], "{p:?} {q:?} at {k}");
+        }
+    }
+    let lowest = frames[11].mesh().positions().iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
+    assert!((-0.06..0.0).contains(&lowest), "{lowest}");
+}
+
+#[test]
+fn a_goal_that_was_reached_becomes_the_shape_at_rest() {
+    let mut goal = pressed(0, cube().into());
+    let tets = goal.part_mut(Kind::Tets).unwrap();
+    tets.set(GOAL_FRAME, vec![12.0]).unwrap();
+    tets.set(GOAL_HOLD, vec![24.0]).unwrap();
+    let frames = simulating(cube())
+        .input(GOALS, goal)
+        .set(GOAL_ON, GoalOn::All)
+        .set(GRAVITY, [0.0; 3])
+        .set(VOLUME, 0.0)
+        .set(DAMPING, all(0.05))
+        .frames([1, 48]);
+    let rest = frames[0].mesh().positions();
+    let (low, high) = frames[1]
+        .mesh()
+        .positions()
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), p| (low.min(p[1]), high.max(p[1])));
+    assert!((high - low - 0.06).abs() < 1e-6, "{low} {high}");
+    assert!(frames[1].metrics["elastic"] < 1e-6, "{:?}", frames[1].metrics);
+    assert_eq!(rest.len(), 26, "the point inside is none of the surface's");
+}
+
+#[test]
+fn goals_inside_leave_the_surface_alone() {
+    // Without springs, gravity and volume nothing but a goal could move a particle.
+    let frames = simulating(cube())
+        .input(GOALS, pressed(0, cube().into()))
+        .set(GRAVITY, [0.0; 3])
+        .set(VOLUME, 0.0)
+        .set(STIFFNESS, all(0.0))
+        .frames([1, 2, 5]);
+    for frame in &frames[1..] {
+        for (p, q) in frame.mesh().positions().iter().zip(frames[0].mesh().positions()) {
+            assert!((0..3).all(|k| (p[k] - q[k]).abs() < 1e-8), "{p:?} {q:?}");
+        }
+    }
+    assert!(frames[1].metrics["goal_distance"] > 0.0);
+}
+
+#[test]
+fn a_block_rests_on_the_ground() {
+    let frames =
+        simulating(block([3; 3], [0.0; 3], [0.1; 3])).set(GROUND, true).set(STIFFNESS, all(1e5)).frames([1, 120, 121]);
+    let lowest = |frame: &Tasted| frame.mesh().positions().iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
+    assert!((0.0..=1e-3).contains(&lowest(&frames[1])), "{}", lowest(&frames[1]));
+    let moved = frames[1].mesh().positions().iter().zip(frames[2].mesh().positions()).map(|(p, q)| (p[1] - q[1]).abs());
+    assert!(moved.fold(0.0, f32::max) < 1e-6);
+    // The weight of 1 dm³ of water presses E = 1e5 by a half of ρgh/E on the mean.
+    assert!((height(&frames[1]) - 0.1).abs() < 2e-3, "{}", height(&frames[1]));
+}
+
+#[test]
+fn a_fine_surface_is_carried_by_coarse_tets() {
+    let fine =
+        Component::mesh(vec![3], vec![0, 1, 2], vec![[0.01, 0.02, 0.03], [0.05, 0.06, 0.03], [0.09, 0.02, 0.04]])
+            .unwrap();
+    let frames = simulating(Geometry::from(cube()).with(fine.clone())).frames([1, 5]);
+    let fallen = (0.5 * G * 16.0 * H * H) as f32;
+    assert_eq!(frames[0].mesh().runs(), fine.runs());
+    for (p, q) in fine.positions().iter().zip(frames[1].mesh().positions()) {
+        assert!((p[1] - q[1] - fallen).abs() < 1e-6 && (p[0] - q[0]).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn a_goal_of_no_body_or_of_two_is_refused_with_both_named() {
+    let (goal, other) = (pressed(0, cube().into()), block([1; 3], [0.0; 3], [0.1; 3]));
+    let refused = |bench: Bench| bench.input(GOALS, goal.clone()).at(2.0).try_cook().unwrap_err().fact;
+    assert_eq!(
+        refused(simulating(other)),
+        "`goals` 0 has 48 tets of 27 points, and no body has the same: 6 tets of 8 points"
+    );
+    assert_eq!(refused(simulating(cube()).input(BODIES, cube())), "`goals` 0 has the tets of both `bodies` 0 and 1");
+}
+
+#[test]
+fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
+    let upper = || block([2, 1, 2], [0.0, 0.102, 0.0], [0.1, 0.05, 0.1]);
+    // The upper one is held by its top; the lower one hangs on the springs between them.
+    let held = pins(vec![[0.0, 0.152, 0.0], [0.1, 0.152, 0.0], [0.0, 0.152, 0.1], [0.1, 0.152, 0.1]], 0.01);
+    let coupled = |stiffness: f64| {
+        simulating(cube())
+            .input(BODIES, upper())
+            .input(PINS, held.clone())
+            .set(COUPLING_RADIUS, 5e-3)
+            .set(COUPLING_STIFFNESS, stiffness)
+            .set(COUPLING_BREAK, 3.0)
+            .set(STIFFNESS, all(1e5))
+            .frames([1, 24])
+    };
+    let drop =
+        |frames: &[Tasted]| frames[0].part(Kind::Mesh).positions()[0][1] - frames[1].part(Kind::Mesh).positions()[0][1];
+    let held = coupled(2e4);
+    assert!(held[1].metrics["torn"] == 0.0 && drop(&held) < 0.01, "{} {:?}", drop(&held), held[1].metrics);
+    let torn = coupled(1.0);
+    assert!(torn[1].metrics["torn"] == 9.0 && drop(&torn) > 0.5, "{} {:?}", drop(&torn), torn[1].metrics);
+}
