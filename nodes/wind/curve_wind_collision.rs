@@ -83,7 +83,7 @@ const LENGTH_ERROR: Metric =
 /// See the module.
 pub static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    1,
+    2,
     "Curves bend around what wind blows them into. Each segment, root to tip, turns from where it grows towards where \
      wind wants it, until it touches a collider. Put it after the wind, and give it the curves from before the wind as \
      `rest`. What could not be freed is counted, not hidden.",
