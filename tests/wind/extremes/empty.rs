@@ -27,6 +27,8 @@ fn nothing_and_hardly_anything_go_through() {
         ("triangles that are points", on(&[[0.0, 0.4, 0.0]; 3], &[[0, 1, 2], [0, 0, 0]])),
         ("no gusts", Scene::new().with("gusts", r#""num_gusts": 0"#)),
     ]);
+    let none = Scene::new().cook_some(&NODES, &[], 2);
+    assert!(none.frames.is_empty() && none.errors.is_empty(), "no frames are no work");
     assert_eq!(cooked[0].of(2, "out").unwrap().point_count(), 0);
     assert_eq!(cooked[1].of(2, "out").unwrap().positions(), [root; 3], "what has one CV does not bend");
 }
