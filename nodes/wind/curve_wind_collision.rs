@@ -68,8 +68,11 @@ params! { PARAMS:
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, around what is in their way. Lengths are kept.");
 
-const CROSSINGS_LEFT: Metric =
-    Metric::new("crossings_left", Unit::None, "Segments that cross a collider as they are written.");
+const CROSSINGS_LEFT: Metric = Metric::new(
+    "crossings_left",
+    Unit::None,
+    "Segments that cross a collider as they are written; 0 while `blend` is 0.",
+);
 const UNFREED: Metric =
     Metric::new("unfreed_segments", Unit::None, "Segments that no turn frees from the collider they are in.");
 const STARTED_INSIDE: Metric = Metric::new("started_inside", Unit::None, "Curves that cross a collider at rest.");

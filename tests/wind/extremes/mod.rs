@@ -175,13 +175,18 @@ fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
         }
         let wrong = scene.refused.iter().find(|node| !cooked.errors.iter().any(|(refused, ..)| refused == *node));
         assert_eq!(wrong, None, "{what}: it is not refused");
-        for frame in 0..3 {
-            let at = Frame::whole(frame as i64 + 1);
-            check(&format!("{what}, frame {}", frame + 1), &cooked, frame, (scene.fur)(at), (scene.skin)(at));
-        }
+        check_all(what, &cooked, &scene);
         cooked
     });
     held.collect()
+}
+
+/// Checks all frames of what came out.
+fn check_all(what: &str, cooked: &Cooked, scene: &Scene) {
+    for frame in 0..3 {
+        let at = Frame::whole(frame as i64 + 1);
+        check(&format!("{what}, frame {}", frame + 1), cooked, frame, (scene.fur)(at), (scene.skin)(at));
+    }
 }
 
 fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometry) {

@@ -96,7 +96,8 @@ fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
                 Shape::Span | Shape::Vec2 => (false, |x| format!("[{x:?}, {x:?}]")),
                 _ => continue,
             };
-            let fault = |x: f64| Scene::new().with(id, format!(r#""{}": {}"#, spec.name, written(x))).fault();
+            let set = |x: f64| Scene::new().with(id, format!(r#""{}": {}"#, spec.name, written(x)));
+            let fault = |x: f64| set(x).fault();
             for (end, out) in [(hard.low, -1.0), (hard.high, 1.0)] {
                 if !end.is_finite() {
                     continue;
@@ -105,6 +106,13 @@ fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
                 let open = hard.open && out < 0.0;
                 let (inside, beyond) = if open { (end + step, end) } else { (end, end + out * step) };
                 assert_eq!(fault(inside), None, "`{}` of {name} takes {inside}", spec.name);
+                // A thousand million steps are as dear as they sound, and at a blend of 0 crossings are not looked for.
+                if !(spec.name == "rotation_steps" && out > 0.0 || id == "out" && spec.name == "blend" && out < 0.0) {
+                    let cooked = set(inside).cook(2);
+                    let refused = cooked.errors.iter().all(|(node, kind, _)| node == id && *kind == ErrorKind::Refused);
+                    assert!(refused, "`{}` of {name} at {inside}: {:?}", spec.name, cooked.errors);
+                    check_all(&format!("`{}` of {name} at {inside}", spec.name), &cooked, &set(inside));
+                }
                 let said = fault(beyond).unwrap_or_default();
                 assert!(
                     said.contains(&format!("`{}`", spec.name)) && said.contains("expected"),
