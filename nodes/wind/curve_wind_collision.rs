@@ -43,7 +43,7 @@ inputs! { INPUTS:
 params! { PARAMS:
     METHOD: Param<Method> = Param::choice("method", Method::Exact, "How a segment's turn is stopped.");
     ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Steps of a turn. More come nearer to the contact.")
-        .within(1.0, 1e9).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
+        .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
         "How far outside of the skin a root is brought, its curve with it. Below `gap` the beginning of a curve is not \
          tested, as it lies in the skin.")
