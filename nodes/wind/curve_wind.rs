@@ -98,7 +98,7 @@ const LENGTH_ERROR: Metric =
 /// See the module.
 pub static NODE: Node = Node::new(
     "Curve_Wind",
-    1,
+    2,
     "Wind bends curves, root to tip, without stretching them. Each CV turns the rest of its curve towards the wind, which \
      noise varies from place to place and carries downwind. An `envelope` on the CVs, 1 where it is missing, scales the \
      wind: gusts and shielding write it.",

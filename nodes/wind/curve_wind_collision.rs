@@ -43,7 +43,7 @@ inputs! { INPUTS:
 params! { PARAMS:
     METHOD: Param<Method> = Param::choice("method", Method::Exact, "How a segment's turn is stopped.");
     ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Steps of a turn. More come nearer to the contact.")
-        .within(1.0, 1e9).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
+        .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
         "How far outside of the skin a root is brought, its curve with it. Below `gap` the beginning of a curve is not \
          tested, as it lies in the skin.")
@@ -68,8 +68,11 @@ params! { PARAMS:
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, around what is in their way. Lengths are kept.");
 
-const CROSSINGS_LEFT: Metric =
-    Metric::new("crossings_left", Unit::None, "Segments that cross a collider as they are written.");
+const CROSSINGS_LEFT: Metric = Metric::new(
+    "crossings_left",
+    Unit::None,
+    "Segments that cross a collider as they are written; 0 while `blend` is 0.",
+);
 const UNFREED: Metric =
     Metric::new("unfreed_segments", Unit::None, "Segments that no turn frees from the collider they are in.");
 const STARTED_INSIDE: Metric = Metric::new("started_inside", Unit::None, "Curves that cross a collider at rest.");
@@ -83,7 +86,7 @@ const LENGTH_ERROR: Metric =
 /// See the module.
 pub static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    1,
+    2,
     "Curves bend around what wind blows them into. Each segment, root to tip, turns from where it grows towards where \
      wind wants it, until it touches a collider. Put it after the wind, and give it the curves from before the wind as \
      `rest`. What could not be freed is counted, not hidden.",

@@ -11,7 +11,7 @@
 //! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through a
 //!   cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
 //!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5 and
-//!   0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 % (tests/shielding.rs).
+//!   0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 % (tests/wind/shelter.rs).
 
 use std::sync::Arc;
 

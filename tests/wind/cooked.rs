@@ -1,15 +1,14 @@
 //! Graphs on the assets of `graphs/`, cooked in memory.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
 
-use engine::cook::{Delivered, Engine, Settings};
+use engine::cook::{Engine, Report, Settings};
 use engine::geometry::Geometry;
 use engine::graph::{Graph, GraphOutput, Link, probe};
-use engine::plan::Request;
+use engine::testing::cook_all;
 use engine::time::Frame;
 
 /// The bear, and its fur.
@@ -20,33 +19,56 @@ pub(crate) const BEAR: &str = r#"
 /// Frames of each output.
 type Frames = Vec<Vec<Geometry>>;
 
-/// What these nodes deliver at frames 1…`frames`: of each output all frames.
-pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
-    let text = format!(
+/// By node, name and frame.
+pub(crate) type Metrics = BTreeMap<String, BTreeMap<String, BTreeMap<Frame, f64>>>;
+
+/// A graph of these nodes, its outputs so many of them, over frames 1…`frames`.
+pub(crate) fn graph(nodes: &str, outputs: &[&str], frames: i64) -> Graph {
+    load(&text(nodes, outputs, frames), outputs).unwrap_or_else(|fault| panic!("{fault}"))
+}
+
+/// The first fault of such a graph.
+pub(crate) fn fault(nodes: &str, output: &str) -> Option<String> {
+    load(&text(nodes, &[output], 1), &[output]).err()
+}
+
+fn text(nodes: &str, outputs: &[&str], frames: i64) -> String {
+    format!(
         r#"{{ "convect": 1, "scene": {{ "frames": [1, {frames}], "seed": 7 }},
               "nodes": {{ {nodes} }}, "outputs": {{ "out": "{}" }} }}"#,
         outputs[0]
-    );
-    cook_text(&text, outputs, frames).0
+    )
 }
 
-/// As [`cook`], of an example's nodes; and all metrics, by node, name and frame.
+/// What these nodes deliver at frames 1…`frames`: of each output all frames.
+pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
+    cook_graph(&graph(nodes, outputs, frames), frames).0
+}
+
+/// As [`cook`], of an example's nodes; and all metrics.
 pub(crate) fn cook_file(example: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
     let path = graphs().join(example).join(example).with_extension("json");
-    cook_text(&fs::read_to_string(path).unwrap(), outputs, frames)
+    let graph = load(&fs::read_to_string(path).unwrap(), outputs).unwrap_or_else(|fault| panic!("{fault}"));
+    cook_graph(&graph, frames)
 }
 
-/// By node, name and frame.
-pub(crate) type Metrics = BTreeMap<String, BTreeMap<String, BTreeMap<Frame, f64>>>;
+/// The first output at `frames`, in the order asked for, on so many threads.
+pub(crate) fn cook_in_order(graph: &Graph, frames: &[i64], threads: usize) -> Vec<Arc<Geometry>> {
+    let engine = Engine::new(&Settings { threads, ..Settings::default() }).unwrap();
+    let frames: Vec<Frame> = frames.iter().copied().map(Frame::whole).collect();
+    let (found, report) = cook_all(&engine, graph, &frames);
+    assert!(report.errors.is_empty(), "{}", report.errors[0].1);
+    frames.iter().map(|frame| found[&(0, *frame)].clone()).collect()
+}
 
 fn graphs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs")
 }
 
-fn cook_text(text: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
+fn load(text: &str, outputs: &[&str]) -> Result<Graph, String> {
     let folder = graphs().join("bear_wind");
-    let mut graph =
-        Graph::load(text, &folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
+    let graph = Graph::load(text, &folder, convect::CATALOGUE, &[], &probe);
+    let mut graph = graph.map_err(|faults| faults[0].to_string())?;
     graph.outputs = outputs
         .iter()
         .map(|name| {
@@ -54,20 +76,24 @@ fn cook_text(text: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
             GraphOutput { name: (*name).into(), from: Link { node, port: 0 }, attributes: None, v: false }
         })
         .collect();
+    Ok(graph)
+}
+
+fn cook_graph(graph: &Graph, frames: i64) -> (Frames, Metrics) {
     let engine = Engine::new(&Settings::default()).unwrap();
-    let request = Request { outputs: (0..outputs.len()).collect(), frames: (1..=frames).map(Frame::whole).collect() };
-    let mut found = vec![vec![Geometry::default(); frames as usize]; outputs.len()];
-    let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
-        for one in finished {
-            found[one.output][one.frame.number() as usize - 1] = (*one.geometry).clone();
-        }
-        Ok(())
-    };
-    let report = engine.cook(&graph, &request, None, &AtomicBool::new(false), &mut sink).unwrap();
+    let asked: Vec<Frame> = (1..=frames).map(Frame::whole).collect();
+    let (found, report) = cook_all(&engine, graph, &asked);
     assert!(report.errors.is_empty(), "{}", report.errors[0].1);
+    let of_output =
+        |output: usize| asked.iter().map(|frame| (*found[&(output, *frame)]).clone()).collect::<Vec<Geometry>>();
+    ((0..graph.outputs.len()).map(of_output).collect(), metrics(graph, report))
+}
+
+/// All that was published.
+pub(crate) fn metrics(graph: &Graph, report: Report) -> Metrics {
     let metrics = graph.nodes.iter().zip(report.nodes).map(|(node, report)| {
-        let named = report.metrics.into_iter().map(|(name, values)| (name.to_string(), values.into_iter().collect()));
+        let named = report.metrics.into_iter().map(|(name, values)| (name.to_string(), values));
         (node.id.to_string(), named.collect())
     });
-    (found, metrics.collect())
+    metrics.collect()
 }

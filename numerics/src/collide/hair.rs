@@ -56,16 +56,16 @@ impl Hair<'_> {
                 self.out[k + 1] = self.out[k];
                 continue;
             }
-            let to = way / way.norm();
+            let wanted = way / way.norm();
             let rest = wide(self.rest[k + 1]) - wide(self.rest[k]);
-            let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { to };
+            let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { wanted };
             axis = perpendicular(&from, &axis);
             let pivot = wide(self.out[k]);
             let (from, to) = match all.ground(&pivot, length) {
-                None => (from, to),
+                None => (from, wanted),
                 Some(ground) => {
-                    let led =
-                        [&from, &to].map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, all.coherence));
+                    let led = [&from, &wanted]
+                        .map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, all.coherence));
                     (led[0], led[1])
                 }
             };
@@ -83,7 +83,9 @@ impl Hair<'_> {
             };
             let mut done = segment.turn(all.method, all.obstacles, &mut scratch.nearby);
             let mut end = segment.end(&done.direction);
-            if !done.met && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
+            // Not where it was led elsewhere.
+            let reaches = !done.met && to == wanted;
+            if reaches && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
                 end = self.goal[k + 1];
             }
             if !done.clear && first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {

@@ -26,7 +26,8 @@ pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
         let right = share > 0.5;
         let t = if right { 1.5 - share } else { 0.5 - share };
         let [before, after] = [0.5 * t * t, 0.5 * (1.0 - t) * (1.0 - t)];
-        let moved = mix32(salt.wrapping_add(axis as u32));
+        // By whole cells of the coarser octave: moved by half of one, 4 % of the energy would be that octave's.
+        let moved = mix32(salt.wrapping_add(axis as u32)) & !1;
         let middle = point.cell[axis].wrapping_add(u32::from(right)).wrapping_add(moved);
         let place = |step: u32| middle.wrapping_add(step).wrapping_sub(1) as usize % TILE;
         ([0, 1, 2].map(place), [before, 1.0 - before - after, after])

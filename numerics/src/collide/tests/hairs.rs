@@ -184,6 +184,24 @@ fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
 }
 
 #[test]
+fn coherent_fur_crosses_nothing_either() {
+    let mesh = sphere(12);
+    let tree = TriangleTree::build(&mesh.0, &mesh.1);
+    let obstacles = [&tree];
+    let normals = normals(&mesh.0, &mesh.1);
+    let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
+    for (k, wind) in [V3::x(), -V3::y(), unit(Key::new(8))].iter().enumerate() {
+        for coherence in [0.3, 1.0] {
+            let (starts, rest, goal) = fur(1000, 6, 0.5, *wind);
+            let out = collide(&starts, &rest, &goal, &Collide { skin: Some(skin), coherence, ..on(&obstacles) });
+            assert_eq!(out.unfreed_segments, 0, "case {k}, {coherence}");
+            assert_eq!(crossings(&starts, &out.points, &mesh), 0, "case {k}, {coherence}");
+            assert!(worst_length(&starts, &goal, &out.points) < 1e-6);
+        }
+    }
+}
+
+#[test]
 fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);

@@ -1,4 +1,4 @@
-//! One spring against the exact solution of its equation (NUMERICS A, jiggle).
+//! One spring against the exact solution of its equation.
 
 use super::*;
 

@@ -1,0 +1,100 @@
+//! Straight curves in a wind without noise.
+
+use numerics::bend::{Bend, Mode, bend};
+use numerics::ramp::Ramp;
+
+use super::{Figure, storage};
+
+type Point = [f32; 3];
+
+const RESOLUTION_FREE: Mode = Mode::ResolutionFree { reference_segments: 4.0 };
+
+/// A straight curve of length 1 at an angle of `theta` to x, bent by wind along x.
+fn bent(root: Point, theta: f64, segments: usize, g: f32, mode: Mode) -> Vec<Point> {
+    let along = [libm::cos(theta), 0.6 * libm::sin(theta), 0.8 * libm::sin(theta)];
+    let cv = |k: usize| std::array::from_fn(|d| root[d] + (along[d] * k as f64 / segments as f64) as f32);
+    let points: Vec<Point> = (0..=segments).map(cv).collect();
+    let ramp = Ramp::constant(1.0);
+    let with = Bend {
+        wind: [1.0, 0.0, 0.0],
+        rotate: g,
+        rotate_mask: None,
+        envelope: None,
+        ramp: &ramp,
+        mode,
+        blend: 1.0,
+        blend_mask: None,
+        noise: None,
+    };
+    bend(&[0, segments as u32 + 1], &points, &with).points
+}
+
+fn angle_to_x(ends: &[Point]) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|k| f64::from(ends[1][k]) - f64::from(ends[0][k]));
+    libm::atan2((y * y + z * z).sqrt(), x)
+}
+
+/// Errors of segments' angles, each with what storing the positions may turn it by; `law` gives the share of the angle
+/// that is left from the segment's number and its middle's u.
+fn angle_errors(root: Point, segments: usize, mode: Mode, law: impl Fn(f64, usize, f64) -> f64) -> Vec<[f64; 2]> {
+    let mut errors = Vec::new();
+    for theta in [1e-3, 0.3, 1.2, 1.5, 2.7, 3.1] {
+        for g in [0.05_f32, 0.3, 0.5, 0.9] {
+            let points = bent(root, theta, segments, g, mode);
+            let storage = storage(&points) * segments as f64;
+            errors.extend(points.windows(2).enumerate().map(|(k, ends)| {
+                let left = law(1.0 - f64::from(g), k, (k as f64 + 0.5) / segments as f64);
+                [(angle_to_x(ends) - theta * left).abs(), storage]
+            }));
+        }
+    }
+    errors
+}
+
+/// How far the tip is from that of the finest curve, of length 1.
+fn tip_error(segments: usize, g: f32) -> f64 {
+    let tip = |segments| *bent([0.0; 3], 2.0, segments, g, RESOLUTION_FREE).last().unwrap();
+    let (tip, finest) = (tip(segments), tip(1024));
+    (0..3).map(|k| f64::from(tip[k]) - f64::from(finest[k])).map(|d| d * d).sum::<f64>().sqrt()
+}
+
+pub(super) fn figures() -> Vec<Figure> {
+    let counts = [2, 4, 8, 32, 128];
+    // W2: every pivot turns the rest of a straight curve by the share g of what is left.
+    let paper = |root: Point| {
+        (1..=8).flat_map(move |n| angle_errors(root, n, Mode::Paper, |left, k, _| libm::pow(left, k as f64 + 1.0)))
+    };
+    let free = |root: Point| {
+        counts
+            .into_iter()
+            .flat_map(move |n| angle_errors(root, n, RESOLUTION_FREE, |left, _, u| libm::pow(left, 4.0 * u)))
+    };
+    let far = [900.0, -7.0, 400.0];
+    let shares = [0.3, 0.5, 0.7];
+    let orders = shares.map(|g| {
+        let order = |pair: &[usize]| {
+            let finer = pair[1] as f64 / pair[0] as f64;
+            libm::log(tip_error(pair[0], g) / tip_error(pair[1], g)) / libm::log(finer)
+        };
+        counts.windows(2).map(order).collect::<Vec<_>>()
+    });
+    let at_9_cvs = shares.map(|g| tip_error(8, g)).into_iter().fold(0.0, f64::max);
+    vec![
+        Figure::stored(
+            "Curve_Wind: segment k of a straight curve is left with θ₀(1−g)^k, 1 to 8 segments",
+            paper([0.0; 3]),
+            2e-6,
+            " rad",
+        ),
+        Figure::stored("the same a kilometre away", paper(far), 2e-6, " rad"),
+        Figure::stored(
+            "`resolution_free`: θ₀(1−g)^(u·n) in the middle of every segment, 3 to 129 CVs",
+            free([0.0; 3]),
+            2e-6,
+            " rad",
+        ),
+        Figure::stored("the same a kilometre away", free(far), 2e-6, " rad"),
+        Figure::within("its tips converge, 3 to 129 CVs: order", &orders.concat(), [1.7, 2.3]),
+        Figure::error("its tip at 9 CVs", at_9_cvs, 1e-2, " L"),
+    ]
+}

@@ -1,0 +1,180 @@
+//! Where segments that turn into something stop.
+//!
+//! Each shape's first contact is a closed form in the angle φ of the turn. Where a mesh stands for a round shape, two
+//! radii bound it: that of its points and that of its faces' middles. Turns that graze (a contact that a hair's breadth
+//! makes or breaks) are left out.
+
+mod round;
+mod sharp;
+mod steps;
+
+use numerics::collide::{Collide, Method, Scaled, collide};
+use numerics::random::Key;
+use numerics::tree::TriangleTree;
+use std::f64::consts::{PI, TAU};
+
+use super::Figure;
+
+type V = [f64; 3];
+type Point = [f32; 3];
+
+fn dot(a: V, b: V) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: V, b: V) -> V {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// a + t·b.
+fn along(a: V, b: V, t: f64) -> V {
+    std::array::from_fn(|k| a[k] + t * b[k])
+}
+
+fn unit(v: V) -> V {
+    let length = dot(v, v).sqrt();
+    v.map(|x| x / length)
+}
+
+fn random_unit(key: Key) -> V {
+    let v: V = [0, 1, 2].map(|axis| 2.0 * key.of(axis).f64() - 1.0);
+    if (0.01..1.0).contains(&dot(v, v)) { unit(v) } else { random_unit(key.of(9)) }
+}
+
+fn narrow(v: V) -> Point {
+    v.map(|x| x as f32)
+}
+
+fn wide(v: Point) -> V {
+    v.map(f64::from)
+}
+
+/// A segment of length 1 that is to turn about one end.
+struct Turn {
+    rest: [Point; 2],
+    goal: [Point; 2],
+    pivot: V,
+    /// Where it points, and which way it turns: unit, at a right angle.
+    u: V,
+    v: V,
+    /// How far.
+    goal_angle: f64,
+}
+
+impl Turn {
+    fn new(pivot: V, from: V, to: V) -> Self {
+        let pivot = narrow(pivot);
+        let [rest, goal] = [from, to].map(|way| [pivot, narrow(along(wide(pivot), way, 1.0))]);
+        let pivot = wide(pivot);
+        // As the rounded positions say.
+        let [u, to] = [rest, goal].map(|ends| unit(along(wide(ends[1]), pivot, -1.0)));
+        let v = unit(along(to, u, -dot(to, u)));
+        let mut turn = Self { rest, goal, pivot, u, v, goal_angle: 0.0 };
+        turn.goal_angle = turn.angle(to);
+        turn
+    }
+
+    /// The angle of a direction in the plane of the turn, 0 to 2π.
+    fn angle(&self, way: V) -> f64 {
+        libm::atan2(dot(way, self.v), dot(way, self.u)).rem_euclid(TAU)
+    }
+
+    fn direction(&self, angle: f64) -> V {
+        along(self.u.map(|x| libm::cos(angle) * x), self.v, libm::sin(angle))
+    }
+}
+
+/// Where a turn first meets something.
+enum First {
+    Never,
+    /// Between these angles, which are one but for what a mesh leaves of a round shape.
+    At([f64; 2]),
+    Grazes,
+}
+
+/// A mesh, and turns with their first contact.
+struct Case {
+    points: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+    turns: Vec<(Turn, First)>,
+}
+
+/// What is kept from contact: with 1 as the length this is the angle, or so.
+const GAP: f64 = 1e-6;
+
+/// Thin curves without a skin.
+fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: Method, gap: f64) -> Collide<'a> {
+    Collide {
+        obstacles,
+        skin: None,
+        method,
+        coherence: 0.0,
+        gap,
+        offset_root: gap,
+        offset_scale: None,
+        at_rest: None,
+        blend: Scaled { value: 1.0, mask: None },
+        width: Scaled { value: 0.0, mask: None },
+    }
+}
+
+/// The largest error of the angle at which turns stop, and the farthest that any goes on past its first contact.
+fn worst(case: &Case) -> [f64; 2] {
+    let tree = TriangleTree::build(&case.points, &case.triangles);
+    let obstacles = [&tree];
+    let starts: Vec<u32> = (0..=case.turns.len() as u32).map(|turn| 2 * turn).collect();
+    let ends = |of: fn(&Turn) -> [Point; 2]| case.turns.iter().flat_map(|(turn, _)| of(turn)).collect::<Vec<_>>();
+    let out =
+        collide(&starts, &ends(|turn| turn.rest), &ends(|turn| turn.goal), &plain(&obstacles, Method::Exact, GAP));
+    let (mut error, mut past, mut met) = (0.0_f64, 0.0_f64, 0);
+    for ((turn, first), written) in case.turns.iter().zip(out.points.chunks(2)) {
+        let angle = turn.angle(along(wide(written[1]), turn.pivot, -1.0));
+        let angle = if angle > 1.5 * PI { angle - TAU } else { angle };
+        let [low, high] = match first {
+            First::Grazes => continue,
+            First::Never => [turn.goal_angle; 2],
+            First::At(between) => between.map(|angle| angle.min(turn.goal_angle)),
+        };
+        met += usize::from(high < turn.goal_angle);
+        error = error.max((angle - low).abs()).max((angle - high).abs());
+        past = past.max(angle - high);
+    }
+    assert!(met > 100 && met < case.turns.len(), "{met} of {} turns meet something", case.turns.len());
+    [error, past]
+}
+
+/// Random turns about pivots that `pivot` gives.
+fn turns(
+    count: u64,
+    salt: u64,
+    pivot: impl Fn(Key) -> V,
+    first: impl Fn(&Turn) -> Option<First>,
+) -> Vec<(Turn, First)> {
+    let turn = |k: u64| {
+        let key = Key::new(salt).of(k);
+        let turn = Turn::new(pivot(key), random_unit(key.of(20)), random_unit(key.of(21)));
+        first(&turn).map(|first| (turn, first))
+    };
+    (0..count).filter_map(turn).collect()
+}
+
+pub(super) fn figures() -> Vec<Figure> {
+    let cases = [
+        ("Curve_Wind_Collision: first contact with a plane", worst(&round::floor())),
+        ("first contact with a sphere", worst(&round::sphere())),
+        ("first contact with a cylinder's flank", worst(&round::cylinder())),
+        ("first contact with the edge of a blade of 1°", sharp::blades()),
+        ("first contact with a needle 1e-6 thick", sharp::needles()),
+        ("first contact with the first of 144 needles", worst(&sharp::grid())),
+    ];
+    let past = cases.iter().map(|(_, [_, past])| *past).fold(0.0, f64::max);
+    let mut figures: Vec<Figure> =
+        cases.iter().map(|(law, [error, _])| Figure::error(law, *error, 1e-4, " rad")).collect();
+    figures.push(Figure::error("how far any of these goes past its first contact", past, 1e-5, " L"));
+    figures.push(Figure::within(
+        "`steps` comes nearer to `exact` as 1/steps, 2 to 256: slope",
+        &[steps::slope()],
+        [0.8, 1.2],
+    ));
+    figures
+}

@@ -1,0 +1,68 @@
+//! Nothing at all, and hardly anything.
+
+use super::*;
+use crate::cooked::cook;
+
+fn of(list: Vec<Vec<Point>>) -> Scene {
+    Scene::new().fur(move |_| curves(&list))
+}
+
+fn on(points: &[Point], triangles: &[[u32; 3]]) -> Scene {
+    let (points, triangles) = (points.to_vec(), triangles.to_vec());
+    Scene::new().skin(move |_| mesh(&triangles, points.clone()))
+}
+
+#[test]
+fn nothing_and_hardly_anything_go_through() {
+    let root = [0.0, 0.5, 0.0];
+    let cooked = hold([
+        ("no curves", of(vec![])),
+        ("one CV", of(vec![vec![root]; 3])),
+        ("two equal CVs", of(vec![vec![root; 2], vec![root, root, [0.0, 0.8, 0.1]]])),
+        ("all CVs equal", of(vec![vec![root; 5]; 20])),
+        ("one curve of one, among others", of([vec![vec![root]], hairs(20, 5, 0.3)].concat())),
+        ("an empty mesh", on(&[], &[]).refused(&["grown"])),
+        ("one triangle", on(&[[-1.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, -1.0]], &[[0, 1, 2]])),
+        ("one triangle without area", on(&[[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1, 2]])),
+        ("triangles that are points", on(&[[0.0, 0.4, 0.0]; 3], &[[0, 1, 2], [0, 0, 0]])),
+        ("no gusts", Scene::new().with("gusts", r#""num_gusts": 0"#)),
+    ]);
+    let none = Scene::new().cook_some(&NODES, &[], 2);
+    assert!(none.frames.is_empty() && none.errors.is_empty(), "no frames are no work");
+    assert_eq!(cooked[0].of(2, "out").unwrap().point_count(), 0);
+    assert_eq!(cooked[1].of(2, "out").unwrap().positions(), [root; 3], "what has one CV does not bend");
+}
+
+#[test]
+fn triangles_without_area_among_others_change_nothing() {
+    let flat = Scene::new().skin(|_| ball_of(|all| [all, vec![[0, 0, 1], [5, 5, 5], [0, 1, 1]]].concat()));
+    let cooked = hold([("a ball", Scene::new()), ("a ball with triangles without area", flat)]);
+    for node in ["lee", "out"] {
+        let [plain, flat] = [0, 1].map(|row: usize| cooked[row].of(2, node).unwrap());
+        assert_eq!(plain.positions(), flat.positions());
+    }
+}
+
+#[test]
+fn curves_without_a_skin_blow_and_swing() {
+    let nodes = r#"
+        "fur": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0], [0, 2, 0]] } },
+        "gusts": { "type": "Curve_Wind_Gusts", "inputs": { "curves": "fur" }, "params": { "base": 0.5 } },
+        "lee": { "type": "Curve_Wind_Shielding", "inputs": { "curves": "gusts" } },
+        "wind": { "type": "Curve_Wind", "inputs": { "curves": "lee" } },
+        "swing": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" } },
+        "out": { "type": "Curve_Wind_Collision", "inputs": { "curves": "swing", "rest": "fur" } }"#;
+    let frames = cook(nodes, &["fur", "out"], 12);
+    let [still, blown] = [0, 1].map(|output| frames[output][11].curves().unwrap());
+    assert!(length_error(blown, still) <= 1e-5);
+    assert!(norm(difference(wide(blown.positions()[2]), wide(still.positions()[2]))) > 0.1);
+    for (node, input) in [("Curve_Attach", "rest_skin"), ("Curve_Interpolate", "skin")] {
+        let curves = if node == "Curve_Attach" { "curves" } else { "guides" };
+        let alone = format!(
+            r#""fur": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
+               "n": {{ "type": "{node}", "inputs": {{ "{curves}": "fur" }} }}"#
+        );
+        let said = fault(&alone, "n").unwrap_or_default();
+        assert!(said.contains(&format!("`{input}`")), "{said}");
+    }
+}

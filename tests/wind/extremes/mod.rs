@@ -1,0 +1,322 @@
+//! The wind nodes at their extremes: absurd numbers, nothing at all, wind from everywhere, colliders that should not be.
+//!
+//! Each row of a table is a scene, and all of its nodes are held to the same: what comes out is finite, has the lengths
+//! and roots that went in, envelopes of 0…1, no crossing that is not counted, and the same bits on one thread and on
+//! seven; or it is refused, where the row says so, by a message and never by a panic.
+
+mod colliders;
+mod empty;
+mod numbers;
+mod wind;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use engine::cook::{Engine, Settings};
+use engine::error::ErrorKind;
+use engine::geometry::{Component, ENVELOPE, Geometry, Kind, P};
+use engine::graph::Body;
+use engine::testing::cook_all;
+use engine::time::Frame;
+use numerics::random::Key;
+use numerics::shapes::icosphere;
+
+use super::cooked::{fault, graph, metrics};
+
+type Point = [f32; 3];
+type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
+
+/// The nodes that are held to it: the chain, and what carries and fills curves.
+const NODES: [&str; 7] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs"];
+
+/// What all nodes of a row are given.
+#[derive(Clone)]
+struct Scene {
+    fur: At,
+    skin: At,
+    /// By node, its params.
+    params: BTreeMap<&'static str, String>,
+    fps: f64,
+    /// Nodes that refuse it.
+    refused: &'static [&'static str],
+}
+
+impl Scene {
+    /// Fur on a ball of radius ½, in a wind that turns.
+    fn new() -> Self {
+        let params = [
+            ("gusts", r#""radius_range": [0.4, 0.8], "start_frame_range": [-10, 2], "base": 0.2"#),
+            ("wind", r#""wind_dir": { "keyframes": [[1, [1, 0, 0]], [3, [0, 0.5, 1]]] }"#),
+            ("hairs", r#""density": 20"#),
+        ];
+        Self {
+            fur: Arc::new(|_| curves(&hairs(20, 5, 0.3))),
+            skin: Arc::new(|_| ball()),
+            params: params.map(|(node, params)| (node, params.to_owned())).into(),
+            fps: 24.0,
+            refused: &[],
+        }
+    }
+
+    fn fur(self, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
+        Self { fur: Arc::new(at), ..self }
+    }
+
+    fn skin(self, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
+        Self { skin: Arc::new(at), ..self }
+    }
+
+    /// With these params of a node, in place of those it has here.
+    fn with(mut self, node: &'static str, params: impl Into<String>) -> Self {
+        self.params.insert(node, params.into());
+        self
+    }
+
+    fn refused(self, refused: &'static [&'static str]) -> Self {
+        Self { refused, ..self }
+    }
+
+    fn nodes(&self) -> String {
+        let params = |node: &str| self.params.get(node).map_or("", String::as_str);
+        format!(
+            r#"
+            "fur": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
+            "skin": {{ "type": "Mesh_Primitive" }}, "still": {{ "type": "Mesh_Primitive" }},
+            "gust": {{ "type": "Gust_Control" }},
+            "gusts": {{ "type": "Curve_Wind_Gusts", "inputs": {{ "curves": "fur", "controls": ["gust"] }}, "params": {{ {} }} }},
+            "lee": {{ "type": "Curve_Wind_Shielding", "inputs": {{ "curves": "gusts", "colliders": ["skin"] }}, "params": {{ {} }} }},
+            "wind": {{ "type": "Curve_Wind", "inputs": {{ "curves": "lee" }}, "params": {{ {} }} }},
+            "swing": {{ "type": "Curve_Jiggle", "inputs": {{ "curves": "wind", "skin": "skin" }}, "params": {{ {} }} }},
+            "out": {{ "type": "Curve_Wind_Collision",
+                     "inputs": {{ "curves": "swing", "rest": "fur", "colliders": ["skin"] }}, "params": {{ {} }} }},
+            "grown": {{ "type": "Curve_Attach", "inputs": {{ "curves": "fur", "rest_skin": "still", "skin": "skin" }} }},
+            "hairs": {{ "type": "Curve_Interpolate", "inputs": {{ "guides": "fur", "skin": "skin" }}, "params": {{ {} }} }}"#,
+            params("gusts"),
+            params("lee"),
+            params("wind"),
+            params("swing"),
+            params("out"),
+            params("hairs"),
+        )
+    }
+
+    /// The first fault that such a graph has before anything is cooked.
+    fn fault(&self) -> Option<String> {
+        fault(&self.nodes(), "out")
+    }
+
+    /// Cooks frames 1 to 3 on so many threads.
+    fn cook(&self, threads: usize) -> Cooked {
+        self.cook_some(&NODES, &[1, 2, 3], threads)
+    }
+
+    /// Cooks some of the nodes at some of the frames.
+    fn cook_some(&self, nodes: &[&str], frames: &[i64], threads: usize) -> Cooked {
+        let mut graph = graph(&self.nodes(), nodes, 3);
+        graph.scene.fps = self.fps;
+        let first = (self.skin)(Frame::whole(1));
+        let given: [(&str, At); 3] =
+            [("fur", self.fur.clone()), ("skin", self.skin.clone()), ("still", Arc::new(move |_| first.clone()))];
+        for (id, at) in given {
+            let node = graph.nodes.iter_mut().find(|node| &*node.id == id).unwrap();
+            node.body = Body::Given { at, moves: true };
+        }
+        let engine = Engine::new(&Settings { threads, ..Settings::default() }).unwrap();
+        let frames: Vec<Frame> = frames.iter().copied().map(Frame::whole).collect();
+        let (found, report) = cook_all(&engine, &graph, &frames);
+        let errors =
+            report.errors.iter().map(|(_, error, _)| (error.node.to_string(), error.error.kind, error.to_string()));
+        let mut errors: Vec<_> = errors.collect();
+        errors.dedup();
+        let metrics = metrics(&graph, report);
+        let metric = |node: &str, name: &str| -> Vec<f64> {
+            let values = metrics.get(node).and_then(|node| node.get(name));
+            values.map(|values| values.values().copied().collect()).unwrap_or_default()
+        };
+        let made = |frame: &Frame| {
+            let output = |node: &&str| nodes.iter().position(|name| name == node);
+            NODES.iter().map(|node| found.get(&(output(node)?, *frame)).cloned()).collect()
+        };
+        let counts = ["crossings_left", "started_inside", "contacts", "unfreed_segments"];
+        Cooked {
+            frames: frames.iter().map(made).collect(),
+            counts: counts.map(|name| (name, metric("out", name))).into(),
+            errors,
+        }
+    }
+}
+
+/// What came out.
+#[derive(PartialEq)]
+struct Cooked {
+    /// By frame, what each node made.
+    frames: Vec<Vec<Option<Arc<Geometry>>>>,
+    /// What collision counted, by frame.
+    counts: BTreeMap<&'static str, Vec<f64>>,
+    /// Node, kind and message.
+    errors: Vec<(String, ErrorKind, String)>,
+}
+
+impl Cooked {
+    fn of(&self, frame: usize, node: &str) -> Option<&Component> {
+        let place = NODES.iter().position(|name| *name == node).unwrap();
+        self.frames[frame][place].as_ref().map(|geometry| geometry.curves().unwrap())
+    }
+}
+
+/// Holds every node to what the module says, in each of these scenes; gives what they made.
+fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
+    let held = rows.into_iter().map(|(what, scene)| {
+        let cooked = scene.cook(1);
+        assert!(cooked == scene.cook(7), "{what}: other bits on 7 threads than on one");
+        for (node, kind, error) in &cooked.errors {
+            assert!(matches!(kind, ErrorKind::Refused | ErrorKind::NotFinite), "{what}: {error} ({kind:?})");
+            assert!(scene.refused.contains(&node.as_str()), "{what}: {error}");
+        }
+        let wrong = scene.refused.iter().find(|node| !cooked.errors.iter().any(|(refused, ..)| refused == *node));
+        assert_eq!(wrong, None, "{what}: it is not refused");
+        check_all(what, &cooked, &scene);
+        cooked
+    });
+    held.collect()
+}
+
+/// Checks all frames of what came out.
+fn check_all(what: &str, cooked: &Cooked, scene: &Scene) {
+    for frame in 0..3 {
+        let at = Frame::whole(frame as i64 + 1);
+        check(&format!("{what}, frame {}", frame + 1), cooked, frame, (scene.fur)(at), (scene.skin)(at));
+    }
+}
+
+fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometry) {
+    let fur = fur.curves().unwrap();
+    for node in NODES {
+        let Some(made) = cooked.of(frame, node) else { continue };
+        assert!(made.positions().as_flattened().iter().all(|x| x.is_finite()), "{what}: `{node}`");
+        if let Some(envelope) = made.get(ENVELOPE).filter(|_| fur.get(ENVELOPE).is_none()) {
+            assert!(envelope.iter().all(|x| (0.0..=1.0).contains(x)), "{what}: `{node}`");
+        }
+        if node != "hairs" {
+            assert_eq!(made.runs(), fur.runs(), "{what}: `{node}`");
+            let error = length_error(made, fur);
+            assert!(error <= 1e-5, "{what}: `{node}` changes lengths by {error:.1e} of a curve's");
+        }
+        if ["wind", "swing"].contains(&node) {
+            let roots =
+                |part: &Component| part.runs().ranges().map(|cvs| part.positions()[cvs.start]).collect::<Vec<_>>();
+            assert!(roots(made) == roots(fur), "{what}: `{node}` moves roots");
+        }
+    }
+    if let Some(out) = cooked.of(frame, "out") {
+        let (found, counted) = (crossings(out, skin.mesh().unwrap()), cooked.counts["crossings_left"][frame]);
+        assert!(found as f64 <= counted, "{what}: {found} segments cross, {counted} were counted");
+    }
+}
+
+/// The largest change of a segment's length, as a share of the curve's and beyond what storing positions may change.
+fn length_error(made: &Component, fur: &Component) -> f64 {
+    let mut worst = 0.0_f64;
+    for cvs in fur.runs().ranges() {
+        let (now, then) = (&made.positions()[cvs.clone()], &fur.positions()[cvs]);
+        let lengths = |points: &[Point]| -> Vec<f64> {
+            points.windows(2).map(|ends| norm(difference(wide(ends[1]), wide(ends[0])))).collect()
+        };
+        let largest = now.iter().chain(then).flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+        let allowed = 4.0 * (f64::from(largest.next_up()) - f64::from(largest));
+        let (now, then) = (lengths(now), lengths(then));
+        let whole: f64 = then.iter().sum();
+        for (now, then) in now.iter().zip(&then) {
+            let beyond = ((now - then).abs() - allowed).max(0.0);
+            worst = worst.max(if whole > 0.0 { beyond / whole } else { beyond });
+        }
+    }
+    worst
+}
+
+/// Segments that pass through a triangle: the segment's ends on either side of it, all three edges passed on the same
+/// side; in f64.
+fn crossings(curves: &Component, mesh: &Component) -> usize {
+    let corners = |triangle: &[u32; 3]| triangle.map(|corner| wide(mesh.positions()[corner as usize]));
+    let triangles: Vec<[[f64; 3]; 3]> = mesh.triangles().corners.iter().map(corners).collect();
+    let crosses = |a: [f64; 3], b: [f64; 3], triangle: &[[f64; 3]; 3]| {
+        let [p, q, r] = triangle.map(|corner| difference(corner, a));
+        let way = difference(b, a);
+        let normal = cross(difference(q, p), difference(r, p));
+        let (start, end) = (-dot(normal, p), dot(normal, difference(way, p)));
+        let volumes = [dot(way, cross(p, q)), dot(way, cross(q, r)), dot(way, cross(r, p))];
+        start * end < 0.0 && (volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0))
+    };
+    let segments = curves.runs().ranges().flat_map(|cvs| curves.positions()[cvs].windows(2));
+    segments.filter(|ends| triangles.iter().any(|triangle| crosses(wide(ends[0]), wide(ends[1]), triangle))).count()
+}
+
+fn wide(p: Point) -> [f64; 3] {
+    p.map(f64::from)
+}
+
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Curves as CVs a curve.
+fn curves(list: &[Vec<Point>]) -> Geometry {
+    let counts = list.iter().map(|curve| curve.len() as u32).collect();
+    Component::curves(counts, list.concat()).unwrap().into()
+}
+
+/// Curves of `cvs` CVs and this length, that stand and lean on the ball.
+fn hairs(count: u64, cvs: usize, length: f32) -> Vec<Vec<Point>> {
+    let hair = |k: u64| {
+        let up = direction(Key::new(5).of(k));
+        let lean = direction(Key::new(6).of(k));
+        let way: Point = std::array::from_fn(|d| up[d] + 0.4 * lean[d]);
+        let size = way.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let at = |cv: usize| cv as f32 / (cvs - 1).max(1) as f32 * length / size;
+        (0..cvs).map(|cv| std::array::from_fn(|d| 0.5 * up[d] + at(cv) * way[d])).collect()
+    };
+    (0..count).map(hair).collect()
+}
+
+fn direction(key: Key) -> Point {
+    let v: Point = [0, 1, 2].map(|axis| key.of(axis).between([-1.0, 1.0]));
+    let size = v.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if (0.1..1.0).contains(&size) { v.map(|x| x / size) } else { direction(key.of(9)) }
+}
+
+/// A ball of radius ½, of 320 triangles.
+fn ball() -> Geometry {
+    ball_of(|triangles| triangles)
+}
+
+/// The ball's points, joined otherwise.
+fn ball_of(triangles: impl Fn(Vec<[u32; 3]>) -> Vec<[u32; 3]>) -> Geometry {
+    let ball = icosphere(0.5, 2);
+    mesh(&triangles(ball.triangles()), ball.points.iter().map(|p| p.map(|x| x as f32)).collect())
+}
+
+fn mesh(triangles: &[[u32; 3]], points: Vec<Point>) -> Geometry {
+    Component::mesh(vec![3; triangles.len()], triangles.as_flattened().to_vec(), points).unwrap().into()
+}
+
+/// Every position of a geometry changed.
+fn moved(mut geometry: Geometry, change: impl Fn(Point) -> Point) -> Geometry {
+    for kind in [Kind::Curves, Kind::Mesh] {
+        if let Some(part) = geometry.part_mut(kind) {
+            part.edit(P).unwrap().iter_mut().for_each(|p| *p = change(*p));
+        }
+    }
+    geometry
+}

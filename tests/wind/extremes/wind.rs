@@ -1,0 +1,139 @@
+//! Wind from everywhere, gusts by the thousand, springs of any stiffness, curves of any number.
+
+use super::*;
+use engine::geometry::SHIELDED;
+
+fn blowing(wind: &str) -> Scene {
+    let wind = format!(r#""wind_dir": {wind}"#);
+    Scene::new().with("gusts", format!(r#"{wind}, "base": 0.2"#)).with("lee", wind.clone()).with("wind", wind)
+}
+
+fn enveloped(value: f32) -> Scene {
+    Scene::new().fur(move |_| {
+        let mut fur = curves(&hairs(20, 5, 0.3));
+        let part = fur.part_mut(Kind::Curves).unwrap();
+        part.set(ENVELOPE, vec![value; part.point_count()]).unwrap();
+        fur
+    })
+}
+
+#[test]
+fn wind_from_anywhere_bends_and_never_breaks() {
+    let upright = |_| {
+        curves(&(0..20).map(|k| (0..5).map(|cv| [0.1 * k as f32, 0.1 * cv as f32, 0.0]).collect()).collect::<Vec<_>>())
+    };
+    let cooked = hold([
+        (
+            "along the curves",
+            blowing("[0, 1, 0]").fur(upright).with("wind", r#""wind_dir": [0, 1, 0], "noise": "none""#),
+        ),
+        (
+            "against them exactly",
+            blowing("[0, -1, 0]").fur(upright).with("wind", r#""wind_dir": [0, -1, 0], "noise": "none""#),
+        ),
+        (
+            "turning about in a frame",
+            blowing(r#"{ "keyframes": [[1, [1, 0, 0]], [2, [-1, 0, 0]], [3, [1, 0, 0.001]]] }"#),
+        ),
+        ("turning about between frames", blowing(r#"{ "keyframes": [[1, [1, 0, 0]], [2.5, [-1, 0, 0.001]]] }"#)),
+        ("of length 1e-38", blowing("[1e-38, 0, 1e-38]")),
+        ("of length 1e38", blowing("[0, 1e38, 1e38]")),
+        ("all the way round at every CV", Scene::new().with("wind", r#""global_rotate": 1000"#)),
+    ]);
+    assert_eq!(cooked[0].of(0, "wind").unwrap().positions(), upright(Frame::whole(1)).curves().unwrap().positions());
+    assert_ne!(cooked[1].of(0, "wind").unwrap().positions(), upright(Frame::whole(1)).curves().unwrap().positions());
+    for node in ["gusts", "lee", "wind"] {
+        let said = Scene::new().with(node, r#""wind_dir": [0, 0, 0]"#).fault().unwrap_or_default();
+        assert!(said.contains("`wind_dir` is [0, 0, 0]"), "{node}: {said}");
+    }
+}
+
+#[test]
+fn envelopes_beyond_their_range_and_gusts_by_the_thousand_are_met() {
+    let gusts = |params: &str| Scene::new().with("gusts", format!(r#"{params}, "start_frame_range": [-100, 1]"#));
+    hold([
+        ("envelopes below 0", enveloped(-3.0)),
+        ("envelopes above 1", enveloped(1e30)),
+        ("10,000 gusts over each other", gusts(r#""num_gusts": 10000, "radius_range": [1, 3], "distance": 0.1"#)),
+        ("gusts of radius 0", gusts(r#""radius_range": [0, 0]"#)),
+        ("gusts of no life", gusts(r#""life_range": [0, 0], "decay_range": [0, 0]"#)),
+        ("gusts that end at once", gusts(r#""life_range": [1, 1], "decay_range": [0, 0]"#)),
+    ]);
+    for (param, range) in [
+        ("radius_range", "[-1, 1]"),
+        ("speed_range", "[-1, 1]"),
+        ("life_range", "[-1, 1]"),
+        ("decay_range", "[-1, -1]"),
+    ] {
+        let said = Scene::new().with("gusts", format!(r#""{param}": {range}"#)).fault().unwrap_or_default();
+        assert!(said.contains(&format!("`{param}` is {range}")), "{said}");
+    }
+}
+
+#[test]
+fn springs_of_any_stiffness_and_damping_swing_and_hold() {
+    let swing = |params: &str| Scene::new().with("swing", params);
+    let cooked = hold([
+        ("1e-6 Hz", swing(r#""frequency": 1e-6"#)),
+        ("1e9 Hz", swing(r#""frequency": 1e9"#)),
+        ("ζ 1e-6", swing(r#""damping": 1e-6"#)),
+        ("ζ 1e6", swing(r#""damping": 1e6"#)),
+        ("1e9 Hz, ζ 1e-6, against still air", swing(r#""frequency": 1e9, "damping": 1e-6, "drag": "world""#)),
+        ("1e-6 Hz, ζ 1e6, against still air", swing(r#""frequency": 1e-6, "damping": 1e6, "drag": "world""#)),
+    ]);
+    // So stiff a spring is where the wind is, to the rounding of its positions.
+    let apart = |a: &Component, b: &Component| {
+        let pairs = a.positions().iter().zip(b.positions());
+        pairs.map(|(a, b)| norm(difference(wide(*a), wide(*b)))).fold(0.0, f64::max)
+    };
+    assert!(apart(cooked[1].of(2, "swing").unwrap(), cooked[1].of(2, "wind").unwrap()) < 1e-6);
+    assert!(apart(cooked[0].of(2, "swing").unwrap(), cooked[0].of(2, "wind").unwrap()) > 0.01);
+    let said = swing(r#""damping": 0"#).fault().unwrap_or_default();
+    assert!(said.contains("`damping` is 0") && said.contains("more than 0"), "{said}");
+}
+
+#[test]
+fn curves_of_2_and_of_10_000_cvs_are_met_by_every_node() {
+    hold([
+        ("2 CVs", Scene::new().fur(|_| curves(&hairs(40, 2, 0.3)))),
+        ("10,000 CVs", Scene::new().fur(|_| curves(&hairs(2, 10_000, 0.3))).with("hairs", r#""density": 1"#)),
+    ]);
+}
+
+/// A million curves of two CVs on the ball.
+fn million() -> Scene {
+    let fur = |_| {
+        let hair = |k: u64| {
+            let up = direction(Key::new(5).of(k));
+            [up.map(|x| 0.5 * x), [0.6 * up[0] + 0.02, 0.6 * up[1], 0.6 * up[2]]]
+        };
+        let points: Vec<[Point; 2]> = (0..1_000_000).map(hair).collect();
+        Component::curves(vec![2; points.len()], points.as_flattened().to_vec()).unwrap().into()
+    };
+    Scene::new().fur(fur).with("hairs", r#""density": 10000"#)
+}
+
+#[test]
+fn a_million_curves_go_through_the_chain() {
+    let cooked = million().cook_some(&["lee", "out"], &[1], 2);
+    assert_eq!(cooked.errors, []);
+    let [lee, out] = ["lee", "out"].map(|node| cooked.of(0, node).unwrap());
+    assert_eq!((lee.element_count(), out.element_count()), (1_000_000, 1_000_000));
+    let share = lee.get(SHIELDED).unwrap().iter().filter(|share| **share > 0.0).count();
+    assert!((400_000..500_000).contains(&share), "hardly half of the ball is in the lee: {share}");
+    assert!(length_error(out, lee) <= 1e-5);
+}
+
+#[test]
+fn a_million_curves_are_carried_and_filled_between() {
+    let turning =
+        |frame: Frame| moved(ball(), |[x, y, z]| if frame.floor_number() == 2 { [z, y, -x] } else { [x, y, z] });
+    let cooked = million().skin(turning).cook_some(&["grown", "hairs"], &[2], 2);
+    assert_eq!(cooked.errors, []);
+    let [grown, hairs] = ["grown", "hairs"].map(|node| cooked.of(0, node).unwrap());
+    let fur = (million().fur)(Frame::whole(2));
+    let turned = fur.curves().unwrap().positions().iter().map(|[x, y, z]| [*z, *y, -*x]);
+    let apart = turned.zip(grown.positions()).map(|(a, b)| norm(difference(wide(a), wide(*b)))).fold(0.0, f64::max);
+    assert!(apart < 1e-6, "a quarter turn carries all: {apart}");
+    assert!(hairs.element_count() > 30_000);
+}
