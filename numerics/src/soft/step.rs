@@ -11,7 +11,7 @@
 
 use super::V3;
 use super::body::Body;
-use super::contact::{Contact, Query, Touching};
+use super::contact::{Contact, Query, Touch, Touching};
 use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
 use super::guess::{Guess, Rigid};
@@ -30,6 +30,8 @@ const NEWTON_SHARE: f64 = 0.1;
 const GAIN: f64 = 0.1;
 /// Times that implicit Euler looks for contacts it has missed.
 const ROUNDS: u32 = 4;
+/// Share of all loads that friction may have counted otherwise than they turn out.
+const CHANGED: f64 = 0.3;
 /// Share of the mean spring that a first guess may move a particle to a surface.
 const NUDGE: f64 = 0.3;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
@@ -116,7 +118,7 @@ impl Stepper<'_> {
             let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v))
-                && self.missed(&full, &start.x, &moving.x, times, &firmness).is_none();
+                && !self.missed(&full, &start.x, &moving.x, times, &firmness).1;
             if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
@@ -173,13 +175,14 @@ impl Stepper<'_> {
     fn newton(&self, tolerance: Option<f64>) -> Newton {
         match tolerance {
             Some(tolerance) => {
-                Newton { most: MOST_ACCURATE, share: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
+                Newton { most: MOST_ACCURATE, share: 0.0, scale: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
             }
-            None => Newton { most: MOST, share: 0.0, tolerance: 0.0, search: false },
+            None => Newton { most: MOST, share: 0.0, scale: 0.0, tolerance: 0.0, search: false },
         }
     }
 
-    /// Contacts that `x` has and `known` has not, with all others: what was far may be pushed near, and surfaces bend.
+    /// The contacts that `x` has, and whether `known` lacks deep ones of them: what was far may be pushed near, and surfaces
+    /// bend.
     fn missed(
         &self,
         known: &[Touching],
@@ -187,11 +190,14 @@ impl Stepper<'_> {
         x: &[V3],
         times: [f64; 2],
         firmness: &[f64],
-    ) -> Option<Vec<Touching>> {
-        self.frame.contacts?;
-        let deep = |contacts: &[Touching]| contacts.iter().filter(|c| c.too_near(x)).count();
+    ) -> (Vec<Touching>, bool) {
+        if self.frame.contacts.is_none() {
+            return (Vec::new(), false);
+        }
+        let deep = |contacts: &[Touching]| contacts.iter().filter(|contact| contact.too_near(x)).count();
         let found = self.contacts(start, x, times, firmness);
-        (deep(&found) > deep(known)).then_some(found)
+        let missed = deep(&found) > deep(known);
+        (found, missed)
     }
 
     /// Implicit Euler; `off` where it begins off balance by more than its contacts.
@@ -208,14 +214,24 @@ impl Stepper<'_> {
         let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
-        let newton = Newton { most: MOST, share: EULER_SHARE, tolerance: 0.0, search: true };
+        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let goes = |place: usize| self.setting.body.mass[place] * (falls + (y[place] - moving.x[place]).norm_squared());
+        let scale = (0..x.len()).map(goes).sum();
+        let newton = Newton { most: MOST, share: EULER_SHARE, scale, tolerance: 0.0, search: true };
         let mut solved = Solved::default();
         for round in 1..=ROUNDS {
             let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
             solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
-            match self.missed(contacts, &moving.x, &x, times, firmness) {
-                Some(found) if round < ROUNDS => *contacts = found,
-                _ => break,
+            let changed = reload(contacts, &self.work.touches);
+            let (mut found, missed) = self.missed(contacts, &moving.x, &x, times, firmness);
+            let unmet = found.iter().filter(|contact| contact.too_near(&x)).map(|contact| -contact.clearance(&x, 0.0));
+            solved.unmet = unmet.fold(0.0, f64::max);
+            if round == ROUNDS || !(missed || changed > CHANGED) {
+                break;
+            }
+            if missed {
+                take_loads(contacts, &mut found);
+                *contacts = found;
             }
         }
         let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
@@ -357,6 +373,32 @@ impl Stepper<'_> {
     }
 }
 
+/// Has friction count the pushes that were found; gives the share of them that it did not count before.
+fn reload(contacts: &mut [Touching], touches: &[Touch]) -> f64 {
+    let (mut sum, mut changed) = (0.0, 0.0);
+    for (contact, touch) in contacts.iter_mut().zip(touches) {
+        let load = contact.load_of(touch);
+        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
+        contact.load = load;
+    }
+    if sum > 0.0 { changed / sum } else { 0.0 }
+}
+
+/// Has contacts found anew count the loads of those that `known` has of the same particles in about the same direction.
+fn take_loads(known: &[Touching], found: &mut [Touching]) {
+    /// Cosine of the angle within which directions are the same.
+    const SAME: f64 = 0.9;
+    let mut order: Vec<u32> = (0..known.len() as u32).collect();
+    order.sort_by_key(|index| (known[*index as usize].places, *index));
+    for contact in found {
+        let first = order.partition_point(|index| known[*index as usize].places < contact.places);
+        let mine = order[first..].iter().map(|index| &known[*index as usize]);
+        let alike = mine.take_while(|other| other.places == contact.places);
+        let nearest = alike.max_by(|a, b| a.normal.dot(&contact.normal).total_cmp(&b.normal.dot(&contact.normal)));
+        contact.load = nearest.filter(|other| other.normal.dot(&contact.normal) > SAME).map_or(0.0, |other| other.load);
+    }
+}
+
 /// Joules.
 fn kinetic(body: &Body, v: &[V3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
@@ -378,5 +420,6 @@ fn sum(a: Solved, b: Solved) -> Solved {
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
         failed: a.failed || b.failed,
+        unmet: b.unmet,
     }
 }
