@@ -254,17 +254,17 @@ impl Touching {
     }
 
     /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
-    /// of its own, and what is solved stays convex. A contact that begins has none yet, nor one whose surface moves so far
-    /// that its plane then is not known.
-    pub(super) fn loaded(&self, x: &[V3], seconds: f64) -> Self {
-        let depth = -self.clearance(x, seconds);
+    /// of its own, and what is solved stays convex. A contact that begins has none yet. Where the surface moves so far that
+    /// its plane then is not known it is what the particle was under at last, of `loads`.
+    pub(super) fn loaded(&self, x: &[V3], loads: &[f64], seconds: f64) -> Self {
         let near = self.velocity.norm() * seconds <= self.gap;
-        Self { load: if near { self.load_at(depth) } else { 0.0 }, ..*self }
+        let last = || self.alone().map_or(0.0, |(place, _)| loads[place]);
+        Self { load: if near { self.load_at(-self.clearance(x, seconds)) } else { last() }, ..*self }
     }
 
-    /// The load that friction counts where it does what it did.
-    pub(super) fn load_of(&self, touch: &Touch) -> f64 {
-        self.load_at(touch.depth)
+    /// The push at `x`, as a load.
+    pub(super) fn push(&self, x: &[V3]) -> f64 {
+        self.load_at(-self.clearance(x, 0.0))
     }
 
     fn load_at(&self, depth: f64) -> f64 {
@@ -325,17 +325,22 @@ impl Touching {
         (out, 3)
     }
 
-    /// The drag that belongs to where particles are `dx` on in a stage of `a`, of length 1 at most, as the system that
-    /// [`Self::resisted`] with `drag` stands for has it.
-    pub(super) fn drag(&self, touch: &Touch, drag: &V3, dx: &[V3], a: f64) -> V3 {
+    /// The drag that belongs to where particles are a `share` of `dx` on in a stage of `a`, of length 1 at most, as the
+    /// system that [`Self::resisted`] with `drag` stands for has it. None where all of a step that was too long would have
+    /// turned the slip round.
+    pub(super) fn drag(&self, touch: &Touch, drag: &V3, dx: &[V3], share: f64, a: f64) -> V3 {
         let most = self.friction * self.load;
-        if !(most > 0.0) || touch.mode == Mode::Apart {
+        if most <= 0.0 || touch.mode == Mode::Apart {
             return V3::zeros();
         }
         let way = self.between(dx);
-        let more = (way - self.normal * self.normal.dot(&way)) / a;
-        let turned = if touch.mode == Mode::Slides { more - drag * touch.slip.dot(&more) } else { more };
-        let next = touch.slip + turned * (touch.grip / most);
+        let more = (way - self.normal * self.normal.dot(&way)) * (touch.grip / (a * most));
+        let slides = touch.mode == Mode::Slides;
+        if slides && share < 1.0 && touch.slip.dot(&(touch.slip + more)) < 0.0 {
+            return V3::zeros();
+        }
+        let turned = if slides { more - drag * touch.slip.dot(&more) } else { more };
+        let next = drag.lerp(&(touch.slip + turned), share);
         next * (SURE / next.norm().max(1.0))
     }
 

@@ -142,7 +142,11 @@ impl Solver {
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
         let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
-        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend };
+        let mut loads = vec![0.0; body.len()];
+        for (place, load) in body.order.places.iter().zip(&state.loads) {
+            loads[*place as usize] = *load;
+        }
+        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
         let mut report = Report::default();
         self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
         let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
@@ -161,10 +165,12 @@ impl Solver {
         (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
         describe(&mut report, &setting, &energies, &moving);
         state.trend.resize(body.len(), [0.0; 3]);
+        state.loads.resize(body.len(), 0.0);
         for (caller, place) in body.order.places.iter().enumerate() {
             state.positions[caller] = moving.x[*place as usize].into();
             state.velocities[caller] = moving.v[*place as usize].into();
             state.trend[caller] = moving.trend[*place as usize].into();
+            state.loads[caller] = moving.loads[*place as usize];
         }
         report
     }

@@ -166,11 +166,11 @@ impl Work {
                 return solved;
             }
             let (share, lower) = if newton.search { self.search(on, stage, x, base) } else { (1.0, base) };
+            for ((contact, touch), drag) in stage.contacts.iter().zip(&self.touches).zip(&mut self.drags) {
+                *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
+            }
             self.dx.iter_mut().for_each(|d| *d *= share);
             x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d);
-            for ((contact, touch), drag) in stage.contacts.iter().zip(&self.touches).zip(&mut self.drags) {
-                *drag = contact.drag(touch, drag, &self.dx, stage.a);
-            }
             self.r = vec![V3::zeros(); x.len()];
             self.assemble(on, stage, x, false);
             let after = self.square(clusters);

@@ -11,7 +11,7 @@
 
 use super::V3;
 use super::body::Body;
-use super::contact::{Contact, Query, Touch, Touching};
+use super::contact::{Contact, Query, Touching};
 use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
 use super::guess::{Guess, Rigid};
@@ -46,6 +46,8 @@ pub(super) struct Moving {
     pub(super) v: Vec<V3>,
     /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
     pub(super) trend: Vec<V3>,
+    /// The push of an obstacle that each particle was under at last, newtons.
+    pub(super) loads: Vec<f64>,
 }
 
 /// What a step took and reached.
@@ -97,7 +99,7 @@ impl Stepper<'_> {
         let mut full = match self.frame.contacts {
             Some(_) => {
                 let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-                self.contacts(&start.x, &ahead, times, &firmness)
+                self.contacts(&start, &ahead, times, &firmness)
             }
             None => Vec::new(),
         };
@@ -118,7 +120,7 @@ impl Stepper<'_> {
             let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v))
-                && !self.missed(&full, &start.x, &moving.x, times, &firmness).1;
+                && !self.missed(&full, &start, &moving.x, times, &firmness).1;
             if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
@@ -135,6 +137,7 @@ impl Stepper<'_> {
         let touches = stepped.euler || stepped.contacts > 0;
         let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
+        moving.loads = self.loads(&full, &moving.x);
         self.keep_finite(&start, moving, &mut stepped);
         stepped.after = match after.filter(|_| stepped.stopped == 0) {
             Some(energies) => energies,
@@ -159,17 +162,28 @@ impl Stepper<'_> {
         !self.setting.drive.moves() && self.frame.contacts.is_none()
     }
 
-    /// Contacts on the way `from` here `to` there, with the load they have at its start.
-    fn contacts(&self, from: &[V3], to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+    /// Contacts on the way from `start` `to` there, with the load they have at its start.
+    fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.setting.body;
         let outwards =
             |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
         let mut found: Vec<Contact> = Vec::new();
-        contacts.find(&Query { from: &outwards(from), to: &outwards(to), times }, &mut found);
+        contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
         let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
-        known.map(|contact| contact.loaded(from, h)).collect()
+        known.map(|contact| contact.loaded(&start.x, &start.loads, h)).collect()
+    }
+
+    /// The largest push of an obstacle on each particle at `x`.
+    fn loads(&self, contacts: &[Touching], x: &[V3]) -> Vec<f64> {
+        let mut loads = vec![0.0; x.len()];
+        for contact in contacts {
+            if let Some((place, _)) = contact.alone() {
+                loads[place] = f64::max(loads[place], contact.push(x));
+            }
+        }
+        loads
     }
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
@@ -186,7 +200,7 @@ impl Stepper<'_> {
     fn missed(
         &self,
         known: &[Touching],
-        start: &[V3],
+        start: &Moving,
         x: &[V3],
         times: [f64; 2],
         firmness: &[f64],
@@ -222,8 +236,8 @@ impl Stepper<'_> {
         for round in 1..=ROUNDS {
             let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
             solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
-            let changed = reload(contacts, &self.work.touches);
-            let (mut found, missed) = self.missed(contacts, &moving.x, &x, times, firmness);
+            let changed = reload(contacts, &x);
+            let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
             let unmet = found.iter().filter(|contact| contact.too_near(&x)).map(|contact| -contact.clearance(&x, 0.0));
             solved.unmet = unmet.fold(0.0, f64::max);
             if round == ROUNDS || !(missed || changed > CHANGED) {
@@ -374,10 +388,10 @@ impl Stepper<'_> {
 }
 
 /// Has friction count the pushes that were found; gives the share of them that it did not count before.
-fn reload(contacts: &mut [Touching], touches: &[Touch]) -> f64 {
+fn reload(contacts: &mut [Touching], x: &[V3]) -> f64 {
     let (mut sum, mut changed) = (0.0, 0.0);
-    for (contact, touch) in contacts.iter_mut().zip(touches) {
-        let load = contact.load_of(touch);
+    for contact in contacts {
+        let load = contact.push(x);
         (sum, changed) = (sum + load, changed + (load - contact.load).abs());
         contact.load = load;
     }
