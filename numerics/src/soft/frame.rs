@@ -78,8 +78,7 @@ pub struct Report {
     pub newton: u32,
     /// Iterations of linear solves.
     pub cg: u32,
-    /// The largest share of a stage's first residual, or of that of motion as if nothing resisted it where that is larger,
-    /// that was left of it.
+    /// The largest share of a stage's first residual that was left of it.
     pub residual: f64,
     /// Solves that stopped short of what was asked, and steps that left contacts too deep.
     pub caps_hit: u32,

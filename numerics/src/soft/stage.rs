@@ -27,8 +27,6 @@ const STALE: f64 = 1.5;
 const UNFORESEEN: f64 = 0.5;
 /// Times as large as before that a residual's square may be after an iteration without line search.
 const RISE: f64 = 100.0;
-/// Share of the residual of motion as if nothing resisted it that is as good as none.
-const FINE: f64 = 1e-2;
 /// Share of a step from which on what it gained tells what is left to gain.
 const LONG: f64 = 0.2;
 /// Iterations a stage with contacts may have.
@@ -69,8 +67,10 @@ pub(super) struct Newton {
     pub(super) most: u32,
     /// With a line search, the share of the first residual that ends it.
     pub(super) share: f64,
-    /// With a line search, the residual's square of motion as if nothing resisted it: little of that is enough too.
+    /// That residual's square counts as this at most: what a guess that is far off leaves is no measure.
     pub(super) scale: f64,
+    /// A residual's square that is enough whatever the first was.
+    pub(super) enough: f64,
     /// A step this short ends it, metres.
     pub(super) tolerance: f64,
     /// Whether the objective may not rise.
@@ -83,10 +83,12 @@ pub(super) struct Solved {
     pub(super) newton: u32,
     pub(super) cg: u32,
     pub(super) caps: u32,
-    /// Residual at the end ÷ at the start, or ÷ that of motion as if nothing resisted it where that is larger.
+    /// Residual at the end ÷ at the start.
     pub(super) residual: f64,
     /// Whether the residual rose, or a number is not finite.
     pub(super) failed: bool,
+    /// The residual's square that was asked for.
+    pub(super) enough: f64,
     /// How deep the worst contact is that is left too deep, metres below its gap; 0 where none is.
     pub(super) unmet: f64,
 }
@@ -155,6 +157,7 @@ impl Work {
             let before = self.square(clusters);
             if solved.newton == 0 {
                 first = before;
+                solved.enough = newton.enough.max(newton.share * newton.share * first.min(newton.scale));
             }
             let base = if newton.search { self.objective(on, stage, x) } else { 0.0 };
             self.direction(on, stage, warm, x, &mut solved);
@@ -179,16 +182,14 @@ impl Work {
                 solved.failed = true;
                 return solved;
             }
-            let whole = first.max(newton.scale);
-            solved.residual = if whole > 0.0 { (after / whole).sqrt() } else { 0.0 };
+            solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
             let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
             let unforeseen = share == 1.0 && self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before;
             let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
             let most = if newton.search && !stage.contacts.is_empty() { CONTACT_ITERATIONS } else { newton.most };
             let wanted = if newton.search {
-                let enough = (FINE * FINE * newton.scale).max(newton.share * newton.share * first);
-                let slow = share > LONG && base - lower <= FINE * FINE * newton.scale;
-                (after > enough && !slow) || deep
+                let slow = share > LONG && base - lower <= solved.enough;
+                (after > solved.enough && !slow) || deep
             } else if newton.tolerance > 0.0 {
                 longest > newton.tolerance
             } else {

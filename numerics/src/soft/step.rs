@@ -37,7 +37,7 @@ const NUDGE: f64 = 0.3;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
 const UNSETTLED: u32 = 4;
 /// Share of the first residual at which implicit Euler stops.
-const EULER_SHARE: f64 = 0.03;
+const EULER_SHARE: f64 = 0.01;
 
 /// Positions and velocities, the solver's order.
 #[derive(Clone, Debug)]
@@ -189,9 +189,9 @@ impl Stepper<'_> {
     fn newton(&self, tolerance: Option<f64>) -> Newton {
         match tolerance {
             Some(tolerance) => {
-                Newton { most: MOST_ACCURATE, share: 0.0, scale: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
+                Newton { most: MOST_ACCURATE, share: 0.0, scale: 0.0, enough: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
             }
-            None => Newton { most: MOST, share: 0.0, scale: 0.0, tolerance: 0.0, search: false },
+            None => Newton { most: MOST, share: 0.0, scale: 0.0, enough: 0.0, tolerance: 0.0, search: false },
         }
     }
 
@@ -228,14 +228,13 @@ impl Stepper<'_> {
         let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
-        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
-        let goes = |place: usize| self.setting.body.mass[place] * (falls + (y[place] - moving.x[place]).norm_squared());
-        let scale = (0..x.len()).map(goes).sum();
-        let newton = Newton { most: MOST, share: EULER_SHARE, scale, tolerance: 0.0, search: true };
+        let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
+        let mut newton = Newton { most: MOST, share: EULER_SHARE, scale, enough: 0.0, tolerance: 0.0, search: true };
         let mut solved = Solved::default();
         for round in 1..=ROUNDS {
             let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
             solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
+            newton.enough = solved.enough;
             let changed = reload(contacts, &x);
             let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
             let unmet = found.iter().filter(|contact| contact.too_near(&x)).map(|contact| -contact.clearance(&x, 0.0));
@@ -253,6 +252,19 @@ impl Stepper<'_> {
         let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
         (moving.x, moving.v) = (x, v);
         (solved, estimate)
+    }
+
+    /// About the square of the residual of motion on from `x` to `y`, gravity and obstacles within `h`, if nothing gave way.
+    fn scale(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> f64 {
+        let mass = &self.setting.body.mass;
+        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let own: f64 = (0..x.len()).map(|place| mass[place] * (falls + (y[place] - x[place]).norm_squared())).sum();
+        let given = contacts.iter().flat_map(|contact| {
+            let way = (contact.velocity * h).norm_squared();
+            contact.sides().map(move |(place, weight)| mass[place] * weight * weight * way)
+        });
+        let scale = own + given.sum::<f64>();
+        if scale > 0.0 { scale } else { f64::INFINITY }
     }
 
     /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
@@ -434,6 +446,7 @@ fn sum(a: Solved, b: Solved) -> Solved {
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
         failed: a.failed || b.failed,
+        enough: a.enough.max(b.enough),
         unmet: b.unmet,
     }
 }
