@@ -37,7 +37,7 @@ const NUDGE: f64 = 0.3;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
 const UNSETTLED: u32 = 4;
 /// Share of the first residual at which implicit Euler stops.
-const EULER_SHARE: f64 = 0.01;
+const EULER_SHARE: f64 = 0.03;
 
 /// Positions and velocities, the solver's order.
 #[derive(Clone, Debug)]
