@@ -204,12 +204,13 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, own: boo
     let (mut wall, mut cpu, mut newton, mut caps, mut through, mut taken) = (0.0, 0.0, 0, 0, 0.0_f64, 0);
     let (mut slowest, mut fastest, mut resting) = (0.0_f64, 0.0_f64, 0.0_f64);
     if !quiet {
-        println!("frame steps newton    cg  residual caps contacts overlap÷gap inside÷gap volume turned fastest m/s    ms");
+        println!(
+            "frame steps newton    cg  residual caps contacts overlap÷gap inside÷gap volume turned fastest m/s    ms"
+        );
     }
     let frames = tool.frames.min(limit);
     for frame in 0..frames {
-        let poses = [0.0, 1.0]
-            .map(|share| Pose { share, positions: tool.at(f64::from(frame) + share) });
+        let poses = [0.0, 1.0].map(|share| Pose { share, positions: tool.at(f64::from(frame) + share) });
         let obstacles = [Obstacle::new(&tool.triangles, &poses, FRAME, THICKNESS, 0.5).expect("a tool")];
         let own = own.then_some(Rub { thickness: THICKNESS, friction: 0.5 });
         let ground = tool.ground.then_some(ground);

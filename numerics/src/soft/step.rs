@@ -188,9 +188,14 @@ impl Stepper<'_> {
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
         match tolerance {
-            Some(tolerance) => {
-                Newton { most: MOST_ACCURATE, share: 0.0, scale: 0.0, enough: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
-            }
+            Some(tolerance) => Newton {
+                most: MOST_ACCURATE,
+                share: 0.0,
+                scale: 0.0,
+                enough: 0.0,
+                tolerance: NEWTON_SHARE * tolerance,
+                search: false,
+            },
             None => Newton { most: MOST, share: 0.0, scale: 0.0, enough: 0.0, tolerance: 0.0, search: false },
         }
     }
