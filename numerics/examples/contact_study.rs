@@ -1,10 +1,11 @@
 //! What soft bodies cost and how deep they are pressed in under hard contact: dough of 5 kPa that rests, is rolled over,
 //! pressed and hit.
 //!
-//! `cargo run --release -p numerics --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [quiet]`;
+//! `cargo run --release -p numerics --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [quiet]`;
 //! threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh), roll (a pin that rolls on by ten
 //! thicknesses a frame, 1 cm into the dough), press (a plate down to 60 % of the height and up again), fist (a sphere a
-//! third of the way in, ten thicknesses a frame). A line a frame, then a line a case.
+//! third of the way in, ten thicknesses a frame), knead (a pin at twice the pace, half the way in), slap (a plate that
+//! comes to half the height within a frame). A line a frame, then a line a case.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
@@ -149,7 +150,21 @@ impl Tool {
                 };
                 (sphere(32, 16, 0.04), at, true, 24)
             }
-            _ => panic!("`{case}`; expected rest, plate, roll, press or fist"),
+            "knead" => {
+                let at = |frame: f64| {
+                    let way = frame * 20.0 * THICKNESS;
+                    (-way / 0.05, [-0.08 + way, 0.075, 0.06])
+                };
+                (cylinder(48, 0.05, 0.3), at, true, 24)
+            }
+            "slap" => {
+                let at = |frame: f64| {
+                    let down = (frame - 2.0).clamp(0.0, 1.0) - 0.3 * (frame - 6.0).max(0.0);
+                    (0.0, [0.12, 0.06 + 0.02 + 0.01 - 0.05 * down, 0.06])
+                };
+                (slab([0.5, 0.02, 0.5]), at, true, 24)
+            }
+            _ => panic!("`{case}`; expected rest, plate, roll, press, fist, knead or slap"),
         };
         Self { points, triangles, at, ground, frames }
     }
@@ -182,19 +197,19 @@ fn main() {
     let is_asked = |name: &str| words.iter().any(|word| word == name);
     let (steps, limit) = (number("steps=").unwrap_or(0), number("frames=").unwrap_or(u32::MAX));
     let sizes = [("tiny", [12, 3, 6]), ("small", [26, 7, 12]), ("large", [54, 14, 27])];
-    let cases = ["rest", "plate", "roll", "press", "fist"];
+    let cases = ["rest", "plate", "roll", "press", "fist", "knead", "slap"];
     let (any_size, any_case) = (sizes.iter().any(|s| is_asked(s.0)), cases.iter().any(|c| is_asked(c)));
     for case in cases.into_iter().filter(|case| !any_case || is_asked(case)) {
         for (name, cells) in sizes.into_iter().filter(|(name, _)| is_asked(name) || (!any_size && *name == "small")) {
-            run(case, name, cells, steps, limit, is_asked("self"), is_asked("quiet"));
+            run(case, name, cells, steps, limit, number("pascal=").unwrap_or(5000), [is_asked("self"), is_asked("quiet")]);
         }
     }
 }
 
-fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, own: bool, quiet: bool) {
+fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: u32, [own, quiet]: [bool; 2]) {
     let plain = |value| Scaled { value, mask: None };
     let (points, tets, faces) = dough(cells, [0.0, THICKNESS, 0.0]);
-    let material = Material { density: plain(1000.0), stiffness: plain(5e3), damping: plain(0.01) };
+    let material = Material { density: plain(1000.0), stiffness: plain(f64::from(pascal)), damping: plain(0.01) };
     let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).expect("dough");
     let skins = [Skin::new(&points, &faces, &body.springs()).expect("dough")];
     let tool = Tool::of(case);
