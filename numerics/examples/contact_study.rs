@@ -212,6 +212,9 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: 
     let material = Material { density: plain(1000.0), stiffness: plain(f64::from(pascal)), damping: plain(0.01) };
     let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).expect("dough");
     let skins = [Skin::new(&points, &faces, &body.springs()).expect("dough")];
+    let mut skin_points: Vec<u32> = faces.iter().flatten().copied().collect();
+    skin_points.sort_unstable();
+    skin_points.dedup();
     let tool = Tool::of(case);
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 };
     let mut state = State::at_rest(&body);
@@ -234,8 +237,9 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: 
         let clocks = (Instant::now(), ProcessTime::now());
         let report = solver.step(&body, &mut state, &asked);
         let (ms, cpu_ms) = (clocks.0.elapsed().as_secs_f64() * 1e3, clocks.1.elapsed().as_secs_f64() * 1e3);
-        let inside = tool.deepest(&state.positions, f64::from(frame + 1));
-        let low = state.positions.iter().map(|p| -p[1]).fold(0.0, f64::max);
+        let outer: Points = skin_points.iter().map(|index| state.positions[*index as usize]).collect();
+        let inside = tool.deepest(&outer, f64::from(frame + 1));
+        let low = outer.iter().map(|p| -p[1]).fold(0.0, f64::max);
         let inside = inside.max(if tool.ground { low } else { 0.0 });
         let speed = state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max);
         (wall, cpu, newton, caps) = (wall + ms, cpu + cpu_ms, newton + report.newton, caps + report.caps_hit);

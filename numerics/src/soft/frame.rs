@@ -196,8 +196,8 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
     }
 }
 
-/// A step from one of `times` to the other, or two halves of it where it leaves contacts unmet, as long as that makes them
-/// shallower than `deepest`, metres.
+/// A step from one of `times` to the other, or two halves of it where it leaves contacts unmet: short steps only as long as
+/// that makes them shallower than `deepest`, metres.
 fn halve(
     stepper: &mut Stepper<'_>,
     moving: &mut Moving,
@@ -208,11 +208,14 @@ fn halve(
 ) {
     /// Share of the depth that halves have to leave, at most, to be halved too.
     const HELPS: f64 = 0.9;
+    /// Share of the frame above which a step is not short.
+    const SHORT: f64 = 1.0 / 16.0;
     let (start, reserve, unsettled) = (moving.clone(), *stepper.reserve, *stepper.unsettled);
     let stepped = stepper.step(moving, times, energies, None, false);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
-    let smallest = times[1] - times[0] <= 1.0 / f64::from(MOST_STEPS);
-    if !unmet || smallest || stepped.solved.unmet > HELPS * deepest {
+    let share = times[1] - times[0];
+    let hopeless = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
+    if !unmet || hopeless || share <= 1.0 / f64::from(MOST_STEPS) {
         add(report, &stepped);
         *energies = stepped.after;
         return;
