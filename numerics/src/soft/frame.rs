@@ -130,6 +130,15 @@ impl Solver {
     /// Where `state` does not fit `body`, a goal or pin names no particle, or `body` has not the shape it was made for.
     pub fn step(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
         assert!(state.fits(body), "a state of another body");
+        if body.order.clusters.is_wide() {
+            // From within, a loop over parts costs no call from thread to thread to begin.
+            rayon::scope(|_| self.step_here(body, state, frame))
+        } else {
+            self.step_here(body, state, frame)
+        }
+    }
+
+    fn step_here(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
         let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
         let gravity = V3::from(frame.gravity);
         let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
