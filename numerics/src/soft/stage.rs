@@ -89,7 +89,7 @@ pub(super) struct Solved {
     pub(super) failed: bool,
     /// The residual's square that was asked for.
     pub(super) enough: f64,
-    /// How deep the worst contact is that is left too deep, metres below its gap; 0 where none is.
+    /// How deep the worst contact is that got too deep, metres below its gap; 0 where none did.
     pub(super) unmet: f64,
 }
 

@@ -125,7 +125,8 @@ impl Stepper<'_> {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
                 let (again, estimate) = self.euler(moving, times, &mut full, &firmness, off);
-                stepped = Stepped { solved: sum(stepped.solved, again), estimate, euler: true, ..Stepped::default() };
+                let solved = Solved { failed: again.failed, ..sum(stepped.solved, again) };
+                stepped = Stepped { solved, estimate, euler: true, ..Stepped::default() };
                 after = None;
                 *self.unsettled = if goes_on { 0 } else { UNSETTLED };
             }
@@ -242,8 +243,9 @@ impl Stepper<'_> {
             newton.enough = solved.enough;
             let changed = reload(contacts, &x);
             let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
-            let unmet = found.iter().filter(|contact| contact.too_near(&x)).map(|contact| -contact.clearance(&x, 0.0));
-            solved.unmet = unmet.fold(0.0, f64::max);
+            // What was deep before is on its way out.
+            let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
+            solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             if round == ROUNDS || !(missed || changed > CHANGED) {
                 break;
             }
