@@ -23,6 +23,8 @@ const SIZE: [f64; 3] = [0.24, 0.06, 0.12];
 type V3 = Vector3<f64>;
 type Points = Vec<[f64; 3]>;
 type Triangles = Vec<[u32; 3]>;
+/// Where a tool is at a frame: a turn about z, then a shift.
+type Place = fn(f64) -> (f64, [f64; 3]);
 
 /// Cells of six tetrahedra, the lowest corner at `at`, and their surface.
 fn dough(cells: [u32; 3], at: [f64; 3]) -> (Points, Vec<[u32; 4]>, Triangles) {
@@ -113,11 +115,11 @@ fn slab(size: [f64; 3]) -> (Points, Triangles) {
     ((0..8).map(corner).collect(), triangles)
 }
 
-/// What does something to the dough: its mesh where it stands, and where it is at a frame: a turn about z, then a shift.
+/// What does something to the dough: its mesh about the origin, and where it is.
 struct Tool {
     points: Points,
     triangles: Triangles,
-    at: fn(f64) -> (f64, [f64; 3]),
+    at: Place,
     ground: bool,
     frames: u32,
 }
@@ -126,7 +128,7 @@ impl Tool {
     fn of(case: &str) -> Self {
         let middle = [0.5 * SIZE[0], 0.5 * SIZE[2]];
         assert!(middle == [0.12, 0.06], "the tools are made for this dough");
-        let ((points, triangles), at, ground, frames): (_, fn(f64) -> (f64, [f64; 3]), _, _) = match case {
+        let ((points, triangles), at, ground, frames): (_, Place, _, _) = match case {
             "rest" => (slab([0.1, 0.1, 0.1]), |_| (0.0, [9.0, 9.0, 9.0]), true, 240),
             "plate" => (slab([1.03, 0.1, 1.01]), |_| (0.0, [0.12, -0.05, 0.06]), false, 240),
             "roll" => {
@@ -201,7 +203,15 @@ fn main() {
     let (any_size, any_case) = (sizes.iter().any(|s| is_asked(s.0)), cases.iter().any(|c| is_asked(c)));
     for case in cases.into_iter().filter(|case| !any_case || is_asked(case)) {
         for (name, cells) in sizes.into_iter().filter(|(name, _)| is_asked(name) || (!any_size && *name == "small")) {
-            run(case, name, cells, steps, limit, number("pascal=").unwrap_or(5000), [is_asked("self"), is_asked("quiet")]);
+            run(
+                case,
+                name,
+                cells,
+                steps,
+                limit,
+                number("pascal=").unwrap_or(5000),
+                [is_asked("self"), is_asked("quiet")],
+            );
         }
     }
 }
