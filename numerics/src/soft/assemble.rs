@@ -6,7 +6,7 @@ use super::contact::Mode;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
 use super::springs::{self, Link, Motion};
-use super::stage::{Friction, Setting, Stage, Work};
+use super::stage::{Setting, Stage, Work};
 use super::system::{halfway, smoother};
 
 impl Work {
@@ -67,7 +67,7 @@ impl Work {
     }
 
     /// The residual at `x`, and where `linear` the system there.
-    pub(super) fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: Option<Friction>) {
+    pub(super) fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: bool) {
         let (body, a) = (on.body, stage.a);
         let clusters = &body.order.clusters;
         let mut v = std::mem::take(&mut self.v);
@@ -75,8 +75,8 @@ impl Work {
         self.loose_forces(on, stage, x, &v);
         let motion = Motion { x, v: &v };
         let mut r = std::mem::take(&mut self.r);
-        if let Some(friction) = linear {
-            self.set_rows(on, stage, friction == Friction::Careful);
+        if linear {
+            self.set_rows(on, stage);
             let mut system = std::mem::take(&mut self.system);
             let (held, blocks, regions, loose) = (&system.held, &system.blocks, &system.regions, &system.loose);
             let parts = (
@@ -134,7 +134,7 @@ impl Work {
     }
 
     /// What volumes, thin tetrahedra and contacts resist.
-    fn set_rows(&mut self, on: &Setting<'_>, stage: &Stage<'_>, careful: bool) {
+    fn set_rows(&mut self, on: &Setting<'_>, stage: &Stage<'_>) {
         let (body, a) = (on.body, stage.a);
         let clusters = &body.order.clusters;
         if !self.volumes.is_off() {
@@ -149,8 +149,9 @@ impl Work {
             along.extend(thin.gradient.iter().map(|g| g * root));
             starts.push(places.len() as u32);
         }
-        for (contact, touch) in stage.contacts.iter().zip(&self.touches).filter(|pair| pair.1.mode != Mode::Apart) {
-            let resisted = contact.resisted(touch, a, careful);
+        let known = stage.contacts.iter().zip(&self.touches).zip(&self.drags);
+        for ((contact, touch), drag) in known.filter(|known| known.0.1.mode != Mode::Apart) {
+            let resisted = contact.resisted(touch, a, drag);
             if let Some((place, weight)) = contact.alone() {
                 if self.system.blocks.is_empty() {
                     self.system.blocks.resize(body.len(), [0.0; 6]);

@@ -19,6 +19,10 @@ const HOLD: f64 = 1e4;
 const STRAIGHT: f64 = 0.95;
 /// Share of its gap below which a contact is too deep to leave it there.
 const DEEP: f64 = 0.96;
+/// Share of a drag that is believed to go on: the rest keeps a slip from being turned round too far.
+const SURE: f64 = 0.98;
+/// Length of a sum of two units below which they are opposite.
+const OPPOSITE: f64 = 1e-9;
 /// Body lengths a second at which friction is all of μN; below it creeps in proportion.
 const CREEP: f64 = 2e-5;
 
@@ -74,7 +78,7 @@ pub(super) struct Touching {
     /// Most that sticking resists slip with, N·s/m.
     hold: f64,
     /// N that friction counts, newtons.
-    load: f64,
+    pub(super) load: f64,
     /// What it is taken to do throughout a step.
     frozen: Option<Touch>,
 }
@@ -104,17 +108,10 @@ pub(super) struct Touch {
     /// N, and its slope with the depth.
     pub(super) push: f64,
     slope: f64,
-    /// Resistance to slip, N·s/m, and the slip's direction where it slides.
+    /// Resistance to slip, N·s/m, and the share of all friction that the slip rouses: of length 1 where it slides.
     grip: f64,
     slip: V3,
     pub(super) energy: f64,
-}
-
-impl Touch {
-    /// What Newton's method asks whether it has changed.
-    pub(super) fn state(&self) -> (Mode, bool) {
-        (self.mode, self.push > 0.0)
-    }
 }
 
 impl Touching {
@@ -248,26 +245,32 @@ impl Touching {
         if most > 0.0 {
             let slip = self.slip(v);
             let (speed, creep) = (slip.norm(), creep(size).max(most / self.hold));
-            touch.mode = Mode::Sticks;
-            if speed <= creep {
-                touch.grip = most / creep;
-            } else {
-                touch.mode = Mode::Slides;
-                touch.grip = most / speed;
-                touch.slip = slip / speed;
-            }
+            touch.mode = if speed <= creep { Mode::Sticks } else { Mode::Slides };
+            touch.grip = most / speed.max(creep);
+            touch.slip = slip / speed.max(creep);
             touch.force -= slip * touch.grip;
         }
         touch
     }
 
     /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
-    /// of its own, and what is solved stays convex. A contact that begins has none yet.
-    pub(super) fn loaded(&self, x: &[V3], seconds: f64) -> Self {
-        let depth = -self.clearance(x, seconds);
+    /// of its own, and what is solved stays convex. A contact that begins has none yet. Where the surface moves so far that
+    /// its plane then is not known it is what the particle was under at last, of `loads`.
+    pub(super) fn loaded(&self, x: &[V3], loads: &[f64], seconds: f64) -> Self {
+        let near = self.velocity.norm() * seconds <= self.gap;
+        let last = || self.alone().map_or(0.0, |(place, _)| loads[place]);
+        Self { load: if near { self.load_at(-self.clearance(x, seconds)) } else { last() }, ..*self }
+    }
+
+    /// The push at `x`, as a load.
+    pub(super) fn push(&self, x: &[V3]) -> f64 {
+        self.load_at(-self.clearance(x, 0.0))
+    }
+
+    fn load_at(&self, depth: f64) -> f64 {
         // Where surfaces are through each other the push is no load but a way out.
         let deepest = if self.gap > 0.0 { STRAIGHT * self.gap } else { f64::INFINITY };
-        Self { load: if depth > 0.0 { self.spring(depth.min(deepest)).0 } else { 0.0 }, ..*self }
+        if depth > 0.0 { self.spring(depth.min(deepest)).0 } else { 0.0 }
     }
 
     /// The push at a depth > 0, its slope, and the energy it stores.
@@ -297,28 +300,48 @@ impl Touching {
         a * most * held
     }
 
-    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness. Sliding surfaces
-    /// do not resist faster or slower sliding, which is exact; a `careful` answer has them resist like slower ones would,
-    /// which never overshoots.
-    pub(super) fn resisted(&self, touch: &Touch, a: f64, careful: bool) -> ([V3; 3], usize) {
+    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness.
+    ///
+    /// Friction grows no further once surfaces slide, so that Newton's method alone would turn slips round and back. It is
+    /// made linear together with what it is (Chan, Golub & Mulet 1999): with no `drag` it resists as slower surfaces would,
+    /// which never overshoots, and with the drag that belongs to the slip exactly.
+    pub(super) fn resisted(&self, touch: &Touch, a: f64, drag: &V3) -> ([V3; 3], usize) {
         let n = self.normal;
         let mut out = [n * (a * a * touch.slope).max(0.0).sqrt(), V3::zeros(), V3::zeros()];
-        let grip = (a * touch.grip).max(0.0).sqrt();
-        match touch.mode {
-            Mode::Apart => (out, 0),
-            Mode::Pushes => (out, 1),
-            Mode::Sticks => {
-                let across = n.cross(&if n.x.abs() < 0.7 { V3::x() } else { V3::y() }).normalize();
-                out[1] = across * grip;
-                out[2] = n.cross(&across) * grip;
-                (out, 3)
-            }
+        let (along, [least, most]) = match touch.mode {
+            Mode::Apart => return (out, 0),
+            Mode::Pushes => return (out, 1),
+            Mode::Sticks => (V3::zeros(), [1.0, 1.0]),
             Mode::Slides => {
-                out[1] = n.cross(&touch.slip) * grip;
-                out[2] = touch.slip * grip;
-                (out, if careful { 3 } else { 2 })
+                let (length, common) = (drag.norm(), drag.dot(&touch.slip));
+                let middle = if length > 0.0 { drag / length + touch.slip } else { touch.slip };
+                (middle, [1.0 - 0.5 * (common + length), 1.0 - 0.5 * (common - length)])
             }
+        };
+        let any = || n.cross(&if n.x.abs() < 0.7 { V3::x() } else { V3::y() }).normalize();
+        let along = along.try_normalize(OPPOSITE).unwrap_or_else(any);
+        out[1] = along * (a * touch.grip * least).max(0.0).sqrt();
+        out[2] = n.cross(&along) * (a * touch.grip * most).max(0.0).sqrt();
+        (out, 3)
+    }
+
+    /// The drag that belongs to where particles are a `share` of `dx` on in a stage of `a`, of length 1 at most, as the
+    /// system that [`Self::resisted`] with `drag` stands for has it. None where all of a step that was too long would have
+    /// turned the slip round.
+    pub(super) fn drag(&self, touch: &Touch, drag: &V3, dx: &[V3], share: f64, a: f64) -> V3 {
+        let most = self.friction * self.load;
+        if most <= 0.0 || touch.mode == Mode::Apart {
+            return V3::zeros();
         }
+        let way = self.between(dx);
+        let more = (way - self.normal * self.normal.dot(&way)) * (touch.grip / (a * most));
+        let slides = touch.mode == Mode::Slides;
+        if slides && share < 1.0 && touch.slip.dot(&(touch.slip + more)) < 0.0 {
+            return V3::zeros();
+        }
+        let turned = if slides { more - drag * touch.slip.dot(&more) } else { more };
+        let next = drag.lerp(&(touch.slip + turned), share);
+        next * (SURE / next.norm().max(1.0))
     }
 
     /// That, as the block of a particle alone in it.

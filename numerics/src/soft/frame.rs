@@ -47,7 +47,7 @@ pub struct Frame<'a> {
     pub contacts: Option<&'a dyn Contacts>,
     /// How time is stepped through.
     pub integrator: Integrator,
-    /// Steps in the frame; 0: as many as needed.
+    /// Steps in the frame; 0: one, or two halves and so on where it leaves contacts too deep or errors too large.
     pub substeps: u32,
     /// Whether it begins off balance: rest lengths jumped, say. Then it is stepped through with implicit Euler.
     pub rough: bool,
@@ -80,7 +80,7 @@ pub struct Report {
     pub cg: u32,
     /// The largest share of a stage's first residual that was left of it.
     pub residual: f64,
-    /// Solves that stopped short of what was asked.
+    /// Solves that stopped short of what was asked, and steps that left contacts too deep.
     pub caps_hit: u32,
     /// Estimated error of the positions that the frame added, metres: the sum over its steps of the largest of a particle.
     pub error_estimate: f64,
@@ -130,6 +130,15 @@ impl Solver {
     /// Where `state` does not fit `body`, a goal or pin names no particle, or `body` has not the shape it was made for.
     pub fn step(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
         assert!(state.fits(body), "a state of another body");
+        if body.order.clusters.is_wide() {
+            // From within, a loop over parts costs no call from thread to thread to begin.
+            rayon::scope(|_| self.step_here(body, state, frame))
+        } else {
+            self.step_here(body, state, frame)
+        }
+    }
+
+    fn step_here(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
         let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
         let gravity = V3::from(frame.gravity);
         let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
@@ -141,7 +150,11 @@ impl Solver {
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
         let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
-        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend };
+        let mut loads = vec![0.0; body.len()];
+        for (place, load) in body.order.places.iter().zip(&state.loads) {
+            loads[*place as usize] = *load;
+        }
+        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
         let mut report = Report::default();
         self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
         let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
@@ -160,10 +173,12 @@ impl Solver {
         (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
         describe(&mut report, &setting, &energies, &moving);
         state.trend.resize(body.len(), [0.0; 3]);
+        state.loads.resize(body.len(), 0.0);
         for (caller, place) in body.order.places.iter().enumerate() {
             state.positions[caller] = moving.x[*place as usize].into();
             state.velocities[caller] = moving.v[*place as usize].into();
             state.trend[caller] = moving.trend[*place as usize].into();
+            state.loads[caller] = moving.loads[*place as usize];
         }
         report
     }
@@ -178,12 +193,49 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
     if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
         return adapt(stepper, moving, energies, report, tolerance);
     }
-    let steps = stepper.frame.substeps.clamp(1, MOST_STEPS);
+    if stepper.frame.substeps == 0 {
+        return halve(stepper, moving, energies, report, [0.0, 1.0], f64::INFINITY);
+    }
+    let steps = stepper.frame.substeps.min(MOST_STEPS);
     for step in 0..steps {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
         let stepped = stepper.step(moving, times, energies, None, false);
         *energies = stepped.after;
         add(report, &stepped);
+    }
+}
+
+/// A step from one of `times` to the other, or two halves of it where it leaves contacts unmet: short steps only as long as
+/// that makes them shallower than `deepest`, metres.
+fn halve(
+    stepper: &mut Stepper<'_>,
+    moving: &mut Moving,
+    energies: &mut Energies,
+    report: &mut Report,
+    times: [f64; 2],
+    deepest: f64,
+) {
+    /// Share of the depth that halves have to leave, at most, to be halved too.
+    const HELPS: f64 = 0.9;
+    /// Share of the frame above which a step is not short.
+    const SHORT: f64 = 1.0 / 16.0;
+    let (start, reserve, unsettled) = (moving.clone(), *stepper.reserve, *stepper.unsettled);
+    let stepped = stepper.step(moving, times, energies, None, false);
+    let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
+    let share = times[1] - times[0];
+    let hopeless = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
+    if !unmet || hopeless || share <= 1.0 / f64::from(MOST_STEPS) {
+        add(report, &stepped);
+        *energies = stepped.after;
+        return;
+    }
+    add_work(report, &stepped);
+    *moving = start;
+    (*stepper.reserve, *stepper.unsettled) = (reserve, unsettled);
+    stepper.look(moving);
+    let middle = 0.5 * (times[0] + times[1]);
+    for half in [[times[0], middle], [middle, times[1]]] {
+        halve(stepper, moving, energies, report, half, stepped.solved.unmet);
     }
 }
 
@@ -202,20 +254,18 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS);
-        let fits = stepped.estimate <= allowed || stepped.euler;
-        add(report, &stepped);
+        let fits = (stepped.estimate <= allowed || stepped.euler) && (stepped.solved.unmet <= 0.0 || smallest);
         let change = if stepped.estimate > 0.0 { RESERVE * (allowed / stepped.estimate).sqrt() } else { CHANGE[1] };
         share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
         // No step is small enough: what is left of it is calmed.
         calm = !fits && smallest;
         if fits {
+            add(report, &stepped);
             report.caps_hit += u32::from(smallest && stepped.euler);
             *energies = stepped.after;
             time = end;
         } else {
-            // The work counts, the result does not.
-            report.error_estimate -= stepped.estimate;
-            report.substeps -= 1;
+            add_work(report, &stepped);
             *moving = before;
             *stepper.reserve = reserve;
             stepper.look(moving);
@@ -223,10 +273,15 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
     }
 }
 
-fn add(report: &mut Report, stepped: &Stepped) {
+/// The work of a step whose result does not count.
+fn add_work(report: &mut Report, stepped: &Stepped) {
     report.newton += stepped.solved.newton;
     report.cg += stepped.solved.cg;
-    report.caps_hit += stepped.solved.caps;
+}
+
+fn add(report: &mut Report, stepped: &Stepped) {
+    add_work(report, stepped);
+    report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
     report.residual = report.residual.max(stepped.solved.residual);
     report.error_estimate += stepped.estimate;
     report.energy_shed += stepped.shed;

@@ -98,6 +98,11 @@ impl Parts {
         Self { starts, wide: len.saturating_mul(weight) >= WORTH_THREADS }
     }
 
+    /// Whether threads share the work.
+    pub(super) fn is_wide(&self) -> bool {
+        self.wide
+    }
+
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)

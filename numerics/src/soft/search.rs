@@ -45,8 +45,8 @@ impl Work {
         inertial + a * a * (stored + thin + contact + springs + own)
     }
 
-    /// The share of `dx` that lowers the objective from `base`: 1, ½, ¼ …; 0 where none does.
-    pub(super) fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> f64 {
+    /// The share of `dx` that lowers the objective from `base`, 1, ½, ¼ …, or 0 where none does; and what it is there.
+    pub(super) fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> (f64, f64) {
         let mut trial = std::mem::take(&mut self.trial);
         let mut share = 1.0;
         for _ in 0..HALVINGS {
@@ -55,11 +55,11 @@ impl Work {
             let value = self.objective(on, stage, &trial);
             if value <= base + ROUNDING * base.abs() {
                 self.trial = trial;
-                return share;
+                return (share, value);
             }
             share *= 0.5;
         }
         self.trial = trial;
-        0.0
+        (0.0, base)
     }
 }

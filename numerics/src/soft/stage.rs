@@ -2,13 +2,13 @@
 //!
 //! Implicit Euler is one such stage, TR-BDF2 two with the same a. The derivative is made positive semi-definite, so that each
 //! iteration goes downhill; with a line search the objective never rises. One iteration is what a step has by default;
-//! it goes on where contacts change or the force turned out otherwise than its derivative said.
+//! it goes on where the force turned out otherwise than its derivative said, and with contacts until they are met.
 
 use super::V3;
 use super::body::Body;
 use super::cg::{self, Coarse, Limits};
 use super::coarse::{self, Layout};
-use super::contact::{Mode, Touch, Touching};
+use super::contact::{Touch, Touching};
 use super::drive::Drive;
 use super::springs::{Link, Record, Rest};
 use super::state::Warm;
@@ -27,10 +27,10 @@ const STALE: f64 = 1.5;
 const UNFORESEEN: f64 = 0.5;
 /// Times as large as before that a residual's square may be after an iteration without line search.
 const RISE: f64 = 100.0;
-/// Iterations a stage may have where contacts change.
+/// Share of a step from which on what it gained tells what is left to gain.
+const LONG: f64 = 0.2;
+/// Iterations a stage with contacts may have.
 const CONTACT_ITERATIONS: u32 = 20;
-/// Share of a step that a line search takes where friction is made linear with more care from then on.
-const CAREFUL: f64 = 0.3;
 
 /// What a stage is to solve.
 #[derive(Clone, Copy)]
@@ -63,21 +63,18 @@ pub(super) struct Setting<'a> {
 /// When Newton's method stops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newton {
-    /// Iterations at most; contacts that change get [`CONTACT_ITERATIONS`].
+    /// Iterations at most; with a line search contacts get [`CONTACT_ITERATIONS`].
     pub(super) most: u32,
     /// With a line search, the share of the first residual that ends it.
     pub(super) share: f64,
+    /// That residual's square counts as this at most: what a guess that is far off leaves is no measure.
+    pub(super) scale: f64,
+    /// A residual's square that is enough whatever the first was.
+    pub(super) enough: f64,
     /// A step this short ends it, metres.
     pub(super) tolerance: f64,
     /// Whether the objective may not rise.
     pub(super) search: bool,
-}
-
-/// How sliding contacts resist in the linear system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Friction {
-    Exact,
-    Careful,
 }
 
 /// What a stage took and reached.
@@ -90,6 +87,10 @@ pub(super) struct Solved {
     pub(super) residual: f64,
     /// Whether the residual rose, or a number is not finite.
     pub(super) failed: bool,
+    /// The residual's square that was asked for.
+    pub(super) enough: f64,
+    /// How deep the worst contact is that got too deep, metres below its gap; 0 where none did.
+    pub(super) unmet: f64,
 }
 
 /// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.
@@ -112,6 +113,8 @@ pub(super) struct Work {
     pub(super) trial: Vec<V3>,
     pub(super) thin: Vec<Thin>,
     pub(super) touches: Vec<Touch>,
+    /// What friction each contact is taken to have, as a share of all that it can.
+    pub(super) drags: Vec<V3>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
     pub(super) extra: Vec<V3>,
     /// The group of each piece whose momentum nothing outside but gravity changes, and pieces that nothing touches.
@@ -147,14 +150,15 @@ impl Work {
         self.find_free(on, stage);
         let mut solved = Solved::default();
         let mut first = 0.0;
-        let mut friction = Friction::Exact;
+        self.drags.clear();
+        self.drags.resize(stage.contacts.len(), V3::zeros());
         loop {
-            self.assemble(on, stage, x, Some(friction));
+            self.assemble(on, stage, x, true);
             let before = self.square(clusters);
             if solved.newton == 0 {
                 first = before;
+                solved.enough = newton.enough.max(newton.share * newton.share * first.min(newton.scale));
             }
-            let modes: Vec<(Mode, bool)> = self.touches.iter().map(Touch::state).collect();
             let base = if newton.search { self.objective(on, stage, x) } else { 0.0 };
             self.direction(on, stage, warm, x, &mut solved);
             solved.newton += 1;
@@ -164,11 +168,14 @@ impl Work {
                 solved.failed = true;
                 return solved;
             }
-            let share = if newton.search { self.search(on, stage, x, base) } else { 1.0 };
+            let (share, lower) = if newton.search { self.search(on, stage, x, base) } else { (1.0, base) };
+            for ((contact, touch), drag) in stage.contacts.iter().zip(&self.touches).zip(&mut self.drags) {
+                *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
+            }
             self.dx.iter_mut().for_each(|d| *d *= share);
             x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d);
             self.r = vec![V3::zeros(); x.len()];
-            self.assemble(on, stage, x, None);
+            self.assemble(on, stage, x, false);
             let after = self.square(clusters);
             let fell = after <= RISE * before;
             if !newton.search && !fell {
@@ -178,20 +185,19 @@ impl Work {
             solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
             let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
             let unforeseen = share == 1.0 && self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before;
-            let changed = self.touches.iter().zip(&modes).any(|(touch, state)| touch.state() != *state);
             let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
-            let stuck = share < CAREFUL && friction == Friction::Exact && !self.touches.is_empty();
-            friction = if share < CAREFUL { Friction::Careful } else { Friction::Exact };
-            let most = if changed || deep || stuck { CONTACT_ITERATIONS } else { newton.most };
+            let most = if newton.search && !stage.contacts.is_empty() { CONTACT_ITERATIONS } else { newton.most };
             let wanted = if newton.search {
-                solved.residual > newton.share
+                let slow = share > LONG && base - lower <= solved.enough;
+                (after > solved.enough && !slow) || deep
             } else if newton.tolerance > 0.0 {
                 longest > newton.tolerance
             } else {
                 unforeseen
             };
-            let wanted = (wanted && share > 0.0) || stuck || ((changed || deep) && share > 0.0);
+            let wanted = wanted && share > 0.0;
             if !wanted || solved.newton >= most {
+                solved.caps += u32::from(wanted && most == CONTACT_ITERATIONS);
                 solved.failed |= !after.is_finite();
                 self.turn(body, x);
                 return solved;

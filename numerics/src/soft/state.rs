@@ -22,6 +22,8 @@ pub struct State {
     pub torn: Vec<bool>,
     /// How velocities changed in the last step, m/s²: what the next first guess goes by; none at the start.
     pub(super) trend: Vec<[f64; 3]>,
+    /// The push of an obstacle that each particle was under at last, newtons; none at the start.
+    pub(super) loads: Vec<f64>,
     /// Steps for which contacts are taken to change.
     pub(super) unsettled: u32,
     /// Energy that steps without drive have lost so far, joules.
@@ -49,6 +51,7 @@ impl State {
             volumes: body.volumes.clone(),
             torn: vec![false; body.lengths.len()],
             trend: Vec::new(),
+            loads: Vec::new(),
             unsettled: 0,
             reserve: 0.0,
             warm: Warm::default(),

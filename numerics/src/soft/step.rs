@@ -30,6 +30,8 @@ const NEWTON_SHARE: f64 = 0.1;
 const GAIN: f64 = 0.1;
 /// Times that implicit Euler looks for contacts it has missed.
 const ROUNDS: u32 = 4;
+/// Share of all loads that friction may have counted otherwise than they turn out.
+const CHANGED: f64 = 0.3;
 /// Share of the mean spring that a first guess may move a particle to a surface.
 const NUDGE: f64 = 0.3;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
@@ -44,6 +46,8 @@ pub(super) struct Moving {
     pub(super) v: Vec<V3>,
     /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
     pub(super) trend: Vec<V3>,
+    /// The push of an obstacle that each particle was under at last, newtons.
+    pub(super) loads: Vec<f64>,
 }
 
 /// What a step took and reached.
@@ -95,7 +99,7 @@ impl Stepper<'_> {
         let mut full = match self.frame.contacts {
             Some(_) => {
                 let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-                self.contacts(&start.x, &ahead, times, &firmness)
+                self.contacts(&start, &ahead, times, &firmness)
             }
             None => Vec::new(),
         };
@@ -116,12 +120,13 @@ impl Stepper<'_> {
             let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v))
-                && self.missed(&full, &start.x, &moving.x, times, &firmness).is_none();
+                && !self.missed(&full, &start, &moving.x, times, &firmness).1;
             if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
                 let (again, estimate) = self.euler(moving, times, &mut full, &firmness, off);
-                stepped = Stepped { solved: sum(stepped.solved, again), estimate, euler: true, ..Stepped::default() };
+                let solved = Solved { failed: again.failed, ..sum(stepped.solved, again) };
+                stepped = Stepped { solved, estimate, euler: true, ..Stepped::default() };
                 after = None;
                 *self.unsettled = if goes_on { 0 } else { UNSETTLED };
             }
@@ -133,6 +138,7 @@ impl Stepper<'_> {
         let touches = stepped.euler || stepped.contacts > 0;
         let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
+        moving.loads = self.loads(&full, &moving.x);
         self.keep_finite(&start, moving, &mut stepped);
         stepped.after = match after.filter(|_| stepped.stopped == 0) {
             Some(energies) => energies,
@@ -157,41 +163,61 @@ impl Stepper<'_> {
         !self.setting.drive.moves() && self.frame.contacts.is_none()
     }
 
-    /// Contacts on the way `from` here `to` there, with the load they have at its start.
-    fn contacts(&self, from: &[V3], to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+    /// Contacts on the way from `start` `to` there, with the load they have at its start.
+    fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.setting.body;
         let outwards =
             |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
         let mut found: Vec<Contact> = Vec::new();
-        contacts.find(&Query { from: &outwards(from), to: &outwards(to), times }, &mut found);
+        contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
         let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
-        known.map(|contact| contact.loaded(from, h)).collect()
+        known.map(|contact| contact.loaded(&start.x, &start.loads, h)).collect()
+    }
+
+    /// The largest push of an obstacle on each particle at `x`.
+    fn loads(&self, contacts: &[Touching], x: &[V3]) -> Vec<f64> {
+        let mut loads = vec![0.0; x.len()];
+        for contact in contacts {
+            if let Some((place, _)) = contact.alone() {
+                loads[place] = f64::max(loads[place], contact.push(x));
+            }
+        }
+        loads
     }
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
         match tolerance {
-            Some(tolerance) => {
-                Newton { most: MOST_ACCURATE, share: 0.0, tolerance: NEWTON_SHARE * tolerance, search: false }
-            }
-            None => Newton { most: MOST, share: 0.0, tolerance: 0.0, search: false },
+            Some(tolerance) => Newton {
+                most: MOST_ACCURATE,
+                share: 0.0,
+                scale: 0.0,
+                enough: 0.0,
+                tolerance: NEWTON_SHARE * tolerance,
+                search: false,
+            },
+            None => Newton { most: MOST, share: 0.0, scale: 0.0, enough: 0.0, tolerance: 0.0, search: false },
         }
     }
 
-    /// Contacts that `x` has and `known` has not, with all others: what was far may be pushed near, and surfaces bend.
+    /// The contacts that `x` has, and whether `known` lacks deep ones of them: what was far may be pushed near, and surfaces
+    /// bend.
     fn missed(
         &self,
         known: &[Touching],
-        start: &[V3],
+        start: &Moving,
         x: &[V3],
         times: [f64; 2],
         firmness: &[f64],
-    ) -> Option<Vec<Touching>> {
-        self.frame.contacts?;
-        let deep = |contacts: &[Touching]| contacts.iter().filter(|c| c.too_near(x)).count();
+    ) -> (Vec<Touching>, bool) {
+        if self.frame.contacts.is_none() {
+            return (Vec::new(), false);
+        }
+        let deep = |contacts: &[Touching]| contacts.iter().filter(|contact| contact.too_near(x)).count();
         let found = self.contacts(start, x, times, firmness);
-        (deep(&found) > deep(known)).then_some(found)
+        let missed = deep(&found) > deep(known);
+        (found, missed)
     }
 
     /// Implicit Euler; `off` where it begins off balance by more than its contacts.
@@ -208,14 +234,24 @@ impl Stepper<'_> {
         let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
-        let newton = Newton { most: MOST, share: EULER_SHARE, tolerance: 0.0, search: true };
+        let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
+        let mut newton = Newton { most: MOST, share: EULER_SHARE, scale, enough: 0.0, tolerance: 0.0, search: true };
         let mut solved = Solved::default();
         for round in 1..=ROUNDS {
             let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
             solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
-            match self.missed(contacts, &moving.x, &x, times, firmness) {
-                Some(found) if round < ROUNDS => *contacts = found,
-                _ => break,
+            newton.enough = solved.enough;
+            let changed = reload(contacts, &x);
+            let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
+            // What was deep before is on its way out.
+            let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
+            solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
+            if round == ROUNDS || !(missed || changed > CHANGED) {
+                break;
+            }
+            if missed {
+                take_loads(contacts, &mut found);
+                *contacts = found;
             }
         }
         let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
@@ -223,6 +259,19 @@ impl Stepper<'_> {
         let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
         (moving.x, moving.v) = (x, v);
         (solved, estimate)
+    }
+
+    /// About the square of the residual of motion on from `x` to `y`, gravity and obstacles within `h`, if nothing gave way.
+    fn scale(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> f64 {
+        let mass = &self.setting.body.mass;
+        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let own: f64 = (0..x.len()).map(|place| mass[place] * (falls + (y[place] - x[place]).norm_squared())).sum();
+        let given = contacts.iter().flat_map(|contact| {
+            let way = (contact.velocity * h).norm_squared();
+            contact.sides().map(move |(place, weight)| mass[place] * weight * weight * way)
+        });
+        let scale = own + given.sum::<f64>();
+        if scale > 0.0 { scale } else { f64::INFINITY }
     }
 
     /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
@@ -357,6 +406,32 @@ impl Stepper<'_> {
     }
 }
 
+/// Has friction count the pushes that were found; gives the share of them that it did not count before.
+fn reload(contacts: &mut [Touching], x: &[V3]) -> f64 {
+    let (mut sum, mut changed) = (0.0, 0.0);
+    for contact in contacts {
+        let load = contact.push(x);
+        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
+        contact.load = load;
+    }
+    if sum > 0.0 { changed / sum } else { 0.0 }
+}
+
+/// Has contacts found anew count the loads of those that `known` has of the same particles in about the same direction.
+fn take_loads(known: &[Touching], found: &mut [Touching]) {
+    /// Cosine of the angle within which directions are the same.
+    const SAME: f64 = 0.9;
+    let mut order: Vec<u32> = (0..known.len() as u32).collect();
+    order.sort_by_key(|index| (known[*index as usize].places, *index));
+    for contact in found {
+        let first = order.partition_point(|index| known[*index as usize].places < contact.places);
+        let mine = order[first..].iter().map(|index| &known[*index as usize]);
+        let alike = mine.take_while(|other| other.places == contact.places);
+        let nearest = alike.max_by(|a, b| a.normal.dot(&contact.normal).total_cmp(&b.normal.dot(&contact.normal)));
+        contact.load = nearest.filter(|other| other.normal.dot(&contact.normal) > SAME).map_or(0.0, |other| other.load);
+    }
+}
+
 /// Joules.
 fn kinetic(body: &Body, v: &[V3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
@@ -378,5 +453,7 @@ fn sum(a: Solved, b: Solved) -> Solved {
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
         failed: a.failed || b.failed,
+        enough: a.enough.max(b.enough),
+        unmet: b.unmet,
     }
 }

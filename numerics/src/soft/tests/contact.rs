@@ -339,3 +339,34 @@ fn frictions_and_obstacles_beyond_reason() {
         }
     }
 }
+
+#[test]
+fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
+    let ground = ground(0.5);
+    let from = |index: usize, turned: bool| {
+        let out = random(7, index) * 0.2;
+        if turned { out } else { V3::zeros() }
+    };
+    for stiffness in [1e-6, 1.0, 1e3, 1e6, 1e9, 1e12] {
+        for (ratio, turned) in [(1.0, false), (1e6, false), (1.0, true), (1e6, true)] {
+            let (points, tets) = block([3, 3, 3], 0.1);
+            let mask: Vec<f32> = (0..points.len()).map(|i| if i % 2 == 0 { 1.0 } else { 1.0 / ratio as f32 }).collect();
+            let density = Scaled { value: 1000.0, mask: Some(&mask) };
+            let material = Material { density, ..material(1000.0, stiffness, 0.01) };
+            let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
+            let mut state = State::at_rest(&body);
+            for (index, x) in state.positions.iter_mut().enumerate() {
+                *x = (V3::from(*x) + V3::y() * 0.12 + from(index, turned)).into();
+            }
+            let mut solver = Solver::new(&body);
+            for number in 0..48 {
+                let report = solver.step(&body, &mut state, &Frame { contacts: Some(&ground), ..Frame::default() });
+                let what = || format!("E {stiffness}, ratio {ratio}, turned {turned}, frame {number}: {report:?}");
+                assert!(is_finite(&state) && report.stopped == 0, "{}", what());
+                assert!(lowest(&state) > -THICKNESS, "{} {}", lowest(&state), what());
+                let far = state.positions.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
+                assert!(far < 1e3, "{far} {}", what());
+            }
+        }
+    }
+}

@@ -52,8 +52,6 @@ fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> Body {
 #[test]
 fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
     let thickness = 2e-3;
-    let (points, tets, faces) = block([3, 3, 3], 0.1, [0.03, 0.9 * thickness, 0.05]);
-    let body = body(&points, &tets, 5e4);
     // Of 8 × 8 squares, askew to the block's own.
     let mut plate = Vec::new();
     for z in 0..9 {
@@ -61,20 +59,28 @@ fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
     }
     let squares = (0..64u32).map(|k| (k % 8) + 9 * (k / 8));
     let triangles: Vec<[u32; 3]> = squares.flat_map(|a| [[a, a + 9, a + 10], [a, a + 10, a + 1]]).collect();
-    let plate = Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, thickness, 0.5).unwrap();
-    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
-    let own = Some(Rub { thickness, friction: 0.5 });
-    let scene = Scene { skins: &skins, obstacles: &[plate], own, ..Scene::default() };
-    let mut state = State::at_rest(&body);
-    let mut solver = Solver::new(&body);
-    let frame = Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() };
-    for _ in 0..240 {
-        let _ = solver.step(&body, &mut state, &frame);
-        let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-        assert!(lowest > 0.0, "{lowest}");
+    let plate = [Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, thickness, 0.5).unwrap()];
+    for (stiffness, side) in [(5e4, 0.1), (5e3, 0.02)] {
+        let (points, tets, faces) = block([3, 3, 3], side, [0.03, 0.9 * thickness, 0.05]);
+        let body = body(&points, &tets, stiffness);
+        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+        let own = Some(Rub { thickness, friction: 0.5 });
+        let scene = Scene { skins: &skins, obstacles: &plate, own, ..Scene::default() };
+        let frame = Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() };
+        let mut state = State::at_rest(&body);
+        let mut solver = Solver::new(&body);
+        for number in 0..240 {
+            let report = solver.step(&body, &mut state, &frame);
+            let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+            assert!(lowest > 0.0, "frame {number}: {lowest} {report:?}");
+            let speed = fastest(&state);
+            assert!(number < 120 || speed < 1e-4 * 9.81 * FRAME, "frame {number}: {} g·dt", speed / (9.81 * FRAME));
+        }
     }
-    let speed = state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max);
-    assert!(speed < 1e-4 * 9.81 * FRAME, "{} g·dt", speed / (9.81 * FRAME));
+}
+
+fn fastest(state: &State) -> f64 {
+    state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
 }
 
 const SIDES: usize = 32;
@@ -140,18 +146,91 @@ fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
 #[test]
 fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
     let (points, tets, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
-    let body = body(&points, &tets, 2e4);
+    // Steps in which the pin moves ten times its thickness, and such in which it moves less than that.
+    for (stiffness, substeps) in [(2e4, 0), (5e3, 0), (2e4, 16)] {
+        let body = body(&points, &tets, stiffness);
+        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+        let mut state = State::at_rest(&body);
+        let mut solver = Solver::new(&body);
+        let step = |scene: &Scene<'_>| {
+            let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps, ..Frame::default() };
+            let report = solver.step(&body, &mut state, &frame);
+            assert_eq!((report.stopped, report.inverted_tets), (0, 0));
+            assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
+            assert!(fastest(&state) < 1.0, "{report:?}");
+            state.positions.clone()
+        };
+        let worst = rolled_over(30, step, &skins);
+        assert!(worst < THICKNESS, "{worst}");
+    }
+}
+
+/// A block of dough under a box whose lower side is `height` above the ground at each frame; gives the state after each.
+fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &State)) {
+    let (points, tets, faces) = block([6, 4, 6], 0.02, [0.0, THICKNESS, 0.0]);
+    let body = body(&points, &tets, 5e3);
     let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let (plate, triangles) = cuboid([0.4, 0.02, 0.4]);
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
     let mut state = State::at_rest(&body);
     let mut solver = Solver::new(&body);
-    // Steps in which the pin moves less than its thickness.
-    let step = |scene: &Scene<'_>| {
-        let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps: 16, ..Frame::default() };
-        let report = solver.step(&body, &mut state, &frame);
-        assert_eq!(report.stopped, 0);
-        assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
-        state.positions.clone()
+    for frame in 0..frames {
+        let poses = [0.0, 1.0].map(|share| {
+            let height = height(f64::from(frame) + share) + 0.01;
+            let at: Vec<[f64; 3]> = plate.iter().map(|[x, y, z]| [x + 0.06, y + height, z + 0.06]).collect();
+            pose(share, &at)
+        });
+        let plate = [Obstacle::new(&triangles, &poses, FRAME, THICKNESS, 0.5).unwrap()];
+        let scene = Scene { skins: &skins, obstacles: &plate, ground, ..Scene::default() };
+        let report =
+            solver.step(&body, &mut state, &Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() });
+        let highest = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max);
+        let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+        assert!(lowest > 0.0 && highest < height(f64::from(frame + 1)), "frame {frame}: {lowest} {highest} {report:?}");
+        assert!(fastest(&state) < 2.0, "frame {frame}: {report:?}");
+        each(frame, &state);
+    }
+}
+
+#[test]
+fn dough_pressed_to_three_fifths_of_its_height_comes_back() {
+    let height = |frame: f64| {
+        let down = if frame < 24.0 { frame / 24.0 } else { (36.0 - frame) / 12.0 };
+        0.08 + 2.0 * THICKNESS - 0.4 * 0.08 * down
     };
-    let worst = rolled_over(30, step, &skins);
-    assert!(worst < THICKNESS, "{worst}");
+    let mut top = 0.0;
+    pressed(96, height, |_, state| top = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max));
+    assert!(top > 0.075, "{top}");
+}
+
+#[test]
+fn dough_hit_by_fifteen_thicknesses_in_a_frame_stays_outside() {
+    let height = |frame: f64| 0.09 - 0.015 * frame.min(3.0);
+    pressed(24, height, |_, _| {});
+}
+
+#[test]
+fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume() {
+    let (points, tets, faces) = block([6, 3, 4], 0.02, [0.0; 3]);
+    let body = body(&points, &tets, 5e3);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let whole = |threads: usize, resumed: bool| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut state = State::at_rest(&body);
+            let mut solver = Solver::new(&body);
+            let step = |scene: &Scene<'_>| {
+                if resumed {
+                    solver = Solver::new(&body);
+                    state = state.clone();
+                }
+                let _ = solver.step(&body, &mut state, &Frame { contacts: Some(scene), ..Frame::default() });
+                state.positions.clone()
+            };
+            rolled_over(14, step, &skins);
+            state
+        })
+    };
+    let one = whole(1, false);
+    assert!(one == whole(3, false) && one == whole(2, true));
 }
