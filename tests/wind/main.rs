@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod coherence;
+#[path = "../cooked/mod.rs"]
 mod cooked;
 mod extremes;
 mod pictures;

@@ -69,14 +69,17 @@ fn load(text: &str, outputs: &[&str]) -> Result<Graph, String> {
     let folder = graphs().join("bear_wind");
     let graph = Graph::load(text, &folder, convect::CATALOGUE, &[], &probe);
     let mut graph = graph.map_err(|faults| faults[0].to_string())?;
-    graph.outputs = outputs
-        .iter()
-        .map(|name| {
-            let node = graph.nodes.iter().position(|node| &*node.id == *name).unwrap();
-            GraphOutput { name: (*name).into(), from: Link { node, port: 0 }, attributes: None, v: false }
-        })
-        .collect();
+    graph.outputs = outputs.iter().map(|name| output(&graph, name)).collect();
     Ok(graph)
+}
+
+/// Of a node, or `"node.port"`.
+fn output(graph: &Graph, name: &str) -> GraphOutput {
+    let (id, port) = name.split_once('.').unwrap_or((name, ""));
+    let node = graph.nodes.iter().position(|node| &*node.id == id).unwrap();
+    let ports = graph.nodes[node].node().map_or(&[][..], |node| node.outputs);
+    let port = ports.iter().position(|output| output.name == port).unwrap_or(0);
+    GraphOutput { name: name.into(), from: Link { node, port }, attributes: None, v: false }
 }
 
 fn cook_graph(graph: &Graph, frames: i64) -> (Frames, Metrics) {
