@@ -2,7 +2,8 @@
 //!
 //! The solver asks a [`Contacts`] once a stage for all that may touch, and treats each as a spring that only pushes and only
 //! below the distance kept, without limit where the surfaces meet: N = κδ ÷ (1 − δ/gap), implicit like every other force.
-//! Friction is Coulomb's, sticking to a creep of [`CREEP`] body lengths a second, implicit too, with N as the step begins.
+//! Friction is Coulomb's, sticking to a creep of [`CREEP`] body lengths a second, implicit too, with N
+//! as it was at last until the step has its own.
 //!
 //! Limit: the surfaces a contact was found for are planes within the stage.
 

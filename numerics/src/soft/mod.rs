@@ -19,6 +19,7 @@ mod contact;
 mod drive;
 mod edges;
 mod energy;
+mod euler;
 mod frame;
 mod guess;
 mod momentum;

@@ -1,0 +1,157 @@
+//! Implicit Euler with contacts: finds them, solves, looks whether others came and what friction they have, goes on.
+//!
+//! Friction is solved with pushes that are given: those the particles were under at last, then those that the solution has,
+//! until they are about the same. So what is solved has an objective, and what comes out has Coulomb's friction of its own pushes.
+
+use super::V3;
+use super::contact::{Contact, Query, Touching};
+use super::stage::{Newton, Solved, Stage};
+use super::step::{MOST, Moving, Stepper, sum};
+
+/// Times that implicit Euler looks for contacts it has missed.
+const ROUNDS: u32 = 4;
+/// Share of the mean spring that a first guess may move a particle to a surface.
+const NUDGE: f64 = 0.3;
+/// Share of all loads that friction may have counted otherwise than they turn out.
+const CHANGED: f64 = 0.3;
+/// Share of the first residual at which implicit Euler stops.
+const EULER_SHARE: f64 = 0.03;
+
+impl Stepper<'_> {
+    /// Contacts on the way from `start` `to` there, with the load they have at its start.
+    pub(super) fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+        let h = (times[1] - times[0]) * self.seconds;
+        let Some(contacts) = self.frame.contacts else { return Vec::new() };
+        let body = self.setting.body;
+        let outwards =
+            |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
+        let mut found: Vec<Contact> = Vec::new();
+        contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
+        let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
+        known.map(|contact| contact.loaded(&start.x, &start.loads, h)).collect()
+    }
+
+    /// The largest push of an obstacle on each particle at `x`.
+    pub(super) fn loads(&self, contacts: &[Touching], x: &[V3]) -> Vec<f64> {
+        let mut loads = vec![0.0; x.len()];
+        for contact in contacts {
+            if let Some((place, _)) = contact.alone() {
+                loads[place] = f64::max(loads[place], contact.push(x));
+            }
+        }
+        loads
+    }
+
+    /// The contacts that `x` has, and whether `known` lacks deep ones of them: what was far may be pushed near, and surfaces
+    /// bend.
+    pub(super) fn missed(
+        &self,
+        known: &[Touching],
+        start: &Moving,
+        x: &[V3],
+        times: [f64; 2],
+        firmness: &[f64],
+    ) -> (Vec<Touching>, bool) {
+        if self.frame.contacts.is_none() {
+            return (Vec::new(), false);
+        }
+        let deep = |contacts: &[Touching]| contacts.iter().filter(|contact| contact.too_near(x)).count();
+        let found = self.contacts(start, x, times, firmness);
+        let missed = deep(&found) > deep(known);
+        (found, missed)
+    }
+
+    /// Implicit Euler; `off` where it begins off balance by more than its contacts.
+    pub(super) fn euler(
+        &mut self,
+        moving: &mut Moving,
+        times: [f64; 2],
+        contacts: &mut Vec<Touching>,
+        firmness: &[f64],
+        off: bool,
+    ) -> (Solved, f64) {
+        let h = (times[1] - times[0]) * self.seconds;
+        let mut z = moving.x.clone();
+        let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
+        let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
+        self.pin(&mut x, &mut z, times[1], h);
+        let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
+        let mut newton = Newton { most: MOST, share: EULER_SHARE, scale, enough: 0.0, tolerance: 0.0, search: true };
+        let mut solved = Solved::default();
+        for round in 1..=ROUNDS {
+            let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
+            solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
+            newton.enough = solved.enough;
+            let changed = reload(contacts, &x);
+            let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
+            // What was deep before is on its way out.
+            let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
+            solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
+            if round == ROUNDS || !(missed || changed > CHANGED) {
+                break;
+            }
+            if missed {
+                take_loads(contacts, &mut found);
+                *contacts = found;
+            }
+        }
+        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
+        // What velocities changed by is a whole step late.
+        let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
+        (moving.x, moving.v) = (x, v);
+        (solved, estimate)
+    }
+
+    /// About the square of the residual of motion on from `x` to `y`, gravity and obstacles within `h`, if nothing gave way.
+    fn scale(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> f64 {
+        let mass = &self.setting.body.mass;
+        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let own: f64 = (0..x.len()).map(|place| mass[place] * (falls + (y[place] - x[place]).norm_squared())).sum();
+        let given = contacts.iter().flat_map(|contact| {
+            let way = (contact.velocity * h).norm_squared();
+            contact.sides().map(move |(place, weight)| mass[place] * weight * weight * way)
+        });
+        let scale = own + given.sum::<f64>();
+        if scale > 0.0 { scale } else { f64::INFINITY }
+    }
+
+    /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
+    fn slid(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> Vec<V3> {
+        let mut out = y.to_vec();
+        for contact in contacts {
+            let Some((place, weight)) = contact.alone() else { continue };
+            let before = contact.clearance(x, h);
+            let missing = before.min(0.0) - contact.clearance(&out, 0.0);
+            if (missing > 0.0 || before < 0.0) && missing.abs() < NUDGE * self.setting.body.spacing {
+                out[place] += contact.normal * (missing / weight);
+            }
+        }
+        out
+    }
+}
+
+/// Has friction count the pushes that were found; gives the share of them that it did not count before.
+fn reload(contacts: &mut [Touching], x: &[V3]) -> f64 {
+    let (mut sum, mut changed) = (0.0, 0.0);
+    for contact in contacts {
+        let load = contact.push(x);
+        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
+        contact.load = load;
+    }
+    if sum > 0.0 { changed / sum } else { 0.0 }
+}
+
+/// Has contacts found anew count the loads of those that `known` has of the same particles in about the same direction.
+fn take_loads(known: &[Touching], found: &mut [Touching]) {
+    /// Cosine of the angle within which directions are the same.
+    const SAME: f64 = 0.9;
+    let mut order: Vec<u32> = (0..known.len() as u32).collect();
+    order.sort_by_key(|index| (known[*index as usize].places, *index));
+    for contact in found {
+        let first = order.partition_point(|index| known[*index as usize].places < contact.places);
+        let mine = order[first..].iter().map(|index| &known[*index as usize]);
+        let alike = mine.take_while(|other| other.places == contact.places);
+        let nearest = alike.max_by(|a, b| a.normal.dot(&contact.normal).total_cmp(&b.normal.dot(&contact.normal)));
+        contact.load = nearest.filter(|other| other.normal.dot(&contact.normal) > SAME).map_or(0.0, |other| other.load);
+    }
+}
