@@ -1,5 +1,7 @@
 //! Graphs on the assets of `graphs/`, cooked in memory.
 
+#![allow(dead_code, reason = "each suite takes what it needs")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -219,11 +219,14 @@ fn halve(
     const HELPS: f64 = 0.9;
     /// Share of the frame above which a step is not short.
     const SHORT: f64 = 1.0 / 16.0;
+    /// Newton iterations of a frame after which what is unmet is left so: a frame ends.
+    const MOST_NEWTON: u32 = 400;
     let (start, reserve, unsettled) = (moving.clone(), *stepper.reserve, *stepper.unsettled);
     let stepped = stepper.step(moving, times, energies, None, false);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
-    let hopeless = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
+    let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
+    let hopeless = no_help || report.newton >= MOST_NEWTON;
     if !unmet || hopeless || share <= 1.0 / f64::from(MOST_STEPS) {
         add(report, &stepped);
         *energies = stepped.after;
