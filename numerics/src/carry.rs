@@ -88,7 +88,8 @@ impl Inverse {
         let [a, b, c, d] = tet.map(|corner| wide(points[corner as usize]));
         let (p, q, r) = (b - a, c - a, d - a);
         let volume = p.dot(&q.cross(&r));
-        if !(volume.abs() > FLAT * p.norm() * q.norm() * r.norm()) {
+        let solid = volume.abs() > FLAT * p.norm() * q.norm() * r.norm();
+        if !solid {
             return None;
         }
         let rows = nalgebra::Matrix3::from_rows(&[

@@ -260,6 +260,10 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         let fits = (stepped.estimate <= allowed || stepped.euler) && (stepped.solved.unmet <= 0.0 || smallest);
         let change = if stepped.estimate > 0.0 { RESERVE * (allowed / stepped.estimate).sqrt() } else { CHANGE[1] };
         share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
+        if stepped.solved.unmet > 0.0 {
+            // The estimate knows nothing of contacts: what sank asks for shorter steps.
+            share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
+        }
         // No step is small enough: what is left of it is calmed.
         calm = !fits && smallest;
         if fits {
