@@ -24,7 +24,7 @@ fn goals_inside_leave_the_dent_that_goals_on_all_take_away() {
     let hand = at(5, 16);
     let tip = hand.iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
     let under: Vec<usize> = (0..skin)
-        .filter(|k| rest[*k][1] > 0.052 && (rest[*k][0] - tip[0]).hypot(rest[*k][2] - tip[2]) < 0.025)
+        .filter(|k| rest[*k][1] > 0.052 && libm::hypot(rest[*k][0] - tip[0], rest[*k][2] - tip[2]) < 0.025)
         .collect();
     let dent = |output: usize, frame: usize| {
         let all = at(output, frame);

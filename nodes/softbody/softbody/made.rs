@@ -136,8 +136,8 @@ impl Made {
             points: &rest,
             triangles: &triangles,
             parts: &parts,
-            radius: f64::from(cx.get(COUPLING_RADIUS)),
-            stiffness: f64::from(cx.get(COUPLING_STIFFNESS)),
+            radius: cx.get(COUPLING_RADIUS),
+            stiffness: cx.get(COUPLING_STIFFNESS),
             damping: f64::from(cx.get(DAMPING).value),
         });
         let mut made = Self {
