@@ -82,20 +82,21 @@ fn encode_table(out: &mut Vec<u8>, table: &Table) {
     }
 }
 
-struct Reader<'a>(&'a [u8]);
+/// What of some bytes is not read yet; each read is `None` where they end too soon.
+pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+    pub(crate) fn take(&mut self, n: usize) -> Option<&'a [u8]> {
         let (head, rest) = self.0.split_at_checked(n)?;
         self.0 = rest;
         Some(head)
     }
 
-    fn count(&mut self) -> Option<usize> {
+    pub(crate) fn count(&mut self) -> Option<usize> {
         Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
     }
 
-    fn piece(&mut self) -> Option<&'a [u8]> {
+    pub(crate) fn piece(&mut self) -> Option<&'a [u8]> {
         let n = self.count()?;
         self.take(n)
     }

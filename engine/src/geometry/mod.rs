@@ -20,6 +20,7 @@ use std::sync::Arc;
 pub use attribute::{
     Attr, CURVE_ID, ENVELOPE, ID, N, ORIENT, Owner, P, PREF, SHIELDED, THICKNESS, UVW, V, WIDTH, fixed_type,
 };
+pub(crate) use bytes::Reader;
 pub use column::{Column, ColumnType, Item, Name, Table};
 pub use component::Component;
 pub use topology::{Faces, Runs, Topology};

@@ -1,7 +1,7 @@
 //! A finished frame as bytes, and back.
 
 use super::KeptMetric;
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Reader};
 use crate::key::Key;
 
 /// A geometry and the metrics of what went into it as bytes, every bit of them.
@@ -20,35 +20,16 @@ pub(super) fn encode(geometry: &Geometry, metrics: &[KeptMetric]) -> Vec<u8> {
 /// What [`encode`] has written; `None` where it is anything else.
 pub(super) fn decode(bytes: &[u8]) -> Option<(Geometry, Vec<KeptMetric>)> {
     let mut reader = Reader(bytes);
-    let metrics = reader.metrics()?;
+    let metrics = metrics(&mut reader)?;
     Some((Geometry::from_bytes(reader.0)?, metrics))
 }
 
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (head, rest) = self.0.split_at_checked(n)?;
-        self.0 = rest;
-        Some(head)
+fn metrics(reader: &mut Reader<'_>) -> Option<Vec<KeptMetric>> {
+    let mut metrics = Vec::new();
+    for _ in 0..reader.count()? {
+        let key = Key(reader.take(16)?.try_into().ok()?);
+        let name = std::str::from_utf8(reader.piece()?).ok()?.to_owned();
+        metrics.push((key, name, f64::from_le_bytes(reader.take(8)?.try_into().ok()?)));
     }
-
-    fn count(&mut self) -> Option<usize> {
-        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?) as usize)
-    }
-
-    fn piece(&mut self) -> Option<&'a [u8]> {
-        let n = self.count()?;
-        self.take(n)
-    }
-
-    fn metrics(&mut self) -> Option<Vec<KeptMetric>> {
-        let mut metrics = Vec::new();
-        for _ in 0..self.count()? {
-            let key = Key(self.take(16)?.try_into().ok()?);
-            let name = std::str::from_utf8(self.piece()?).ok()?.to_owned();
-            metrics.push((key, name, f64::from_le_bytes(self.take(8)?.try_into().ok()?)));
-        }
-        Some(metrics)
-    }
+    Some(metrics)
 }
