@@ -1,8 +1,8 @@
 //! Softbody: dough that is pounded, rolled and directed, an egg that cracks open.
 //!
 //! R1: "mass-spring systems" on Delaunay tetrahedra, with collisions, goal shapes for "the internal particles of the dough",
-//! constraints that are animated, and springs that couple the yolk with the white. The solver is [`numerics::soft`], contacts
-//! are found by [`numerics::touch`].
+//! constraints that are animated, and springs that couple the yolk with the white. The solver is [`bodies::soft`], contacts
+//! are found by [`bodies::touch`].
 //!
 //! Departures, and what R leaves open:
 //! * Springs alone let bodies turn inside out and lose volume: pressures keep it, by `volume`.
@@ -13,9 +13,9 @@
 
 use std::sync::{Arc, OnceLock};
 
+use bodies::soft::{Body, Frame as Step, Integrator, Plasticity, Report, Solver, State, flow, reset, tear};
+use bodies::touch::{Ground, Rub, Scene};
 use engine::prelude::*;
-use numerics::soft::{Body, Frame as Step, Integrator, Plasticity, Report, Solver, State, flow, reset, tear};
-use numerics::touch::{Ground, Rub, Scene};
 use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
@@ -273,7 +273,8 @@ impl Chain for Run {
         let report = solving.solver.step(&solving.body, &mut self.state, &frame);
         let plasticity =
             Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
-        let _ = flow(&solving.body, &mut self.state, plasticity, seconds);
+        let drawn = goals.shape(times[1]);
+        let _ = flow(&solving.body, &mut self.state, plasticity, seconds, drawn.as_deref());
         let mut brought = 0.0;
         let keep = f64::from(cx.get(KEEP_DENTS));
         goals.resets(times[1], whole, frames, |shape, share| {

@@ -17,7 +17,7 @@ pub struct Path(Level);
 
 /// Which of the copies of a kernel a path runs, narrowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Level {
+pub enum Level {
     /// What every CPU of the build's target has: SSE2, or NEON.
     Baseline,
     /// Eight lanes: AVX2.
@@ -88,7 +88,7 @@ impl Path {
     }
 
     /// Which copy of a kernel it runs.
-    pub(crate) fn level(self) -> Level {
+    pub fn level(self) -> Level {
         self.0
     }
 }
@@ -117,6 +117,7 @@ fn widest_level() -> Level {
 /// A function that runs `body`, an `#[inline(always)]` function of the same arguments, compiled for
 /// the path that is its first argument:
 /// `kernel! { pub fn bend_group(group: &Group<'_>) -> Reached = group_body; }`
+#[macro_export]
 macro_rules! kernel {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path;) => {
         $(#[$meta])*
@@ -145,7 +146,7 @@ macro_rules! kernel {
         }
     };
 }
-pub(crate) use kernel;
+pub use kernel;
 
 #[cfg(test)]
 mod tests {

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
+use bodies::soft;
 use engine::prelude::*;
-use numerics::soft;
 
 use super::GoalOn;
 use super::made::{Given, Made};
@@ -118,6 +118,20 @@ impl<'a> Goals<'a> {
                 Some(Drawn { from: Some(from.places), to: to.places, share, strength })
             }
         }
+    }
+
+    /// The shape that bodies are drawn to at a frame, a place for each particle, NaN where none draws it; none where none
+    /// is drawn.
+    pub(super) fn shape(&self, frame: f64) -> Option<Vec<[f64; 3]>> {
+        let mut shape = None;
+        for (wire, particles) in self.made.wires.iter().enumerate() {
+            let Some(now) = self.drawn(wire, frame) else { continue };
+            let shape = shape.get_or_insert_with(|| vec![[f64::NAN; 3]; self.made.rest.len()]);
+            for (point, particle) in particles.clone().enumerate() {
+                shape[particle] = self.place(&now, particle, point);
+            }
+        }
+        shape
     }
 
     /// The share of the way from the shape at rest to each goal's that is gone after the step to `frame`; in the caller's

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use bodies::touch::{Obstacle, Pose};
 use engine::prelude::*;
-use numerics::touch::{Obstacle, Pose};
 
 /// What bodies cannot pass in a step of `seconds` whose `samples` are the wires at rising times.
 ///

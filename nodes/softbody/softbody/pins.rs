@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use bodies::soft::{Goal, Pin};
 use engine::prelude::*;
-use numerics::soft::{Goal, Pin};
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
 

@@ -1,7 +1,7 @@
 //! What soft bodies cost and how deep they are pressed in under hard contact: dough of 5 kPa that rests, is rolled over,
 //! pressed and hit.
 //!
-//! `cargo run --release -p numerics --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [quiet]`;
+//! `cargo run --release -p bodies --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [quiet]`;
 //! threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh), roll (a pin that rolls on by ten
 //! thicknesses a frame, 1 cm into the dough), press (a plate down to 60 % of the height and up again), fist (a sphere a
 //! third of the way in, ten thicknesses a frame), knead (a pin at twice the pace, half the way in), slap (a plate that
@@ -9,10 +9,10 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
+use bodies::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+use bodies::touch::{Ground, Obstacle, Pose, Rub, Scene, Skin};
 use cpu_time::ProcessTime;
 use nalgebra::Vector3;
-use numerics::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
-use numerics::touch::{Ground, Obstacle, Pose, Rub, Scene, Skin};
 use std::time::Instant;
 
 const FRAME: f64 = 1.0 / 24.0;

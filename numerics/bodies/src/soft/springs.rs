@@ -9,7 +9,7 @@
 use super::V3;
 use super::body::Body;
 use super::parts::Several;
-use crate::random::Key;
+use numerics::random::Key;
 
 /// Largest a²k a record holds: α, β and products with displacements stay far inside of f32.
 const STIFFEST: f64 = 1e24;
@@ -111,8 +111,8 @@ impl Seen {
 /// distance squared is beyond numbers.
 #[cold]
 fn unusual(d: V3, spring: u32, first: bool) -> (V3, f64) {
-    let size = d.amax();
-    if size > 0.0 {
+    if d != V3::zeros() {
+        let size = d.amax();
         let scaled = d / size;
         return (scaled.normalize(), size * scaled.norm());
     }

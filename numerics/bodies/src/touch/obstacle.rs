@@ -4,8 +4,8 @@ use super::motion::{Motion, Pose};
 use super::surface::{Moment, NONE, Surface};
 use super::swept::Elements;
 use super::{TouchError, V3};
-use crate::tree::TriangleTree;
-use crate::vec3::Vec3;
+use numerics::tree::TriangleTree;
+use numerics::vec3::Vec3;
 
 /// A mesh that moves through the frame as its poses say, as rigidly as they allow.
 #[derive(Clone, Debug)]

@@ -24,9 +24,9 @@ mod swept;
 mod vertex;
 
 use crate::soft::{Contact, Contacts, Query};
-use crate::tree::{Cuboid, TriangleTree};
 pub use motion::Pose;
 use near::Nearest;
+use numerics::tree::{Cuboid, TriangleTree};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::Rub;
 use rayon::prelude::*;

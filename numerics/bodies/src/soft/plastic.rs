@@ -21,7 +21,10 @@ pub struct Plasticity {
 }
 
 /// Lets springs flow for `seconds`; returns the energy that takes, joules.
-pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64) -> f64 {
+///
+/// `drawn` is the shape that goals draw the body to, particles by the caller's index, NaN where they draw none. A length
+/// between that at rest and the drawn one is on its way and no dent; strain counts from the nearer of the two.
+pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64, drawn: Option<&[[f64; 3]]>) -> f64 {
     let flows = plasticity.yield_strain > 0.0 && plasticity.creep > 0.0 && seconds > 0.0;
     if !flows {
         return 0.0;
@@ -29,12 +32,20 @@ pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64
     let share = -libm::expm1(-plasticity.creep * seconds);
     let before = elastic(body, state);
     let x = places(body, &state.positions);
+    let drawn = drawn.map(|drawn| places(body, drawn));
     for spring in 0..body.ends.len() {
-        let rest = state.lengths[spring] * state.dents[spring];
-        if rest > 0.0 && !state.torn[spring] {
-            let strain = springs::length(body, &x, spring) / rest - 1.0;
+        let (length, dent) = (state.lengths[spring], state.dents[spring]);
+        let meant = match &drawn {
+            Some(drawn) if spring < body.meshed() => springs::length(body, drawn, spring),
+            _ => f64::NAN,
+        };
+        // The least and the most of a number and NaN are the number.
+        let (least, most) = (length.min(meant) * dent, length.max(meant) * dent);
+        if least > 0.0 && !state.torn[spring] {
+            let now = springs::length(body, &x, spring);
+            let strain = now / now.clamp(least, most) - 1.0;
             let above = (strain.abs() - plasticity.yield_strain).max(0.0).copysign(strain);
-            let dent = state.dents[spring] * (1.0 + share * above).max(0.0);
+            let dent = dent * (1.0 + share * above).max(0.0);
             if dent.is_finite() {
                 state.dents[spring] = dent.clamp(DENTS[0], DENTS[1]);
             }

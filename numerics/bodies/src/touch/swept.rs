@@ -1,10 +1,10 @@
 //! Boxes around what moves, in a tree sixteen wide, f32, rounded outwards: nothing that may meet is left out.
 
 use super::surface::Places;
-use crate::lanes::{F32x16, LANES, set};
-use crate::simd::{Path, kernel};
-use crate::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
-use crate::vec3::Vec3;
+use numerics::lanes::{F32x16, LANES, set};
+use numerics::simd::{Path, kernel};
+use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
+use numerics::vec3::Vec3;
 
 /// Levels that 2³² elements need, at most.
 const MOST_LEVELS: usize = 8;

@@ -1,13 +1,13 @@
 //! Prints what soft bodies cost and how wrong they are: a cantilever of 2 × 0.5 × 0.5 m that falls from rest.
 //!
-//! `cargo run --release -p numerics --example soft_study [small|large|huge]… [quick]`; threads by `RAYON_NUM_THREADS`; quick: the
+//! `cargo run --release -p bodies --example soft_study [small|large|huge]… [quick]`; threads by `RAYON_NUM_THREADS`; quick: the
 //! default integrator alone, without a reference. Error: root
 //! mean square over the frames of how far the tip's mean is from a fine reference's, ÷ 2 m.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
+use bodies::soft::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Scaled, Solver, State};
 use cpu_time::ProcessTime;
-use numerics::soft::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Scaled, Solver, State};
 use std::time::Instant;
 
 const ROUNDS: usize = 3;

@@ -2,7 +2,7 @@
 
 use super::surface::Surface;
 use super::*;
-use crate::random::Key;
+use numerics::random::Key;
 
 mod bodies;
 mod hand;

@@ -85,6 +85,10 @@ fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
     let _ = reset(&body, &mut state, &shape, 1.0, 0.0);
     assert!(state.dents.iter().all(|dent| *dent == 1.0));
     assert!((state.lengths[0] / body.lengths()[0] - 2.0).abs() < 1e-12);
+    let nowhere = vec![[f64::NAN; 3]; body.len()];
+    let kept = state.clone();
+    assert_eq!(reset(&body, &mut state, &nowhere, 1.0, 0.0), 0.0);
+    assert_eq!(state, kept, "what has no goal stays");
 }
 
 #[test]
@@ -95,7 +99,7 @@ fn springs_flow_above_the_yield_strain_alone() {
     let at = |stretch: f64| {
         let mut state = State::at_rest(&body);
         state.positions[1][0] = 1.0 + stretch;
-        let freed = flow(&body, &mut state, plasticity, 0.5);
+        let freed = flow(&body, &mut state, plasticity, 0.5, None);
         (state.dents[0], freed)
     };
     assert_eq!(at(0.09), (1.0, 0.0));
@@ -109,7 +113,30 @@ fn springs_flow_above_the_yield_strain_alone() {
     assert!(at(1e9).0 <= 10.0 && at(-1.0).0 >= 0.1);
     let mut state = State::at_rest(&body);
     state.positions[1][0] = 5.0;
-    assert_eq!(flow(&body, &mut state, Plasticity { yield_strain: 0.0, creep: 2.0 }, 1.0), 0.0);
+    assert_eq!(flow(&body, &mut state, Plasticity { yield_strain: 0.0, creep: 2.0 }, 1.0, None), 0.0);
+}
+
+#[test]
+fn on_the_way_to_a_goal_nothing_is_dented() {
+    let body = block_body([1, 1, 1], 1.0, &material(1000.0, 1e4, 0.02));
+    let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
+    let rest = State::at_rest(&body).positions;
+    let scaled = |by: f64| rest.iter().map(|x| x.map(|x| x * by)).collect::<Vec<_>>();
+    let goal = scaled(2.0);
+    let dents = |by: f64, drawn: &[[f64; 3]]| {
+        let mut state = State::at_rest(&body);
+        state.positions = scaled(by);
+        let _ = flow(&body, &mut state, plasticity, 0.5, Some(drawn));
+        state.dents
+    };
+    let share = 1.0 - libm::exp(-1.0);
+    let (past, short) = (1.0 + share * (1.4 - 0.1), 1.0 + share * (0.1 - 0.3));
+    // Past the goal, short of the shape at rest: strain is that from the nearer of both.
+    for (by, dent) in [(1.0, 1.0), (1.5, 1.0), (2.0, 1.0), (2.19, 1.0), (4.8, past), (0.91, 1.0), (0.7, short)] {
+        assert!(dents(by, &goal).iter().all(|own| (own - dent).abs() < 1e-9), "{by}: {dent}");
+    }
+    let nowhere = vec![[f64::NAN; 3]; rest.len()];
+    assert!(dents(1.5, &nowhere).iter().all(|own| (own - (1.0 + share * 0.4)).abs() < 1e-9));
 }
 
 #[test]

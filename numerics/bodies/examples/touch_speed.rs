@@ -1,10 +1,10 @@
-//! How long finding contacts takes: `RAYON_NUM_THREADS=1 cargo run --release -p numerics --example touch_speed`.
+//! How long finding contacts takes: `RAYON_NUM_THREADS=1 cargo run --release -p bodies --example touch_speed`.
 //!
 //! `touch_speed 200 pin` is 200 rounds of one case. A pin of 2,048 triangles rolls over a slab of dough whose surface has some 2,200 vertices, and the dough over itself.
 
+use bodies::soft::Query;
+use bodies::touch::{Found, Ground, Obstacle, Pose, Rub, Scene, Skin};
 use cpu_time::ProcessTime;
-use numerics::soft::Query;
-use numerics::touch::{Found, Ground, Obstacle, Pose, Rub, Scene, Skin};
 use std::time::Duration;
 
 const THICKNESS: f64 = 1e-3;

@@ -110,7 +110,7 @@ fn share_signed(part: f64, whole: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Key;
+    use numerics::random::Key;
 
     fn random(seed: u64, k: u64) -> V3 {
         let key = Key::new(seed).of(k);

@@ -6,7 +6,7 @@ use super::swept::{self, BoxTree};
 use super::vertex::{self, Moving, Rules};
 use super::{REACH, Scene, Seen, V3, in_order};
 use crate::soft::{Contact, Query};
-use crate::tree::Cuboid;
+use numerics::tree::Cuboid;
 
 /// How surfaces of bodies touch.
 #[derive(Clone, Copy, Debug, PartialEq)]

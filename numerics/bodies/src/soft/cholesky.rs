@@ -3,7 +3,7 @@
 //! Promise: the same bits on every SIMD path and number of threads (sums run in eight fixed lanes); a direction in which the
 //! matrix is zero to rounding gets no solution component instead of a huge one. Cost n³/3 and n² a solve.
 
-use crate::simd::{Path, kernel};
+use numerics::simd::{Path, kernel};
 use rayon::prelude::*;
 
 /// Lanes of a sum.
@@ -109,7 +109,7 @@ fn take_body(a: &mut [f64], b: &[f64], s: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Key;
+    use numerics::random::Key;
 
     /// B·Bᵀ + s·I of random B, and the full matrix.
     fn matrix(n: usize, s: f64) -> (Vec<f64>, Vec<Vec<f64>>) {

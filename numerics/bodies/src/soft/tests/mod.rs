@@ -1,7 +1,7 @@
 //! Bodies against closed forms, then against what would break them.
 
 use super::*;
-use crate::random::Key;
+use numerics::random::Key;
 
 mod contact;
 mod exact;

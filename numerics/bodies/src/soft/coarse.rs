@@ -11,8 +11,8 @@ use super::order::Order;
 use super::parts::Parts;
 use super::rows::Rows;
 use super::system::System;
-use crate::simd::Path;
 use nalgebra::Matrix3;
+use numerics::simd::Path;
 
 type M3 = Matrix3<f64>;
 
