@@ -76,6 +76,7 @@ impl Work {
         let motion = Motion { x, v: &v };
         let mut r = std::mem::take(&mut self.r);
         if linear {
+            self.expect(stage);
             self.set_rows(on, stage);
             let mut system = std::mem::take(&mut self.system);
             let (held, blocks, regions, loose) = (&system.held, &system.blocks, &system.regions, &system.loose);
@@ -131,6 +132,30 @@ impl Work {
         }
         self.r = r;
         self.v = v;
+    }
+
+    /// Makes pushes linear where they are expected.
+    fn expect(&mut self, stage: &Stage<'_>) {
+        self.unlike.clear();
+        for (index, ((contact, touch), push)) in
+            stage.contacts.iter().zip(&mut self.touches).zip(&self.pushes).enumerate()
+        {
+            let before = touch.push;
+            contact.expect(touch, *push);
+            if touch.push != before {
+                self.unlike.push((index, touch.push - before));
+            }
+        }
+    }
+
+    /// Takes what pushes are linear from instead of what they are: the residual that a direction is to answer.
+    pub(super) fn foresee(&mut self, stage: &Stage<'_>) {
+        for (index, more) in &self.unlike {
+            let contact = &stage.contacts[*index];
+            for (place, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
+                self.r[place] += contact.normal * (more * weight * stage.a * stage.a);
+            }
+        }
     }
 
     /// What volumes, thin tetrahedra and contacts resist.

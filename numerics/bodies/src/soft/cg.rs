@@ -6,7 +6,7 @@
 
 use super::V3;
 use super::body::Body;
-use super::coarse::{self, Layout, lever, moved};
+use super::coarse::{self, Anchors, Layout, lever, moved};
 use super::system::{System, halfway, rest_of_the_way};
 
 /// Least share of a residual that is worth asking for where its square has a bound of its own.
@@ -47,6 +47,7 @@ pub(super) struct Coarse<'a> {
     pub(super) layout: &'a Layout,
     pub(super) factor: &'a [f64],
     pub(super) arms: &'a [[f32; 3]],
+    pub(super) anchors: &'a Anchors,
 }
 
 impl Coarse<'_> {
@@ -67,13 +68,15 @@ impl Coarse<'_> {
         if modes.is_empty() {
             V3::zeros()
         } else {
-            moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place]))
+            let free = moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place]));
+            self.anchors.at(place).map_or(free, |way| way * free)
         }
     }
 
     /// A particle's share of the force on its cluster, added to `sums`.
     #[inline(always)]
     fn restrict(&self, place: usize, r: V3, sums: &mut [f64; 6]) {
+        let r = self.anchors.at(place).map_or(r, |way| way.tr_mul(&r));
         let torque = lever(self.arms[place]).cross(&r);
         for axis in 0..3 {
             sums[axis] += r[axis];

@@ -10,14 +10,82 @@ use super::cholesky::{self, row};
 use super::order::Order;
 use super::parts::Parts;
 use super::rows::Rows;
-use super::system::System;
+use super::system::{System, halfway, rest_of_the_way, times};
 use nalgebra::Matrix3;
 use numerics::simd::Path;
+use serde::{Deserialize, Serialize};
 
 type M3 = Matrix3<f64>;
 
 /// Motions of a cluster: three shifts, three turns.
 const MODES: usize = 6;
+
+/// How far particles that contacts hold follow their clusters' motions.
+///
+/// A surface that many particles press on would hold their whole cluster, and what lies above them could not be told to
+/// move. One step of the smoother on what contacts resist, F = 1 − D⁻¹C, leaves it free: F is near 0 along a contact and 1
+/// where there is none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Anchors {
+    /// Of each particle the entry in `ways`; empty where nothing is held.
+    of: Vec<u32>,
+    /// F, column by column.
+    ways: Vec<[[f64; 3]; 3]>,
+}
+
+impl Anchors {
+    pub(super) fn new(system: &System) -> Self {
+        /// Share of a particle's resistance below which contacts do not count.
+        const LITTLE: f64 = 0.1;
+        let mut anchors = Self::default();
+        if system.blocks.is_empty() && system.loose.is_empty() {
+            return anchors;
+        }
+        for place in 0..system.inertia.len() {
+            let mut block = system.blocks.get(place).copied().unwrap_or_default();
+            if !system.loose.is_empty() {
+                system.loose.add_block(place, &mut block);
+            }
+            if system.held[place] || block.iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let smoother = &system.smoother[place];
+            let taken = [V3::x(), V3::y(), V3::z()]
+                .map(|axis| rest_of_the_way(smoother, halfway(smoother, times(&block, axis))));
+            if taken.iter().all(|column| column.amax() < LITTLE) {
+                continue;
+            }
+            anchors.of.resize(system.inertia.len(), FREE);
+            anchors.of[place] = anchors.ways.len() as u32;
+            anchors.ways.push(std::array::from_fn(|k| {
+                let mut column = -taken[k];
+                column[k] += 1.0;
+                column.into()
+            }));
+        }
+        anchors
+    }
+
+    /// How much others differ from these: 1 where all of them let go, say.
+    pub(super) fn change(&self, others: &Self) -> f64 {
+        let most = self.ways.len().max(others.ways.len());
+        let way = |anchors: &Self, place: usize| anchors.at(place).unwrap_or_else(M3::identity);
+        let held = |place: &usize| [self, others].iter().any(|anchors| anchors.at(*place).is_some());
+        let places = (0..self.of.len().max(others.of.len())).filter(held);
+        let sum: f64 = places.map(|place| (way(self, place) - way(others, place)).norm()).sum();
+        if most > 0 { sum / most as f64 } else { 0.0 }
+    }
+
+    /// F of a particle that is held.
+    #[inline(always)]
+    pub(super) fn at(&self, place: usize) -> Option<M3> {
+        let way = self.ways.get(*self.of.get(place)? as usize)?;
+        Some(M3::from_columns(&way.map(V3::from)))
+    }
+}
+
+/// No entry.
+const FREE: u32 = u32::MAX;
 
 /// Which entries of the factor belong to which cluster.
 #[derive(Clone, Debug, Default)]
@@ -82,17 +150,17 @@ pub(super) fn moved(modes: &[f64], arm: V3) -> V3 {
     V3::new(modes[0], modes[1], modes[2]) + V3::new(modes[3], modes[4], modes[5]).cross(&arm)
 }
 
-/// The factor of Pᵀ·A·P, P the clusters' motions.
-pub(super) fn factor(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]]) -> Vec<f64> {
+/// The factor of Pᵀ·A·P, P the clusters' motions, and what of them particles in contact follow.
+pub(super) fn factor(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], anchors: &Anchors) -> Vec<f64> {
     let mut matrix = vec![0.0; layout.size];
     if let Some(bands) = &layout.bands {
         bands.each(&mut matrix[..], |cluster, mine: &mut [f64]| {
-            band(layout, body, system, arms, cluster, mine);
+            band(layout, body, system, arms, anchors, cluster, mine);
         });
     }
     for rows in [&system.regions, &system.loose] {
         if !rows.is_empty() {
-            add_rows(layout, system, rows, arms, &mut matrix);
+            add_rows(layout, system, rows, arms, anchors, &mut matrix);
         }
     }
     for (_, count, first) in &layout.pieces {
@@ -121,7 +189,15 @@ fn turn(r: V3) -> M3 {
 }
 
 /// The rows of one cluster: springs and what each particle resists alone.
-fn band(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], cluster: usize, out: &mut [f64]) {
+fn band(
+    layout: &Layout,
+    body: &Body,
+    system: &System,
+    arms: &[[f32; 3]],
+    anchors: &Anchors,
+    cluster: usize,
+    out: &mut [f64],
+) {
     let (first, _, _) = layout.pieces[layout.piece[cluster] as usize];
     let local = cluster - first;
     let base = row(MODES * local);
@@ -136,6 +212,9 @@ fn band(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], cluste
             continue;
         }
         let mine = lever(arms[place]);
+        let anchor = anchors.at(place);
+        let shift = anchor.unwrap_or_else(M3::identity);
+        let sway = shift * turn(mine);
         let mut own = M3::identity() * system.inertia[place];
         if let Some([xx, xy, xz, yy, yz, zz]) = system.blocks.get(place) {
             own += M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
@@ -144,7 +223,8 @@ fn band(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], cluste
             let (other, alpha) = (record.other as usize, f64::from(record.alpha));
             let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
             let home = layout.cluster[other] as usize;
-            if home == cluster && !system.held[other] {
+            let far_anchor = anchors.at(other);
+            if home == cluster && !system.held[other] && anchor.is_none() && far_anchor.is_none() {
                 if other > place {
                     // Springs inside resist a turn as far as they are stretched, and no shift.
                     let d = mine - lever(arms[other]);
@@ -158,36 +238,32 @@ fn band(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], cluste
             }
             let h = M3::identity() * alpha + w * w.transpose();
             own += h;
-            if home < cluster && !system.held[other] {
-                let (mine, far) = (turn(mine), turn(lever(arms[other])));
-                let (h_far, left) = (h * far, mine.transpose() * h);
-                let both = left * far;
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let home = home - first;
-                        add(home, i, j, -h[(i, j)]);
-                        add(home, i, 3 + j, -h_far[(i, j)]);
-                        add(home, 3 + i, j, -left[(i, j)]);
-                        add(home, 3 + i, 3 + j, -both[(i, j)]);
-                    }
-                }
+            // Within the cluster each pair is met twice, once a side, as its product and the transpose of it.
+            if home <= cluster && !system.held[other] {
+                let far_shift = far_anchor.unwrap_or_else(M3::identity);
+                let far = [far_shift, far_shift * turn(lever(arms[other]))];
+                add_product(&mut |i, j, value| add(home - first, i, j, -value), [shift, sway], &h, far);
             }
         }
-        let mine = turn(mine);
-        let left = mine.transpose() * own;
-        let both = left * mine;
-        for i in 0..3 {
-            for j in 0..3 {
-                add(local, i, j, own[(i, j)]);
-                add(local, 3 + i, j, left[(i, j)]);
-                add(local, 3 + i, 3 + j, both[(i, j)]);
+        add_product(&mut |i, j, value| add(local, i, j, value), [shift, sway], &own, [shift, sway]);
+    }
+}
+
+/// Pᵀ·h·Q of two particles' motions, shifts and turns, entry by entry.
+fn add_product(add: &mut impl FnMut(usize, usize, f64), p: [M3; 2], h: &M3, q: [M3; 2]) {
+    for (row, p) in p.iter().enumerate() {
+        let left = p.transpose() * h;
+        for (column, q) in q.iter().enumerate() {
+            let both = left * q;
+            for i in 0..3 {
+                (0..3).for_each(|j| add(3 * row + i, 3 * column + j, both[(i, j)]));
             }
         }
     }
 }
 
 /// What rows that span clusters resist; between pieces that do not hang together it is left out.
-fn add_rows(layout: &Layout, system: &System, rows: &Rows, arms: &[[f32; 3]], matrix: &mut [f64]) {
+fn add_rows(layout: &Layout, system: &System, rows: &Rows, arms: &[[f32; 3]], anchors: &Anchors, matrix: &mut [f64]) {
     let mut pushes: Vec<(usize, [f64; MODES])> = Vec::new();
     for index in 0..rows.len() {
         pushes.clear();
@@ -197,6 +273,7 @@ fn add_rows(layout: &Layout, system: &System, rows: &Rows, arms: &[[f32; 3]], ma
                 pushes.push((cluster, [0.0; MODES]));
                 pushes.len() - 1
             });
+            let g = anchors.at(place as usize).map_or(g, |way| way.tr_mul(&g));
             let torque = lever(arms[place as usize]).cross(&g);
             for axis in 0..3 {
                 pushes[at].1[axis] += g[axis];

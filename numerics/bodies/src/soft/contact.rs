@@ -259,8 +259,15 @@ impl Touching {
     /// its plane then is not known it is what the particle was under at last, of `loads`.
     pub(super) fn loaded(&self, x: &[V3], loads: &[f64], seconds: f64) -> Self {
         let near = self.velocity.norm() * seconds <= self.gap;
-        let last = || self.alone().map_or(0.0, |(place, _)| loads[place]);
-        Self { load: if near { self.load_at(-self.clearance(x, seconds)) } else { last() }, ..*self }
+        let last = self.sides().map(|(place, _)| loads[place]).fold(0.0, f64::max);
+        let now = if near {
+            self.load_at(-self.clearance(x, seconds))
+        } else if self.alone().is_some() {
+            last
+        } else {
+            0.0
+        };
+        Self { load: now.min(last), ..*self }
     }
 
     /// The push at `x`, as a load.
@@ -291,6 +298,26 @@ impl Touching {
         let (push, slope, energy) = curved(edge);
         let more = depth - edge;
         (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
+    }
+
+    /// Makes the push linear where it is `expected`, if that is less than it is: from too deep, where it grows without limit,
+    /// Newton's method would come back by half of what is left at a time.
+    pub(super) fn expect(&self, touch: &mut Touch, expected: f64) {
+        if self.frozen.is_some() || touch.depth <= 0.0 || self.gap <= 0.0 || expected >= touch.push {
+            return;
+        }
+        let left = self.firm / (self.firm + expected / self.gap);
+        let slope = self.firm / (left * left);
+        let push = expected + slope * (touch.depth - self.gap * (1.0 - left));
+        (touch.push, touch.slope) = (push, slope);
+    }
+
+    /// The push where particles are a `share` of `dx` on.
+    pub(super) fn expected(&self, touch: &Touch, dx: &[V3], share: f64) -> f64 {
+        if touch.depth <= 0.0 {
+            return 0.0;
+        }
+        (touch.push - touch.slope * share * self.normal.dot(&self.between(dx))).max(0.0)
     }
 
     /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does.

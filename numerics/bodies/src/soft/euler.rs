@@ -35,7 +35,7 @@ impl Stepper<'_> {
     pub(super) fn loads(&self, contacts: &[Touching], x: &[V3]) -> Vec<f64> {
         let mut loads = vec![0.0; x.len()];
         for contact in contacts {
-            if let Some((place, _)) = contact.alone() {
+            for (place, _) in contact.sides() {
                 loads[place] = f64::max(loads[place], contact.push(x));
             }
         }
@@ -79,7 +79,7 @@ impl Stepper<'_> {
         let mut newton = Newton { most: MOST, share: EULER_SHARE, scale, enough: 0.0, tolerance: 0.0, search: true };
         let mut solved = Solved::default();
         for round in 1..=ROUNDS {
-            let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: 0.0, index: 0 };
+            let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: &[], index: 0 };
             solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
             newton.enough = solved.enough;
             let changed = reload(contacts, &x);

@@ -93,9 +93,9 @@ impl<'a> Guess<'a> {
         Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
     }
 
-    /// The energy that turns pieces, joules.
-    pub(super) fn spinning(&self) -> f64 {
-        self.pieces.iter().map(|piece| piece.energy).sum()
+    /// The energy that turns each piece, joules.
+    pub(super) fn spinning(&self) -> Vec<f64> {
+        self.pieces.iter().map(|piece| piece.energy).collect()
     }
 
     /// Positions after `seconds`.

@@ -3,14 +3,58 @@
 use super::V3;
 use super::assemble::velocities;
 use super::springs;
-use super::stage::{Setting, Stage, Work};
+use super::stage::{Newton, Setting, Solved, Stage, Work};
+use super::state::Warm;
 
 /// Halvings of a step that a line search tries.
 const HALVINGS: u32 = 16;
+/// Share of a step from which on what it gained tells what is left to gain.
+const LONG: f64 = 0.2;
+/// Iterations a stage with contacts may have.
+const CONTACT_ITERATIONS: u32 = 20;
 /// Share of the objective that is rounding: a smaller decrease is not searched for.
 const ROUNDING: f64 = 1e-12;
 
 impl Work {
+    /// Newton's method downhill, until the residual is small enough and no contact too deep.
+    pub(super) fn descend(
+        &mut self,
+        on: &Setting<'_>,
+        stage: &Stage<'_>,
+        newton: Newton,
+        warm: &mut Warm,
+        x: &mut [V3],
+    ) -> Solved {
+        let most = if stage.contacts.is_empty() { newton.most } else { CONTACT_ITERATIONS };
+        let mut solved = Solved::default();
+        let (mut first, mut base, mut slow, mut stuck) = (0.0, 0.0, false, false);
+        loop {
+            self.assemble(on, stage, x, true);
+            let now = self.square(&on.body.order.clusters);
+            if solved.newton == 0 {
+                first = now;
+                base = self.objective(on, stage, x);
+                solved.enough = newton.enough.max(newton.share * newton.share * first.min(newton.scale));
+            }
+            solved.residual = if first > 0.0 { (now / first).sqrt() } else { 0.0 };
+            let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
+            let wanted = (now > solved.enough && !slow) || deep;
+            if !wanted || stuck || solved.newton >= most {
+                solved.caps += u32::from(wanted && !stuck && most == CONTACT_ITERATIONS);
+                solved.failed = !now.is_finite();
+                return solved;
+            }
+            self.foresee(stage);
+            if !self.direction(on, stage, warm, x, &mut solved) {
+                return solved;
+            }
+            let (share, lower) = self.search(on, stage, x, base);
+            self.follow(stage, share, x);
+            (slow, stuck) = (share > LONG && base - lower <= solved.enough, share == 0.0);
+            base = lower;
+        }
+    }
+
     /// What the stage makes least: ½(x − y)ᵀM(x − y) + a²·(energies).
     pub(super) fn objective(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
         let (body, a) = (on.body, stage.a);

@@ -7,7 +7,7 @@
 use super::V3;
 use super::body::Body;
 use super::cg::{self, Coarse, Limits};
-use super::coarse::{self, Layout};
+use super::coarse::{self, Anchors, Layout};
 use super::contact::{Touch, Touching};
 use super::drive::Drive;
 use super::springs::{Link, Record, Rest};
@@ -17,20 +17,20 @@ use super::volume::{Inventory, Thin, Volumes};
 
 /// Share of the first residual that linear equations may leave.
 const CG_SHARE: f64 = 0.1;
+/// That share where contacts are taken to go on and nothing is solved again: a slip drifts by what is left, and piles jump.
+const CG_SHARE_TOUCHING: f64 = 0.02;
 /// Share of the energy that turns free pieces which a linear solve may leave as noise: it would slow them.
 const NOISE: f64 = 1e-8;
 /// Iterations a linear solve has at most.
 const CG_CAP: u32 = 300;
 /// Times as many iterations as when it was new, at which the coarse factor is made again.
 const STALE: f64 = 1.5;
+/// Change of what contacts hold at which it is made again too: worth some ten iterations.
+const MOVED: f64 = 0.2;
 /// Share of the first residual above which what the derivative did not foresee asks for another iteration.
 const UNFORESEEN: f64 = 0.5;
 /// Times as large as before that a residual's square may be after an iteration without line search.
 const RISE: f64 = 100.0;
-/// Share of a step from which on what it gained tells what is left to gain.
-const LONG: f64 = 0.2;
-/// Iterations a stage with contacts may have.
-const CONTACT_ITERATIONS: u32 = 20;
 
 /// What a stage is to solve.
 #[derive(Clone, Copy)]
@@ -44,8 +44,8 @@ pub(super) struct Stage<'a> {
     pub(super) contacts: &'a [Touching],
     /// Seconds from there to the time that contacts were found for.
     pub(super) early: f64,
-    /// Energy that turns free pieces, joules.
-    pub(super) spinning: f64,
+    /// Energy that turns each piece, joules; none where it does not matter.
+    pub(super) spinning: &'a [f64],
     /// Which of a step's stages, for the count of iterations.
     pub(super) index: usize,
 }
@@ -63,7 +63,7 @@ pub(super) struct Setting<'a> {
 /// When Newton's method stops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newton {
-    /// Iterations at most; with a line search contacts get [`CONTACT_ITERATIONS`].
+    /// Iterations at most; with a line search contacts get more.
     pub(super) most: u32,
     /// With a line search, the share of the first residual that ends it.
     pub(super) share: f64,
@@ -115,6 +115,10 @@ pub(super) struct Work {
     pub(super) touches: Vec<Touch>,
     /// What friction each contact is taken to have, as a share of all that it can.
     pub(super) drags: Vec<V3>,
+    /// What push each contact is expected to have, newtons.
+    pub(super) pushes: Vec<f64>,
+    /// Contacts whose push is linear from another than it has, and how much more that is.
+    pub(super) unlike: Vec<(usize, f64)>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
     pub(super) extra: Vec<V3>,
     /// The group of each piece whose momentum nothing outside but gravity changes, and pieces that nothing touches.
@@ -146,74 +150,78 @@ impl Work {
         warm: &mut Warm,
         x: &mut [V3],
     ) -> Solved {
-        let (body, clusters) = (on.body, &on.body.order.clusters);
         self.find_free(on, stage);
-        let mut solved = Solved::default();
-        let mut first = 0.0;
         self.drags.clear();
         self.drags.resize(stage.contacts.len(), V3::zeros());
+        self.pushes.clear();
+        self.pushes.extend(stage.contacts.iter().map(|contact| contact.load));
+        let solved = if newton.search {
+            self.descend(on, stage, newton, warm, x)
+        } else {
+            self.iterate(on, stage, newton, warm, x)
+        };
+        self.turn(on.body, x);
+        solved
+    }
+
+    /// Newton's method without looking back: on where the force turned out otherwise than foreseen, or until steps are short.
+    fn iterate(
+        &mut self,
+        on: &Setting<'_>,
+        stage: &Stage<'_>,
+        newton: Newton,
+        warm: &mut Warm,
+        x: &mut [V3],
+    ) -> Solved {
+        let clusters = &on.body.order.clusters;
+        let mut solved = Solved::default();
+        let mut first = 0.0;
         loop {
             self.assemble(on, stage, x, true);
             let before = self.square(clusters);
             if solved.newton == 0 {
                 first = before;
-                solved.enough = newton.enough.max(newton.share * newton.share * first.min(newton.scale));
             }
-            let base = if newton.search { self.objective(on, stage, x) } else { 0.0 };
-            self.direction(on, stage, warm, x, &mut solved);
-            solved.newton += 1;
-            let foreseen = std::mem::take(&mut self.r);
-            if !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite())) {
-                self.r = foreseen;
-                solved.failed = true;
+            if !self.direction(on, stage, warm, x, &mut solved) {
                 return solved;
             }
-            let (share, lower) = if newton.search { self.search(on, stage, x, base) } else { (1.0, base) };
-            for ((contact, touch), drag) in stage.contacts.iter().zip(&self.touches).zip(&mut self.drags) {
-                *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
-            }
-            self.dx.iter_mut().for_each(|d| *d *= share);
-            x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d);
+            let foreseen = std::mem::take(&mut self.r);
+            self.follow(stage, 1.0, x);
             self.r = vec![V3::zeros(); x.len()];
             self.assemble(on, stage, x, false);
             let after = self.square(clusters);
-            let fell = after <= RISE * before;
-            if !newton.search && !fell {
-                solved.failed = true;
-                return solved;
-            }
+            solved.failed = after > RISE * before || !after.is_finite();
             solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
-            let longest = self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
-            let unforeseen = share == 1.0 && self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before;
-            let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
-            let most = if newton.search && !stage.contacts.is_empty() { CONTACT_ITERATIONS } else { newton.most };
-            let wanted = if newton.search {
-                let slow = share > LONG && base - lower <= solved.enough;
-                (after > solved.enough && !slow) || deep
-            } else if newton.tolerance > 0.0 {
-                longest > newton.tolerance
+            let wanted = if newton.tolerance > 0.0 {
+                self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max) > newton.tolerance
             } else {
-                unforeseen
+                self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before
             };
-            let wanted = wanted && share > 0.0;
-            if !wanted || solved.newton >= most {
-                solved.caps += u32::from(wanted && most == CONTACT_ITERATIONS);
-                solved.failed |= !after.is_finite();
-                self.turn(body, x);
+            if solved.failed || !wanted || solved.newton >= newton.most {
                 return solved;
             }
         }
     }
 
+    /// Goes a `share` of `dx`, with what contacts are expected to do there.
+    pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [V3]) {
+        let known = stage.contacts.iter().zip(&self.touches).zip(&mut self.drags).zip(&mut self.pushes);
+        for (((contact, touch), drag), push) in known {
+            *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
+            *push = contact.expected(touch, &self.dx, share);
+        }
+        x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
+    }
+
     /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
     pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [V3]) {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         cg::precondition(&self.system, body, coarse, r);
     }
 
     /// A⁻¹r, by conjugate gradients.
     pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<V3>) -> cg::Reached {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![V3::zeros(); r.len()];
         let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
@@ -227,29 +235,40 @@ impl Work {
         pushing.fold((0, 0.0), |(count, deepest), touch| (count + 1, touch.depth.max(deepest)))
     }
 
-    /// The Newton direction `dx` at `x`; `r` becomes what of the residual it leaves.
-    fn direction(&mut self, on: &Setting<'_>, stage: &Stage<'_>, warm: &mut Warm, x: &[V3], solved: &mut Solved) {
+    /// The Newton direction `dx` at `x`; `r` becomes what of the residual it leaves. False where it is none.
+    pub(super) fn direction(
+        &mut self,
+        on: &Setting<'_>,
+        stage: &Stage<'_>,
+        warm: &mut Warm,
+        x: &[V3],
+        solved: &mut Solved,
+    ) -> bool {
         let body = on.body;
         self.dx.clear();
         self.dx.resize(x.len(), V3::zeros());
         let wanted = self.momenta(body);
         self.shift(body, &wanted);
         coarse::arms(&body.order.clusters, x, &mut self.arms);
-        if warm.factor.len() != self.layout.size() {
-            self.renew(body, warm);
+        let anchors = Anchors::new(&self.system);
+        if warm.factor.len() != self.layout.size() || anchors.change(&warm.anchors) > MOVED {
+            self.renew(body, warm, anchors);
         }
         let fresh = &mut warm.fresh[stage.index];
         let bound = if *fresh == 0 { CG_CAP } else { (3 * *fresh).max(*fresh + 10) };
-        let square =
-            if stage.spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * stage.spinning } else { f64::INFINITY };
-        let limits = Limits { share: CG_SHARE, square, cap: bound.min(CG_CAP) };
-        let mut reached = self.iterate(body, warm, limits);
+        let free = stage.spinning.iter().zip(&self.turns).filter(|piece| *piece.1);
+        let spinning: f64 = free.map(|piece| piece.0).sum();
+        let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
+        let once = !stage.contacts.is_empty() && !stage.spinning.is_empty();
+        let asked = if once { CG_SHARE_TOUCHING } else { CG_SHARE };
+        let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
+        let mut reached = self.gradients(body, warm, limits);
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // Stale past use: go on with a new one.
-            self.renew(body, warm);
-            let limits = Limits { share: (CG_SHARE / reached.share.max(CG_SHARE)).min(1.0), square, cap: CG_CAP };
-            reached = self.iterate(body, warm, limits);
+            self.renew(body, warm, Anchors::new(&self.system));
+            let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
+            reached = self.gradients(body, warm, limits);
             solved.cg += reached.iterations;
         }
         let fresh = &mut warm.fresh[stage.index];
@@ -261,15 +280,18 @@ impl Work {
         solved.caps += u32::from(!reached.met);
         // Linear solves leave a share of the residual; momentum they may not touch.
         self.shift(body, &wanted);
+        solved.newton += 1;
+        solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
+        !solved.failed
     }
 
-    fn iterate(&mut self, body: &Body, warm: &Warm, limits: Limits) -> cg::Reached {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms };
+    fn gradients(&mut self, body: &Body, warm: &Warm, limits: Limits) -> cg::Reached {
+        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 
-    fn renew(&mut self, body: &Body, warm: &mut Warm) {
-        warm.factor = coarse::factor(&self.layout, body, &self.system, &self.arms);
-        warm.fresh = [0; 2];
+    fn renew(&mut self, body: &Body, warm: &mut Warm, anchors: Anchors) {
+        warm.factor = coarse::factor(&self.layout, body, &self.system, &self.arms, &anchors);
+        (warm.anchors, warm.fresh) = (anchors, [0; 2]);
     }
 }

@@ -1,6 +1,7 @@
 //! What a body carries from one frame to the next.
 
 use super::body::Body;
+use super::coarse::Anchors;
 use serde::{Deserialize, Serialize};
 
 /// Everything the next frame hangs on: written and read back, the frames that follow have the same bits.
@@ -35,6 +36,7 @@ pub struct State {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Warm {
     pub(super) factor: Vec<f64>,
+    pub(super) anchors: Anchors,
     /// Iterations to the tolerance when it was new, for each stage of a step; 0 before the first.
     pub(super) fresh: [u32; 2],
 }

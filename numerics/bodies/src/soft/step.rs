@@ -186,7 +186,7 @@ impl Stepper<'_> {
         let guess = Guess::new(body, &self.setting.drive.held, &start.x, &start.v, &start.trend, h);
         let mut x = guess.at(2.0 * a);
         let spinning = guess.spinning();
-        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning, index: 0 };
+        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning: &spinning, index: 0 };
         let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v);
         let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
         let y: Vec<V3> = (0..x.len())
@@ -208,7 +208,7 @@ impl Stepper<'_> {
         let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
         let mut x = guess.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
-        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning, index: 1 };
+        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning: &spinning, index: 1 };
         let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
         let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
 
