@@ -3,7 +3,8 @@
 //! Softbody on a block of dough that hangs by one end, rests on the ground, does so a thousand times as stiff, and is
 //! rolled over by a pin that goes on ten thicknesses a frame, and on the beam that other solvers were measured on; with
 //! and without volumes. The first frames in order, without what the start costs; no cache, nothing written, no
-//! self-collision. Errors are against sixteen accurate steps a frame. Memory is that of a process of its own.
+//! self-collision. Errors are against sixteen accurate steps a frame: few frames, since soft dough that hangs by one end
+//! folds, and after a dozen frames thirty-two steps no longer agree with sixteen. Memory is that of a process of its own.
 
 use std::collections::BTreeSet;
 use std::convert::Infallible;
@@ -50,7 +51,7 @@ struct Size {
 }
 
 const SIZES: [Size; 3] = [
-    Size { name: "2k", dough: [24, 6, 12], beam: [32, 8, 8], frames: 24, alone: true, exact: &Scene::ALL },
+    Size { name: "2k", dough: [24, 6, 12], beam: [32, 8, 8], frames: 8, alone: true, exact: &Scene::ALL },
     Size {
         name: "20k",
         dough: [52, 13, 26],
@@ -156,17 +157,12 @@ fn main() {
     }
     let engines = [1, 2].map(|threads| Engine::new(&Settings { threads, ..Settings::default() }).expect("threads"));
     timing::print_machine(&engines[1]);
-    let mut figures = Figures::default();
-    let mut measured = Vec::new();
     for size in SIZES.iter().filter(|size| asked.is_empty() || asked.contains(size.name)) {
-        measured.push((size, measure(size, &engines, &mut figures)));
-    }
-    figures.print();
-    for (size, cases) in &measured {
-        describe(size, cases, &engines[1], &figures);
-    }
-    for (size, cases) in &measured {
-        compare(size, cases, &figures);
+        let mut figures = Figures::default();
+        let cases = measure(size, &engines, &mut figures);
+        figures.print();
+        describe(size, &cases, &engines[1], &figures);
+        compare(&cases, &figures);
     }
 }
 
@@ -215,16 +211,16 @@ fn describe(size: &Size, cases: &[Case], engine: &Engine, figures: &Figures) {
 }
 
 /// What contacts and volumes cost, of the same body.
-fn compare(size: &Size, cases: &[Case], figures: &Figures) {
+fn compare(cases: &[Case], figures: &Figures) {
     let of = |scene: Scene, volume: u8| {
         let case = cases.iter().find(|case| (case.scene, case.volume, case.threads) == (scene, volume, 2));
         figures.least(&case.expect("all were run").name)
     };
     let of_free = |scene| of(scene, 1) / of(Scene::Free, 1);
-    println!("\n{}: rolling ÷ free {:.1}, at most 2.5 are asked for", size.name, of_free(Scene::Rolling));
-    println!("{}: resting ÷ free {:.2}, stiff ÷ free {:.2}", size.name, of_free(Scene::Resting), of_free(Scene::Stiff));
+    println!("\nrolling ÷ free {:.2}, at most 2.5 are asked for", of_free(Scene::Rolling));
+    println!("resting ÷ free {:.2}, stiff ÷ free {:.2}", of_free(Scene::Resting), of_free(Scene::Stiff));
     let volumes = Scene::ALL.map(|scene| format!("{} {:.2}", scene.name(), of(scene, 1) / of(scene, 0)));
-    println!("{}: volume 1 ÷ volume 0 {}, at most 1.5 are asked for", size.name, volumes.join(", "));
+    println!("volume 1 ÷ volume 0: {}, at most 1.5 are asked for\n", volumes.join(", "));
 }
 
 /// The word before a size and a scene that makes this program a child of [`peak`].
