@@ -1,5 +1,5 @@
-//! What soft bodies cost and how deep they are pressed in under hard contact: dough of 5 kPa that rests, is rolled over,
-//! pressed and hit.
+//! How deep soft bodies are pressed in under hard contact, and which frames are slow: dough of 5 kPa that rests, is rolled
+//! over, pressed and hit. What a frame costs, of more sizes, is `cargo bench --bench softbody`'s to say.
 //!
 //! `cargo run --release -p bodies --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [quiet]`;
 //! threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh), roll (a pin that rolls on by ten
@@ -11,8 +11,9 @@
 
 use bodies::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
 use bodies::touch::{Ground, Obstacle, Pose, Rub, Scene, Skin};
-use cpu_time::ProcessTime;
 use nalgebra::Vector3;
+use numerics::shapes::{Polygons, block, cylinder, sphere};
+use numerics::tets::{boundary, cubes};
 use std::time::Instant;
 
 const FRAME: f64 = 1.0 / 24.0;
@@ -22,103 +23,20 @@ const SIZE: [f64; 3] = [0.24, 0.06, 0.12];
 
 type V3 = Vector3<f64>;
 type Points = Vec<[f64; 3]>;
-type Triangles = Vec<[u32; 3]>;
 /// Where a tool is at a frame: a turn about z, then a shift.
 type Place = fn(f64) -> (f64, [f64; 3]);
 
-/// Cells of six tetrahedra, the lowest corner at `at`, and their surface.
-fn dough(cells: [u32; 3], at: [f64; 3]) -> (Points, Vec<[u32; 4]>, Triangles) {
-    let counts = cells.map(|n| n + 1);
-    let (mut points, mut tets) = (Points::new(), Vec::new());
-    for z in 0..counts[2] {
-        for y in 0..counts[1] {
-            for x in 0..counts[0] {
-                points.push(std::array::from_fn(|axis| {
-                    at[axis] + SIZE[axis] * f64::from([x, y, z][axis]) / f64::from(cells[axis])
-                }));
-            }
-        }
-    }
-    for z in 0..cells[2] {
-        for y in 0..cells[1] {
-            for x in 0..cells[0] {
-                let corner =
-                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
-                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    tets.push([corner(0), corner(a), corner(b), corner(7)]);
-                }
-            }
-        }
-    }
-    let place = |corner: u32| V3::from(points[corner as usize]);
-    let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::new();
-    for [a, b, c, d] in &tets {
-        for ([p, q, r], inner) in [([*a, *b, *c], *d), ([*a, *b, *d], *c), ([*a, *c, *d], *b), ([*b, *c, *d], *a)] {
-            let up = (place(q) - place(p)).cross(&(place(r) - place(p))).dot(&(place(inner) - place(p))) < 0.0;
-            let face = if up { [p, q, r] } else { [p, r, q] };
-            let mut key = face;
-            key.sort_unstable();
-            faces.push((key, face));
-        }
-    }
-    faces.sort_unstable();
-    let outer = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1).map(|group| group[0].1).collect();
-    (points, tets, outer)
-}
-
-/// A cylinder along z.
-fn cylinder(around: u32, radius: f64, length: f64) -> (Points, Triangles) {
-    let (mut points, mut triangles) = (Points::new(), Triangles::new());
-    for k in 0..around {
-        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(around));
-        points.extend([-0.5, 0.5].map(|end| [radius * cosine, radius * sine, end * length]));
-    }
-    points.extend([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]);
-    for k in 0..around {
-        let (a, b) = (2 * k, 2 * ((k + 1) % around));
-        triangles.extend([[a, b, b + 1], [a, b + 1, a + 1], [2 * around, b, a], [2 * around + 1, a + 1, b + 1]]);
-    }
-    (points, triangles)
-}
-
-/// A sphere of rings between two poles.
-fn sphere(around: u32, rings: u32, radius: f64) -> (Points, Triangles) {
-    let (mut points, mut triangles) = (Points::new(), Triangles::new());
-    for ring in 1..rings {
-        let (sine, cosine) = libm::sincos(std::f64::consts::PI * f64::from(ring) / f64::from(rings));
-        for k in 0..around {
-            let (s, c) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(around));
-            points.push([radius * sine * c, radius * cosine, radius * sine * s]);
-        }
-    }
-    let (top, last) = (points.len() as u32, (rings - 2) * around);
-    points.extend([[0.0, radius, 0.0], [0.0, -radius, 0.0]]);
-    for k in 0..around {
-        let next = (k + 1) % around;
-        for ring in 0..rings - 2 {
-            let [a, b, c, d] =
-                [ring * around + k, ring * around + next, (ring + 1) * around + k, (ring + 1) * around + next];
-            triangles.extend([[a, b, c], [b, d, c]]);
-        }
-        triangles.extend([[top, next, k], [top + 1, last + k, last + next]]);
-    }
-    (points, triangles)
-}
-
-/// A box about the origin.
-fn slab(size: [f64; 3]) -> (Points, Triangles) {
-    let corner = |bits: u32| std::array::from_fn(|axis| size[axis] * (f64::from(bits >> axis & 1) - 0.5));
-    let mut triangles = Triangles::new();
-    for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
-        triangles.extend([[a, b, c], [a, c, d]]);
-    }
-    ((0..8).map(corner).collect(), triangles)
+/// A cylinder that lies along z.
+fn rolling_pin() -> Polygons {
+    let mut pin = cylinder([0.1, 0.3, 0.1], 12);
+    pin.points.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*z, *y));
+    pin
 }
 
 /// What does something to the dough: its mesh about the origin, and where it is.
 struct Tool {
     points: Points,
-    triangles: Triangles,
+    triangles: Vec<[u32; 3]>,
     at: Place,
     ground: bool,
     frames: u32,
@@ -128,7 +46,8 @@ impl Tool {
     fn of(case: &str) -> Self {
         let middle = [0.5 * SIZE[0], 0.5 * SIZE[2]];
         assert!(middle == [0.12, 0.06], "the tools are made for this dough");
-        let ((points, triangles), at, ground, frames): (_, Place, _, _) = match case {
+        let slab = |size| block(size, [1; 3]);
+        let (shape, at, ground, frames): (_, Place, _, _) = match case {
             "rest" => (slab([0.1, 0.1, 0.1]), |_| (0.0, [9.0, 9.0, 9.0]), true, 240),
             "plate" => (slab([1.03, 0.1, 1.01]), |_| (0.0, [0.12, -0.05, 0.06]), false, 240),
             "roll" => {
@@ -136,7 +55,7 @@ impl Tool {
                     let way = frame * 10.0 * THICKNESS;
                     (-way / 0.05, [-0.08 + way, 0.1, 0.06])
                 };
-                (cylinder(48, 0.05, 0.3), at, true, 42)
+                (rolling_pin(), at, true, 42)
             }
             "press" => {
                 let at = |frame: f64| {
@@ -150,14 +69,14 @@ impl Tool {
                     let down = if frame < 8.0 { frame } else { (16.0 - frame).max(-10.0) };
                     (0.0, [0.11, 0.06 + 0.04 + 0.055 - 0.01 * down - 0.001, 0.055])
                 };
-                (sphere(32, 16, 0.04), at, true, 24)
+                (sphere([0.08; 3], 8), at, true, 24)
             }
             "knead" => {
                 let at = |frame: f64| {
                     let way = frame * 20.0 * THICKNESS;
                     (-way / 0.05, [-0.08 + way, 0.075, 0.06])
                 };
-                (cylinder(48, 0.05, 0.3), at, true, 24)
+                (rolling_pin(), at, true, 24)
             }
             "slap" => {
                 let at = |frame: f64| {
@@ -168,7 +87,7 @@ impl Tool {
             }
             _ => panic!("`{case}`; expected rest, plate, roll, press, fist, knead or slap"),
         };
-        Self { points, triangles, at, ground, frames }
+        Self { triangles: shape.triangles(), points: shape.points, at, ground, frames }
     }
 
     fn at(&self, frame: f64) -> Points {
@@ -216,9 +135,11 @@ fn main() {
     }
 }
 
-fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: u32, [own, quiet]: [bool; 2]) {
+fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal: u32, [own, quiet]: [bool; 2]) {
     let plain = |value| Scaled { value, mask: None };
-    let (points, tets, faces) = dough(cells, [0.0, THICKNESS, 0.0]);
+    let (points, tets) = cubes(cells, [0.0, THICKNESS, 0.0], SIZE);
+    let narrow: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let faces: Vec<[u32; 3]> = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
     let material = Material { density: plain(1000.0), stiffness: plain(f64::from(pascal)), damping: plain(0.01) };
     let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).expect("dough");
     let skins = [Skin::new(&points, &faces, &body.springs()).expect("dough")];
@@ -229,7 +150,7 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: 
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 };
     let mut state = State::at_rest(&body);
     let mut solver = Solver::new(&body);
-    let (mut wall, mut cpu, mut newton, mut caps, mut through, mut taken) = (0.0, 0.0, 0, 0, 0.0_f64, 0);
+    let (mut wall, mut newton, mut caps, mut through, mut taken) = (0.0, 0, 0, 0.0_f64, 0);
     let (mut slowest, mut fastest, mut resting) = (0.0_f64, 0.0_f64, 0.0_f64);
     if !quiet {
         println!(
@@ -244,15 +165,15 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: 
         let ground = tool.ground.then_some(ground);
         let scene = Scene { skins: &skins, obstacles: &obstacles, ground, own, ..Scene::default() };
         let asked = Frame { seconds: FRAME, contacts: Some(&scene), substeps: steps, ..Frame::default() };
-        let clocks = (Instant::now(), ProcessTime::now());
+        let clock = Instant::now();
         let report = solver.step(&body, &mut state, &asked);
-        let (ms, cpu_ms) = (clocks.0.elapsed().as_secs_f64() * 1e3, clocks.1.elapsed().as_secs_f64() * 1e3);
+        let ms = clock.elapsed().as_secs_f64() * 1e3;
         let outer: Points = skin_points.iter().map(|index| state.positions[*index as usize]).collect();
         let inside = tool.deepest(&outer, f64::from(frame + 1));
         let low = outer.iter().map(|p| -p[1]).fold(0.0, f64::max);
         let inside = inside.max(if tool.ground { low } else { 0.0 });
         let speed = state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max);
-        (wall, cpu, newton, caps) = (wall + ms, cpu + cpu_ms, newton + report.newton, caps + report.caps_hit);
+        (wall, newton, caps) = (wall + ms, newton + report.newton, caps + report.caps_hit);
         (through, slowest, fastest) = (through.max(inside), slowest.max(ms), fastest.max(speed));
         taken += report.substeps;
         if 2 * frame >= frames {
@@ -276,11 +197,10 @@ fn run(case: &str, name: &str, cells: [u32; 3], steps: u32, limit: u32, pascal: 
     }
     let each = |sum: f64| sum / f64::from(frames);
     println!(
-        "{case:6} {name:6} {:6} particles: {:.1} ms a frame (cpu {:.1}, slowest {slowest:.1}), {:.1} steps, {:.1} newton, \
+        "{case:6} {name:6} {:6} particles: {:.1} ms a frame (slowest {slowest:.1}), {:.1} steps, {:.1} newton, \
          {caps} caps, inside {:.3} gaps, fastest {fastest:.2}, in the second half {:.1e} g·dt",
         body.len(),
         each(wall),
-        each(cpu),
         each(f64::from(taken)),
         each(f64::from(newton)),
         through / THICKNESS,

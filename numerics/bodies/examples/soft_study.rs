@@ -1,13 +1,14 @@
-//! Prints what soft bodies cost and how wrong they are: a cantilever of 2 × 0.5 × 0.5 m that falls from rest.
+//! Prints how the integrators trade work for error: a cantilever of 2 × 0.5 × 0.5 m that falls from rest, also ten thousand
+//! times as stiff.
 //!
-//! `cargo run --release -p bodies --example soft_study [small|large|huge]… [quick]`; threads by `RAYON_NUM_THREADS`; quick: the
-//! default integrator alone, without a reference. Error: root
-//! mean square over the frames of how far the tip's mean is from a fine reference's, ÷ 2 m.
+//! `cargo run --release -p bodies --example soft_study [small|large|huge]…`; threads by `RAYON_NUM_THREADS`. Error: root mean
+//! square over the frames of how far the tip's mean is from a fine reference's, ÷ 2 m. What the default integrator costs
+//! and misses by, through the node, is `cargo bench --bench softbody`'s to say.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
 use bodies::soft::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Scaled, Solver, State};
-use cpu_time::ProcessTime;
+use numerics::tets::cubes;
 use std::time::Instant;
 
 const ROUNDS: usize = 3;
@@ -19,38 +20,12 @@ struct Beam {
     tip: Vec<usize>,
 }
 
-/// Cells of six tetrahedra, clamped at x = 0; at ×1 the springs along the sides of the small beam's cells have 1.9e5 N/m.
-fn beam(cells: [u32; 3], times: f64, beta: f64) -> Beam {
-    let counts = cells.map(|n| n + 1);
-    let index = |x: u32, y: u32, z: u32| x + counts[0] * (y + counts[1] * z);
-    let mut points = Vec::new();
-    let (mut pins, mut tip) = (Vec::new(), Vec::new());
-    for z in 0..counts[2] {
-        for y in 0..counts[1] {
-            for x in 0..counts[0] {
-                let at: [f64; 3] =
-                    std::array::from_fn(|axis| SIZE[axis] * f64::from([x, y, z][axis]) / f64::from(cells[axis]));
-                if x == 0 {
-                    pins.push(Pin { particle: points.len() as u32, between: [at, at] });
-                }
-                if x == cells[0] {
-                    tip.push(points.len());
-                }
-                points.push(at);
-            }
-        }
-    }
-    let mut tets = Vec::new();
-    for z in 0..cells[2] {
-        for y in 0..cells[1] {
-            for x in 0..cells[0] {
-                let corner = |bits: u32| index(x + (bits & 1), y + (bits >> 1 & 1), z + (bits >> 2));
-                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    tets.push([corner(0), corner(a), corner(b), corner(7)]);
-                }
-            }
-        }
-    }
+/// Clamped at x = 0; at ×1 the springs along the sides of the small beam's cells have 1.9e5 N/m.
+fn beam(cells: [usize; 3], times: f64, beta: f64) -> Beam {
+    let (points, tets) = cubes(cells, [0.0; 3], SIZE);
+    let at = |x: f64| points.iter().zip(0..).filter(move |(p, _)| p[0] == x);
+    let pins = at(0.0).map(|(p, particle)| Pin { particle, between: [*p; 2] }).collect();
+    let tip = at(SIZE[0]).map(|(_, particle)| particle as usize).collect();
     let plain = |value| Scaled { value, mask: None };
     let material = Material { density: plain(1000.0), stiffness: plain(3.04e6 * times), damping: plain(beta) };
     let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
@@ -60,7 +35,6 @@ fn beam(cells: [u32; 3], times: f64, beta: f64) -> Beam {
 struct Run {
     tips: Vec<[f64; 3]>,
     wall: f64,
-    cpu: f64,
     newton: u32,
     cg: u32,
     caps: u32,
@@ -71,21 +45,12 @@ struct Run {
 fn run(beam: &Beam, frames: usize, frame: &Frame<'_>) -> Run {
     let mut state = State::at_rest(&beam.body);
     let mut solver = Solver::new(&beam.body);
-    let mut out = Run {
-        tips: Vec::new(),
-        wall: 0.0,
-        cpu: 0.0,
-        newton: 0,
-        cg: 0,
-        caps: 0,
-        estimate: 0.0,
-        last: Report::default(),
-    };
+    let mut out =
+        Run { tips: Vec::new(), wall: 0.0, newton: 0, cg: 0, caps: 0, estimate: 0.0, last: Report::default() };
     for _ in 0..frames {
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let clock = Instant::now();
         let report = solver.step(&beam.body, &mut state, frame);
-        out.wall += wall.elapsed().as_secs_f64() * 1e3 / frames as f64;
-        out.cpu += cpu.elapsed().as_secs_f64() * 1e3 / frames as f64;
+        out.wall += clock.elapsed().as_secs_f64() * 1e3 / frames as f64;
         out.newton += report.newton;
         out.cg += report.cg;
         out.caps += report.caps_hit;
@@ -106,31 +71,24 @@ fn error(run: &Run, reference: &Run) -> f64 {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).collect();
-    let quick = asked.iter().any(|word| word == "quick");
-    let sizes_asked: Vec<&String> = asked.iter().filter(|word| *word != "quick").collect();
     let sizes = [("small", [32, 8, 8], 24, 64), ("large", [70, 17, 17], 6, 32), ("huge", [96, 24, 24], 6, 16)];
     println!(
-        "beam      stiffness volume  integrator      steps     ms    cpu ms  newton  cg/solve caps  err/L    estimate/L  tip z"
+        "beam      stiffness volume  integrator      steps     ms  newton  cg/solve caps  err/L    estimate/L  tip z"
     );
-    for (name, cells, frames, fine) in sizes {
-        if !sizes_asked.is_empty() && !sizes_asked.iter().any(|word| *word == name) {
-            continue;
-        }
+    let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|word| word == name);
+    for (name, cells, frames, fine) in sizes.into_iter().filter(|size| is_asked(size.0)) {
         for (times, beta, frames) in [(1.0, 1e-3, frames), (1e4, 1e-5, 6)] {
             let beam = beam(cells, times, beta);
             for volume in [0.0, 1.0] {
                 let frame = Frame { volume, pins: &beam.pins, ..Frame::default() };
                 let accurate = Integrator::Accurate { tolerance: 1e-6 };
-                let fine = if quick { 1 } else { fine };
                 let reference = run(&beam, frames, &Frame { substeps: fine, integrator: accurate, ..frame });
                 let mut cases = vec![
                     ("default", Integrator::Default, 0),
                     ("default", Integrator::Default, 2),
                     ("euler", Integrator::Euler, 0),
                 ];
-                if quick {
-                    cases.truncate(1);
-                } else if name == "small" {
+                if name == "small" {
                     cases.push(("default", Integrator::Default, 4));
                     for (name, tolerance) in [("tol 1e-3", 1e-3), ("tol 1e-4", 1e-4), ("tol 1e-5", 1e-5)] {
                         cases.push((name, Integrator::Accurate { tolerance }, 0));
@@ -139,14 +97,12 @@ fn main() {
                 for (integrator, how, substeps) in cases {
                     let frame = Frame { integrator: how, substeps, ..frame };
                     let runs: Vec<Run> = (0..ROUNDS).map(|_| run(&beam, frames, &frame)).collect();
-                    let least = |of: fn(&Run) -> f64| runs.iter().map(of).fold(f64::INFINITY, f64::min);
                     let one = &runs[0];
                     println!(
-                        "{name:6} {:6} {times:6.0e} {volume:6}  {integrator:10} {substeps:3}/{:4} {:8.2} {:8.2} {:6.1} {:8.1} {:5} {:9.1e} {:9.1e} {:9.4}",
+                        "{name:6} {:6} {times:6.0e} {volume:6}  {integrator:10} {substeps:3}/{:4} {:8.2} {:6.1} {:8.1} {:5} {:9.1e} {:9.1e} {:9.4}",
                         beam.body.len(),
                         one.last.substeps,
-                        least(|run| run.wall),
-                        least(|run| run.cpu),
+                        runs.iter().map(|run| run.wall).fold(f64::INFINITY, f64::min),
                         f64::from(one.newton) / frames as f64,
                         f64::from(one.cg) / f64::from(one.newton),
                         one.caps,

@@ -16,6 +16,7 @@
 mod boundary;
 mod closed;
 mod cross;
+mod cubes;
 mod delaunay;
 mod edges;
 mod fault;
@@ -31,6 +32,7 @@ mod winding;
 
 pub use boundary::{Face, boundary};
 pub use closed::Closed;
+pub use cubes::cubes;
 pub use delaunay::{Delaunay, NONE, delaunay};
 pub use edges::{edges, missing_edges};
 pub use fault::Fault;

@@ -2,44 +2,17 @@
 
 use super::*;
 use crate::soft::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+use numerics::tets::{boundary, cubes};
 
 const FRAME: f64 = 1.0 / 24.0;
 
 type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
 
-/// A block of cubes of `side`, its lowest corner at `at`: particles, tetrahedra, and the surface facing outwards.
-fn block(cells: [u32; 3], side: f64, at: [f64; 3]) -> Block {
-    let counts = cells.map(|n| n + 1);
-    let (mut points, mut tets) = (Vec::new(), Vec::new());
-    for z in 0..counts[2] {
-        for y in 0..counts[1] {
-            points.extend((0..counts[0]).map(|x| [0, 1, 2].map(|axis| at[axis] + side * f64::from([x, y, z][axis]))));
-        }
-    }
-    for z in 0..cells[2] {
-        for y in 0..cells[1] {
-            for x in 0..cells[0] {
-                let corner =
-                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
-                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    tets.push([corner(0), corner(a), corner(b), corner(7)]);
-                }
-            }
-        }
-    }
-    let place = |corner: u32| V3::from(points[corner as usize]);
-    let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::new();
-    for [a, b, c, d] in &tets {
-        for ([p, q, r], inner) in [([*a, *b, *c], *d), ([*a, *b, *d], *c), ([*a, *c, *d], *b), ([*b, *c, *d], *a)] {
-            let up = (place(q) - place(p)).cross(&(place(r) - place(p))).dot(&(place(inner) - place(p))) < 0.0;
-            let face = if up { [p, q, r] } else { [p, r, q] };
-            let mut key = face;
-            key.sort_unstable();
-            faces.push((key, face));
-        }
-    }
-    faces.sort_unstable();
-    let outer = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1).map(|group| group[0].1).collect();
+/// A block of so many cubes of `side`, its lowest corner at `at`: particles, tets, and the surface facing outwards.
+fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
+    let (points, tets) = cubes(cells, at, cells.map(|n| side * n as f64));
+    let narrow: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let outer = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
     (points, tets, outer)
 }
 
@@ -83,12 +56,11 @@ fn fastest(state: &State) -> f64 {
     state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
 }
 
-const SIDES: usize = 32;
 const THICKNESS: f64 = 1e-3;
 
 /// A pin that rolls on by ten thicknesses a frame, 1 cm into the block of [`rolled_over`].
 fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let (points, triangles) = cylinder(SIDES as u32, 0.05, 0.3);
+    let (points, triangles) = cylinder(8, 0.05, 0.3);
     let way = frame * 10.0 * THICKNESS;
     let (sine, cosine) = libm::sincos(-way / 0.05);
     let put = |[x, y, z]: &[f64; 3]| [cosine * x - sine * y - 0.08 + way, sine * x + cosine * y + 0.1, z + 0.06];
@@ -96,13 +68,12 @@ fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
 }
 
 /// The deepest that any of `points` is in the pin.
-fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]]) -> f64 {
-    let sides: Vec<(V3, V3)> = (0..SIDES)
-        .map(|k| {
-            let [a, b, c] = [2 * k, 2 * ((k + 1) % SIDES), 2 * k + 1].map(|corner| V3::from(pin[corner]));
-            (a, (b - a).cross(&(c - a)).normalize())
-        })
-        .collect();
+fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
+    let side = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|corner| V3::from(pin[corner as usize]));
+        (a, (b - a).cross(&(c - a)).normalize())
+    };
+    let sides: Vec<(V3, V3)> = faces.iter().map(side).collect();
     let depth = |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
     points.iter().map(depth).fold(0.0, f64::max)
 }
@@ -115,7 +86,7 @@ fn rolled_over(frames: u32, mut step: impl FnMut(&Scene<'_>) -> Vec<[f64; 3]>, s
         let [(from, faces), (to, _)] = [frame, frame + 1].map(|frame| rolling(f64::from(frame)));
         let pin = [Obstacle::new(&faces, &[pose(0.0, &from), pose(1.0, &to)], FRAME, THICKNESS, 0.3).unwrap()];
         let points = step(&Scene { skins, obstacles: &pin, ground, ..Scene::default() });
-        worst = worst.max(deepest(&points, &to));
+        worst = worst.max(deepest(&points, &to, &faces));
     }
     worst
 }

@@ -1,0 +1,338 @@
+//! What soft bodies cost, and how wrong they are: `cargo bench --bench softbody`, or `-- 2k` for that size alone.
+//!
+//! Softbody on a block of dough that hangs by one end, rests on the ground, does so a thousand times as stiff, and is
+//! rolled over by a pin that goes on ten thicknesses a frame, and on the beam that other solvers were measured on; with
+//! and without volumes. The first frames in order, without what the start costs; no cache, nothing written, no
+//! self-collision. Errors are against sixteen accurate steps a frame: few frames, since soft dough that hangs by one end
+//! folds, and after a dozen frames thirty-two steps no longer agree with sixteen. Memory is that of a process of its own.
+
+use std::collections::BTreeSet;
+use std::convert::Infallible;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use engine::cook::{Delivered, Engine, Report, Settings};
+use engine::geometry::{Component, Geometry};
+use engine::graph::{Body, Graph, probe};
+use engine::plan::Request;
+use engine::time::Frame;
+use numerics::tets::cubes;
+use timing::Figures;
+
+mod timing;
+
+/// The program's own.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// Runs of a case at most, and the time after which it is not run again.
+const ROUNDS: usize = 5;
+const ENOUGH: Duration = Duration::from_secs(5);
+
+/// Metres; what Softbody has where nothing is said.
+const THICKNESS: f64 = 1e-3;
+/// Of the rolling pin, metres.
+const RADIUS: f64 = 0.05;
+
+/// How finely bodies are cut.
+struct Size {
+    name: &'static str,
+    dough: [usize; 3],
+    beam: [usize; 3],
+    /// Frames that are looked at.
+    frames: i64,
+    /// Whether one thread is measured too.
+    alone: bool,
+    /// What sixteen steps a frame are affordable for.
+    exact: &'static [Scene],
+}
+
+const SIZES: [Size; 3] = [
+    Size { name: "2k", dough: [24, 6, 12], beam: [32, 8, 8], frames: 8, alone: true, exact: &Scene::ALL },
+    Size {
+        name: "20k",
+        dough: [52, 13, 26],
+        beam: [70, 17, 17],
+        frames: 6,
+        alone: true,
+        exact: &[Scene::Beam, Scene::Free, Scene::Resting],
+    },
+    Size { name: "100k", dough: [92, 23, 46], beam: [96, 24, 24], frames: 3, alone: false, exact: &[] },
+];
+
+/// What bodies are in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Scene {
+    /// 2 m of something firm, held by one end.
+    Beam,
+    /// Dough held by one end.
+    Free,
+    Resting,
+    Stiff,
+    Rolling,
+}
+
+impl Scene {
+    const ALL: [Self; 5] = [Self::Beam, Self::Free, Self::Resting, Self::Stiff, Self::Rolling];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Beam => "beam",
+            Self::Free => "free",
+            Self::Resting => "resting",
+            Self::Stiff => "stiff",
+            Self::Rolling => "rolling",
+        }
+    }
+
+    /// Sides of the body, metres.
+    fn sides(self) -> [f64; 3] {
+        match self {
+            Self::Beam => [2.0, 0.5, 0.5],
+            _ => [0.24, 0.06, 0.12],
+        }
+    }
+}
+
+/// One line of the figures.
+struct Case {
+    name: String,
+    scene: Scene,
+    volume: u8,
+    threads: usize,
+    graph: Graph,
+    spent: Duration,
+    /// What the last run published, and where it left particles frame by frame.
+    report: Report,
+    places: Vec<[f32; 3]>,
+}
+
+impl Case {
+    fn new(size: &Size, scene: Scene, volume: u8, threads: usize) -> Self {
+        let alone = if threads == 1 { ", 1 thread" } else { "" };
+        Self {
+            name: format!("{} {}, volume {volume}{alone}", size.name, scene.name()),
+            graph: graph(size, scene, &format!(r#""volume": {volume}"#)),
+            scene,
+            volume,
+            threads,
+            spent: Duration::ZERO,
+            report: Report::default(),
+            places: Vec::new(),
+        }
+    }
+
+    /// Mean of a metric over the frames after the first.
+    fn mean(&self, metric: &str) -> f64 {
+        let frames = self.report.nodes.iter().find_map(|node| node.metrics.get(metric)).expect("a metric of Softbody");
+        frames.values().sum::<f64>() / frames.len() as f64
+    }
+
+    /// Root mean square distance from where particles are after sixteen steps a frame, by the body's longest side.
+    fn error(&self, engine: &Engine, size: &Size) -> f64 {
+        let params = format!(r#""volume": {}, "integrator": "accurate", "substeps": 16"#, self.volume);
+        let (_, exact) = cook(engine, &graph(size, self.scene, &params), 2..=size.frames + 1);
+        let square = |(a, b): (&[f32; 3], &[f32; 3])| {
+            (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|x| x * x).sum::<f64>()
+        };
+        let squares: f64 = self.places.iter().zip(&exact).map(square).sum();
+        (squares / exact.len() as f64).sqrt() / self.scene.sides()[0]
+    }
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    if let [peak, size, scene] = &words[..]
+        && peak == PEAK
+    {
+        return cook_for_peak(size, scene);
+    }
+    let asked: BTreeSet<&str> = words.iter().map(String::as_str).collect();
+    if let Some(other) = asked.iter().find(|word| SIZES.iter().all(|size| size.name != **word)) {
+        eprintln!("no size is `{other}`; expected 2k, 20k or 100k");
+        std::process::exit(2);
+    }
+    let engines = [1, 2].map(|threads| Engine::new(&Settings { threads, ..Settings::default() }).expect("threads"));
+    timing::print_machine(&engines[1]);
+    for size in SIZES.iter().filter(|size| asked.is_empty() || asked.contains(size.name)) {
+        let mut figures = Figures::default();
+        let cases = measure(size, &engines, &mut figures);
+        figures.print();
+        describe(size, &cases, &engines[1], &figures);
+        compare(&cases, &figures);
+    }
+}
+
+/// Runs all cases of a size, one after the other, several times.
+fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Case> {
+    let case = |scene| {
+        let alone = size.alone.then(|| Case::new(size, scene, 1, 1));
+        [0, 1].map(|volume| Case::new(size, scene, volume, 2)).into_iter().chain(alone)
+    };
+    let mut cases: Vec<Case> = Scene::ALL.into_iter().flat_map(case).collect();
+    for _ in 0..ROUNDS {
+        figures.calibrate();
+        for case in cases.iter_mut().filter(|case| case.spent < ENOUGH) {
+            let engine = &engines[case.threads - 1];
+            let (start, _) = cook(engine, &case.graph, 1..=1);
+            let (report, places) = cook(engine, &case.graph, 2..=size.frames + 1);
+            figures.add(&*case.name, size.frames as u32, report.cooking.saturating_sub(start.cooking));
+            case.spent += report.cooking + start.cooking;
+            (case.report, case.places) = (report, places);
+        }
+    }
+    cases
+}
+
+/// What the cases of a size took a frame, how wrong they are, and the memory they need.
+fn describe(size: &Size, cases: &[Case], engine: &Engine, figures: &Figures) {
+    println!(
+        "\n{:<22} {:>9} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9} {:>8}",
+        "a frame of", "ms", "steps", "newton", "cg", "caps", "contacts", "error", "peak MB"
+    );
+    for case in cases.iter().filter(|case| case.threads == 2) {
+        let [steps, newton, cg, caps, contacts] =
+            ["substeps_used", "newton", "cg", "caps_hit", "contacts"].map(|metric| case.mean(metric));
+        let ms = figures.least(&case.name) * 1e3;
+        let error = match size.exact.contains(&case.scene) {
+            true => format!("{:.1e}", case.error(engine, size)),
+            false => String::new(),
+        };
+        let peak = if case.volume == 1 { peak(size, case.scene) } else { None };
+        let peak = peak.map_or(String::new(), |bytes| format!("{:.0}", bytes * 1e-6));
+        println!(
+            "{:<22} {ms:>9.2} {steps:>7.1} {newton:>7.1} {cg:>7.0} {caps:>7.1} {contacts:>9.0} {error:>9} {peak:>8}",
+            case.name
+        );
+    }
+}
+
+/// What contacts and volumes cost, of the same body.
+fn compare(cases: &[Case], figures: &Figures) {
+    let of = |scene: Scene, volume: u8| {
+        let case = cases.iter().find(|case| (case.scene, case.volume, case.threads) == (scene, volume, 2));
+        figures.least(&case.expect("all were run").name)
+    };
+    let of_free = |scene| of(scene, 1) / of(Scene::Free, 1);
+    println!("\nrolling ÷ free {:.2}, at most 2.5 are asked for", of_free(Scene::Rolling));
+    println!("resting ÷ free {:.2}, stiff ÷ free {:.2}", of_free(Scene::Resting), of_free(Scene::Stiff));
+    let volumes = Scene::ALL.map(|scene| format!("{} {:.2}", scene.name(), of(scene, 1) / of(scene, 0)));
+    println!("volume 1 ÷ volume 0: {}, at most 1.5 are asked for\n", volumes.join(", "));
+}
+
+/// The word before a size and a scene that makes this program a child of [`peak`].
+const PEAK: &str = "peak";
+
+/// Most memory of a process that cooks two frames of a scene, bytes; `None` where the system does not tell.
+fn peak(size: &Size, scene: Scene) -> Option<f64> {
+    let program = std::env::current_exe().expect("this program");
+    let child = Command::new(program).args([PEAK, size.name, scene.name()]).output().expect("a process");
+    assert!(child.status.success(), "{}", String::from_utf8_lossy(&child.stderr));
+    String::from_utf8_lossy(&child.stdout).trim().parse::<f64>().ok().map(|kilobytes| kilobytes * 1024.0)
+}
+
+/// The child: cooks, and prints the most memory it had, kB.
+fn cook_for_peak(size: &str, scene: &str) {
+    let size = SIZES.iter().find(|known| known.name == size).expect("a size");
+    let scene = Scene::ALL.into_iter().find(|known| known.name() == scene).expect("a scene");
+    let engine = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
+    cook(&engine, &graph(size, scene, r#""volume": 1"#), 2..=3);
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.strip_suffix("kB"));
+    println!("{}", peak.unwrap_or_default());
+}
+
+/// Where particles are, frame after frame.
+fn cook(engine: &Engine, graph: &Graph, frames: std::ops::RangeInclusive<i64>) -> (Report, Vec<[f32; 3]>) {
+    let request = Request { outputs: vec![0], frames: frames.map(Frame::whole).collect() };
+    let mut places = Vec::new();
+    let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
+        for one in finished {
+            places.extend_from_slice(one.geometry.tets().expect("tets").positions());
+        }
+        Ok(())
+    };
+    let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut sink).expect("it cooks");
+    assert!(report.errors.is_empty(), "{}", report.errors[0].1);
+    (report, places)
+}
+
+/// Softbody on a body in a scene, with more params.
+fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
+    let sides = scene.sides();
+    let (cells, low) = match scene {
+        Scene::Beam => (size.beam, [0.0; 3]),
+        _ => (size.dough, [0.0, THICKNESS, 0.0]),
+    };
+    let (points, tets) = cubes(cells, low, sides);
+    let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let last = size.frames + 1;
+    let (before, inputs, own) = match scene {
+        Scene::Beam => (held(&points), r#""pins": ["pins"]"#, r#""stiffness": 3.04e6, "damping": 1e-3"#),
+        Scene::Free => (held(&points), r#""pins": ["pins"]"#, r#""stiffness": 5e3"#),
+        Scene::Resting => (String::new(), "", r#""stiffness": 5e3, "ground": true"#),
+        Scene::Stiff => (String::new(), "", r#""stiffness": 5e6, "ground": true"#),
+        Scene::Rolling => (rolling(last, sides), r#""colliders": ["pin"]"#, r#""stiffness": 5e3, "ground": true"#),
+    };
+    let wires = if inputs.is_empty() { String::new() } else { format!(", {inputs}") };
+    let text = format!(
+        r#"{{
+            "convect": 1,
+            "scene": {{ "frames": [1, {last}], "fps": 24 }},
+            "nodes": {{
+                "body": {{ "type": "Tet_In", "params": {{ "points": [], "tets": [] }} }},
+                {before}
+                "soft": {{
+                    "type": "Softbody",
+                    "inputs": {{ "bodies": ["body"]{wires} }},
+                    "params": {{ {own}, {params}, "self_collision": false }}
+                }}
+            }},
+            "outputs": {{ "body": "soft.tets" }}
+        }}"#
+    );
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut graph =
+        Graph::load(&text, folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
+    let body: Geometry = Component::tets(tets, points).expect("tets").into();
+    let node = graph.nodes.iter_mut().find(|node| &*node.id == "body").expect("a node");
+    node.body = Body::Given { at: Arc::new(move |_| body.clone()), moves: false };
+    graph
+}
+
+/// Pins that hold the end at x = 0 where it is.
+fn held(points: &[[f32; 3]]) -> String {
+    let end: Vec<[f32; 3]> = points.iter().copied().filter(|p| p[0] == 0.0).collect();
+    format!(
+        r#""end": {{ "type": "Point_In", "params": {{ "points": {end:?} }} }},
+           "pins": {{ "type": "Softbody_Pin", "inputs": {{ "targets": "end" }}, "params": {{ "radius": 1e-5 }} }},"#
+    )
+}
+
+/// A pin that reaches the dough within the first frame and rolls on, a centimetre deep.
+fn rolling(last: i64, [_, height, depth]: [f64; 3]) -> String {
+    let (mut places, mut turns) = (Vec::new(), Vec::new());
+    for frame in 1..=last {
+        let way = 10.0 * THICKNESS * (frame - 1) as f64;
+        places.push(format!("[{frame}, [{}, {}, {}]]", way - 0.04, height + RADIUS - 0.01, 0.5 * depth));
+        turns.push(format!("[{frame}, [90, 0, {}]]", -(way / RADIUS).to_degrees()));
+    }
+    let (places, turns, across) = (places.join(", "), turns.join(", "), 2.0 * RADIUS);
+    format!(
+        r#""wood": {{
+               "type": "Mesh_Primitive",
+               "params": {{ "shape": "cylinder", "size": [{across}, 0.3, {across}], "divisions": 12 }}
+           }},
+           "pin": {{
+               "type": "Transform",
+               "inputs": {{ "geometry": "wood" }},
+               "params": {{
+                   "translate": {{ "keyframes": [{places}] }},
+                   "rotate": {{ "keyframes": [{turns}] }}
+               }}
+           }},"#
+    )
+}
