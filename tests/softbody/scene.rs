@@ -80,8 +80,16 @@ impl Scene {
         self
     }
 
+    /// The height above which particles are kept from the ground; none where there is none.
+    pub(crate) fn kept_from_ground(&self) -> Option<f64> {
+        let number = |name: &str, default: f64| self.params.get(name).map_or(default, |value| value.parse().unwrap());
+        let there = self.params.get("ground").is_some_and(|value| value == "true");
+        there.then(|| number("ground_height", 0.0) + number("thickness", 1e-3))
+    }
+
     fn nodes(&self) -> String {
-        let names = |letter: char, count: usize| -> Vec<String> { (0..count).map(|k| format!("{letter}{k}")).collect() };
+        let names =
+            |letter: char, count: usize| -> Vec<String> { (0..count).map(|k| format!("{letter}{k}")).collect() };
         let (bodies, colliders) = (names('b', self.bodies.len()), names('c', self.colliders.len()));
         let (goals, pins) = (names('g', self.goals.len()), names('p', usize::from(self.pins.is_some())));
         let node = |name: &String, body: &str| format!(r#""{name}": {{ {body} }},"#);

@@ -49,7 +49,9 @@ fn off_pins() -> [usize; 2] {
     };
     let cooked = Scene::of(body.clone()).pins(0.2, move |frame| vec![hand(frame)]).set("ground", true).run(24);
     let near: Vec<usize> = (0..body.point_count())
-        .filter(|i| distance(&body.positions()[*i].map(f64::from), &hand(Time::whole(1)).map(f64::from)) <= f64::from(0.2_f32))
+        .filter(|i| {
+            distance(&body.positions()[*i].map(f64::from), &hand(Time::whole(1)).map(f64::from)) <= f64::from(0.2_f32)
+        })
         .collect();
     assert!(held.iter().any(|i| near.contains(i)) && near.len() < body.point_count());
     let mut off = 0;

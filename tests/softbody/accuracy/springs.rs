@@ -110,7 +110,12 @@ fn chain(light: f64) -> f64 {
 
 pub(super) fn figures() -> Vec<Figure> {
     vec![
-        Figure::error("One spring over a period of 200 steps, k 1e-6 to 1e12 N/m, m 1e-6 to 1e6 kg", every_spring(), 2e-4, ""),
+        Figure::error(
+            "One spring over a period of 200 steps, k 1e-6 to 1e12 N/m, m 1e-6 to 1e6 kg",
+            every_spring(),
+            2e-4,
+            "",
+        ),
         Figure::within("its error falls with the step: order", &orders(Integrator::Default), [1.9, 2.1]),
         Figure::within("`euler`: order", &orders(Integrator::Euler), [0.9, 1.1]),
         Figure::error("energy and stretch over their start, steps of 1e-3 to 1e9 s", beyond_start(), 1e-6, ""),

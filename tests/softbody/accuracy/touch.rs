@@ -139,7 +139,12 @@ pub(super) fn figures() -> Vec<Figure> {
         Figure::error("Between plates at half its height, and on the way: volume", volume, 2e-2, ""),
         Figure::error("how far its bulge is from symmetry", askew(&pressed.last()), 2e-2, " L"),
         Figure::never("tets inside out there", turned, 6 * 6 * 6 * 6),
-        Figure::error("Under those plates, and a rolling pin that moves 10 `thickness` a frame: `deepest_overlap`", overlap, 1.0, " `thickness`"),
+        Figure::error(
+            "Under those plates, and a rolling pin that moves 10 `thickness` a frame: `deepest_overlap`",
+            overlap,
+            1.0,
+            " `thickness`",
+        ),
         Figure::never(
             "particles within the pin or the ground",
             rolled.iter().map(|found| found.1).sum(),
