@@ -24,7 +24,7 @@ pub(crate) struct Scene {
     pins: Option<At>,
     /// By name, as a graph file has them.
     params: BTreeMap<String, String>,
-    pub(crate) fps: f64,
+    fps: f64,
 }
 
 impl Scene {
@@ -72,6 +72,11 @@ impl Scene {
             pins.into()
         };
         Self { pins: Some(Arc::new(pins)), ..self }
+    }
+
+    /// At so many frames a second.
+    pub(crate) fn at(self, fps: f64) -> Self {
+        Self { fps, ..self }
     }
 
     /// With this param, in place of what it was.

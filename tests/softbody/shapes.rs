@@ -6,6 +6,16 @@ use engine::geometry::{Component, Geometry};
 
 /// Cubes of `side`, `cells` of them along each axis from `low` on, six tets each.
 pub(crate) fn block(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
+    cut(cells, side, low, |_| 0)
+}
+
+/// The same, each cube cut as the mirror image of the next: of an even count of cells along an axis, both halves are.
+pub(crate) fn mirrored(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
+    cut(cells, side, low, |[x, y, z]| (x & 1) + 2 * (y & 1) + 4 * (z & 1))
+}
+
+/// Which axes each cube is turned round along, a bit each.
+fn cut(cells: [u32; 3], side: f64, low: [f64; 3], turned: impl Fn([u32; 3]) -> u32) -> Component {
     let counts = cells.map(|n| n + 1);
     let (mut points, mut tets) = (Vec::new(), Vec::new());
     for z in 0..counts[2] {
@@ -15,9 +25,13 @@ pub(crate) fn block(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
                 if x == cells[0] || y == cells[1] || z == cells[2] {
                     continue;
                 }
-                let corner =
-                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
+                let turned = turned([x, y, z]);
+                let corner = |bits: u32| {
+                    let bits = bits ^ turned;
+                    x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)))
+                };
                 for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    let [a, b] = if turned.count_ones() % 2 == 0 { [a, b] } else { [b, a] };
                     tets.push([corner(0), corner(a), corner(b), corner(7)]);
                 }
             }

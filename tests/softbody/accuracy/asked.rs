@@ -17,7 +17,7 @@ fn released() -> ([f64; 2], f64) {
     let (modulus, side) = (1e4, 0.3_f64);
     let body = shapes::block([3; 3], 0.1, [0.0; 3]);
     let scene = Scene::of(body.clone()).goal(flat(&body), 24.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
-    let cooked = scene.set("stiffness", modulus).set("damping", 0.2).cook([240], 2);
+    let cooked = scene.set("stiffness", modulus).set("damping", 0.2).cook([480], 2);
     let found = cooked.last();
     let stored: Vec<[f32; 3]> = found.iter().map(|p| p.map(|x| x as f32)).collect();
     let strains = shapes::springs(&flat(&body), 1.0).into_iter().map(|spring| {
@@ -35,6 +35,11 @@ fn pulled_surface() -> [usize; 2] {
     let cooked = scene.set("stiffness", 0).set("volume", 0).run(6);
     let [start, end] = [0, 5].map(|place| cooked.surface[place].as_ref().unwrap().mesh().unwrap().positions().to_vec());
     assert!(cooked.at(5) != cooked.at(0), "its inside goes to the goal");
+    eprintln!(
+        "SURFACE {:?}",
+        start.iter().zip(&end).map(|(a, b)| distance(&a.map(f64::from), &b.map(f64::from))).fold(0.0, f64::max)
+    );
+    eprintln!("ALL {:?}", largest(cooked.at(5).iter().zip(&cooked.at(0)).map(|(a, b)| distance(a, b))));
     [start.iter().zip(&end).filter(|(a, b)| a != b).count(), start.len()]
 }
 
