@@ -90,7 +90,7 @@ fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
     let goal = changed(&cube(0.002), |_, [x, y, z]| [1.2 * x, 0.7 * y, 1.2 * z]);
     // Something for every param to act on.
     let busy = || {
-        let top = cube(0.002).positions()[63];
+        let top = cube(0.002).positions()[26];
         let scene = grounded(cube(0.002)).and(block([1; 3], 0.1, [0.0, 0.105, 0.0]));
         let scene = scene.goal(goal.clone(), 3.0, 100.0, 1.0).pins(1e-3, move |_| vec![top]);
         scene
