@@ -38,10 +38,7 @@ fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
     for (what, scene) in rows {
         for integrator in INTEGRATORS {
             let scene = scene.clone().set("integrator", format!("\"{integrator}\"")).set("tolerance", 1e-2);
-            #[allow(clippy::disallowed_methods)]
-            let begun = std::time::Instant::now();
             let cooked = scene.cook(1..=FRAMES, 1);
-            eprintln!("TIMED {what} {integrator} {:?} newton {:?} cg {:?} steps {:?}", begun.elapsed(), cooked.said("newton"), cooked.said("cg"), cooked.said("substeps_used"));
             let mut faults = faults(&scene, &cooked);
             if cooked != scene.cook(1..=FRAMES, 7) {
                 faults.push("other bits on 7 threads than on one".into());
