@@ -31,7 +31,7 @@ fn cut(cells: [u32; 3], side: f64, low: [f64; 3], turned: impl Fn([u32; 3]) -> u
                     x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)))
                 };
                 for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    let [a, b] = if turned.count_ones() % 2 == 0 { [a, b] } else { [b, a] };
+                    let [a, b] = if turned.count_ones().is_multiple_of(2) { [a, b] } else { [b, a] };
                     tets.push([corner(0), corner(a), corner(b), corner(7)]);
                 }
             }
