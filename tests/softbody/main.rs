@@ -1,13 +1,19 @@
-//! Dough and an egg, as paper R describes them: figures of the examples, printed as they are checked
-//! (`cargo test --test softbody -- --nocapture`).
+//! Soft bodies: how well they meet their laws, what they do at extremes, and figures of dough and an egg as paper R
+//! describes them; all are printed as they are checked (`cargo test --test softbody -- --nocapture`).
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 
+mod accuracy;
 #[path = "../cooked/mod.rs"]
 mod cooked;
 mod egg;
+mod extremes;
+#[path = "../laws/mod.rs"]
+mod laws;
 mod pound;
 mod rolling;
+mod scene;
+mod shapes;
 
 use engine::geometry::{Geometry, Kind};
 

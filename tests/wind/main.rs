@@ -8,6 +8,8 @@ mod coherence;
 #[path = "../cooked/mod.rs"]
 mod cooked;
 mod extremes;
+#[path = "../laws/mod.rs"]
+mod laws;
 mod pictures;
 mod shelter;
 mod storm;

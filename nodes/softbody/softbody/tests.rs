@@ -168,23 +168,6 @@ fn a_goal_that_was_reached_becomes_the_shape_at_rest() {
 }
 
 #[test]
-fn goals_inside_leave_the_surface_alone() {
-    // Without springs, gravity and volume nothing but a goal could move a particle.
-    let frames = simulating(cube())
-        .input(GOALS, pressed(0, cube().into()))
-        .set(GRAVITY, [0.0; 3])
-        .set(VOLUME, 0.0)
-        .set(STIFFNESS, all(0.0))
-        .frames([1, 2, 5]);
-    for frame in &frames[1..] {
-        for (p, q) in frame.mesh().positions().iter().zip(frames[0].mesh().positions()) {
-            assert!((0..3).all(|k| (p[k] - q[k]).abs() < 1e-8), "{p:?} {q:?}");
-        }
-    }
-    assert!(frames[1].metrics["goal_distance"] > 0.0);
-}
-
-#[test]
 fn a_block_rests_on_the_ground() {
     let frames =
         simulating(block([3; 3], [0.0; 3], [0.1; 3])).set(GROUND, true).set(STIFFNESS, all(1e5)).frames([1, 120, 121]);

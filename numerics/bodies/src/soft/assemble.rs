@@ -57,7 +57,7 @@ impl Work {
     #[inline(always)]
     fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, motion: &Motion<'_>) -> V3 {
         let mut sum = on.drive.force(place, on.body.mass[place], time, motion.x[place], motion.v[place]);
-        if !self.volumes.is_off() {
+        if !self.system.regions.is_empty() {
             sum -= self.system.regions.gather(place, &self.volumes.pressures, &self.volumes.gradients);
         }
         if let Some(extra) = self.extra.get(place) {

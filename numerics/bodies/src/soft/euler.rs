@@ -6,7 +6,7 @@
 use super::V3;
 use super::contact::{Contact, Query, Touching};
 use super::stage::{Newton, Solved, Stage};
-use super::step::{MOST, Moving, Stepper, sum};
+use super::step::{MOST, Moving, Stepper, deepest, sum};
 
 /// Times that implicit Euler looks for contacts it has missed.
 const ROUNDS: u32 = 4;
@@ -87,6 +87,7 @@ impl Stepper<'_> {
             // What was deep before is on its way out.
             let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
+            solved.deepest = deepest(&found, &x);
             if round == ROUNDS || !(missed || changed > CHANGED) {
                 break;
             }

@@ -91,6 +91,8 @@ pub(super) struct Solved {
     pub(super) enough: f64,
     /// How deep the worst contact is that got too deep, metres below its gap; 0 where none did.
     pub(super) unmet: f64,
+    /// How deep the worst contact is of all there are at the end, those that nothing was done about too, metres below its gap.
+    pub(super) deepest: f64,
 }
 
 /// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.

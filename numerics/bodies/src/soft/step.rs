@@ -111,8 +111,12 @@ impl Stepper<'_> {
             let gain = energies.sum() - before.sum();
             let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
-            let goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v))
-                && !self.missed(&full, &start, &moving.x, times, &firmness).1;
+            let mut goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v));
+            if goes_on {
+                let (found, missed) = self.missed(&full, &start, &moving.x, times, &firmness);
+                stepped.solved.deepest = deepest(&found, &moving.x);
+                goes_on = !missed;
+            }
             if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
@@ -127,6 +131,7 @@ impl Stepper<'_> {
             *self.unsettled = (*self.unsettled).max(1);
         }
         (stepped.contacts, stepped.overlap) = self.work.touching();
+        stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
         let touches = stepped.euler || stepped.contacts > 0;
         let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
@@ -301,6 +306,11 @@ fn firmness(body: &Body) -> Vec<f64> {
     (0..body.len()).map(of).collect()
 }
 
+/// How far the worst contact is below its gap at `x`, metres; 0 where none is.
+pub(super) fn deepest(contacts: &[Touching], x: &[V3]) -> f64 {
+    contacts.iter().map(|contact| -contact.clearance(x, 0.0)).fold(0.0, f64::max)
+}
+
 pub(super) fn sum(a: Solved, b: Solved) -> Solved {
     Solved {
         newton: a.newton + b.newton,
@@ -310,5 +320,6 @@ pub(super) fn sum(a: Solved, b: Solved) -> Solved {
         failed: a.failed || b.failed,
         enough: a.enough.max(b.enough),
         unmet: b.unmet,
+        deepest: b.deepest,
     }
 }

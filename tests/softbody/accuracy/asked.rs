@@ -1,0 +1,109 @@
+//! What bodies are asked for: goals, pins, springs that join them. The node's.
+
+use engine::time::Frame as Time;
+
+use super::*;
+use crate::scene::Scene;
+
+/// A block of 0.3 m, half as high and wider by as much.
+fn flat(body: &engine::geometry::Component) -> engine::geometry::Component {
+    let wider = std::f64::consts::SQRT_2;
+    shapes::changed(body, |_, [x, y, z]| [x * wider, y * 0.5, z * wider])
+}
+
+/// Whose goal was reached, became its shape at rest and let go: the largest strain of its springs off the goal's lengths,
+/// with what storing takes, and the energy left in them ÷ E·V.
+fn released() -> ([f64; 2], f64) {
+    let (modulus, side) = (1e4, 0.3_f64);
+    let body = shapes::block([3; 3], 0.1, [0.0; 3]);
+    let scene = Scene::of(body.clone()).goal(flat(&body), 24.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
+    let cooked = scene.set("stiffness", modulus).set("damping", 0.2).set("drag", 5).cook([480], 2);
+    let found = cooked.last();
+    let stored: Vec<[f32; 3]> = found.iter().map(|p| p.map(|x| x as f32)).collect();
+    let strains = shapes::springs(&flat(&body), 1.0).into_iter().map(|spring| {
+        let [a, b] = spring.ends.map(|end| found[end]);
+        [(distance(&a, &b) / spring.length - 1.0).abs(), storage(&stored) / spring.length]
+    });
+    let worst = strains.reduce(|a, b| if b[0] > a[0] { b } else { a }).unwrap();
+    (worst, cooked.said("elastic").last().unwrap() / (modulus * side * side * side))
+}
+
+/// A goal alone pulls at a block: how many particles of its surface move, of how many, and how far the furthest, ÷ the
+/// furthest of all.
+fn pulled_surface(cells: u32) -> (usize, usize, f64) {
+    let body = shapes::block([cells; 3], 0.1, [0.0; 3]);
+    let scene = Scene::of(body.clone()).goal(flat(&body), 2.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
+    let cooked = scene.set("stiffness", 0).set("volume", 0).run(6);
+    let way = |from: &[V], to: &[V]| from.iter().zip(to).map(|(a, b)| distance(a, b)).collect::<Vec<_>>();
+    let skin = |place: usize| crate::points(cooked.surface[place].as_ref().unwrap());
+    let (surface, all) = (way(&skin(0), &skin(5)), largest(way(&cooked.at(0), &cooked.at(5))));
+    let share = if all > 0.0 { largest(surface.iter().copied()) / all } else { 0.0 };
+    (surface.iter().filter(|way| **way > 0.0).count(), surface.len(), share)
+}
+
+/// How many times a pinned particle is not, to the bit, where the animation puts it, of how many.
+fn off_pins() -> [usize; 2] {
+    let body = shapes::block([4, 2, 2], 0.1, [0.0; 3]);
+    let held: Vec<usize> = (0..body.point_count()).filter(|i| body.positions()[*i][0] == 0.0).collect();
+    // All nine hang on one point, as on a hand that wanders and comes back to a place of f32.
+    let hand = |frame: Time| {
+        let at = frame.number() - 1.0;
+        [0.1 * libm::sin(at), 0.1 + 0.03 * at, 0.1 * libm::cos(0.7 * at)].map(|x| x as f32)
+    };
+    let cooked = Scene::of(body.clone()).pins(0.2, move |frame| vec![hand(frame)]).set("ground", true).run(24);
+    let near: Vec<usize> = (0..body.point_count())
+        .filter(|i| {
+            distance(&body.positions()[*i].map(f64::from), &hand(Time::whole(1)).map(f64::from)) <= f64::from(0.2_f32)
+        })
+        .collect();
+    assert!(held.iter().any(|i| near.contains(i)) && near.len() < body.point_count());
+    let mut off = 0;
+    for frame in 0..24 {
+        let (from, to) = (hand(Time::whole(1)), hand(Time::whole(frame as i64 + 1)));
+        let found = cooked.at(frame);
+        for particle in &near {
+            let place = body.positions()[*particle];
+            let way = |k: usize| f64::from(to[k]) + (f64::from(place[k]) - f64::from(from[k]));
+            off += usize::from((0..3).any(|k| found[*particle][k] != f64::from(way(k) as f32)));
+        }
+    }
+    [off, 24 * near.len()]
+}
+
+/// The longest that a coupling spring gets by its length at rest, between a cube that is held and one that hangs on it.
+fn joined() -> f64 {
+    let (lower, upper) = (shapes::block([2; 3], 0.05, [0.0; 3]), shapes::block([2; 3], 0.05, [0.0, 0.102, 0.0]));
+    let top: Vec<[f32; 3]> = upper.positions().iter().filter(|p| p[1] > 0.2).copied().collect();
+    let scene = Scene::of(lower.clone()).and(upper.clone()).pins(1e-3, move |_| top.clone());
+    let scene = scene.set("coupling_radius", 5e-3).set("coupling_stiffness", 2e4).set("stiffness", 1e5);
+    let cooked = scene.set("body_collision", false).run(48);
+    let count = lower.point_count();
+    let on_top = (0..count).filter(|i| lower.positions()[*i][1] > 0.09);
+    let pairs: Vec<[usize; 2]> = on_top.map(|i| [i, count + i - 6]).collect();
+    let length = |points: &[V], [a, b]: [usize; 2]| distance(&points[a], &points[b]);
+    let rest = cooked.at(0);
+    let of = |frame: usize| {
+        let points = cooked.at(frame);
+        largest(pairs.iter().map(|pair| length(&points, *pair) / length(&rest, *pair)))
+    };
+    largest((0..48).map(of))
+}
+
+pub(super) fn figures() -> Vec<Figure> {
+    let (strain, energy) = released();
+    let (alone, within, [off, pinned]) = (pulled_surface(1), pulled_surface(3), off_pins());
+    vec![
+        Figure::stored("A goal reached, reset and let go: strain off its shape", [strain], 1e-6, ""),
+        Figure::error("energy left in its springs ÷ E·V", energy, 1e-12, ""),
+        Figure::never("particles that a goal moves where all are on the surface", alone.0, alone.1),
+        Figure::error(
+            "way of the surface ÷ that of the inside, which a goal pulls, without springs",
+            within.2,
+            0.0,
+            "",
+        )
+        .missed(),
+        Figure::never("pinned particles not, to the bit, where the animation puts them", off, pinned),
+        Figure::within("Springs that join two bodies, the lower hanging: longest ÷ at rest", &[joined()], [1.0, 1.1]),
+    ]
+}

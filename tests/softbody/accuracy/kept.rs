@@ -1,0 +1,132 @@
+//! What has to be kept: momentum, energy, shape in free fall. The solver's, as the node gives no velocities.
+
+use std::f64::consts::TAU;
+
+use bodies::soft::Integrator;
+use numerics::random::Key;
+
+use super::*;
+
+fn momentum(body: &Body, state: &State) -> V {
+    let each = state.velocities.iter().zip(body.masses());
+    each.fold([0.0; 3], |sum, (v, mass)| add(sum, *v, mass))
+}
+
+fn angular(body: &Body, state: &State) -> V {
+    let each = state.positions.iter().zip(&state.velocities).zip(body.masses());
+    each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, cross(*x, *v), mass))
+}
+
+/// A block that turns, stretches and moves.
+fn thrown(damping: f64) -> (Body, State) {
+    let body = block([5, 4, 3], 0.1, 1e5, damping);
+    let mut state = State::at_rest(&body);
+    for (index, v) in state.velocities.iter_mut().enumerate() {
+        let key = Key::new(1).of(index as u64);
+        let own: V = std::array::from_fn(|k| 0.2 * (key.of(k as u64).f64() - 0.5));
+        let arm = add(state.positions[index], [0.25, 0.2, 0.15], -1.0);
+        *v = add(add([0.3, -0.2, 0.5], cross([0.2, 3.0, -1.0], arm), 1.0), own, 1.0);
+    }
+    (body, state)
+}
+
+/// The share of its momentum that it gains or loses in 200 steps.
+fn lost_momentum(integrator: Integrator, volume: f64) -> f64 {
+    let (body, mut state) = thrown(0.0);
+    let before = momentum(&body, &state);
+    steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 200);
+    distance(&momentum(&body, &state), &before) / norm(before)
+}
+
+/// The same of two blocks that are joined and pull at each other.
+fn lost_by_a_pair() -> f64 {
+    let one = shapes::block([2; 3], 0.1, [0.0; 3]);
+    let mut points: Vec<V> = one.positions().iter().map(|p| p.map(f64::from)).collect();
+    let mut tets = one.tet_corners().to_vec();
+    let lower = points.len() as u32;
+    points.extend(points.clone().iter().map(|[x, y, z]| [*x, y + 0.25, *z]));
+    tets.extend(one.tet_corners().iter().map(|tet| tet.map(|corner| corner + lower)));
+    let joint = |i: u32| Spring { ends: [i + 6, lower + i], stiffness: 500.0, damping: 1.0, length: 0.05 };
+    let joints: Vec<Spring> = [0, 1, 2, 9, 10, 11, 18, 19, 20].map(joint).into();
+    let body = made(&points, &tets, 1e5, 0.01, &joints);
+    let mut state = State::at_rest(&body);
+    state.velocities[lower as usize..].fill([0.2, 0.3, -0.1]);
+    let before = momentum(&body, &state);
+    steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 100);
+    distance(&momentum(&body, &state), &before) / norm(before)
+}
+
+/// What a block that turns about z loses of its angular momentum in so many steps, so many of them a turn; and how many
+/// of them were implicit Euler, which loses two thirds.
+fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
+    let body = block([4, 3, 3], 0.1, modulus, 0.0);
+    let mut state = State::at_rest(&body);
+    for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
+        *x = add(*x, [0.2, 0.15, 0.15], -1.0);
+        *v = cross([0.0, 0.0, 1.0], *x);
+    }
+    let before = angular(&body, &state);
+    let reports = steps(&body, &mut state, &Frame { seconds: TAU / steps_a_turn, ..BARE }, count);
+    let lost = distance(&angular(&body, &state), &before) / norm(before);
+    (lost, reports.iter().map(|report| report.euler_steps).sum())
+}
+
+/// The most that energy rises above the start in 100 steps, as a share of it.
+fn gained(integrator: Integrator, volume: f64, damping: f64) -> f64 {
+    let (body, mut state) = thrown(damping);
+    let each = state.velocities.iter().zip(body.masses());
+    let start: f64 = each.map(|(v, mass)| 0.5 * mass * norm(*v) * norm(*v)).sum();
+    let reports = steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 100);
+    largest(reports.iter().map(|report| (report.kinetic + report.elastic + report.volume_energy) / start - 1.0))
+}
+
+/// The largest error of a particle's way in a second of free fall, metres, of 9.8: `fallen` is the way along gravity.
+fn fall(integrator: Integrator, fallen: f64) -> f64 {
+    let body = block([6, 5, 4], 0.1, 1e6, 0.01);
+    let start = State::at_rest(&body);
+    let mut state = start.clone();
+    let gravity = [0.0, -9.81, 2.0];
+    steps(&body, &mut state, &Frame { gravity, volume: 1.0, integrator, ..BARE }, 24);
+    let each = state.positions.iter().zip(&start.positions);
+    largest(each.map(|(after, before)| distance(after, &add(*before, gravity, fallen))))
+}
+
+pub(super) fn figures() -> Vec<Figure> {
+    let accurate = Integrator::Accurate { tolerance: 1e-3 };
+    let ways = [(Integrator::Default, 0.0), (Integrator::Default, 1.0), (Integrator::Euler, 1.0), (accurate, 1.0)];
+    let turns = [1e5, 1e6, 1e8].map(|modulus| lost_turning(modulus, 100.0, 1000));
+    let finer = lost_turning(1e5, 200.0, 2000);
+    let gains = [
+        gained(Integrator::Default, 0.0, 0.0),
+        gained(Integrator::Default, 1.0, 0.01),
+        gained(Integrator::Euler, 1.0, 0.0),
+        gained(accurate, 1.0, 0.01),
+    ];
+    // Σ i·h² over 24 steps of 1/24.
+    let euler = fall(Integrator::Euler, 300.0 / 576.0);
+    vec![
+        Figure::error(
+            "A free body: momentum lost in 200 steps",
+            largest(ways.map(|(integrator, volume)| lost_momentum(integrator, volume))),
+            1e-10,
+            "",
+        ),
+        Figure::error("of two that are joined", lost_by_a_pair(), 1e-9, ""),
+        Figure::error(
+            "angular momentum lost in 1,000 steps, 100 a turn, E 1e5 to 1e8 Pa",
+            largest(turns.map(|turn| turn.0)),
+            2e-3,
+            "",
+        ),
+        Figure::within("it falls with the step: order", &[libm::log2(turns[0].0 / finer.0)], [1.8, 3.2]),
+        Figure::never("steps of those that fell back to `euler`", turns.iter().map(|turn| turn.1 as usize).sum(), 3000),
+        Figure::error("energy over its start, undriven, with and without damping", largest(gains), 1e-6, ""),
+        Figure::error(
+            "free fall over a second: from the parabola",
+            largest([fall(Integrator::Default, 0.5), fall(accurate, 0.5)]),
+            1e-9,
+            " m",
+        ),
+        Figure::error("`euler`: from its own sum", euler, 1e-9, " m"),
+    ]
+}

@@ -1,0 +1,154 @@
+//! What bodies do against ground, plates and a rolling pin: the node's.
+
+use engine::geometry::{Component, Geometry};
+use engine::time::Frame as Time;
+
+use super::*;
+use crate::scene::{Cooked, Scene};
+
+const G: f64 = 9.81;
+/// Frames a second.
+const FPS: f64 = 24.0;
+const THICKNESS: f64 = 1e-3;
+
+/// A block of 0.4 m that falls 0.2 m, at E, `damping` and `volume`; at frames 1, 240 and 241.
+fn dropped(modulus: f64, damping: f64, volume: f64) -> Cooked {
+    let block = shapes::block([4; 3], 0.1, [0.0, 0.2, 0.0]);
+    let scene = Scene::of(block).set("stiffness", modulus).set("damping", damping).set("volume", volume);
+    let cooked = scene.set("ground", true).cook([1, 240, 241], 2);
+    assert_eq!(cooked.errors, []);
+    cooked
+}
+
+/// How far the middle of a block on the ground is from where its weight presses it, as a share of its height: mean of
+/// the column's sag is ρgh²/3E, and its foot is kept off the ground by `thickness`.
+fn height_error() -> f64 {
+    let modulus = 1e6;
+    let height = mean(&dropped(modulus, 2e-3, 1.0).last())[1];
+    let exact = 0.2 + THICKNESS - 1000.0 * G * 0.4 * 0.4 / (3.0 * modulus);
+    (height - exact).abs() / 0.4
+}
+
+/// The fastest particle of such blocks after 240 frames, in g·dt.
+fn speed_at_rest() -> f64 {
+    let fastest = |modulus: f64, volume: f64| {
+        let cooked = dropped(modulus, 2e3 / modulus, volume);
+        largest(cooked.at(1).iter().zip(&cooked.at(2)).map(|(a, b)| distance(a, b))) * FPS / (G / FPS)
+    };
+    largest([fastest(5e4, 0.0), fastest(5e4, 1.0), fastest(1e7, 1.0)])
+}
+
+/// A block on a slope of 30° with friction μ: how far it moves along it in a second, ÷ its length, and its acceleration
+/// by g(sin − μ cos).
+fn on_slope(friction: f64) -> [f64; 2] {
+    let (sine, cosine) = (0.5, 0.75_f64.sqrt());
+    let block = shapes::block([4, 2, 4], 0.1, [0.0, 0.9 * THICKNESS, 0.0]);
+    let gravity = format!("[{}, {}, 0]", G * sine, -G * cosine);
+    let scene = Scene::of(block).set("gravity", gravity).set("stiffness", 1e6).set("damping", 0.005);
+    let cooked = scene.set("ground", true).set("friction", friction).cook([25, 49, 73], 2);
+    let [a, b, c] = [0, 1, 2].map(|place| mean(&cooked.at(place))[0]);
+    [(b - a).abs() / 0.4, (c - 2.0 * b + a) / (G * (sine - friction * cosine))]
+}
+
+/// A block pressed to half its height by plates: at each frame from where they stand still.
+fn pressed() -> Cooked {
+    let block = shapes::mirrored([6; 3], 0.1, [0.0, THICKNESS, 0.0]);
+    let upper = |frame: Time| {
+        let way = 0.3 * ((frame.number() - 1.0) / 48.0).min(1.0);
+        let foot = 0.6 + 2.0 * THICKNESS - way;
+        shapes::cuboid([-0.5, foot, -0.5], [1.1, foot + 0.1, 1.1])
+    };
+    let scene = Scene::of(block).collider(|_| shapes::cuboid([-0.5, -0.1, -0.5], [1.1, 0.0, 1.1])).collider(upper);
+    let scene = scene.set("gravity", "[0, 0, 0]").set("stiffness", 1e5).set("damping", 0.02);
+    let cooked = scene.cook(1..=97, 2);
+    assert_eq!(cooked.errors, []);
+    cooked
+}
+
+/// How far the middle of its width is from that of its foot and how far its widths differ, ÷ its width.
+fn askew(points: &[V]) -> f64 {
+    let ends = |axis: usize| {
+        let along = || points.iter().map(|p| p[axis]);
+        [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)]
+    };
+    let [x, z] = [0, 2].map(ends);
+    let width = x[1] - x[0];
+    largest([(x[0] + x[1] - 0.6).abs() / width, (z[0] + z[1] - 0.6).abs() / width, (width / (z[1] - z[0]) - 1.0).abs()])
+}
+
+const SIDES: usize = 32;
+
+/// A pin that rolls on by ten thicknesses a frame, 1 cm into the dough.
+fn pin(frame: Time) -> Geometry {
+    let way = (frame.number() - 1.0) * 10.0 * THICKNESS;
+    let (mut points, mut counts, mut corners) = (Vec::new(), vec![4; SIDES], Vec::new());
+    for k in 0..SIDES {
+        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * k as f64 / SIDES as f64 - way / 0.05);
+        let place = |z: f64| [0.05 * cosine - 0.08 + way, 0.05 * sine + 0.1, z].map(|x| x as f32);
+        points.extend([place(-0.09), place(0.21)]);
+        let next = (k + 1) % SIDES;
+        corners.extend([2 * k, 2 * next, 2 * next + 1, 2 * k + 1]);
+    }
+    for side in [0, 1] {
+        counts.push(SIDES as u32);
+        corners.extend((0..SIDES).map(|k| 2 * if side == 0 { SIDES - 1 - k } else { k } + side));
+    }
+    Component::mesh(counts, corners.iter().map(|corner| *corner as u32).collect(), points).unwrap().into()
+}
+
+/// Whether a point is within the pin: behind all of its sides, by more than what storing it takes.
+fn within(points: &[V], p: &V) -> bool {
+    let depth = |k: usize| {
+        let (a, b) = (points[2 * k], points[2 * ((k + 1) % SIDES)]);
+        let out = cross(add(b, a, -1.0), [0.0, 0.0, 1.0]);
+        let from = add(*p, a, -1.0);
+        -(out[0] * from[0] + out[1] * from[1]) / norm(out)
+    };
+    (-0.09..0.21).contains(&p[2]) && (0..SIDES).all(|k| depth(k) > 1e-7)
+}
+
+/// Dough under the pin: the deepest overlap it publishes ÷ `thickness`, and how many of its particles are within the pin
+/// or below the ground, of how many.
+fn rolled(modulus: f64) -> (f64, usize, usize) {
+    let dough = shapes::block([12, 3, 6], 0.02, [0.0; 3]);
+    let scene = Scene::of(dough).collider(pin).set("stiffness", modulus).set("damping", 0.02).set("friction", 0.3);
+    let cooked = scene.set("ground", true).set("ground_height", -THICKNESS).run(31);
+    let (mut passed, mut count) = (0, 0);
+    for frame in 0..31 {
+        let pin = crate::points(&pin(Time::whole(frame as i64 + 1)));
+        let points = cooked.at(frame);
+        passed += points.iter().filter(|p| within(&pin, p) || p[1] < -THICKNESS).count();
+        count += points.len();
+    }
+    (cooked.most("deepest_overlap") / THICKNESS, passed, count)
+}
+
+pub(super) fn figures() -> Vec<Figure> {
+    let sticks = [0.7, 1.0, 1e6].map(|friction| on_slope(friction)[0]);
+    let slides = [0.0, 0.3, 0.5].map(|friction| (on_slope(friction)[1] - 1.0).abs());
+    let pressed = pressed();
+    let volume = (pressed.said("volume_ratio").last().unwrap() - 1.0).abs();
+    let turned = *pressed.said("inverted_tets").last().unwrap() as usize;
+    let rolled = [2e4, 5e3].map(rolled);
+    let overlap = largest(rolled.iter().map(|found| found.0).chain([pressed.most("deepest_overlap") / THICKNESS]));
+    vec![
+        Figure::error("A block dropped on the ground: height of its middle", height_error(), 1e-2, " L"),
+        Figure::error("its fastest particle after 240 frames", speed_at_rest(), 1e-4, " g·dt"),
+        Figure::error("on 30° with μ of 0.7 and more: creep in a second", largest(sticks), 1e-4, " L"),
+        Figure::error("with μ of 0.5 and less: acceleration by g(sin − μ cos)", largest(slides), 1e-2, ""),
+        Figure::error("Between plates at half its height: volume", volume, 2e-2, "").missed(),
+        Figure::error("how far its bulge is from symmetry", askew(&pressed.last()), 2e-2, " L").missed(),
+        Figure::never("tets inside out there", turned, 6 * 6 * 6 * 6),
+        Figure::error(
+            "Under those plates, and a rolling pin that moves 10 `thickness` a frame: `deepest_overlap`",
+            overlap,
+            1.0,
+            " `thickness`",
+        ),
+        Figure::never(
+            "particles within the pin or the ground",
+            rolled.iter().map(|found| found.1).sum(),
+            rolled.iter().map(|found| found.2).sum(),
+        ),
+    ]
+}

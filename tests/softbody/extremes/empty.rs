@@ -1,0 +1,53 @@
+//! Nothing at all, and hardly anything.
+
+use super::*;
+
+fn mesh(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Geometry {
+    Component::mesh(vec![3; triangles.len()], triangles.concat(), points.to_vec()).unwrap().into()
+}
+
+#[test]
+fn colliders_of_nothing_and_of_next_to_nothing_stop_nothing_else() {
+    let against = |points: &[[f32; 3]], triangles: &[[u32; 3]]| {
+        let mesh = mesh(points, triangles);
+        grounded(cube(0.02)).collider(move |_| mesh.clone())
+    };
+    let flat = [[-1.0, 0.03, 0.0], [0.0, 0.03, 0.0], [1.0, 0.03, 0.0]];
+    let cooked = hold([
+        ("no collider", grounded(cube(0.02))),
+        ("an empty collider", against(&[], &[])),
+        ("points alone", against(&flat, &[])),
+        ("a triangle without area", against(&flat, &[[0, 1, 2]])),
+        ("a triangle that is a point", against(&[[0.05, 0.05, 0.05]; 3], &[[0, 1, 2], [0, 0, 0]])),
+        ("a triangle", against(&[[-1.0, 0.01, -1.0], [0.0, 0.01, 1.0], [1.0, 0.01, -1.0]], &[[0, 1, 2]])),
+    ]);
+    for k in [1, 2] {
+        assert!(cooked[k].last() == cooked[0].last(), "{k}");
+    }
+}
+
+#[test]
+fn bodies_of_nothing_come_out_as_nothing_or_are_refused() {
+    let nothing = || Component::tets(vec![], vec![]).unwrap();
+    let cooked =
+        hold([("an empty body", grounded(nothing())), ("and one beside it", grounded(nothing()).and(cube(0.02)))]);
+    assert_eq!(cooked[0].tets[1].as_ref().unwrap().tets().unwrap().point_count(), 0);
+    let flat = changed(&cube(0.0), |_, [x, _, z]| [x, 0.0, z]);
+    let one = |p: [f32; 3]| Component::tets(vec![[0, 1, 2, 3]], vec![p; 4]).unwrap();
+    refused([
+        (
+            "points without a tet",
+            Scene::of(Component::tets(vec![], vec![[0.0; 3]; 3]).unwrap()),
+            "the body has no mass",
+        ),
+        ("a flat body", Scene::of(flat), "the body has no mass"),
+        ("a tet that is a point", Scene::of(one([0.1; 3])), "the body has no mass"),
+        (
+            "a tet of one point",
+            Scene::of(Component::tets(vec![[0; 4]], vec![[0.0; 3]]).unwrap()),
+            "joins particles [0, 0, 0, 0]",
+        ),
+    ]);
+    let none = grounded(cube(0.02)).cook([], 2);
+    assert!(none.tets.is_empty() && none.errors.is_empty(), "no frames are no work");
+}

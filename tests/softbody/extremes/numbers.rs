@@ -1,0 +1,127 @@
+//! Numbers that no scene should have: at the ends of f32, far away, beyond the ranges of params, no numbers at all.
+
+use super::*;
+use engine::param::Shape;
+
+/// A cube and a plate under it, at a scale; with `thickness` at that scale where `fits`.
+fn scaled(scale: f64, fits: bool) -> Scene {
+    let body = changed(&cube(0.002), |_, p| p.map(|x| x * scale));
+    let plate = cuboid([-0.3, -0.1, -0.3], [0.4, 0.0, 0.4]);
+    let mut plate = plate.mesh().unwrap().clone();
+    plate.edit(P).unwrap().iter_mut().flatten().for_each(|x| *x = (f64::from(*x) * scale) as f32);
+    let plate = Geometry::from(plate);
+    let scene = Scene::of(body).collider(move |_| plate.clone());
+    if fits { scene.set("thickness", format!("{:e}", 1e-3 * scale)) } else { scene }
+}
+
+#[test]
+fn a_scene_of_any_size_and_place_and_frames_of_any_length_are_met() {
+    let away = |way: f64| Scene::of(changed(&cube(0.0), move |_, p| p.map(|x| x + way))).set("ground", true);
+    let at = |fps: f64| grounded(cube(0.02)).at(fps);
+    hold([
+        ("1e-6", scaled(1e-6, true)),
+        ("1e6", scaled(1e6, true)),
+        ("1e-6, params as they are", scaled(1e-6, false)),
+        ("1e6, params as they are", scaled(1e6, false)),
+        ("1e-30", scaled(1e-30, true)),
+        ("1e30, params as they are", scaled(1e30, false)),
+        ("denormal, params as they are", scaled(1e-40, false)),
+        ("1 km away", away(1e3)),
+        ("a frame of 1,000 s", at(1e-3)),
+        ("a frame of 1 µs", at(1e6)),
+        ("time stands still", grounded(cube(0.02)).set("time_scale", 0)),
+        ("time runs a million times as fast", grounded(cube(0.02)).set("time_scale", "1e6")),
+    ]);
+    refused([("features of 3 cm 1e7 m away, where 1 m is the least there is", away(1e7), "the body has no mass")]);
+}
+
+#[test]
+fn what_is_no_number_is_refused_by_name_wherever_it_stands() {
+    let tets = |name: &'static str, bad: f32| {
+        let mut body = with(cube(0.02), "soft", |_| 1.0);
+        match name {
+            "P" => body.edit(P).unwrap()[7][1] = bad,
+            name => body.edit(Attr::<f32>::point(name)).unwrap()[7] = bad,
+        }
+        body
+    };
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let bowl = move |_: Frame| {
+            let mut bowl = cuboid([-0.1; 3], [0.0; 3]);
+            bowl.part_mut(engine::geometry::Kind::Mesh).unwrap().edit(P).unwrap()[7][1] = bad;
+            bowl
+        };
+        let soft = r#"{ "value": 1000, "attribute": "soft" }"#;
+        refused([
+            ("a place", Scene::of(tets("P", bad)), "`P` of point 7 of the tets is NaN or infinite"),
+            (
+                "a mask",
+                Scene::of(tets("soft", bad)).set("stiffness", soft),
+                "`soft` of point 7 of the tets is NaN or infinite",
+            ),
+            (
+                "a goal",
+                Scene::of(cube(0.02)).goal(tets("P", bad), 2.0, 10.0, 0.0),
+                "`P` of point 7 of the tets is NaN or infinite",
+            ),
+            (
+                "a pin",
+                Scene::of(cube(0.02)).pins(1.0, move |_| vec![[bad; 3]]),
+                "`P` of point 0 of the points is NaN or infinite",
+            ),
+            ("a collider", Scene::of(cube(0.02)).collider(bowl), "`P` of point 7 of the mesh is NaN or infinite"),
+        ]);
+    }
+}
+
+#[test]
+fn keyframes_in_any_order_doubled_single_or_none_are_met_or_refused_by_name() {
+    let keyed = |keys: &str| grounded(cube(0.02)).set("stiffness", format!(r#"{{ "keyframes": {keys} }}"#));
+    hold([("a single one", keyed("[[3, 1e4]]")), ("1e-3 to 1e12 in a frame", keyed("[[2, 1e-3], [3, 1e12]]"))]);
+    for keys in ["[]", "[[3, 1e4], [1, 1e3]]", "[[2, 1e4], [2, 1e3]]"] {
+        let said = keyed(keys).fault().unwrap_or_default();
+        assert!(said.contains("stiffness"), "{keys}: {said}");
+    }
+}
+
+#[test]
+fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
+    let node = convect::CATALOGUE.nodes().find(|node| node.name == "Softbody").unwrap();
+    let goal = changed(&cube(0.002), |_, [x, y, z]| [1.2 * x, 0.7 * y, 1.2 * z]);
+    // Something for every param to act on.
+    let busy = || {
+        let top = cube(0.002).positions()[26];
+        let scene = grounded(cube(0.002)).and(block([1; 3], 0.1, [0.0, 0.105, 0.0]));
+        let scene = scene.goal(goal.clone(), 3.0, 100.0, 1.0).pins(1e-3, move |_| vec![top]);
+        scene
+            .set("coupling_radius", 0.02)
+            .set("self_collision", true)
+            .set("plastic_yield", 0.01)
+            .set("plastic_creep", 10)
+    };
+    let (mut ends, mut outside) = (0, 0);
+    for spec in node.param_specs() {
+        let hard = spec.facts.hard;
+        let (whole, written): (bool, fn(f64) -> String) = match spec.shape {
+            Shape::Float | Shape::Masked => (false, |x| format!("{x:?}")),
+            Shape::Int => (true, |x| format!("{x}")),
+            _ => continue,
+        };
+        let set = |x: f64| busy().set(spec.name, written(x));
+        for (end, out) in [(hard.low, -1.0), (hard.high, 1.0)] {
+            if !end.is_finite() {
+                continue;
+            }
+            let step = if whole { 1.0 } else { 1e-6 * end.abs().max(1e-3) };
+            let (inside, beyond) = if hard.open && out < 0.0 { (end + step, end) } else { (end, end + out * step) };
+            let what = format!("`{}` at {inside}", spec.name);
+            assert_eq!(set(inside).fault(), None, "{what}");
+            let cooked = set(inside).cook(1..=FRAMES, 2);
+            assert_eq!(faults(&set(inside), &cooked), [""; 0], "{what}");
+            let said = set(beyond).fault().unwrap_or_default();
+            assert!(said.contains(&format!("`{}`", spec.name)) && said.contains("expected"), "{beyond}: {said}");
+            (ends, outside) = (ends + 1, outside + 1);
+        }
+    }
+    assert!(ends > 15 && outside > 15, "{ends} {outside}");
+}
