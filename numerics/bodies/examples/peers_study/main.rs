@@ -1,0 +1,161 @@
+//! Work and precision of one TR-BDF2 step a frame against XPBD in small steps and vertex block descent, with and without
+//! contact: the same springs, dashpots, pressures, masses and contacts, one thread for all.
+//!
+//! `cargo run --release -p bodies --example peers_study [free] [drop] [roll] [stiff] [quick] [PATH.svg]`; quick: one round and
+//! coarser references. A line a setting on stdout, and a picture where a path is given; about ten minutes for all four.
+//! Error: root mean square over frames and particles of the distance to a reference ÷ the body's size; `own` to the same
+//! method in very short steps, so that what the methods make of contacts is told apart from error of time. `passes`: how
+//! often a frame looks at all springs, whatever the machine; one of ours is an iteration of conjugate gradients or a look at
+//! forces, one of XPBD's an iteration, one of VBD's a sweep.
+
+#![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
+
+mod model;
+mod plot;
+mod run;
+mod scene;
+mod vbd;
+mod xpbd;
+
+use bodies::soft::Integrator;
+use plot::{Line, Panel};
+use run::{Method, Run};
+use scene::Scene;
+
+/// Rounds of which the fastest counts, of settings that take less than [`QUICK_MS`] a frame.
+const ROUNDS: usize = 3;
+const QUICK_MS: f64 = 150.0;
+/// Chebyshev's ρ, as in the paper's examples.
+const RADIUS: f64 = 0.95;
+
+/// A method with some of its settings, named as in the picture.
+struct Family {
+    name: &'static str,
+    settings: Vec<(String, Method)>,
+}
+
+fn families() -> Vec<Family> {
+    let ours = |integrator, steps: &[u32]| {
+        let name = |steps: &u32| if *steps == 0 { "default".to_owned() } else { steps.to_string() };
+        steps.iter().map(|steps| (name(steps), Method::Ours { integrator, steps: *steps })).collect()
+    };
+    let named = |steps: u32, iterations: u32| format!("{steps}x{iterations}");
+    let xpbd = |steps: &[u32], iterations| {
+        let method = |steps: &u32| (named(*steps, iterations), Method::Xpbd { steps: *steps, iterations });
+        steps.iter().map(method).collect()
+    };
+    let vbd = |settings: &[(u32, u32)], radius| {
+        let method =
+            |(steps, iterations): &(u32, u32)| Method::Vbd { steps: *steps, iterations: *iterations, radius };
+        settings.iter().map(|setting| (named(setting.0, setting.1), method(setting))).collect()
+    };
+    let accurate = |name: &str, tolerance| {
+        (name.to_owned(), Method::Ours { integrator: Integrator::Accurate { tolerance }, steps: 0 })
+    };
+    vec![
+        Family { name: "ours", settings: ours(Integrator::Default, &[0, 2, 4, 8, 16, 64]) },
+        Family { name: "ours, accurate", settings: vec![accurate("1e-3", 1e-3), accurate("1e-4", 1e-4)] },
+        Family { name: "ours, implicit Euler", settings: ours(Integrator::Euler, &[0, 4, 16]) },
+        Family { name: "XPBD n x 1", settings: xpbd(&[4, 8, 16, 32, 64, 128, 256, 512], 1) },
+        Family { name: "XPBD n x 8", settings: xpbd(&[1, 4, 16, 64], 8) },
+        Family { name: "VBD n x 1", settings: vbd(&[(4, 1), (16, 1), (64, 1), (256, 1)], 0.0) },
+        Family { name: "VBD n x 8", settings: vbd(&[(1, 8), (4, 8), (16, 8), (64, 8)], 0.0) },
+        Family {
+            name: "VBD, Chebyshev",
+            settings: vbd(&[(1, 20), (1, 100), (4, 25), (16, 10), (64, 5)], RADIUS),
+        },
+    ]
+}
+
+/// The same methods in very short steps.
+struct Limits {
+    ours: Run,
+    xpbd: Run,
+    vbd: Run,
+}
+
+impl Limits {
+    fn new(scene: &Scene, quick: bool) -> Self {
+        let fine = |steps: u32| if quick { steps / 4 } else { steps };
+        let accurate = Integrator::Accurate { tolerance: 1e-6 };
+        Self {
+            ours: Run::new(scene, Method::Ours { integrator: accurate, steps: fine(256) }),
+            xpbd: Run::new(scene, Method::Xpbd { steps: fine(2048), iterations: 1 }),
+            vbd: Run::new(scene, Method::Vbd { steps: fine(512), iterations: 3, radius: 0.0 }),
+        }
+    }
+
+    fn of(&self, method: Method) -> &Run {
+        match method {
+            Method::Ours { .. } => &self.ours,
+            Method::Xpbd { .. } => &self.xpbd,
+            Method::Vbd { .. } => &self.vbd,
+        }
+    }
+}
+
+/// Runs a scene with all methods, prints them, and gives what a picture shows.
+fn study(scene: &Scene, quick: bool) -> Panel {
+    let size = scene.body.size();
+    let springs = scene.body.springs().len();
+    println!("\n{} ({} particles, {springs} springs, {} frames)", scene.title, scene.points.len(), scene.frames);
+    println!(
+        "{:21} {:>8} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>6}",
+        "method", "setting", "ms", "passes", "M evals", "error", "own", "at end", "overlap", "lost %", "least"
+    );
+    let limits = Limits::new(scene, quick);
+    let line = |family: &str, setting: &str, run: &Run, own: Option<&Run>| {
+        let (error, end) = run.error(&limits.ours, size);
+        let own = own.map_or("-".to_owned(), |own| format!("{:.1e}", run.error(own, size).0));
+        println!(
+            "{family:21} {setting:>8} {:9.2} {:7.0} {:8.2} {error:8.1e} {own:>8} {end:8.1e} {:7.3} {:6.2} {:6.2}",
+            run.ms,
+            run.passes,
+            run.passes * springs as f64 * 1e-6,
+            run.overlap,
+            100.0 * run.lost,
+            run.least,
+        );
+        error
+    };
+    for (name, limit) in [("ours", &limits.ours), ("XPBD", &limits.xpbd), ("VBD", &limits.vbd)] {
+        line(name, "limit", limit, None);
+    }
+    let mut families: Vec<(Family, Vec<Run>)> = families().into_iter().map(|family| (family, Vec::new())).collect();
+    for round in 0..if quick { 1 } else { ROUNDS } {
+        for (family, runs) in &mut families {
+            for (at, (_, method)) in family.settings.iter().enumerate() {
+                if round == 0 {
+                    runs.push(Run::new(scene, *method));
+                } else if runs[at].ms < QUICK_MS {
+                    runs[at].ms = runs[at].ms.min(Run::new(scene, *method).ms);
+                }
+            }
+        }
+    }
+    let lines = families.iter().map(|(family, runs)| {
+        let point = |((setting, method), run): (&(String, Method), &Run)| {
+            let error = line(family.name, setting, run, Some(limits.of(*method)));
+            (setting.clone(), run.ms, error)
+        };
+        Line { name: family.name, points: family.settings.iter().zip(runs).map(point).collect() }
+    });
+    let lines = lines.collect();
+    Panel { title: scene.title, floor: limits.xpbd.error(&limits.ours, size).0, lines }
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let is_asked = |name: &str| words.iter().any(|word| word == name);
+    // All on one thread; where the pool is there already it is what the caller wants.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).build_global();
+    let names = ["free", "drop", "roll", "stiff"];
+    let any = names.iter().any(|name| is_asked(name));
+    let asked = names.into_iter().filter(|name| !any || is_asked(name));
+    let panels: Vec<Panel> = asked.map(|name| study(&Scene::new(name), is_asked("quick"))).collect();
+    if let Some(path) = words.iter().find(|word| word.ends_with(".svg"))
+        && let Err(error) = std::fs::write(path, plot::svg(&panels))
+    {
+        println!("`{path}` was not written: {error}");
+    }
+}
