@@ -145,10 +145,11 @@ impl Region {
             let [a, b, c] = face.map(|corner| x[self.particles[usize::from(corner)] as usize] - origin);
             let bc = b.cross(&c);
             six += a.dot(&bc);
-            gradient[usize::from(face[0])] += bc / 6.0;
-            gradient[usize::from(face[1])] += c.cross(&a) / 6.0;
-            gradient[usize::from(face[2])] += a.cross(&b) / 6.0;
+            gradient[usize::from(face[0])] += bc;
+            gradient[usize::from(face[1])] += c.cross(&a);
+            gradient[usize::from(face[2])] += a.cross(&b);
         }
+        gradient.iter_mut().for_each(|g| *g *= 1.0 / 6.0);
         six / 6.0
     }
 

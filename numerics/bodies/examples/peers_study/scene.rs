@@ -135,15 +135,15 @@ impl Scene {
         match name {
             "free" => {
                 let beam = ([2.0, 0.5, 0.5], [32, 8, 8], [0.0; 3]);
-                let mut scene = made("free: cantilever, no contact", 24, Tools::default(), beam, 3.04e6, 1e-3);
+                let mut scene = made("free: cantilever, no contact", 16, Tools::default(), beam, 3.04e6, 1e-3);
                 scene.pins = scene.clamped();
                 scene
             }
-            "drop" => made("drop: dough falls 2 cm and rests", 24, ground, (DOUGH, CELLS, above(0.02)), 5e3, 0.01),
-            "stiff" => made("stiff: the same, E times 100", 24, ground, (DOUGH, CELLS, above(0.02)), 5e5, 1e-4),
+            "drop" => made("drop: dough falls 2 cm and rests", 22, ground, (DOUGH, CELLS, above(0.02)), 5e3, 0.01),
+            "stiff" => made("stiff: the same, E times 100", 22, ground, (DOUGH, CELLS, above(0.02)), 5e5, 1e-4),
             "roll" => {
                 let tools = Tools { roller: Some(roller), ..ground };
-                made("roll: a pin rolls over dough", 30, tools, (DOUGH, CELLS, above(0.0)), 5e3, 0.01)
+                made("roll: a pin rolls over dough", 24, tools, (DOUGH, CELLS, above(0.0)), 5e3, 0.01)
             }
             _ => panic!("`{name}`; expected free, drop, roll or stiff"),
         }

@@ -54,6 +54,8 @@ pub(crate) struct Vbd {
     /// Two sweeps ago, and one.
     earlier: [Vec<V3>; 2],
     touched: Vec<bool>,
+    /// How the regions around the particle at hand change with it, m².
+    gradients: Vec<V3>,
     /// Of regions now, and where the step began, m³.
     volumes: Vec<f64>,
     volumes_before: Vec<f64>,
@@ -62,8 +64,11 @@ pub(crate) struct Vbd {
 impl Vbd {
     pub(crate) fn new(model: Model, points: &[V3], substeps: u32, iterations: u32, radius: f64) -> Self {
         let still = || vec![V3::zeros(); points.len()];
+        let around = Around::new(&model);
+        let most = around.fan_starts.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0);
         Self {
-            around: Around::new(&model),
+            around,
+            gradients: vec![V3::zeros(); most],
             substeps,
             iterations,
             radius,
@@ -156,8 +161,9 @@ impl Vbd {
             block.m33 += alpha;
         }
         let fans = around.fan_starts[particle]..around.fan_starts[particle + 1];
-        for fan in &around.fans[fans.clone()] {
+        for (fan, kept) in around.fans[fans.clone()].iter().zip(&mut self.gradients) {
             let (region, gradient) = (&self.model.regions[fan.region as usize], around.gradient(fan, mine, &self.x));
+            *kept = gradient;
             let volume = self.volumes[fan.region as usize];
             let own = region.pressure(volume);
             let pace = (volume - self.volumes_before[fan.region as usize]) / h;
@@ -183,9 +189,9 @@ impl Vbd {
         self.touched[particle] = touched;
         let Some(step) = block.cholesky().map(|root| root.solve(&force)) else { return };
         self.x[particle] = mine + step;
-        for fan in &around.fans[fans] {
+        for (fan, gradient) in around.fans[fans].iter().zip(&self.gradients) {
             // A volume is linear in one particle, whose own place its gradient does not hang on.
-            self.volumes[fan.region as usize] += around.gradient(fan, mine, &self.x).dot(&step);
+            self.volumes[fan.region as usize] += gradient.dot(&step);
         }
     }
 
@@ -244,7 +250,7 @@ impl Around {
     #[inline(always)]
     fn gradient(&self, fan: &Fan, mine: V3, x: &[V3]) -> V3 {
         let side = |[b, c]: &[u32; 2]| (x[*b as usize] - mine).cross(&(x[*c as usize] - mine));
-        self.sides[fan.sides.clone()].iter().map(side).sum::<V3>() / 6.0
+        self.sides[fan.sides.clone()].iter().map(side).sum::<V3>() * (1.0 / 6.0)
     }
 }
 
