@@ -10,10 +10,20 @@ use cpu_time::ProcessTime;
 /// How time is stepped through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Method {
-    Ours { integrator: Integrator, steps: u32 },
-    Xpbd { steps: u32, iterations: u32 },
+    Ours {
+        integrator: Integrator,
+        steps: u32,
+    },
+    Xpbd {
+        steps: u32,
+        iterations: u32,
+    },
     /// `radius` is Chebyshev's ρ; 0: no acceleration.
-    Vbd { steps: u32, iterations: u32, radius: f64 },
+    Vbd {
+        steps: u32,
+        iterations: u32,
+        radius: f64,
+    },
 }
 
 /// What came of it.

@@ -123,11 +123,8 @@ impl Scene {
         const CELLS: [u32; 3] = [26, 7, 12];
         let ground = Tools { ground: true, roller: None };
         // Ten thicknesses a frame, 1 cm into the dough.
-        let roller = Roller {
-            start: V3::new(-0.08, 0.1, 0.06),
-            pace: V3::new(10.0 * GAP / FRAME, 0.0, 0.0),
-            radius: 0.05,
-        };
+        let roller =
+            Roller { start: V3::new(-0.08, 0.1, 0.06), pace: V3::new(10.0 * GAP / FRAME, 0.0, 0.0), radius: 0.05 };
         let above = |height: f64| [0.0, GAP + height, 0.0];
         let made = |title, frames, tools, (size, cells, at), modulus, damping| {
             Self::block(title, frames, tools, (size, cells, at), modulus, damping)

@@ -198,10 +198,10 @@ impl Vbd {
     fn accelerate(&mut self, sweep: u32, omega: f64) {
         let [two, one] = &mut self.earlier;
         if sweep >= 2 {
-            for particle in 0..self.x.len() {
-                if self.model.inverse[particle] > 0.0 && !self.touched[particle] {
-                    self.x[particle] = (self.x[particle] - two[particle]) * omega + two[particle];
-                }
+            let free =
+                self.model.inverse.iter().zip(&self.touched).map(|(inverse, touched)| *inverse > 0.0 && !touched);
+            for ((x, two), _) in self.x.iter_mut().zip(&*two).zip(free).filter(|each| each.1) {
+                *x = (*x - two) * omega + two;
             }
             measure(&self.model.regions, &self.x, &mut self.volumes);
         }

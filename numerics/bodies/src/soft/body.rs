@@ -228,7 +228,9 @@ impl Body {
     /// index.
     pub fn regions(&self) -> Vec<Vec<[u32; 3]>> {
         let caller = |place: u32| self.order.callers[place as usize];
-        (0..self.regions.len()).map(|region| self.regions.around(region).map(|face| face.map(caller)).collect()).collect()
+        (0..self.regions.len())
+            .map(|region| self.regions.around(region).map(|face| face.map(caller)).collect())
+            .collect()
     }
 
     /// Longest side of the box around the points at rest, metres: what tolerances are relative to.
