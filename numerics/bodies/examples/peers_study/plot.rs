@@ -123,8 +123,8 @@ fn draw(out: &mut String, panel: &Panel) {
         let _ = writeln!(
             out,
             "<path d=\"M{left} {y:.1}h{wide}\" stroke=\"#888\" stroke-dasharray=\"2 3\"/>\
-             <text x=\"{}\" y=\"{:.1}\" font-size=\"9\" fill=\"#666\">our fine limit and the nearest peer's are this far apart</text>",
-            left + 4.0,
+             <text x=\"{}\" y=\"{:.1}\" font-size=\"9\" fill=\"#666\" text-anchor=\"end\">our fine limit and the nearest peer's are this far apart</text>",
+            left + wide - 4.0,
             y - 4.0
         );
     }
@@ -141,11 +141,13 @@ fn draw(out: &mut String, panel: &Panel) {
     for (line, (colour, _)) in panel.lines.iter().zip(STYLES) {
         for (name, ms, error) in &line.points {
             let Some([x, y]) = room(&mut taken, place(*ms, *error), name.len()) else { continue };
-            let _ = writeln!(
-                out,
-                "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"10\" fill=\"{colour}\" stroke=\"#fcfcfa\" stroke-width=\"3\" \
-                 paint-order=\"stroke\">{name}</text>"
-            );
+            // Once wide in the colour of the ground, so that lines below do not cross it.
+            for around in ["stroke=\"#fcfcfa\" stroke-width=\"3\"", ""] {
+                let _ = writeln!(
+                    out,
+                    "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"10\" fill=\"{colour}\" {around}>{name}</text>"
+                );
+            }
         }
     }
 }
@@ -186,6 +188,8 @@ fn axes(out: &mut String, across: [f64; 2], up: [f64; 2]) {
 
 /// Where a label of so many letters goes beside a point: to where nothing is yet, or nowhere.
 fn room(taken: &mut Vec<Area>, [x, y]: [f64; 2], letters: usize) -> Option<[f64; 2]> {
+    /// Times as far as beside the point that a label may be.
+    const FAR: f64 = 1.8;
     let [left, top, inner_wide, inner_high] = INSIDE;
     let (wide, high) = (LETTER[0] * letters as f64, LETTER[1]);
     let sides = [
@@ -198,7 +202,8 @@ fn room(taken: &mut Vec<Area>, [x, y]: [f64; 2], letters: usize) -> Option<[f64;
         [-5.0 - wide, -5.0],
         [-5.0 - wide, 12.0],
     ];
-    sides.iter().map(|[dx, dy]| [x + dx, y + dy]).find(|[x, y]| {
+    let far = sides.iter().map(|[dx, dy]| [dx * FAR, dy * FAR]);
+    sides.iter().copied().chain(far).map(|[dx, dy]| [x + dx, y + dy]).find(|[x, y]| {
         let own = [*x, y - high + 2.0, x + wide, y + 2.0];
         let inside = own[0] > left && own[1] > top && own[2] < left + inner_wide && own[3] < top + inner_high;
         let free = taken.iter().all(|a| own[2] < a[0] || a[2] < own[0] || own[3] < a[1] || a[3] < own[1]);

@@ -137,7 +137,7 @@ impl Scene {
                 scene
             }
             "drop" => made("drop: dough falls 2 cm and rests", 22, ground, (DOUGH, CELLS, above(0.02)), 5e3, 0.01),
-            "stiff" => made("stiff: the same, E times 100", 22, ground, (DOUGH, CELLS, above(0.02)), 5e5, 1e-4),
+            "stiff" => made("stiff: the drop, E times 100", 22, ground, (DOUGH, CELLS, above(0.02)), 5e5, 1e-4),
             "roll" => {
                 let tools = Tools { roller: Some(roller), ..ground };
                 made("roll: a pin rolls over dough", 24, tools, (DOUGH, CELLS, above(0.0)), 5e3, 0.01)
