@@ -123,9 +123,9 @@ fn draw(out: &mut String, panel: &Panel) {
         let _ = writeln!(
             out,
             "<path d=\"M{left} {y:.1}h{wide}\" stroke=\"#888\" stroke-dasharray=\"2 3\"/>\
-             <text x=\"{}\" y=\"{:.1}\" font-size=\"9\" fill=\"#666\" text-anchor=\"end\">our fine limit and the nearest peer's are this far apart</text>",
+             <text x=\"{}\" y=\"{:.1}\" font-size=\"9\" fill=\"#666\" text-anchor=\"end\">from our fine limit to the nearest peer's</text>",
             left + wide - 4.0,
-            y - 4.0
+            y + 12.0
         );
     }
     let mut taken: Vec<Area> = Vec::new();
@@ -189,7 +189,7 @@ fn axes(out: &mut String, across: [f64; 2], up: [f64; 2]) {
 /// Where a label of so many letters goes beside a point: to where nothing is yet, or nowhere.
 fn room(taken: &mut Vec<Area>, [x, y]: [f64; 2], letters: usize) -> Option<[f64; 2]> {
     /// Times as far as beside the point that a label may be.
-    const FAR: f64 = 1.8;
+    const FAR: f64 = 1.3;
     let [left, top, inner_wide, inner_high] = INSIDE;
     let (wide, high) = (LETTER[0] * letters as f64, LETTER[1]);
     let sides = [
