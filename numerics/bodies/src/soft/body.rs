@@ -224,6 +224,15 @@ impl Body {
         self.order.places.iter().map(|place| self.mass[*place as usize]).collect()
     }
 
+    /// The clusters of tetrahedra whose volume is kept as one: the triangles around each, facing outwards, by the caller's
+    /// index.
+    pub fn regions(&self) -> Vec<Vec<[u32; 3]>> {
+        let caller = |place: u32| self.order.callers[place as usize];
+        (0..self.regions.len())
+            .map(|region| self.regions.around(region).map(|face| face.map(caller)).collect())
+            .collect()
+    }
+
     /// Longest side of the box around the points at rest, metres: what tolerances are relative to.
     pub fn size(&self) -> f64 {
         self.size

@@ -89,6 +89,13 @@ impl Regions {
         self.damping = weighed.iter().zip(&all).map(|(sum, all)| if *all > 0.0 { sum / all } else { 0.0 }).collect();
     }
 
+    /// The triangles around a region, outwards, corners by place.
+    pub(super) fn around(&self, region: usize) -> impl Iterator<Item = [u32; 3]> {
+        let corners = &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize];
+        let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
+        faces.iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
+    }
+
     /// The volume of a region with particles at `x`, and how it changes with each of its own: m² outwards.
     pub(super) fn measure(&self, region: usize, x: &[V3], gradient: &mut [V3]) -> f64 {
         let corners = &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize];
@@ -160,6 +167,17 @@ mod tests {
         assert!(gradient.iter().sum::<V3>().norm() < 1e-9);
         regions.set_material(&[1.0 / 6.0; 6], &[30.0; 6], &[0.5; 6]);
         assert!((regions.energy[0] - 30.0).abs() < 1e-12 && (regions.damping[0] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_triangles_around_a_region_enclose_its_volume() {
+        let (points, tets) = cube();
+        let regions = Regions::new(&points, &tets);
+        let enclosed = |[a, b, c]: [u32; 3]| {
+            let [a, b, c] = [a, b, c].map(|corner| points[corner as usize]);
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        assert!((regions.around(0).map(enclosed).sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -1,0 +1,145 @@
+//! XPBD (Macklin et al. 2016) in small steps (Macklin et al. 2019): Gauss–Seidel over springs, then regions, then contacts,
+//! in a fixed order.
+//!
+//! A constraint's impulse is λ = −h²·F(C, Ċ) of its force law F, made linear where the constraint is: for a spring that is
+//! XPBD's compliance and damping to the letter, and laws that stiffen fit in. Friction is a constraint on the slip of a
+//! step, bounded by μ times the contact's own impulse (Müller et al. 2020).
+
+use crate::model::{Law, Model, Spring};
+use crate::scene::{FRAME, GRAVITY, Tools, V3};
+
+/// A body on its way, with all memory that its steps need.
+pub(crate) struct Xpbd {
+    model: Model,
+    substeps: u32,
+    iterations: u32,
+    x: Vec<V3>,
+    v: Vec<V3>,
+    before: Vec<V3>,
+    /// Impulses × h of springs, regions, and of each surface on each particle of the skin: along its normal, and across.
+    of_springs: Vec<f64>,
+    of_regions: Vec<f64>,
+    of_surfaces: Vec<[(f64, V3); Tools::MOST]>,
+    gradient: Vec<V3>,
+}
+
+impl Xpbd {
+    pub(crate) fn new(model: Model, points: &[V3], substeps: u32, iterations: u32) -> Self {
+        let widest = model.regions.iter().map(|region| region.particles.len()).max().unwrap_or(0);
+        Self {
+            substeps,
+            iterations,
+            x: points.to_vec(),
+            v: vec![V3::zeros(); points.len()],
+            before: points.to_vec(),
+            of_springs: vec![0.0; model.springs.len()],
+            of_regions: vec![0.0; model.regions.len()],
+            of_surfaces: vec![[(0.0, V3::zeros()); Tools::MOST]; model.skin.len()],
+            gradient: vec![V3::zeros(); widest],
+            model,
+        }
+    }
+
+    pub(crate) fn positions(&self) -> &[V3] {
+        &self.x
+    }
+
+    /// Goes through a frame; returns how often all springs were looked at.
+    pub(crate) fn frame(&mut self, frame: u32) -> f64 {
+        let h = FRAME / f64::from(self.substeps);
+        for step in 0..self.substeps {
+            let end = FRAME * (f64::from(frame) + f64::from(step + 1) / f64::from(self.substeps));
+            self.before.copy_from_slice(&self.x);
+            for ((x, v), inverse) in self.x.iter_mut().zip(&mut self.v).zip(&self.model.inverse) {
+                if *inverse > 0.0 {
+                    *v += GRAVITY * h;
+                    *x += *v * h;
+                }
+            }
+            self.of_springs.fill(0.0);
+            self.of_regions.fill(0.0);
+            self.of_surfaces.fill([(0.0, V3::zeros()); Tools::MOST]);
+            for _ in 0..self.iterations {
+                self.springs(h);
+                self.regions(h);
+                self.contacts(h, end);
+            }
+            for ((v, x), before) in self.v.iter_mut().zip(&self.x).zip(&self.before) {
+                *v = (x - before) / h;
+            }
+        }
+        f64::from(self.substeps * self.iterations)
+    }
+
+    fn springs(&mut self, h: f64) {
+        let inverse = &self.model.inverse;
+        for (Spring { ends, k, c, rest }, lambda) in self.model.springs.iter().zip(&mut self.of_springs) {
+            let [a, b] = ends.map(|end| end as usize);
+            let way = self.x[a] - self.x[b];
+            let length = way.norm();
+            let weight = inverse[a] + inverse[b];
+            if length < 1e-12 || weight == 0.0 {
+                continue;
+            }
+            let normal = way / length;
+            let moved = normal.dot(&(self.x[a] - self.before[a] - self.x[b] + self.before[b]));
+            let law = Law { force: k * (length - rest) + c * moved / h, slope: k + c / h };
+            let change = impulse(law, h, weight, lambda);
+            self.x[a] += normal * (change * inverse[a]);
+            self.x[b] -= normal * (change * inverse[b]);
+        }
+    }
+
+    fn regions(&mut self, h: f64) {
+        let inverse = &self.model.inverse;
+        for (region, lambda) in self.model.regions.iter().zip(&mut self.of_regions) {
+            let gradient = &mut self.gradient[..region.particles.len()];
+            let volume = region.measure(&self.x, gradient);
+            let (mut weight, mut moved) = (0.0, 0.0);
+            for (g, particle) in gradient.iter().zip(&region.particles) {
+                let particle = *particle as usize;
+                weight += inverse[particle] * g.norm_squared();
+                moved += g.dot(&(self.x[particle] - self.before[particle]));
+            }
+            let own = region.pressure(volume);
+            let law = Law { force: own.force + region.c * moved / h, slope: own.slope + region.c / h };
+            let change = impulse(law, h, weight, lambda);
+            for (g, particle) in gradient.iter().zip(&region.particles) {
+                self.x[*particle as usize] += g * (change * inverse[*particle as usize]);
+            }
+        }
+    }
+
+    fn contacts(&mut self, h: f64, time: f64) {
+        for (particle, impulses) in self.model.skin.iter().zip(&mut self.of_surfaces) {
+            let particle = *particle as usize;
+            let weight = self.model.inverse[particle];
+            for (which, (along, across)) in impulses.iter_mut().enumerate() {
+                let Some(surface) = self.model.tools.around(self.x[particle], time)[which] else { continue };
+                let push = self.model.push(particle, &surface);
+                // A push lessens the depth that it fights, as a spring's pull lessens its length.
+                let mut pull = -*along;
+                self.x[particle] -= surface.normal * (impulse(push, h, weight, &mut pull) * weight);
+                *along = (-pull).max(0.0);
+                if *along > 0.0 || *across != V3::zeros() {
+                    let slip = self.x[particle] - self.before[particle] - surface.velocity * h;
+                    let slip = slip - surface.normal * surface.normal.dot(&slip);
+                    let wanted = *across - slip / weight;
+                    let (most, length) = (Model::friction(*along), wanted.norm());
+                    let held = if length > most { wanted * (most / length) } else { wanted };
+                    self.x[particle] += (held - *across) * weight;
+                    *across = held;
+                }
+            }
+        }
+    }
+}
+
+/// What the impulse `lambda` of a constraint changes by so that it is −h² of its law, where the constraint's particles move
+/// by `weight` an impulse.
+#[inline(always)]
+fn impulse(law: Law, h: f64, weight: f64, lambda: &mut f64) -> f64 {
+    let change = (-h * h * law.force - *lambda) / (1.0 + weight * h * h * law.slope);
+    *lambda += change;
+    change
+}
