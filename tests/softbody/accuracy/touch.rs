@@ -50,12 +50,13 @@ fn on_slope(friction: f64) -> [f64; 2] {
     [(b - a).abs() / 0.4, (c - 2.0 * b + a) / (G * (sine - friction * cosine))]
 }
 
-/// A block pressed to half its height by plates: at each frame from where they stand still.
-fn pressed() -> Cooked {
-    let block = shapes::mirrored([6; 3], 0.1, [0.0, THICKNESS, 0.0]);
-    let upper = |frame: Time| {
-        let way = 0.3 * ((frame.number() - 1.0) / 48.0).min(1.0);
-        let foot = 0.6 + 2.0 * THICKNESS - way;
+/// A block of 0.6 by 0.6 m and so many cells of 0.1 m high, pressed to half that by plates.
+fn pressed(cells: u32) -> Cooked {
+    let height = 0.1 * f64::from(cells);
+    let block = shapes::mirrored([6, cells, 6], 0.1, [0.0, THICKNESS, 0.0]);
+    let upper = move |frame: Time| {
+        let way = 0.5 * height * ((frame.number() - 1.0) / 48.0).min(1.0);
+        let foot = height + 2.0 * THICKNESS - way;
         shapes::cuboid([-0.5, foot, -0.5], [1.1, foot + 0.1, 1.1])
     };
     let scene = Scene::of(block).collider(|_| shapes::cuboid([-0.5, -0.1, -0.5], [1.1, 0.0, 1.1])).collider(upper);
@@ -126,19 +127,27 @@ fn rolled(modulus: f64) -> (f64, usize, usize) {
 pub(super) fn figures() -> Vec<Figure> {
     let sticks = [0.7, 1.0, 1e6].map(|friction| on_slope(friction)[0]);
     let slides = [0.0, 0.3, 0.5].map(|friction| (on_slope(friction)[1] - 1.0).abs());
-    let pressed = pressed();
-    let volume = (pressed.said("volume_ratio").last().unwrap() - 1.0).abs();
-    let turned = *pressed.said("inverted_tets").last().unwrap() as usize;
+    let [cube, flat] = [6, 3].map(pressed);
+    let volume = |pressed: &Cooked| (pressed.said("volume_ratio").last().unwrap() - 1.0).abs();
+    let turned = |pressed: &Cooked| *pressed.said("inverted_tets").last().unwrap() as usize;
+    let deepest = |pressed: &Cooked| pressed.most("deepest_overlap") / THICKNESS;
     let rolled = [2e4, 5e3].map(rolled);
-    let overlap = largest(rolled.iter().map(|found| found.0).chain([pressed.most("deepest_overlap") / THICKNESS]));
+    let overlap = largest(rolled.iter().map(|found| found.0).chain([deepest(&cube), deepest(&flat)]));
     vec![
         Figure::error("A block dropped on the ground: height of its middle", height_error(), 1e-2, " L"),
         Figure::error("its fastest particle after 240 frames", speed_at_rest(), 1e-4, " g·dt"),
         Figure::error("on 30° with μ of 0.7 and more: creep in a second", largest(sticks), 1e-4, " L"),
         Figure::error("with μ of 0.5 and less: acceleration by g(sin − μ cos)", largest(slides), 1e-2, ""),
-        Figure::error("Between plates at half its height: volume", volume, 2e-2, "").missed(),
-        Figure::error("how far its bulge is from symmetry", askew(&pressed.last()), 2e-2, " L").missed(),
-        Figure::never("tets inside out there", turned, 6 * 6 * 6 * 6),
+        Figure::error(
+            "Between plates at half its height: volume of a cube, of a block half as high",
+            largest([volume(&cube), volume(&flat)]),
+            2e-2,
+            "",
+        ),
+        Figure::error("how far the block's bulge is from symmetry", askew(&flat.last()), 2e-2, " L"),
+        // Springs pressed to half their length push sideways more than those beside them hold: with all integrators.
+        Figure::error("and the cube's, which gives way to one side", askew(&cube.last()), 2e-2, " L").missed(),
+        Figure::never("tets inside out there", turned(&cube) + turned(&flat), 6 * 6 * 6 * (6 + 3)),
         Figure::error(
             "Under those plates, and a rolling pin that moves 10 `thickness` a frame: `deepest_overlap`",
             overlap,

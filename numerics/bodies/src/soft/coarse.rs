@@ -34,14 +34,19 @@ pub(super) struct Anchors {
 }
 
 impl Anchors {
+    /// Of a system; particles that hang on nothing follow nobody.
     pub(super) fn new(system: &System) -> Self {
         /// Share of a particle's resistance below which contacts do not count.
         const LITTLE: f64 = 0.1;
         let mut anchors = Self::default();
-        if system.blocks.is_empty() && system.loose.is_empty() {
+        if system.blocks.is_empty() && system.loose.is_empty() && system.alone.is_empty() {
             return anchors;
         }
         for place in 0..system.inertia.len() {
+            if system.alone.get(place) == Some(&true) {
+                anchors.hold(place, system.inertia.len(), [[0.0; 3]; 3]);
+                continue;
+            }
             let mut block = system.blocks.get(place).copied().unwrap_or_default();
             if !system.loose.is_empty() {
                 system.loose.add_block(place, &mut block);
@@ -55,15 +60,20 @@ impl Anchors {
             if taken.iter().all(|column| column.amax() < LITTLE) {
                 continue;
             }
-            anchors.of.resize(system.inertia.len(), FREE);
-            anchors.of[place] = anchors.ways.len() as u32;
-            anchors.ways.push(std::array::from_fn(|k| {
+            let way = std::array::from_fn(|k| {
                 let mut column = -taken[k];
                 column[k] += 1.0;
                 column.into()
-            }));
+            });
+            anchors.hold(place, system.inertia.len(), way);
         }
         anchors
+    }
+
+    fn hold(&mut self, place: usize, count: usize, way: [[f64; 3]; 3]) {
+        self.of.resize(count, FREE);
+        self.of[place] = self.ways.len() as u32;
+        self.ways.push(way);
     }
 
     /// How much others differ from these: 1 where all of them let go, say.

@@ -147,6 +147,7 @@ impl Solver {
         self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
         self.work.system.regions.idle = self.work.volumes.is_off();
         springs::links(body, &rest, &mut self.work.links);
+        springs::alone(body, &self.work.links, &mut self.work.system.alone);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
         let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
@@ -199,7 +200,7 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
     let steps = stepper.frame.substeps.min(MOST_STEPS);
     for step in 0..steps {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(moving, times, energies, None, false);
+        let stepped = stepper.step(moving, times, energies, accurate, false);
         *energies = stepped.after;
         add(report, &stepped);
     }
@@ -247,6 +248,8 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
     /// Most and least that a step is changed by, and what is kept in reserve.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
+    /// Newton iterations of a frame after which steps are taken as they are, calmed, and counted: a frame ends.
+    const MOST_NEWTON: u32 = 4000;
     let (mut time, mut share, mut calm) = (0.0, 1.0_f64, false);
     while time < 1.0 {
         // Equal steps to the end, so that no sliver is left there.
@@ -256,9 +259,14 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         let (before, reserve) = (moving.clone(), *stepper.reserve);
         let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
         let allowed = tolerance * (end - time);
-        let smallest = end - time <= 2.0 / f64::from(MOST_STEPS);
-        let fits = (stepped.estimate <= allowed || stepped.euler) && (stepped.solved.unmet <= 0.0 || smallest);
-        let change = if stepped.estimate > 0.0 { RESERVE * (allowed / stepped.estimate).sqrt() } else { CHANGE[1] };
+        let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
+        // What begins off balance is calmed, not followed: its estimate says how far it jumped. At a contact it counts.
+        let close = stepped.estimate <= allowed || stepped.calmed || (stepped.euler && smallest);
+        let fits = close && (stepped.solved.unmet <= 0.0 || smallest);
+        // An estimate a second falls with the step where the method is of order 1, with its square where it is of order 2.
+        let ratio = allowed / stepped.estimate;
+        let ratio = if stepped.euler { ratio } else { ratio.sqrt() };
+        let change = if stepped.estimate > 0.0 { RESERVE * ratio } else { CHANGE[1] };
         share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
         if stepped.solved.unmet > 0.0 {
             // The estimate knows nothing of contacts: what sank asks for shorter steps.
@@ -268,7 +276,7 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         calm = !fits && smallest;
         if fits {
             add(report, &stepped);
-            report.caps_hit += u32::from(smallest && stepped.euler);
+            report.caps_hit += u32::from(stepped.euler && !stepped.calmed && stepped.estimate > allowed);
             *energies = stepped.after;
             time = end;
         } else {

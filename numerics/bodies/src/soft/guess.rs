@@ -86,10 +86,10 @@ pub(super) struct Guess<'a> {
 }
 
 impl<'a> Guess<'a> {
-    /// From `x`, `v` and the change of velocity in the step of `before` seconds that led there. Pieces with `held` particles
+    /// From `x`, `v` and the change of velocity in the step of `before` seconds that led there. Pieces with `loose` particles
     /// are not rigid.
-    pub(super) fn new(body: &'a Body, held: &[bool], x: &'a [V3], v: &'a [V3], trend: &'a [V3], before: f64) -> Self {
-        let rigid = |piece: &Range<usize>| Rigid::new(body, held, piece, x, v, trend);
+    pub(super) fn new(body: &'a Body, loose: &[bool], x: &'a [V3], v: &'a [V3], trend: &'a [V3], before: f64) -> Self {
+        let rigid = |piece: &Range<usize>| Rigid::new(body, loose, piece, x, v, trend);
         Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
     }
 

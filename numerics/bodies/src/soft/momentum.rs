@@ -19,7 +19,8 @@ impl Work {
         self.system.held.clone_from(&on.drive.held);
         let mut bound = vec![false; order.pieces.len()];
         let mut turns = vec![true; order.pieces.len()];
-        for place in (0..on.body.len()).filter(|place| on.drive.held[*place]) {
+        let alone = &self.system.alone;
+        for place in (0..on.body.len()).filter(|place| on.drive.held[*place] || alone.get(*place) == Some(&true)) {
             bound[piece_of(place)] = true;
         }
         let mut links = Vec::new();

@@ -76,6 +76,16 @@ pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
     });
 }
 
+/// Which particles no spring holds; empty where each has one.
+pub(super) fn alone(body: &Body, links: &[Link], out: &mut Vec<bool>) {
+    let of = |ends: &[u32]| links[ends[0] as usize..ends[1] as usize].iter().all(|link| link.k == 0.0);
+    out.clear();
+    out.extend(body.starts.windows(2).map(of));
+    if !out.contains(&true) {
+        out.clear();
+    }
+}
+
 /// A spring seen from one end: the way there from the other, its length, and 1 ÷ that.
 #[derive(Clone, Copy)]
 struct Seen {

@@ -25,6 +25,8 @@ const NOISE: f64 = 1e-8;
 const CG_CAP: u32 = 300;
 /// Times as many iterations as when it was new, at which the coarse factor is made again.
 const STALE: f64 = 1.5;
+/// Iterations after which it is made again whatever it brings: what was good where it was made may do worse than a new one.
+const OLD: u32 = 500;
 /// Change of what contacts hold at which it is made again too: worth some ten iterations.
 const MOVED: f64 = 0.2;
 /// Share of the first residual above which what the derivative did not foresee asks for another iteration.
@@ -253,7 +255,8 @@ impl Work {
         self.shift(body, &wanted);
         coarse::arms(&body.order.clusters, x, &mut self.arms);
         let anchors = Anchors::new(&self.system);
-        if warm.factor.len() != self.layout.size() || anchors.change(&warm.anchors) > MOVED {
+        let old = warm.factor.len() != self.layout.size() || warm.spent > OLD;
+        if old || anchors.change(&warm.anchors) > MOVED {
             self.renew(body, warm, anchors);
         }
         let fresh = &mut warm.fresh[stage.index];
@@ -273,6 +276,7 @@ impl Work {
             reached = self.gradients(body, warm, limits);
             solved.cg += reached.iterations;
         }
+        warm.spent += reached.iterations;
         let fresh = &mut warm.fresh[stage.index];
         if *fresh == 0 {
             *fresh = reached.iterations.max(1);
@@ -294,6 +298,6 @@ impl Work {
 
     fn renew(&mut self, body: &Body, warm: &mut Warm, anchors: Anchors) {
         warm.factor = coarse::factor(&self.layout, body, &self.system, &self.arms, &anchors);
-        (warm.anchors, warm.fresh) = (anchors, [0; 2]);
+        (warm.anchors, warm.fresh, warm.spent) = (anchors, [0; 2], 0);
     }
 }

@@ -39,6 +39,8 @@ pub(super) struct Warm {
     pub(super) anchors: Anchors,
     /// Iterations to the tolerance when it was new, for each stage of a step; 0 before the first.
     pub(super) fresh: [u32; 2],
+    /// Iterations since then.
+    pub(super) spent: u32,
 }
 
 impl State {

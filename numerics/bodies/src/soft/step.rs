@@ -49,6 +49,8 @@ pub(super) struct Stepped {
     /// Largest estimated error of a particle, metres.
     pub(super) estimate: f64,
     pub(super) euler: bool,
+    /// Whether that was to calm it, not for its contacts.
+    pub(super) calmed: bool,
     /// Joules taken out.
     pub(super) shed: f64,
     pub(super) after: Energies,
@@ -102,7 +104,7 @@ impl Stepper<'_> {
         if rough || self.frame.integrator == Integrator::Euler {
             let off = calm || self.frame.rough || turned;
             (stepped.solved, stepped.estimate) = self.euler(moving, times, &mut full, &firmness, off);
-            stepped.euler = true;
+            (stepped.euler, stepped.calmed) = (true, off);
         } else {
             let size = body.size;
             let frozen: Vec<Touching> = full.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
@@ -122,7 +124,7 @@ impl Stepper<'_> {
                 let off = stepped.solved.failed || gained;
                 let (again, estimate) = self.euler(moving, times, &mut full, &firmness, off);
                 let solved = Solved { failed: again.failed, ..sum(stepped.solved, again) };
-                stepped = Stepped { solved, estimate, euler: true, ..Stepped::default() };
+                stepped = Stepped { solved, estimate, euler: true, calmed: off, ..Stepped::default() };
                 after = None;
                 *self.unsettled = if goes_on { 0 } else { UNSETTLED };
             }
@@ -188,7 +190,7 @@ impl Stepper<'_> {
         let newton = self.newton(tolerance);
 
         let start = moving.clone();
-        let guess = Guess::new(body, &self.setting.drive.held, &start.x, &start.v, &start.trend, h);
+        let guess = Guess::new(body, &self.loose(), &start.x, &start.v, &start.trend, h);
         let mut x = guess.at(2.0 * a);
         let spinning = guess.spinning();
         let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning: &spinning, index: 0 };
@@ -233,6 +235,12 @@ impl Stepper<'_> {
         let estimate = error.iter().map(V3::norm_squared).fold(0.0, f64::max).sqrt();
         (moving.x, moving.v) = (x, v);
         (solved, estimate)
+    }
+
+    /// Particles that do not go along with their piece: those held, and those that hang on nothing.
+    fn loose(&self) -> Vec<bool> {
+        let (held, alone) = (&self.setting.drive.held, &self.work.system.alone);
+        (0..held.len()).map(|place| held[place] || alone.get(place) == Some(&true)).collect()
     }
 
     /// Puts held particles where they are at `time`, and where (x − z)/a is their velocity.

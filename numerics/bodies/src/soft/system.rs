@@ -20,6 +20,8 @@ pub(super) struct System {
     pub(super) blocks: Vec<[f64; 6]>,
     /// Particles whose motion is given.
     pub(super) held: Vec<bool>,
+    /// Those that no spring holds; empty where there are none.
+    pub(super) alone: Vec<bool>,
     /// Volumes of regions.
     pub(super) regions: Rows,
     /// Tetrahedra about to turn over, contacts of two bodies.

@@ -13,8 +13,8 @@ use super::parts::{Parts, Several};
 const SPRINGS: f64 = 2.0 / 3.0;
 /// Share of the springs' loss that is left where all of a small one is fought: what conjugate gradients do nearly level.
 const LEFT: f64 = 0.1;
-/// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (23 times).
-const SLIGHT: f64 = 0.012;
+/// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (114 times).
+const SLIGHT: f64 = 0.0065;
 const MUCH: f64 = 0.04;
 /// Volume ÷ volume at rest below which a tetrahedron is pushed open.
 const THIN: f64 = 0.3;
