@@ -28,7 +28,9 @@ impl Work {
     /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
     fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) {
         let body = on.body;
-        self.volumes.measure(body, x, v, 0.0);
+        if !std::mem::take(&mut self.measured) {
+            self.volumes.measure(body, x, v, 0.0);
+        }
         self.thin = self.volumes.thin(body, x, on.volumes, &self.inventory.watched);
         self.touches.clear();
         self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, stage.early, body.size)));

@@ -50,6 +50,7 @@ impl Work {
             }
             let (share, lower) = self.search(on, stage, x, base);
             self.follow(stage, share, x);
+            self.measured = share > 0.0;
             (slow, stuck) = (share > LONG && base - lower <= solved.enough, share == 0.0);
             base = lower;
         }

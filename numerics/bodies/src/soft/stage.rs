@@ -103,6 +103,8 @@ pub(super) struct Work {
     pub(super) system: System,
     pub(super) layout: Layout,
     pub(super) volumes: Volumes,
+    /// Whether they are of where the next look is: a search ends with measuring what it takes.
+    pub(super) measured: bool,
     /// Tetrahedra as the step began.
     pub(super) inventory: Inventory,
     pub(super) arms: Vec<[f32; 3]>,
