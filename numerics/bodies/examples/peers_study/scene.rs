@@ -5,6 +5,7 @@
 
 use bodies::soft::{Body, Contact, Contacts, Material, Mesh, Pin, Query, Scaled};
 use nalgebra::Vector3;
+use numerics::tets::{boundary, cubes};
 
 pub(crate) type V3 = Vector3<f64>;
 
@@ -155,34 +156,14 @@ impl Scene {
         modulus: f64,
         damping: f64,
     ) -> Self {
-        let counts = cells.map(|n| n + 1);
-        let (mut points, mut tets, mut skin) = (Vec::new(), Vec::new(), Vec::new());
-        for z in 0..counts[2] {
-            for y in 0..counts[1] {
-                for x in 0..counts[0] {
-                    let cell = [x, y, z];
-                    if (0..3).any(|axis| cell[axis] == 0 || cell[axis] == cells[axis]) {
-                        skin.push(points.len() as u32);
-                    }
-                    let place = |axis: usize| at[axis] + size[axis] * f64::from(cell[axis]) / f64::from(cells[axis]);
-                    points.push(V3::new(place(0), place(1), place(2)));
-                }
-            }
-        }
-        for z in 0..cells[2] {
-            for y in 0..cells[1] {
-                for x in 0..cells[0] {
-                    let corner =
-                        |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
-                    for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                        tets.push([corner(0), corner(a), corner(b), corner(7)]);
-                    }
-                }
-            }
-        }
+        let (places, tets) = cubes(cells.map(|n| n as usize), at, size);
+        let points: Vec<V3> = places.iter().map(|p| V3::from(*p)).collect();
+        let narrow: Vec<[f32; 3]> = places.iter().map(|p| p.map(|x| x as f32)).collect();
+        let mut skin: Vec<u32> = boundary(&tets, &narrow).iter().flat_map(|face| face.corners).collect();
+        skin.sort_unstable();
+        skin.dedup();
         let plain = |value| Scaled { value, mask: None };
         let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
-        let places: Vec<[f64; 3]> = points.iter().map(|p| (*p).into()).collect();
         let mesh = Mesh { points: &places, tets: &tets, ..Mesh::default() };
         let body = Body::new(&mesh, &material, &[]).expect("a block");
         Self { title, frames, points, tets, skin, body, modulus, damping, pins: Vec::new(), tools }

@@ -2,6 +2,7 @@
 
 use super::*;
 use numerics::random::Key;
+use numerics::tets::cubes;
 
 mod contact;
 mod exact;
@@ -33,28 +34,7 @@ fn material(density: f64, stiffness: f64, damping: f64) -> Material<'static> {
 
 /// Boxes of `cells` cubes of `side`, each cut into six tetrahedra.
 fn block(cells: [u32; 3], side: f64) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
-    let counts = cells.map(|n| n + 1);
-    let mut points = Vec::new();
-    for z in 0..counts[2] {
-        for y in 0..counts[1] {
-            for x in 0..counts[0] {
-                points.push([x, y, z].map(|n| f64::from(n) * side));
-            }
-        }
-    }
-    let mut tets = Vec::new();
-    for z in 0..cells[2] {
-        for y in 0..cells[1] {
-            for x in 0..cells[0] {
-                let corner =
-                    |bits: u32| x + (bits & 1) + counts[0] * (y + (bits >> 1 & 1) + counts[1] * (z + (bits >> 2)));
-                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-                    tets.push([corner(0), corner(a), corner(b), corner(7)]);
-                }
-            }
-        }
-    }
-    (points, tets)
+    cubes(cells.map(|n| n as usize), [0.0; 3], cells.map(|n| f64::from(n) * side))
 }
 
 fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> Body {
