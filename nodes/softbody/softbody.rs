@@ -159,6 +159,7 @@ metrics! {
     CONTACTS = "contacts", Unit::None, "Contacts that push.";
     DEEPEST_OVERLAP = "deepest_overlap", Unit::Metres, "How far the worst contact is nearer than `thickness`.";
     GOAL_DISTANCE = "goal_distance", Unit::Metres, "Mean distance of pulled particles to where goals draw them.";
+    PINNED = "pinned", Unit::None, "Particles that pins hold or pull; 0: none was within their `radius` at the start.";
     TORN = "torn", Unit::None, "Coupling springs torn since the start.";
     SUBSTEPS_USED = "substeps_used", Unit::None, "Steps that the frame took.";
 }
@@ -237,9 +238,11 @@ impl Chain for Run {
         let goals = Goals::of(&self.given, &made, cx.input(GOALS), cx.get(START_FRAME) as f64)?;
         let (mut pulled, mut held) = (Vec::new(), Vec::new());
         goals.pull(times, on, &mut pulled);
+        let drawn = pulled.len();
         if let [(_, before), .., (_, now)] = cx.samples(PINS) {
             pins::pull(&made.holds, [before, now], cx.frame(), &mut held, &mut pulled)?;
         }
+        let pinned = held.len() + pulled.len() - drawn;
         let (friction, mask) = masked(cx, &self.given, || FRICTION)?;
         let (friction, thickness) = (f64::from(friction), f64::from(cx.get(THICKNESS)));
         let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
@@ -285,7 +288,7 @@ impl Chain for Run {
             let _ = tear(&solving.body, &mut self.state, stretch, NEAR * solving.body.size());
         }
         let far = goals.distance(times[1], on, &self.state.positions);
-        self.said = said(&report, brought, far.unwrap_or(0.0), &self.state);
+        self.said = said(&report, brought, far.unwrap_or(0.0), pinned, &self.state);
         self.solving = Some(solving);
         Ok(())
     }
@@ -333,7 +336,7 @@ impl Solving {
 }
 
 /// Values in the order of [`METRICS`].
-fn said(report: &Report, reset_energy: f64, goal_distance: f64, state: &State) -> Vec<f64> {
+fn said(report: &Report, reset_energy: f64, goal_distance: f64, pinned: usize, state: &State) -> Vec<f64> {
     let torn = state.torn.iter().filter(|torn| **torn).count();
     vec![
         f64::from(report.newton),
@@ -352,6 +355,7 @@ fn said(report: &Report, reset_energy: f64, goal_distance: f64, state: &State) -
         f64::from(report.contacts),
         report.deepest_overlap,
         goal_distance,
+        pinned as f64,
         torn as f64,
         f64::from(report.substeps),
     ]
