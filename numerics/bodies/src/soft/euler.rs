@@ -5,15 +5,14 @@
 
 use super::V3;
 use super::contact::{Contact, Query, Touching};
-use super::stage::{Newton, Solved, Stage};
-use super::step::{MOST, Moving, Stepper, deepest, sum};
+use super::search::{CHANGED, Enough, reload};
+use super::stage::{Solved, Stage};
+use super::step::{Moving, Stepper, deepest, sum};
 
 /// Times that implicit Euler looks for contacts it has missed.
 const ROUNDS: u32 = 4;
 /// Share of the mean spring that a first guess may move a particle to a surface.
 const NUDGE: f64 = 0.3;
-/// Share of all loads that friction may have counted otherwise than they turn out.
-const CHANGED: f64 = 0.3;
 /// Share of the first residual at which implicit Euler stops.
 const EULER_SHARE: f64 = 0.03;
 
@@ -76,13 +75,13 @@ impl Stepper<'_> {
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
         let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
-        let mut newton = Newton { most: MOST, share: EULER_SHARE, scale, enough: 0.0, tolerance: 0.0, search: true };
+        let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0 };
         let mut solved = Solved::default();
+        let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts: &[], early: 0.0, spinning: &[], index: 0 };
         for round in 1..=ROUNDS {
-            let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts, early: 0.0, spinning: &[], index: 0 };
-            solved = sum(solved, self.work.solve(&self.setting, &stage, newton, self.warm, &mut x));
-            newton.enough = solved.enough;
-            let changed = reload(contacts, &x);
+            solved = sum(solved, self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x));
+            enough.square = solved.enough;
+            let (changed, _) = reload(contacts, &x, &self.work.v, h, self.setting.body.size);
             let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
             // What was deep before is on its way out.
             let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
@@ -129,17 +128,6 @@ impl Stepper<'_> {
         }
         out
     }
-}
-
-/// Has friction count the pushes that were found; gives the share of them that it did not count before.
-fn reload(contacts: &mut [Touching], x: &[V3]) -> f64 {
-    let (mut sum, mut changed) = (0.0, 0.0);
-    for contact in contacts {
-        let load = contact.push(x);
-        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
-        contact.load = load;
-    }
-    if sum > 0.0 { changed / sum } else { 0.0 }
 }
 
 /// Has contacts found anew count the loads of those that `known` has of the same particles in about the same direction.

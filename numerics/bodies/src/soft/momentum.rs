@@ -2,15 +2,16 @@
 
 use super::V3;
 use super::body::Body;
+use super::contact::Touching;
 use super::guess::Turn;
 use super::order::pieces;
-use super::stage::{Setting, Stage, Work};
+use super::stage::{Setting, Work};
 use nalgebra::Matrix3;
 
 impl Work {
     /// Which pieces, joined by contacts with each other, nothing but gravity, drag and goals acts on from outside; and which
     /// of them are in no contact.
-    pub(super) fn find_free(&mut self, on: &Setting<'_>, stage: &Stage<'_>) {
+    pub(super) fn find_free(&mut self, on: &Setting<'_>, contacts: &[Touching]) {
         let order = &on.body.order;
         let piece_of = |place: usize| {
             let cluster = self.layout.cluster[place] as usize;
@@ -24,7 +25,7 @@ impl Work {
             bound[piece_of(place)] = true;
         }
         let mut links = Vec::new();
-        for contact in stage.contacts {
+        for contact in contacts {
             let first = contact.places[0] as usize;
             for (place, _) in contact.sides() {
                 turns[piece_of(place)] = false;

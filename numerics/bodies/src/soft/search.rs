@@ -2,58 +2,86 @@
 
 use super::V3;
 use super::assemble::velocities;
+use super::contact::Touching;
 use super::springs;
-use super::stage::{Newton, Setting, Solved, Stage, Work};
+use super::stage::{Setting, Solved, Stage, Work};
 use super::state::Warm;
 
 /// Halvings of a step that a line search tries.
 const HALVINGS: u32 = 16;
 /// Share of a step from which on what it gained tells what is left to gain.
 const LONG: f64 = 0.2;
-/// Iterations a stage with contacts may have.
-const CONTACT_ITERATIONS: u32 = 20;
+/// Iterations a stage may have without contacts, and with them.
+const MOST: u32 = 4;
+const MOST_TOUCHING: u32 = 20;
+/// Iterations after which friction counts what it counted at last, so that a descent ends.
+const RELOADS: u32 = 8;
+/// Share of all loads that friction may have counted otherwise than they turn out.
+pub(super) const CHANGED: f64 = 0.3;
 /// Share of the objective that is rounding: a smaller decrease is not searched for.
 const ROUNDING: f64 = 1e-12;
 
+/// When a descent ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Enough {
+    /// Share of the first residual.
+    pub(super) share: f64,
+    /// That residual's square counts as this at most: what a guess that is far off leaves is no measure.
+    pub(super) scale: f64,
+    /// A residual's square that is enough whatever the first was.
+    pub(super) square: f64,
+}
+
 impl Work {
-    /// Newton's method downhill, until the residual is small enough and no contact too deep.
+    /// Solves the stage from the guess `x` by Newton's method downhill, until the residual is small enough and no contact too
+    /// deep. Friction counts the pushes that `contacts` are found to have on the way, which replace their loads.
     pub(super) fn descend(
         &mut self,
         on: &Setting<'_>,
         stage: &Stage<'_>,
-        newton: Newton,
+        contacts: &mut [Touching],
+        enough: Enough,
         warm: &mut Warm,
         x: &mut [V3],
     ) -> Solved {
-        let most = if stage.contacts.is_empty() { newton.most } else { CONTACT_ITERATIONS };
+        self.begin(on, contacts);
+        let most = if contacts.is_empty() { MOST } else { MOST_TOUCHING };
         let mut solved = Solved::default();
         let (mut first, mut base, mut slow, mut stuck) = (0.0, 0.0, false, false);
         loop {
+            let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(on, stage, x, true);
             let now = self.square(&on.body.order.clusters);
             if solved.newton == 0 {
                 first = now;
                 base = self.objective(on, stage, x);
-                solved.enough = newton.enough.max(newton.share * newton.share * first.min(newton.scale));
+                solved.enough = enough.square.max(enough.share * enough.share * first.min(enough.scale));
             }
             solved.residual = if first > 0.0 { (now / first).sqrt() } else { 0.0 };
-            let deep = stage.contacts.iter().any(|contact| contact.too_near(x));
+            let deep = contacts.iter().any(|contact| contact.too_near(x));
             let wanted = (now > solved.enough && !slow) || deep;
             if !wanted || stuck || solved.newton >= most {
-                solved.caps += u32::from(wanted && !stuck && most == CONTACT_ITERATIONS);
+                solved.caps += u32::from(wanted && !stuck && most == MOST_TOUCHING);
                 solved.failed = !now.is_finite();
-                return solved;
+                break;
             }
             self.foresee(stage);
             if !self.direction(on, stage, warm, x, &mut solved) {
-                return solved;
+                break;
             }
             let (share, lower) = self.search(on, stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             (slow, stuck) = (share > LONG && base - lower <= solved.enough, share == 0.0);
             base = lower;
+            if share == 1.0 && !deep && solved.newton <= RELOADS {
+                let (changed, more) = reload(contacts, x, &self.v, stage.a, on.body.size);
+                base += more;
+                slow &= changed <= CHANGED;
+            }
         }
+        self.turn(on.body, x);
+        solved
     }
 
     /// What the stage makes least: ½(x − y)ᵀM(x − y) + a²·(energies).
@@ -91,20 +119,34 @@ impl Work {
     }
 
     /// The share of `dx` that lowers the objective from `base`, 1, ½, ¼ …, or 0 where none does; and what it is there.
-    pub(super) fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> (f64, f64) {
+    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> (f64, f64) {
         let mut trial = std::mem::take(&mut self.trial);
-        let mut share = 1.0;
+        let (mut share, mut found) = (1.0, (0.0, base));
         for _ in 0..HALVINGS {
             trial.clear();
             trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
             let value = self.objective(on, stage, &trial);
             if value <= base + ROUNDING * base.abs() {
-                self.trial = trial;
-                return (share, value);
+                found = (share, value);
+                break;
             }
             share *= 0.5;
         }
         self.trial = trial;
-        (0.0, base)
+        found
     }
+}
+
+/// Has friction count the pushes that contacts have at `x`, where velocities are `v`. Gives the share of them that it did not
+/// count before, and how much more friction counts in the objective of a stage of `a`.
+pub(super) fn reload(contacts: &mut [Touching], x: &[V3], v: &[V3], a: f64, size: f64) -> (f64, f64) {
+    let (mut sum, mut changed, mut more) = (0.0, 0.0, 0.0);
+    for contact in contacts {
+        let load = contact.push(x);
+        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
+        more -= contact.friction_energy(v, a, size);
+        contact.load = load;
+        more += contact.friction_energy(v, a, size);
+    }
+    (if sum > 0.0 { changed / sum } else { 0.0 }, a * a * more)
 }

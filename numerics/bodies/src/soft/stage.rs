@@ -65,18 +65,10 @@ pub(super) struct Setting<'a> {
 /// When Newton's method stops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newton {
-    /// Iterations at most; with a line search contacts get more.
+    /// Iterations at most.
     pub(super) most: u32,
-    /// With a line search, the share of the first residual that ends it.
-    pub(super) share: f64,
-    /// That residual's square counts as this at most: what a guess that is far off leaves is no measure.
-    pub(super) scale: f64,
-    /// A residual's square that is enough whatever the first was.
-    pub(super) enough: f64,
-    /// A step this short ends it, metres.
+    /// A step this short ends it, metres; 0 where it goes on as long as the force turns out otherwise than foreseen.
     pub(super) tolerance: f64,
-    /// Whether the objective may not rise.
-    pub(super) search: bool,
 }
 
 /// What a stage took and reached.
@@ -147,7 +139,17 @@ impl Work {
         Self { system, layout: Layout::new(&body.order), r: vec![V3::zeros(); count], ..Self::default() }
     }
 
-    /// Solves the stage from the guess `x`, whose held particles are where they have to be.
+    /// Makes ready for a stage's first look at `contacts`.
+    pub(super) fn begin(&mut self, on: &Setting<'_>, contacts: &[Touching]) {
+        self.find_free(on, contacts);
+        self.drags.clear();
+        self.drags.resize(contacts.len(), V3::zeros());
+        self.pushes.clear();
+        self.pushes.extend(contacts.iter().map(|contact| contact.load));
+    }
+
+    /// Solves the stage from the guess `x`, whose held particles are where they have to be, without looking back: Newton's
+    /// method goes on where the force turned out otherwise than foreseen, or until steps are short.
     pub(super) fn solve(
         &mut self,
         on: &Setting<'_>,
@@ -156,21 +158,12 @@ impl Work {
         warm: &mut Warm,
         x: &mut [V3],
     ) -> Solved {
-        self.find_free(on, stage);
-        self.drags.clear();
-        self.drags.resize(stage.contacts.len(), V3::zeros());
-        self.pushes.clear();
-        self.pushes.extend(stage.contacts.iter().map(|contact| contact.load));
-        let solved = if newton.search {
-            self.descend(on, stage, newton, warm, x)
-        } else {
-            self.iterate(on, stage, newton, warm, x)
-        };
+        self.begin(on, stage.contacts);
+        let solved = self.iterate(on, stage, newton, warm, x);
         self.turn(on.body, x);
         solved
     }
 
-    /// Newton's method without looking back: on where the force turned out otherwise than foreseen, or until steps are short.
     fn iterate(
         &mut self,
         on: &Setting<'_>,

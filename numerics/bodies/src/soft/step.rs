@@ -21,7 +21,7 @@ use super::volume::Inventory;
 
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 /// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
-pub(super) const MOST: u32 = 4;
+const MOST: u32 = 4;
 /// Newton iterations a stage has in accurate mode.
 const MOST_ACCURATE: u32 = 12;
 /// Share of the tolerance at which Newton's method stops in accurate mode.
@@ -164,15 +164,8 @@ impl Stepper<'_> {
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
         match tolerance {
-            Some(tolerance) => Newton {
-                most: MOST_ACCURATE,
-                share: 0.0,
-                scale: 0.0,
-                enough: 0.0,
-                tolerance: NEWTON_SHARE * tolerance,
-                search: false,
-            },
-            None => Newton { most: MOST, share: 0.0, scale: 0.0, enough: 0.0, tolerance: 0.0, search: false },
+            Some(tolerance) => Newton { most: MOST_ACCURATE, tolerance: NEWTON_SHARE * tolerance },
+            None => Newton { most: MOST, tolerance: 0.0 },
         }
     }
 
