@@ -49,7 +49,7 @@ impl Anchors {
             }
             let mut block = system.blocks.get(place).copied().unwrap_or_default();
             if !system.loose.is_empty() {
-                system.loose.add_block(place, &mut block);
+                system.loose.add_block(place, 1.0, &mut block);
             }
             if system.held[place] || block.iter().all(|x| *x == 0.0) {
                 continue;

@@ -14,7 +14,7 @@ const ROUNDS: u32 = 4;
 /// Share of the mean spring that a first guess may move a particle to a surface.
 const NUDGE: f64 = 0.3;
 /// Share of the first residual at which implicit Euler stops.
-const EULER_SHARE: f64 = 0.03;
+const EULER_SHARE: f64 = 0.05;
 
 impl Stepper<'_> {
     /// Contacts on the way from `start` `to` there, with the load they have at its start.

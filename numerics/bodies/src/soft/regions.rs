@@ -101,19 +101,23 @@ impl Regions {
         let corners = &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize];
         gradient.fill(V3::zeros());
         let Some(first) = corners.first() else { return 0.0 };
-        // From a point nearby, so that nothing is lost far from the origin.
+        for [a, b, c] in &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize] {
+            let [a, b, c] = [usize::from(*a), usize::from(*b), usize::from(*c)];
+            let at = x[corners[a] as usize];
+            let twice_area = (x[corners[b] as usize] - at).cross(&(x[corners[c] as usize] - at));
+            gradient[a] += twice_area;
+            gradient[b] += twice_area;
+            gradient[c] += twice_area;
+        }
+        // Around a corner of a closed surface areas sum up to what the volume changes by; and the volume, of degree 3, is a
+        // third of Σ x·that, from a point nearby so that nothing is lost far from the origin.
         let origin = x[*first as usize];
         let mut volume = 0.0;
-        for face in &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize] {
-            let [a, b, c] = face.map(|corner| x[corners[usize::from(corner)] as usize] - origin);
-            let (bc, ca, ab) = (b.cross(&c), c.cross(&a), a.cross(&b));
-            volume += a.dot(&bc);
-            for (corner, part) in face.iter().zip([bc, ca, ab]) {
-                gradient[usize::from(*corner)] += part;
-            }
+        for (part, corner) in gradient.iter_mut().zip(corners) {
+            *part /= 6.0;
+            volume += part.dot(&(x[*corner as usize] - origin));
         }
-        gradient.iter_mut().for_each(|part| *part /= 6.0);
-        volume / 6.0
+        volume / 3.0
     }
 }
 
@@ -131,16 +135,28 @@ fn halve(centres: &[V3], tets: &mut [u32], regions: usize, base: usize, starts: 
     halve(centres, right, regions - regions / 2, base + middle, starts);
 }
 
-/// Faces of one tetrahedron alone, turning outwards where it has a positive volume.
+/// The surface around tetrahedra, outwards where their volumes are positive: faces without those that cancel each other, so
+/// that it is closed, and encloses the sum of all volumes, however tetrahedra overlap.
 fn boundary(tets: impl Iterator<Item = [u32; 4]>) -> Vec<[u32; 3]> {
-    let sorted = |mut face: [u32; 3]| {
-        face.sort_unstable();
-        face
-    };
     let outwards = |[a, b, c, d]: [u32; 4]| [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
-    let mut faces: Vec<([u32; 3], [u32; 3])> = tets.flat_map(outwards).map(|face| (sorted(face), face)).collect();
+    let mut faces: Vec<([u32; 3], bool)> = tets.flat_map(outwards).map(ascending).collect();
     faces.sort_unstable();
-    faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() % 2 == 1).map(|same| same[0].1).collect()
+    let around = |same: &[([u32; 3], bool)]| {
+        let even = same.iter().filter(|face| face.1).count();
+        let odd = same.len() - even;
+        let [a, b, c] = same[0].0;
+        let face = if even > odd { [a, b, c] } else { [a, c, b] };
+        std::iter::repeat_n(face, even.abs_diff(odd))
+    };
+    faces.chunk_by(|a, b| a.0 == b.0).flat_map(around).collect()
+}
+
+/// A face's corners in ascending order, and whether it turns the same way.
+fn ascending(face: [u32; 3]) -> ([u32; 3], bool) {
+    let mut sorted = face;
+    sorted.sort_unstable();
+    let first = face.iter().position(|corner| *corner == sorted[0]).unwrap_or(0);
+    (sorted, face[(first + 1) % 3] == sorted[1])
 }
 
 #[cfg(test)]

@@ -133,11 +133,11 @@ impl Rows {
         mine.iter().fold(V3::zeros(), |sum, at| sum + wide(at.along) * self.change[at.row as usize])
     }
 
-    /// Σ g gᵀ of the particle at `place`, added to `block`.
+    /// `weight` of Σ g gᵀ of the particle at `place`, added to `block`.
     #[inline(always)]
-    pub(super) fn add_block(&self, place: usize, block: &mut [f64; 6]) {
+    pub(super) fn add_block(&self, place: usize, weight: f64, block: &mut [f64; 6]) {
         for at in &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize] {
-            add_square(block, wide(at.along), 1.0);
+            add_square(block, wide(at.along), weight);
         }
     }
 

@@ -17,6 +17,8 @@ use super::volume::{Inventory, Thin, Volumes};
 
 /// Share of the first residual that linear equations may leave.
 const CG_SHARE: f64 = 0.1;
+/// That share where contacts may change and Newton's method goes on anyway.
+const CG_SHARE_SEARCHING: f64 = 0.2;
 /// That share where contacts are taken to go on and nothing is solved again: a slip drifts by what is left, and piles jump.
 const CG_SHARE_TOUCHING: f64 = 0.02;
 /// Share of the energy that turns free pieces which a linear solve may leave as noise: it would slow them.
@@ -28,7 +30,7 @@ const STALE: f64 = 1.5;
 /// Iterations after which it is made again whatever it brings: what was good where it was made may do worse than a new one.
 const OLD: u32 = 500;
 /// Change of what contacts hold at which it is made again too: worth some ten iterations.
-const MOVED: f64 = 0.2;
+const MOVED: f64 = 0.3;
 /// Share of the first residual above which what the derivative did not foresee asks for another iteration.
 const UNFORESEEN: f64 = 0.5;
 /// Times as large as before that a residual's square may be after an iteration without line search.
@@ -259,8 +261,15 @@ impl Work {
         let free = stage.spinning.iter().zip(&self.turns).filter(|piece| *piece.1);
         let spinning: f64 = free.map(|piece| piece.0).sum();
         let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
-        let once = !stage.contacts.is_empty() && !stage.spinning.is_empty();
-        let asked = if once { CG_SHARE_TOUCHING } else { CG_SHARE };
+        let touching = !stage.contacts.is_empty();
+        let searching = touching && stage.spinning.is_empty();
+        let asked = if searching {
+            CG_SHARE_SEARCHING
+        } else if touching {
+            CG_SHARE_TOUCHING
+        } else {
+            CG_SHARE
+        };
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
         let mut reached = self.gradients(body, warm, limits);
         solved.cg += reached.iterations;
@@ -275,7 +284,7 @@ impl Work {
         let fresh = &mut warm.fresh[stage.index];
         if *fresh == 0 {
             *fresh = reached.iterations.max(1);
-        } else if f64::from(reached.iterations) > STALE * f64::from(*fresh) + 1.0 {
+        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*fresh) + 1.0 {
             *warm = Warm::default();
         }
         solved.caps += u32::from(!reached.met);
