@@ -5,7 +5,7 @@
 
 use super::V3;
 use super::contact::{Contact, Query, Touching};
-use super::search::{CHANGED, Enough, reload};
+use super::search::{Enough, reload};
 use super::stage::{Solved, Stage};
 use super::step::{Moving, Stepper, deepest, sum};
 
@@ -81,13 +81,13 @@ impl Stepper<'_> {
         for round in 1..=ROUNDS {
             solved = sum(solved, self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x));
             enough.square = solved.enough;
-            let (changed, _) = reload(contacts, &x, &self.work.v, h, self.setting.body.size);
+            let changed = reload(contacts, &x, &self.work.v, h, self.setting.body.size).is_some();
             let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
             // What was deep before is on its way out.
             let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
-            if round == ROUNDS || !(missed || changed > CHANGED) {
+            if round == ROUNDS || !(missed || changed) {
                 break;
             }
             if missed {

@@ -17,7 +17,7 @@ const MOST_TOUCHING: u32 = 20;
 /// Iterations after which friction counts what it counted at last, so that a descent ends.
 const RELOADS: u32 = 8;
 /// Share of all loads that friction may have counted otherwise than they turn out.
-pub(super) const CHANGED: f64 = 0.3;
+const CHANGED: f64 = 0.3;
 /// Share of the objective that is rounding: a smaller decrease is not searched for.
 const ROUNDING: f64 = 1e-12;
 
@@ -74,10 +74,9 @@ impl Work {
             self.measured = share > 0.0;
             (slow, stuck) = (share > LONG && base - lower <= solved.enough, share == 0.0);
             base = lower;
-            if share == 1.0 && !deep && solved.newton <= RELOADS {
-                let (changed, more) = reload(contacts, x, &self.v, stage.a, on.body.size);
-                base += more;
-                slow &= changed <= CHANGED;
+            let loads_may_change = share == 1.0 && !deep && solved.newton <= RELOADS;
+            if loads_may_change && let Some(more) = reload(contacts, x, &self.v, stage.a, on.body.size) {
+                (base, slow) = (base + more, false);
             }
         }
         self.turn(on.body, x);
@@ -137,16 +136,17 @@ impl Work {
     }
 }
 
-/// Has friction count the pushes that contacts have at `x`, where velocities are `v`. Gives the share of them that it did not
-/// count before, and how much more friction counts in the objective of a stage of `a`.
-pub(super) fn reload(contacts: &mut [Touching], x: &[V3], v: &[V3], a: f64, size: f64) -> (f64, f64) {
-    let (mut sum, mut changed, mut more) = (0.0, 0.0, 0.0);
-    for contact in contacts {
-        let load = contact.push(x);
-        (sum, changed) = (sum + load, changed + (load - contact.load).abs());
-        more -= contact.friction_energy(v, a, size);
-        contact.load = load;
-        more += contact.friction_energy(v, a, size);
-    }
-    (if sum > 0.0 { changed / sum } else { 0.0 }, a * a * more)
+/// Has friction count the pushes that contacts have at `x`, where velocities are `v`, if what it counted before is another by
+/// more than [`CHANGED`]: then gives how much more it counts in the objective of a stage of `a`.
+pub(super) fn reload(contacts: &mut [Touching], x: &[V3], v: &[V3], a: f64, size: f64) -> Option<f64> {
+    let sums = contacts.iter().map(|contact| (contact.push(x), contact.load));
+    let (sum, changed) = sums.fold((0.0, 0.0), |sums, (now, then)| (sums.0 + now, sums.1 + (now - then).abs()));
+    (changed > CHANGED * sum).then(|| {
+        let more = contacts.iter_mut().map(|contact| {
+            let before = contact.friction_energy(v, a, size);
+            contact.load = contact.push(x);
+            contact.friction_energy(v, a, size) - before
+        });
+        a * a * more.sum::<f64>()
+    })
 }
