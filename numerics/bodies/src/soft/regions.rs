@@ -197,6 +197,27 @@ mod tests {
     }
 
     #[test]
+    fn a_regions_volume_is_the_sum_of_its_tetrahedra_where_they_overlap_too() {
+        // Both stand on the same side of the face 0 1 2: 1 × ½ ÷ 3 and 2 × ½ ÷ 3.
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, 2.0]];
+        let mut points = corners.map(V3::from);
+        let regions = Regions::new(&points, &[[0, 1, 2, 3], [0, 1, 2, 4]]);
+        let mut gradient = [V3::zeros(); 5];
+        assert!((regions.measure(0, &points, &mut gradient) - 0.5).abs() < 1e-15);
+        let mut moved = |point: usize, axis: usize, by: f64| {
+            points[point][axis] += by;
+            let volume = regions.measure(0, &points, &mut [V3::zeros(); 5]);
+            points[point][axis] -= by;
+            volume
+        };
+        // The volume is a straight line of each coordinate alone.
+        for (point, axis) in (0..15).map(|k| (k / 3, k % 3)) {
+            let slope = 0.5 * (moved(point, axis, 1.0) - moved(point, axis, -1.0));
+            assert!((slope - gradient[point][axis]).abs() < 1e-14, "{point} {axis}: {slope} {}", gradient[point]);
+        }
+    }
+
+    #[test]
     fn a_face_between_two_tetrahedra_is_no_boundary() {
         let (_, tets) = cube();
         assert_eq!(boundary(tets.into_iter()).len(), 12);
