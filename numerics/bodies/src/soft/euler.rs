@@ -1,7 +1,7 @@
 //! Implicit Euler with contacts: finds them, solves, looks whether others came and what friction they have, goes on.
 //!
-//! Friction is solved with pushes that are given: those the particles were under at last, then those that the solution has,
-//! until they are about the same. So what is solved has an objective, and what comes out has Coulomb's friction of its own pushes.
+//! Friction is solved with pushes that are given: those the particles were under at last, then those found on the way down,
+//! until they are about the same. So each step has an objective, and what comes out has Coulomb's friction of its own pushes.
 
 use super::V3;
 use super::contact::{Contact, Query, Touching};

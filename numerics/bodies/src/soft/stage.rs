@@ -262,6 +262,7 @@ impl Work {
         let spinning: f64 = free.map(|piece| piece.0).sum();
         let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
         let touching = !stage.contacts.is_empty();
+        // Implicit Euler alone asks for no bound on turning.
         let searching = touching && stage.spinning.is_empty();
         let asked = if searching {
             CG_SHARE_SEARCHING
