@@ -6,8 +6,10 @@
 
 use super::V3;
 use super::body::Body;
-use super::coarse::{self, Anchors, Layout, lever, moved};
+use super::cholesky::Lower;
+use super::coarse::{Anchors, lever, moved};
 use super::system::{System, halfway, rest_of_the_way};
+use numerics::simd::Path;
 
 /// Least share of a residual that is worth asking for where its square has a bound of its own.
 const FINEST: f64 = 1e-4;
@@ -44,8 +46,7 @@ pub(super) struct Scratch {
 /// Both levels of the preconditioner: `system.smoother` is the other half of it.
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
-    pub(super) layout: &'a Layout,
-    pub(super) factor: &'a [f64],
+    pub(super) factor: &'a Lower,
     pub(super) arms: &'a [[f32; 3]],
     pub(super) anchors: &'a Anchors,
 }
@@ -54,11 +55,11 @@ impl Coarse<'_> {
     /// The clusters' motions for the forces on them, and what they gain: cᵀ·(PᵀAP)⁻¹·c.
     fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
         modes.clear();
-        if self.factor.is_empty() {
+        if self.factor.len() == 0 {
             return 0.0;
         }
         modes.extend(forces.iter().flatten());
-        coarse::solve(self.layout, self.factor, modes);
+        self.factor.solve(Path::chosen(), modes);
         forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
     }
 

@@ -2,23 +2,20 @@
 //! cluster are solved for exactly.
 //!
 //! They are what conjugate gradients find last, as news of them travels one spring an iteration; springs inside a cluster
-//! do not resist them. Bodies that do not hang together are factored apart, so a thousand small ones cost what they are.
+//! do not resist them. Clusters stand in an order in which neighbours are near each other, so that the factor is a narrow
+//! band; a thousand small bodies cost what they are.
 
 use super::V3;
 use super::body::Body;
-use super::cholesky::{self, row};
-use super::order::Order;
 use super::parts::Parts;
-use super::rows::Rows;
 use super::system::{System, halfway, rest_of_the_way, times};
 use nalgebra::Matrix3;
-use numerics::simd::Path;
 use serde::{Deserialize, Serialize};
 
 type M3 = Matrix3<f64>;
 
 /// Motions of a cluster: three shifts, three turns.
-const MODES: usize = 6;
+pub(super) const MODES: usize = 6;
 
 /// How far particles that contacts hold follow their clusters' motions.
 ///
@@ -97,40 +94,54 @@ impl Anchors {
 /// No entry.
 const FREE: u32 = u32::MAX;
 
-/// Which entries of the factor belong to which cluster.
+/// Which clusters have to do with which.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
-    /// Of each piece: its first cluster, how many, and where its packed matrix begins.
-    pieces: Vec<(usize, usize, usize)>,
-    /// The piece of each cluster.
-    piece: Vec<u32>,
     /// The cluster of each particle.
     pub(super) cluster: Vec<u32>,
-    /// Rows of each cluster as parts of the packed matrices.
-    bands: Option<Parts>,
-    size: usize,
+    /// The piece of each cluster.
+    pub(super) piece: Vec<u32>,
+    /// The first cluster that each is joined with, by springs and regions.
+    pub(super) first: Vec<u32>,
 }
 
 impl Layout {
-    pub(super) fn new(order: &Order) -> Self {
-        let mut layout = Self::default();
-        let mut bands = vec![0];
-        for (index, clusters) in order.pieces.iter().enumerate() {
-            layout.pieces.push((clusters.start, clusters.len(), layout.size));
-            bands.extend((1..=clusters.len()).map(|local| layout.size + row(MODES * local)));
-            layout.piece.extend(clusters.clone().map(|_| index as u32));
-            layout.size += row(MODES * clusters.len());
-        }
+    pub(super) fn new(body: &Body) -> Self {
+        let order = &body.order;
+        let mut layout = Self { first: (0..order.clusters.len() as u32).collect(), ..Self::default() };
         for cluster in 0..order.clusters.len() {
             layout.cluster.extend(order.clusters.range(cluster).map(|_| cluster as u32));
         }
-        layout.bands = Some(Parts::new(bands));
+        for (index, clusters) in order.pieces.iter().enumerate() {
+            layout.piece.extend(clusters.clone().map(|_| index as u32));
+        }
+        let mut first = std::mem::take(&mut layout.first);
+        for place in 0..body.len() {
+            let hung = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
+            hung.iter().for_each(|hung| layout.join(&mut first, &[place as u32, hung.other]));
+        }
+        let regions = &body.regions;
+        for ends in regions.starts.windows(2) {
+            layout.join(&mut first, &regions.particles[ends[0] as usize..ends[1] as usize]);
+        }
+        layout.first = first;
         layout
     }
 
-    /// Numbers a factor has.
-    pub(super) fn size(&self) -> usize {
-        self.size
+    /// Has `first` reach the first cluster of the same piece that one of `places` is in, for the clusters of all of them.
+    pub(super) fn join(&self, first: &mut [u32], places: &[u32]) {
+        let clusters = || places.iter().map(|place| self.cluster[*place as usize]);
+        let Some(least) = clusters().min() else { return };
+        for cluster in clusters() {
+            if self.piece[cluster as usize] == self.piece[least as usize] {
+                first[cluster as usize] = first[cluster as usize].min(least);
+            }
+        }
+    }
+
+    /// How many rows a factor has.
+    pub(super) fn rows(&self) -> usize {
+        MODES * self.first.len()
     }
 }
 
@@ -158,156 +169,4 @@ pub(super) fn lever(arm: [f32; 3]) -> V3 {
 #[inline(always)]
 pub(super) fn moved(modes: &[f64], arm: V3) -> V3 {
     V3::new(modes[0], modes[1], modes[2]) + V3::new(modes[3], modes[4], modes[5]).cross(&arm)
-}
-
-/// The factor of Pᵀ·A·P, P the clusters' motions, and what of them particles in contact follow.
-pub(super) fn factor(layout: &Layout, body: &Body, system: &System, arms: &[[f32; 3]], anchors: &Anchors) -> Vec<f64> {
-    let mut matrix = vec![0.0; layout.size];
-    if let Some(bands) = &layout.bands {
-        bands.each(&mut matrix[..], |cluster, mine: &mut [f64]| {
-            band(layout, body, system, arms, anchors, cluster, mine);
-        });
-    }
-    for rows in [&system.regions, &system.loose] {
-        if !rows.is_empty() {
-            add_rows(layout, system, rows, arms, anchors, &mut matrix);
-        }
-    }
-    for (_, count, first) in &layout.pieces {
-        let n = MODES * count;
-        cholesky::factor(&mut matrix[*first..first + row(n)], n);
-    }
-    matrix
-}
-
-/// Solves with the factor: forces on the clusters become their motions.
-pub(super) fn solve(layout: &Layout, factor: &[f64], modes: &mut [f64]) {
-    let path = Path::chosen();
-    let mut left = modes;
-    for (_, count, first) in &layout.pieces {
-        let n = MODES * count;
-        let (mine, rest) = left.split_at_mut(n);
-        cholesky::solve(path, &factor[*first..first + row(n)], mine);
-        left = rest;
-    }
-}
-
-/// −[r]×: what a turn does at `r`.
-#[inline(always)]
-fn turn(r: V3) -> M3 {
-    M3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
-}
-
-/// The rows of one cluster: springs and what each particle resists alone.
-fn band(
-    layout: &Layout,
-    body: &Body,
-    system: &System,
-    arms: &[[f32; 3]],
-    anchors: &Anchors,
-    cluster: usize,
-    out: &mut [f64],
-) {
-    let (first, _, _) = layout.pieces[layout.piece[cluster] as usize];
-    let local = cluster - first;
-    let base = row(MODES * local);
-    let mut add = |other: usize, i: usize, j: usize, value: f64| {
-        let (i, j) = (MODES * local + i, MODES * other + j);
-        if j <= i {
-            out[row(i) + j - base] += value;
-        }
-    };
-    for place in body.order.clusters.range(cluster) {
-        if system.held[place] {
-            continue;
-        }
-        let mine = lever(arms[place]);
-        let anchor = anchors.at(place);
-        let shift = anchor.unwrap_or_else(M3::identity);
-        let sway = shift * turn(mine);
-        let mut own = M3::identity() * system.inertia[place];
-        if let Some([xx, xy, xz, yy, yz, zz]) = system.blocks.get(place) {
-            own += M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
-        }
-        for record in &system.records[body.starts[place] as usize..body.starts[place + 1] as usize] {
-            let (other, alpha) = (record.other as usize, f64::from(record.alpha));
-            let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
-            let home = layout.cluster[other] as usize;
-            let far_anchor = anchors.at(other);
-            if home == cluster && !system.held[other] && anchor.is_none() && far_anchor.is_none() {
-                if other > place {
-                    // Springs inside resist a turn as far as they are stretched, and no shift.
-                    let d = mine - lever(arms[other]);
-                    let u = d.cross(&w);
-                    let h = (M3::identity() * d.norm_squared() - d * d.transpose()) * alpha + u * u.transpose();
-                    for i in 0..3 {
-                        (0..=i).for_each(|j| add(local, 3 + i, 3 + j, h[(i, j)]));
-                    }
-                }
-                continue;
-            }
-            let h = M3::identity() * alpha + w * w.transpose();
-            own += h;
-            // Within the cluster each pair is met twice, once a side, as its product and the transpose of it.
-            if home <= cluster && !system.held[other] {
-                let far_shift = far_anchor.unwrap_or_else(M3::identity);
-                let far = [far_shift, far_shift * turn(lever(arms[other]))];
-                add_product(&mut |i, j, value| add(home - first, i, j, -value), [shift, sway], &h, far);
-            }
-        }
-        add_product(&mut |i, j, value| add(local, i, j, value), [shift, sway], &own, [shift, sway]);
-    }
-}
-
-/// Pᵀ·h·Q of two particles' motions, shifts and turns, entry by entry.
-fn add_product(add: &mut impl FnMut(usize, usize, f64), p: [M3; 2], h: &M3, q: [M3; 2]) {
-    for (row, p) in p.iter().enumerate() {
-        let left = p.transpose() * h;
-        for (column, q) in q.iter().enumerate() {
-            let both = left * q;
-            for i in 0..3 {
-                (0..3).for_each(|j| add(3 * row + i, 3 * column + j, both[(i, j)]));
-            }
-        }
-    }
-}
-
-/// What rows that span clusters resist; between pieces that do not hang together it is left out.
-fn add_rows(layout: &Layout, system: &System, rows: &Rows, arms: &[[f32; 3]], anchors: &Anchors, matrix: &mut [f64]) {
-    let mut pushes: Vec<(usize, [f64; MODES])> = Vec::new();
-    for index in 0..rows.len() {
-        pushes.clear();
-        for (place, g) in rows.entries(index).filter(|(place, _)| !system.held[*place as usize]) {
-            let cluster = layout.cluster[place as usize] as usize;
-            let at = pushes.iter().position(|known| known.0 == cluster).unwrap_or_else(|| {
-                pushes.push((cluster, [0.0; MODES]));
-                pushes.len() - 1
-            });
-            let g = anchors.at(place as usize).map_or(g, |way| way.tr_mul(&g));
-            let torque = lever(arms[place as usize]).cross(&g);
-            for axis in 0..3 {
-                pushes[at].1[axis] += g[axis];
-                pushes[at].1[3 + axis] += torque[axis];
-            }
-        }
-        if pushes.len() < 2 && pushes.iter().all(|push| push.1.iter().all(|p| p.abs() == 0.0)) {
-            continue;
-        }
-        for (cluster, push) in &pushes {
-            let piece = layout.piece[*cluster];
-            let (first, _, base) = layout.pieces[piece as usize];
-            let others = pushes.iter().filter(|(other, _)| other <= cluster && layout.piece[*other] == piece);
-            for (other, far) in others {
-                for i in 0..MODES {
-                    let at = MODES * (cluster - first) + i;
-                    for j in 0..MODES {
-                        let column = MODES * (other - first) + j;
-                        if column <= at {
-                            matrix[base + row(at) + column] += push[i] * far[j];
-                        }
-                    }
-                }
-            }
-        }
-    }
 }

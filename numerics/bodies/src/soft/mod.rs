@@ -21,6 +21,7 @@ mod edges;
 mod energy;
 mod euler;
 mod frame;
+mod galerkin;
 mod guess;
 mod momentum;
 mod order;

@@ -85,6 +85,11 @@ impl Rows {
         self.starts[row] as usize..self.starts[row + 1] as usize
     }
 
+    /// The particles of a row.
+    pub(super) fn places(&self, row: usize) -> &[u32] {
+        &self.particles[self.row(row)]
+    }
+
     /// The entries' particles and vectors.
     pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (u32, V3)> {
         self.row(row).map(|entry| (self.particles[entry], wide(self.along[entry])))

@@ -10,6 +10,7 @@ use super::cg::{self, Coarse, Limits};
 use super::coarse::{self, Anchors, Layout};
 use super::contact::{Touch, Touching};
 use super::drive::Drive;
+use super::galerkin::Galerkin;
 use super::springs::{Link, Record, Rest};
 use super::state::Warm;
 use super::system::System;
@@ -138,7 +139,7 @@ impl Work {
         };
         let regions = &body.regions;
         system.regions.set_topology(count, &regions.starts, &regions.particles, regions.parts());
-        Self { system, layout: Layout::new(&body.order), r: vec![V3::zeros(); count], ..Self::default() }
+        Self { system, layout: Layout::new(body), r: vec![V3::zeros(); count], ..Self::default() }
     }
 
     /// Makes ready for a stage's first look at `contacts`.
@@ -216,13 +217,13 @@ impl Work {
 
     /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
     pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [V3]) {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
+        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         cg::precondition(&self.system, body, coarse, r);
     }
 
     /// A⁻¹r, by conjugate gradients.
     pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<V3>) -> cg::Reached {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
+        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![V3::zeros(); r.len()];
         let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
@@ -252,7 +253,7 @@ impl Work {
         self.shift(body, &wanted);
         coarse::arms(&body.order.clusters, x, &mut self.arms);
         let anchors = Anchors::new(&self.system);
-        let old = warm.factor.len() != self.layout.size() || warm.spent > OLD;
+        let old = warm.factor.len() != self.layout.rows() || warm.spent > OLD;
         if old || anchors.change(&warm.anchors) > MOVED {
             self.renew(body, warm, anchors);
         }
@@ -297,12 +298,13 @@ impl Work {
     }
 
     fn gradients(&mut self, body: &Body, warm: &Warm, limits: Limits) -> cg::Reached {
-        let coarse = Coarse { layout: &self.layout, factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
+        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 
     fn renew(&mut self, body: &Body, warm: &mut Warm, anchors: Anchors) {
-        warm.factor = coarse::factor(&self.layout, body, &self.system, &self.arms, &anchors);
+        let (layout, system, arms) = (&self.layout, &self.system, &self.arms);
+        warm.factor = Galerkin { layout, body, system, arms, anchors: &anchors }.factor();
         (warm.anchors, warm.fresh, warm.spent) = (anchors, [0; 2], 0);
     }
 }

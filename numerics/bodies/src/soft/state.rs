@@ -1,6 +1,7 @@
 //! What a body carries from one frame to the next.
 
 use super::body::Body;
+use super::cholesky::Lower;
 use super::coarse::Anchors;
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +36,7 @@ pub struct State {
 /// The coarse half of the preconditioner, kept while it is good enough: it is what the iterations hang on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Warm {
-    pub(super) factor: Vec<f64>,
+    pub(super) factor: Lower,
     pub(super) anchors: Anchors,
     /// Iterations to the tolerance when it was new, for each stage of a step; 0 before the first.
     pub(super) fresh: [u32; 2],

@@ -1,0 +1,253 @@
+//! The coarse matrix: what clusters' motions meet, Pᵀ·A·P, P the shift and turn of each cluster at its particles.
+
+use super::V3;
+use super::body::Body;
+use super::cholesky::Lower;
+use super::coarse::{Anchors, Layout, MODES, lever};
+use super::parts::Parts;
+use super::rows::Rows;
+use super::system::System;
+use nalgebra::Matrix3;
+
+type M3 = Matrix3<f64>;
+
+/// What the matrix is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Galerkin<'a> {
+    pub(super) layout: &'a Layout,
+    pub(super) body: &'a Body,
+    pub(super) system: &'a System,
+    pub(super) arms: &'a [[f32; 3]],
+    /// What of their clusters' motions particles in contact follow.
+    pub(super) anchors: &'a Anchors,
+}
+
+impl Galerkin<'_> {
+    /// The matrix's factor.
+    pub(super) fn factor(&self) -> Lower {
+        let (layout, system) = (self.layout, self.system);
+        let mut first = layout.first.clone();
+        if !system.loose.is_empty() {
+            for row in 0..system.loose.len() {
+                layout.join(&mut first, system.loose.places(row));
+            }
+        }
+        let begin = |row: usize| MODES * first[row / MODES] as usize;
+        let mut matrix = Lower::zeros((0..layout.rows()).map(begin));
+        let bands = Parts::new(matrix.bands(MODES));
+        bands.each(matrix.values_mut(), |cluster, out: &mut [f64]| {
+            write(&self.band(first[cluster] as usize, cluster), out);
+        });
+        for rows in [&system.regions, &system.loose] {
+            if !rows.is_empty() {
+                self.add_rows(rows, &mut matrix);
+            }
+        }
+        matrix.factor();
+        matrix
+    }
+
+    /// A cluster against those from `first` to itself: springs and what each particle resists alone.
+    fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
+        let Self { layout, body, system, arms, anchors } = self;
+        let mut blocks = vec![Block::default(); cluster + 1 - first];
+        let last = cluster - first;
+        for place in body.order.clusters.range(cluster).filter(|place| !system.held[*place]) {
+            let mine = lever(arms[place]);
+            let anchor = anchors.at(place);
+            // What resists the particle: in all directions alike, and otherwise.
+            let (mut alike, mut other_ways) = (system.inertia[place], M3::zeros());
+            if let Some([xx, xy, xz, yy, yz, zz]) = system.blocks.get(place) {
+                other_ways += M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
+            }
+            for record in &system.records[body.starts[place] as usize..body.starts[place + 1] as usize] {
+                let (other, alpha) = (record.other as usize, f64::from(record.alpha));
+                let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
+                let (home, far) = (layout.cluster[other] as usize, lever(arms[other]));
+                let (far_anchor, held) = (anchors.at(other), system.held[other]);
+                let free = anchor.is_none() && far_anchor.is_none();
+                if home == cluster && free && !held {
+                    if other > place {
+                        blocks[last].add_turn(alpha, w, mine - far);
+                    }
+                    continue;
+                }
+                alike += alpha;
+                if anchor.is_none() {
+                    blocks[last].add_along(1.0, w, mine, mine);
+                } else {
+                    other_ways += w * w.transpose();
+                }
+                // Within the cluster each pair is met twice, once a side, as its product and the transpose of it.
+                if home <= cluster && !held {
+                    let block = &mut blocks[home - first];
+                    if free {
+                        block.add_alike(-alpha, mine, far);
+                        block.add_along(-1.0, w, mine, far);
+                    } else {
+                        let h = M3::from_diagonal_element(-alpha) - w * w.transpose();
+                        block.add_product(motion(anchor, mine), &h, motion(far_anchor, far));
+                    }
+                }
+            }
+            if anchor.is_none() {
+                blocks[last].add_alike(alike, mine, mine);
+                if other_ways != M3::zeros() {
+                    blocks[last].add_product(motion(None, mine), &other_ways, motion(None, mine));
+                }
+            } else {
+                let own = other_ways + M3::from_diagonal_element(alike);
+                blocks[last].add_product(motion(anchor, mine), &own, motion(anchor, mine));
+            }
+        }
+        blocks
+    }
+
+    /// What rows that span clusters resist; between pieces that do not hang together it is left out.
+    fn add_rows(&self, rows: &Rows, matrix: &mut Lower) {
+        let Self { layout, system, arms, anchors, .. } = self;
+        let mut pushes: Vec<(usize, [f64; MODES])> = Vec::new();
+        for index in 0..rows.len() {
+            pushes.clear();
+            for (place, g) in rows.entries(index).filter(|(place, _)| !system.held[*place as usize]) {
+                let cluster = layout.cluster[place as usize] as usize;
+                let at = pushes.iter().position(|known| known.0 == cluster).unwrap_or_else(|| {
+                    pushes.push((cluster, [0.0; MODES]));
+                    pushes.len() - 1
+                });
+                let g = anchors.at(place as usize).map_or(g, |way| way.tr_mul(&g));
+                let torque = lever(arms[place as usize]).cross(&g);
+                for axis in 0..3 {
+                    pushes[at].1[axis] += g[axis];
+                    pushes[at].1[3 + axis] += torque[axis];
+                }
+            }
+            if pushes.len() < 2 && pushes.iter().all(|push| push.1.iter().all(|p| p.abs() == 0.0)) {
+                continue;
+            }
+            for (cluster, push) in &pushes {
+                let piece = layout.piece[*cluster];
+                let others = pushes.iter().filter(|(other, _)| other <= cluster && layout.piece[*other] == piece);
+                for (other, far) in others {
+                    for i in 0..MODES {
+                        let at = MODES * cluster + i;
+                        for j in 0..MODES {
+                            let column = MODES * other + j;
+                            if column <= at {
+                                matrix.add(at, column, push[i] * far[j]);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Writes a cluster's rows as far as the diagonal.
+fn write(blocks: &[Block], out: &mut [f64]) {
+    let before = MODES * (blocks.len() - 1);
+    let mut left = out.iter_mut();
+    for row in 0..MODES {
+        let entries = blocks.iter().flat_map(|block| block.0[row]).take(before + row + 1);
+        entries.zip(&mut left).for_each(|(entry, out)| *out = entry);
+    }
+}
+
+/// −[r]×: what a turn does at `r`.
+#[inline(always)]
+fn turn(r: V3) -> M3 {
+    M3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
+}
+
+/// What a cluster's shifts and turns do to a particle at `arm`, as far as it follows them.
+#[inline(always)]
+fn motion(anchor: Option<M3>, arm: V3) -> [M3; 2] {
+    let shift = anchor.unwrap_or_else(M3::identity);
+    [shift, shift * turn(arm)]
+}
+
+/// The motions of one cluster, rows, against those of another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Block([[f64; MODES]; MODES]);
+
+impl Block {
+    /// Springs inside of a cluster, `d` from one end to the other: they resist a turn as far as they are stretched, and no
+    /// shift.
+    #[inline(always)]
+    fn add_turn(&mut self, alpha: f64, w: V3, d: V3) {
+        let (u, square) = (d.cross(&w), d.norm_squared());
+        for i in 0..3 {
+            for j in 0..3 {
+                let turned = if i == j { square } else { 0.0 } - d[i] * d[j];
+                self.0[3 + i][3 + j] += alpha * turned + u[i] * u[j];
+            }
+        }
+    }
+
+    /// Pᵀ·αI·Q of particles at `p` and `q` that are free.
+    #[inline(always)]
+    fn add_alike(&mut self, alpha: f64, p: V3, q: V3) {
+        let (p, dot) = (p * alpha, p.dot(&q) * alpha);
+        let q_alpha = q * alpha;
+        let shift_turn = [[0.0, q_alpha.z, -q_alpha.y], [-q_alpha.z, 0.0, q_alpha.x], [q_alpha.y, -q_alpha.x, 0.0]];
+        let turn_shift = [[0.0, -p.z, p.y], [p.z, 0.0, -p.x], [-p.y, p.x, 0.0]];
+        for i in 0..3 {
+            self.0[i][i] += alpha;
+            self.0[3 + i][3 + i] += dot;
+            for j in 0..3 {
+                self.0[i][3 + j] += shift_turn[i][j];
+                self.0[3 + i][j] += turn_shift[i][j];
+                self.0[3 + i][3 + j] -= q[i] * p[j];
+            }
+        }
+    }
+
+    /// Pᵀ·s·wwᵀ·Q of particles at `p` and `q` that are free.
+    #[inline(always)]
+    fn add_along(&mut self, s: f64, w: V3, p: V3, q: V3) {
+        let (p, q) = (p.cross(&w), q.cross(&w));
+        let left = [w.x, w.y, w.z, p.x, p.y, p.z].map(|x| s * x);
+        let right = [w.x, w.y, w.z, q.x, q.y, q.z];
+        for (row, left) in self.0.iter_mut().zip(left) {
+            row.iter_mut().zip(right).for_each(|(sum, right)| *sum += left * right);
+        }
+    }
+
+    /// Pᵀ·h·Q of two particles' motions, shifts and turns.
+    fn add_product(&mut self, p: [M3; 2], h: &M3, q: [M3; 2]) {
+        for (row, p) in p.iter().enumerate() {
+            let left = p.transpose() * h;
+            for (column, q) in q.iter().enumerate() {
+                let both = left * q;
+                for i in 0..3 {
+                    (0..3).for_each(|j| self.0[3 * row + i][3 * column + j] += both[(i, j)]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_short_for_free_particles_is_their_product() {
+        let [p, q, w] = [[0.3, -0.8, 0.5], [-0.9, 0.1, 0.7], [1.2, 0.4, -2.0]].map(V3::from);
+        let (mut short, mut long) = (Block::default(), Block::default());
+        short.add_alike(1.7, p, q);
+        short.add_along(-0.6, w, p, q);
+        let h = M3::from_diagonal_element(1.7) - w * w.transpose() * 0.6;
+        long.add_product(motion(None, p), &h, motion(None, q));
+        // Both ends of a spring in one cluster, against each other and themselves.
+        short.add_turn(0.9, w, p - q);
+        let h = M3::from_diagonal_element(0.9) + w * w.transpose();
+        for (a, b, sign) in [(p, p, 1.0), (q, q, 1.0), (p, q, -1.0), (q, p, -1.0)] {
+            long.add_product(motion(None, a), &(h * sign), motion(None, b));
+        }
+        for (short, long) in short.0.as_flattened().iter().zip(long.0.as_flattened()) {
+            assert!((short - long).abs() < 1e-14, "{short} for {long}");
+        }
+    }
+}
