@@ -1,11 +1,10 @@
 //! Forces, residual and linear system of a stage at some positions.
 
 use super::V3;
-use super::body::Body;
 use super::contact::Mode;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
-use super::springs::{self, Link, Motion};
+use super::springs::{self, Motion, Sums};
 use super::stage::{Setting, Stage, Work};
 use super::system::{halfway, smoother};
 
@@ -21,9 +20,10 @@ impl Work {
         let (body, work) = (on.body, &*self);
         let motion = Motion { x, v };
         body.order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
-            for (place, out) in body.order.clusters.range(cluster).zip(out) {
-                *out = springs::force(work.links(body, place), &motion, place)
-                    + work.own_force(on, stage.time, place, &motion);
+            let places = body.order.clusters.range(cluster);
+            for place in places.clone() {
+                springs::pull(body.hanging.of(place, &work.links), &motion, place, places.start, out);
+                out[place - places.start] += work.own_force(on, stage.time, place, &motion);
             }
         });
         out
@@ -52,11 +52,6 @@ impl Work {
                 }
             }
         }
-    }
-
-    #[inline(always)]
-    fn links(&self, body: &Body, place: usize) -> &[Link] {
-        &self.links[body.starts[place] as usize..body.starts[place + 1] as usize]
     }
 
     /// All but springs.
@@ -90,14 +85,19 @@ impl Work {
                 &mut r[..],
                 &mut system.inertia[..],
                 &mut system.smoother[..],
-                Several::new(&body.starts, &mut system.records),
+                Several::new(&body.hanging.starts, &mut system.records),
             );
             // `own_force` reads the regions' entries, which have moved out of `self` with the system.
             let work = &*self;
             clusters.each(parts, |cluster, (r, inertia, smooth, mut records)| {
-                let places = clusters.range(cluster).zip(r).zip(inertia).zip(smooth).zip(records.iter_mut());
-                for ((((place, r), inertia), smooth), records) in places {
-                    let (pull, mut block) = springs::linearise(work.links(body, place), &motion, a, place, records);
+                let places = clusters.range(cluster);
+                let first = places.start;
+                r.fill(V3::zeros());
+                let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; places.len()] };
+                for (((place, inertia), smooth), records) in places.zip(inertia).zip(smooth).zip(records.iter_mut()) {
+                    let links = body.hanging.of(place, &work.links);
+                    springs::linearise(links, records, &motion, a, place, first, &mut sums);
+                    let (pull, mut block) = (sums.forces[place - first], sums.blocks[place - first]);
                     let mass = body.mass[place];
                     let mut own = on.drive.force(place, mass, stage.time, x[place], v[place]);
                     if !regions.is_empty() {
@@ -113,7 +113,7 @@ impl Work {
                     }
                     *inertia = mass + on.drive.inertia(place, mass, a);
                     [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
-                    *r = if held[place] {
+                    sums.forces[place - first] = if held[place] {
                         V3::zeros()
                     } else {
                         (own + pull) * (a * a) - (x[place] - stage.y[place]) * mass
@@ -125,12 +125,15 @@ impl Work {
         } else {
             let work = &*self;
             clusters.each(&mut r[..], |cluster, r: &mut [V3]| {
-                for (place, r) in clusters.range(cluster).zip(r) {
+                let places = clusters.range(cluster);
+                r.fill(V3::zeros());
+                for place in places.clone() {
+                    springs::pull(body.hanging.of(place, &work.links), &motion, place, places.start, r);
+                    let r = &mut r[place - places.start];
                     *r = if work.system.held[place] {
                         V3::zeros()
                     } else {
-                        let force = springs::force(work.links(body, place), &motion, place)
-                            + work.own_force(on, stage.time, place, &motion);
+                        let force = *r + work.own_force(on, stage.time, place, &motion);
                         force * (a * a) - (x[place] - stage.y[place]) * body.mass[place]
                     };
                 }

@@ -8,7 +8,8 @@
 //! is taken as its mirror image, a flat one has no volume to keep. Metres, seconds, kilograms.
 
 use super::V3;
-use super::edges::{EDGES, edges, hang, neighbours_of_missing};
+use super::edges::{EDGES, edges, neighbours_of_missing};
+use super::hanging::Hanging;
 use super::order::Order;
 use super::parts::Parts;
 use super::regions::Regions;
@@ -121,9 +122,8 @@ pub struct Body {
     pub(super) stiffness: Vec<f64>,
     pub(super) damping: Vec<f64>,
     pub(super) lengths: Vec<f64>,
-    /// The springs at each particle: where its own begin, then the other end and the spring.
-    pub(super) starts: Vec<u32>,
-    pub(super) hung: Vec<Hung>,
+    /// The springs at each particle.
+    pub(super) hanging: Hanging,
     /// Tetrahedra with a volume, corners by place, turning so that it is positive.
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) volumes: Vec<f64>,
@@ -146,13 +146,6 @@ pub struct Body {
     pub(super) size: f64,
     /// Mean length of its springs at rest, metres.
     pub(super) spacing: f64,
-}
-
-/// A spring as one of its ends sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Hung {
-    pub(super) other: u32,
-    pub(super) spring: u32,
 }
 
 #[derive(Clone, Debug)]
@@ -336,7 +329,6 @@ impl Body {
         let rest: Vec<V3> = order.callers.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
-        let (starts, hung) = hang(count, &ends);
         let low = rest.iter().fold(V3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let high = rest.iter().fold(V3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
         let regions = Regions::new(&rest, &tets);
@@ -349,12 +341,11 @@ impl Body {
             size: if count > 0 { (high - low).max() } else { 0.0 },
             mass: vec![1.0; count],
             moduli: vec![0.0; tets.len()],
+            hanging: Hanging::new(&order.clusters, &ends),
             order,
             rest,
             ends,
             lengths,
-            starts,
-            hung,
             tets,
             volumes,
             regions,

@@ -117,8 +117,8 @@ impl Layout {
         }
         let mut first = std::mem::take(&mut layout.first);
         for place in 0..body.len() {
-            let hung = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
-            hung.iter().for_each(|hung| layout.join(&mut first, &[place as u32, hung.other]));
+            let [_, across] = body.hanging.of(place, &body.hanging.hung);
+            across.iter().for_each(|hung| layout.join(&mut first, &[place as u32, hung.other]));
         }
         let regions = &body.regions;
         for ends in regions.starts.windows(2) {

@@ -1,6 +1,6 @@
-//! The springs of a body: edges of tetrahedra, each once, and which hang at which particle.
+//! The springs of a body: edges of tetrahedra, each once.
 
-use super::body::{Hung, Mesh};
+use super::body::Mesh;
 
 /// Corners that each of the six edges of a tetrahedron joins.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
@@ -60,26 +60,4 @@ pub(super) fn neighbours_of_missing(mesh: &Mesh<'_>, ends: &[[u32; 2]], tet_spri
         near
     };
     mesh.missing.iter().map(near).collect()
-}
-
-/// The springs at each particle, by the other end.
-pub(super) fn hang(count: usize, ends: &[[u32; 2]]) -> (Vec<u32>, Vec<Hung>) {
-    let mut starts = vec![0u32; count + 1];
-    ends.iter().flatten().for_each(|end| starts[*end as usize + 1] += 1);
-    for particle in 0..count {
-        starts[particle + 1] += starts[particle];
-    }
-    let mut next = starts.clone();
-    let mut hung = vec![Hung { other: 0, spring: 0 }; 2 * ends.len()];
-    for (spring, [a, b]) in ends.iter().enumerate() {
-        for (end, other) in [(*a, *b), (*b, *a)] {
-            let slot = &mut next[end as usize];
-            hung[*slot as usize] = Hung { other, spring: spring as u32 };
-            *slot += 1;
-        }
-    }
-    for particle in 0..count {
-        hung[starts[particle] as usize..starts[particle + 1] as usize].sort_unstable_by_key(|at| (at.other, at.spring));
-    }
-    (starts, hung)
 }

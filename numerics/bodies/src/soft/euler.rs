@@ -18,7 +18,7 @@ const EULER_SHARE: f64 = 0.05;
 
 impl Stepper<'_> {
     /// Contacts on the way from `start` `to` there, with the load they have at its start.
-    pub(super) fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2], firmness: &[f64]) -> Vec<Touching> {
+    pub(super) fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2]) -> Vec<Touching> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.setting.body;
@@ -26,7 +26,7 @@ impl Stepper<'_> {
             |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
         let mut found: Vec<Contact> = Vec::new();
         contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
-        let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, firmness));
+        let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, &self.work.firmness));
         known.map(|contact| contact.loaded(&start.x, &start.loads, h)).collect()
     }
 
@@ -49,13 +49,12 @@ impl Stepper<'_> {
         start: &Moving,
         x: &[V3],
         times: [f64; 2],
-        firmness: &[f64],
     ) -> (Vec<Touching>, bool) {
         if self.frame.contacts.is_none() {
             return (Vec::new(), false);
         }
         let deep = |contacts: &[Touching]| contacts.iter().filter(|contact| contact.too_near(x)).count();
-        let found = self.contacts(start, x, times, firmness);
+        let found = self.contacts(start, x, times);
         let missed = deep(&found) > deep(known);
         (found, missed)
     }
@@ -66,7 +65,6 @@ impl Stepper<'_> {
         moving: &mut Moving,
         times: [f64; 2],
         contacts: &mut Vec<Touching>,
-        firmness: &[f64],
         off: bool,
     ) -> (Solved, f64) {
         let h = (times[1] - times[0]) * self.seconds;
@@ -82,7 +80,7 @@ impl Stepper<'_> {
             solved = sum(solved, self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x));
             enough.square = solved.enough;
             let changed = reload(contacts, &x, &self.work.v, h, self.setting.body.size).is_some();
-            let (mut found, missed) = self.missed(contacts, moving, &x, times, firmness);
+            let (mut found, missed) = self.missed(contacts, moving, &x, times);
             // What was deep before is on its way out.
             let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);

@@ -147,7 +147,8 @@ impl Solver {
         self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
         self.work.system.regions.idle = self.work.volumes.is_off();
         springs::links(body, &rest, &mut self.work.links);
-        springs::alone(body, &self.work.links, &mut self.work.system.alone);
+        springs::firmness(body, &self.work.links, &mut self.work.firmness);
+        self.work.system.set_alone(&self.work.firmness);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
         let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };

@@ -6,6 +6,7 @@ use super::cholesky::Lower;
 use super::coarse::{Anchors, Layout, MODES, lever};
 use super::parts::Parts;
 use super::rows::Rows;
+use super::springs::Record;
 use super::system::System;
 use nalgebra::Matrix3;
 
@@ -52,7 +53,12 @@ impl Galerkin<'_> {
         let Self { layout, body, system, arms, anchors } = self;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
-        for place in body.order.clusters.range(cluster).filter(|place| !system.held[*place]) {
+        for place in body.order.clusters.range(cluster) {
+            let [inside, across] = body.hanging.of(place, &system.records);
+            inside.iter().for_each(|record| self.add_inside(place, record, &mut blocks[last]));
+            if system.held[place] {
+                continue;
+            }
             let mine = lever(arms[place]);
             let anchor = anchors.at(place);
             // What resists the particle: in all directions alike, and otherwise.
@@ -60,28 +66,18 @@ impl Galerkin<'_> {
             if let Some([xx, xy, xz, yy, yz, zz]) = system.blocks.get(place) {
                 other_ways += M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
             }
-            for record in &system.records[body.starts[place] as usize..body.starts[place + 1] as usize] {
-                let (other, alpha) = (record.other as usize, f64::from(record.alpha));
-                let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
-                let (home, far) = (layout.cluster[other] as usize, lever(arms[other]));
-                let (far_anchor, held) = (anchors.at(other), system.held[other]);
-                let free = anchor.is_none() && far_anchor.is_none();
-                if home == cluster && free && !held {
-                    if other > place {
-                        blocks[last].add_turn(alpha, w, mine - far);
-                    }
-                    continue;
-                }
+            for record in across {
+                let (other, alpha, w) = (record.other as usize, f64::from(record.alpha), record.along());
                 alike += alpha;
                 if anchor.is_none() {
                     blocks[last].add_along(1.0, w, mine, mine);
                 } else {
                     other_ways += w * w.transpose();
                 }
-                // Within the cluster each pair is met twice, once a side, as its product and the transpose of it.
-                if home <= cluster && !held {
-                    let block = &mut blocks[home - first];
-                    if free {
+                let home = layout.cluster[other] as usize;
+                if home < cluster && !system.held[other] {
+                    let (block, far, far_anchor) = (&mut blocks[home - first], lever(arms[other]), anchors.at(other));
+                    if anchor.is_none() && far_anchor.is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
                     } else {
@@ -101,6 +97,27 @@ impl Galerkin<'_> {
             }
         }
         blocks
+    }
+
+    /// A spring inside of a cluster that hangs at `place`.
+    #[inline(always)]
+    fn add_inside(&self, place: usize, record: &Record, block: &mut Block) {
+        let (alpha, w) = (f64::from(record.alpha), record.along());
+        let ends = [place, record.other as usize];
+        let anchors = ends.map(|end| self.anchors.at(end));
+        let arms = ends.map(|end| lever(self.arms[end]));
+        let held = ends.map(|end| self.system.held[end]);
+        if held == [false; 2] && anchors == [None; 2] {
+            block.add_turn(alpha, w, arms[0] - arms[1]);
+            return;
+        }
+        let h = M3::from_diagonal_element(alpha) + w * w.transpose();
+        let motions = [motion(anchors[0], arms[0]), motion(anchors[1], arms[1])];
+        for (i, j, h) in [(0, 0, h), (1, 1, h), (0, 1, -h), (1, 0, -h)] {
+            if !held[i] && !held[j] {
+                block.add_product(motions[i], &h, motions[j]);
+            }
+        }
     }
 
     /// What rows that span clusters resist; between pieces that do not hang together it is left out.

@@ -23,6 +23,7 @@ mod euler;
 mod frame;
 mod galerkin;
 mod guess;
+mod hanging;
 mod momentum;
 mod order;
 mod parts;

@@ -1,7 +1,8 @@
 //! The force of the springs on each particle, and its derivative: what a spring's ends do to each other.
 //!
-//! Each end of a spring computes it for itself, from the same numbers with the sign turned, so both forces add up to zero in
-//! every bit, and a particle needs only its own slot.
+//! Springs inside of a cluster are computed once and act on both ends. Each end of one between clusters computes it for
+//! itself, from the same numbers with the sign turned. So both forces add up to zero in every bit, and a cluster needs only
+//! its own slots.
 //!
 //! Source: H = αI + (a²k + ac − α)nnᵀ, α = a²k·max(0, 1 − L₀/l), Baraff & Witkin 1998 with what makes H indefinite left
 //! out: positive semi-definite for every length.
@@ -14,7 +15,7 @@ use numerics::random::Key;
 /// Largest a²k a record holds: α, β and products with displacements stay far inside of f32.
 const STIFFEST: f64 = 1e24;
 
-/// Half of H that one end sees: Hd = αd + w(w·d), d its displacement against the other end's.
+/// What a spring resists with: Hd = αd + w(w·d), d the displacement of the end it hangs at against the other's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub(super) struct Record {
@@ -44,7 +45,22 @@ impl Rest<'_> {
     }
 }
 
-/// A spring as one end sees it, with all that its force hangs on: read in order, once a look.
+impl Record {
+    /// w.
+    #[inline(always)]
+    pub(super) fn along(&self) -> V3 {
+        V3::new(f64::from(self.w[0]), f64::from(self.w[1]), f64::from(self.w[2]))
+    }
+
+    /// Hd.
+    #[inline(always)]
+    pub(super) fn times(&self, d: V3) -> V3 {
+        let w = self.along();
+        d * f64::from(self.alpha) + w * w.dot(&d)
+    }
+}
+
+/// A spring as the end it hangs at sees it, with all that its force hangs on: read in order, once a look.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     other: u32,
@@ -54,14 +70,15 @@ pub(super) struct Link {
     rest: f64,
 }
 
-/// The springs at each particle, as in [`Body::hung`]; torn ones neither pull nor resist.
+/// The springs as they hang, one for each of `body.hanging`; torn ones neither pull nor resist.
 pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
-    out.resize(body.hung.len(), Link::default());
-    let links = Several::new(&body.starts, out);
+    let hanging = &body.hanging;
+    out.resize(hanging.hung.len(), Link::default());
+    let links = Several::new(&hanging.starts, out);
     body.order.clusters.each(links, |cluster, mut links| {
         for (place, links) in body.order.clusters.range(cluster).zip(links.iter_mut()) {
-            let hung = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
-            for (link, hung) in links.iter_mut().zip(hung) {
+            let hung = hanging.of(place, &hanging.hung);
+            for (link, hung) in links.iter_mut().zip(hung.into_iter().flatten()) {
                 let at = hung.spring as usize;
                 let holds = if rest.holds(hung.spring) { 1.0 } else { 0.0 };
                 *link = Link {
@@ -76,14 +93,19 @@ pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
     });
 }
 
-/// Which particles no spring holds; empty where each has one.
-pub(super) fn alone(body: &Body, links: &[Link], out: &mut Vec<bool>) {
-    let of = |ends: &[u32]| links[ends[0] as usize..ends[1] as usize].iter().all(|link| link.k == 0.0);
+/// Σk of the springs that hold each particle, N/m.
+pub(super) fn firmness(body: &Body, links: &[Link], out: &mut Vec<f64>) {
     out.clear();
-    out.extend(body.starts.windows(2).map(of));
-    if !out.contains(&true) {
-        out.clear();
-    }
+    out.resize(body.len(), 0.0);
+    let clusters = &body.order.clusters;
+    clusters.each(&mut out[..], |cluster, out: &mut [f64]| {
+        let places = clusters.range(cluster);
+        for place in places.clone() {
+            let [inside, across] = body.hanging.of(place, links);
+            out[place - places.start] += inside.iter().chain(across).map(|link| f64::from(link.k)).sum::<f64>();
+            inside.iter().for_each(|link| out[link.other as usize - places.start] += f64::from(link.k));
+        }
+    });
 }
 
 /// A spring seen from one end: the way there from the other, its length, and 1 ÷ that.
@@ -132,49 +154,80 @@ fn unusual(d: V3, spring: u32, first: bool) -> (V3, f64) {
     (if first { way } else { -way }, 0.0)
 }
 
-/// The force of its springs on the particle at `place`, newtons.
-#[inline(always)]
-pub(super) fn force(links: &[Link], motion: &Motion<'_>, place: usize) -> V3 {
-    let mut sum = V3::zeros();
-    for link in links {
-        let seen = Seen::from(link, place, motion.x);
-        sum -= seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize]);
-    }
-    sum
-}
-
-/// The force, the records of the particle's springs for steps of `a`, and the sum of their H.
-#[inline(always)]
-pub(super) fn linearise(
-    links: &[Link],
-    motion: &Motion<'_>,
-    a: f64,
-    place: usize,
-    records: &mut [Record],
-) -> (V3, [f64; 6]) {
-    let (mut sum, mut block) = (V3::zeros(), [0.0; 6]);
-    for (link, record) in links.iter().zip(records) {
-        let seen = Seen::from(link, place, motion.x);
-        sum -= seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize]);
-        let k = (a * a * f64::from(link.k)).min(STIFFEST);
-        let along = (k + a * f64::from(link.c)).min(2.0 * STIFFEST);
+impl Link {
+    /// What pulls the particle at `place` to the other end, newtons, and H for steps of `a`, in full and as a record.
+    #[inline(always)]
+    fn linearise(&self, motion: &Motion<'_>, a: f64, place: usize, record: &mut Record) -> (V3, [f64; 6]) {
+        let seen = Seen::from(self, place, motion.x);
+        let force = seen.way * seen.tension(self, motion.v[place] - motion.v[self.other as usize]);
+        let k = (a * a * f64::from(self.k)).min(STIFFEST);
+        let along = (k + a * f64::from(self.c)).min(2.0 * STIFFEST);
         let alpha = if seen.length > 0.0 {
-            k * (1.0 - link.rest * seen.inverse).max(0.0)
-        } else if link.rest > 0.0 {
+            k * (1.0 - self.rest * seen.inverse).max(0.0)
+        } else if self.rest > 0.0 {
             0.0
         } else {
             k
         };
         let w = seen.way * (along - alpha).max(0.0).sqrt();
-        *record = Record { other: link.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
-        block[0] += alpha + w.x * w.x;
-        block[1] += w.x * w.y;
-        block[2] += w.x * w.z;
-        block[3] += alpha + w.y * w.y;
-        block[4] += w.y * w.z;
-        block[5] += alpha + w.z * w.z;
+        *record = Record { other: self.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
+        let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
+        (force, h)
     }
-    (sum, block)
+}
+
+/// Adds to a cluster's forces, newtons, what the springs that hang at `place` pull with; `first` is the cluster's first place.
+/// After the particles before it, and this one, its own sum is whole.
+#[inline(always)]
+pub(super) fn pull([inside, across]: [&[Link]; 2], motion: &Motion<'_>, place: usize, first: usize, forces: &mut [V3]) {
+    let force = |link: &Link| {
+        let seen = Seen::from(link, place, motion.x);
+        seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize])
+    };
+    let mut sum = forces[place - first];
+    for link in inside {
+        let force = force(link);
+        sum -= force;
+        forces[link.other as usize - first] += force;
+    }
+    across.iter().for_each(|link| sum -= force(link));
+    forces[place - first] = sum;
+}
+
+/// What [`linearise`] adds to, a slot for each particle of a cluster: forces, and sums of H.
+pub(super) struct Sums<'a> {
+    pub(super) forces: &'a mut [V3],
+    pub(super) blocks: &'a mut [[f64; 6]],
+}
+
+/// As [`pull`], with the `records` of the springs for steps of `a`, and the sums of their H.
+#[inline(always)]
+pub(super) fn linearise(
+    [inside, across]: [&[Link]; 2],
+    records: &mut [Record],
+    motion: &Motion<'_>,
+    a: f64,
+    place: usize,
+    first: usize,
+    sums: &mut Sums<'_>,
+) {
+    let add = |sum: &mut [f64; 6], h: [f64; 6]| sum.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
+    let (mut force, mut block) = (sums.forces[place - first], sums.blocks[place - first]);
+    let (inside_records, across_records) = records.split_at_mut(inside.len());
+    for (link, record) in inside.iter().zip(inside_records) {
+        let (pull, h) = link.linearise(motion, a, place, record);
+        let other = link.other as usize - first;
+        force -= pull;
+        add(&mut block, h);
+        sums.forces[other] += pull;
+        add(&mut sums.blocks[other], h);
+    }
+    for (link, record) in across.iter().zip(across_records) {
+        let (pull, h) = link.linearise(motion, a, place, record);
+        force -= pull;
+        add(&mut block, h);
+    }
+    (sums.forces[place - first], sums.blocks[place - first]) = (force, block);
 }
 
 /// The energy that spring `at` holds, joules.

@@ -105,6 +105,8 @@ pub(super) struct Work {
     pub(super) arms: Vec<[f32; 3]>,
     /// The springs as the frame has them.
     pub(super) links: Vec<Link>,
+    /// Σk of those at each particle, N/m.
+    pub(super) firmness: Vec<f64>,
     pub(super) scratch: cg::Scratch,
     /// Velocities at the positions looked at.
     pub(super) v: Vec<V3>,
@@ -131,7 +133,7 @@ impl Work {
     pub(super) fn new(body: &Body) -> Self {
         let count = body.len();
         let mut system = System {
-            records: vec![Record::default(); body.hung.len()],
+            records: vec![Record::default(); body.hanging.hung.len()],
             inertia: vec![0.0; count],
             held: vec![false; count],
             smoother: vec![[0.0; 6]; count],

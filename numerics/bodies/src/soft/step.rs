@@ -89,11 +89,10 @@ impl Stepper<'_> {
         let start = moving.clone();
         let mut stepped = Stepped::default();
 
-        let firmness = self.frame.contacts.map_or_else(Vec::new, |_| firmness(body));
         let mut full = match self.frame.contacts {
             Some(_) => {
                 let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-                self.contacts(&start, &ahead, times, &firmness)
+                self.contacts(&start, &ahead, times)
             }
             None => Vec::new(),
         };
@@ -103,7 +102,7 @@ impl Stepper<'_> {
         let mut after = None;
         if rough || self.frame.integrator == Integrator::Euler {
             let off = calm || self.frame.rough || turned;
-            (stepped.solved, stepped.estimate) = self.euler(moving, times, &mut full, &firmness, off);
+            (stepped.solved, stepped.estimate) = self.euler(moving, times, &mut full, off);
             (stepped.euler, stepped.calmed) = (true, off);
         } else {
             let size = body.size;
@@ -115,14 +114,14 @@ impl Stepper<'_> {
             after = Some(energies);
             let mut goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v));
             if goes_on {
-                let (found, missed) = self.missed(&full, &start, &moving.x, times, &firmness);
+                let (found, missed) = self.missed(&full, &start, &moving.x, times);
                 stepped.solved.deepest = deepest(&found, &moving.x);
                 goes_on = !missed;
             }
             if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
-                let (again, estimate) = self.euler(moving, times, &mut full, &firmness, off);
+                let (again, estimate) = self.euler(moving, times, &mut full, off);
                 let solved = Solved { failed: again.failed, ..sum(stepped.solved, again) };
                 stepped = Stepped { solved, estimate, euler: true, calmed: off, ..Stepped::default() };
                 after = None;
@@ -296,15 +295,6 @@ impl Stepper<'_> {
 /// Joules.
 fn kinetic(body: &Body, v: &[V3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
-}
-
-/// Σk of the springs at each particle, N/m.
-fn firmness(body: &Body) -> Vec<f64> {
-    let of = |place: usize| {
-        let mine = &body.hung[body.starts[place] as usize..body.starts[place + 1] as usize];
-        mine.iter().map(|hung| body.stiffness[hung.spring as usize]).sum()
-    };
-    (0..body.len()).map(of).collect()
 }
 
 /// How far the worst contact is below its gap at `x`, metres; 0 where none is.

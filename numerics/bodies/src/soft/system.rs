@@ -12,7 +12,7 @@ use super::springs::Record;
 /// M + a²K + aC around some positions.
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// The springs at each particle, as in [`Body::hung`].
+    /// The springs as they hang, one for each of `Body::hanging`.
     pub(super) records: Vec<Record>,
     /// What resists each particle alone in all directions alike: mass, drag, goals. Kilograms.
     pub(super) inertia: Vec<f64>,
@@ -38,14 +38,27 @@ impl System {
         let system = &*self;
         let (regions, loose) = (!system.regions.is_empty(), !system.loose.is_empty());
         clusters.sum(out, |cluster, out: &mut [V3]| {
+            let places = clusters.range(cluster);
+            let first = places.start;
+            out.fill(V3::zeros());
             let mut sum = 0.0;
-            for (place, out) in clusters.range(cluster).zip(out) {
+            for place in places {
+                let mine = p[place];
+                let mut total = out[place - first] + mine * system.inertia[place];
+                let [inside, across] = body.hanging.of(place, &system.records);
+                for record in inside {
+                    let other = record.other as usize;
+                    let force = record.times(mine - p[other]);
+                    total += force;
+                    out[other - first] -= force;
+                }
+                for record in across {
+                    total += record.times(mine - p[record.other as usize]);
+                }
                 if system.held[place] {
-                    *out = V3::zeros();
+                    out[place - first] = V3::zeros();
                     continue;
                 }
-                let mine = p[place];
-                let mut total = mine * system.inertia[place] + system.pull(body, place, mine, p);
                 if !system.blocks.is_empty() {
                     total += times(&system.blocks[place], mine);
                 }
@@ -55,23 +68,19 @@ impl System {
                 if loose {
                     total += system.loose.push(place);
                 }
-                *out = total;
+                out[place - first] = total;
                 sum += mine.dot(&total);
             }
             sum
         })
     }
 
-    /// The springs' part.
-    #[inline(always)]
-    fn pull(&self, body: &Body, place: usize, mine: V3, p: &[V3]) -> V3 {
-        let mut sum = V3::zeros();
-        for record in &self.records[body.starts[place] as usize..body.starts[place + 1] as usize] {
-            let d = mine - p[record.other as usize];
-            let w = V3::new(f64::from(record.w[0]), f64::from(record.w[1]), f64::from(record.w[2]));
-            sum += d * f64::from(record.alpha) + w * w.dot(&d);
+    /// Takes those to be alone that springs of no `firmness` hold.
+    pub(super) fn set_alone(&mut self, firmness: &[f64]) {
+        self.alone.clear();
+        if firmness.contains(&0.0) {
+            self.alone.extend(firmness.iter().map(|k| *k == 0.0));
         }
-        sum
     }
 }
 
