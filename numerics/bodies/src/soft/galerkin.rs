@@ -5,7 +5,7 @@ use super::body::Body;
 use super::cholesky::Lower;
 use super::coarse::{Anchors, Layout, MODES, lever};
 use super::parts::Parts;
-use super::rows::Rows;
+use super::rows::{Rows, add_square};
 use super::springs::Record;
 use super::system::System;
 use nalgebra::Matrix3;
@@ -39,11 +39,8 @@ impl Galerkin<'_> {
         bands.each(matrix.values_mut(), |cluster, out: &mut [f64]| {
             write(&self.band(first[cluster] as usize, cluster), out);
         });
-        for rows in [&system.regions, &system.loose] {
-            if !rows.is_empty() {
-                self.add_rows(rows, &mut matrix);
-            }
-        }
+        self.add_rows(&system.regions, &mut matrix);
+        self.add_rows(&system.loose, &mut matrix);
         matrix.factor();
         matrix
     }
@@ -61,19 +58,13 @@ impl Galerkin<'_> {
             }
             let mine = lever(arms[place]);
             let anchor = anchors.at(place);
-            // What resists the particle: in all directions alike, and otherwise.
-            let (mut alike, mut other_ways) = (system.inertia[place], M3::zeros());
-            if let Some([xx, xy, xz, yy, yz, zz]) = system.blocks.get(place) {
-                other_ways += M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
-            }
+            // What resists the particle itself.
+            let mut own = system.blocks.get(place).copied().unwrap_or_default();
+            let mut alike = system.inertia[place];
             for record in across {
                 let (other, alpha, w) = (record.other as usize, f64::from(record.alpha), record.along());
                 alike += alpha;
-                if anchor.is_none() {
-                    blocks[last].add_along(1.0, w, mine, mine);
-                } else {
-                    other_ways += w * w.transpose();
-                }
+                add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
                     let (block, far, far_anchor) = (&mut blocks[home - first], lever(arms[other]), anchors.at(other));
@@ -86,14 +77,13 @@ impl Galerkin<'_> {
                     }
                 }
             }
-            if anchor.is_none() {
+            if own == [0.0; 6] && anchor.is_none() {
                 blocks[last].add_alike(alike, mine, mine);
-                if other_ways != M3::zeros() {
-                    blocks[last].add_product(motion(None, mine), &other_ways, motion(None, mine));
-                }
             } else {
-                let own = other_ways + M3::from_diagonal_element(alike);
-                blocks[last].add_product(motion(anchor, mine), &own, motion(anchor, mine));
+                let [xx, xy, xz, yy, yz, zz] = own;
+                let h = M3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) + M3::from_diagonal_element(alike);
+                let motion = motion(anchor, mine);
+                blocks[last].add_product(motion, &h, motion);
             }
         }
         blocks
@@ -120,45 +110,59 @@ impl Galerkin<'_> {
         }
     }
 
-    /// What rows that span clusters resist; between pieces that do not hang together it is left out.
+    /// What rows resist; between pieces that do not hang together it is left out.
     fn add_rows(&self, rows: &Rows, matrix: &mut Lower) {
-        let Self { layout, system, arms, anchors, .. } = self;
-        let mut pushes: Vec<(usize, [f64; MODES])> = Vec::new();
-        for index in 0..rows.len() {
-            pushes.clear();
-            for (place, g) in rows.entries(index).filter(|(place, _)| !system.held[*place as usize]) {
-                let cluster = layout.cluster[place as usize] as usize;
-                let at = pushes.iter().position(|known| known.0 == cluster).unwrap_or_else(|| {
-                    pushes.push((cluster, [0.0; MODES]));
-                    pushes.len() - 1
-                });
-                let g = anchors.at(place as usize).map_or(g, |way| way.tr_mul(&g));
-                let torque = lever(arms[place as usize]).cross(&g);
-                for axis in 0..3 {
-                    pushes[at].1[axis] += g[axis];
-                    pushes[at].1[3 + axis] += torque[axis];
-                }
-            }
-            if pushes.len() < 2 && pushes.iter().all(|push| push.1.iter().all(|p| p.abs() == 0.0)) {
-                continue;
-            }
-            for (cluster, push) in &pushes {
-                let piece = layout.piece[*cluster];
-                let others = pushes.iter().filter(|(other, _)| other <= cluster && layout.piece[*other] == piece);
-                for (other, far) in others {
-                    for i in 0..MODES {
-                        let at = MODES * cluster + i;
-                        for j in 0..MODES {
-                            let column = MODES * other + j;
-                            if column <= at {
-                                matrix.add(at, column, push[i] * far[j]);
-                            }
+        let Some(parts) = rows.parts() else { return };
+        let of_part = |part, ()| -> Vec<Vec<Push>> { parts.range(part).map(|row| self.pushes(rows, row)).collect() };
+        let each = parts.map((), of_part);
+        let piece = |push: &Push| self.layout.piece[push.cluster];
+        for pushes in each.iter().flatten() {
+            for near in pushes {
+                let to = |far: &&Push| far.cluster <= near.cluster && piece(far) == piece(near);
+                for far in pushes.iter().filter(to) {
+                    for (i, push) in near.along.iter().enumerate() {
+                        let count = if far.cluster == near.cluster { i + 1 } else { MODES };
+                        for (j, other) in far.along[..count].iter().enumerate() {
+                            matrix.add(MODES * near.cluster + i, MODES * far.cluster + j, push * other);
                         }
                     }
                 }
             }
         }
     }
+
+    /// How the motions of clusters change a row; none where it lies within one that moves as a whole, as rigid motions
+    /// change no volume and no gap.
+    fn pushes(&self, rows: &Rows, row: usize) -> Vec<Push> {
+        let Self { layout, system, arms, anchors, .. } = self;
+        let mut pushes: Vec<Push> = Vec::new();
+        let home = |place: usize| layout.cluster[place] as usize;
+        let places = rows.places(row);
+        let free = |place: usize| !system.held[place] && anchors.at(place).is_none();
+        if places.iter().all(|place| home(*place as usize) == home(places[0] as usize) && free(*place as usize)) {
+            return pushes;
+        }
+        for (place, g) in rows.entries(row).filter(|(place, _)| !system.held[*place]) {
+            let cluster = home(place);
+            let at = pushes.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
+                pushes.push(Push { cluster, along: [0.0; MODES] });
+                pushes.len() - 1
+            });
+            let g = anchors.at(place).map_or(g, |way| way.tr_mul(&g));
+            let torque = lever(arms[place]).cross(&g);
+            for axis in 0..3 {
+                pushes[at].along[axis] += g[axis];
+                pushes[at].along[3 + axis] += torque[axis];
+            }
+        }
+        pushes
+    }
+}
+
+/// How the motions of a cluster change a row.
+struct Push {
+    cluster: usize,
+    along: [f64; MODES],
 }
 
 /// Writes a cluster's rows as far as the diagonal.

@@ -51,7 +51,8 @@ impl Hanging {
     /// Of something there is for each of them: what the particle at `place` has inside its cluster, and to others.
     #[inline(always)]
     pub(super) fn of<'a, T>(&self, place: usize, all: &'a [T]) -> [&'a [T]; 2] {
-        let [start, middle, end] = [self.starts[place], self.middles[place], self.starts[place + 1]].map(|at| at as usize);
+        let [start, middle, end] =
+            [self.starts[place], self.middles[place], self.starts[place + 1]].map(|at| at as usize);
         [&all[start..middle], &all[middle..end]]
     }
 }
@@ -64,7 +65,8 @@ mod tests {
     fn a_spring_hangs_once_inside_a_cluster_and_twice_between_two() {
         let clusters = Parts::new(vec![0, 3, 5]);
         let hanging = Hanging::new(&clusters, &[[1, 0], [3, 1], [1, 2], [4, 3], [0, 4]]);
-        let others = |place| hanging.of(place, &hanging.hung).map(|some| some.iter().map(|hung| hung.other).collect::<Vec<_>>());
+        let others =
+            |place| hanging.of(place, &hanging.hung).map(|some| some.iter().map(|hung| hung.other).collect::<Vec<_>>());
         assert_eq!(others(0), [vec![1], vec![4]]);
         assert_eq!(others(1), [vec![2], vec![3]]);
         assert_eq!(others(2), [vec![], vec![]]);

@@ -91,8 +91,13 @@ impl Rows {
     }
 
     /// The entries' particles and vectors.
-    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (u32, V3)> {
-        self.row(row).map(|entry| (self.particles[entry], wide(self.along[entry])))
+    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (usize, V3)> {
+        self.row(row).map(|entry| (self.particles[entry] as usize, wide(self.along[entry])))
+    }
+
+    /// The rows in parts; none where there is no row that counts.
+    pub(super) fn parts(&self) -> Option<&Parts> {
+        self.parts.as_ref().filter(|_| !self.is_empty())
     }
 
     /// Sets what each entry resists: `weight` of the row, times the entry's gradient.
@@ -120,7 +125,10 @@ impl Rows {
 
     /// Measures how `p` changes each row; [`Rows::push`] then gives what that does.
     pub(super) fn measure(&mut self, p: &[V3]) {
-        let Some(parts) = self.parts.as_ref().filter(|_| !self.is_empty()) else { return };
+        if self.is_empty() {
+            return;
+        }
+        let Some(parts) = &self.parts else { return };
         let (starts, particles, along) = (&self.starts, &self.particles, &self.along);
         parts.each(&mut self.change[..], |part, mine: &mut [f64]| {
             for (row, change) in parts.range(part).zip(mine) {

@@ -3,7 +3,7 @@
 use super::V3;
 use super::assemble::velocities;
 use super::contact::Touching;
-use super::springs;
+use super::springs::{self, Motion};
 use super::stage::{Setting, Solved, Stage, Work};
 use super::state::Warm;
 
@@ -97,24 +97,25 @@ impl Work {
             let touch = touching.at(x, &v, stage.early, body.size);
             contact += touch.energy + touching.friction_energy(&v, a, body.size);
         }
-        let springs = body.spring_parts.sum((), |part, ()| {
-            let of = |at| springs::energy(body, &on.rest, x, at) + springs::dissipation(body, &on.rest, x, &v, at, a);
-            body.spring_parts.range(part).map(of).sum()
-        });
+        let (motion, links) = (Motion { x, v: &v }, &self.links);
         let clusters = &body.order.clusters;
         let (mut own, mut inertial) = (0.0, 0.0);
         for (mine, moved) in clusters.map((), |cluster, ()| {
-            clusters.range(cluster).filter(|place| !on.drive.held[*place]).fold((0.0, 0.0), |sum, place| {
+            clusters.range(cluster).fold((0.0, 0.0), |(own, inertial), place| {
+                let springs = springs::energy_at(body.hanging.of(place, links), &motion, place, a);
+                if on.drive.held[place] {
+                    return (own + springs, inertial);
+                }
                 let mass = body.mass[place];
                 let energy = on.drive.energy(place, mass, stage.time, a, x[place], v[place]);
-                (sum.0 + energy, sum.1 + 0.5 * mass * (x[place] - stage.y[place]).norm_squared())
+                (own + springs + energy, inertial + 0.5 * mass * (x[place] - stage.y[place]).norm_squared())
             })
         }) {
             own += mine;
             inertial += moved;
         }
         self.v = v;
-        inertial + a * a * (stored + thin + contact + springs + own)
+        inertial + a * a * (stored + thin + contact + own)
     }
 
     /// The share of `dx` that lowers the objective from `base`, 1, ½, ¼ …, or 0 where none does; and what it is there.

@@ -249,15 +249,20 @@ pub(super) fn length(body: &Body, x: &[V3], at: usize) -> f64 {
     if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 }
 }
 
-/// What a line search counts the dashpot of spring `at` as, where `v` changes by 1/a of what `x` does.
+/// What a line search counts the springs as that hang at `place`, each once, joules: their energy, and the dashpots' for
+/// velocities that change by 1/a of what positions do.
 #[inline(always)]
-pub(super) fn dissipation(body: &Body, rest: &Rest<'_>, x: &[V3], v: &[V3], at: usize, a: f64) -> f64 {
-    let [first, second] = body.ends[at].map(|end| end as usize);
-    let d = x[first] - x[second];
-    let squared = d.norm_squared();
-    if squared == 0.0 || !rest.holds(at as u32) {
-        return 0.0;
-    }
-    let pace = d.dot(&(v[first] - v[second]));
-    0.5 * a * body.damping[at] * pace * pace / squared
+pub(super) fn energy_at([inside, across]: [&[Link]; 2], motion: &Motion<'_>, place: usize, a: f64) -> f64 {
+    let energy = |link: &Link| {
+        let other = link.other as usize;
+        let d = motion.x[place] - motion.x[other];
+        let squared = d.norm_squared();
+        let pace = d.dot(&(motion.v[place] - motion.v[other]));
+        let damped = if squared > 0.0 { a * f64::from(link.c) * pace * pace / squared } else { 0.0 };
+        let length = if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 };
+        let strain = length - link.rest;
+        f64::from(link.k) * strain * strain + damped
+    };
+    let across = across.iter().filter(|link| place < link.other as usize);
+    0.5 * (inside.iter().map(energy).sum::<f64>() + across.map(energy).sum::<f64>())
 }

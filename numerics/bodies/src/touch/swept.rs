@@ -5,6 +5,7 @@ use numerics::lanes::{F32x16, LANES, set};
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
 use numerics::vec3::Vec3;
+use rayon::prelude::*;
 
 /// Levels that 2³² elements need, at most.
 const MOST_LEVELS: usize = 8;
@@ -81,13 +82,9 @@ fn bounds(boxes: &Boxes) -> Cuboid {
 
 /// The box of each point in all poses.
 pub(super) fn boxes(poses: &[Places<'_>]) -> Vec<Cuboid> {
-    let mut boxes: Vec<Cuboid> = poses[0].iter().map(box_of).collect();
-    for pose in &poses[1..] {
-        for (own, p) in boxes.iter_mut().zip(*pose) {
-            *own = join(own, &box_of(p));
-        }
-    }
-    boxes
+    let (first, others) = poses.split_first().map_or((&[][..], &[][..]), |(first, others)| (*first, others));
+    let of = |point: usize| others.iter().fold(box_of(&first[point]), |own, pose| join(&own, &box_of(&pose[point])));
+    (0..first.len()).into_par_iter().with_min_len(1024).map(of).collect()
 }
 
 /// The box of NaN, which meets nothing, where a point is not finite.
