@@ -277,8 +277,11 @@ impl Touching {
 
     fn load_at(&self, depth: f64) -> f64 {
         // Where surfaces are through each other the push is no load but a way out.
+        if depth <= 0.0 || self.taken(depth) > 1.0 {
+            return 0.0;
+        }
         let deepest = if self.gap > 0.0 { STRAIGHT * self.gap } else { f64::INFINITY };
-        if depth > 0.0 { self.spring(depth.min(deepest)).0 } else { 0.0 }
+        self.spring(depth.min(deepest)).0
     }
 
     /// The push at a depth > 0, its slope, and the energy it stores.
