@@ -1,7 +1,7 @@
 //! How deep soft bodies are pressed in under hard contact, and which frames are slow: dough of 5 kPa that rests, is rolled
 //! over, pressed and hit. What a frame costs, of more sizes, is `cargo bench --bench softbody`'s to say.
 //!
-//! `cargo run --release -p bodies --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [quiet]`;
+//! `cargo run --release -p bodies --example contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [volume=N] [quiet]`;
 //! threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh), roll (a pin that rolls on by ten
 //! thicknesses a frame, 1 cm into the dough), press (a plate down to 60 % of the height and up again), fist (a sphere a
 //! third of the way in, ten thicknesses a frame), knead (a pin at twice the pace, half the way in), slap (a plate that
@@ -129,13 +129,14 @@ fn main() {
                 steps,
                 limit,
                 number("pascal=").unwrap_or(5000),
+                number("volume=").unwrap_or(1),
                 [is_asked("self"), is_asked("quiet")],
             );
         }
     }
 }
 
-fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal: u32, [own, quiet]: [bool; 2]) {
+fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal: u32, volume: u32, [own, quiet]: [bool; 2]) {
     let plain = |value| Scaled { value, mask: None };
     let (points, tets) = cubes(cells, [0.0, THICKNESS, 0.0], SIZE);
     let narrow: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
@@ -164,7 +165,7 @@ fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal
         let own = own.then_some(Rub { thickness: THICKNESS, friction: 0.5 });
         let ground = tool.ground.then_some(ground);
         let scene = Scene { skins: &skins, obstacles: &obstacles, ground, own, ..Scene::default() };
-        let asked = Frame { seconds: FRAME, contacts: Some(&scene), substeps: steps, ..Frame::default() };
+        let asked = Frame { seconds: FRAME, contacts: Some(&scene), substeps: steps, volume: f64::from(volume), ..Frame::default() };
         let clock = Instant::now();
         let report = solver.step(&body, &mut state, &asked);
         let ms = clock.elapsed().as_secs_f64() * 1e3;
