@@ -136,7 +136,16 @@ fn main() {
     }
 }
 
-fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal: u32, volume: u32, [own, quiet]: [bool; 2]) {
+fn run(
+    case: &str,
+    name: &str,
+    cells: [usize; 3],
+    steps: u32,
+    limit: u32,
+    pascal: u32,
+    volume: u32,
+    [own, quiet]: [bool; 2],
+) {
     let plain = |value| Scaled { value, mask: None };
     let (points, tets) = cubes(cells, [0.0, THICKNESS, 0.0], SIZE);
     let narrow: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
@@ -165,7 +174,13 @@ fn run(case: &str, name: &str, cells: [usize; 3], steps: u32, limit: u32, pascal
         let own = own.then_some(Rub { thickness: THICKNESS, friction: 0.5 });
         let ground = tool.ground.then_some(ground);
         let scene = Scene { skins: &skins, obstacles: &obstacles, ground, own, ..Scene::default() };
-        let asked = Frame { seconds: FRAME, contacts: Some(&scene), substeps: steps, volume: f64::from(volume), ..Frame::default() };
+        let asked = Frame {
+            seconds: FRAME,
+            contacts: Some(&scene),
+            substeps: steps,
+            volume: f64::from(volume),
+            ..Frame::default()
+        };
         let clock = Instant::now();
         let report = solver.step(&body, &mut state, &asked);
         let ms = clock.elapsed().as_secs_f64() * 1e3;

@@ -20,6 +20,10 @@ const HOLD: f64 = 1e4;
 const STRAIGHT: f64 = 0.95;
 /// Share of its gap below which a contact is too deep to leave it there.
 const DEEP: f64 = 0.96;
+/// Shares of its gap that a step may close a contact by before it is stopped, and where: one that was apart, and one that
+/// pushed already.
+const CLOSED: [f64; 2] = [0.05, 0.02];
+const PRESSED: [f64; 2] = [0.3, 0.1];
 /// Share of a drag that is believed to go on: the rest keeps a slip from being turned round too far.
 const SURE: f64 = 0.98;
 /// Length of a sum of two units below which they are opposite.
@@ -165,6 +169,15 @@ impl Touching {
     pub(super) fn too_near(&self, x: &[V3]) -> bool {
         let depth = -self.clearance(x, 0.0);
         depth > 0.0 && self.taken(depth) > DEEP
+    }
+
+    /// How far what goes from `x` `to` there has to stay back where it would get deep into the contact: a step further is seen
+    /// how it pushes.
+    pub(super) fn stops(&self, x: &[V3], to: &[V3]) -> Option<f64> {
+        let (before, after) = (-self.clearance(x, 0.0), -self.clearance(to, 0.0));
+        let [most, stop] = if before > 0.0 { PRESSED } else { CLOSED };
+        let left = before.max(stop * self.gap);
+        (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
     }
 
     /// Whether one particle alone is in it.

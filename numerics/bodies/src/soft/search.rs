@@ -8,7 +8,7 @@ use super::stage::{Setting, Solved, Stage, Work};
 use super::state::Warm;
 
 /// Halvings of a step that a line search tries.
-const HALVINGS: u32 = 16;
+const HALVINGS: usize = 16;
 /// Share of a step from which on what it gained tells what is left to gain.
 const LONG: f64 = 0.2;
 /// Iterations a stage may have without contacts, and with them.
@@ -30,6 +30,16 @@ pub(super) struct Enough {
     pub(super) scale: f64,
     /// A residual's square that is enough whatever the first was.
     pub(super) square: f64,
+}
+
+/// Where a line search ends.
+struct Found {
+    /// Of the direction; 0 where none lowers the objective.
+    share: f64,
+    /// The objective there.
+    lower: f64,
+    /// Whether contacts stopped particles.
+    stopped: bool,
 }
 
 impl Work {
@@ -69,10 +79,11 @@ impl Work {
             if !self.direction(on, stage, warm, x, &mut solved) {
                 break;
             }
-            let (share, lower) = self.search(on, stage, x, base);
+            let Found { share, lower, stopped } = self.search(on, stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
-            (slow, stuck) = (share > LONG && base - lower <= solved.enough, share == 0.0);
+            let all = share > LONG && !stopped;
+            (slow, stuck) = (all && base - lower <= solved.enough, share == 0.0);
             base = lower;
             let loads_may_change = share == 1.0 && !deep && solved.newton <= RELOADS;
             if loads_may_change && let Some(more) = reload(contacts, x, &self.v, stage.a, on.body.size) {
@@ -118,23 +129,46 @@ impl Work {
         inertial + a * a * (stored + thin + contact + own)
     }
 
-    /// The share of `dx` that lowers the objective from `base`, 1, ½, ¼ …, or 0 where none does; and what it is there.
-    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> (f64, f64) {
+    /// Goes 1, ½, ¼ … of `dx` until that lowers the objective from `base`, each share as it is and then with [`stop`]. `dx`
+    /// becomes what led there.
+    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> Found {
         let mut trial = std::mem::take(&mut self.trial);
-        let (mut share, mut found) = (1.0, (0.0, base));
-        for _ in 0..HALVINGS {
-            trial.clear();
-            trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
-            let value = self.objective(on, stage, &trial);
-            if value <= base + ROUNDING * base.abs() {
-                found = (share, value);
+        let mut found = Found { share: 0.0, lower: base, stopped: false };
+        let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
+        for (share, stopped) in shares.flat_map(|share| [(share, false), (share, true)]) {
+            if !stopped {
+                trial.clear();
+                trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
+            } else if !stop(on, stage, x, &mut trial) {
+                continue;
+            }
+            let lower = self.objective(on, stage, &trial);
+            if lower <= base + ROUNDING * base.abs() {
+                if stopped {
+                    self.dx.iter_mut().zip(&trial).zip(x).for_each(|((d, trial), x)| *d = (trial - x) / share);
+                }
+                found = Found { share, lower, stopped };
                 break;
             }
-            share *= 0.5;
         }
         self.trial = trial;
         found
     }
+}
+
+/// Stops particles that go from `x` to `trial` on their own where they would get too deep into a contact, and says whether
+/// there were any. A direction knows nothing of contacts that it closes, and takes their pushes for straight lines: one
+/// particle that has to stop would hold up all others.
+fn stop(on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], trial: &mut [V3]) -> bool {
+    let mut stopped = false;
+    for contact in stage.contacts {
+        let Some((place, weight)) = contact.alone().filter(|side| !on.drive.held[side.0]) else { continue };
+        if let Some(back) = contact.stops(x, trial) {
+            trial[place] += contact.normal * (back / weight);
+            stopped = true;
+        }
+    }
+    stopped
 }
 
 /// Has friction count the pushes that contacts have at `x`, where velocities are `v`, if what it counted before is another by
