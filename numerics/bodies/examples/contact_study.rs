@@ -128,8 +128,7 @@ fn main() {
                 cells,
                 steps,
                 limit,
-                number("pascal=").unwrap_or(5000),
-                number("volume=").unwrap_or(1),
+                [number("pascal=").unwrap_or(5000), number("volume=").unwrap_or(1)],
                 [is_asked("self"), is_asked("quiet")],
             );
         }
@@ -142,8 +141,7 @@ fn run(
     cells: [usize; 3],
     steps: u32,
     limit: u32,
-    pascal: u32,
-    volume: u32,
+    [pascal, volume]: [u32; 2],
     [own, quiet]: [bool; 2],
 ) {
     let plain = |value| Scaled { value, mask: None };
