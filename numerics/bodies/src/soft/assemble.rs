@@ -4,7 +4,7 @@ use super::V3;
 use super::contact::Mode;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
-use super::springs::{self, Motion, Sums};
+use super::springs::{self, Sums};
 use super::stage::{Setting, Stage, Work};
 use super::system::{halfway, smoother};
 
@@ -13,17 +13,29 @@ use super::system::{halfway, smoother};
 const OVERLAP: f64 = 3.0;
 
 impl Work {
+    /// Begins a stage of `a` whose springs' lengths and regions' volumes come from those `before`.
+    pub(super) fn come_from(
+        &mut self,
+        on: &Setting<'_>,
+        a: f64,
+        before: impl Fn(usize, usize) -> f64 + Sync,
+        volumes: Vec<f64>,
+    ) {
+        springs::links(on.body, &on.rest, a, before, &mut self.links);
+        self.volumes.begin(a, volumes);
+        self.measured = false;
+    }
+
     /// The force on each particle at `x` and `v`.
     pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) -> Vec<V3> {
         self.loose_forces(on, stage, x, v);
         let mut out = vec![V3::zeros(); x.len()];
         let (body, work) = (on.body, &*self);
-        let motion = Motion { x, v };
         body.order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
             let places = body.order.clusters.range(cluster);
             for place in places.clone() {
-                springs::pull(body.hanging.of(place, &work.links), &motion, place, places.start, out);
-                out[place - places.start] += work.own_force(on, stage.time, place, &motion);
+                springs::pull(body.hanging.of(place, &work.links), x, place, places.start, out);
+                out[place - places.start] += work.own_force(on, stage.time, place, x, v);
             }
         });
         out
@@ -33,7 +45,7 @@ impl Work {
     fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) {
         let body = on.body;
         if !std::mem::take(&mut self.measured) {
-            self.volumes.measure(body, x, v, 0.0);
+            self.volumes.measure(body, x);
         }
         self.thin = self.volumes.thin(body, x, on.volumes, &self.inventory.watched);
         self.touches.clear();
@@ -56,8 +68,8 @@ impl Work {
 
     /// All but springs.
     #[inline(always)]
-    fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, motion: &Motion<'_>) -> V3 {
-        let mut sum = on.drive.force(place, on.body.mass[place], time, motion.x[place], motion.v[place]);
+    fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, x: &[V3], v: &[V3]) -> V3 {
+        let mut sum = on.drive.force(place, on.body.mass[place], time, x[place], v[place]);
         if !self.system.regions.is_empty() {
             sum -= self.system.regions.gather(place, &self.volumes.pressures, &self.volumes.gradients);
         }
@@ -74,7 +86,6 @@ impl Work {
         let mut v = std::mem::take(&mut self.v);
         velocities(clusters, x, stage, &mut v);
         self.loose_forces(on, stage, x, &v);
-        let motion = Motion { x, v: &v };
         let mut r = std::mem::take(&mut self.r);
         if linear {
             self.expect(stage);
@@ -96,7 +107,7 @@ impl Work {
                 let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; places.len()] };
                 for (((place, inertia), smooth), records) in places.zip(inertia).zip(smooth).zip(records.iter_mut()) {
                     let links = body.hanging.of(place, &work.links);
-                    springs::linearise(links, records, &motion, a, place, first, &mut sums);
+                    springs::linearise(links, records, x, a, place, first, &mut sums);
                     let (pull, mut block) = (sums.forces[place - first], sums.blocks[place - first]);
                     let mass = body.mass[place];
                     let mut own = on.drive.force(place, mass, stage.time, x[place], v[place]);
@@ -128,12 +139,12 @@ impl Work {
                 let places = clusters.range(cluster);
                 r.fill(V3::zeros());
                 for place in places.clone() {
-                    springs::pull(body.hanging.of(place, &work.links), &motion, place, places.start, r);
+                    springs::pull(body.hanging.of(place, &work.links), x, place, places.start, r);
                     let r = &mut r[place - places.start];
                     *r = if work.system.held[place] {
                         V3::zeros()
                     } else {
-                        let force = *r + work.own_force(on, stage.time, place, &motion);
+                        let force = *r + work.own_force(on, stage.time, place, x, &v);
                         force * (a * a) - (x[place] - stage.y[place]) * body.mass[place]
                     };
                 }

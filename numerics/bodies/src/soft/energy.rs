@@ -33,7 +33,7 @@ impl Energies {
 pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Moving, looked: bool) -> Energies {
     let (body, x, v) = (on.body, &moving.x, &moving.v);
     if !looked {
-        work.volumes.measure(body, x, v, 0.0);
+        work.volumes.measure(body, x);
     }
     let watched = &work.inventory.watched;
     let thin: f64 = work.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();

@@ -6,6 +6,7 @@
 use super::V3;
 use super::contact::{Contact, Query, Touching};
 use super::search::{Enough, reload};
+use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Moving, Stepper, deepest, sum};
 
@@ -72,6 +73,8 @@ impl Stepper<'_> {
         let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
+        let volumes = self.work.volumes.at(self.setting.body, &z);
+        self.work.come_from(&self.setting, h, |first, second| distance(&z, first, second), volumes);
         let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
         let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0 };
         let mut solved = Solved::default();

@@ -146,8 +146,7 @@ impl Solver {
         let rest = Rest { lengths: &lengths, torn: &state.torn };
         self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
         self.work.system.regions.idle = self.work.volumes.is_off();
-        springs::links(body, &rest, &mut self.work.links);
-        springs::firmness(body, &self.work.links, &mut self.work.firmness);
+        springs::firmness(body, &rest, &mut self.work.firmness);
         self.work.system.set_alone(&self.work.firmness);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
         let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();

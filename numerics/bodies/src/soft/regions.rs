@@ -91,14 +91,19 @@ impl Regions {
 
     /// The triangles around a region, outwards, corners by place.
     pub(super) fn around(&self, region: usize) -> impl Iterator<Item = [u32; 3]> {
-        let corners = &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize];
+        let corners = self.of(region);
         let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
         faces.iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
     }
 
+    /// The particles of a region.
+    pub(super) fn of(&self, region: usize) -> &[u32] {
+        &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize]
+    }
+
     /// The volume of a region with particles at `x`, and how it changes with each of its own: m² outwards.
     pub(super) fn measure(&self, region: usize, x: &[V3], gradient: &mut [V3]) -> f64 {
-        let corners = &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize];
+        let corners = self.of(region);
         gradient.fill(V3::zeros());
         let Some(first) = corners.first() else { return 0.0 };
         for [a, b, c] in &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize] {

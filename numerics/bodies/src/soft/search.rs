@@ -3,7 +3,7 @@
 use super::V3;
 use super::assemble::velocities;
 use super::contact::Touching;
-use super::springs::{self, Motion};
+use super::springs;
 use super::stage::{Setting, Solved, Stage, Work};
 use super::state::Warm;
 
@@ -99,8 +99,8 @@ impl Work {
         let (body, a) = (on.body, stage.a);
         let mut v = std::mem::take(&mut self.v);
         velocities(&body.order.clusters, x, stage, &mut v);
-        let damped = self.volumes.measure(body, x, &v, a);
-        let stored = self.volumes.stored + damped;
+        self.volumes.measure(body, x);
+        let stored = self.volumes.stored + self.volumes.damped;
         let watched = &self.inventory.watched;
         let thin: f64 = self.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
         let mut contact = 0.0;
@@ -108,12 +108,12 @@ impl Work {
             let touch = touching.at(x, &v, stage.early, body.size);
             contact += touch.energy + touching.friction_energy(&v, a, body.size);
         }
-        let (motion, links) = (Motion { x, v: &v }, &self.links);
+        let links = &self.links;
         let clusters = &body.order.clusters;
         let (mut own, mut inertial) = (0.0, 0.0);
         for (mine, moved) in clusters.map((), |cluster, ()| {
             clusters.range(cluster).fold((0.0, 0.0), |(own, inertial), place| {
-                let springs = springs::energy_at(body.hanging.of(place, links), &motion, place, a);
+                let springs = springs::energy_at(body.hanging.of(place, links), x, place);
                 if on.drive.held[place] {
                     return (own + springs, inertial);
                 }

@@ -9,6 +9,7 @@
 
 use super::V3;
 use super::body::Body;
+use super::hanging::Hung;
 use super::parts::Several;
 use numerics::random::Key;
 
@@ -22,13 +23,6 @@ pub(super) struct Record {
     pub(super) other: u32,
     pub(super) alpha: f32,
     pub(super) w: [f32; 3],
-}
-
-/// Where the particles are, and how fast.
-#[derive(Clone, Copy)]
-pub(super) struct Motion<'a> {
-    pub(super) x: &'a [V3],
-    pub(super) v: &'a [V3],
 }
 
 /// Lengths at rest, a spring, and which springs are torn; none where empty.
@@ -60,18 +54,30 @@ impl Record {
     }
 }
 
-/// A spring as the end it hangs at sees it, with all that its force hangs on: read in order, once a look.
+/// A spring and its dashpot as the end they hang at sees them within a stage: read in order, once a look.
+///
+/// There the dashpot is a spring too: it counts how fast the length changes, (l − lz)/a with lz what it came from, so that
+/// k(l − L₀) + c(l − lz)/a = K(l − R). Its force is the slope of an energy, and a body that turns by any angle within a step
+/// is not damped, as the pace of its ends along the spring would have it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     other: u32,
     spring: u32,
+    /// K, N/m.
     k: f32,
-    c: f32,
+    /// R, metres.
     rest: f64,
 }
 
-/// The springs as they hang, one for each of `body.hanging`; torn ones neither pull nor resist.
-pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
+/// The springs as they hang, one for each of `body.hanging`, in a stage of `a` whose lengths come from what `before` gives of
+/// two ends; torn ones neither pull nor resist.
+pub(super) fn links(
+    body: &Body,
+    rest: &Rest<'_>,
+    a: f64,
+    before: impl Fn(usize, usize) -> f64 + Sync,
+    out: &mut Vec<Link>,
+) {
     let hanging = &body.hanging;
     out.resize(hanging.hung.len(), Link::default());
     let links = Several::new(&hanging.starts, out);
@@ -80,30 +86,33 @@ pub(super) fn links(body: &Body, rest: &Rest<'_>, out: &mut Vec<Link>) {
             let hung = hanging.of(place, &hanging.hung);
             for (link, hung) in links.iter_mut().zip(hung.into_iter().flatten()) {
                 let at = hung.spring as usize;
-                let holds = if rest.holds(hung.spring) { 1.0 } else { 0.0 };
-                *link = Link {
-                    other: hung.other,
-                    spring: hung.spring,
-                    k: body.stiffness[at] as f32 * holds,
-                    c: body.damping[at] as f32 * holds,
-                    rest: rest.lengths[at],
-                };
+                let (k, dashed) = (body.stiffness[at], body.damping[at] / a);
+                let both = (k + dashed).min(f64::from(f32::MAX)) as f32;
+                let mut length = rest.lengths[at];
+                if dashed > 0.0 {
+                    // Where nothing moves the force is the spring's, whatever both were rounded to.
+                    let before = before(place, hung.other as usize);
+                    length = (before - (before - length) * (k / f64::from(both))).max(0.0);
+                }
+                let k = if rest.holds(hung.spring) { both } else { 0.0 };
+                *link = Link { other: hung.other, spring: hung.spring, k, rest: length };
             }
         }
     });
 }
 
 /// Σk of the springs that hold each particle, N/m.
-pub(super) fn firmness(body: &Body, links: &[Link], out: &mut Vec<f64>) {
+pub(super) fn firmness(body: &Body, rest: &Rest<'_>, out: &mut Vec<f64>) {
     out.clear();
     out.resize(body.len(), 0.0);
     let clusters = &body.order.clusters;
     clusters.each(&mut out[..], |cluster, out: &mut [f64]| {
         let places = clusters.range(cluster);
         for place in places.clone() {
-            let [inside, across] = body.hanging.of(place, links);
-            out[place - places.start] += inside.iter().chain(across).map(|link| f64::from(link.k)).sum::<f64>();
-            inside.iter().for_each(|link| out[link.other as usize - places.start] += f64::from(link.k));
+            let [inside, across] = body.hanging.of(place, &body.hanging.hung);
+            let k = |hung: &Hung| if rest.holds(hung.spring) { body.stiffness[hung.spring as usize] } else { 0.0 };
+            out[place - places.start] += inside.iter().chain(across).map(k).sum::<f64>();
+            inside.iter().for_each(|hung| out[hung.other as usize - places.start] += k(hung));
         }
     });
 }
@@ -134,8 +143,8 @@ impl Seen {
 
     /// What pulls the ends together, newtons.
     #[inline(always)]
-    fn tension(&self, link: &Link, dv: V3) -> f64 {
-        f64::from(link.k) * (self.length - link.rest) + f64::from(link.c) * self.way.dot(&dv)
+    fn tension(&self, link: &Link) -> f64 {
+        f64::from(link.k) * (self.length - link.rest)
     }
 }
 
@@ -157,11 +166,10 @@ fn unusual(d: V3, spring: u32, first: bool) -> (V3, f64) {
 impl Link {
     /// What pulls the particle at `place` to the other end, newtons, and H for steps of `a`, in full and as a record.
     #[inline(always)]
-    fn linearise(&self, motion: &Motion<'_>, a: f64, place: usize, record: &mut Record) -> (V3, [f64; 6]) {
-        let seen = Seen::from(self, place, motion.x);
-        let force = seen.way * seen.tension(self, motion.v[place] - motion.v[self.other as usize]);
+    fn linearise(&self, x: &[V3], a: f64, place: usize, record: &mut Record) -> (V3, [f64; 6]) {
+        let seen = Seen::from(self, place, x);
+        let force = seen.way * seen.tension(self);
         let k = (a * a * f64::from(self.k)).min(STIFFEST);
-        let along = (k + a * f64::from(self.c)).min(2.0 * STIFFEST);
         let alpha = if seen.length > 0.0 {
             k * (1.0 - self.rest * seen.inverse).max(0.0)
         } else if self.rest > 0.0 {
@@ -169,7 +177,7 @@ impl Link {
         } else {
             k
         };
-        let w = seen.way * (along - alpha).max(0.0).sqrt();
+        let w = seen.way * (k - alpha).max(0.0).sqrt();
         *record = Record { other: self.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
         let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
         (force, h)
@@ -179,10 +187,10 @@ impl Link {
 /// Adds to a cluster's forces, newtons, what the springs that hang at `place` pull with; `first` is the cluster's first place.
 /// After the particles before it, and this one, its own sum is whole.
 #[inline(always)]
-pub(super) fn pull([inside, across]: [&[Link]; 2], motion: &Motion<'_>, place: usize, first: usize, forces: &mut [V3]) {
+pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[V3], place: usize, first: usize, forces: &mut [V3]) {
     let force = |link: &Link| {
-        let seen = Seen::from(link, place, motion.x);
-        seen.way * seen.tension(link, motion.v[place] - motion.v[link.other as usize])
+        let seen = Seen::from(link, place, x);
+        seen.way * seen.tension(link)
     };
     let mut sum = forces[place - first];
     for link in inside {
@@ -205,7 +213,7 @@ pub(super) struct Sums<'a> {
 pub(super) fn linearise(
     [inside, across]: [&[Link]; 2],
     records: &mut [Record],
-    motion: &Motion<'_>,
+    x: &[V3],
     a: f64,
     place: usize,
     first: usize,
@@ -215,7 +223,7 @@ pub(super) fn linearise(
     let (mut force, mut block) = (sums.forces[place - first], sums.blocks[place - first]);
     let (inside_records, across_records) = records.split_at_mut(inside.len());
     for (link, record) in inside.iter().zip(inside_records) {
-        let (pull, h) = link.linearise(motion, a, place, record);
+        let (pull, h) = link.linearise(x, a, place, record);
         let other = link.other as usize - first;
         force -= pull;
         add(&mut block, h);
@@ -223,7 +231,7 @@ pub(super) fn linearise(
         add(&mut sums.blocks[other], h);
     }
     for (link, record) in across.iter().zip(across_records) {
-        let (pull, h) = link.linearise(motion, a, place, record);
+        let (pull, h) = link.linearise(x, a, place, record);
         force -= pull;
         add(&mut block, h);
     }
@@ -244,24 +252,31 @@ pub(super) fn energy(body: &Body, rest: &Rest<'_>, x: &[V3], at: usize) -> f64 {
 #[inline(always)]
 pub(super) fn length(body: &Body, x: &[V3], at: usize) -> f64 {
     let [a, b] = body.ends[at];
-    let d = x[a as usize] - x[b as usize];
+    distance(x, a as usize, b as usize)
+}
+
+/// How far two particles are from each other, metres.
+#[inline(always)]
+pub(super) fn distance(x: &[V3], a: usize, b: usize) -> f64 {
+    let d = x[a] - x[b];
     let squared = d.norm_squared();
     if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 }
 }
 
-/// What a line search counts the springs as that hang at `place`, each once, joules: their energy, and the dashpots' for
-/// velocities that change by 1/a of what positions do.
+/// That, and how fast it changes, m/s.
 #[inline(always)]
-pub(super) fn energy_at([inside, across]: [&[Link]; 2], motion: &Motion<'_>, place: usize, a: f64) -> f64 {
+pub(super) fn drift(x: &[V3], v: &[V3], a: usize, b: usize) -> [f64; 2] {
+    let length = distance(x, a, b);
+    let pace = if length > 0.0 { (x[a] - x[b]).dot(&(v[a] - v[b])) / length } else { 0.0 };
+    [length, pace]
+}
+
+/// The energy within a stage of the springs that hang at `place`, each once, and their dashpots, joules.
+#[inline(always)]
+pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[V3], place: usize) -> f64 {
     let energy = |link: &Link| {
-        let other = link.other as usize;
-        let d = motion.x[place] - motion.x[other];
-        let squared = d.norm_squared();
-        let pace = d.dot(&(motion.v[place] - motion.v[other]));
-        let damped = if squared > 0.0 { a * f64::from(link.c) * pace * pace / squared } else { 0.0 };
-        let length = if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 };
-        let strain = length - link.rest;
-        f64::from(link.k) * strain * strain + damped
+        let strain = distance(x, place, link.other as usize) - link.rest;
+        f64::from(link.k) * strain * strain
     };
     let across = across.iter().filter(|link| place < link.other as usize);
     0.5 * (inside.iter().map(energy).sum::<f64>() + across.map(energy).sum::<f64>())

@@ -33,7 +33,7 @@ const OLD: u32 = 500;
 /// Change of what contacts hold at which it is made again too: worth some ten iterations.
 const MOVED: f64 = 0.3;
 /// Share of the first residual above which what the derivative did not foresee asks for another iteration.
-const UNFORESEEN: f64 = 0.5;
+const UNFORESEEN: f64 = 0.35;
 /// Times as large as before that a residual's square may be after an iteration without line search.
 const RISE: f64 = 100.0;
 

@@ -15,6 +15,7 @@ use super::contact::Touching;
 use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
 use super::guess::{Guess, Rigid};
+use super::springs::{distance, drift};
 use super::stage::{Newton, Setting, Solved, Stage, Work};
 use super::state::Warm;
 use super::volume::Inventory;
@@ -186,7 +187,19 @@ impl Stepper<'_> {
         let mut x = guess.at(2.0 * a);
         let spinning = guess.spinning();
         let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning: &spinning, index: 0 };
+        let volumes = self.work.volumes.drift(body, &moving.x, &moving.v);
+        // Lengths and volumes go by the same rules as positions do.
+        let on_from_start = |work: &mut Work, seconds: f64| {
+            let length = |first, second| {
+                let [length, pace] = drift(&moving.x, &moving.v, first, second);
+                length + pace * seconds
+            };
+            let volumes = volumes.iter().map(|[volume, pace]| volume + pace * seconds).collect();
+            work.come_from(&self.setting, a, length, volumes);
+        };
+        on_from_start(self.work, -a);
         let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v);
+        on_from_start(self.work, a);
         let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
         let y: Vec<V3> = (0..x.len())
             .map(|place| z[place] + moving.v[place] * a + force[place] * (a * a / body.mass[place]))
@@ -203,6 +216,12 @@ impl Stepper<'_> {
         let mix = |middle: &[V3], start: &[V3]| -> Vec<V3> {
             middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
         };
+        let swollen = self.work.volumes.at(body, &x_middle);
+        let swollen = swollen.iter().zip(&volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
+        let length = |first, second| {
+            distance(&x_middle, first, second) * weight - distance(&moving.x, first, second) * start_weight
+        };
+        self.work.come_from(&self.setting, a, length, swollen);
         let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
         let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
         let mut x = guess.past(h, GAMMA, &x_middle);

@@ -38,10 +38,14 @@ pub(super) struct Volumes {
     pub(super) gradients: Vec<V3>,
     /// Pressure each region has, Pa.
     pub(super) pressures: Vec<f64>,
-    /// How each region's pressure grows with its volume, Pa/m³, and with how fast that changes.
-    slopes: Vec<[f64; 2]>,
-    /// What they stored when last measured, joules.
+    /// How each region's pressure grows with its volume within the stage, Pa/m³.
+    slopes: Vec<f64>,
+    /// The stage's a, seconds, and the volumes it comes from: dashpots count (V − those)/a, as springs do.
+    a: f64,
+    before: Vec<f64>,
+    /// What they stored when last measured, and what their dashpots count in a line search, joules.
     pub(super) stored: f64,
+    pub(super) damped: f64,
 }
 
 /// A tetrahedron that is thin or turned over.
@@ -78,8 +82,11 @@ impl Volumes {
             parts: Some(parts),
             gradients: vec![V3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
-            slopes: vec![[0.0; 2]; regions.len()],
+            slopes: vec![0.0; regions.len()],
+            a: f64::INFINITY,
+            before: vec![0.0; regions.len()],
             stored: 0.0,
+            damped: 0.0,
         }
     }
 
@@ -88,38 +95,62 @@ impl Volumes {
         self.parts.is_none()
     }
 
-    /// Measures pressures, gradients and what is stored; returns what dashpots count for steps of `a` in a line search.
-    pub(super) fn measure(&mut self, body: &Body, x: &[V3], v: &[V3], a: f64) -> f64 {
-        let Some(parts) = &self.parts else { return 0.0 };
-        let (regions, stiffness, rest) = (&body.regions, &self.stiffness, &self.rest);
+    /// The volume of each region with particles at `x`.
+    pub(super) fn at(&self, body: &Body, x: &[V3]) -> Vec<f64> {
+        self.drift(body, x, &[]).into_iter().map(|[volume, _]| volume).collect()
+    }
+
+    /// That, and how fast it changes, m³/s; all still where there is no `v`.
+    pub(super) fn drift(&self, body: &Body, x: &[V3], v: &[V3]) -> Vec<[f64; 2]> {
+        let regions = &body.regions;
+        let mut out = vec![[0.0; 2]; self.before.len()];
+        if let Some(parts) = &self.parts {
+            parts.each(&mut out[..], |part, out: &mut [[f64; 2]]| {
+                let mut gradient = Vec::new();
+                for (region, out) in parts.range(part).zip(out) {
+                    let particles = regions.of(region);
+                    gradient.resize(particles.len(), V3::zeros());
+                    let volume = regions.measure(region, x, &mut gradient);
+                    let pace = |(g, place): (&V3, &u32)| v.get(*place as usize).map_or(0.0, |v| g.dot(v));
+                    *out = [volume, gradient.iter().zip(particles).map(pace).sum()];
+                }
+            });
+        }
+        out
+    }
+
+    /// Begins a stage of `a` whose volumes come from those `before`.
+    pub(super) fn begin(&mut self, a: f64, before: Vec<f64>) {
+        (self.a, self.before) = (a, before);
+    }
+
+    /// Measures pressures, gradients and energies.
+    pub(super) fn measure(&mut self, body: &Body, x: &[V3]) {
+        let Some(parts) = &self.parts else { return };
+        let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
         let gradients = Several::new(&regions.starts, &mut self.gradients);
         let out = (&mut self.pressures[..], &mut self.slopes[..], gradients);
         let sums = parts.map(out, |part, (pressures, slopes, mut gradients)| {
             let (mut stored, mut damped) = (0.0, 0.0);
             let regions_here = parts.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
             for (((region, pressure), slope), mine) in regions_here {
-                let particles =
-                    &regions.particles[regions.starts[region] as usize..regions.starts[region + 1] as usize];
-                let lost = regions.measure(region, x, mine) - rest[region];
-                let pace: f64 = mine.iter().zip(particles).map(|(g, place)| g.dot(&v[*place as usize])).sum();
+                let volume = regions.measure(region, x, mine);
                 let k = stiffness[region];
-                let (push, steep, energy) = stiffened(lost, rest[region]);
-                let c = k * regions.damping[region];
-                *pressure = k * push + c * pace;
-                *slope = [k * steep, c];
+                let (push, steep, energy) = stiffened(volume - rest[region], rest[region]);
+                let (dashed, more) = (k * regions.damping[region] / a, volume - before[region]);
+                *pressure = k * push + dashed * more;
+                *slope = k * steep + dashed;
                 stored += k * energy;
-                damped += 0.5 * a * c * pace * pace;
+                damped += 0.5 * dashed * more * more;
             }
             (stored, damped)
         });
-        let (stored, damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
-        self.stored = stored;
-        damped
+        (self.stored, self.damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
     }
 
     /// What each region resists for steps of `a`, where last measured.
     pub(super) fn weights(&self, a: f64) -> Vec<f64> {
-        self.slopes.iter().map(|[k, c]| k * a * a + c * a).collect()
+        self.slopes.iter().map(|slope| slope * a * a).collect()
     }
 
     /// Those of the `watched` tetrahedra that are thin.
