@@ -84,6 +84,8 @@ pub(super) struct Touching {
     hold: f64,
     /// N that friction counts, newtons.
     pub(super) load: f64,
+    /// How much deeper it may be, metres: surfaces that are through each other come apart at a pace.
+    slack: f64,
     /// What it is taken to do throughout a step.
     frozen: Option<Touch>,
 }
@@ -138,6 +140,7 @@ impl Touching {
             firm: 0.0,
             hold: 0.0,
             load: 0.0,
+            slack: 0.0,
             frozen: None,
         };
         let mut yielding = 0.0;
@@ -167,14 +170,14 @@ impl Touching {
 
     /// Whether it is deeper than it may stay.
     pub(super) fn too_near(&self, x: &[V3]) -> bool {
-        let depth = -self.clearance(x, 0.0);
+        let depth = self.depth(x, 0.0);
         depth > 0.0 && self.taken(depth) > DEEP
     }
 
     /// How far what goes from `x` `to` there has to stay back where it would get deep into the contact: a step further is seen
     /// how it pushes.
     pub(super) fn stops(&self, x: &[V3], to: &[V3]) -> Option<f64> {
-        let (before, after) = (-self.clearance(x, 0.0), -self.clearance(to, 0.0));
+        let (before, after) = (self.depth(x, 0.0), self.depth(to, 0.0));
         let [most, stop] = if before > 0.0 { PRESSED } else { CLOSED };
         let left = before.max(stop * self.gap);
         (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
@@ -197,6 +200,18 @@ impl Touching {
         self.normal.dot(&self.between(x)) - offset - self.gap
     }
 
+    /// How far below the gap it pushes, likewise.
+    fn depth(&self, x: &[V3], seconds: f64) -> f64 {
+        -self.clearance(x, seconds) - self.slack
+    }
+
+    /// Takes it to be on its way out where surfaces are through each other as a step of `seconds` begins at `x`: by `way` in
+    /// that step. All at once, within a short step, they would leave each other like a shot.
+    pub(super) fn on_its_way(self, x: &[V3], seconds: f64, way: f64) -> Self {
+        let through = -self.clearance(x, seconds) - self.gap;
+        Self { slack: (through - way).max(0.0), ..self }
+    }
+
     /// Takes it to go on as at `x` and `v`, `seconds` before the time it was found for: to push or not, stick or slide, with
     /// the push a straight line of the depth. A step that only pushes one way is no step of order 2; one that goes on is.
     pub(super) fn frozen(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Self {
@@ -206,7 +221,7 @@ impl Touching {
     /// Whether what a frozen contact was taken to do is what it does at `x` and `v`.
     pub(super) fn goes_on(&self, x: &[V3], v: &[V3]) -> bool {
         let Some(then) = self.frozen else { return true };
-        let depth = -self.clearance(x, 0.0);
+        let depth = self.depth(x, 0.0);
         let push = then.push + then.slope * (depth - then.depth);
         let slip = self.slip(v);
         let stays = depth > 0.0 && self.taken(depth) < STRAIGHT;
@@ -226,7 +241,7 @@ impl Touching {
 
     /// What it does at `x` and `v`, `seconds` before the time it was found for; `size` is the body's.
     pub(super) fn at(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Touch {
-        let depth = -self.clearance(x, seconds);
+        let depth = self.depth(x, seconds);
         if let Some(then) = self.frozen {
             let push = then.push + then.slope * (depth - then.depth);
             let drag = match then.mode {
@@ -274,7 +289,7 @@ impl Touching {
         let near = self.velocity.norm() * seconds <= self.gap;
         let last = self.sides().map(|(place, _)| loads[place]).fold(0.0, f64::max);
         let now = if near {
-            self.load_at(-self.clearance(x, seconds))
+            self.load_at(self.depth(x, seconds))
         } else if self.alone().is_some() {
             last
         } else {
@@ -285,7 +300,7 @@ impl Touching {
 
     /// The push at `x`, as a load.
     pub(super) fn push(&self, x: &[V3]) -> f64 {
-        self.load_at(-self.clearance(x, 0.0))
+        self.load_at(self.depth(x, 0.0))
     }
 
     fn load_at(&self, depth: f64) -> f64 {

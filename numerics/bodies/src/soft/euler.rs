@@ -28,7 +28,8 @@ impl Stepper<'_> {
         let mut found: Vec<Contact> = Vec::new();
         contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
         let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, &self.work.firmness));
-        known.map(|contact| contact.loaded(&start.x, &start.loads, h)).collect()
+        let way = body.spacing * h / self.seconds;
+        known.map(|c| c.on_its_way(&start.x, h, way).loaded(&start.x, &start.loads, h)).collect()
     }
 
     /// The largest push of an obstacle on each particle at `x`.
