@@ -1,4 +1,5 @@
-//! Implicit Euler with contacts: finds them, solves, looks whether others came and what friction they have, goes on.
+//! Implicit Euler with contacts: finds them, solves, looks whether others came, what got thin and what friction there is, and
+//! goes on.
 //!
 //! Friction is solved with pushes that are given: those the particles were under at last, then those found on the way down,
 //! until they are about the same. So each step has an objective, and what comes out has Coulomb's friction of its own pushes.
@@ -85,11 +86,12 @@ impl Stepper<'_> {
             enough.square = solved.enough;
             let changed = reload(contacts, &x, &self.work.v, h, self.setting.body.size).is_some();
             let (mut found, missed) = self.missed(contacts, moving, &x, times);
+            let thinned = self.thinned(&x);
             // What was deep before is on its way out.
             let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
-            if round == ROUNDS || !(missed || changed) {
+            if round == ROUNDS || !(missed || changed || thinned) {
                 break;
             }
             if missed {

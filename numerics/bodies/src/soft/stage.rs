@@ -100,8 +100,9 @@ pub(super) struct Work {
     pub(super) volumes: Volumes,
     /// Whether they are of where the next look is: a search ends with measuring what it takes.
     pub(super) measured: bool,
-    /// Tetrahedra as the step began.
+    /// Tetrahedra as the step began, and where they were looked over since.
     pub(super) inventory: Inventory,
+    pub(super) seen: Option<Inventory>,
     pub(super) arms: Vec<[f32; 3]>,
     /// The springs as the frame has them.
     pub(super) links: Vec<Link>,

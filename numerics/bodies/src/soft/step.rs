@@ -119,7 +119,8 @@ impl Stepper<'_> {
                 stepped.solved.deepest = deepest(&found, &moving.x);
                 goes_on = !missed;
             }
-            if stepped.solved.failed || gained || !goes_on || !energies.sum().is_finite() {
+            let thinned = goes_on && self.thinned(&moving.x);
+            if stepped.solved.failed || gained || !goes_on || thinned || !energies.sum().is_finite() {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
                 let (again, estimate) = self.euler(moving, times, &mut full, off);
@@ -139,11 +140,11 @@ impl Stepper<'_> {
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
         moving.loads = self.loads(&full, &moving.x);
         self.keep_finite(&start, moving, &mut stepped);
+        self.look(moving);
         stepped.after = match after.filter(|_| stepped.stopped == 0) {
             Some(energies) => energies,
             None => measure(self.work, &self.setting, times[1], moving, false),
         };
-        self.look(moving);
         if self.undriven() {
             self.shed(before, moving, &mut stepped);
         } else {
@@ -152,9 +153,23 @@ impl Stepper<'_> {
         stepped
     }
 
-    /// Looks the tetrahedra over.
+    /// Looks the tetrahedra over for what begins where particles are now.
     pub(super) fn look(&mut self, moving: &Moving) {
-        self.work.inventory = Inventory::new(self.setting.body, &moving.x, self.setting.volumes);
+        let seen = self.work.seen.take();
+        self.work.inventory =
+            seen.unwrap_or_else(|| Inventory::new(self.setting.body, &moving.x, self.setting.volumes));
+    }
+
+    /// Looks them over within a step, and says whether any got thin at `x` that were not watched.
+    pub(super) fn thinned(&mut self, x: &[V3]) -> bool {
+        if self.work.volumes.is_off() {
+            return false;
+        }
+        let (body, volumes) = (self.setting.body, self.setting.volumes);
+        let seen = Inventory::new(body, x, volumes);
+        let thinned = self.work.inventory.watch(&seen, body, x, volumes);
+        self.work.seen = Some(seen);
+        thinned
     }
 
     /// Whether nothing from outside does work but gravity and goals that stand still.
@@ -260,12 +275,13 @@ impl Stepper<'_> {
     }
 
     /// Particles that are nowhere stay where they were.
-    fn keep_finite(&self, start: &Moving, moving: &mut Moving, stepped: &mut Stepped) {
+    fn keep_finite(&mut self, start: &Moving, moving: &mut Moving, stepped: &mut Stepped) {
         for place in 0..moving.x.len() {
             if !moving.x[place].iter().chain(moving.v[place].iter()).all(|x| x.is_finite()) {
                 (moving.x[place], moving.v[place]) = (start.x[place], V3::zeros());
                 moving.trend[place] = V3::zeros();
                 stepped.stopped += 1;
+                self.work.seen = None;
             }
         }
     }

@@ -18,7 +18,8 @@ const SLIGHT: f64 = 0.0065;
 const MUCH: f64 = 0.04;
 /// Volume ÷ volume at rest below which a tetrahedron is pushed open.
 const THIN: f64 = 0.3;
-/// Volume ÷ volume at rest below which it is watched within a step: one that gets thin from above is so for the next step.
+/// Volume ÷ volume at rest below which it is watched within a step. One that gets thin from above has to be seen and watched
+/// too, as it would begin the next step with energy from nowhere.
 const WATCHED: f64 = 0.7;
 /// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
 const OPENING: f64 = 16.0;
@@ -235,5 +236,18 @@ impl Inventory {
         }
         all.ratio = if before > 0.0 { now / before } else { 1.0 };
         all
+    }
+
+    /// Watches those too that turn out thin in `later`, of `rest` and with particles at `x`, and says whether there are such.
+    pub(super) fn watch(&mut self, later: &Self, body: &Body, x: &[V3], rest: &[f64]) -> bool {
+        let thin = |tet: &&u32| {
+            let at = **tet as usize;
+            let left = volume(body.tets[at].map(|corner| x[corner as usize]));
+            left < THIN * rest[at] && self.watched.binary_search(*tet).is_err()
+        };
+        let missed: Vec<u32> = later.watched.iter().filter(thin).copied().collect();
+        self.watched.extend(&missed);
+        self.watched.sort_unstable();
+        !missed.is_empty()
     }
 }
