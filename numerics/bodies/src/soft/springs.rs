@@ -4,8 +4,8 @@
 //! itself, from the same numbers with the sign turned. So both forces add up to zero in every bit, and a cluster needs only
 //! its own slots.
 //!
-//! Source: H = αI + (a²k + ac − α)nnᵀ, α = a²k·max(0, 1 − L₀/l), Baraff & Witkin 1998 with what makes H indefinite left
-//! out: positive semi-definite for every length.
+//! Source: H = αI + (a²K − α)nnᵀ, α = a²K·max(0, 1 − R/l), Baraff & Witkin 1998 with what makes H indefinite left out:
+//! positive semi-definite for every length. K and R are those of spring and dashpot together, see [`Link`].
 
 use super::V3;
 use super::body::Body;
@@ -57,8 +57,8 @@ impl Record {
 /// A spring and its dashpot as the end they hang at sees them within a stage: read in order, once a look.
 ///
 /// There the dashpot is a spring too: it counts how fast the length changes, (l − lz)/a with lz what it came from, so that
-/// k(l − L₀) + c(l − lz)/a = K(l − R). Its force is the slope of an energy, and a body that turns by any angle within a step
-/// is not damped, as the pace of its ends along the spring would have it.
+/// k(l − L₀) + c(l − lz)/a = K(l − R). So its force is the slope of an energy, which a line search has to know, and a body that
+/// turns by any angle within a step is not damped. The pace of its ends along the spring has neither.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     other: u32,
