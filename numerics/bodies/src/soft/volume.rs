@@ -246,8 +246,11 @@ impl Inventory {
             left < THIN * rest[at] && self.watched.binary_search(*tet).is_err()
         };
         let missed: Vec<u32> = later.watched.iter().filter(thin).copied().collect();
-        self.watched.extend(&missed);
+        if missed.is_empty() {
+            return false;
+        }
+        self.watched.extend(missed);
         self.watched.sort_unstable();
-        !missed.is_empty()
+        true
     }
 }
