@@ -174,6 +174,11 @@ impl Touching {
         depth > 0.0 && self.taken(depth) > DEEP
     }
 
+    /// Whether it begins a step of `seconds` at `x` so deep that its push is a way out, not a spring's.
+    pub(super) fn is_through(&self, x: &[V3], seconds: f64) -> bool {
+        self.taken(self.depth(x, seconds)) >= STRAIGHT
+    }
+
     /// How far what goes from `x` `to` there has to stay back where it would get deep into the contact: a step further is seen
     /// how it pushes.
     pub(super) fn stops(&self, x: &[V3], to: &[V3]) -> Option<f64> {

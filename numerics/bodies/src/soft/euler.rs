@@ -10,6 +10,7 @@ use super::search::{Enough, reload};
 use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Moving, Stepper, deepest, sum};
+use std::cell::OnceCell;
 
 /// Times that implicit Euler looks for contacts it has missed.
 const ROUNDS: u32 = 4;
@@ -62,6 +63,11 @@ impl Stepper<'_> {
         (found, missed)
     }
 
+    /// How deep the worst contact is where particles are at `time`, metres below its gap.
+    fn depth(&self, moving: &Moving, time: f64) -> f64 {
+        deepest(&self.contacts(moving, &moving.x, [time; 2]), &moving.x)
+    }
+
     /// Implicit Euler; `off` where it begins off balance by more than its contacts.
     pub(super) fn euler(
         &mut self,
@@ -81,14 +87,19 @@ impl Stepper<'_> {
         let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0 };
         let mut solved = Solved::default();
         let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts: &[], early: 0.0, spinning: &[], index: 0 };
+        let before = OnceCell::new();
         for round in 1..=ROUNDS {
             solved = sum(solved, self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x));
             enough.square = solved.enough;
             let changed = reload(contacts, &x, &self.work.v, h, self.setting.body.size).is_some();
             let (mut found, missed) = self.missed(contacts, moving, &x, times);
             let thinned = self.thinned(&x);
-            // What was deep before is on its way out.
-            let sank = |c: &&Touching| c.too_near(&x) && c.clearance(&x, 0.0) < c.clearance(&moving.x, h);
+            // What was deep before is on its way out. A plane of the end may call deep what was none: surfaces turn.
+            let sank = |c: &&Touching| {
+                let now = -c.clearance(&x, 0.0);
+                c.too_near(&x)
+                    && (now > -c.clearance(&moving.x, h) || now > *before.get_or_init(|| self.depth(moving, times[0])))
+            };
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
             if round == ROUNDS || !(missed || changed || thinned) {

@@ -32,12 +32,27 @@ pub(super) struct Enough {
     pub(super) square: f64,
 }
 
+/// The objective at some positions.
+#[derive(Clone, Copy, Debug, Default)]
+struct Level {
+    /// What contacts count in it.
+    contacts: f64,
+    /// What all else does.
+    others: f64,
+}
+
+impl Level {
+    fn sum(self) -> f64 {
+        self.contacts + self.others
+    }
+}
+
 /// Where a line search ends.
 struct Found {
     /// Of the direction; 0 where none lowers the objective.
     share: f64,
     /// The objective there.
-    lower: f64,
+    lower: Level,
     /// Whether contacts stopped particles.
     stopped: bool,
 }
@@ -57,14 +72,15 @@ impl Work {
         self.begin(on, contacts);
         let most = if contacts.is_empty() { MOST } else { MOST_TOUCHING };
         let mut solved = Solved::default();
-        let (mut first, mut base, mut slow, mut stuck) = (0.0, 0.0, false, false);
+        let (mut first, mut base, mut slow, mut stuck) = (0.0, Level::default(), false, false);
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(on, stage, x, true);
             let now = self.square(&on.body.order.clusters);
             if solved.newton == 0 {
                 first = now;
-                base = self.objective(on, stage, x);
+                let contacts = self.of_contacts(on, stage, x);
+                base = Level { contacts, others: self.of_others(on, stage, x) };
                 solved.enough = enough.square.max(enough.share * enough.share * first.min(enough.scale));
             }
             solved.residual = if first > 0.0 { (now / first).sqrt() } else { 0.0 };
@@ -75,6 +91,7 @@ impl Work {
                 solved.failed = !now.is_finite();
                 break;
             }
+            self.keep_pull(stage);
             self.foresee(stage);
             if !self.direction(on, stage, warm, x, &mut solved) {
                 break;
@@ -83,32 +100,27 @@ impl Work {
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             let all = share > LONG && !stopped;
-            (slow, stuck) = (all && base - lower <= solved.enough, share == 0.0);
+            (slow, stuck) = (all && base.sum() - lower.sum() <= solved.enough, share == 0.0);
             base = lower;
             let loads_may_change = share == 1.0 && !deep && solved.newton <= RELOADS;
             if loads_may_change && let Some(more) = reload(contacts, x, &self.v, stage.a, on.body.size) {
-                (base, slow) = (base + more, false);
+                base.contacts += more;
+                slow = false;
             }
         }
         self.turn(on.body, x);
         solved
     }
 
-    /// What the stage makes least: ½(x − y)ᵀM(x − y) + a²·(energies).
-    pub(super) fn objective(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
+    /// What all but contacts count in what the stage makes least, ½(x − y)ᵀM(x − y) + a²·(energies), at positions that
+    /// [`Self::of_contacts`] was asked about.
+    fn of_others(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
         let (body, a) = (on.body, stage.a);
-        let mut v = std::mem::take(&mut self.v);
-        velocities(&body.order.clusters, x, stage, &mut v);
         self.volumes.measure(body, x);
         let stored = self.volumes.stored + self.volumes.damped;
         let watched = &self.inventory.watched;
         let thin: f64 = self.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
-        let mut contact = 0.0;
-        for touching in stage.contacts {
-            let touch = touching.at(x, &v, stage.early, body.size);
-            contact += touch.energy + touching.friction_energy(&v, a, body.size);
-        }
-        let links = &self.links;
+        let (v, links) = (&self.v, &self.links);
         let clusters = &body.order.clusters;
         let (mut own, mut inertial) = (0.0, 0.0);
         for (mine, moved) in clusters.map((), |cluster, ()| {
@@ -125,15 +137,40 @@ impl Work {
             own += mine;
             inertial += moved;
         }
-        self.v = v;
-        inertial + a * a * (stored + thin + contact + own)
+        inertial + a * a * (stored + thin + own)
+    }
+
+    /// What contacts count in it at `x`; makes velocities those there.
+    fn of_contacts(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
+        let (body, a) = (on.body, stage.a);
+        velocities(&body.order.clusters, x, stage, &mut self.v);
+        let of = |contact: &Touching| {
+            let touch = contact.at(x, &self.v, stage.early, body.size);
+            touch.energy + contact.friction_energy(&self.v, a, body.size)
+        };
+        a * a * stage.contacts.iter().map(of).sum::<f64>()
+    }
+
+    /// Keeps what of the residual is not of contacts.
+    fn keep_pull(&mut self, stage: &Stage<'_>) {
+        self.pull.clone_from(&self.r);
+        for (contact, touch) in stage.contacts.iter().zip(&self.touches) {
+            for (place, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
+                self.pull[place] -= touch.force * (weight * stage.a * stage.a);
+            }
+        }
     }
 
     /// Goes 1, ½, ¼ … of `dx` until that lowers the objective from `base`, each share as it is and then with [`stop`]. `dx`
     /// becomes what led there.
-    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: f64) -> Found {
+    ///
+    /// Where contacts gain more on the way than all else loses on its slope, nothing else is asked: a step too far into a
+    /// contact is the most usual of those that lower nothing.
+    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: Level) -> Found {
         let mut trial = std::mem::take(&mut self.trial);
         let mut found = Found { share: 0.0, lower: base, stopped: false };
+        let most = base.sum() + ROUNDING * base.sum().abs();
+        let clusters = &on.body.order.clusters;
         let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
         for (share, stopped) in shares.flat_map(|share| [(share, false), (share, true)]) {
             if !stopped {
@@ -142,8 +179,14 @@ impl Work {
             } else if !stop(on, stage, x, &mut trial) {
                 continue;
             }
-            let lower = self.objective(on, stage, &trial);
-            if lower <= base + ROUNDING * base.abs() {
+            let contacts = self.of_contacts(on, stage, &trial);
+            let lost = |place: usize| self.pull[place].dot(&(trial[place] - x[place]));
+            let lost = clusters.sum((), |cluster, ()| clusters.range(cluster).map(lost).sum());
+            if base.sum() + (contacts - base.contacts) - lost > most {
+                continue;
+            }
+            let lower = Level { contacts, others: self.of_others(on, stage, &trial) };
+            if lower.sum() <= most {
                 if stopped {
                     self.dx.iter_mut().zip(&trial).zip(x).for_each(|((d, trial), x)| *d = (trial - x) / share);
                 }

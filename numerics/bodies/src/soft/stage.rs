@@ -113,6 +113,8 @@ pub(super) struct Work {
     pub(super) v: Vec<V3>,
     /// −(M(x − y) − a²f).
     pub(super) r: Vec<V3>,
+    /// What of it is not of contacts.
+    pub(super) pull: Vec<V3>,
     pub(super) dx: Vec<V3>,
     pub(super) trial: Vec<V3>,
     pub(super) thin: Vec<Thin>,

@@ -98,7 +98,9 @@ impl Stepper<'_> {
             None => Vec::new(),
         };
         let turned = self.frame.volume > 0.0 && self.work.inventory.turned > 0;
-        let rough = calm || *self.unsettled > 0 || self.frame.rough || turned;
+        // What pushes a way out grows no weaker in a straight line: it would throw.
+        let through = full.iter().any(|contact| contact.is_through(&start.x, h));
+        let rough = calm || *self.unsettled > 0 || self.frame.rough || turned || through;
         *self.unsettled = self.unsettled.saturating_sub(1);
         let mut after = None;
         if rough || self.frame.integrator == Integrator::Euler {
@@ -111,7 +113,7 @@ impl Stepper<'_> {
             (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &frozen, tolerance);
             let energies = measure(self.work, &self.setting, times[1], moving, true);
             let gain = energies.sum() - before.sum();
-            let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+            let gained = self.undriven(&full) && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let mut goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v));
             if goes_on {
@@ -145,7 +147,7 @@ impl Stepper<'_> {
             Some(energies) => energies,
             None => measure(self.work, &self.setting, times[1], moving, false),
         };
-        if self.undriven() {
+        if self.undriven(&full) {
             self.shed(before, moving, &mut stepped);
         } else {
             *self.reserve = 0.0;
@@ -173,8 +175,8 @@ impl Stepper<'_> {
     }
 
     /// Whether nothing from outside does work but gravity and goals that stand still.
-    fn undriven(&self) -> bool {
-        !self.setting.drive.moves() && self.frame.contacts.is_none()
+    fn undriven(&self, contacts: &[Touching]) -> bool {
+        !self.setting.drive.moves() && contacts.is_empty()
     }
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
