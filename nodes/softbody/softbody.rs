@@ -158,6 +158,7 @@ metrics! {
     INVERTED_TETS = "inverted_tets", Unit::None, "Tets inside out.";
     CONTACTS = "contacts", Unit::None, "Contacts that push.";
     DEEPEST_OVERLAP = "deepest_overlap", Unit::Metres, "How far the worst contact is nearer than `thickness`.";
+    LET_GO = "let_go", Unit::None, "Edges of the surface drawn out to over 8 times their length: colliders let them go.";
     GOAL_DISTANCE = "goal_distance", Unit::Metres, "Mean distance of pulled particles to where goals draw them.";
     PINNED = "pinned", Unit::None, "Particles that pins hold or pull; 0: none was within their `radius` at the start.";
     TORN = "torn", Unit::None, "Coupling springs torn since the start.";
@@ -288,7 +289,8 @@ impl Chain for Run {
             let _ = tear(&solving.body, &mut self.state, stretch, NEAR * solving.body.size());
         }
         let far = goals.distance(times[1], on, &self.state.positions);
-        self.said = said(&report, brought, far.unwrap_or(0.0), pinned, &self.state);
+        let let_go = if obstacles.is_empty() { 0 } else { made.let_go(&self.state.positions) };
+        self.said = said(&report, brought, let_go, far.unwrap_or(0.0), pinned, &self.state);
         self.solving = Some(solving);
         Ok(())
     }
@@ -336,7 +338,14 @@ impl Solving {
 }
 
 /// Values in the order of [`METRICS`].
-fn said(report: &Report, reset_energy: f64, goal_distance: f64, pinned: usize, state: &State) -> Vec<f64> {
+fn said(
+    report: &Report,
+    reset_energy: f64,
+    let_go: usize,
+    goal_distance: f64,
+    pinned: usize,
+    state: &State,
+) -> Vec<f64> {
     let torn = state.torn.iter().filter(|torn| **torn).count();
     vec![
         f64::from(report.newton),
@@ -354,6 +363,7 @@ fn said(report: &Report, reset_energy: f64, goal_distance: f64, pinned: usize, s
         f64::from(report.inverted_tets),
         f64::from(report.contacts),
         report.deepest_overlap,
+        let_go as f64,
         goal_distance,
         pinned as f64,
         torn as f64,

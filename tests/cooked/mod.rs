@@ -26,12 +26,12 @@ pub(crate) type Metrics = BTreeMap<String, BTreeMap<String, BTreeMap<Frame, f64>
 
 /// A graph of these nodes, its outputs so many of them, over frames 1…`frames`.
 pub(crate) fn graph(nodes: &str, outputs: &[&str], frames: i64) -> Graph {
-    load(&text(nodes, outputs, frames), outputs).unwrap_or_else(|fault| panic!("{fault}"))
+    load(&text(nodes, outputs, frames), outputs, &[]).unwrap_or_else(|fault| panic!("{fault}"))
 }
 
 /// The first fault of such a graph.
 pub(crate) fn fault(nodes: &str, output: &str) -> Option<String> {
-    load(&text(nodes, &[output], 1), &[output]).err()
+    load(&text(nodes, &[output], 1), &[output], &[]).err()
 }
 
 fn text(nodes: &str, outputs: &[&str], frames: i64) -> String {
@@ -49,8 +49,13 @@ pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
 
 /// As [`cook`], of an example's nodes; and all metrics.
 pub(crate) fn cook_file(example: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
+    cook_file_with(example, outputs, frames, &[])
+}
+
+/// That, with params or controls set anew, each by its key.
+pub(crate) fn cook_file_with(example: &str, outputs: &[&str], frames: i64, set: &[(&str, &str)]) -> (Frames, Metrics) {
     let path = graphs().join(example).join(example).with_extension("json");
-    let graph = load(&fs::read_to_string(path).unwrap(), outputs).unwrap_or_else(|fault| panic!("{fault}"));
+    let graph = load(&fs::read_to_string(path).unwrap(), outputs, set).unwrap_or_else(|fault| panic!("{fault}"));
     cook_graph(&graph, frames)
 }
 
@@ -67,9 +72,10 @@ fn graphs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs")
 }
 
-fn load(text: &str, outputs: &[&str]) -> Result<Graph, String> {
+fn load(text: &str, outputs: &[&str], set: &[(&str, &str)]) -> Result<Graph, String> {
     let folder = graphs().join("bear_wind");
-    let graph = Graph::load(text, &folder, convect::CATALOGUE, &[], &probe);
+    let set: Vec<(String, String)> = set.iter().map(|(key, json)| (key.to_string(), json.to_string())).collect();
+    let graph = Graph::load(text, &folder, convect::CATALOGUE, &set, &probe);
     let mut graph = graph.map_err(|faults| faults[0].to_string())?;
     graph.outputs = outputs.iter().map(|name| output(&graph, name)).collect();
     Ok(graph)

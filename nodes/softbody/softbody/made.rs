@@ -165,6 +165,11 @@ impl Made {
         Body::new(&mesh, &stuff.material(), &self.joints).map_err(refusal)
     }
 
+    /// Edges of the skins that colliders let go with particles at `x`.
+    pub(super) fn let_go(&self, x: &[[f64; 3]]) -> usize {
+        self.skins.iter().map(|skin| skin.count_let_go(x)).sum()
+    }
+
     /// Springs between bodies.
     pub(super) fn joints(&self) -> usize {
         self.joints.len()

@@ -67,13 +67,14 @@ impl Galerkin<'_> {
                 add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
-                    let (block, far, far_anchor) = (&mut blocks[home - first], lever(arms[other]), anchors.at(other));
-                    if anchor.is_none() && far_anchor.is_none() {
+                    let (block, far) = (&mut blocks[home - first], lever(arms[other]));
+                    if anchor.is_none() && anchors.at(other).is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
                     } else {
-                        let h = M3::from_diagonal_element(-alpha) - w * w.transpose();
-                        block.add_product(motion(anchor, mine), &h, motion(far_anchor, far));
+                        for (scale, way) in ways(record) {
+                            block.add(-scale, &self.along(place, way), &self.along(other, way));
+                        }
                     }
                 }
             }
@@ -92,22 +93,27 @@ impl Galerkin<'_> {
     /// A spring inside of a cluster that hangs at `place`.
     #[inline(always)]
     fn add_inside(&self, place: usize, record: &Record, block: &mut Block) {
-        let (alpha, w) = (f64::from(record.alpha), record.along());
         let ends = [place, record.other as usize];
         let anchors = ends.map(|end| self.anchors.at(end));
-        let arms = ends.map(|end| lever(self.arms[end]));
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && anchors == [None; 2] {
-            block.add_turn(alpha, w, arms[0] - arms[1]);
+            let [here, there] = ends.map(|end| lever(self.arms[end]));
+            block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
-        let h = M3::from_diagonal_element(alpha) + w * w.transpose();
-        let motions = [motion(anchors[0], arms[0]), motion(anchors[1], arms[1])];
-        for (i, j, h) in [(0, 0, h), (1, 1, h), (0, 1, -h), (1, 0, -h)] {
-            if !held[i] && !held[j] {
-                block.add_product(motions[i], &h, motions[j]);
-            }
+        for (scale, way) in ways(record) {
+            let [here, there] = ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, way) });
+            let apart = std::array::from_fn(|mode| here[mode] - there[mode]);
+            block.add(scale, &apart, &apart);
         }
+    }
+
+    /// How far the motions of a particle's cluster move it along `way`.
+    #[inline(always)]
+    fn along(&self, place: usize, way: V3) -> [f64; MODES] {
+        let way = self.anchors.at(place).map_or(way, |follows| follows.tr_mul(&way));
+        let turned = lever(self.arms[place]).cross(&way);
+        [way.x, way.y, way.z, turned.x, turned.y, turned.z]
     }
 
     /// What rows resist; between pieces that do not hang together it is left out.
@@ -134,7 +140,7 @@ impl Galerkin<'_> {
     /// How the motions of clusters change a row; none where it lies within one that moves as a whole, as rigid motions
     /// change no volume and no gap.
     fn pushes(&self, rows: &Rows, row: usize) -> Vec<Push> {
-        let Self { layout, system, arms, anchors, .. } = self;
+        let Self { layout, system, anchors, .. } = self;
         let mut pushes: Vec<Push> = Vec::new();
         let home = |place: usize| layout.cluster[place] as usize;
         let places = rows.places(row);
@@ -148,12 +154,7 @@ impl Galerkin<'_> {
                 pushes.push(Push { cluster, along: [0.0; MODES] });
                 pushes.len() - 1
             });
-            let g = anchors.at(place).map_or(g, |way| way.tr_mul(&g));
-            let torque = lever(arms[place]).cross(&g);
-            for axis in 0..3 {
-                pushes[at].along[axis] += g[axis];
-                pushes[at].along[3 + axis] += torque[axis];
-            }
+            pushes[at].along.iter_mut().zip(self.along(place, g)).for_each(|(sum, along)| *sum += along);
         }
         pushes
     }
@@ -163,6 +164,14 @@ impl Galerkin<'_> {
 struct Push {
     cluster: usize,
     along: [f64; MODES],
+}
+
+/// What a spring resists in, each with how much.
+#[inline(always)]
+fn ways(record: &Record) -> impl Iterator<Item = (f64, V3)> {
+    let alpha = f64::from(record.alpha);
+    let alike = [V3::x(), V3::y(), V3::z()].map(|axis| (alpha, axis));
+    std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
 }
 
 /// Writes a cluster's rows as far as the diagonal.
@@ -228,10 +237,15 @@ impl Block {
     #[inline(always)]
     fn add_along(&mut self, s: f64, w: V3, p: V3, q: V3) {
         let (p, q) = (p.cross(&w), q.cross(&w));
-        let left = [w.x, w.y, w.z, p.x, p.y, p.z].map(|x| s * x);
-        let right = [w.x, w.y, w.z, q.x, q.y, q.z];
-        for (row, left) in self.0.iter_mut().zip(left) {
-            row.iter_mut().zip(right).for_each(|(sum, right)| *sum += left * right);
+        self.add(s, &[w.x, w.y, w.z, p.x, p.y, p.z], &[w.x, w.y, w.z, q.x, q.y, q.z]);
+    }
+
+    /// s·p·qᵀ.
+    #[inline(always)]
+    fn add(&mut self, s: f64, p: &[f64; MODES], q: &[f64; MODES]) {
+        for (row, p) in self.0.iter_mut().zip(p) {
+            let left = s * p;
+            row.iter_mut().zip(q).for_each(|(sum, q)| *sum += left * q);
         }
     }
 

@@ -30,6 +30,7 @@ use numerics::tree::{Cuboid, TriangleTree};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::Rub;
 use rayon::prelude::*;
+use skin::LetGo;
 pub use skin::Skin;
 use std::sync::OnceLock;
 use surface::{Moment, Places};
@@ -153,8 +154,9 @@ impl Scene<'_> {
         if !self.obstacles.is_empty() {
             for skin in self.skins {
                 let faces = skin.faces.sweep(&boxes, 0.0);
+                let let_go = skin.let_go(query.from);
                 for obstacle in self.obstacles {
-                    self.against(query, skin, &boxes, &faces, obstacle, &mut seen);
+                    self.against(query, (skin, &let_go), &boxes, &faces, obstacle, &mut seen);
                 }
             }
         }
@@ -202,11 +204,11 @@ impl Scene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// What a skin meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
+    /// What a skin, but for what is let go of it, meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
     fn against(
         &self,
         query: &Query<'_>,
-        skin: &Skin,
+        (skin, let_go): (&Skin, &LetGo),
         boxes: &[Cuboid],
         faces: &BoxTree<'_>,
         obstacle: &Obstacle,
@@ -229,6 +231,7 @@ impl Scene<'_> {
             scene: self,
             query,
             skin,
+            let_go,
             obstacle,
             boxes: [boxes, &still_boxes],
             body: Moving { surface: &skin.surface, poses: &ways },
@@ -257,6 +260,7 @@ struct Meeting<'a> {
     scene: &'a Scene<'a>,
     query: &'a Query<'a>,
     skin: &'a Skin,
+    let_go: &'a LetGo,
     obstacle: &'a Obstacle,
     /// Of particles and of the obstacle's points, on their way.
     boxes: [&'a [Cuboid]; 2],
@@ -295,7 +299,7 @@ impl Meeting<'_> {
         let has_inside = self.obstacle.surface.closed;
         let tell = |(): &mut (), vertices: &[u32], out: &mut Vec<Seen>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for vertex in vertices {
+            for vertex in vertices.iter().filter(|vertex| !self.let_go.has_particle(**vertex)) {
                 tree.meeting(&self.boxes[0][*vertex as usize], &mut faces);
                 let own = &self.boxes[0][*vertex as usize];
                 if faces.is_empty() && !(has_inside && swept::meet(own, &bounds)) {
@@ -339,6 +343,7 @@ impl Meeting<'_> {
             for point in points {
                 let region = swept::wider(&self.boxes[1][*point as usize], self.rules.reach);
                 tree.meeting(&region, &mut faces);
+                faces.retain(|face| !self.let_go.has_face(*face));
                 if faces.is_empty() {
                     continue;
                 }
@@ -362,7 +367,7 @@ impl Meeting<'_> {
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
         let tell = |(): &mut (), edges: &[u32], out: &mut Vec<Seen>| {
             let mut others = Vec::new();
-            for index in edges {
+            for index in edges.iter().filter(|edge| !self.let_go.has_edge(**edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
                 tree.meeting(&swept::around(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {

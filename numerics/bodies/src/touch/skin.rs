@@ -3,8 +3,11 @@
 use super::TouchError;
 use super::near::{Nearest, along};
 use super::obstacle::{check_points, check_triangles};
-use super::surface::{Moment, Surface};
+use super::surface::{Edge, Moment, NONE, Surface};
 use super::swept::Elements;
+
+/// Times as long as at rest, and as the skin's edges are on average, from which on an edge is let go.
+const LONG: f64 = 8.0;
 
 /// A surface of particles, facing outwards.
 #[derive(Clone, Debug)]
@@ -13,6 +16,8 @@ pub struct Skin {
     pub(super) faces: Elements<3>,
     pub(super) edges: Elements<2>,
     rest: Vec<[f64; 3]>,
+    /// Length of its edges at rest, metres.
+    mean: f64,
     /// Particles of the surface within two links of each particle, rising.
     starts: Vec<u32>,
     rings: Vec<u32>,
@@ -36,6 +41,7 @@ impl Skin {
             faces: Elements::new(surface.triangles.clone(), rest),
             edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
             rest: rest.to_vec(),
+            mean: surface.edges.iter().map(|edge| length(edge, rest)).sum::<f64>() / surface.edges.len().max(1) as f64,
             surface,
             starts,
             rings,
@@ -58,6 +64,34 @@ impl Skin {
         Nearest::on(face, at.place(particle), self.surface.corners(&at, face)).distance
     }
 
+    /// What obstacles let go with particles at `x`.
+    pub(super) fn let_go(&self, x: &[[f64; 3]]) -> LetGo {
+        let surface = &self.surface;
+        let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_drawn_out(edge, x)).collect();
+        if !edges.contains(&true) {
+            return LetGo::default();
+        }
+        let (mut faces, mut particles) = (vec![false; surface.triangles.len()], vec![true; self.rest.len()]);
+        for (edge, let_go) in surface.edges.iter().zip(&edges) {
+            if *let_go {
+                edge.faces.iter().filter(|face| **face != NONE).for_each(|face| faces[*face as usize] = true);
+            } else {
+                edge.ends.iter().for_each(|end| particles[*end as usize] = false);
+            }
+        }
+        LetGo { edges, faces, particles }
+    }
+
+    /// How many edges obstacles let go with particles at `x`: those more than eight times as long as at rest, and as edges are
+    /// on average.
+    pub fn count_let_go(&self, x: &[[f64; 3]]) -> usize {
+        self.surface.edges.iter().filter(|edge| self.is_drawn_out(edge, x)).count()
+    }
+
+    fn is_drawn_out(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
+        length(edge, x) > LONG * length(edge, &self.rest).max(self.mean)
+    }
+
     /// How far two edges are apart at rest, metres.
     pub(super) fn rest_between(&self, edge: u32, other: u32) -> f64 {
         let at = Moment::of(&self.rest);
@@ -66,6 +100,37 @@ impl Skin {
         let [s, t] = along([p, q], [a, b]);
         (p.lerp(&q, s) - a.lerp(&b, t)).norm()
     }
+}
+
+/// What of a skin obstacles let go: edges that are drawn out too far to be skin. What a tool has hooked would be drawn out for
+/// ever, as it stays on the side it came from; let go, it comes back.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LetGo {
+    /// By edge; empty where none is.
+    edges: Vec<bool>,
+    /// By triangle: whether one of its edges is.
+    faces: Vec<bool>,
+    /// By particle: whether all its edges are.
+    particles: Vec<bool>,
+}
+
+impl LetGo {
+    pub(super) fn has_edge(&self, edge: u32) -> bool {
+        self.edges.get(edge as usize) == Some(&true)
+    }
+
+    pub(super) fn has_face(&self, face: u32) -> bool {
+        self.faces.get(face as usize) == Some(&true)
+    }
+
+    pub(super) fn has_particle(&self, particle: u32) -> bool {
+        self.particles.get(particle as usize) == Some(&true)
+    }
+}
+
+fn length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
+    let at = Moment::of(places);
+    (at.place(edge.ends[0]) - at.place(edge.ends[1])).norm()
 }
 
 /// Lists of the surface's particles within two links of each of them.

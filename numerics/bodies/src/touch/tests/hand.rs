@@ -184,3 +184,29 @@ fn two_sheets_touch_and_neighbours_do_not() {
         );
     }
 }
+
+/// A spike rises a millimetre below a sheet of two triangles whose far corner is drawn out: over eight times its edges' length
+/// at rest the sheet is let go, and its corner, which hangs on nothing else, too; what is left of it is not.
+#[test]
+fn skin_that_is_drawn_out_is_let_go() {
+    let rest = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
+    let skin = [Skin::new(&rest, &[[0, 2, 1], [1, 2, 3]], &[]).unwrap()];
+    let (points, triangles) = cuboid([0.2, 0.2, 0.2]);
+    let under = |at: [f64; 3]| {
+        let moved: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + at[0], p[1] + at[1] - 0.101, p[2] + at[2]]).collect();
+        Obstacle::new(&triangles, &[pose(0.0, &moved)], 1.0, 0.01, 0.0).unwrap()
+    };
+    for (corner, held) in [(6.0, true), (12.0, false)] {
+        let mut x = rest;
+        x[3] = [corner, 0.0, corner];
+        let middle = 0.25 + corner / 3.0;
+        let obstacles = [under([0.3, 0.0, 0.3]), under([middle, 0.0, middle]), under([corner, 0.0, corner])];
+        let touched = obstacles.each_ref().map(|obstacle| {
+            let scene = Scene { skins: &skin, obstacles: std::slice::from_ref(obstacle), ..Scene::default() };
+            !find(&scene, &x, &x, [0.0, 1.0]).0.is_empty()
+        });
+        assert_eq!(touched, [true, held, held], "drawn out to {corner}");
+        // Both edges that end at the corner.
+        assert_eq!(skin[0].count_let_go(&x), if held { 0 } else { 2 });
+    }
+}
