@@ -84,13 +84,14 @@ impl Stepper<'_> {
         let volumes = self.work.volumes.at(self.setting.body, &z);
         self.work.come_from(&self.setting, h, |first, second| distance(&z, first, second), volumes);
         let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
-        let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0 };
+        let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
         let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts: &[], early: 0.0, spinning: &[], index: 0 };
         let before = OnceCell::new();
         for round in 1..=ROUNDS {
-            solved = sum(solved, self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x));
-            enough.square = solved.enough;
+            let again = self.work.descend(&self.setting, &stage, contacts, enough, self.warm, &mut x);
+            solved = Solved { residual: again.residual, ..sum(solved, again) };
+            (enough.square, enough.first) = (solved.enough, solved.first);
             let changed = reload(contacts, &x, &self.work.v, h, self.setting.body.size).is_some();
             let (mut found, missed) = self.missed(contacts, moving, &x, times);
             let thinned = self.thinned(&x);

@@ -30,6 +30,8 @@ pub(super) struct Enough {
     pub(super) scale: f64,
     /// A residual's square that is enough whatever the first was.
     pub(super) square: f64,
+    /// The square of the residual that the step began with; 0 where it begins here.
+    pub(super) first: f64,
 }
 
 /// The objective at some positions.
@@ -72,18 +74,18 @@ impl Work {
         self.begin(on, contacts);
         let most = if contacts.is_empty() { MOST } else { MOST_TOUCHING };
         let mut solved = Solved::default();
-        let (mut first, mut base, mut slow, mut stuck) = (0.0, Level::default(), false, false);
+        let (mut base, mut slow, mut stuck) = (Level::default(), false, false);
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(on, stage, x, true);
             let now = self.square(&on.body.order.clusters);
             if solved.newton == 0 {
-                first = now;
+                solved.first = if enough.first > 0.0 { enough.first } else { now };
                 let contacts = self.of_contacts(on, stage, x);
                 base = Level { contacts, others: self.of_others(on, stage, x) };
-                solved.enough = enough.square.max(enough.share * enough.share * first.min(enough.scale));
+                solved.enough = enough.square.max(enough.share * enough.share * now.min(enough.scale));
             }
-            solved.residual = if first > 0.0 { (now / first).sqrt() } else { 0.0 };
+            solved.residual = if solved.first > 0.0 { (now / solved.first).sqrt() } else { 0.0 };
             let deep = contacts.iter().any(|contact| contact.too_near(x));
             let wanted = (now > solved.enough && !slow) || deep;
             if !wanted || stuck || solved.newton >= most {

@@ -82,6 +82,8 @@ pub(super) struct Solved {
     pub(super) caps: u32,
     /// Residual at the end ÷ at the start.
     pub(super) residual: f64,
+    /// The square of that at the start.
+    pub(super) first: f64,
     /// Whether the residual rose, or a number is not finite.
     pub(super) failed: bool,
     /// The residual's square that was asked for.

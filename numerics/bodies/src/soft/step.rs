@@ -126,7 +126,7 @@ impl Stepper<'_> {
                 moving.clone_from(&start);
                 let off = stepped.solved.failed || gained;
                 let (again, estimate) = self.euler(moving, times, &mut full, off);
-                let solved = Solved { failed: again.failed, ..sum(stepped.solved, again) };
+                let solved = Solved { failed: again.failed, residual: again.residual, ..sum(stepped.solved, again) };
                 stepped = Stepped { solved, estimate, euler: true, calmed: off, ..Stepped::default() };
                 after = None;
                 *self.unsettled = if goes_on { 0 } else { UNSETTLED };
@@ -345,6 +345,7 @@ pub(super) fn sum(a: Solved, b: Solved) -> Solved {
         cg: a.cg + b.cg,
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
+        first: b.first,
         failed: a.failed || b.failed,
         enough: a.enough.max(b.enough),
         unmet: b.unmet,
