@@ -195,7 +195,7 @@ impl Touching {
     }
 
     /// Σ w·values.
-    fn between(&self, values: &[V3]) -> V3 {
+    pub(super) fn between(&self, values: &[V3]) -> V3 {
         self.sides().fold(V3::zeros(), |sum, (place, weight)| sum + values[place] * weight)
     }
 

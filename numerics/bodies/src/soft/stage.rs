@@ -129,7 +129,8 @@ pub(super) struct Work {
     pub(super) unlike: Vec<(usize, f64)>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
     pub(super) extra: Vec<V3>,
-    /// The group of each piece whose momentum nothing outside but gravity changes, and pieces that nothing touches.
+    /// The group of pieces that hang together by contacts, of each piece in one that is nowhere held; and pieces that nothing
+    /// holds or touches.
     pub(super) groups: Vec<Option<u32>>,
     pub(super) turns: Vec<bool>,
 }
@@ -256,8 +257,8 @@ impl Work {
         let body = on.body;
         self.dx.clear();
         self.dx.resize(x.len(), V3::zeros());
-        let wanted = self.momenta(body);
-        self.shift(body, &wanted);
+        let whole = self.whole(body, stage);
+        self.shift(body, stage, &whole);
         coarse::arms(&body.order.clusters, x, &mut self.arms);
         let anchors = Anchors::new(&self.system);
         let old = warm.factor.len() != self.layout.rows() || warm.spent > OLD;
@@ -298,7 +299,7 @@ impl Work {
         }
         solved.caps += u32::from(!reached.met);
         // Linear solves leave a share of the residual; momentum they may not touch.
-        self.shift(body, &wanted);
+        self.shift(body, stage, &whole);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
         !solved.failed

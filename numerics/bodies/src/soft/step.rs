@@ -11,7 +11,7 @@
 
 use super::V3;
 use super::body::Body;
-use super::contact::Touching;
+use super::contact::{Mode, Touching};
 use super::energy::{Energies, measure};
 use super::frame::{Frame, Integrator};
 use super::guess::{Guess, Rigid};
@@ -28,7 +28,7 @@ const MOST_ACCURATE: u32 = 12;
 /// Share of the tolerance at which Newton's method stops in accurate mode.
 const NEWTON_SHARE: f64 = 0.1;
 /// Share of the energy at hand that a step may gain before it is done again with implicit Euler.
-const GAIN: f64 = 0.1;
+const GAIN: f64 = 0.02;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
 const UNSETTLED: u32 = 4;
 
@@ -113,7 +113,7 @@ impl Stepper<'_> {
             (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &frozen, tolerance);
             let energies = measure(self.work, &self.setting, times[1], moving, true);
             let gain = energies.sum() - before.sum();
-            let gained = self.undriven(&full) && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+            let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let mut goes_on = frozen.iter().all(|contact| contact.goes_on(&moving.x, &moving.v));
             if goes_on {
@@ -147,7 +147,7 @@ impl Stepper<'_> {
             Some(energies) => energies,
             None => measure(self.work, &self.setting, times[1], moving, false),
         };
-        if self.undriven(&full) {
+        if self.undriven() {
             self.shed(before, moving, &mut stepped);
         } else {
             *self.reserve = 0.0;
@@ -174,9 +174,10 @@ impl Stepper<'_> {
         thinned
     }
 
-    /// Whether nothing from outside does work but gravity and goals that stand still.
-    fn undriven(&self, contacts: &[Touching]) -> bool {
-        !self.setting.drive.moves() && contacts.is_empty()
+    /// Whether nothing from outside did work in the step but gravity and goals that stand still: contacts may be near, not
+    /// push.
+    fn undriven(&self) -> bool {
+        !self.setting.drive.moves() && self.work.touches.iter().all(|touch| touch.mode == Mode::Apart)
     }
 
     fn newton(&self, tolerance: Option<f64>) -> Newton {
@@ -292,9 +293,11 @@ impl Stepper<'_> {
     fn shed(&mut self, before: &Energies, moving: &mut Moving, stepped: &mut Stepped) {
         /// Share of the energy that is rounding.
         const ROUNDING: f64 = 1e-9;
+        /// Share of it that what was lost may bring back.
+        const LENT: f64 = 2e-3;
         let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
-        *self.reserve -= gained;
+        *self.reserve = (*self.reserve - gained).min(LENT * after.scale());
         if *self.reserve >= -ROUNDING * before.scale().max(after.scale()) {
             return;
         }
