@@ -83,7 +83,7 @@ impl Stepper<'_> {
         self.pin(&mut x, &mut z, times[1], h);
         let volumes = self.work.volumes.at(self.setting.body, &z);
         self.work.come_from(&self.setting, h, |first, second| distance(&z, first, second), volumes);
-        let scale = if contacts.is_empty() { f64::INFINITY } else { self.scale(&moving.x, &y, contacts, h) };
+        let scale = self.scale(&moving.x, &y, contacts, h);
         let mut enough = Enough { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
         let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts: &[], early: 0.0, spinning: &[], index: 0 };

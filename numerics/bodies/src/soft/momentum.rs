@@ -75,18 +75,25 @@ impl Work {
         let sums = self.sums(body, |place| (self.r[place], inertia[place]));
         let (wanted, mut resisted): (Vec<V3>, Vec<M3>) =
             sums.into_iter().map(|(wanted, inertia)| (wanted, M3::identity() * inertia)).unzip();
-        let mut holds = Vec::new();
-        let known = stage.contacts.iter().zip(&self.touches).zip(&self.drags).enumerate();
-        for (index, ((contact, touch), drag)) in known.filter(|known| known.1.0.1.mode != Mode::Apart) {
-            let weight: f64 = contact.weights.iter().sum();
-            let piece = self.layout.piece[self.layout.cluster[contact.places[0] as usize] as usize];
-            let Some(group) = self.groups[piece as usize].filter(|_| weight.abs() > HELD) else { continue };
-            let ways = contact.resisted(touch, stage.a, drag);
-            let hold = Hold { group: group as usize, contact: index, weight, ways };
-            hold.ways().for_each(|way| resisted[hold.group] += way * way.transpose() * (weight * weight));
-            holds.push(hold);
+        let holds = self.holds(stage);
+        for hold in &holds {
+            let shift = |way: &V3| way * way.transpose() * (hold.weight * hold.weight);
+            hold.ways().for_each(|way| resisted[hold.group] += shift(way));
         }
         Whole { wanted, resisted, holds }
+    }
+
+    /// What obstacles hold groups by.
+    fn holds(&self, stage: &Stage<'_>) -> Vec<Hold> {
+        let known = stage.contacts.iter().zip(&self.touches).zip(&self.drags).enumerate();
+        let holds =
+            known.filter(|known| known.1.0.1.mode != Mode::Apart).filter_map(|(index, ((contact, touch), drag))| {
+                let weight: f64 = contact.weights.iter().sum();
+                let piece = self.layout.piece[self.layout.cluster[contact.places[0] as usize] as usize];
+                let group = self.groups[piece as usize].filter(|_| weight.abs() > HELD)? as usize;
+                Some(Hold { group, contact: index, weight, ways: contact.resisted(touch, stage.a, drag) })
+            });
+        holds.collect()
     }
 
     fn sums(&self, body: &Body, of: impl Fn(usize) -> (V3, f64) + Sync) -> Vec<(V3, f64)> {
@@ -132,29 +139,48 @@ impl Work {
         }
     }
 
-    /// Turns each free piece as a whole so that it has the angular momentum of the stage's equation, whatever linear solves
-    /// left: springs and volumes do not feel it.
-    pub(super) fn turn(&self, body: &Body, x: &mut [V3]) {
-        /// Share of a piece's inertia below which it has none about an axis.
+    /// Turns each group as a whole so that it has the angular momentum of the stage's equation, whatever linear solves left:
+    /// springs and volumes do not feel it, and contacts with obstacles are counted for what they resist.
+    pub(super) fn turn(&self, body: &Body, stage: &Stage<'_>, x: &mut [V3]) {
+        /// Share of a group's inertia below which it has none about an axis.
         const NOTHING: f64 = 1e-9;
         let inertia = &self.system.inertia;
-        for (_, piece) in body.order.pieces.iter().enumerate().filter(|(index, _)| self.turns[*index]) {
-            let places = body.places(piece);
-            let (sum, mass) = places.clone().fold((V3::zeros(), 0.0), |(sum, mass), place| {
-                (sum + x[place] * inertia[place], mass + inertia[place])
-            });
-            let middle = sum / mass;
-            let (mut torque, mut tensor) = (V3::zeros(), M3::zeros());
-            for place in places.clone() {
-                let arm = x[place] - middle;
-                torque += arm.cross(&self.r[place]);
-                tensor += (M3::identity() * arm.norm_squared() - arm * arm.transpose()) * inertia[place];
+        let members = || {
+            let grouped = body.order.pieces.iter().zip(&self.groups);
+            let grouped = grouped.filter_map(|(piece, group)| Some(((*group)? as usize, piece)));
+            grouped.flat_map(|(group, piece)| body.places(piece).map(move |place| (group, place)))
+        };
+        let count = body.order.pieces.len();
+        let mut middles = vec![(V3::zeros(), 0.0); count];
+        for (group, place) in members() {
+            middles[group].0 += x[place] * inertia[place];
+            middles[group].1 += inertia[place];
+        }
+        let middles: Vec<V3> = middles.into_iter().map(|(sum, mass)| sum / mass).collect();
+        let mut turned = vec![(V3::zeros(), M3::zeros()); count];
+        for (group, place) in members() {
+            let arm = x[place] - middles[group];
+            let (torque, tensor) = &mut turned[group];
+            *torque += arm.cross(&self.r[place]);
+            *tensor += (M3::identity() * arm.norm_squared() - arm * arm.transpose()) * inertia[place];
+        }
+        turned.iter_mut().for_each(|(_, tensor)| *tensor += M3::identity() * (NOTHING * tensor.trace()));
+        for hold in self.holds(stage) {
+            let sides = stage.contacts[hold.contact].sides();
+            let arm = sides.fold(V3::zeros(), |sum, (place, weight)| sum + (x[place] - middles[hold.group]) * weight);
+            for way in hold.ways() {
+                let lever = arm.cross(way);
+                turned[hold.group].1 += lever * lever.transpose();
             }
-            tensor += M3::identity() * (NOTHING * tensor.trace());
-            let Some(angle) = tensor.try_inverse().map(|inverse| inverse * torque) else { continue };
-            if angle.iter().all(|x| x.is_finite()) {
-                let turn = Turn::by(angle);
-                x[places].iter_mut().for_each(|x| *x = middle + turn.apply(*x - middle));
+        }
+        let turn = |(torque, tensor): &(V3, M3)| {
+            let angle = tensor.cholesky()?.solve(torque);
+            angle.iter().all(|x| x.is_finite()).then(|| Turn::by(angle))
+        };
+        let turns: Vec<Option<Turn>> = turned.iter().map(turn).collect();
+        for (group, place) in members() {
+            if let Some(turn) = &turns[group] {
+                x[place] = middles[group] + turn.apply(x[place] - middles[group]);
             }
         }
     }

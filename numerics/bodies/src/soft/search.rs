@@ -110,8 +110,26 @@ impl Work {
                 slow = false;
             }
         }
-        self.turn(on.body, x);
+        let stage = &Stage { contacts: &*contacts, ..*stage };
+        self.turn_downhill(on, stage, base, x);
         solved
+    }
+
+    /// Turns groups as wholes, if that does not lead higher than `base`: contacts that were open may close.
+    fn turn_downhill(&mut self, on: &Setting<'_>, stage: &Stage<'_>, base: Level, x: &mut [V3]) {
+        let mut turned = x.to_vec();
+        self.turn(on.body, stage, &mut turned);
+        if turned == x {
+            return;
+        }
+        let contacts = self.of_contacts(on, stage, &turned);
+        let level = Level { contacts, others: self.of_others(on, stage, &turned) };
+        self.measured = level.sum() <= base.sum() + ROUNDING * base.sum().abs();
+        if self.measured {
+            x.copy_from_slice(&turned);
+        } else {
+            velocities(&on.body.order.clusters, x, stage, &mut self.v);
+        }
     }
 
     /// What all but contacts count in what the stage makes least, ½(x − y)ᵀM(x − y) + a²·(energies), at positions that

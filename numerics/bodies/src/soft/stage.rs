@@ -171,7 +171,7 @@ impl Work {
     ) -> Solved {
         self.begin(on, stage.contacts);
         let solved = self.iterate(on, stage, newton, warm, x);
-        self.turn(on.body, x);
+        self.turn(on.body, stage, x);
         solved
     }
 

@@ -28,7 +28,7 @@ const MOST_ACCURATE: u32 = 12;
 /// Share of the tolerance at which Newton's method stops in accurate mode.
 const NEWTON_SHARE: f64 = 0.1;
 /// Share of the energy at hand that a step may gain before it is done again with implicit Euler.
-const GAIN: f64 = 0.02;
+const GAIN: f64 = 0.005;
 /// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
 const UNSETTLED: u32 = 4;
 

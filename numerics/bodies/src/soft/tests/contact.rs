@@ -295,7 +295,7 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
 
     let mut state = State::at_rest(&body);
     state.velocities[lower as usize..].iter_mut().for_each(|v| *v = [0.0, -1.0, 0.0]);
-    let before = momentum(&body, &state);
+    let (before, turning) = (momentum(&body, &state), angular_momentum(&body, &state));
     let mut solver = Solver::new(&body);
     let frame = Frame { gravity: [0.0; 3], contacts: Some(&stack), ..Frame::default() };
     let mut touched = 0;
@@ -308,6 +308,8 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
     assert!(touched > 0);
     let after = momentum(&body, &state);
     assert!((after - before).norm() < 1e-6 * before.norm(), "{before} became {after}");
+    let after = angular_momentum(&body, &state);
+    assert!((after - turning).norm() < 1e-2 * turning.norm(), "{turning} became {after}");
 
     let ground = ground(0.5);
     let both = Both(&ground, &stack);

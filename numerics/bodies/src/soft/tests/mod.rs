@@ -61,6 +61,12 @@ fn momentum(body: &Body, state: &State) -> V3 {
     each.fold(V3::zeros(), |sum, (v, mass)| sum + V3::from(*v) * mass)
 }
 
+/// About the origin.
+fn angular_momentum(body: &Body, state: &State) -> V3 {
+    let moving = state.positions.iter().zip(&state.velocities).zip(body.masses());
+    moving.map(|((x, v), mass)| V3::from(*x).cross(&V3::from(*v)) * mass).sum()
+}
+
 fn random(seed: u64, index: usize) -> V3 {
     let key = Key::new(seed).of(index as u64);
     V3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)

@@ -205,3 +205,31 @@ fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume(
     let one = whole(1, false);
     assert!(one == whole(3, false) && one == whole(2, true));
 }
+
+/// A corner beyond a plate hangs on it, on the side it came to; where that draws it out over eight times the length of its
+/// edges it is let go and comes home.
+#[test]
+fn a_corner_beyond_a_plate_hangs_on_it_unless_that_draws_it_out_too_far() {
+    let (side, thick) = (0.1, 0.02);
+    let (points, tets, faces) = block([3, 3, 3], side, [0.0; 3]);
+    let body = body(&points, &tets, 1e4);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let corner = points.iter().position(|p| p.iter().all(|x| *x > 2.9 * side)).unwrap();
+    for (high, hangs) in [(0.5, true), (1.5, false)] {
+        let (mut plate, triangles) = cuboid([2.0, thick, 2.0]);
+        plate.iter_mut().for_each(|p| p[1] += high - 0.5 * thick);
+        let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, THICKNESS, 0.5).unwrap()];
+        let scene = Scene { skins: &skins, obstacles: &obstacles, ..Scene::default() };
+        let frame = Frame { contacts: Some(&scene), seconds: FRAME, gravity: [0.0; 3], drag: 4.0, ..Frame::default() };
+        let mut state = State::at_rest(&body);
+        state.positions[corner][1] = high + 0.1;
+        assert_eq!(skins[0].count_let_go(&state.positions) == 0, hangs);
+        let mut solver = Solver::new(&body);
+        for _ in 0..48 {
+            let _ = solver.step(&body, &mut state, &frame);
+        }
+        let at = state.positions[corner][1];
+        assert_eq!(at > high, hangs, "beyond {high} m, then at {at} m");
+        assert_eq!(skins[0].count_let_go(&state.positions), 0);
+    }
+}
