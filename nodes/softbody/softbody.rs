@@ -171,7 +171,9 @@ pub static NODE: Node = Node::new(
     1,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, rub and press against colliders, the ground, each \
      other and themselves, keep their volume and, where they are plastic, their dents; goals direct them and pins hold \
-     them. Stiffness does not hang on how finely they are cut, and no setting makes them blow up.",
+     them. Stiffness does not hang on how finely they are cut, and none blows up, stiff or soft, \
+     light beside heavy, from any start. Inner particles collide with nothing: dough of a few hundred pascals and less may \
+     fall out of its skin.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)

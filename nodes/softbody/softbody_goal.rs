@@ -115,7 +115,7 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
     };
     Err(Error::refused(fact).hint(
         "move the points of the mesh that comes out of Tetrahedralize beside the tets: where the surface was repaired, \
-         it is not the one that went in",
+         it is not the one that went in, and one that was mirrored has its faces turned round",
     ))
 }
 
