@@ -103,7 +103,7 @@ impl Skin {
 }
 
 /// What of a skin obstacles let go: edges that are drawn out too far to be skin. What a tool has hooked would be drawn out for
-/// ever, as it stays on the side it came from; let go, it comes back.
+/// ever, as it stays on the side it came from; let go, it is drawn out no further.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LetGo {
     /// By edge; empty where none is.
