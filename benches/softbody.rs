@@ -14,12 +14,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use bodies::tets::cubes;
 use engine::cook::{Delivered, Engine, Report, Settings};
 use engine::geometry::{Component, Geometry};
 use engine::graph::{Body, Graph, probe};
 use engine::plan::Request;
 use engine::time::Frame;
-use numerics::tets::cubes;
 use timing::Figures;
 
 mod timing;

@@ -1,7 +1,7 @@
 //! Curve_Attach: curves follow the skin that they grew on.
 //!
 //! Each root is bound to its nearest point of `rest_skin` and to its distance from it, and from there carried to `skin`
-//! ([`numerics::attach`]): the whole curve turns about it by the rotation nearest to how the skin around it has
+//! ([`curves::attach`]): the whole curve turns about it by the rotation nearest to how the skin around it has
 //! deformed, and moves with it. So curves stay as long as they are and neighbours turn alike on either side of an edge,
 //! however the skin stretches. What Transform turns is turned: `v`, `N`, `orient`. `Pref`, where the curves have none,
 //! becomes what they were before, so that what is sampled at rest sticks to them.
@@ -11,8 +11,8 @@
 //! its curves inwards. The motion of the skin is not added to `v`. The binding is kept as long as the roots and `rest_skin`
 //! stand still, so curves that already move at rest cost no more.
 
+use curves::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
 use engine::prelude::*;
-use numerics::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
 
 use crate::shared::faces::{counted, same_faces};
 use crate::shared::kept::Roots;

@@ -2,7 +2,7 @@
 //!
 //! At the scene's first frame roots are spread over the skin as Curve_Scatter does it, and each hair is bound to the
 //! guides whose roots are nearest, with weights that are 0 before a guide is exchanged for another
-//! ([`numerics::guides`]). Both are kept from then on, so nothing hangs on where guides are blown: a hair is at every
+//! ([`curves::guides`]). Both are kept from then on, so nothing hangs on where guides are blown: a hair is at every
 //! frame the same mix of its guides' shapes as they are now, and any frame cooks alone. Shapes are mixed in the frames
 //! of the roots: on a curved skin a hair stands on it as its guides do, and where the skin moves, frames turn as in
 //! Curve_Attach. Roots stay on their faces. A hair at a guide's root is that guide.
@@ -11,10 +11,10 @@
 //! heaviest guide. `curve_id` is the hair's place in the endless list of roots, `Pref` the hair at the scene's first
 //! frame, `uvw` the skin's where it has one.
 
+use curves::attach::{Binding, Pose};
+use curves::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
+use curves::scatter::Spot;
 use engine::prelude::*;
-use numerics::attach::{Binding, Pose};
-use numerics::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
-use numerics::scatter::Spot;
 
 use crate::shared::kept::{Array, Roots};
 use crate::shared::planting::{self, Planting, at_roots, same_rows};

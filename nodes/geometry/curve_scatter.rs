@@ -1,6 +1,6 @@
 //! Curve_Scatter: straight blades of grass or hair, spread evenly over a skin.
 //!
-//! Roots are chosen on the skin as it is at the scene's first frame ([`numerics::scatter`]) and stay on their faces
+//! Roots are chosen on the skin as it is at the scene's first frame ([`curves::scatter`]) and stay on their faces
 //! while it moves, so blades neither pop nor slide; there, too, `Pref` is taken and the mask read. The places are the
 //! first of one endless list: a higher density keeps every blade and adds some between, and a mask keeps fewer of the
 //! first where it is lower, so that it thins evenly. A blade's place in the list is its `curve_id`, which its length and
@@ -9,9 +9,9 @@
 //! Each frame of a moving skin costs as much as the first; Curve_Attach moves curves that were grown on a still one.
 //! Distances are straight through space: nearby folds that face the same way share their room.
 
+use curves::scatter::{Blade, Spot, grow, vertex_normals};
 use engine::prelude::*;
 use numerics::random::Key;
-use numerics::scatter::{Blade, Spot, grow, vertex_normals};
 
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 

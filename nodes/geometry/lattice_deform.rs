@@ -1,7 +1,7 @@
 //! Lattice_Deform: space is a block of jelly, and control points in it are pulled about.
 //!
 //! R2 shapes liquids with "lattice deformers", and a goal shape of a soft body (R1) has to have the faces of the body's
-//! surface: a lattice moves points and nothing else. The map is Sederberg and Parry's ([`numerics::lattice`]): Bernstein
+//! surface: a lattice moves points and nothing else. The map is Sederberg and Parry's ([`curves::lattice`]): Bernstein
 //! polynomials over the whole box, or tents over its cells. Offsets, not places, are set and keyed, so what is not
 //! mentioned is not moved.
 //!
@@ -13,9 +13,9 @@
 //!   what becomes of space in the middle of its points. `width`, `thickness` and all else stay as they are.
 //! * The motion of keyed offsets is not added to `v`. A volume's grid lies along the axes: it is refused.
 
+use curves::lattice::{Basis as Shares, Lattice, Matrix, Moved, Outside as Beyond};
+use curves::lattice::{control_points, turn_normals, turn_orientations, turn_vectors};
 use engine::prelude::*;
-use numerics::lattice::{Basis as Shares, Lattice, Matrix, Moved, Outside as Beyond};
-use numerics::lattice::{control_points, turn_normals, turn_orientations, turn_vectors};
 use numerics::volume;
 use std::sync::Arc;
 

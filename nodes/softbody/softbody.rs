@@ -1,8 +1,8 @@
 //! Softbody: dough that is pounded, rolled and directed, an egg that cracks open.
 //!
 //! R1: "mass-spring systems" on Delaunay tetrahedra, with collisions, goal shapes for "the internal particles of the dough",
-//! constraints that are animated, and springs that couple the yolk with the white. The solver is [`bodies::soft`], contacts
-//! are found by [`bodies::touch`].
+//! constraints that are animated, and springs that couple the yolk with the white. The solver is [`bodies::mass_spring`], contacts
+//! are found by [`bodies::collision`].
 //!
 //! Departures, and what R leaves open:
 //! * Springs alone let bodies turn inside out and lose volume: pressures keep it, by `volume`.
@@ -13,8 +13,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bodies::soft::{Body, Frame as Step, Integrator, Plasticity, Report, Solver, State, flow, reset, tear};
-use bodies::touch::{Ground, Rub, Scene};
+use bodies::collision::{Ground, Rub, Scene};
+use bodies::mass_spring::{Body, Frame as Step, Integrator, Plasticity, Report, Solver, State, flow, reset, tear};
 use engine::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -3,14 +3,14 @@
 //! R1: "we only directed the internal particles of the dough to match the 'internal' goal shapes. This made the surface
 //! move freely … and respond to collisions". R does not say where internal goal shapes come from. Here an artist shapes
 //! the surface, and its inside follows as the static equilibrium of an elastic body whose surface is held there
-//! ([`numerics::goals`]): the cotangent Laplacian of the tets, which turns, stretches and shears the inside exactly as an
+//! ([`bodies::goals`]): the cotangent Laplacian of the tets, which turns, stretches and shears the inside exactly as an
 //! affine change of the surface does. Springs would leave a grain of their own in it.
 //!
 //! The shape has the points of the body's surface, in their order: the surface that comes out of Tetrahedralize, moved by
 //! Lattice_Deform or modelled. Where a body brings its surface along, faces are compared too; else points are counted.
 
+use bodies::goals::{Goal, Held, Limits, goal};
 use engine::prelude::*;
-use numerics::goals::{Goal, Held, Limits, goal};
 
 use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, SURFACE_POINT};
 

@@ -1,7 +1,7 @@
 //! Tetrahedralize: closed surfaces as bodies of tets.
 //!
 //! R1: "create a Delaunay tetrahedralization of our input surface and convert the internal nodes and edges into internal
-//! particles and springs", for "an unbiased set of springs that cover the volume". The making is in [`numerics::tets`].
+//! particles and springs", for "an unbiased set of springs that cover the volume". The making is in [`bodies::tets`].
 //!
 //! What R leaves open:
 //! * R's internal nodes come from nowhere in particular. Here they are a body-centred cubic lattice at the surface's mean
@@ -10,11 +10,11 @@
 //! * A closed shell within another is the wall of a cavity, and one within that a body again: the white of an egg ends
 //!   where the yolk begins. Inside is what the surface winds around once.
 //! * A surface's edge may be none of the tets'. No list of those is kept: the surface that rides along has the edges, and
-//!   [`numerics::tets::missing_edges`] tells which the tets lack, so that they cannot fall out of step.
+//!   [`bodies::tets::missing_edges`] tells which the tets lack, so that they cannot fall out of step.
 //! * Flat tets, whose volume says nothing, stay, as their edges are good springs, and are marked `sliver`.
 
+use bodies::tets::{Closed, Fault, Fill, Side, Solid, Surface};
 use engine::prelude::*;
-use numerics::tets::{Closed, Fault, Fill, Side, Solid, Surface};
 
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
 

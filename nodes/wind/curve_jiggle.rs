@@ -14,10 +14,10 @@
 //!   that face's rigid motion carries the swing and its target along, and only the rest of the motion is lagged.
 //! * While `blend` is 0 or `ramp` nowhere above 0 nothing swings: when they rise, curves start from rest.
 
-use engine::prelude::*;
-use numerics::jiggle::{
+use curves::jiggle::{
     Carry, Drag as SpringDrag, Frame as FaceFrame, Jiggle, MASKED, Roots, Spring, steps_to_forget, with_lengths_between,
 };
+use engine::prelude::*;
 use numerics::ramp::Ramp;
 use std::f64::consts::PI;
 use std::sync::Arc;

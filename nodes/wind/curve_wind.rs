@@ -11,8 +11,8 @@
 //! * `blend` turns each segment back towards where it came from, so that half a wind keeps lengths too.
 
 use crate::shared::direction::unit;
+use curves::wind_bend::{Bend, BendNoise, Mode as BendMode, bend};
 use engine::prelude::*;
-use numerics::bend::{Bend, BendNoise, Mode as BendMode, bend};
 use numerics::noise::{Field, Kind as NoiseKind};
 use numerics::ramp::Ramp;
 use std::sync::Arc;

@@ -16,8 +16,8 @@
 
 use std::sync::Arc;
 
+use curves::collide::{Collide, Method as Turn, Scaled, at_rest, collide};
 use engine::prelude::*;
-use numerics::collide::{Collide, Method as Turn, Scaled, at_rest, collide};
 use numerics::tree::TriangleTree;
 
 use crate::shared::surface::{Surface, tree};

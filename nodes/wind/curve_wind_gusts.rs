@@ -14,8 +14,8 @@
 
 use crate::shared::direction::unit;
 use crate::shared::gust_control;
+use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, feel};
 use engine::prelude::*;
-use numerics::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, feel};
 use numerics::ramp::Ramp;
 use std::collections::BTreeMap;
 use std::sync::Arc;

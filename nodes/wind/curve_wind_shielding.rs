@@ -6,7 +6,7 @@
 //! Departures:
 //! * W scales the envelope *by* alpha · `shield`, which calms the exposed side. Its first sentence and figure 1 calm the
 //!   lee, and so do we.
-//! * Rays are cast from the CV upwind, in a frame that looks along the wind ([`numerics::shield`]): a far offset costs
+//! * Rays are cast from the CV upwind, in a frame that looks along the wind ([`curves::shield`]): a far offset costs
 //!   neither precision nor time. The skin that a CV lies on is not its own shelter, the far side of a body is.
 //! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through a
 //!   cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
@@ -15,9 +15,9 @@
 
 use std::sync::Arc;
 
+use curves::shield::{Collider, Neighbours, Shield, shield};
 use engine::geometry::Triangles;
 use engine::prelude::*;
-use numerics::shield::{Collider, Neighbours, Shield, shield};
 use numerics::tree::TriangleTree;
 
 use crate::shared::surface::tree;

@@ -10,9 +10,9 @@
 //! * `strength` may be negative: a place of calm within a gust.
 
 use crate::shared::gust_control;
+use curves::gusts::{self, outline};
 use engine::prelude::*;
 use numerics::affine::Affine;
-use numerics::gusts::{self, outline};
 use numerics::ramp::Ramp;
 use std::sync::Arc;
 
@@ -82,9 +82,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use curves::gusts::{Gusts, feel};
     use engine::param::{Source, Value};
     use engine::testing::{Bench, Tasted, bench, conforms};
-    use numerics::gusts::{Gusts, feel};
     use numerics::ramp::Interpolation;
 
     fn degrees(x: f64, y: f64, z: f64) -> Turn {

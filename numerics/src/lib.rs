@@ -1,4 +1,5 @@
-//! Numerics of convect: plain slices in, plain slices out; knows no node and no geometry.
+//! What all kernels stand on: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, triangle trees and
+//! shapes; plain slices in, plain slices out; knows no node and no geometry.
 //!
 //! Promise: the same bits on any x86-64 or aarch64 CPU and for any number of threads. Sums have a
 //! fixed order, products and sums are never fused, transcendental functions are our own.
@@ -12,24 +13,12 @@
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod affine;
-pub mod attach;
-pub mod bend;
-pub mod carry;
-pub mod collide;
-pub mod goals;
-pub mod guides;
-pub mod gusts;
-pub mod jiggle;
 pub mod lanes;
-pub mod lattice;
 pub mod noise;
 pub mod ramp;
 pub mod random;
-pub mod scatter;
 pub mod shapes;
-pub mod shield;
 pub mod simd;
-pub mod tets;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

@@ -138,7 +138,7 @@ impl Ramp {
 
     /// [`Ramp::eval`] on every lane.
     #[inline(always)]
-    pub(crate) fn eval_lanes(&self, at: &F32x16) -> F32x16 {
+    pub fn eval_lanes(&self, at: &F32x16) -> F32x16 {
         if self.keys.len() > FEW_KEYS {
             return F32x16::from_fn(|lane| self.eval(at.0[lane]));
         }

@@ -22,7 +22,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
 
 /// [`sin_cos`] on every lane. Two loops: the first's f64 would halve the lanes of the second.
 #[inline(always)]
-pub(crate) fn sin_cos_lanes(x: &F32x16) -> (F32x16, F32x16) {
+pub fn sin_cos_lanes(x: &F32x16) -> (F32x16, F32x16) {
     let [mut r, mut sine, mut cosine] = [F32x16::splat(0.0); 3];
     let mut quarters = [0; LANES];
     for lane in 0..LANES {

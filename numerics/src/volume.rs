@@ -12,7 +12,7 @@ const CHUNK: usize = 4096;
 type Vec3 = [f64; 3];
 
 /// Six times the volume of a tet, its corner `a` the origin.
-pub(crate) fn six_volumes([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
+pub fn six_volumes([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
     triple(from(a, b), from(a, c), from(a, d))
 }
 

@@ -1,8 +1,8 @@
 //! Where curves grow on a skin: what Curve_Scatter and Curve_Interpolate have in common.
 
+use curves::scatter::{Spot, Surface};
 use engine::prelude::*;
 use numerics::random::Key;
-use numerics::scatter::{Spot, Surface};
 
 /// At most this many CVs: with `Pref` and `uvw`, 2.4 gigabytes.
 const MOST_CVS: f64 = (1_u32 << 26) as f64;

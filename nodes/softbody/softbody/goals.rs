@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use bodies::soft;
+use bodies::mass_spring;
 use engine::prelude::*;
 
 use super::GoalOn;
@@ -69,7 +69,7 @@ impl<'a> Goals<'a> {
     }
 
     /// Adds what pulls in a step between two frames.
-    pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<soft::Goal>) {
+    pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<mass_spring::Goal>) {
         for (wire, particles) in self.made.wires.iter().enumerate() {
             let Some(now) = self.drawn(wire, times[1]) else { continue };
             let before = self.drawn(wire, times[0]);
@@ -79,7 +79,7 @@ impl<'a> Goals<'a> {
                 let to = self.place(&now, particle, point);
                 let from = before.as_ref().map_or(to, |before| self.place(before, particle, point));
                 let between = [from, to];
-                out.push(soft::Goal { particle: particle as u32, between, strength: now.strength, damping });
+                out.push(mass_spring::Goal { particle: particle as u32, between, strength: now.strength, damping });
             }
         }
     }

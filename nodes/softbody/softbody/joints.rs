@@ -4,7 +4,7 @@
 //! those is seen by where surfaces face: a particle is joined with the nearest particles of other bodies within the radius
 //! that it sees outside of its own surface and that see it outside of theirs, or both inside where surfaces overlap.
 
-use bodies::soft::Spring;
+use bodies::mass_spring::Spring;
 
 /// Springs that a particle asks for, at most.
 const MOST: usize = 4;

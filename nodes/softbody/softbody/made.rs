@@ -1,10 +1,10 @@
 //! What is made of the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
 
-use bodies::soft::{Body, BodyError, Material, Mesh, Scaled, Spring};
-use bodies::touch::Skin;
+use bodies::carry::{Carrier, carry};
+use bodies::collision::Skin;
+use bodies::mass_spring::{Body, BodyError, Material, Mesh, Scaled, Spring};
+use bodies::tets::{boundary, edges, missing_edges};
 use engine::prelude::*;
-use numerics::carry::{Carrier, carry};
-use numerics::tets::{boundary, edges, missing_edges};
 
 use super::joints::{Couple, couple};
 use super::pins::{Hold, holds};

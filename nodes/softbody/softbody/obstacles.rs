@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bodies::touch::{Obstacle, Pose};
+use bodies::collision::{Obstacle, Pose};
 use engine::prelude::*;
 
 /// What bodies cannot pass in a step of `seconds` whose `samples` are the wires at rising times.

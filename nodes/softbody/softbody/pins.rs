@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bodies::soft::{Goal, Pin};
+use bodies::mass_spring::{Goal, Pin};
 use engine::prelude::*;
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};

@@ -1,7 +1,7 @@
 use super::*;
+use bodies::tets::{Closed, Fill, Surface};
 use engine::testing::{Bench, bench, conformance};
 use numerics::shapes::{self, Polygons};
-use numerics::tets::{Closed, Fill, Surface};
 
 type Map = fn([f64; 3]) -> [f64; 3];
 

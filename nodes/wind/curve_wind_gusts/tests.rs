@@ -1,6 +1,6 @@
 use super::*;
+use curves::gusts::{Shape, outline};
 use engine::testing::{Bench, Tasted, bench, conformance};
-use numerics::gusts::{Shape, outline};
 use numerics::ramp::Interpolation;
 
 fn span(low: f32, high: f32) -> Span {

@@ -6,8 +6,8 @@
 //! inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one a point from the run's first on: x, y, and what
 //! joins them (0 linear, 1 smooth, 2 constant). Once the keys are through, points repeat the last.
 
+use curves::gusts::{AXIS_ROWS, Control, Shape};
 use engine::prelude::*;
-use numerics::gusts::{AXIS_ROWS, Control, Shape};
 use numerics::ramp::{Interpolation, Ramp};
 
 pub(crate) const POINTS: Attr<i32> = Attr::point("gust_points");

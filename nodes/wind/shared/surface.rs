@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use curves::collide::{Skin, normals};
 use engine::geometry::{Component, Triangles};
-use numerics::collide::{Skin, normals};
 use numerics::tree::TriangleTree;
 
 /// The tree of a mesh's triangles.

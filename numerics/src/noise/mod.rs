@@ -80,7 +80,7 @@ impl Field {
 
     /// [`Field::at`] on every lane; an axis an array.
     #[inline(always)]
-    pub(crate) fn at_lanes(&self, points: &[[f64; LANES]; 3]) -> Lanes<3> {
+    pub fn at_lanes(&self, points: &[[f64; LANES]; 3]) -> Lanes<3> {
         let mut sum = [F32x16::splat(0.0); 3];
         for octave in &self.octaves {
             let points = Points::at(points, octave.scale);
@@ -131,7 +131,7 @@ pub fn noise3(seed: u32, point: [f64; 3]) -> f32 {
 /// One octave of scalar gradient noise on sixteen points, counted in cells, within ±2²² of them: that
 /// of [`noise3`] but for the rounding of f32.
 #[inline(always)]
-pub(crate) fn bumps(salt: u32, points: &Lanes<3>) -> F32x16 {
+pub fn bumps(salt: u32, points: &Lanes<3>) -> F32x16 {
     let mut out = F32x16::splat(0.0);
     for lane in 0..LANES {
         out.0[lane] = perlin::noise(Point::near(get(points, lane)), salt)[0];

@@ -133,7 +133,7 @@ impl Boxes {
 impl Block {
     /// The corners of a lane's triangle as seen from `p`.
     #[inline(always)]
-    pub(crate) fn around(&self, lane: usize, p: Vec3) -> [Vec3; 3] {
+    pub fn around(&self, lane: usize, p: Vec3) -> [Vec3; 3] {
         let [a, b, c] = &self.corners;
         [sub(get(a, lane), p), sub(get(b, lane), p), sub(get(c, lane), p)]
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use bodies::soft::Integrator;
+use bodies::mass_spring::Integrator;
 use numerics::random::Key;
 
 use super::*;

@@ -10,7 +10,7 @@ mod settled;
 mod springs;
 mod touch;
 
-use bodies::soft::{Body, Frame, Material, Mesh, Report, Scaled, Solver, Spring, State};
+use bodies::mass_spring::{Body, Frame, Material, Mesh, Report, Scaled, Solver, Spring, State};
 
 use super::laws::{Figure, hold, storage};
 use super::{distance, shapes};
@@ -34,7 +34,7 @@ const BARE: Frame<'static> = Frame {
     goals: &[],
     pins: &[],
     contacts: None,
-    integrator: bodies::soft::Integrator::Default,
+    integrator: bodies::mass_spring::Integrator::Default,
     substeps: 0,
     rough: false,
 };

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use bodies::soft::Integrator;
+use bodies::mass_spring::Integrator;
 
 use super::*;
 
@@ -98,7 +98,7 @@ fn chain(light: f64) -> f64 {
     let body = Body::of_springs(&points, &[&[1.0], &masses[..]].concat(), &springs).unwrap();
     let mut state = State::at_rest(&body);
     (0..COUNT).for_each(|i| state.positions[i + 1][0] += amplitude * u[i]);
-    let pins = [bodies::soft::Pin { particle: 0, between: [[0.0; 3]; 2] }];
+    let pins = [bodies::mass_spring::Pin { particle: 0, between: [[0.0; 3]; 2] }];
     let frame = Frame { seconds: TAU / slowest.sqrt() / 200.0, pins: &pins, ..BARE };
     let mut solver = Solver::new(&body);
     largest((1..=200).map(|step| {

@@ -1,6 +1,6 @@
 //! Straight curves in a wind without noise.
 
-use numerics::bend::{Bend, Mode, bend};
+use curves::wind_bend::{Bend, Mode, bend};
 use numerics::ramp::Ramp;
 
 use super::{Figure, storage};

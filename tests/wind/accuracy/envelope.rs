@@ -1,9 +1,9 @@
 //! Gusts and shelter: where the wind is let in.
 
+use curves::shield::{Collider, Shield, shield};
 use engine::geometry::ENVELOPE;
 use numerics::random::Key;
 use numerics::shapes;
-use numerics::shield::{Collider, Shield, shield};
 
 use super::Figure;
 use crate::cooked::cook;

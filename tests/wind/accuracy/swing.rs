@@ -1,6 +1,6 @@
 //! Jiggle against the exact solution of its equation.
 
-use numerics::jiggle::{Drag, Jiggle, Spring};
+use curves::jiggle::{Drag, Jiggle, Spring};
 use numerics::ramp::Ramp;
 use numerics::random::Key;
 use std::f64::consts::PI;

@@ -8,7 +8,7 @@ mod round;
 mod sharp;
 mod steps;
 
-use numerics::collide::{Collide, Method, Scaled, collide};
+use curves::collide::{Collide, Method, Scaled, collide};
 use numerics::random::Key;
 use numerics::tree::TriangleTree;
 use std::f64::consts::{PI, TAU};

@@ -1,0 +1,151 @@
+//! Points that tets carry: a fine surface on a coarse body.
+//!
+//! Each point is bound to the tet it lies in, or to that of the nearest face, by its barycentric coordinates there; where the
+//! tets go it goes, exactly so for affine motion. Limit: a point far outside of all tets is carried as if its tet went on to
+//! there, which magnifies how that one deforms.
+
+use numerics::tree::TriangleTree;
+use numerics::vec3::Vec3;
+use rayon::prelude::*;
+
+type V3 = nalgebra::Vector3<f64>;
+
+/// What a point hangs on: particles and their shares, which sum to 1. Unused ones have weight 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carrier {
+    /// Indices.
+    pub particles: [u32; 4],
+    /// Shares.
+    pub weights: [f64; 4],
+}
+
+impl Carrier {
+    /// A point that is that particle.
+    pub fn on(particle: u32) -> Self {
+        Self { particles: [particle, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] }
+    }
+
+    /// Where the point is when particles are at `places`; exactly there for one that is a particle.
+    #[inline]
+    pub fn at(&self, places: &[[f64; 3]]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (particle, weight) in self.particles.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0) {
+            let place = places[*particle as usize];
+            (0..3).for_each(|k| sum[k] += place[k] * weight);
+        }
+        sum
+    }
+}
+
+/// Binds `carried` to `tets` of `points`; all in metres. None where no tet has a volume.
+///
+/// # Panics
+/// Where a tet names no point.
+pub fn carry(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec<Carrier>> {
+    let solid: Vec<u32> =
+        (0..tets.len() as u32).filter(|tet| Inverse::of(points, tets[*tet as usize]).is_some()).collect();
+    if solid.is_empty() {
+        return None;
+    }
+    // A straight way from a point to the nearest of all faces crosses none: that face is of the tet the point is in.
+    let faces: Vec<[u32; 3]> = solid.iter().flat_map(|tet| sides(tets[*tet as usize])).collect();
+    let tree = TriangleTree::build(points, &faces);
+    let mut owners: Vec<([u32; 3], u32)> =
+        faces.iter().enumerate().map(|(k, face)| (sorted(*face), solid[k / 4])).collect();
+    owners.sort_unstable();
+    let bind = |p: &Vec3| {
+        let nearest = tree.closest(*p, f32::INFINITY).map_or([0; 3], |found| sorted(faces[found.triangle as usize]));
+        let from = owners.partition_point(|owner| owner.0 < nearest);
+        let around = owners[from..].iter().take_while(|owner| owner.0 == nearest).map(|owner| owner.1);
+        let shares = |tet: u32| Some((tet, Inverse::of(points, tets[tet as usize])?.shares(p)));
+        let least = |shares: &[f64; 4]| shares.iter().copied().fold(f64::INFINITY, f64::min);
+        let best = around.filter_map(shares).reduce(|a, b| if least(&b.1) > least(&a.1) { b } else { a });
+        best.map_or(Carrier::on(0), |(tet, weights)| Carrier { particles: tets[tet as usize], weights })
+    };
+    Some(carried.par_iter().map(bind).collect())
+}
+
+fn sides([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 4] {
+    [[b, c, d], [a, d, c], [a, b, d], [a, c, b]]
+}
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+/// What makes barycentric coordinates of places.
+struct Inverse {
+    first: V3,
+    rows: nalgebra::Matrix3<f64>,
+}
+
+impl Inverse {
+    /// Of a tet with a volume.
+    fn of(points: &[Vec3], tet: [u32; 4]) -> Option<Self> {
+        /// Least volume ÷ the product of its edges that counts: rounding of f32 positions.
+        const FLAT: f64 = 1e-6;
+        let [a, b, c, d] = tet.map(|corner| wide(points[corner as usize]));
+        let (p, q, r) = (b - a, c - a, d - a);
+        let volume = p.dot(&q.cross(&r));
+        let solid = volume.abs() > FLAT * p.norm() * q.norm() * r.norm();
+        if !solid {
+            return None;
+        }
+        let rows = nalgebra::Matrix3::from_rows(&[
+            (q.cross(&r) / volume).transpose(),
+            (r.cross(&p) / volume).transpose(),
+            (p.cross(&q) / volume).transpose(),
+        ]);
+        Some(Self { first: a, rows })
+    }
+
+    fn shares(&self, p: &Vec3) -> [f64; 4] {
+        let [b, c, d]: [f64; 3] = (self.rows * (wide(*p) - self.first)).into();
+        [1.0 - b - c - d, b, c, d]
+    }
+}
+
+fn wide(p: Vec3) -> V3 {
+    V3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POINTS: [Vec3; 5] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
+    const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
+
+    #[test]
+    fn a_point_hangs_on_the_tet_it_is_in() {
+        let found = carry(&POINTS, &TETS, &[[0.1, 0.2, 0.3], [0.75, 0.75, 0.75], [0.0, 1.0, 0.0]]).unwrap();
+        assert_eq!(found[0].particles, TETS[0]);
+        for (share, expected) in found[0].weights.iter().zip([0.4, 0.1, 0.2, 0.3]) {
+            assert!((share - expected).abs() < 1e-7);
+        }
+        assert_eq!(found[1].particles, TETS[1]);
+        assert_eq!(found[2].at(&POINTS.map(|p| p.map(f64::from))), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn affine_motion_carries_points_within_and_without_alike() {
+        let carried = [[0.2, 0.3, 0.1], [0.6, 0.6, 0.7], [-0.5, 0.2, 0.1], [3.0, 3.0, 3.0]];
+        let found = carry(&POINTS, &TETS, &carried).unwrap();
+        let affine = |p: Vec3| {
+            let [x, y, z] = p.map(f64::from);
+            [2.0 * x + 0.5 * y + 3.0, y - 0.25 * z - 1.0, 0.5 * z + x]
+        };
+        let places = POINTS.map(affine);
+        for (carrier, p) in found.iter().zip(carried) {
+            let (at, expected) = (carrier.at(&places), affine(p));
+            assert!((0..3).all(|k| (at[k] - expected[k]).abs() < 1e-6), "{at:?}, expected {expected:?}");
+        }
+    }
+
+    #[test]
+    fn flat_tets_carry_nothing() {
+        assert_eq!(carry(&[[0.0; 3]; 4], &[[0, 1, 2, 3]], &[[0.0; 3]]), None);
+        assert_eq!(carry(&[], &[], &[]), None);
+    }
+}

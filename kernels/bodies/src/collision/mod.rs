@@ -1,0 +1,428 @@
+//! Finds what soft bodies touch: animated meshes, the ground, each other, themselves. [`Scene`] is a [`mass_spring::Contacts`].
+//!
+//! Both sides move in every test, and time is continuous: a vertex that goes through a triangle, or an edge through an
+//! edge, within a step is kept on the side it came from, however thin the sheet. Candidates come from boxes around the
+//! whole way, sixteen at a time in f32 and rounded outwards; what is decided is decided in f64 (Bridson et al. 2002:
+//! roots of the cubic of coplanarity).
+//!
+//! Promise: no vertex and no edge goes through unseen while points go straight between the poses looked at, of which a
+//! turning obstacle has as many as keep it within a quarter of its thickness; only what is nearest around counts, so flat
+//! parts give one contact a vertex whatever their triangles are; the same bits for any number of threads. Limits: a
+//! contact is a plane; a side is known from where the step began, so what sits beyond an open sheet then belongs there;
+//! edges that were near within the way but neither at its ends nor through each other are not told; positions beyond f32
+//! are not found.
+
+mod cross;
+mod edge;
+mod motion;
+mod near;
+mod obstacle;
+mod pair;
+mod skin;
+mod surface;
+mod swept;
+mod vertex;
+
+use crate::mass_spring::{Contact, Contacts, Query};
+pub use motion::Pose;
+use near::Nearest;
+use numerics::tree::{Cuboid, TriangleTree};
+pub use obstacle::{Ground, Obstacle};
+pub use pair::Rub;
+use rayon::prelude::*;
+use skin::LetGo;
+pub use skin::Skin;
+use std::sync::OnceLock;
+use surface::{Moment, Places};
+use swept::BoxTree;
+use vertex::{Moving, Rules};
+
+type V3 = nalgebra::Vector3<f64>;
+
+/// Vertices or edges that a task looks after: some 20 µs of work.
+const TASK: usize = 64;
+/// Gaps within which things count.
+const REACH: f64 = 2.0;
+/// Share of the gap by which a turning obstacle may leave the straight lines between the poses looked at.
+const SAG: f64 = 0.25;
+
+/// Why there is nothing to touch.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TouchError {
+    /// An obstacle is nowhere.
+    #[error("an obstacle has no pose; expected one at least")]
+    NoPose,
+    /// A pose has other points than the first.
+    #[error("pose {index} has {count} points; expected {expected}, as the first")]
+    Points {
+        /// Which pose.
+        index: usize,
+        /// Points it has.
+        count: usize,
+        /// Points the first has.
+        expected: usize,
+    },
+    /// Shares of the frame do not rise.
+    #[error("`share` of pose {index} is {share}; expected a finite number above the one before")]
+    Share {
+        /// Which pose.
+        index: usize,
+        /// Its share.
+        share: f64,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("point {0} is not finite")]
+    Point(usize),
+    /// A triangle has a corner that there is none of.
+    #[error("triangle {index} has corners {corners:?}; expected points of {count}")]
+    Triangle {
+        /// Which.
+        index: usize,
+        /// Its corners.
+        corners: [u32; 3],
+        /// Points there are.
+        count: usize,
+    },
+    /// A link joins a particle that there is none of.
+    #[error("link {index} joins {ends:?}; expected particles of {count}")]
+    Link {
+        /// Which.
+        index: usize,
+        /// Its ends.
+        ends: [u32; 2],
+        /// Particles there are.
+        count: usize,
+    },
+    /// A number is negative or not finite.
+    #[error("`{what}` is {value}; expected a finite number, 0 or more")]
+    Number {
+        /// Which number.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+    },
+}
+
+/// All that may touch.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scene<'a> {
+    /// Surfaces of bodies.
+    pub skins: &'a [Skin],
+    /// What each particle's friction is scaled by; 1 where there is none.
+    pub friction: Option<&'a [f32]>,
+    /// First of all.
+    pub ground: Option<Ground>,
+    /// Animated meshes.
+    pub obstacles: &'a [Obstacle],
+    /// How skins touch each other; none: they do not.
+    pub between: Option<Rub>,
+    /// How skins touch themselves; none: they do not.
+    pub own: Option<Rub>,
+}
+
+/// What a search found.
+#[must_use]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Contacts.
+    pub contacts: u32,
+    /// How far below its gap the worst of them was where the way began, along its normal at the end, metres.
+    pub deepest_overlap: f64,
+}
+
+impl Contacts for Scene<'_> {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        let _ = self.search(query, out);
+    }
+}
+
+/// A contact and where its second side was when the way began: n·u is that less what was kept.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    contact: Contact,
+    /// n·u at which surfaces touched at the start.
+    start: f64,
+}
+
+impl Scene<'_> {
+    /// [`Contacts::find`], with what it found: the ground's contacts by particle; each obstacle's by particle, then
+    /// by its own points, then by edges; then pairs of bodies; then each body's own.
+    pub fn search(&self, query: &Query<'_>, out: &mut Vec<Contact>) -> Found {
+        let mut seen = Vec::new();
+        self.on_ground(query, &mut seen);
+        let boxes = swept::boxes(&[query.from, query.to]);
+        if !self.obstacles.is_empty() {
+            for skin in self.skins {
+                let faces = skin.faces.sweep(&boxes, 0.0);
+                let let_go = skin.let_go(query.from);
+                for obstacle in self.obstacles {
+                    self.against(query, (skin, &let_go), &boxes, &faces, obstacle, &mut seen);
+                }
+            }
+        }
+        self.pairs(query, &boxes, &mut seen);
+        let mut found = Found { contacts: seen.len() as u32, deepest_overlap: 0.0 };
+        for Seen { contact, start } in &seen {
+            let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
+            let apart: V3 = sides.map(|(particle, weight)| V3::from(query.from[*particle as usize]) * weight).sum();
+            let height = V3::from(contact.normal).dot(&apart) - start;
+            found.deepest_overlap = found.deepest_overlap.max(contact.gap - height);
+        }
+        out.extend(seen.iter().map(|seen| seen.contact));
+        found
+    }
+
+    fn on_ground(&self, query: &Query<'_>, out: &mut Vec<Seen>) {
+        let Some(ground) = self.ground else { return };
+        let up = V3::from(ground.up);
+        for particle in self.skins.iter().flat_map(|skin| &skin.surface.vertices) {
+            let height = |x: &[[f64; 3]]| up.dot(&V3::from(x[*particle as usize])) - ground.height;
+            if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
+                let contact = Contact {
+                    particles: [*particle, 0, 0, 0],
+                    weights: [1.0, 0.0, 0.0, 0.0],
+                    normal: ground.up,
+                    offset: ground.height,
+                    gap: ground.thickness,
+                    velocity: [0.0; 3],
+                    friction: ground.friction * self.mask(&[*particle], &[1.0]),
+                };
+                out.push(Seen { contact, start: ground.height });
+            }
+        }
+    }
+
+    /// What friction is scaled by where particles have `weights`.
+    fn mask(&self, particles: &[u32], weights: &[f64]) -> f64 {
+        let Some(mask) = self.friction else { return 1.0 };
+        let of = |particle: &u32| mask.get(*particle as usize).map_or(1.0, |scale| f64::from(*scale));
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for (particle, weight) in particles.iter().zip(weights).filter(|side| *side.1 != 0.0) {
+            sum += of(particle) * weight.abs();
+            whole += weight.abs();
+        }
+        if whole > 0.0 { sum / whole } else { 1.0 }
+    }
+
+    /// What a skin, but for what is let go of it, meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
+    fn against(
+        &self,
+        query: &Query<'_>,
+        (skin, let_go): (&Skin, &LetGo),
+        boxes: &[Cuboid],
+        faces: &BoxTree<'_>,
+        obstacle: &Obstacle,
+        out: &mut Vec<Seen>,
+    ) {
+        let rules = Rules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
+        let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
+        let poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
+        let poses: Vec<Places<'_>> = poses.iter().map(Vec::as_slice).collect();
+        let still_boxes = swept::boxes(&poses);
+        let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
+        if !swept::meet(&faces.bounds, &tree.bounds) {
+            return;
+        }
+        let between = between(query, &times);
+        let mut ways: Vec<Places<'_>> = vec![query.from];
+        ways.extend(between.iter().map(Vec::as_slice));
+        ways.push(query.to);
+        let meeting = Meeting {
+            scene: self,
+            query,
+            skin,
+            let_go,
+            obstacle,
+            boxes: [boxes, &still_boxes],
+            body: Moving { surface: &skin.surface, poses: &ways },
+            still: Moving { surface: &obstacle.surface, poses: &poses },
+            rules,
+        };
+        meeting.vertices(&tree, out);
+        meeting.points(faces, out);
+        meeting.edges(out);
+    }
+}
+
+/// Where particles are between the first and the last of `times`.
+fn between(query: &Query<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
+    let whole = query.times[1] - query.times[0];
+    let at = |time: &f64| {
+        let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
+        let each = query.from.par_iter().zip(query.to).with_min_len(1024);
+        each.map(|(from, to)| V3::from(*from).lerp(&V3::from(*to), share).into()).collect()
+    };
+    times[1..times.len() - 1].iter().map(at).collect()
+}
+
+/// A skin and an obstacle, both on their way.
+struct Meeting<'a> {
+    scene: &'a Scene<'a>,
+    query: &'a Query<'a>,
+    skin: &'a Skin,
+    let_go: &'a LetGo,
+    obstacle: &'a Obstacle,
+    /// Of particles and of the obstacle's points, on their way.
+    boxes: [&'a [Cuboid]; 2],
+    body: Moving<'a>,
+    still: Moving<'a>,
+    rules: Rules,
+}
+
+/// Tells what each of `things` meets, in their order, whatever the number of threads; `scratch` is memory to use again.
+fn in_order<T: Sync, S>(
+    things: &[T],
+    scratch: impl Fn() -> S + Sync + Send,
+    tell: impl Fn(&mut S, &[T], &mut Vec<Seen>) + Sync,
+    out: &mut Vec<Seen>,
+) {
+    let part = |scratch: &mut S, part: &[T]| {
+        let mut seen = Vec::new();
+        tell(scratch, part, &mut seen);
+        seen
+    };
+    let parts: Vec<Vec<Seen>> = things.par_chunks(TASK).map_init(scratch, part).collect();
+    out.extend(parts.into_iter().flatten());
+}
+
+/// The places of a point in all poses.
+fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<V3>) {
+    path.clear();
+    path.extend(poses.iter().map(|pose| V3::from(pose[point as usize])));
+}
+
+impl Meeting<'_> {
+    /// The skin's vertices against the obstacle's triangles.
+    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
+        // Of where it is at all, as nothing less is at hand; what is not closed has no inside.
+        let (solid, bounds) = (OnceLock::new(), tree.bounds);
+        let has_inside = self.obstacle.surface.closed;
+        let tell = |(): &mut (), vertices: &[u32], out: &mut Vec<Seen>| {
+            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
+            for vertex in vertices.iter().filter(|vertex| !self.let_go.has_particle(**vertex)) {
+                tree.meeting(&self.boxes[0][*vertex as usize], &mut faces);
+                let own = &self.boxes[0][*vertex as usize];
+                if faces.is_empty() && !(has_inside && swept::meet(own, &bounds)) {
+                    continue;
+                }
+                path_of(self.body.poses, *vertex, &mut path);
+                let start = path[0];
+                hits.clear();
+                let sunk = || self.sunk(&solid, &bounds, start);
+                vertex::hits(&path, &self.still, &faces, sunk, &self.rules, &mut hits);
+                for hit in &hits {
+                    let corners = self.obstacle.surface.triangles[hit.face as usize];
+                    let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
+                    out.extend(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
+                }
+            }
+        };
+        in_order(&self.skin.surface.vertices, || (), tell, out);
+    }
+
+    /// The nearest triangle where the way begins, of a vertex within the obstacle's `bounds`; `solid` are its triangles
+    /// then, put where they are once they are asked.
+    fn sunk(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: V3) -> Option<Nearest> {
+        let p = [start.x as f32, start.y as f32, start.z as f32];
+        if !swept::meet(&Cuboid { low: p, high: p }, bounds) {
+            return None;
+        }
+        let solid = solid.get_or_init(|| {
+            let mut tree = self.obstacle.solid.clone();
+            tree.refit(&obstacle::narrow(self.still.poses[0]));
+            tree
+        });
+        let face = solid.closest(p, f32::INFINITY)?.triangle;
+        Some(Nearest::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
+    }
+
+    /// The obstacle's sharp points against the skin's triangles.
+    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
+        let tell = |(): &mut (), points: &[u32], out: &mut Vec<Seen>| {
+            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
+            for point in points {
+                let region = swept::wider(&self.boxes[1][*point as usize], self.rules.reach);
+                tree.meeting(&region, &mut faces);
+                faces.retain(|face| !self.let_go.has_face(*face));
+                if faces.is_empty() {
+                    continue;
+                }
+                path_of(self.still.poses, *point, &mut path);
+                hits.clear();
+                vertex::hits(&path, &self.body, &faces, || None, &self.rules, &mut hits);
+                for hit in &hits {
+                    let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
+                    let [u, v, w] = hit.weights;
+                    let first = ([a, b, c, 0], [u, v, w, 0.0]);
+                    out.extend(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
+                }
+            }
+        };
+        in_order(&self.obstacle.sharp_points, || (), tell, out);
+    }
+
+    /// The skin's edges against the obstacle's sharp ones.
+    fn edges(&self, out: &mut Vec<Seen>) {
+        let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
+        let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
+        let tell = |(): &mut (), edges: &[u32], out: &mut Vec<Seen>| {
+            let mut others = Vec::new();
+            for index in edges.iter().filter(|edge| !self.let_go.has_edge(**edge)) {
+                let edge = &self.skin.surface.edges[*index as usize];
+                tree.meeting(&swept::around(&edge.ends, self.boxes[0]), &mut others);
+                for other in &others {
+                    let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
+                    if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
+                        let [s, t] = hit.shares;
+                        let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
+                        out.extend(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
+                    }
+                }
+            }
+        };
+        in_order(&indices, || (), tell, out);
+    }
+
+    /// A contact of particles with points of the obstacle; none where it would only push into the ground.
+    fn contact(
+        &self,
+        (particles, weights): ([u32; 4], [f64; 4]),
+        (points, shares): (&[u32], &[f64]),
+        normal: V3,
+        shift: f64,
+    ) -> Option<Seen> {
+        let touched = |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.place(*point) * *share).sum();
+        let (start, end): (V3, V3) = (touched(&self.still.start()), touched(&self.still.end()));
+        let gap = self.rules.gap;
+        let normal = self.scene.above_ground(normal, end, gap)?;
+        let contact = Contact {
+            particles,
+            weights,
+            normal: normal.into(),
+            offset: normal.dot(&end) - shift,
+            gap,
+            velocity: self.obstacle.velocity_of(self.query.times[1], points, shares).into(),
+            friction: self.obstacle.friction * self.scene.mask(&particles, &weights),
+        };
+        Some(Seen { contact, start: normal.dot(&start) })
+    }
+}
+
+impl Scene<'_> {
+    /// A normal that pushes nothing at `point` below the ground: along it where it would, none where nothing is left.
+    fn above_ground(&self, normal: V3, point: V3, gap: f64) -> Option<V3> {
+        /// Share of a normal that is left above the rounding of one straight down.
+        const LEFT: f64 = 1e-3;
+        let Some(ground) = self.ground else { return Some(normal) };
+        let up = V3::from(ground.up);
+        let down = -normal.dot(&up);
+        let pushed = (point + normal * gap).dot(&up) - ground.height;
+        if down <= 0.0 || pushed >= ground.thickness {
+            return Some(normal);
+        }
+        (normal + up * down).try_normalize(LEFT)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,235 @@
+//! Bodies under the solver: what rests, and what is rolled over.
+
+use super::*;
+use crate::mass_spring::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+use crate::tets::{boundary, cubes};
+
+const FRAME: f64 = 1.0 / 24.0;
+
+type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
+
+/// A block of so many cubes of `side`, its lowest corner at `at`: particles, tets, and the surface facing outwards.
+fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
+    let (points, tets) = cubes(cells, at, cells.map(|n| side * n as f64));
+    let narrow: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
+    let outer = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
+    (points, tets, outer)
+}
+
+fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> Body {
+    let plain = |value| Scaled { value, mask: None };
+    let material = Material { density: plain(1000.0), stiffness: plain(stiffness), damping: plain(0.02) };
+    Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, &[]).unwrap()
+}
+
+#[test]
+fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
+    let thickness = 2e-3;
+    // Of 8 × 8 squares, askew to the block's own.
+    let mut plate = Vec::new();
+    for z in 0..9 {
+        plate.extend((0..9).map(|x| [0.113 * f64::from(x) - 0.3, 0.0, 0.107 * f64::from(z) - 0.3]));
+    }
+    let squares = (0..64u32).map(|k| (k % 8) + 9 * (k / 8));
+    let triangles: Vec<[u32; 3]> = squares.flat_map(|a| [[a, a + 9, a + 10], [a, a + 10, a + 1]]).collect();
+    let plate = [Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, thickness, 0.5).unwrap()];
+    for (stiffness, side) in [(5e4, 0.1), (5e3, 0.02)] {
+        let (points, tets, faces) = block([3, 3, 3], side, [0.03, 0.9 * thickness, 0.05]);
+        let body = body(&points, &tets, stiffness);
+        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+        let own = Some(Rub { thickness, friction: 0.5 });
+        let scene = Scene { skins: &skins, obstacles: &plate, own, ..Scene::default() };
+        let frame = Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() };
+        let mut state = State::at_rest(&body);
+        let mut solver = Solver::new(&body);
+        for number in 0..240 {
+            let report = solver.step(&body, &mut state, &frame);
+            let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+            assert!(lowest > 0.0, "frame {number}: {lowest} {report:?}");
+            let speed = fastest(&state);
+            assert!(number < 120 || speed < 1e-4 * 9.81 * FRAME, "frame {number}: {} g·dt", speed / (9.81 * FRAME));
+        }
+    }
+}
+
+fn fastest(state: &State) -> f64 {
+    state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
+}
+
+const THICKNESS: f64 = 1e-3;
+
+/// A pin that rolls on by ten thicknesses a frame, 1 cm into the block of [`rolled_over`].
+fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (points, triangles) = cylinder(8, 0.05, 0.3);
+    let way = frame * 10.0 * THICKNESS;
+    let (sine, cosine) = libm::sincos(-way / 0.05);
+    let put = |[x, y, z]: &[f64; 3]| [cosine * x - sine * y - 0.08 + way, sine * x + cosine * y + 0.1, z + 0.06];
+    (points.iter().map(put).collect(), triangles)
+}
+
+/// The deepest that any of `points` is in the pin.
+fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
+    let side = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|corner| V3::from(pin[corner as usize]));
+        (a, (b - a).cross(&(c - a)).normalize())
+    };
+    let sides: Vec<(V3, V3)> = faces.iter().map(side).collect();
+    let depth = |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
+    points.iter().map(depth).fold(0.0, f64::max)
+}
+
+/// Frames of a block under the pin, moved on by `step` through each; gives the deepest in any.
+fn rolled_over(frames: u32, mut step: impl FnMut(&Scene<'_>) -> Vec<[f64; 3]>, skins: &[Skin]) -> f64 {
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: -THICKNESS, thickness: THICKNESS, friction: 0.8 });
+    let mut worst = 0.0_f64;
+    for frame in 0..frames {
+        let [(from, faces), (to, _)] = [frame, frame + 1].map(|frame| rolling(f64::from(frame)));
+        let pin = [Obstacle::new(&faces, &[pose(0.0, &from), pose(1.0, &to)], FRAME, THICKNESS, 0.3).unwrap()];
+        let points = step(&Scene { skins, obstacles: &pin, ground, ..Scene::default() });
+        worst = worst.max(deepest(&points, &to, &faces));
+    }
+    worst
+}
+
+#[test]
+fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
+    let (points, _, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
+    let skins = [Skin::new(&points, &faces, &[]).unwrap()];
+    let mut now = points.clone();
+    // Vertices that go where their contacts put them and nothing else moves.
+    let put = |scene: &Scene<'_>| {
+        let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
+        contacts.retain(|contact| contact.weights[1] == 0.0);
+        for _ in 0..50 {
+            for contact in &contacts {
+                let (p, n) = (V3::from(now[contact.particles[0] as usize]), V3::from(contact.normal));
+                let lacks = (contact.offset + contact.gap - n.dot(&p)).max(0.0);
+                now[contact.particles[0] as usize] = (p + n * lacks).into();
+            }
+        }
+        assert!(now.iter().all(|p| p[1] > -1e-9));
+        now.clone()
+    };
+    let worst = rolled_over(30, put, &skins);
+    assert!(worst < 0.01 * THICKNESS, "{worst}");
+}
+
+#[test]
+fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
+    let (points, tets, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
+    // Steps in which the pin moves ten times its thickness, and such in which it moves less than that.
+    for (stiffness, substeps) in [(2e4, 0), (5e3, 0), (2e4, 16)] {
+        let body = body(&points, &tets, stiffness);
+        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+        let mut state = State::at_rest(&body);
+        let mut solver = Solver::new(&body);
+        let step = |scene: &Scene<'_>| {
+            let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps, ..Frame::default() };
+            let report = solver.step(&body, &mut state, &frame);
+            assert_eq!((report.stopped, report.inverted_tets), (0, 0));
+            assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
+            assert!(fastest(&state) < 1.0, "{report:?}");
+            state.positions.clone()
+        };
+        let worst = rolled_over(30, step, &skins);
+        assert!(worst < THICKNESS, "{worst}");
+    }
+}
+
+/// A block of dough under a box whose lower side is `height` above the ground at each frame; gives the state after each.
+fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &State)) {
+    let (points, tets, faces) = block([6, 4, 6], 0.02, [0.0, THICKNESS, 0.0]);
+    let body = body(&points, &tets, 5e3);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let (plate, triangles) = cuboid([0.4, 0.02, 0.4]);
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
+    let mut state = State::at_rest(&body);
+    let mut solver = Solver::new(&body);
+    for frame in 0..frames {
+        let poses = [0.0, 1.0].map(|share| {
+            let height = height(f64::from(frame) + share) + 0.01;
+            let at: Vec<[f64; 3]> = plate.iter().map(|[x, y, z]| [x + 0.06, y + height, z + 0.06]).collect();
+            pose(share, &at)
+        });
+        let plate = [Obstacle::new(&triangles, &poses, FRAME, THICKNESS, 0.5).unwrap()];
+        let scene = Scene { skins: &skins, obstacles: &plate, ground, ..Scene::default() };
+        let report =
+            solver.step(&body, &mut state, &Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() });
+        let highest = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max);
+        let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+        assert!(lowest > 0.0 && highest < height(f64::from(frame + 1)), "frame {frame}: {lowest} {highest} {report:?}");
+        assert!(fastest(&state) < 2.0, "frame {frame}: {report:?}");
+        each(frame, &state);
+    }
+}
+
+#[test]
+fn dough_pressed_to_three_fifths_of_its_height_comes_back() {
+    let height = |frame: f64| {
+        let down = if frame < 24.0 { frame / 24.0 } else { (36.0 - frame) / 12.0 };
+        0.08 + 2.0 * THICKNESS - 0.4 * 0.08 * down
+    };
+    let mut top = 0.0;
+    pressed(96, height, |_, state| top = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max));
+    assert!(top > 0.075, "{top}");
+}
+
+#[test]
+fn dough_hit_by_fifteen_thicknesses_in_a_frame_stays_outside() {
+    let height = |frame: f64| 0.09 - 0.015 * frame.min(3.0);
+    pressed(24, height, |_, _| {});
+}
+
+#[test]
+fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume() {
+    let (points, tets, faces) = block([6, 3, 4], 0.02, [0.0; 3]);
+    let body = body(&points, &tets, 5e3);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let whole = |threads: usize, resumed: bool| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut state = State::at_rest(&body);
+            let mut solver = Solver::new(&body);
+            let step = |scene: &Scene<'_>| {
+                if resumed {
+                    solver = Solver::new(&body);
+                    state = state.clone();
+                }
+                let _ = solver.step(&body, &mut state, &Frame { contacts: Some(scene), ..Frame::default() });
+                state.positions.clone()
+            };
+            rolled_over(14, step, &skins);
+            state
+        })
+    };
+    let one = whole(1, false);
+    assert!(one == whole(3, false) && one == whole(2, true));
+}
+
+/// A corner beyond a plate hangs on it, on the side it came to; where that draws it out over eight times the length of its
+/// edges it is let go and comes home.
+#[test]
+fn a_corner_beyond_a_plate_hangs_on_it_unless_that_draws_it_out_too_far() {
+    let (side, thick) = (0.1, 0.02);
+    let (points, tets, faces) = block([3, 3, 3], side, [0.0; 3]);
+    let body = body(&points, &tets, 1e4);
+    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let corner = points.iter().position(|p| p.iter().all(|x| *x > 2.9 * side)).unwrap();
+    for (high, hangs) in [(0.5, true), (1.5, false)] {
+        let (mut plate, triangles) = cuboid([2.0, thick, 2.0]);
+        plate.iter_mut().for_each(|p| p[1] += high - 0.5 * thick);
+        let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, THICKNESS, 0.5).unwrap()];
+        let scene = Scene { skins: &skins, obstacles: &obstacles, ..Scene::default() };
+        let frame = Frame { contacts: Some(&scene), seconds: FRAME, gravity: [0.0; 3], drag: 4.0, ..Frame::default() };
+        let mut state = State::at_rest(&body);
+        state.positions[corner][1] = high + 0.1;
+        assert_eq!(skins[0].count_let_go(&state.positions) == 0, hangs);
+        let mut solver = Solver::new(&body);
+        for _ in 0..48 {
+            let _ = solver.step(&body, &mut state, &frame);
+        }
+        let at = state.positions[corner][1];
+        assert_eq!(at > high, hangs, "beyond {high} m, then at {at} m");
+        assert_eq!(skins[0].count_let_go(&state.positions), 0);
+    }
+}

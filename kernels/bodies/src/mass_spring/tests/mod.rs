@@ -1,0 +1,73 @@
+//! Bodies against closed forms, then against what would break them.
+
+use super::*;
+use crate::tets::cubes;
+use numerics::random::Key;
+
+mod contact;
+mod exact;
+mod goals;
+mod hostile;
+mod kept;
+
+/// No gravity, no volume: springs alone.
+const BARE: Frame<'static> = Frame {
+    seconds: 1.0 / 24.0,
+    gravity: [0.0; 3],
+    drag: 0.0,
+    volume: 0.0,
+    goals: &[],
+    pins: &[],
+    contacts: None,
+    integrator: Integrator::Default,
+    substeps: 0,
+    rough: false,
+};
+
+fn plain(value: f64) -> Scaled<'static> {
+    Scaled { value, mask: None }
+}
+
+fn material(density: f64, stiffness: f64, damping: f64) -> Material<'static> {
+    Material { density: plain(density), stiffness: plain(stiffness), damping: plain(damping) }
+}
+
+/// Boxes of `cells` cubes of `side`, each cut into six tetrahedra.
+fn block(cells: [u32; 3], side: f64) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
+    cubes(cells.map(|n| n as usize), [0.0; 3], cells.map(|n| f64::from(n) * side))
+}
+
+fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> Body {
+    let (points, tets) = block(cells, side);
+    Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, material, &[]).unwrap()
+}
+
+/// Steps `frames` frames and gives the last report.
+fn steps(body: &Body, state: &mut State, frame: &Frame<'_>, frames: usize) -> Report {
+    let mut solver = Solver::new(body);
+    let mut report = Report::default();
+    for _ in 0..frames {
+        report = solver.step(body, state, frame);
+    }
+    report
+}
+
+fn is_finite(state: &State) -> bool {
+    state.positions.iter().chain(&state.velocities).flatten().all(|x| x.is_finite())
+}
+
+fn momentum(body: &Body, state: &State) -> V3 {
+    let each = state.velocities.iter().zip(body.masses());
+    each.fold(V3::zeros(), |sum, (v, mass)| sum + V3::from(*v) * mass)
+}
+
+/// About the origin.
+fn angular_momentum(body: &Body, state: &State) -> V3 {
+    let moving = state.positions.iter().zip(&state.velocities).zip(body.masses());
+    moving.map(|((x, v), mass)| V3::from(*x).cross(&V3::from(*v)) * mass).sum()
+}
+
+fn random(seed: u64, index: usize) -> V3 {
+    let key = Key::new(seed).of(index as u64);
+    V3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
+}

@@ -1,0 +1,149 @@
+//! A surface that is known to be closed, in order, and around a volume.
+
+use rayon::prelude::*;
+
+use super::cross::crossing;
+use super::edges::edges;
+use super::fault::Fault;
+use super::lattice::{Lattice, Place};
+use super::repair::{Changes, Polygons, Surface, in_order};
+use super::shells::{Shells, pieces, turned};
+use numerics::tree::TriangleTree;
+
+/// A closed surface around one or several bodies, repaired where that was asked for.
+#[derive(Clone, Debug)]
+pub struct Closed {
+    /// The point that came in as each, rising.
+    pub source_points: Vec<u32>,
+    /// The face that came in as each, rising.
+    pub source_faces: Vec<u32>,
+    /// First corner of each face, and the number of corners at the end.
+    pub starts: Vec<u32>,
+    /// Point of each corner, counter-clockwise from outside the bodies.
+    pub corners: Vec<u32>,
+    /// Positions, metres.
+    pub points: Vec<[f32; 3]>,
+    /// What was changed.
+    pub changes: Changes,
+    /// Bodies it bounds.
+    pub bodies: usize,
+    pub(super) lattice: Lattice,
+    pub(super) places: Vec<Place>,
+    pub(super) shells: Shells,
+    /// Shell of each point.
+    pub(super) shell_of: Vec<u32>,
+    pub(super) tree: TriangleTree,
+}
+
+impl Closed {
+    /// The surface, if it is closed, in order and nowhere crosses itself; else, where `repair` says so and it is safe,
+    /// put in order: points at one place joined where the surface hangs together there, points without a face and faces
+    /// without three points or on another's points dropped, faces turned to look away from the bodies. Closed shells
+    /// within another wall off cavities, however they look, and shells within those are bodies again. A surface without a
+    /// face, or with faces that all are one point, is closed around nothing.
+    ///
+    /// # Errors
+    /// The first thing found that is wrong and cannot, or must not, be repaired.
+    ///
+    /// # Panics
+    /// Where a corner is out of range, or there are 2³² corners.
+    pub fn of(surface: &Surface, repair: bool) -> Result<Self, Fault> {
+        if let Some(point) = surface.points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
+            return Err(Fault::NotFinite { point: point as u32 });
+        }
+        let lattice = Lattice::around(surface.points).unwrap_or_else(Lattice::unit);
+        let places: Vec<Place> = surface.points.par_iter().map(|point| lattice.place(point.map(f64::from))).collect();
+        let (polygons, mut changes) = in_order(surface, &places, repair)?;
+        let mut pieces = pieces(&polygons, repair)?;
+        let mut shells = Shells::outward(&polygons, &mut pieces, surface.points, &places)?;
+        let wide: Vec<[f32; 3]> = places.iter().map(|place| place.map(|x| x as f32)).collect();
+        let tree = TriangleTree::build(&wide, &shells.triangles);
+        if let Some((pair, count)) = crossing(&places, &shells.triangles, &tree) {
+            let [first, _] = pair.map(|triangle| shells.triangles[triangle as usize]);
+            let face = |triangle: u32| polygons.faces[shells.polygons[triangle as usize] as usize];
+            return Err(Fault::Crossing { faces: pair.map(face), at: surface.points[first[0] as usize], count });
+        }
+        shells.nest(&mut pieces, &places);
+        turned(&polygons, &pieces, &shells, repair, &mut changes)?;
+        let (source_points, name) = kept(&polygons, places.len());
+        shells.triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner = name[*corner as usize]);
+        Ok(Self {
+            points: source_points.iter().map(|point| surface.points[*point as usize]).collect(),
+            places: source_points.iter().map(|point| places[*point as usize]).collect(),
+            shell_of: shells.of_points(source_points.len()),
+            source_points,
+            corners: corners(&polygons, &pieces, &name),
+            source_faces: polygons.faces,
+            starts: polygons.starts,
+            changes,
+            bodies: shells.bodies,
+            lattice,
+            shells,
+            tree,
+        })
+    }
+
+    /// Points of a face, in order.
+    pub fn face(&self, face: usize) -> &[u32] {
+        &self.corners[self.starts[face] as usize..self.starts[face + 1] as usize]
+    }
+
+    /// Every edge once, its lower point first, sorted.
+    pub fn edges(&self) -> Vec<[u32; 2]> {
+        edges(&self.starts, &self.corners)
+    }
+
+    /// Mean length of the edges, metres; 0 without one.
+    pub fn mean_edge(&self) -> f64 {
+        let edges = self.edges();
+        let length = |[a, b]: &[u32; 2]| distance(self.points[*a as usize], self.points[*b as usize]);
+        edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64
+    }
+
+    /// Longest side of a triangle, steps of the lattice.
+    pub(super) fn longest_side(&self, triangle: u32) -> f64 {
+        let corners = self.shells.triangles[triangle as usize].map(|corner| self.places[corner as usize]);
+        let square = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            [0, 1, 2].map(|axis| f64::from(a[axis] - b[axis])).iter().map(|d| d * d).sum::<f64>()
+        };
+        square(0).max(square(1)).max(square(2)).sqrt()
+    }
+
+    /// Volume between the faces, m³.
+    pub fn volume(&self) -> f64 {
+        let Some(origin) = self.points.first().map(|point| point.map(f64::from)) else { return 0.0 };
+        let from_origin = |corner: u32| {
+            let point = self.points[corner as usize];
+            [0, 1, 2].map(|k| f64::from(point[k]) - origin[k])
+        };
+        let six = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(from_origin);
+            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+        };
+        self.shells.triangles.iter().map(six).sum::<f64>() / 6.0
+    }
+}
+
+/// The points that polygons have, and the number of each among those.
+fn kept(polygons: &Polygons, points: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut name = vec![u32::MAX; points];
+    polygons.corners.iter().for_each(|corner| name[*corner as usize] = 0);
+    let kept: Vec<u32> = (0..points as u32).filter(|point| name[*point as usize] == 0).collect();
+    kept.iter().enumerate().for_each(|(new, old)| name[*old as usize] = new as u32);
+    (kept, name)
+}
+
+/// Corners by their points' new names, turned where they are to be; the first corner stays the first.
+fn corners(polygons: &Polygons, pieces: &[(u32, bool)], name: &[u32]) -> Vec<u32> {
+    let mut corners: Vec<u32> = polygons.corners.iter().map(|corner| name[*corner as usize]).collect();
+    for (run, _) in polygons.starts.windows(2).zip(pieces).filter(|(_, (_, turned))| *turned) {
+        corners[run[0] as usize + 1..run[1] as usize].reverse();
+    }
+    corners
+}
+
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    let d = [0, 1, 2].map(|k| f64::from(a[k]) - f64::from(b[k]));
+    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+}

@@ -1,0 +1,64 @@
+//! Whether faces of a surface pass through each other.
+//!
+//! Exact on the lattice: two triangles cross where a side of one passes through the inside of the other. What only
+//! touches, or lies in one plane, does not; shells that overlap so are found by what is inside of both.
+
+use rayon::prelude::*;
+
+use super::lattice::Place;
+use super::predicates::{At, orient};
+use numerics::tree::TriangleTree;
+
+/// The first pair of triangles that cross, by index, and how many pairs do.
+pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &TriangleTree) -> Option<([u32; 2], usize)> {
+    let found = |first: usize| {
+        let own = triangles[first];
+        let corners = own.map(|corner| places[corner as usize]);
+        let bound = |pick: fn(i32, i32) -> i32| {
+            [0, 1, 2].map(|k| pick(pick(corners[0][k], corners[1][k]), corners[2][k]) as f32)
+        };
+        let (mut least, mut count) = (u32::MAX, 0);
+        tree.visit_box(bound(i32::min), bound(i32::max), |block, lanes| {
+            for (lane, other) in block.triangle.iter().enumerate() {
+                // Each pair once; what shares an edge meets there and, unless flat on each other, nowhere else.
+                if lanes >> lane & 1 == 0 || *other as usize <= first {
+                    continue;
+                }
+                let theirs = triangles[*other as usize];
+                if own.iter().filter(|corner| theirs.contains(corner)).count() < 2 && cross(places, own, theirs) {
+                    least = least.min(*other);
+                    count += 1;
+                }
+            }
+        });
+        (count > 0).then_some(([first as u32, least], count))
+    };
+    let all: Vec<([u32; 2], usize)> = (0..triangles.len()).into_par_iter().filter_map(found).collect();
+    all.first().map(|(pair, _)| (*pair, all.iter().map(|(_, count)| count).sum()))
+}
+
+fn cross(places: &[Place], a: [u32; 3], b: [u32; 3]) -> bool {
+    let at = |triangle: [u32; 3]| triangle.map(|corner| places[corner as usize].map(f64::from));
+    let (at_a, at_b) = (at(a), at(b));
+    let (Some(a_sides), Some(b_sides)) = (sides(&at_b, &at_a), sides(&at_a, &at_b)) else { return false };
+    pierces(&at_a, a_sides, &at_b) || pierces(&at_b, b_sides, &at_a)
+}
+
+/// On which side of a triangle's plane each corner of another lies; `None` where it does not reach both.
+fn sides(plane: &[At; 3], of: &[At; 3]) -> Option<[f64; 3]> {
+    let sides = [0, 1, 2].map(|k| orient(&plane[0], &plane[1], &plane[2], &of[k]));
+    (sides.iter().any(|side| *side > 0.0) && sides.iter().any(|side| *side < 0.0)).then_some(sides)
+}
+
+/// Whether a side of a triangle passes through the inside of another, given on which side of its plane the corners lie.
+fn pierces(triangle: &[At; 3], sides: [f64; 3], through: &[At; 3]) -> bool {
+    (0..3).any(|k| {
+        let (from, to) = (k, (k + 1) % 3);
+        if !(sides[from] > 0.0 && sides[to] < 0.0 || sides[from] < 0.0 && sides[to] > 0.0) {
+            return false;
+        }
+        let turn = |i: usize| orient(&triangle[from], &triangle[to], &through[i], &through[(i + 1) % 3]);
+        let turns = [turn(0), turn(1), turn(2)];
+        turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0)
+    })
+}

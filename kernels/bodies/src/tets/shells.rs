@@ -1,0 +1,231 @@
+//! The shells of a surface: closed, each looking outwards or into the cavity it walls off, and the bodies they bound.
+
+use rayon::prelude::*;
+
+use super::fault::Fault;
+use super::lattice::Place;
+use super::repair::{Changes, Pieces, Polygons, Side};
+use super::winding::Winding;
+use numerics::triangulate::triangulate;
+
+/// A closed piece of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Shell {
+    /// How many others it lies in. Even: the outside of a body; odd: the wall of a cavity.
+    pub(super) depth: u32,
+    /// The body it bounds, numbered by first faces.
+    pub(super) body: u32,
+}
+
+/// The surface as triangles that all look away from the bodies.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shells {
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Polygon of each triangle.
+    pub(super) polygons: Vec<u32>,
+    /// Shell of each triangle.
+    pub(super) shell_of: Vec<u32>,
+    pub(super) all: Vec<Shell>,
+    pub(super) bodies: usize,
+}
+
+/// The shell of each polygon, from 0 in the order of their first faces, and whether it is turned against that face.
+///
+/// # Errors
+/// Where an edge has not two faces, or a shell has one side only.
+pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>, Fault> {
+    let sides = polygons.sides();
+    let edges = || sides.chunk_by(|a, b| a.ends == b.ends);
+    let face = |side: &Side| polygons.faces[side.polygon as usize];
+    if let Some(crowded) = edges().find(|sides| sides.len() > 2) {
+        let count = edges().filter(|sides| sides.len() > 2).count();
+        return Err(Fault::Crowded { points: crowded[0].ends, faces: crowded.len(), count });
+    }
+    if let Some(open) = edges().find(|sides| sides.len() < 2) {
+        let count = edges().filter(|sides| sides.len() < 2).count();
+        return Err(Fault::Open { points: open[0].ends, face: face(&open[0]), count });
+    }
+    let mut pieces = Pieces::new(polygons.len());
+    let turned = |sides: &[Side]| sides[0].rises == sides[1].rises;
+    for sides in edges() {
+        if pieces.join(sides[0].polygon, sides[1].polygon, turned(sides)).is_err() {
+            return Err(Fault::OneSided { face: polygons.faces[pieces.root(sides[0].polygon).0 as usize] });
+        }
+    }
+    if let Some(pair) = edges().find(|sides| !safe && turned(sides)) {
+        let count = edges().filter(|sides| turned(sides)).count();
+        return Err(Fault::Turned { faces: [face(&pair[0]), face(&pair[1])], count });
+    }
+    let mut number = vec![u32::MAX; polygons.len()];
+    let mut count = 0;
+    let numbered = (0..polygons.len() as u32).map(|polygon| {
+        let (root, turned) = pieces.root(polygon);
+        let number = &mut number[root as usize];
+        if *number == u32::MAX {
+            *number = count;
+            count += 1;
+        }
+        (*number, turned)
+    });
+    Ok(numbered.collect())
+}
+
+impl Shells {
+    /// Triangles of polygons whose shells and turns are known, each shell looking away from the space in it.
+    ///
+    /// # Errors
+    /// Where a shell has no volume.
+    pub(super) fn outward(
+        polygons: &Polygons,
+        pieces: &mut [(u32, bool)],
+        points: &[[f32; 3]],
+        places: &[Place],
+    ) -> Result<Self, Fault> {
+        let cut = |polygon: usize| {
+            let corners = polygons.get(polygon);
+            let at: Vec<[f32; 3]> = corners.iter().map(|corner| points[*corner as usize]).collect();
+            triangulate(&at).into_iter().map(move |ear| (ear.map(|k| corners[k as usize]), polygon as u32))
+        };
+        let (triangles, polygon_of): (Vec<_>, Vec<_>) = (0..polygons.len()).into_par_iter().flat_map_iter(cut).unzip();
+        let count = pieces.iter().map(|(shell, _)| *shell as usize + 1).max().unwrap_or(0);
+        let mut shells = Self {
+            shell_of: polygon_of.iter().map(|polygon: &u32| pieces[*polygon as usize].0).collect(),
+            triangles,
+            polygons: polygon_of,
+            all: vec![Shell { depth: 0, body: 0 }; count],
+            bodies: 0,
+        };
+        shells.turn(pieces);
+        let mut volumes = vec![0_i128; count];
+        for (triangle, shell) in shells.triangles.iter().zip(&shells.shell_of) {
+            volumes[*shell as usize] += wedge(triangle.map(|corner| places[corner as usize]));
+        }
+        if let Some(flat) = volumes.iter().position(|volume| *volume == 0) {
+            return Err(Fault::Flat { face: shells.first_face(flat, polygons) });
+        }
+        shells.turn_whole(pieces, |shell| volumes[shell as usize] < 0);
+        Ok(shells)
+    }
+
+    fn first_face(&self, shell: usize, polygons: &Polygons) -> u32 {
+        let first = self.shell_of.iter().position(|other| *other as usize == shell).expect("a shell has triangles");
+        polygons.faces[self.polygons[first] as usize]
+    }
+
+    /// Turns the triangles of polygons that are turned.
+    fn turn(&mut self, pieces: &[(u32, bool)]) {
+        for (triangle, polygon) in self.triangles.iter_mut().zip(&self.polygons) {
+            if pieces[*polygon as usize].1 {
+                triangle.swap(1, 2);
+            }
+        }
+    }
+
+    /// Turns whole shells, and notes it in `pieces`.
+    fn turn_whole(&mut self, pieces: &mut [(u32, bool)], which: impl Fn(u32) -> bool) {
+        for (triangle, shell) in self.triangles.iter_mut().zip(&self.shell_of) {
+            if which(*shell) {
+                triangle.swap(1, 2);
+            }
+        }
+        pieces.iter_mut().filter(|(shell, _)| which(*shell)).for_each(|(_, turned)| *turned = !*turned);
+    }
+
+    /// Finds which shells lie in which and turns the walls of cavities, so that each looks away from the body it bounds.
+    pub(super) fn nest(&mut self, pieces: &mut [(u32, bool)], places: &[Place]) {
+        let within = self.within(places);
+        for (shell, others) in self.all.iter_mut().zip(&within) {
+            shell.depth = others.len() as u32;
+        }
+        // The wall of a cavity bounds the body of the deepest shell around it; shells of one depth that share a point,
+        // theirs together.
+        let mut bodies = Pieces::new(self.all.len());
+        let depth = |shell: u32| within[shell as usize].len();
+        for (shell, others) in within.iter().enumerate().filter(|(_, others)| others.len() % 2 == 1) {
+            let around = others.iter().find(|other| depth(**other) + 1 == others.len());
+            around.inspect(|around| bodies.join(shell as u32, **around, false).unwrap_or(()));
+        }
+        let mut shell_at = vec![u32::MAX; places.len()];
+        for (triangle, shell) in self.triangles.iter().zip(&self.shell_of) {
+            for corner in triangle {
+                let other = std::mem::replace(&mut shell_at[*corner as usize], *shell);
+                if other != u32::MAX && depth(other) == depth(*shell) {
+                    bodies.join(other, *shell, false).unwrap_or(());
+                }
+            }
+        }
+        let mut number = vec![u32::MAX; self.all.len()];
+        for shell in 0..self.all.len() {
+            let number = &mut number[bodies.root(shell as u32).0 as usize];
+            if *number == u32::MAX {
+                *number = self.bodies as u32;
+                self.bodies += 1;
+            }
+            self.all[shell].body = *number;
+        }
+        self.turn_whole(pieces, |shell| depth(shell) % 2 == 1);
+    }
+
+    /// The shells that each shell lies in: where most of some of its triangles' middles are.
+    fn within(&self, places: &[Place]) -> Vec<Vec<u32>> {
+        const SAMPLES: usize = 31;
+        if self.all.len() < 2 {
+            return vec![Vec::new(); self.all.len()];
+        }
+        let mut of_shell = vec![Vec::new(); self.all.len()];
+        for (triangle, shell) in self.shell_of.iter().enumerate() {
+            of_shell[*shell as usize].push(triangle as u32);
+        }
+        let winding = Winding::new(places, &self.triangles, &self.shell_of);
+        let within = |(shell, members): (usize, &Vec<u32>)| {
+            let (mut found, mut tally) = (Vec::new(), Vec::new());
+            let stride = members.len().div_ceil(SAMPLES);
+            let samples = members.iter().step_by(stride);
+            let taken = samples.len();
+            for member in samples {
+                let corners = self.triangles[*member as usize].map(|corner| places[corner as usize].map(i64::from));
+                let sum = [0, 1, 2].map(|k| corners[0][k] + corners[1][k] + corners[2][k]);
+                winding.around(sum, 3, &mut tally);
+                found.extend(tally.iter().map(|(other, _)| *other).filter(|other| *other as usize != shell));
+            }
+            found.sort_unstable();
+            let most = found.chunk_by(|a, b| a == b).filter(|same| 2 * same.len() > taken);
+            most.map(|same| same[0]).collect()
+        };
+        of_shell.par_iter().enumerate().map(within).collect()
+    }
+
+    /// The shell of each point; `u32::MAX` for one without a triangle.
+    pub(super) fn of_points(&self, points: usize) -> Vec<u32> {
+        let mut of = vec![u32::MAX; points];
+        for (triangle, shell) in self.triangles.iter().zip(&self.shell_of) {
+            triangle.iter().for_each(|corner| of[*corner as usize] = of[*corner as usize].min(*shell));
+        }
+        of
+    }
+}
+
+/// Six times the volume between a triangle and the lattice's lowest place.
+fn wedge(corners: [Place; 3]) -> i128 {
+    let [a, b, c] = corners.map(|corner| corner.map(i64::from));
+    let term = |i: usize, j: usize, k: usize| i128::from(a[i]) * i128::from(b[j] * c[k] - b[k] * c[j]);
+    term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)
+}
+
+/// How many faces were turned; or, where none may be, the first shell that would have to be.
+pub(super) fn turned(
+    polygons: &Polygons,
+    pieces: &[(u32, bool)],
+    shells: &Shells,
+    safe: bool,
+    changes: &mut Changes,
+) -> Result<(), Fault> {
+    changes.turned_faces = pieces.iter().filter(|(_, turned)| *turned).count();
+    let Some(first) = pieces.iter().position(|(_, turned)| *turned).filter(|_| !safe) else { return Ok(()) };
+    let mut wrong: Vec<u32> = pieces.iter().filter(|(_, turned)| *turned).map(|(shell, _)| *shell).collect();
+    wrong.dedup();
+    wrong.sort_unstable();
+    wrong.dedup();
+    let cavity = shells.all[pieces[first].0 as usize].depth % 2 == 1;
+    Err(Fault::InsideOut { face: polygons.faces[first], cavity, count: wrong.len() })
+}

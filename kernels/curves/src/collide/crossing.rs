@@ -1,0 +1,89 @@
+//! Whether a segment crosses a triangle: in f64, on the positions as they are written.
+
+use super::near::may_cross;
+use super::sector::V3;
+use numerics::lanes::get;
+use numerics::tree::{Block, TriangleTree};
+use numerics::vec3::Vec3;
+
+/// A segment through a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Crossing {
+    /// Share of the way at which it passes.
+    pub(super) share: f64,
+    /// How far the end that is less far through has come.
+    pub(super) depth: f64,
+    /// Unit normal of the triangle, towards the segment's start.
+    pub(super) normal: V3,
+}
+
+/// An f32 position in f64.
+#[inline(always)]
+pub(super) fn wide(p: Vec3) -> V3 {
+    V3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+}
+
+/// The corners of a block's triangle.
+#[inline(always)]
+pub(super) fn corners(block: &Block, lane: usize) -> [V3; 3] {
+    let [a, b, c] = &block.corners;
+    [wide(get(a, lane)), wide(get(b, lane)), wide(get(c, lane))]
+}
+
+/// Where the segment from `a` to `b` crosses the triangle; touching counts. None in the triangle's own plane.
+pub(super) fn crossing(a: &V3, b: &V3, [p, q, r]: &[V3; 3]) -> Option<Crossing> {
+    let normal = (q - p).cross(&(r - p));
+    let (start, end) = (normal.dot(&(a - p)), normal.dot(&(b - p)));
+    if start * end > 0.0 || start == end {
+        return None;
+    }
+    let way = b - a;
+    let [p, q, r] = [p - a, q - a, r - a];
+    let volumes = [way.dot(&p.cross(&q)), way.dot(&q.cross(&r)), way.dot(&r.cross(&p))];
+    let around = volumes.iter().all(|volume| *volume >= 0.0) || volumes.iter().all(|volume| *volume <= 0.0);
+    let towards_start = start > 0.0 || (start == 0.0 && end < 0.0);
+    around.then(|| {
+        let length = normal.norm();
+        Crossing {
+            share: start / (start - end),
+            depth: start.abs().min(end.abs()) / length,
+            normal: normal * (if towards_start { 1.0 } else { -1.0 } / length),
+        }
+    })
+}
+
+/// The first crossing along the segment from `a` to `b` with triangles of `blocks`.
+#[inline(always)]
+pub(super) fn first_crossing(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Option<Crossing> {
+    let mut first: Option<Crossing> = None;
+    for (block, lanes) in blocks {
+        add_crossings(block, *lanes, a, b, &mut first);
+    }
+    first
+}
+
+/// As [`first_crossing`] with all triangles of trees.
+#[inline(always)]
+pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -> Option<Crossing> {
+    let mut first = None;
+    let low = [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])];
+    let high = [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
+    for tree in obstacles {
+        tree.visit_box(low, high, |block, lanes| add_crossings(block, lanes, a, b, &mut first));
+    }
+    first
+}
+
+#[inline(always)]
+fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option<Crossing>) {
+    let mut lanes = lanes & may_cross(block, a, b);
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane))
+            && first.is_none_or(|first| found.share < first.share)
+        {
+            *first = Some(found);
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Curves against meshes: the kernel of Curve_Wind_Collision (W3).
+//!
+//! Root to tip, each segment turns from where the ones before it have brought its rest direction towards its goal's
+//! direction, until it meets a triangle. One that an earlier turn pushed through a surface turns out of it first, on
+//! the great circle towards the surface's normal where it passes. First contact is a closed form (see [`sector`]).
+//!
+//! Promise: segments keep their goal's lengths to a rounding of the positions; no written segment of a curve that
+//! crosses nothing at rest crosses a triangle, but those counted in [`Collided::unfreed_segments`]; a curve that meets
+//! nothing keeps its goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
+//! obstacles, not volumes, so a curve wholly inside of one stays there.
+
+mod coherence;
+mod crossing;
+mod hair;
+mod near;
+mod rest;
+mod sector;
+mod skin;
+mod turn;
+
+use coherence::Ground;
+use hair::{Hair, Scratch};
+use numerics::simd::{Path, kernel};
+use numerics::tree::TriangleTree;
+use numerics::vec3::Vec3;
+use rayon::prelude::*;
+use rest::at_rest_on;
+pub use rest::{AtRest, at_rest};
+use sector::V3;
+pub use skin::{Skin, normals};
+use std::ops::Range;
+
+/// How a segment's turn is stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// At first contact, in closed form.
+    Exact,
+    /// The paper's: at the last of so many equal steps that crosses nothing.
+    Steps(u32),
+}
+
+/// A number for all CVs, scaled CV by CV where there is a mask.
+#[derive(Clone, Copy, Debug)]
+pub struct Scaled<'a> {
+    /// The number.
+    pub value: f32,
+    /// What scales it.
+    pub mask: Option<&'a [f32]>,
+}
+
+impl Scaled<'_> {
+    /// The number at a CV.
+    #[inline(always)]
+    fn at(&self, cv: usize) -> f32 {
+        self.value * self.mask.map_or(1.0, |mask| mask[cv])
+    }
+}
+
+/// What curves collide with, and how.
+#[derive(Clone)]
+pub struct Collide<'a> {
+    /// The obstacles' triangles, a tree an obstacle.
+    pub obstacles: &'a [&'a TriangleTree],
+    /// The surface that the curves grow on.
+    pub skin: Option<Skin<'a>>,
+    /// How a turn is stopped.
+    pub method: Method,
+    /// How far directions that lie in the skin are led out of it before a segment turns, 0..1; see [`coherence`].
+    pub coherence: f64,
+    /// Arc kept from what is met, metres.
+    pub gap: f64,
+    /// How far outside of the skin the roots are brought, metres; 0 leaves them.
+    pub offset_root: f64,
+    /// Keeps goals this many times as high over the skin as the curves are at rest, where they would be lower.
+    pub offset_scale: Option<f64>,
+    /// What [`at_rest`] said of the same curves, if it was asked.
+    pub at_rest: Option<&'a AtRest>,
+    /// Share of each segment's collision that is kept, 0..1.
+    pub blend: Scaled<'a>,
+    /// Thickness of the curves, metres, one value a CV where masked.
+    pub width: Scaled<'a>,
+}
+
+impl Collide<'_> {
+    /// The skin that a segment is to be led out of, if any is.
+    #[inline(always)]
+    fn ground(&self, pivot: &V3, length: f64) -> Option<Ground> {
+        self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
+    }
+}
+
+/// Curves after their collisions.
+#[must_use]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collided {
+    /// One point for every incoming one.
+    pub points: Vec<Vec3>,
+    /// Segments that no turn frees from what they are in.
+    pub unfreed_segments: u64,
+    /// Segments that cross something as they are written: with a whole blend the unfreed ones.
+    pub crossings_left: u64,
+    /// Curves that cross something at rest.
+    pub started_inside: u64,
+    /// Segments that something keeps from their goal.
+    pub contacts: u64,
+    /// The deepest that a segment reaches through a surface, metres.
+    pub deepest_overlap: f64,
+    /// Largest |length − goal's| of a segment ÷ curve length, as written.
+    pub length_error: f64,
+}
+
+/// What some curves reached.
+#[derive(Clone, Copy, Default)]
+struct Reached {
+    unfreed_segments: u64,
+    crossings_left: u64,
+    contacts: u64,
+    deepest_overlap: f64,
+    length_error: f64,
+}
+
+impl Reached {
+    fn and(self, other: Self) -> Self {
+        Self {
+            unfreed_segments: self.unfreed_segments + other.unfreed_segments,
+            contacts: self.contacts + other.contacts,
+            crossings_left: self.crossings_left + other.crossings_left,
+            deepest_overlap: self.deepest_overlap.max(other.deepest_overlap),
+            length_error: self.length_error.max(other.length_error),
+        }
+    }
+}
+
+/// CVs that a task has at least: some 100 µs of work.
+const TASK_CVS: usize = 256;
+
+/// Collides curves `goal[starts[i]..starts[i + 1]]`, which at rest are those of `rest`.
+///
+/// # Panics
+/// Where `starts` does not run up to the number of points of both.
+pub fn collide(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
+    collide_on(Path::chosen(), starts, rest, goal, how)
+}
+
+/// [`collide()`] on a given SIMD path.
+///
+/// # Panics
+/// As [`collide()`].
+pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
+    let looked;
+    let at_rest = match how.at_rest {
+        Some(at_rest) => at_rest,
+        None => {
+            looked = at_rest_on(path, starts, rest, how);
+            &looked
+        }
+    };
+    let mut points = vec![[0.0; 3]; goal.len()];
+    let mut tasks = Vec::new();
+    let mut left = &mut points[..];
+    let curves = starts.len().saturating_sub(1);
+    let mut first = 0;
+    while first < curves {
+        let mut end = first;
+        while end < curves && ((starts[end] - starts[first]) as usize) < TASK_CVS {
+            end += 1;
+        }
+        let (out, rest) = left.split_at_mut((starts[end] - starts[first]) as usize);
+        tasks.push((first..end, out));
+        (left, first) = (rest, end);
+    }
+    let reached = tasks
+        .into_par_iter()
+        .map(|(curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out))
+        .reduce(Reached::default, Reached::and);
+    let Reached { unfreed_segments, crossings_left, contacts, deepest_overlap, length_error } = reached;
+    let started_inside = at_rest.inside();
+    Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
+}
+
+kernel! {
+    fn collide_task(
+        curves: Range<usize>,
+        starts: &[u32],
+        positions: [&[Vec3]; 2],
+        how: &Collide<'_>,
+        at_rest: &AtRest,
+        out: &mut [Vec3],
+    ) -> Reached = task;
+}
+
+#[inline(always)]
+fn task(
+    curves: Range<usize>,
+    starts: &[u32],
+    [rest, goal]: [&[Vec3]; 2],
+    how: &Collide<'_>,
+    at_rest: &AtRest,
+    out: &mut [Vec3],
+) -> Reached {
+    let mut scratch = Scratch::default();
+    let mut reached = Reached::default();
+    let base = starts[curves.start] as usize;
+    for curve in curves {
+        let cvs = starts[curve] as usize..starts[curve + 1] as usize;
+        let mut hair = Hair {
+            first: cvs.start,
+            shift: at_rest.shift(curve),
+            rest: &rest[cvs.clone()],
+            goal: &goal[cvs.clone()],
+            out: &mut out[cvs.start - base..cvs.end - base],
+        };
+        reached = reached.and(hair.collide(how, &mut scratch));
+    }
+    reached
+}
+
+/// A unit vector at a right angle to the unit vector `to`: the part of `near` that is, if it has any.
+fn perpendicular(to: &V3, near: &V3) -> V3 {
+    let side = near - to * to.dot(near);
+    let length = side.norm();
+    if length > 1e-6 {
+        return side / length;
+    }
+    let [x, y, z] = [to.x.abs(), to.y.abs(), to.z.abs()];
+    let away = if x <= y && x <= z {
+        V3::x()
+    } else if y <= z {
+        V3::y()
+    } else {
+        V3::z()
+    };
+    let side = to.cross(&away);
+    side / side.norm()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! Curves as they grow: how far their roots are lifted, and which cross something already.
+
+use super::Collide;
+use super::crossing::{first_crossing, wide};
+use super::near::narrow;
+use super::sector::V3;
+use super::turn::{Nearby, gather};
+use numerics::simd::{Path, kernel};
+use numerics::vec3::Vec3;
+use rayon::prelude::*;
+
+/// Segments that ask the trees together.
+const GATHERED_SEGMENTS: usize = 6;
+
+/// Curves a task.
+const TASK_CURVES: usize = 64;
+
+/// What curves, obstacles and skin at rest have in common at any wind; see [`at_rest`].
+#[derive(Clone, Debug, Default)]
+pub struct AtRest {
+    curves: Vec<Grown>,
+}
+
+/// A curve at rest.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Grown {
+    /// How far it is moved, so that its root is `offset_root` outside of the skin.
+    pub(super) shift: V3,
+    /// So moved, it crosses something.
+    pub(super) inside: bool,
+}
+
+/// Looks at curves at rest. It depends on `obstacles`, `skin` and `offset_root` of `how` alone: to be kept and handed on in
+/// [`Collide::at_rest`] while these and the curves stand still.
+///
+/// # Panics
+/// As [`super::collide()`].
+pub fn at_rest(starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
+    at_rest_on(Path::chosen(), starts, rest, how)
+}
+
+pub(super) fn at_rest_on(path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
+    let mut curves = vec![Grown::default(); starts.len().saturating_sub(1)];
+    curves.par_chunks_mut(TASK_CURVES).enumerate().for_each(|(task, grown)| {
+        let first = task * TASK_CURVES;
+        grow(path, &starts[first..=first + grown.len()], rest, how, grown);
+    });
+    AtRest { curves }
+}
+
+kernel! {
+    fn grow(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) = grow_task;
+}
+
+#[inline(always)]
+fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) {
+    let mut nearby = Nearby::default();
+    for (ends, grown) in starts.windows(2).zip(grown) {
+        let cvs = &rest[ends[0] as usize..ends[1] as usize];
+        if cvs.len() < 2 || cvs.as_flattened().iter().any(|x| !x.is_finite()) {
+            continue;
+        }
+        if let Some(skin) = &how.skin {
+            grown.shift = skin.lift(cvs[0], how.offset_root);
+        }
+        grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
+    }
+}
+
+/// Whether a curve crosses something.
+#[inline(always)]
+fn crosses_any<'t>(cvs: &[Vec3], shift: &V3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
+    let at = |k: usize| narrow(&(wide(cvs[k]) + shift));
+    for first in (0..cvs.len() - 1).step_by(GATHERED_SEGMENTS) {
+        let last = (first + GATHERED_SEGMENTS).min(cvs.len() - 1);
+        let mut low = at(first);
+        let mut high = low;
+        for k in first + 1..=last {
+            let cv = at(k);
+            low = [low[0].min(cv[0]), low[1].min(cv[1]), low[2].min(cv[2])];
+            high = [high[0].max(cv[0]), high[1].max(cv[1]), high[2].max(cv[2])];
+        }
+        gather(how.obstacles, low, high, nearby);
+        for k in first..last {
+            if first_crossing(nearby, at(k), at(k + 1)).is_some() {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+impl AtRest {
+    /// How many curves cross something.
+    pub(super) fn inside(&self) -> u64 {
+        self.curves.iter().map(|curve| u64::from(curve.inside)).sum()
+    }
+
+    /// How far a curve is moved.
+    pub(super) fn shift(&self, curve: usize) -> V3 {
+        self.curves[curve].shift
+    }
+}

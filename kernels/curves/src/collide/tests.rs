@@ -1,0 +1,40 @@
+//! First contact against a second closed form; written positions against a second crossing test.
+
+use super::crossing::wide;
+use super::sector::{Sector, V3};
+use super::*;
+use numerics::random::Key;
+use numerics::vec3;
+
+mod hairs;
+mod sectors;
+
+/// Whether the segment crosses the triangle: by solving for the point of the plane, in f64. Touching does not count.
+fn crosses(a: &V3, b: &V3, [p, q, r]: &[V3; 3]) -> bool {
+    let (e, f, way) = (q - p, r - p, b - a);
+    let h = way.cross(&f);
+    let det = e.dot(&h);
+    if det == 0.0 {
+        return false;
+    }
+    let s = a - p;
+    let u = s.dot(&h) / det;
+    let g = s.cross(&e);
+    let v = way.dot(&g) / det;
+    let t = f.dot(&g) / det;
+    u > 0.0 && v > 0.0 && u + v < 1.0 && t > 0.0 && t < 1.0
+}
+
+/// A number in −1…1.
+fn coordinate(key: Key) -> f64 {
+    2.0 * f64::from(key.f32()) - 1.0
+}
+
+fn vector(key: Key) -> V3 {
+    V3::new(coordinate(key.of(0)), coordinate(key.of(1)), coordinate(key.of(2)))
+}
+
+fn unit(key: Key) -> V3 {
+    let v = vector(key);
+    if v.norm() > 0.1 { v.normalize() } else { unit(key.of(9)) }
+}

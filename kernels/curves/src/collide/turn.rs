@@ -1,0 +1,304 @@
+//! One segment's turn: from where it points towards its goal until something is met, out of what it stands in first.
+
+use super::crossing::{Crossing, corners, first_crossing};
+use super::near::{Wedge, narrow};
+use super::sector::{Blocked, Sector, V3};
+use super::{Method, perpendicular};
+use numerics::tree::{Block, TriangleTree};
+use numerics::vec3::Vec3;
+use std::f64::consts::PI;
+
+/// How straight into a surface a segment has to stick for the curve to say which way out is taken.
+const STRAIGHT_IN: f64 = 1e-3;
+
+/// A segment that is to turn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    /// The end that stays.
+    pub(super) pivot: V3,
+    /// Where it points, and where it is to point: unit.
+    pub(super) from: V3,
+    pub(super) to: V3,
+    /// About which it turns where the two are opposite.
+    pub(super) axis: V3,
+    /// Where the segment before it points; zero at the root.
+    pub(super) before: V3,
+    pub(super) length: f64,
+    /// Half its thickness.
+    pub(super) half: f64,
+    /// Arc kept from what is met.
+    pub(super) gap: f64,
+    /// The part next to the pivot that meets nothing.
+    pub(super) inner: f64,
+    /// What rounding may move the written positions by.
+    pub(super) rounding: f64,
+}
+
+/// How a turn ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turned {
+    /// Where it points now.
+    pub(super) direction: V3,
+    /// Something kept it from its goal.
+    pub(super) met: bool,
+    /// Nothing came near on its way: it crosses nothing, however positions are rounded.
+    pub(super) clear: bool,
+}
+
+/// Blocks of the tree that a segment may meet, with a bit for each triangle; memory that is used again.
+pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
+
+impl Segment {
+    /// Turns as `method` says. Afterwards `nearby` holds all that the segment may cross where it points now.
+    #[inline(always)]
+    pub(super) fn turn<'t>(
+        &self,
+        method: Method,
+        obstacles: &'t [&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Turned {
+        match self.sweep(method, obstacles, nearby) {
+            Sweep::Free(turned) => turned,
+            Sweep::Stuck => match self.way_out(method, obstacles, nearby) {
+                None => Turned { direction: self.from, met: true, clear: false },
+                Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
+                    Sweep::Free(turned) => Turned { met: true, ..turned },
+                    Sweep::Stuck => Turned { direction, met: true, clear: false },
+                },
+            },
+        }
+    }
+
+    /// As [`Segment::turn`] where that ended in a crossing: obstacles as thick as what rounding may have hidden.
+    #[inline(always)]
+    pub(super) fn turn_wary<'t>(
+        &self,
+        method: Method,
+        obstacles: &'t [&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Turned {
+        Self { half: self.half + 8.0 * self.rounding, gap: self.gap + 8.0 * self.rounding, ..*self }
+            .turn(method, obstacles, nearby)
+    }
+
+    fn sector(&self, from: V3, towards: V3) -> Sector {
+        let axis = from.cross(&towards);
+        let sine = axis.norm();
+        let n = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &self.axis) };
+        Sector {
+            pivot: self.pivot,
+            u: from,
+            v: n.cross(&from),
+            n,
+            reach: self.length + self.half + self.rounding,
+            inner: self.inner,
+            half: self.half,
+            back: self.gap + self.half,
+        }
+    }
+
+    #[inline(always)]
+    fn sweep<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
+        let sector = self.sector(self.from, self.to);
+        let (low, high) = sector.bounds(&self.to);
+        gather(obstacles, low, high, nearby);
+        if nearby.is_empty() {
+            return Sweep::Free(Turned { direction: self.to, met: false, clear: true });
+        }
+        let stop = match method {
+            Method::Exact => first_stop(&sector, &self.to, nearby),
+            Method::Steps(steps) => self.last_free_step(&sector, steps, nearby),
+        };
+        match stop {
+            Stop::Stuck => Sweep::Stuck,
+            Stop::Clear => Sweep::Free(Turned { direction: self.to, met: false, clear: true }),
+            Stop::None => Sweep::Free(Turned { direction: self.to, met: false, clear: false }),
+            Stop::At(angle) => Sweep::Free(Turned { direction: sector.direction(angle), met: true, clear: false }),
+        }
+    }
+
+    /// The end of the segment where it points to `direction`, as written.
+    pub(super) fn end(&self, direction: &V3) -> Vec3 {
+        narrow(&(self.pivot + direction * self.length))
+    }
+
+    /// Where the part that meets things starts, where it points to `direction`.
+    pub(super) fn start(&self, direction: &V3) -> Vec3 {
+        narrow(&(self.pivot + direction * self.inner))
+    }
+
+    fn crosses(&self, direction: &V3, nearby: &Nearby<'_>) -> Option<Crossing> {
+        first_crossing(nearby, self.start(direction), self.end(direction))
+    }
+
+    /// The paper's way: small steps until one crosses.
+    #[inline(always)]
+    fn last_free_step(&self, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
+        let angle = sector.angle_of(&self.to);
+        let at = |step: u32| angle * f64::from(step) / f64::from(steps);
+        if self.crosses(&sector.u, nearby).is_some() {
+            return Stop::Stuck;
+        }
+        for step in 1..=steps {
+            let direction = if step == steps { self.to } else { sector.direction(at(step)) };
+            if self.crosses(&direction, nearby).is_some() {
+                return Stop::At(at(step - 1));
+            }
+        }
+        Stop::None
+    }
+
+    /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
+    /// up to half a turn.
+    #[inline(always)]
+    fn way_out<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Option<V3> {
+        let crossed = self.crosses(&self.from, nearby);
+        // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
+        let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
+        let sector = self.sector(self.from, outwards);
+        let (low, high) = sector.bounds(&-sector.u);
+        gather(obstacles, low, high, nearby);
+        let angle = match method {
+            Method::Exact => first_gap(&sector, nearby),
+            Method::Steps(steps) => {
+                let at = |step: u32| PI * f64::from(step) / f64::from(steps);
+                (1..=steps).map(at).find(|angle| self.crosses(&sector.direction(*angle), nearby).is_none())
+            }
+        };
+        angle.map(|angle| sector.direction(angle))
+    }
+}
+
+/// How far a sweep came.
+enum Sweep {
+    Free(Turned),
+    /// Something is in the way where it starts.
+    Stuck,
+}
+
+/// All blocks of trees that a box meets.
+#[inline(always)]
+pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
+    nearby.clear();
+    for tree in obstacles {
+        tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
+    }
+}
+
+/// Where a sweep is stopped.
+enum Stop {
+    /// Nowhere, as there is nothing near.
+    Clear,
+    /// Nowhere.
+    None,
+    At(f64),
+    /// Something is in the way where it starts.
+    Stuck,
+}
+
+/// How far the sector may turn towards the unit vector `to` of its plane.
+#[inline(always)]
+fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
+    let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
+    let mut wedge = Wedge::new(sector, until);
+    let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
+    for (block, lanes) in nearby {
+        let mut lanes = lanes & wedge.may_meet(block);
+        clear &= lanes == 0;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let mut stuck = false;
+            let mut next = None;
+            sector.blocked_before(until, &corners(block, lane), |blocked| {
+                stuck |= blocked.holds_start();
+                if blocked.lo > 0.0 {
+                    let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
+                    next = Some(next.map_or(angle, |least: f64| least.min(angle)));
+                }
+            });
+            if stuck {
+                return Stop::Stuck;
+            }
+            let Some(next) = next.filter(|next| *next < stop.unwrap_or_else(|| sector.angle_of(to))) else { continue };
+            stop = Some(next);
+            let (sine, cosine) = libm::sincos(next);
+            until = [cosine, sine];
+            wedge = Wedge::new(sector, until);
+            lanes &= wedge.may_meet(block);
+        }
+    }
+    match stop {
+        Some(angle) => Stop::At(angle),
+        None if clear => Stop::Clear,
+        None => Stop::None,
+    }
+}
+
+/// The first angle up to π at which nothing is within the sector's arc.
+#[inline(always)]
+fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
+    let wedge = Wedge::new(sector, [-1.0, 0.0]);
+    let mut taken: Vec<[f64; 2]> = Vec::new();
+    for (block, lanes) in nearby {
+        let mut lanes = lanes & wedge.may_meet(block);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            sector.blocked_by(&corners(block, lane), |blocked| {
+                let arc = |radius: f64| 1.001 * sector.back / radius;
+                let [lo, hi] = [blocked.lo - arc(blocked.lo_radius), blocked.hi + arc(blocked.hi_radius)];
+                taken.push([lo, hi]);
+                taken.push([lo - std::f64::consts::TAU, hi - std::f64::consts::TAU]);
+            });
+        }
+    }
+    taken.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut angle = 0.0;
+    for [lo, hi] in taken {
+        if lo > angle {
+            break;
+        }
+        if hi >= angle {
+            angle = hi;
+        }
+    }
+    (angle <= PI).then_some(angle)
+}
+
+impl Blocked {
+    /// Whether the angle 0 is one of them.
+    fn holds_start(&self) -> bool {
+        (self.lo <= 0.0 && self.hi >= 0.0) || self.hi >= std::f64::consts::TAU
+    }
+}
+
+impl Sector {
+    /// How far it has to turn to the unit vector `to` of its plane: 0…π.
+    fn angle_of(&self, to: &V3) -> f64 {
+        libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
+    }
+
+    /// A box around all that it sweeps while it turns to the unit vector `end` of its plane.
+    fn bounds(&self, end: &V3) -> (Vec3, Vec3) {
+        let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let (u, v) = (self.u[axis], self.v[axis]);
+            let (mut least, mut most) = (0.0_f64.min(u).min(end[axis]), 0.0_f64.max(u).max(end[axis]));
+            // The farthest points of the whole circle along this axis lie at ±(u, v)/|(u, v)|; one counts where the
+            // sector turns past it: forwards from u, and not farther than the end.
+            let past = u * sine - v * cosine;
+            if v >= 0.0 && past >= 0.0 {
+                most = (u * u + v * v).sqrt();
+            }
+            if v <= 0.0 && past <= 0.0 {
+                least = -(u * u + v * v).sqrt();
+            }
+            let slack = self.half + self.back + 1e-6 * (self.reach + self.pivot[axis].abs());
+            low[axis] = (self.pivot[axis] + least * self.reach - slack) as f32;
+            high[axis] = (self.pivot[axis] + most * self.reach + slack) as f32;
+        }
+        (low, high)
+    }
+}

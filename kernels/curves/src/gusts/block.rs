@@ -1,0 +1,203 @@
+//! A block of points, sixteen side by side: the influence of each region near by, summed in order.
+
+use super::control::Local;
+use super::cull::{Bounds, Boxes};
+use super::{BLOCK, LUMPS, Scene, Sphere};
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::noise;
+use numerics::simd::kernel;
+use numerics::vec3::{self, Vec3};
+
+/// The least share of a radius that noise leaves: a boundary at the centre itself has no inside.
+const LEAST_LEFT: f32 = 1e-3;
+
+/// Where on the lattice of noise a sphere's centre lies: no lattice point is at its axes' ends.
+const OFF_LATTICE: Vec3 = [0.37, 0.61, 0.13];
+
+/// Sixteens of a block.
+const ROWS: usize = BLOCK / LANES;
+
+kernel! {
+    /// Writes what up to [`BLOCK`] points within `bounds` get of the regions of `near` to `out`; gives
+    /// how many of them something reaches.
+    pub(super) fn block_values(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
+}
+
+#[inline(always)]
+fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize {
+    let spheres = scene.gusts.spheres;
+    let rows = points.len().div_ceil(LANES);
+    let origin = points[0];
+    let mut at = [[F32x16::splat(0.0); 3]; ROWS];
+    let mut sums = [Sum { value: F32x16::splat(scene.gusts.base), reached: [0; LANES] }; ROWS];
+    let mut loaded = false;
+    for first in (0..near.len()).step_by(LANES) {
+        let met = near.meet(first, bounds);
+        if met == [0; LANES] {
+            continue;
+        }
+        if !loaded {
+            load(points, origin, &mut at);
+            loaded = true;
+        }
+        for lane in (0..LANES).filter(|lane| met[*lane] != 0) {
+            let region = near.region(first + lane);
+            match spheres.get(region) {
+                Some(sphere) => {
+                    let ball = Ball::of(sphere, origin);
+                    for row in 0..rows {
+                        if let Some(share) = ball.share(&at[row]) {
+                            sums[row].add(&share, &scene.falloff.eval(&share), ball.strength);
+                        }
+                    }
+                }
+                None => {
+                    let place = region - spheres.len();
+                    let control = &scene.gusts.controls[place];
+                    let local = control.local(origin);
+                    for row in 0..rows {
+                        add_control(&mut sums[row], &local, scene, place, &at[row]);
+                    }
+                }
+            }
+        }
+        if scene.only_adds && sums[..rows].iter().all(Sum::is_full) {
+            break;
+        }
+    }
+    let mut reached = 0;
+    for (out, sum) in out.chunks_mut(LANES).zip(&sums) {
+        for (lane, out) in out.iter_mut().enumerate() {
+            *out = clamped(sum.value.0[lane]);
+            reached += sum.reached[lane] as usize;
+        }
+    }
+    reached
+}
+
+/// Differences of the points from `origin`; the last one fills its row.
+#[inline(always)]
+fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
+    for (points, at) in points.chunks(LANES).zip(at) {
+        for lane in 0..LANES {
+            set(at, lane, vec3::sub(points[lane.min(points.len() - 1)], origin));
+        }
+    }
+}
+
+#[inline(always)]
+fn add_control(sum: &mut Sum, local: &Local, scene: &Scene<'_>, place: usize, at: &Lanes<3>) {
+    let share = local.share(at);
+    sum.add(&share, &scene.ramps[place].eval(&share), scene.gusts.controls[place].strength());
+}
+
+/// Within 0..1; 0 where opposite infinities met.
+#[inline(always)]
+fn clamped(value: f32) -> f32 {
+    let value = if value > 0.0 { value } else { 0.0 };
+    if value < 1.0 { value } else { 1.0 }
+}
+
+/// What sixteen points have so far.
+#[derive(Clone, Copy)]
+struct Sum {
+    value: F32x16,
+    /// 1 where something was added.
+    reached: [u32; LANES],
+}
+
+impl Sum {
+    /// Adds `influence` × `strength` where `share` lies within the boundary.
+    #[inline(always)]
+    fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32) {
+        for lane in 0..LANES {
+            let influence = influence.0[lane] * strength;
+            let influence = if share.0[lane] < 1.0 { influence } else { 0.0 };
+            self.value.0[lane] += influence;
+            self.reached[lane] |= u32::from(influence != 0.0);
+        }
+    }
+
+    /// Whether all have 1 or more.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        let mut short = 0;
+        for lane in 0..LANES {
+            short |= u32::from(self.value.0[lane] < 1.0);
+        }
+        short == 0
+    }
+}
+
+/// A sphere as seen from a point near by.
+struct Ball {
+    centre: Vec3,
+    /// One over the radius.
+    inverse: f32,
+    strength: f32,
+    noise: f32,
+    salt: u32,
+}
+
+impl Ball {
+    #[inline(always)]
+    fn of(sphere: &Sphere, origin: Vec3) -> Self {
+        Self {
+            centre: [0, 1, 2].map(|axis| (sphere.centre[axis] - f64::from(origin[axis])) as f32),
+            inverse: 1.0 / sphere.radius,
+            strength: sphere.strength,
+            noise: sphere.noise,
+            salt: sphere.salt,
+        }
+    }
+
+    /// How far points are from the centre (0) to the boundary (1); `None` where all are outside.
+    #[inline(always)]
+    fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
+        let mut away = [F32x16::splat(0.0); 3];
+        let mut share = F32x16::splat(0.0);
+        let mut inside = 0;
+        for lane in 0..LANES {
+            let d = vec3::scale(vec3::sub(get(at, lane), self.centre), self.inverse);
+            set(&mut away, lane, d);
+            let square = vec3::dot(d, d);
+            inside |= u32::from(square < 1.0);
+            share.0[lane] = square;
+        }
+        if inside == 0 {
+            return None;
+        }
+        for lane in 0..LANES {
+            share.0[lane] = share.0[lane].sqrt();
+        }
+        if self.noise > 0.0 {
+            self.dent(&away, &mut share);
+        }
+        Some(share)
+    }
+
+    /// Moves the boundary inwards by noise: from a share of the radius to one of what noise leaves of
+    /// it in that direction. The noise depends on the direction alone, so each ray from the centre
+    /// falls off once, and the centre stays the centre.
+    #[inline(always)]
+    fn dent(&self, away: &Lanes<3>, share: &mut F32x16) {
+        let mut cells = *away;
+        for lane in 0..LANES {
+            let length = share.0[lane];
+            // Outside any direction will do, and far outside there is none.
+            let inside = length > 0.0 && length < 1.0;
+            let inverse = LUMPS / if inside { length } else { 1.0 };
+            for axis in 0..3 {
+                let cell = away[axis].0[lane] * inverse + OFF_LATTICE[axis];
+                cells[axis].0[lane] = if inside { cell } else { 0.0 };
+            }
+        }
+        let noise = noise::bumps(self.salt, &cells);
+        for lane in 0..LANES {
+            let taken = clamped(0.5 + noise.0[lane]);
+            let left = 1.0 - self.noise * taken;
+            let left = if left > LEAST_LEFT { left } else { LEAST_LEFT };
+            share.0[lane] /= left;
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Gusts placed by hand: a sphere, or a cube within a cube, moved, turned, stretched, sheared.
+//!
+//! A control's own space has its centre at 0 and its axes' ends at 1. There the share of a point at
+//! q is, from 0 at the centre to 1 at the boundary where the influence ends,
+//! * sphere: |q|;
+//! * cubes: with m = max |qᵢ|, so that level sets are cubes, m/2 up to the inner boundary m = 1, and
+//!   ½ + ½·(m − 1)/(outer − 1) from there to the outer one, m = outer.
+//!
+//! A control without volume (a scale of 0 on an axis) touches nothing.
+
+use numerics::lanes::{F32x16, LANES, Lanes};
+use numerics::ramp::Ramp;
+use numerics::vec3::Vec3;
+
+/// What a control looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// A ball.
+    Sphere,
+    /// A cube within a cube.
+    Cubes,
+}
+
+/// Of the product of its axes' lengths: a control of less volume is flat. Above what f32 positions
+/// make of three axes in a plane, below any stretch an artist makes.
+const FLAT: f64 = 1e-6;
+
+/// A region with its own space and its own ramp.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Control {
+    shape: Shape,
+    centre: [f64; 3],
+    axes: [[f64; 3]; 3],
+    outer: f64,
+    ramp: Ramp,
+    strength: f32,
+    /// From the scene to the control's own space, row by row; `None` where it is flat.
+    inverse: Option<[[f64; 3]; 3]>,
+}
+
+impl Control {
+    /// A control at `centre` whose own axes end at `centre + axes[k]`. `outer` is how many times the
+    /// inner cube the outer one is (less than 1 counts as 1); `strength` may be negative.
+    pub fn new(shape: Shape, centre: [f64; 3], axes: [[f64; 3]; 3], outer: f64, ramp: Ramp, strength: f32) -> Self {
+        let outer = if outer > 1.0 { outer } else { 1.0 };
+        Self { shape, centre, axes, outer, ramp, strength, inverse: inverse(axes) }
+    }
+
+    pub(super) fn centre(&self) -> [f64; 3] {
+        self.centre
+    }
+
+    pub(super) fn ramp(&self) -> &Ramp {
+        &self.ramp
+    }
+
+    pub(super) fn strength(&self) -> f32 {
+        self.strength
+    }
+
+    /// How far it reaches along x, y and z; `None` where it touches nothing.
+    pub(super) fn reach(&self) -> Option<[f64; 3]> {
+        self.inverse.filter(|_| self.strength != 0.0)?;
+        let along = |axis: usize| self.axes.map(|end| end[axis]);
+        Some([0, 1, 2].map(|axis| match self.shape {
+            Shape::Sphere => length(along(axis)),
+            Shape::Cubes => self.outer * along(axis).iter().map(|x| x.abs()).sum::<f64>(),
+        }))
+    }
+
+    /// Whether its influence is nowhere below 0.
+    pub fn only_adds(&self) -> bool {
+        let [least, most] = [self.ramp.min(), self.ramp.max()].map(|value| value * self.strength);
+        least >= 0.0 && most >= 0.0
+    }
+
+    /// The control as seen from a point near by.
+    pub(super) fn local(&self, origin: Vec3) -> Local {
+        let inverse = self.inverse.unwrap_or_default();
+        Local {
+            shape: self.shape,
+            centre: std::array::from_fn(|axis| (self.centre[axis] - f64::from(origin[axis])) as f32),
+            rows: inverse.map(|row| row.map(|x| x as f32)),
+            beyond: (0.5 / (self.outer - 1.0)) as f32,
+        }
+    }
+}
+
+/// A control relative to a point.
+pub(super) struct Local {
+    shape: Shape,
+    centre: Vec3,
+    rows: [Vec3; 3],
+    /// Of the share, a unit beyond the inner cube; infinite where the cubes are one.
+    beyond: f32,
+}
+
+impl Local {
+    /// The shares of sixteen points, from the centre (0) to the outer boundary (1).
+    #[inline(always)]
+    pub(super) fn share(&self, at: &Lanes<3>) -> F32x16 {
+        let mut own = [F32x16::splat(0.0); 3];
+        for row in 0..3 {
+            for lane in 0..LANES {
+                let mut sum = 0.0;
+                for axis in 0..3 {
+                    sum += self.rows[row][axis] * (at[axis].0[lane] - self.centre[axis]);
+                }
+                own[row].0[lane] = sum;
+            }
+        }
+        let mut share = F32x16::splat(0.0);
+        match self.shape {
+            Shape::Sphere => {
+                for lane in 0..LANES {
+                    let [x, y, z] = [own[0].0[lane], own[1].0[lane], own[2].0[lane]];
+                    share.0[lane] = (x * x + y * y + z * z).sqrt();
+                }
+            }
+            Shape::Cubes => {
+                for lane in 0..LANES {
+                    let [x, y, z] = [own[0].0[lane].abs(), own[1].0[lane].abs(), own[2].0[lane].abs()];
+                    let most = if x > y { x } else { y };
+                    let most = if most > z { most } else { z };
+                    let outside = 0.5 + (most - 1.0) * self.beyond;
+                    share.0[lane] = if most > 1.0 { outside } else { 0.5 * most };
+                }
+            }
+        }
+        share
+    }
+}
+
+/// The inverse of the matrix whose columns are `axes`; `None` where they span no volume.
+fn inverse(axes: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
+    // Each axis brought to length 1 first: no product overflows, and flatness has no scale.
+    let lengths = axes.map(length);
+    if !lengths.iter().all(|length| (1e-150..1e150).contains(length)) {
+        return None;
+    }
+    let unit: [[f64; 3]; 3] = std::array::from_fn(|k| axes[k].map(|x| x / lengths[k]));
+    let [a, b, c] = unit;
+    let volume = dot(a, cross(b, c));
+    if volume.abs() <= FLAT {
+        return None;
+    }
+    let rows = [cross(b, c), cross(c, a), cross(a, b)];
+    Some(std::array::from_fn(|k| rows[k].map(|x| x / volume / lengths[k])))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// The first rows of an outline: its centre and the ends of its own x, y and z axis.
+pub const AXIS_ROWS: usize = 4;
+
+/// Points of a great circle, or of a cube's edge, at least.
+const CIRCLE: usize = 32;
+const EDGE: usize = 6;
+
+/// Points that show a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or
+/// the edges of both cubes. At least `least` points.
+pub fn outline(shape: Shape, outer: f64, least: usize) -> Vec<[f32; 3]> {
+    let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    match shape {
+        Shape::Sphere => circles(CIRCLE.max(least.div_ceil(3)), &mut points),
+        Shape::Cubes => {
+            let edge = EDGE.max(least.div_ceil(24));
+            edges(1.0, edge, &mut points);
+            edges(outer, edge, &mut points);
+        }
+    }
+    points
+}
+
+/// Unit circles about x, y and z.
+fn circles(count: usize, points: &mut Vec<[f32; 3]>) {
+    for axis in 0..3 {
+        for k in 0..count {
+            let angle = std::f64::consts::TAU * k as f64 / count as f64;
+            let mut point = [0.0; 3];
+            point[(axis + 1) % 3] = libm::cos(angle) as f32;
+            point[(axis + 2) % 3] = libm::sin(angle) as f32;
+            points.push(point);
+        }
+    }
+}
+
+/// The twelve edges of a cube of this half size, both corners of each.
+fn edges(half: f64, count: usize, points: &mut Vec<[f32; 3]>) {
+    for axis in 0..3 {
+        for corner in 0..4 {
+            for k in 0..count {
+                let mut point = [0.0; 3];
+                point[axis] = (half * (2.0 * k as f64 / (count - 1) as f64 - 1.0)) as f32;
+                point[(axis + 1) % 3] = if corner & 1 == 0 { -half } else { half } as f32;
+                point[(axis + 2) % 3] = if corner & 2 == 0 { -half } else { half } as f32;
+                points.push(point);
+            }
+        }
+    }
+}

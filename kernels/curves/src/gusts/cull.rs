@@ -1,0 +1,122 @@
+//! Which regions a stretch of points may meet: bounds against bounds, sixteen regions at a time.
+//!
+//! Never loses one that reaches a point: boxes of regions are rounded outwards.
+
+use numerics::lanes::LANES;
+use numerics::simd::kernel;
+use numerics::vec3::Vec3;
+
+/// A low and a high corner.
+pub(super) type Bounds = [Vec3; 2];
+
+/// Of nothing: meets nothing, and adds nothing to others.
+pub(super) const NOWHERE: Bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+
+/// Floats of sixteen points.
+const FLOATS: usize = 3 * LANES;
+
+kernel! {
+    /// The bounds of points.
+    pub(super) fn bounds_of(points: &[Vec3]) -> Bounds = bounds_body;
+}
+
+#[inline(always)]
+fn bounds_body(points: &[Vec3]) -> Bounds {
+    let (whole, rest) = points.as_flattened().as_chunks::<FLOATS>();
+    let [mut low, mut high] = [[f32::INFINITY; FLOATS], [f32::NEG_INFINITY; FLOATS]];
+    for floats in whole {
+        for i in 0..FLOATS {
+            low[i] = if floats[i] < low[i] { floats[i] } else { low[i] };
+            high[i] = if floats[i] > high[i] { floats[i] } else { high[i] };
+        }
+    }
+    for (i, float) in rest.iter().enumerate() {
+        low[i] = low[i].min(*float);
+        high[i] = high[i].max(*float);
+    }
+    let (low, high) = (low.as_chunks::<3>().0, high.as_chunks::<3>().0);
+    low.iter().zip(high).fold(NOWHERE, |bounds, (low, high)| join(bounds, [*low, *high]))
+}
+
+/// Around both.
+pub(super) fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
+    [[0, 1, 2].map(|k| low[k].min(other_low[k])), [0, 1, 2].map(|k| high[k].max(other_high[k]))]
+}
+
+/// Bounds of regions, an axis and an end an array, and which region each is of.
+#[derive(Default)]
+pub(super) struct Boxes {
+    low: [Vec<f32>; 3],
+    high: [Vec<f32>; 3],
+    regions: Vec<u32>,
+}
+
+impl Boxes {
+    /// Adds the box `reach` around `centre`, rounded outwards.
+    pub(super) fn push(&mut self, region: u32, centre: [f64; 3], reach: [f64; 3]) {
+        self.regions.push(region);
+        for axis in 0..3 {
+            self.low[axis].push(((centre[axis] - reach[axis]) as f32).next_down());
+            self.high[axis].push(((centre[axis] + reach[axis]) as f32).next_up());
+        }
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.regions.len()
+    }
+
+    /// The region of the box at `place`.
+    pub(super) fn region(&self, place: usize) -> usize {
+        self.regions[place] as usize
+    }
+
+    /// Which of the sixteen boxes from `first` on `bounds` meets: 1, else 0.
+    #[inline(always)]
+    pub(super) fn meet(&self, first: usize, [low, high]: &Bounds) -> [u32; LANES] {
+        let mut met = [0; LANES];
+        let here = LANES.min(self.len() - first);
+        met[..here].fill(1);
+        for axis in 0..3 {
+            let (from, to) = (&self.low[axis][first..first + here], &self.high[axis][first..first + here]);
+            // Whole sixteens become vectors.
+            match (<&[f32; LANES]>::try_from(from), <&[f32; LANES]>::try_from(to)) {
+                (Ok(from), Ok(to)) => {
+                    for lane in 0..LANES {
+                        met[lane] &= u32::from(from[lane] <= high[axis]) & u32::from(to[lane] >= low[axis]);
+                    }
+                }
+                _ => {
+                    for lane in 0..here {
+                        met[lane] &= u32::from(from[lane] <= high[axis]) & u32::from(to[lane] >= low[axis]);
+                    }
+                }
+            }
+        }
+        met
+    }
+}
+
+kernel! {
+    /// Those of `all` that `bounds` meets, in order.
+    pub(super) fn meeting(all: &Boxes, bounds: &Bounds) -> Boxes = meeting_body;
+}
+
+#[inline(always)]
+fn meeting_body(all: &Boxes, bounds: &Bounds) -> Boxes {
+    let mut near = Boxes::default();
+    for first in (0..all.len()).step_by(LANES) {
+        let met = all.meet(first, bounds);
+        if met == [0; LANES] {
+            continue;
+        }
+        for place in (0..LANES).filter(|lane| met[*lane] != 0).map(|lane| first + lane) {
+            near.regions.push(all.regions[place]);
+            for axis in 0..3 {
+                near.low[axis].push(all.low[axis][place]);
+                near.high[axis].push(all.high[axis][place]);
+            }
+        }
+    }
+    near
+}

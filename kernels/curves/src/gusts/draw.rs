@@ -1,0 +1,145 @@
+//! Which gusts are alive at a moment, and what was drawn for each: a pure function of a seed, a
+//! gust's number, its round and the moment.
+//!
+//! A gust's start is drawn once; where it comes again every so many frames, all else is drawn anew
+//! each round. Rounds reach back and forth without end, and those alive are found by a division, so
+//! frame 1,000,000 costs what frame 1 does. Limit: [`MOST_LIVING`] at a moment; beyond it a gust's
+//! newest rounds are kept and the others counted.
+
+use numerics::random::Key;
+
+/// What is drawn from; each range from its lower to its upper end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Draw {
+    /// Another seed, other gusts.
+    pub seed: u64,
+    /// How many gusts.
+    pub gusts: u32,
+    /// Metres.
+    pub radius: [f32; 2],
+    /// Share of the radius that noise may take away, held to 0..1.
+    pub noise: [f32; 2],
+    /// First frame of a gust's first round.
+    pub start: [f64; 2],
+    /// Frames at full strength.
+    pub life: [f64; 2],
+    /// Frames from full strength to none.
+    pub decay: [f64; 2],
+    /// Frames from a round to the next; below [`SHORTEST_ROUND`] there is one round.
+    pub repeat: f64,
+}
+
+/// The shortest time from a round to the next, in frames: the finest step that frames can take.
+const SHORTEST_ROUND: f64 = 1.0 / 5040.0;
+
+/// Most gusts alive at a moment, so that no setting fills the memory.
+pub const MOST_LIVING: u64 = 1 << 16;
+
+/// A gust alive at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gust {
+    /// Its first frame.
+    pub start: f64,
+    /// 1 through its life, then falling to 0.
+    pub strength: f32,
+    /// Metres.
+    pub radius: f32,
+    /// Share of the radius that noise may take away, 0..1.
+    pub noise: f32,
+    /// How far up the range of speeds it is, 0..1.
+    pub speed: f64,
+    /// Where on the plane it starts: −1..1 each way.
+    pub place: [f64; 2],
+    /// Which noise it has.
+    pub salt: u32,
+}
+
+/// All gusts alive at a moment, by number, then by round.
+#[must_use]
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Living {
+    /// The gusts.
+    pub gusts: Vec<Gust>,
+    /// Rounds that may be alive and were left out, beyond [`MOST_LIVING`].
+    pub dropped: u64,
+}
+
+/// What each random number is for.
+#[derive(Clone, Copy)]
+enum Draws {
+    Start,
+    Round,
+    Radius,
+    Noise,
+    Speed,
+    Life,
+    Decay,
+    Across,
+    Up,
+    Salt,
+}
+
+impl Draw {
+    /// The gusts alive at `frame`.
+    pub fn at(&self, frame: f64) -> Living {
+        let mut living = Living::default();
+        let most = (MOST_LIVING / u64::from(self.gusts.max(1))).max(1) as i64;
+        for index in 0..self.gusts {
+            let key = Key::new(self.seed).of(u64::from(index));
+            let start = between(key.of(Draws::Start as u64), self.start);
+            let [first, last] = self.rounds(start, frame);
+            let kept = first.max(last.saturating_sub(most - 1));
+            living.dropped = living.dropped.saturating_add(kept.abs_diff(first));
+            for round in kept..=last {
+                let start = if round == 0 { start } else { start + round as f64 * self.repeat };
+                let key = key.of(Draws::Round as u64).of(round as u64);
+                living.gusts.extend(self.gust(key, start, frame));
+            }
+        }
+        living
+    }
+
+    /// The first and the last round that may be alive at `frame`; none where the first is later.
+    fn rounds(&self, start: f64, frame: f64) -> [i64; 2] {
+        if self.repeat < SHORTEST_ROUND {
+            return [0, 0];
+        }
+        let longest = self.life[1] + self.decay[1];
+        let since = |age: f64| (frame - start - age) / self.repeat;
+        // One more each way: which are alive is asked of each.
+        [since(longest).floor() as i64, since(0.0).ceil() as i64]
+    }
+
+    /// One round, where it is alive.
+    fn gust(&self, key: Key, start: f64, frame: f64) -> Option<Gust> {
+        let of = |draw: Draws| key.of(draw as u64);
+        let strength =
+            strength(frame - start, between(of(Draws::Life), self.life), between(of(Draws::Decay), self.decay));
+        if strength <= 0.0 {
+            return None;
+        }
+        let side = |draw: Draws| 2.0 * of(draw).f64() - 1.0;
+        Some(Gust {
+            start,
+            strength,
+            radius: of(Draws::Radius).between(self.radius),
+            noise: of(Draws::Noise).between(self.noise).clamp(0.0, 1.0),
+            speed: of(Draws::Speed).f64(),
+            place: [side(Draws::Across), side(Draws::Up)],
+            salt: of(Draws::Salt).u32(),
+        })
+    }
+}
+
+/// Uniform between both ends.
+fn between(key: Key, [low, high]: [f64; 2]) -> f64 {
+    (low + (high - low) * key.f64()).clamp(low.min(high), high.max(low))
+}
+
+/// 1 from age 0 up to `life`, then straight down to 0 over `decay`.
+fn strength(age: f64, life: f64, decay: f64) -> f32 {
+    if age < 0.0 || age >= life + decay {
+        return 0.0;
+    }
+    if age < life { 1.0 } else { (1.0 - (age - life) / decay) as f32 }
+}

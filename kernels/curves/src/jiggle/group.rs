@@ -1,0 +1,311 @@
+//! Sixteen curves side by side: a lane a curve, a slot a CV.
+//!
+//! A lane whose curve has ended repeats its last CV; nothing of it is written.
+
+use super::carry::Carry;
+use super::response::Response;
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::simd::kernel;
+use numerics::vec3::Vec3;
+
+/// Sixteen `f64`, aligned as the widest vector.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct F64x16(pub(super) [f64; LANES]);
+
+impl F64x16 {
+    pub(super) const ZERO: Self = Self([0.0; LANES]);
+
+    /// The value that `of` gives for each lane.
+    #[inline(always)]
+    fn from_fn(of: impl Fn(usize) -> f64) -> Self {
+        let mut out = Self::ZERO;
+        for lane in 0..LANES {
+            out.0[lane] = of(lane);
+        }
+        out
+    }
+}
+
+/// What `of` gives for each axis. Not a loop: where f32 and f64 mix, the compiler would unroll the lanes inside of it and
+/// make vectors of three axes.
+#[inline(always)]
+fn axes<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
+}
+
+/// b − a, exactly where they are near each other.
+#[inline(always)]
+fn between(a: &Lanes<3>, b: &Lanes<3>) -> [F64x16; 3] {
+    axes(|axis| F64x16::from_fn(|lane| f64::from(b[axis].0[lane]) - f64::from(a[axis].0[lane])))
+}
+
+/// One CV of each lane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slot {
+    /// From the target to where the CV is, metres.
+    pub(super) offset: [F64x16; 3],
+    /// Velocity, metres a step.
+    pub(super) pace: [F64x16; 3],
+    /// The target.
+    pub(super) target: Lanes<3>,
+}
+
+/// The steps of one CV of each lane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Responses {
+    numbers: [F64x16; 6],
+}
+
+impl Responses {
+    pub(super) const NONE: Self = Self { numbers: [F64x16::ZERO; 6] };
+
+    pub(super) fn set(&mut self, lane: usize, response: Response) {
+        let Response { a, b, c, e, k, l } = response;
+        for (numbers, number) in self.numbers.iter_mut().zip([a, b, c, e, k, l]) {
+            numbers.0[lane] = number;
+        }
+    }
+}
+
+/// Up to sixteen curves.
+#[derive(Clone, Debug)]
+pub(super) struct Curves {
+    /// Which curve each lane is; of a lane without one, the last.
+    pub(super) curve: [u32; LANES],
+    first: [u32; LANES],
+    last: [u32; LANES],
+    /// CVs that are the lane's own: 0 where it has no curve.
+    count: [u32; LANES],
+    /// Most CVs of a curve.
+    pub(super) longest: usize,
+}
+
+impl Curves {
+    /// Of the curves from `first` on that `starts` has, at most sixteen.
+    pub(super) fn new(starts: &[u32], first: usize) -> Self {
+        let end = (first + LANES).min(starts.len() - 1);
+        let base = starts[first];
+        let last = (end - 1) as u32;
+        let mut curves =
+            Self { curve: [last; LANES], first: [base; LANES], last: [base; LANES], count: [0; LANES], longest: 0 };
+        for lane in 0..end - first {
+            let [start, until] = [starts[first + lane], starts[first + lane + 1]];
+            curves.curve[lane] = (first + lane) as u32;
+            if start < until {
+                (curves.first[lane], curves.last[lane]) = (start, until - 1);
+                curves.count[lane] = until - start;
+                curves.longest = curves.longest.max((until - start) as usize);
+            }
+        }
+        curves
+    }
+
+    /// Which point is each lane's CV at `step`.
+    #[inline(always)]
+    pub(super) fn at(&self, step: usize) -> [usize; LANES] {
+        std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step as u32) as usize)
+    }
+
+    /// Writes the lanes' own CVs to `out`, whose first point is `base`.
+    #[inline(always)]
+    fn write(&self, step: usize, points: &Lanes<3>, base: usize, out: &mut [Vec3]) {
+        for lane in 0..LANES {
+            if (step as u32) < self.count[lane] {
+                out[self.first[lane] as usize + step - base] = get(points, lane);
+            }
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn load(&self, step: usize, points: &[Vec3]) -> Lanes<3> {
+        let at = self.at(step);
+        let mut lanes = [F32x16::splat(0.0); 3];
+        for lane in 0..LANES {
+            set(&mut lanes, lane, points[at[lane]]);
+        }
+        lanes
+    }
+}
+
+kernel! {
+    /// A step to `targets`, carried by what moves each curve, where something does.
+    pub(super) fn step_group(
+        curves: &Curves,
+        slots: &mut [Slot],
+        responses: &[Responses],
+        targets: &[Vec3],
+        carries: Option<&[Carry]>,
+    ) -> () = step;
+}
+
+#[inline(always)]
+fn step(curves: &Curves, slots: &mut [Slot], responses: &[Responses], targets: &[Vec3], carries: Option<&[Carry]>) {
+    let carried = carries.map(|carries| Carried::of(curves, carries));
+    for (step, (slot, responses)) in slots.iter_mut().zip(responses).enumerate() {
+        let now = curves.load(step, targets);
+        let mut way = [F64x16::ZERO; 3];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                way[axis].0[lane] = f64::from(now[axis].0[lane]) - f64::from(slot.target[axis].0[lane]);
+            }
+        }
+        if let Some(carried) = &carried {
+            carried.carry(slot, &mut way);
+        }
+        let [a, b, c, e, k, l] = &responses.numbers;
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let (offset, pace) = (slot.offset[axis].0[lane], slot.pace[axis].0[lane]);
+                let way = way[axis].0[lane];
+                slot.offset[axis].0[lane] = (a.0[lane] * offset + b.0[lane] * pace) + k.0[lane] * way;
+                slot.pace[axis].0[lane] = (c.0[lane] * offset + e.0[lane] * pace) + l.0[lane] * way;
+            }
+        }
+        slot.target = now;
+    }
+}
+
+/// What carries sixteen curves.
+struct Carried {
+    change: [[F64x16; 3]; 3],
+    about: [F64x16; 3],
+    shift: [F64x16; 3],
+}
+
+impl Carried {
+    #[inline(always)]
+    fn of(curves: &Curves, carries: &[Carry]) -> Self {
+        let zero = [F64x16::ZERO; 3];
+        let mut carried = Self { change: [zero; 3], about: zero, shift: zero };
+        for lane in 0..LANES {
+            let carry = &carries[curves.curve[lane] as usize];
+            for row in 0..3 {
+                for column in 0..3 {
+                    carried.change[row][column].0[lane] = carry.change[row][column];
+                }
+                carried.about[row].0[lane] = carry.about[row];
+                carried.shift[row].0[lane] = carry.shift[row];
+            }
+        }
+        carried
+    }
+
+    /// Carries the state of a CV along, and takes out of its target's way what is the carrier's.
+    #[inline(always)]
+    fn carry(&self, slot: &mut Slot, way: &mut [F64x16; 3]) {
+        let mut from = [F64x16::ZERO; 3];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                from[axis].0[lane] = f64::from(slot.target[axis].0[lane]) - self.about[axis].0[lane];
+            }
+        }
+        let (from, offset, pace) = (self.turned(&from), self.turned(&slot.offset), self.turned(&slot.pace));
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                way[axis].0[lane] -= from[axis].0[lane] + self.shift[axis].0[lane];
+                slot.offset[axis].0[lane] += offset[axis].0[lane];
+                slot.pace[axis].0[lane] += pace[axis].0[lane];
+            }
+        }
+    }
+
+    /// What the turn adds to a vector.
+    #[inline(always)]
+    fn turned(&self, v: &[F64x16; 3]) -> [F64x16; 3] {
+        let mut out = [F64x16::ZERO; 3];
+        for axis in 0..3 {
+            let [x, y, z] = &self.change[axis];
+            for lane in 0..LANES {
+                out[axis].0[lane] = (x.0[lane] * v[0].0[lane] + y.0[lane] * v[1].0[lane]) + z.0[lane] * v[2].0[lane];
+            }
+        }
+        out
+    }
+}
+
+/// How much of the offset is shown.
+#[derive(Clone, Copy)]
+pub(super) struct Blend<'a> {
+    pub(super) share: f32,
+    pub(super) mask: Option<&'a [f32]>,
+}
+
+impl Blend<'_> {
+    #[inline(always)]
+    fn at(&self, curves: &Curves, step: usize) -> F64x16 {
+        let Some(mask) = self.mask else { return F64x16([f64::from(self.share); LANES]) };
+        let at = curves.at(step);
+        F64x16::from_fn(|lane| {
+            let share = self.share * mask[at[lane]];
+            let share = if share > 0.0 { share } else { 0.0 };
+            f64::from(if share < 1.0 { share } else { 1.0 })
+        })
+    }
+}
+
+kernel! {
+    /// Writes where the curves are, their segments as long as their targets', to `out`, whose first point is `base`.
+    /// Gives the largest square of a distance from the target.
+    pub(super) fn shape_group(
+        curves: &Curves,
+        slots: &[Slot],
+        blend: Blend<'_>,
+        base: usize,
+        out: &mut [Vec3],
+    ) -> f64 = shape;
+}
+
+#[inline(always)]
+fn shape(curves: &Curves, slots: &[Slot], blend: Blend<'_>, base: usize, out: &mut [Vec3]) -> f64 {
+    let mut farthest = F64x16::ZERO;
+    let mut moved = [F64x16::ZERO; 3];
+    let Some(root) = slots.first() else { return 0.0 };
+    // The root's offset is 0.
+    let (mut target, mut shown) = (&root.target, [F64x16::ZERO; 3]);
+    curves.write(0, target, base, out);
+    for (step, slot) in slots.iter().enumerate().skip(1) {
+        let shares = blend.at(curves, step);
+        let next = axes(|axis| F64x16::from_fn(|lane| slot.offset[axis].0[lane] * shares.0[lane]));
+        let rest = between(target, &slot.target);
+        let swung =
+            axes(|axis| F64x16::from_fn(|lane| rest[axis].0[lane] + (next[axis].0[lane] - shown[axis].0[lane])));
+        let (long, now) = (squares(&rest), squares(&swung));
+        // Equal segments give exactly 1; one without a direction keeps its target's.
+        let ratio = F64x16::from_fn(|lane| (long.0[lane] / now.0[lane]).sqrt());
+        let scale = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { ratio.0[lane] } else { 0.0 });
+        let straight = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { 0.0 } else { 1.0 });
+        moved = axes(|axis| {
+            F64x16::from_fn(|lane| {
+                let rest = rest[axis].0[lane];
+                let end = scale.0[lane] * swung[axis].0[lane] + straight.0[lane] * rest;
+                moved[axis].0[lane] + (end - rest)
+            })
+        });
+        let distance = squares(&moved);
+        farthest = F64x16::from_fn(|lane| {
+            let distance = if (step as u32) < curves.count[lane] { distance.0[lane] } else { 0.0 };
+            if distance > farthest.0[lane] { distance } else { farthest.0[lane] }
+        });
+        let written = axes(|axis| {
+            F32x16::from_fn(|lane| {
+                let (target, moved) = (slot.target[axis].0[lane], moved[axis].0[lane]);
+                let to = (f64::from(target) + moved) as f32;
+                // Not the sum where nothing moved: −0 + 0 would lose its sign.
+                if moved == 0.0 { target } else { to }
+            })
+        });
+        curves.write(step, &written, base, out);
+        (target, shown) = (&slot.target, next);
+    }
+    farthest.0.into_iter().fold(0.0, f64::max)
+}
+
+/// Squared lengths.
+#[inline(always)]
+fn squares(v: &[F64x16; 3]) -> F64x16 {
+    F64x16::from_fn(|lane| {
+        let [x, y, z] = [v[0].0[lane], v[1].0[lane], v[2].0[lane]];
+        (x * x + y * y) + z * z
+    })
+}

@@ -1,0 +1,201 @@
+//! Whole curves: lengths, roots, masks, determinism.
+
+use super::*;
+use numerics::vec3;
+
+fn distance(a: Vec3, b: Vec3) -> f64 {
+    (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|d| d * d).sum::<f64>().sqrt()
+}
+
+/// Distance of a position this large from the next.
+fn ulp(points: &[Vec3]) -> f64 {
+    let largest = points.iter().map(|point| vec3::largest(*point)).fold(0.0, f32::max);
+    f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
+}
+
+/// Segments as long as their targets' to 1e-5 of the curve and 4 ulp; roots the same bits.
+fn assert_kept(starts: &[u32], targets: &[Vec3], found: &[Vec3]) {
+    for ends in starts.windows(2) {
+        let curve = ends[0] as usize..ends[1] as usize;
+        let (targets, found) = (&targets[curve.clone()], &found[curve]);
+        let length: f64 = targets.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        for (a, b) in targets.windows(2).zip(found.windows(2)) {
+            let change = (distance(a[0], a[1]) - distance(b[0], b[1])).abs();
+            assert!(change <= 1e-5 * length + 4.0 * ulp(targets).max(ulp(found)), "a segment changed by {change}");
+        }
+        assert_eq!(bits(&targets[..targets.len().min(1)]), bits(&found[..found.len().min(1)]));
+    }
+}
+
+fn swung(path: Path, most: u64, frames: u32) -> Vec<Shaped> {
+    let ramp = rising();
+    let (starts, first) = wobbling(700, most, 0.0);
+    let mut jiggle = Jiggle::at_rest(&starts, &first, &first);
+    let frames = (1..=frames).map(|frame| {
+        let targets = wobbling(700, most, frame as f32).1;
+        jiggle.step_on(path, &targets, &spring(0.6, 0.2, &ramp, Drag::World), 1.0, None);
+        let shaped = jiggle.shape_on(path, 1.0, None);
+        assert_kept(&starts, &targets, &shaped.points);
+        shaped
+    });
+    frames.collect()
+}
+
+#[test]
+fn lengths_and_roots_are_kept_and_every_path_and_number_of_threads_has_the_same_bits() {
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let expected = pool(1).install(|| swung(Path::BASELINE, 9, 12));
+    assert!(expected[11].max_offset > 0.01);
+    for path in Path::all() {
+        for threads in [1, 2, 7] {
+            assert!(pool(threads).install(|| swung(path, 9, 12)) == expected, "{path:?} on {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn lengths_are_restored_root_to_tip_by_hand() {
+    // Both segments of length 1 upwards; the free CVs are pushed by 1 and by 1 along x. Segment 1 points to (1, 1): it
+    // ends at (√½, √½). Segment 2 stays upright, and its root is there.
+    let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
+    let mut jiggle = Jiggle::at_rest(&[0, 3], &points, &points);
+    for cv in 1..3 {
+        jiggle.parts[0].slots[cv].offset[0].0[0] = 1.0;
+    }
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let shaped = jiggle.shape(1.0, None);
+    let expected = [[0.0; 3], [half, half, 0.0], [half, half + 1.0, 0.0]];
+    assert!(shaped.points.iter().zip(expected).all(|(a, b)| distance(*a, b) < 2e-7), "{shaped:?}");
+    let far = 2.0 - f64::sqrt(2.0);
+    assert!((shaped.max_offset - far.sqrt()).abs() < 1e-12);
+    // Half of the push: (½, 1) ÷ √1.25. A mask of ½ does the same; nothing of it the very bits.
+    let half = jiggle.shape(0.5, None);
+    assert!((half.points[1][0] - 0.5 / 1.25_f32.sqrt()).abs() < 1e-7);
+    assert_eq!(jiggle.shape(1.0, Some(&[0.5; 3])), half);
+    assert_eq!(jiggle.shape(0.25, Some(&[9.0; 3])).points, jiggle.shape(1.0, None).points, "a mask ends at the whole");
+    assert_eq!(jiggle.shape(1.0, Some(&[0.0, -1.0, 0.0])).points, points);
+    // Nothing was fed back.
+    assert_eq!(jiggle.parts[0].slots[1].offset[0].0[0], 1.0);
+}
+
+#[test]
+fn what_stands_still_keeps_its_bits() {
+    let (starts, points) = wobbling(60, 9, 3.0);
+    let points: Vec<Vec3> = points.iter().map(|p| [p[0], -0.0, p[2]]).collect();
+    let ramp = soft();
+    let mut jiggle = Jiggle::at_rest(&starts, &points, &points);
+    for _ in 0..50 {
+        jiggle.step(&points, &spring(0.3, 0.1, &ramp, Drag::World), 1.0, Some(&vec![Carry::NONE; 60]));
+    }
+    let shaped = jiggle.shape(0.7, None);
+    assert_eq!(bits(&shaped.points), bits(&points));
+    assert_eq!(shaped.max_offset, 0.0);
+}
+
+#[test]
+fn a_ramp_of_zero_follows_exactly_and_half_of_it_doubles_the_frequency() {
+    let points = |x: f32| [[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 2.0, 0.0]];
+    let run = |ramp: &Ramp, phase: f64| {
+        let mut jiggle = Jiggle::at_rest(&[0, 3], &points(0.0), &points(0.0));
+        for x in [1.0, 2.0, 1.5, -1.0] {
+            jiggle.step(&points(x), &spring(phase, 0.3, ramp, Drag::World), 1.0, None);
+        }
+        [1, 2].map(|cv| jiggle.parts[0].slots[cv].offset[0].0[0])
+    };
+    assert_eq!(run(&Ramp::constant(0.0), 0.8), [0.0; 2]);
+    assert_eq!(run(&Ramp::constant(-1.0), 0.8), [0.0; 2]);
+    // Middle of the curve: ramp ½, so ω doubles.
+    assert_eq!(run(&rising(), 0.8)[0], run(&soft(), 1.6)[0]);
+    assert_eq!(run(&rising(), 0.8)[1], run(&soft(), 0.8)[1]);
+}
+
+#[test]
+fn masks_scale_frequency_and_damping_from_a_quarter_to_four() {
+    let run = |phase: f64, zeta: f64, masks: [Option<f32>; 2]| {
+        let ramp = soft();
+        let [frequency, damping] = masks.map(|mask| mask.map(|mask| [1.0, mask]));
+        let mut jiggle = Jiggle::at_rest(&ONE, &at(0.0), &at(0.0));
+        for x in [1.0, 2.0, 1.5, -1.0] {
+            let spring = Spring {
+                frequency_mask: frequency.as_ref().map(|mask| &mask[..]),
+                damping_mask: damping.as_ref().map(|mask| &mask[..]),
+                ..spring(phase, zeta, &ramp, Drag::World)
+            };
+            jiggle.step(&at(x), &spring, 1.0, None);
+        }
+        free(&jiggle)
+    };
+    assert_eq!(run(0.8, 0.4, [Some(0.5), None]), run(0.4, 0.4, [None; 2]));
+    assert_eq!(run(0.8, 0.4, [None, Some(2.0)]), run(0.8, 0.8, [None; 2]));
+    assert_eq!(run(0.8, 0.4, [Some(0.0), None]), run(0.2, 0.4, [None; 2]));
+    assert_eq!(run(0.8, 0.4, [Some(-3.0), Some(1e9)]), run(0.2, 1.6, [None; 2]));
+}
+
+#[test]
+fn a_spring_that_changes_on_the_way_is_heard() {
+    let ramp = soft();
+    let run = |phases: [f64; 3]| {
+        let mut jiggle = Jiggle::at_rest(&ONE, &at(0.0), &at(0.0));
+        for (phase, x) in phases.iter().zip([1.0, 2.0, 0.0]) {
+            jiggle.step(&at(x), &spring(*phase, 0.3, &ramp, Drag::Target), 1.0, None);
+        }
+        free(&jiggle)
+    };
+    assert_ne!(run([0.5, 0.5, 0.5]), run([0.5, 0.5, 0.9]));
+    assert_ne!(run([0.5, 0.9, 0.5]), run([0.5, 0.5, 0.5]));
+}
+
+#[test]
+fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_come_out() {
+    let ramp = rising();
+    let long: Vec<Vec3> = (0..10_000).map(|k| [0.0, k as f32 * 1e-4, 0.0]).collect();
+    let mut points = vec![[1.0; 3], [2.0; 3], [2.0; 3], [3.0; 3], [3.0; 3], [3.0; 3]];
+    points.extend(&long);
+    let starts = [0, 0, 1, 3, 6, 6, 10_006];
+    let mut jiggle = Jiggle::at_rest(&starts, &points, &points);
+    for frame in 1..20 {
+        let targets: Vec<Vec3> = points.iter().map(|p| [p[0] + 0.1 * frame as f32 * p[1], p[1], p[2]]).collect();
+        jiggle.step(&targets, &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
+        assert_kept(&starts, &targets, &jiggle.shape(1.0, None).points);
+    }
+    let mut none = Jiggle::at_rest(&[0], &[], &[]);
+    none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
+    assert_eq!(none.shape(1.0, None), Shaped { points: vec![], max_offset: 0.0 });
+    let mut none = Jiggle::at_rest(&[], &[], &[]);
+    none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
+}
+
+#[test]
+fn a_scene_scaled_by_a_power_of_two_swings_the_same_bits() {
+    let ramp = rising();
+    let run = |scale: f32| {
+        let frame = |frame: f32| wobbling(40, 6, frame).1.iter().map(|p| p.map(|x| x * scale)).collect::<Vec<_>>();
+        let mut jiggle = Jiggle::at_rest(&wobbling(40, 6, 0.0).0, &frame(0.0), &frame(0.0));
+        for k in 1..9 {
+            jiggle.step(&frame(k as f32), &spring(0.6, 0.2, &ramp, Drag::World), 1.0, None);
+        }
+        jiggle.shape(1.0, None).points.iter().map(|p| p.map(|x| x / scale)).collect::<Vec<_>>()
+    };
+    let expected = bits(&run(1.0));
+    for power in [-60, -20, 20, 60] {
+        let scale = f32::from_bits(((127 + power) as u32) << 23);
+        assert_eq!(bits(&run(scale)), expected, "2^{power}");
+    }
+}
+
+#[test]
+fn between_two_shapes_lengths_are_between_theirs() {
+    let starts = [0, 3, 3, 4];
+    let from = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [5.0; 3]];
+    let to = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 1.0], [5.0; 3]];
+    let middle: Vec<Vec3> = from.iter().zip(&to).map(|(a, b)| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect();
+    let mut points = middle.clone();
+    with_lengths_between(&starts, [&from, &to], 0.5, &mut points);
+    // Directions of the middle, lengths 1.5 and 1.
+    assert!((distance(points[0], points[1]) - 1.5).abs() < 1e-6 && (distance(points[1], points[2]) - 1.0).abs() < 1e-6);
+    assert!((points[1][1] / points[1][0] - 2.0).abs() < 1e-6);
+    assert_eq!([points[0], points[3]], [middle[0], middle[3]]);
+    let mut same = from;
+    with_lengths_between(&starts, [&from, &from], 0.3, &mut same);
+    assert_eq!(same, from);
+}

@@ -1,0 +1,278 @@
+use super::*;
+use numerics::random::Key;
+
+const UNIT: [[f64; 3]; 2] = [[0.0; 3], [1.0; 3]];
+const BASES: [Basis; 2] = [Basis::Trilinear, Basis::Bernstein];
+const SIDES: [Outside; 2] = [Outside::Hold, Outside::Extend];
+
+/// An offset a control point, from its place in the unit box.
+fn offsets(divisions: [usize; 3], offset: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f32; 3]> {
+    let mut offsets = Vec::new();
+    for k in 0..=divisions[2] {
+        for j in 0..=divisions[1] {
+            for i in 0..=divisions[0] {
+                let place = [0, 1, 2].map(|axis| [i, j, k][axis] as f64 / divisions[axis] as f64);
+                offsets.push(offset(place).map(|x| x as f32));
+            }
+        }
+    }
+    offsets
+}
+
+fn random(count: usize, [low, high]: [f32; 2]) -> Vec<[f32; 3]> {
+    (0..count).map(|row| [0, 1, 2].map(|k| Key::new(8).of(row as u64).of(k).between([low, high]))).collect()
+}
+
+fn noisy(divisions: [usize; 3]) -> Vec<[f32; 3]> {
+    random(control_points(divisions).unwrap(), [-0.3, 0.3])
+}
+
+#[track_caller]
+fn assert_close(a: &[[f32; 3]], b: &[[f64; 3]], within: f64) {
+    for (a, b) in a.iter().zip(b) {
+        let near = |k: usize| (f64::from(a[k]) - b[k]).abs() <= within * b[k].abs().max(1.0);
+        assert!((0..3).all(near), "{a:?} is not {b:?}");
+    }
+}
+
+#[test]
+fn one_corner_moves_the_middle_by_an_eighth_and_the_far_corner_not_at_all() {
+    let mut moved = vec![[0.0; 3]; 8];
+    moved[7] = [8.0, 0.0, -16.0];
+    for basis in BASES {
+        let lattice = Lattice::new(UNIT, [1; 3], &moved, basis, Outside::Hold).unwrap();
+        let out = lattice.deform(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0, 1.0, 0.5]], true);
+        assert_eq!(out.points, [[1.5, 0.5, -1.5], [0.0; 3], [9.0, 1.0, -15.0], [5.0, 1.0, -7.5]]);
+        // D = uvw·(8, 0, −16): its derivative in the middle is ¼ of that along each axis.
+        assert_eq!(out.jacobians[0], [[3.0, 2.0, 2.0], [0.0, 1.0, 0.0], [-4.0, -4.0, -3.0]]);
+    }
+}
+
+#[test]
+fn of_two_divisions_the_middle_point_moves_the_middle_fully_or_by_an_eighth() {
+    let mut moved = vec![[0.0; 3]; 27];
+    moved[13] = [0.0, 8.0, 0.0];
+    let at = |basis| {
+        let lattice = Lattice::new(UNIT, [2; 3], &moved, basis, Outside::Hold).unwrap();
+        lattice.deform(&[[0.5; 3], [0.25, 0.5, 0.5]], false).points
+    };
+    assert_eq!(at(Basis::Trilinear), [[0.5, 8.5, 0.5], [0.25, 4.5, 0.5]]);
+    // 2t(1 − t) is ½ in the middle and 3/8 at a quarter.
+    assert_eq!(at(Basis::Bernstein), [[0.5, 1.5, 0.5], [0.25, 1.25, 0.5]]);
+}
+
+#[test]
+fn affine_offsets_give_the_affine_map_inside_and_where_it_goes_on_outside() {
+    // Eighths, so that f32 holds the offsets of halves and quarters: going on outside would enlarge their rounding.
+    let map = [[0.375, -0.75, 0.25], [0.5, -0.375, 0.125], [-0.25, 0.625, 0.875]];
+    let affine = |p: [f64; 3]| [0, 1, 2].map(|row| 0.25 + map[row][0] * p[0] + map[row][1] * p[1] + map[row][2] * p[2]);
+    for divisions in [[1, 1, 1], [3, 2, 5], [4, 16, 2], [16, 1, 7]] {
+        let offsets = offsets(divisions, affine);
+        for basis in BASES {
+            for outside in SIDES {
+                let lattice = Lattice::new(UNIT, divisions, &offsets, basis, outside).unwrap();
+                let goes_on = outside == Outside::Extend && divisions.iter().all(|cells| cells.is_power_of_two());
+                let range = if goes_on { [-3.0, 4.0] } else { [0.0, 1.0] };
+                let points = random(100, range);
+                let expected: Vec<[f64; 3]> = points
+                    .iter()
+                    .map(|p| {
+                        let p = p.map(f64::from);
+                        let by = affine(p);
+                        [0, 1, 2].map(|k| p[k] + by[k])
+                    })
+                    .collect();
+                let out = lattice.deform(&points, true);
+                assert_close(&out.points, &expected, 1e-6);
+                for jacobian in out.jacobians {
+                    for row in 0..3 {
+                        for axis in 0..3 {
+                            let own = f64::from(u8::from(row == axis));
+                            assert!((jacobian[row][axis] - own - map[row][axis]).abs() < 2e-6);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn held_points_outside_move_as_the_nearest_of_the_box() {
+    let offsets = noisy([2, 3, 1]);
+    for basis in BASES {
+        let lattice = Lattice::new(UNIT, [2, 3, 1], &offsets, basis, Outside::Hold).unwrap();
+        let moved = |p: [f32; 3]| {
+            let out = lattice.deform(&[p], true);
+            ([0, 1, 2].map(|k| f64::from(out.points[0][k]) - f64::from(p[k])), out.jacobians[0])
+        };
+        let ((far, slopes), (near, _)) = (moved([7.0, 0.25, -3.0]), moved([1.0, 0.25, 0.0]));
+        assert!((0..3).all(|k| (far[k] - near[k]).abs() < 1e-6));
+        let column = |axis: usize| [0, 1, 2].map(|row| slopes[row][axis]);
+        assert_eq!((column(0), column(2)), ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), "only y changes anything there");
+    }
+}
+
+#[test]
+fn what_rounding_puts_outside_has_the_slopes_of_the_box() {
+    // Mirrored along x and z, in a box that ends where what is in it does: 0.36 is more in f32 than in f64.
+    let corners = [[0.24, 0.0, 0.0], [0.36, 1.0, 1.0]];
+    let turned = offsets([1; 3], |[x, _, z]| [-1.12 * x, 0.0, -2.0 * z]);
+    for basis in BASES {
+        let lattice = Lattice::new(corners, [1; 3], &turned, basis, Outside::Hold).unwrap();
+        let jacobians = lattice.deform(&[[0.36, 0.5, 0.5], [0.3, 0.5, 0.5], [0.37, 0.5, 0.5]], true).jacobians;
+        assert!((jacobians[0][0][0] - jacobians[1][0][0]).abs() < 1e-6 && jacobians[0][0][0] < -8.0);
+        assert_eq!(jacobians[2][0][0], 1.0);
+    }
+}
+
+#[test]
+fn no_offset_keeps_every_bit() {
+    let points = [[-0.0, 0.1, 1e-40], [0.3, -0.0, 7e20]];
+    for basis in BASES {
+        let offsets = vec![[0.0, -0.0, 0.0]; 60];
+        let lattice = Lattice::new([[-1.0; 3], [1.0; 3]], [2, 3, 4], &offsets, basis, Outside::Extend).unwrap();
+        assert!(lattice.is_identity());
+        let out = lattice.deform(&points, true);
+        let bits = |points: &[[f32; 3]]| points.as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&out.points), bits(&points));
+        assert_eq!((out.least, out.folded), (1.0, 0));
+    }
+}
+
+#[test]
+fn the_jacobian_is_the_derivative_of_what_points_do() {
+    // Away from the planes between cells, so that a step stays in its cell.
+    let step = 1.0 / 256.0;
+    let offsets = noisy([2, 3, 4]);
+    let places = [0.1, 0.4, 0.6, 0.85, -0.7, 1.9];
+    for basis in BASES {
+        for outside in SIDES {
+            let lattice = Lattice::new(UNIT, [2, 3, 4], &offsets, basis, outside).unwrap();
+            for n in 0..216 {
+                let p = [places[n % 6], places[n / 6 % 6], places[n / 36]];
+                let jacobian = lattice.deform(&[p], true).jacobians[0];
+                for axis in 0..3 {
+                    let aside = |by: f32| {
+                        let mut p = p;
+                        p[axis] += by;
+                        lattice.deform(&[p], false).points[0].map(f64::from)
+                    };
+                    let (low, high) = (aside(-step), aside(step));
+                    for row in 0..3 {
+                        let slope = (high[row] - low[row]) / (2.0 * f64::from(step));
+                        assert!((slope - jacobian[row][axis]).abs() < 3e-3, "{basis:?} {outside:?} {p:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn cells_meet_without_a_gap() {
+    let offsets = noisy([3, 3, 3]);
+    for basis in BASES {
+        for outside in SIDES {
+            let lattice = Lattice::new(UNIT, [3; 3], &offsets, basis, outside).unwrap();
+            for seam in [0.0_f32, 1.0 / 3.0, 2.0 / 3.0, 1.0] {
+                let [below, above] = [-1e-6, 1e-6].map(|by| lattice.deform(&[[0.2, seam + by, 0.7]], false).points[0]);
+                assert!((0..3).all(|k| (below[k] - above[k]).abs() < 1e-5), "{seam}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_folded_over_is_counted() {
+    // The upper half comes down through the lower: y + D = y − 1.5·y.
+    let flip = offsets([1; 3], |[_, y, _]| [0.0, -1.5 * y, 0.0]);
+    let flat = offsets([1; 3], |[_, y, _]| [0.0, -y, 0.0]);
+    for basis in BASES {
+        let out = |offsets: &[[f32; 3]]| {
+            Lattice::new(UNIT, [1; 3], offsets, basis, Outside::Hold).unwrap().deform(&random(40, [0.0, 1.0]), false)
+        };
+        assert_eq!((out(&flip).folded, out(&flip).least), (40, -0.5));
+        assert_eq!((out(&flat).folded, out(&flat).least), (40, 0.0));
+    }
+}
+
+#[test]
+fn normals_stay_upright_and_vectors_and_orientations_follow() {
+    // Sheared: x + y, y, z. A face along x keeps its normal y; one along y turns with it.
+    let shear = [[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut normals = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
+    turn_normals(&mut normals, &[shear; 3]);
+    let h = std::f32::consts::FRAC_1_SQRT_2;
+    assert_eq!(normals, [[0.0, 1.0, 0.0], [h, -h, 0.0], [0.0; 3]]);
+    let mut vectors = [[0.0, 2.0, 3.0]];
+    turn_vectors(&mut vectors, &[shear]);
+    assert_eq!(vectors, [[2.0, 2.0, 3.0]]);
+    // A quarter turn about z, and three times as large.
+    let mut orientations = [[0.0, 0.0, 0.0, 1.0], [0.1, 0.2, 0.3, 0.4]];
+    turn_orientations(&mut orientations, &[[[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 3.0]], [[0.0; 3]; 3]]);
+    assert!(orientations[0].iter().zip([0.0, 0.0, h, h]).all(|(a, b)| (a - b).abs() < 1e-6));
+    assert_eq!(orientations[1], [0.1, 0.2, 0.3, 0.4], "no rotation is nearest to nothing");
+}
+
+#[test]
+fn a_folded_surface_keeps_the_normal_that_its_winding_says() {
+    // Mirrored in y, the faces still wound as they were: a × b = z becomes −z.
+    let mirror = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut normals = [[0.0, 0.0, 1.0]];
+    turn_normals(&mut normals, &[mirror]);
+    assert_eq!(normals, [[0.0, 0.0, -1.0]]);
+}
+
+#[test]
+fn scaling_everything_scales_the_result() {
+    let (offsets, points) = (noisy([2; 3]), random(64, [-0.5, 1.5]));
+    for size in [1.0 / 1024.0, 1024.0, 1e-30, 1e30] {
+        for basis in BASES {
+            let scaled = |rows: &[[f32; 3]]| rows.iter().map(|row| row.map(|x| x * size)).collect::<Vec<_>>();
+            let one = Lattice::new(UNIT, [2; 3], &offsets, basis, Outside::Extend).unwrap().deform(&points, false);
+            let large = scaled(&offsets);
+            let corners = [[0.0; 3], [f64::from(size); 3]];
+            let lattice = Lattice::new(corners, [2; 3], &large, basis, Outside::Extend).unwrap();
+            let out = lattice.deform(&scaled(&points), false);
+            for (a, b) in out.points.as_flattened().iter().zip(one.points.as_flattened()) {
+                assert!((a / size - b).abs() < 1e-6);
+            }
+            assert_eq!(out.folded, one.folded);
+        }
+    }
+}
+
+#[test]
+fn a_lattice_that_is_none_is_refused() {
+    let offsets = vec![[0.0; 3]; 8];
+    let made = |corners, divisions| Lattice::new(corners, divisions, &offsets, Basis::Bernstein, Outside::Hold);
+    assert!(made(UNIT, [1; 3]).is_some());
+    assert!(made(UNIT, [1, 1, 2]).is_none());
+    assert!(made(UNIT, [7, 0, 0]).is_none());
+    assert!(made([[0.0; 3], [1.0, 0.0, 1.0]], [1; 3]).is_none());
+    assert!(made([[0.0; 3], [1.0, f64::NAN, 1.0]], [1; 3]).is_none());
+    assert_eq!(control_points([usize::MAX, 1, 1]), None);
+    assert_eq!(control_points([1 << 31; 3]), None);
+    let none = Lattice::new(UNIT, [1; 3], &offsets, Basis::Bernstein, Outside::Hold).unwrap().deform(&[], true);
+    assert_eq!((none.points.len(), none.least, none.folded), (0, 1.0, 0));
+}
+
+#[test]
+fn every_path_and_any_number_of_threads_give_the_same_bits() {
+    let points = random(10_001, [-0.4, 1.4]);
+    for (basis, outside) in [(Basis::Trilinear, Outside::Extend), (Basis::Bernstein, Outside::Hold)] {
+        let offsets = noisy([4, 3, 2]);
+        let lattice = Lattice::new(UNIT, [4, 3, 2], &offsets, basis, outside).unwrap();
+        let one = lattice.deform_on(Path::BASELINE, &points, true);
+        assert!(one.points.as_flattened().iter().all(|x| x.is_finite()));
+        for path in Path::all() {
+            for threads in [1, 2, 7] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                assert!(pool.install(|| lattice.deform_on(path, &points, true)) == one, "{path:?} {threads}");
+            }
+        }
+        let alone: Vec<_> = points[..50].iter().map(|p| lattice.deform(&[*p], false).points[0]).collect();
+        assert_eq!(alone, one.points[..50], "a point's bits do not hang on its neighbours");
+    }
+}

@@ -1,0 +1,255 @@
+//! The share of a cone that a mesh covers, sixteen triangles at once.
+//!
+//! The cone's section is a disc. How often a mesh covers a point of it, counting the triangles that show
+//! one face, is the same everywhere but across the edges that bound the mesh as seen from the cone's
+//! tip; so its mean over the disc is its value in the middle and, for each such edge, an integral
+//! along the part of it that lies in the disc (Green's theorem): half the area it spans with the middle
+//! less the disc's sector, over the disc's area. Both jump when an edge crosses the middle, by opposite
+//! amounts, and an edge adds nothing where it enters the disc: the mean is continuous in the wind.
+//!
+//! Faces that show the front and those that show the back are counted apart and the larger mean taken, at
+//! most 1: exact where what is seen lies in one layer, or covers all of the disc, at most too much where one
+//! layer overlaps another in part.
+
+use super::Obstacle;
+use super::rays::{Seen, beside};
+use super::views::View;
+use numerics::lanes::{F32x16, LANES, Lanes, get};
+use numerics::simd::kernel;
+use numerics::tree::{Boxes, Region};
+use numerics::trig;
+use numerics::vec3::{self, Vec3, cross, sub};
+use std::f32::consts::PI;
+
+/// Of the offset, the part at its far end over which shelter fades out: a collider that reaches
+/// past the end as the wind turns would otherwise come and go at once.
+const FADE: f32 = 0.1;
+
+/// A share this close to 0 or 1 is one: above the rounding of the sums.
+const ROUNDING: f32 = 2e-5;
+
+/// By how much of its radius the disc's middle lies beside the ray, either way: meshes are often symmetric,
+/// and corners exactly in the middle would have no angle.
+const ASIDE: [f32; 2] = [3e-5, 2e-5];
+
+/// How far outside of the disc edges are cut off before they are divided by their distance, in radii.
+const MARGIN: f32 = 2.0;
+
+kernel! {
+    /// The share in `covered` that is sheltered of the cone of each CV, half of its angle `cone`.
+    pub(super) fn cover(
+        obstacles: &[Obstacle],
+        views: &[View],
+        reach: f32,
+        cone: f32,
+        covered: &mut [f32],
+    ) = body;
+}
+
+#[inline(always)]
+fn body(obstacles: &[Obstacle], views: &[View], reach: f32, cone: f32, covered: &mut [f32]) {
+    let (sine, cosine) = trig::sin_cos(cone);
+    for (view, covered) in views.iter().zip(covered) {
+        let mut sums = [F32x16::splat(0.0); 2];
+        for obstacle in obstacles {
+            let cone = Cone { at: view.at, slope: sine / cosine, reach, gap: view.gap.at(obstacle.size) };
+            cone.look(obstacle, &mut sums);
+        }
+        let (mut front, mut back) = (0.0, 0.0);
+        for lane in 0..LANES {
+            front += sums[0].0[lane];
+            back += sums[1].0[lane];
+        }
+        let most = if front > back { front } else { back };
+        let share = (most - ROUNDING) / (1.0 - 2.0 * ROUNDING);
+        let share = if share > 0.0 { share } else { 0.0 };
+        *covered = if share < 1.0 { share } else { 1.0 };
+    }
+}
+
+/// A cone upwind of a CV.
+struct Cone {
+    at: Vec3,
+    /// Radius ÷ distance.
+    slope: f32,
+    reach: f32,
+    gap: f32,
+}
+
+impl Cone {
+    /// Adds how often the mesh shows its front and its back, as a mean over the disc, on any lanes.
+    #[inline(always)]
+    fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2]) {
+        let Some(edges) = &obstacle.edges else { return };
+        let tree = &obstacle.tree;
+        for (block, lanes) in tree.walk(self) {
+            let (corners, thirds) = (&tree.blocks()[block].corners, edges.of_block(block));
+            self.add(&self.seen(corners), &self.seen(thirds), lanes, sums);
+        }
+    }
+
+    /// Points as the tip sees them, upright on the disc's middle.
+    #[inline(always)]
+    fn seen(&self, points: &[Lanes<3>; 3]) -> [Lanes<3>; 3] {
+        let mut seen = *points;
+        let (x, y) = (ASIDE[0] * self.slope, ASIDE[1] * self.slope);
+        for point in &mut seen {
+            for lane in 0..LANES {
+                let upwind = point[2].0[lane] - self.at[2];
+                point[0].0[lane] = (point[0].0[lane] - self.at[0]) - x * upwind;
+                point[1].0[lane] = (point[1].0[lane] - self.at[1]) - y * upwind;
+                point[2].0[lane] = upwind;
+            }
+        }
+        seen
+    }
+
+    /// Adds sixteen triangles.
+    #[inline(always)]
+    fn add(&self, corners: &[Lanes<3>; 3], thirds: &[Lanes<3>; 3], lanes: u16, sums: &mut [F32x16; 2]) {
+        let mut count = F32x16::splat(0.0);
+        let (mut front, mut open) = ([false; LANES], [[false; LANES]; 3]);
+        for lane in 0..LANES {
+            let at @ [a, b, c] = [get(&corners[0], lane), get(&corners[1], lane), get(&corners[2], lane)];
+            let seen = Seen::from(at);
+            let counts = self.counts(seen.volume, [a, b, c]) & (lanes >> lane & 1 == 1);
+            front[lane] = seen.volume > 0.0;
+
+            let [x, y, z] = [is_left(a, b), is_left(b, c), is_left(c, a)];
+            let inside = ((x & y & z) | !(x | y | z)) & (seen.towards > 0.0);
+            let weight = self.weight(seen.towards / seen.across);
+            count.0[lane] = if inside & counts { weight } else { 0.0 };
+
+            for side in 0..3 {
+                let (from, to) = (at[side], at[(side + 1) % 3]);
+                let third = get(&thirds[side], lane);
+                let volume = vec3::dot(cross(to, from), third);
+                let goes_on = self.counts(volume, [to, from, third]) & ((volume > 0.0) == (seen.volume > 0.0));
+                open[side][lane] = counts & !goes_on;
+            }
+        }
+        for side in 0..3 {
+            let mut any = false;
+            for lane in 0..LANES {
+                any |= open[side][lane];
+            }
+            if any {
+                for lane in 0..LANES {
+                    let (from, to) = (get(&corners[side], lane), get(&corners[(side + 1) % 3], lane));
+                    let edge = self.edge(from, to);
+                    let edge = if front[lane] { edge } else { -edge };
+                    count.0[lane] += if open[side][lane] { edge } else { 0.0 };
+                }
+            }
+        }
+        for lane in 0..LANES {
+            let (to_front, to_back) = if front[lane] { (count.0[lane], 0.0) } else { (0.0, count.0[lane]) };
+            sums[0].0[lane] += to_front;
+            sums[1].0[lane] += to_back;
+        }
+    }
+
+    /// Whether a triangle, from its volume with the tip, is one, and not one that the CV lies on.
+    #[inline(always)]
+    fn counts(&self, volume: f32, [a, b, c]: [Vec3; 3]) -> bool {
+        let area = vec3::length(cross(sub(b, a), sub(c, a)));
+        (area > 0.0) & (volume.abs() > self.gap * area)
+    }
+
+    /// How much of the wind something stops at a distance: all but at the end of the offset.
+    #[inline(always)]
+    fn weight(&self, distance: f32) -> f32 {
+        let weight = (1.0 - distance / self.reach) * (1.0 / FADE);
+        let weight = if weight > 0.0 { weight } else { 0.0 };
+        if weight < 1.0 { weight } else { 1.0 }
+    }
+
+    /// What an edge adds to the mean over the disc: the part of it in the disc, seen from its middle. It has
+    /// the surface on its left.
+    #[inline(always)]
+    fn edge(&self, from: Vec3, to: Vec3) -> f32 {
+        let (start, end) = self.near_the_cone(from, to);
+        let along = sub(to, from);
+        // An end that is not cut keeps its bits: the next edge begins there.
+        let p = vec3::add(from, vec3::scale(along, start));
+        let q = vec3::sub(to, vec3::scale(along, 1.0 - end));
+        let in_front = (start < end) & (p[2] > 0.0) & (q[2] > 0.0);
+        let (near, far) = (1.0 / (p[2] * self.slope), 1.0 / (q[2] * self.slope));
+        let ([px, py], [qx, qy]) = ([p[0] * near, p[1] * near], [q[0] * far, q[1] * far]);
+
+        // Where the straight line from p to q lies in the unit disc.
+        let [dx, dy] = [qx - px, qy - py];
+        let square = dx * dx + dy * dy;
+        let half = px * dx + py * dy;
+        let inside = half * half - square * (px * px + py * py - 1.0);
+        let root = if inside > 0.0 { inside.sqrt() } else { 0.0 };
+        let (enters, leaves) = ((-half - root) / square, (root - half) / square);
+        let enters = if enters > 0.0 { enters } else { 0.0 };
+        let leaves = if leaves < 1.0 { leaves } else { 1.0 };
+        let [ax, ay] = [px + enters * dx, py + enters * dy];
+        let [bx, by] = [qx - (1.0 - leaves) * dx, qy - (1.0 - leaves) * dy];
+        let twice_area = (ax * by - ay * bx).abs();
+        let angle = trig::atan2(twice_area, ax * bx + ay * by);
+
+        // Distances along a straight line seen in perspective go with their inverses.
+        let nearest = -half / square;
+        let nearest = if nearest > enters { nearest } else { enters };
+        let nearest = if nearest < leaves { nearest } else { leaves };
+        let distance = 1.0 / ((1.0 - nearest) / p[2] + nearest / q[2]);
+
+        let share = (twice_area - angle) * (0.5 / PI) * self.weight(distance);
+        let share = if is_left(from, to) { share } else { -share };
+        let sound = in_front & (inside > 0.0) & (square > 0.0) & (enters < leaves) & (share.abs() <= 1.0);
+        if sound { share } else { 0.0 }
+    }
+
+    /// From where to where, 0…1, an edge lies in the pyramid around the cone; start ≥ end where it does not.
+    #[inline(always)]
+    fn near_the_cone(&self, from: Vec3, to: Vec3) -> (f32, f32) {
+        let (mut start, mut end) = (0.0, 1.0);
+        let slope = MARGIN * self.slope;
+        for axis in 0..2 {
+            for side in [-1.0, 1.0] {
+                let (a, b) = (slope * from[2] - side * from[axis], slope * to[2] - side * to[axis]);
+                let crosses = a / (a - b);
+                start = if (a < 0.0) & (b >= 0.0) & (crosses > start) { crosses } else { start };
+                end = if (a >= 0.0) & (b < 0.0) & (crosses < end) { crosses } else { end };
+                end = if (a < 0.0) & (b < 0.0) { -1.0 } else { end };
+            }
+        }
+        (start, end)
+    }
+}
+
+impl Region for &Cone {
+    #[inline(always)]
+    fn meeting(&self, boxes: &Boxes) -> u16 {
+        let mut mask = 0;
+        for lane in 0..LANES {
+            let mut square = 0.0;
+            for axis in 0..2 {
+                let below = boxes.low[axis].0[lane] - self.at[axis];
+                let above = self.at[axis] - boxes.high[axis].0[lane];
+                let outside = if below > above { below } else { above };
+                let outside = if outside > 0.0 { outside } else { 0.0 };
+                square += outside * outside;
+            }
+            let far = boxes.high[2].0[lane] - self.at[2];
+            let near = boxes.low[2].0[lane] - self.at[2];
+            // A little wider than the cone, for the rounding of both and for `ASIDE`.
+            let radius = self.slope * 1.001 * far;
+            let meets = (far > 0.0) & (near <= self.reach) & (square <= radius * radius);
+            mask |= u16::from(meets) << lane;
+        }
+        mask
+    }
+}
+
+/// Whether the axis lies left of an edge as it is seen along the axis. Where it lies on it, of the two
+/// ways of running along the edge one has it left, so of two triangles one contains it.
+#[inline(always)]
+fn is_left(from: Vec3, to: Vec3) -> bool {
+    let side = beside(from, to);
+    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+    (side > 0.0) | ((side == 0.0) & ((dx > 0.0) | ((dx == 0.0) & (dy > 0.0))))
+}

@@ -1,0 +1,103 @@
+//! Across which side of a triangle another one goes on: beside the blocks of a tree, the third corner of
+//! each side's neighbour.
+
+use numerics::lanes::{Lanes, set};
+use numerics::tree::{NONE, TriangleTree};
+use numerics::vec3::Vec3;
+use rayon::prelude::*;
+
+/// Neighbours' third corners, a block of the tree an entry. Side k runs from corner k to the next; one
+/// without a neighbour has its own first corner there, which spans no triangle with it.
+pub(super) struct Edges(Vec<[Lanes<3>; 3]>);
+
+/// One side of a triangle.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    /// Its two points, the lower index first.
+    points: [u32; 2],
+    /// Whether the triangle runs from the higher to the lower.
+    falls: bool,
+    triangle: u32,
+    side: u8,
+}
+
+/// For each side of each triangle the point that its neighbour adds, or the side's own first.
+#[derive(Clone, Debug)]
+pub struct Neighbours(Vec<[u32; 3]>);
+
+impl Neighbours {
+    /// Two triangles are neighbours where they run along two points in opposite ways, as faces that are
+    /// wound alike do; where more than two meet, they are paired in order and the rest stay alone. Of the points it
+    /// matters which are finite alone.
+    ///
+    /// # Panics
+    /// Where an index is out of range.
+    pub fn of(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        Self(thirds(points, triangles))
+    }
+}
+
+impl Edges {
+    pub(super) fn of(tree: &TriangleTree, points: &[Vec3], Neighbours(thirds): &Neighbours) -> Self {
+        let of_block = |block: &numerics::tree::Block| {
+            let mut third = block.corners;
+            for (lane, triangle) in block.triangle.iter().enumerate().filter(|(_, triangle)| **triangle != NONE) {
+                for (side, point) in thirds[*triangle as usize].iter().enumerate() {
+                    set(&mut third[side], lane, points[*point as usize]);
+                }
+            }
+            third
+        };
+        Self(tree.blocks().par_iter().map(of_block).collect())
+    }
+
+    #[inline(always)]
+    pub(super) fn of_block(&self, block: usize) -> &[Lanes<3>; 3] {
+        &self.0[block]
+    }
+}
+
+fn thirds(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let finite = |point: u32| points[point as usize].iter().all(|x| x.is_finite());
+    let has_sides = |[a, b, c]: [u32; 3]| a != b && b != c && c != a && finite(a) && finite(b) && finite(c);
+    let mut sides: Vec<Side> = Vec::with_capacity(3 * triangles.len());
+    for (triangle, corners) in triangles.iter().enumerate().filter(|(_, corners)| has_sides(**corners)) {
+        for side in 0..3 {
+            let (from, to) = (corners[side], corners[(side + 1) % 3]);
+            let points = [from.min(to), from.max(to)];
+            sides.push(Side { points, falls: from > to, triangle: triangle as u32, side: side as u8 });
+        }
+    }
+    sides.par_sort_unstable();
+    let mut thirds = triangles.to_vec();
+    for same in sides.chunk_by(|a, b| a.points == b.points) {
+        let (rising, falling) = same.split_at(same.partition_point(|side| !side.falls));
+        for (a, b) in rising.iter().zip(falling) {
+            let third = |of: &Side| triangles[of.triangle as usize][(usize::from(of.side) + 2) % 3];
+            thirds[a.triangle as usize][usize::from(a.side)] = third(b);
+            thirds[b.triangle as usize][usize::from(b.side)] = third(a);
+        }
+    }
+    thirds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_knows_the_corner_beyond_it() {
+        // Two triangles of a square, wound alike; then the second turned over, which makes both stand alone.
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(thirds(&points, &[[0, 1, 2], [0, 2, 3]]), [[0, 1, 3], [1, 2, 3]]);
+        assert_eq!(thirds(&points, &[[0, 1, 2], [0, 3, 2]]), [[0, 1, 2], [0, 3, 2]]);
+        assert_eq!(thirds(&points, &[[0, 0, 2]]), [[0, 0, 2]]);
+    }
+
+    #[test]
+    fn of_three_that_meet_two_are_neighbours() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+        let thirds = thirds(&points, &[[0, 1, 2], [1, 0, 3], [1, 0, 4]]);
+        assert_eq!([thirds[0][0], thirds[1][0], thirds[2][0]], [3, 2, 1]);
+    }
+}

@@ -1,0 +1,187 @@
+//! Which curves stand in the lee: the kernel of Curve_Wind_Shielding (W4).
+//!
+//! From each CV a ray goes upwind. As all rays are parallel, everything is turned into a frame whose
+//! third axis points upwind; there a ray is a box without width, a hit a point in a triangle, and a
+//! far offset costs no precision. A CV may ask a cone instead of a ray: what share of it is covered.
+//!
+//! Promise: rays are exact to the rounding of the positions and to [`Shield::skin_gap`], find no cracks
+//! between triangles that share their points, and are stopped by either side of a face. The share of a
+//! cone is continuous in the wind. The same bits on every SIMD path and for any number of threads; finite
+//! for any input.
+//!
+//! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the
+//! gap. So a root on the windward side of a closed skin is free, and one on the lee side is sheltered by
+//! the skin's other side, at any angle of the wind. Limit: a root buried deeper than the gap is covered
+//! by the skin above it.
+
+mod cone;
+mod edges;
+mod frame;
+mod rays;
+mod views;
+
+use edges::Edges;
+pub use edges::Neighbours;
+use frame::Frame;
+use numerics::lanes::{F32x16, LANES, get};
+use numerics::simd::Path;
+use numerics::tree::{Block, TriangleTree};
+use numerics::vec3::{self, Vec3};
+use rayon::prelude::*;
+use views::Views;
+
+/// A mesh that stops the wind.
+#[derive(Clone, Copy, Debug)]
+pub struct Collider<'a> {
+    /// Positions, metres.
+    pub points: &'a [Vec3],
+    /// Three indices of `points` each; which way round does not matter for rays.
+    pub triangles: &'a [[u32; 3]],
+    /// A tree over them, where there is one: saves building another.
+    pub tree: Option<&'a TriangleTree>,
+    /// What [`Neighbours::of`] gives for them, where it is known: saves cones looking for them.
+    pub neighbours: Option<&'a Neighbours>,
+}
+
+impl<'a> Collider<'a> {
+    /// One of which nothing else is known.
+    pub fn of(points: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Self {
+        Self { points, triangles, tree: None, neighbours: None }
+    }
+}
+
+/// How the wind is stopped.
+#[derive(Clone, Copy, Debug)]
+pub struct Shield {
+    /// Where the wind blows to: any length but 0.
+    pub wind: [f64; 3],
+    /// How far upwind of a CV something shelters it, metres.
+    pub offset: f32,
+    /// Half the angle of the cone that a CV looks upwind through, radians, 0…0.5; 0 is a ray.
+    pub cone: f32,
+    /// A CV this close to a triangle's plane lies on it, metres, if that is more than the least that
+    /// positions allow: a hundred-thousandth of the collider's size and a hundredth of the curve's,
+    /// whichever is less, but four units in the last place of the CV's largest coordinate.
+    pub skin_gap: f32,
+}
+
+/// CVs that are sorted together: enough to lie close, and few enough to stay in a cache.
+const SORTED_CVS: usize = 1 << 18;
+
+/// Groups of sixteen CVs that a task has: some 30 µs of work.
+const TASK_GROUPS: usize = 32;
+
+/// Curves that a task sums up.
+const TASK_CURVES: usize = 1024;
+
+/// A collider in the frame of the wind.
+struct Obstacle {
+    tree: TriangleTree,
+    /// Twice the area of each triangle, a block an entry.
+    areas: Vec<F32x16>,
+    /// What bounds the mesh as a cone sees it; none where there are rays alone.
+    edges: Option<Edges>,
+    /// The longest side of its bounds.
+    size: f32,
+}
+
+/// The share of each curve's CVs that `colliders` shelter, 0…1; a curve's CVs are
+/// `points[starts[i]..starts[i + 1]]`.
+///
+/// # Panics
+/// Where `starts` falls or ends beyond `points`, or a triangle's index is out of range.
+pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
+    shield_on(Path::chosen(), starts, points, colliders, shield)
+}
+
+/// [`shield()`] on a given SIMD path.
+///
+/// # Panics
+/// As [`shield()`].
+pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
+    let curves = starts.len().saturating_sub(1);
+    let frame = Frame::of(shield.wind, points, colliders);
+    let reach = frame.length(shield.offset);
+    if curves == 0 || reach.is_nan() || reach <= 0.0 {
+        return vec![0.0; curves];
+    }
+    let obstacle = |collider: &Collider<'_>| Obstacle::of(&frame, collider, shield.cone > 0.0);
+    let mut shares = Vec::with_capacity(curves);
+    let mut batches = batches(starts).into_iter();
+    let first = batches.next().map(|batch| &starts[batch]).unwrap_or_default();
+    let (obstacles, mut views) = rayon::join(
+        || colliders.iter().map(obstacle).collect::<Vec<_>>(),
+        || Views::of(&frame, first, points, shield.skin_gap),
+    );
+    if obstacles.iter().all(|obstacle| obstacle.tree.is_empty()) {
+        return vec![0.0; curves];
+    }
+    let look = |views: &Views, covered: &mut [f32]| {
+        let tasks = covered.par_chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().par_chunks(TASK_GROUPS * LANES));
+        tasks.for_each(|(covered, views)| {
+            for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
+                if shield.cone > 0.0 {
+                    cone::cover(path, &obstacles, views, reach, shield.cone, covered);
+                } else {
+                    rays::cover(path, &obstacles, views, reach, covered);
+                }
+            }
+        });
+    };
+    let mut covered = Vec::new();
+    loop {
+        covered.clear();
+        covered.resize(views.sorted().len(), 0.0);
+        look(&views, &mut covered);
+        shares.par_extend(views.curves().with_min_len(TASK_CURVES).map(|cvs| share(cvs, &covered)));
+        let Some(batch) = batches.next() else { return shares };
+        views = Views::of(&frame, &starts[batch], points, shield.skin_gap);
+    }
+}
+
+/// Runs of curves of about `SORTED_CVS`, as ranges of `starts`, its end included.
+fn batches(starts: &[u32]) -> Vec<std::ops::Range<usize>> {
+    let (mut batches, mut first) = (Vec::new(), 0);
+    for curve in 1..starts.len() {
+        if curve + 1 == starts.len() || (starts[curve] - starts[first]) as usize >= SORTED_CVS {
+            batches.push(first..curve + 1);
+            first = curve;
+        }
+    }
+    batches
+}
+
+/// The mean over a curve's CVs, which are at these places of `covered`; 0 for one without.
+fn share(cvs: &[u32], covered: &[f32]) -> f32 {
+    let sum: f64 = cvs.iter().map(|place| f64::from(covered[*place as usize])).sum();
+    if cvs.is_empty() { 0.0 } else { (sum / cvs.len() as f64) as f32 }
+}
+
+impl Obstacle {
+    /// A collider turned into the frame.
+    fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
+        let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
+        let tree = match collider.tree {
+            Some(tree) => tree.moved(&points),
+            None => TriangleTree::build(&points, collider.triangles),
+        };
+        let area = |block: &Block| {
+            let [a, b, c] = &block.corners;
+            F32x16::from_fn(|lane| {
+                let [a, b, c] = [get(a, lane), get(b, lane), get(c, lane)];
+                vec3::length(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
+            })
+        };
+        let areas = tree.blocks().par_iter().with_min_len(TASK_GROUPS).map(area).collect();
+        let (low, high) = tree.bounds();
+        let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
+        let edges = with_edges.then(|| match collider.neighbours {
+            Some(neighbours) => Edges::of(&tree, &points, neighbours),
+            None => Edges::of(&tree, &points, &Neighbours::of(&points, collider.triangles)),
+        });
+        Self { tree, areas, edges, size }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,134 @@
+//! Sixteen rays at once, each a lane, against one triangle after another.
+
+use super::Obstacle;
+use super::views::View;
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::simd::kernel;
+use numerics::tree::Cuboid;
+use numerics::vec3::{Vec3, sub};
+
+kernel! {
+    /// 1 in `covered` for each of up to sixteen CVs that has a collider within `reach` upwind.
+    pub(super) fn cover(
+        obstacles: &[Obstacle],
+        views: &[View],
+        reach: f32,
+        covered: &mut [f32],
+    ) = body;
+}
+
+#[inline(always)]
+fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32]) {
+    let mut rays = Rays { at: [F32x16::splat(0.0); 3], gap: F32x16::splat(0.0), reach };
+    // A lane without a CV repeats the first.
+    let view = |lane: usize| if lane < views.len() { views[lane] } else { views[0] };
+    for lane in 0..LANES {
+        set(&mut rays.at, lane, view(lane).at);
+    }
+    let mut hit = [0; LANES];
+    for obstacle in obstacles {
+        for lane in 0..LANES {
+            rays.gap.0[lane] = view(lane).gap.at(obstacle.size);
+        }
+        if rays.meet(obstacle, &mut hit) {
+            break;
+        }
+    }
+    for (covered, hit) in covered.iter_mut().zip(hit) {
+        *covered = hit as f32;
+    }
+}
+
+/// Where sixteen rays start, all upwind.
+struct Rays {
+    at: Lanes<3>,
+    gap: F32x16,
+    reach: f32,
+}
+
+impl Rays {
+    /// Sets `hit` to 1 for each ray that meets the tree; whether all are.
+    #[inline(always)]
+    fn meet(&self, obstacle: &Obstacle, hit: &mut [u32; LANES]) -> bool {
+        let (Cuboid { low, high }, tree) = (self.bounds(), &obstacle.tree);
+        for (block, mut lanes) in tree.walk(Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }) {
+            let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
+            while lanes != 0 {
+                let triangle = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let corners = [get(a, triangle), get(b, triangle), get(c, triangle)];
+                self.meet_triangle(corners, areas.0[triangle], hit);
+            }
+            let mut all = 1;
+            for lane in 0..LANES {
+                all &= hit[lane];
+            }
+            if all == 1 {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Sets `hit` to 1 for each ray that meets the triangle, whose area is half of `area`.
+    #[inline(always)]
+    fn meet_triangle(&self, corners: [Vec3; 3], area: f32, hit: &mut [u32; LANES]) {
+        let [a, b, c] = corners;
+        for lane in 0..LANES {
+            let at = get(&self.at, lane);
+            let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);
+            let far = seen.towards > self.gap.0[lane] * area;
+            let near = seen.towards <= self.reach * seen.across;
+            hit[lane] |= u32::from(seen.inside & far & near);
+        }
+    }
+
+    /// The box around the starts.
+    #[inline(always)]
+    fn bounds(&self) -> Cuboid {
+        let (mut low, mut high) = (get(&self.at, 0), get(&self.at, 0));
+        for lane in 1..LANES {
+            let at = get(&self.at, lane);
+            for axis in 0..3 {
+                low[axis] = if at[axis] < low[axis] { at[axis] } else { low[axis] };
+                high[axis] = if at[axis] > high[axis] { at[axis] } else { high[axis] };
+            }
+        }
+        Cuboid { low, high }
+    }
+}
+
+/// A triangle as the start of a ray sees it along the third axis.
+pub(super) struct Seen {
+    /// Whether the ray, or its other way, goes through it, its sides included. Two triangles
+    /// compute a side they share as the same number, so nothing goes between them.
+    pub(super) inside: bool,
+    /// Twice its area across the ray, ≥ 0 where inside.
+    pub(super) across: f32,
+    /// `across` times the way to it; also twice its area in space times the distance of its plane,
+    /// below 0 where that lies behind.
+    pub(super) towards: f32,
+    /// Six times the volume of the tetrahedron that it spans with the start.
+    pub(super) volume: f32,
+}
+
+impl Seen {
+    /// From the corners less the start.
+    #[inline(always)]
+    pub(super) fn from([a, b, c]: [Vec3; 3]) -> Self {
+        let [x, y, z] = [beside(b, c), beside(c, a), beside(a, b)];
+        let positive = (x >= 0.0) & (y >= 0.0) & (z >= 0.0);
+        let negative = (x <= 0.0) & (y <= 0.0) & (z <= 0.0);
+        let sum = x + y + z;
+        let volume = x * a[2] + y * b[2] + z * c[2];
+        let towards = if sum < 0.0 { -volume } else { volume };
+        Self { inside: positive | negative, across: sum.abs(), towards, volume }
+    }
+}
+
+/// Twice the area that a side spans with the axis, as it is seen along the axis: below 0 where that lies right
+/// of the way from `p` to `q`.
+#[inline(always)]
+pub(super) fn beside(p: Vec3, q: Vec3) -> f32 {
+    p[0] * q[1] - p[1] * q[0]
+}

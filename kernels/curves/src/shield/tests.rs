@@ -1,0 +1,316 @@
+use super::*;
+use numerics::random::Key;
+use numerics::shapes;
+
+/// A sphere of radius 1, and another way to turn it, so that no facet is in line with an axis.
+fn sphere(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mesh = shapes::sphere([2.0; 3], n);
+    (mesh.points.iter().map(|point| point.map(|x| x as f32)).collect(), mesh.triangles())
+}
+
+/// Curves of one CV each.
+fn lone(points: &[Vec3]) -> Vec<u32> {
+    (0..=points.len() as u32).collect()
+}
+
+const STILL: Shield = Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, cone: 0.0, skin_gap: 0.0 };
+
+/// The share of each point on its own.
+fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
+    shield(&lone(points), points, &[Collider::of(&mesh.0, &mesh.1)], how)
+}
+
+/// A wall across x at `x`, two units high and wide.
+fn wall(x: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    (vec![[x, -1.0, -1.0], [x, 1.0, -1.0], [x, 1.0, 1.0], [x, -1.0, 1.0]], vec![[0, 1, 2], [0, 2, 3]])
+}
+
+#[test]
+fn half_a_curve_behind_a_wall_is_half_sheltered() {
+    let points = [[0.5, 0.0, 0.0], [0.5, 0.9, 0.0], [0.5, 1.1, 0.0], [0.5, 3.0, 0.0], [-0.5, 0.0, 0.0]];
+    let (wall, triangles) = wall(0.0);
+    let colliders = [Collider::of(&wall, &triangles)];
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &STILL), [0.5, 0.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.49, ..STILL }), [0.0, 0.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { wind: [-3.0, 0.0, 0.0], ..STILL }), [0.0, 1.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &[], &STILL), [0.0, 0.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.0, ..STILL }), [0.0, 0.0]);
+}
+
+#[test]
+fn two_walls_shelter_what_either_shelters() {
+    let (low, triangles) = wall(0.0);
+    let high: Vec<Vec3> = low.iter().map(|[x, y, z]| [x - 1.0, y + 2.5, *z]).collect();
+    let points = [[0.5, 0.0, 0.0], [0.5, 2.0, 0.0], [0.5, 1.2, 0.0]];
+    let colliders = [&low, &high].map(|points| Collider::of(points, &triangles));
+    assert_eq!(shield(&lone(&points), &points, &colliders, &STILL), [1.0, 1.0, 0.0]);
+}
+
+#[test]
+fn a_sphere_shelters_its_silhouette_at_any_offset() {
+    // A ray upwind along x from p meets the unit sphere where y² + z² < 1, between √(1 − y² − z²) either side of
+    // x = 0. The mesh lies within 3e-4 of the sphere: points closer than that to a change are left out.
+    let mesh = sphere(64);
+    let points: Vec<Vec3> =
+        (0..4000u64).map(|i| [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).f32() * 5.0 - 2.5)).collect();
+    for offset in [0.2, 1.0, 3.0, 10.0, 1e4] {
+        let found = shares(&points, &mesh, &Shield { offset, ..STILL });
+        let mut sure = 0;
+        for (point, found) in points.iter().zip(found) {
+            let [x, y, z] = point.map(f64::from);
+            let inside = 1.0 - y * y - z * z;
+            let half = inside.max(0.0).sqrt();
+            let ways = [x + half, x - half];
+            let near =
+                |way: f64| way.abs() < 2e-3 / half.max(1e-2) || (way - f64::from(offset)).abs() < 2e-3 / half.max(1e-2);
+            if inside.abs() < 2e-3 || ways.iter().any(|way| near(*way)) {
+                continue;
+            }
+            let expected = inside > 0.0 && ways.iter().any(|way| *way > 0.0 && *way <= f64::from(offset));
+            assert_eq!(found, f32::from(u8::from(expected)), "{point:?} at {offset}");
+            sure += 1;
+        }
+        assert!(sure > 3000, "{sure}");
+    }
+}
+
+#[test]
+fn roots_on_a_sphere_are_sheltered_on_its_lee_side_alone() {
+    // On the vertices, on the middles of edges and in faces, at any turn of the wind; a face's width from the terminator.
+    let (points, triangles) = sphere(24);
+    let mut roots = points.clone();
+    for [a, b, c] in &triangles {
+        let [a, b, c] = [a, b, c].map(|point| points[*point as usize]);
+        roots.push([0, 1, 2].map(|k| 0.5 * (a[k] + b[k])));
+        roots.push([0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0));
+    }
+    let mesh = (points, triangles);
+    for wind in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.3, 0.5, -0.8], [1.0, 1.0, 1.0]] {
+        let found = shares(&roots, &mesh, &Shield { wind, ..STILL });
+        let length = wind.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for (root, found) in roots.iter().zip(found) {
+            let lee: f64 = (0..3).map(|k| f64::from(root[k]) * wind[k] / length).sum();
+            if lee.abs() > 0.07 {
+                assert_eq!(found, f32::from(u8::from(lee > 0.0)), "{root:?} in {wind:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flat_ground_shelters_nothing_that_grows_on_it() {
+    let ground = shapes::grid([2.0; 2], 20);
+    let mesh = (ground.points.iter().map(|p| p.map(|x| x as f32)).collect::<Vec<Vec3>>(), ground.triangles());
+    let roots: Vec<Vec3> = (0..500u64)
+        .map(|i| [Key::new(2).of(i).of(0).f32() * 1.8 - 0.9, 0.0, Key::new(2).of(i).of(1).f32() * 1.8 - 0.9])
+        .collect();
+    for wind in [[1.0, 0.0, 0.0], [1.0, 1e-3, 0.2], [1.0, 0.3, 0.0], [0.0, -1.0, 0.0]] {
+        for cone in [0.0, 0.1] {
+            assert!(shares(&roots, &mesh, &Shield { wind, cone, ..STILL }).iter().all(|share| *share == 0.0));
+        }
+    }
+}
+
+#[test]
+fn turning_the_wind_round_mirrors_the_shelter() {
+    let (points, triangles) = sphere(16);
+    let curves: Vec<Vec3> =
+        (0..600u64).map(|i| [0, 1, 2].map(|axis| Key::new(3).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
+    let mirrored: Vec<Vec3> = curves.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
+    let mirror: Vec<Vec3> = points.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
+    let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
+    let one = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &STILL);
+    let back = Shield { wind: [-1.0, 0.0, 0.0], ..STILL };
+    let other = shield(&starts, &mirrored, &[Collider::of(&mirror, &triangles)], &back);
+    assert_eq!(one, other);
+    assert!(one.iter().any(|share| *share > 0.3 && *share < 0.9));
+}
+
+#[test]
+fn nothing_goes_between_triangles_that_share_their_points() {
+    // A crumpled sheet; rays exactly at its vertices, at the middles of its edges and just beside both.
+    let n = 12u32;
+    let at = |i: u32, j: u32| {
+        let key = Key::new(4).of(u64::from(i)).of(u64::from(j));
+        [key.of(0).f32() * 0.2, i as f32 + 0.6 * key.of(1).f32(), j as f32 + 0.6 * key.of(2).f32()]
+    };
+    let points: Vec<Vec3> = (0..=n).flat_map(|i| (0..=n).map(move |j| at(i, j))).collect();
+    let corner = |i: u32, j: u32| i * (n + 1) + j;
+    let faces = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let triangles: Vec<[u32; 3]> = faces
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    let mut behind = Vec::new();
+    for i in 2..n - 2 {
+        for j in 2..n - 2 {
+            let (p, q) = (at(i, j), at(i + 1, j + 1));
+            behind.extend([[1.0, p[1], p[2]], [1.0, 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2])]]);
+            behind.push([1.0, p[1] + 1e-6, p[2] - 1e-6]);
+        }
+    }
+    let mesh = (points, triangles);
+    for turn in 0..20 {
+        let wind = [1.0, 0.02 * f64::from(turn) - 0.2, 0.01 * f64::from(turn)];
+        assert!(shares(&behind, &mesh, &Shield { wind, ..STILL }).iter().all(|share| *share == 1.0));
+    }
+}
+
+#[test]
+fn shelter_is_the_same_at_any_scale_and_far_from_the_origin() {
+    let (points, triangles) = sphere(16);
+    let curves: Vec<Vec3> =
+        (0..600u64).map(|i| [0, 1, 2].map(|axis| Key::new(5).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
+    let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
+    for cone in [0.0, 0.1] {
+        let how = Shield { wind: [0.5, 0.4, 0.8], offset: 8.0, cone, skin_gap: 0.0 };
+        let expected = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
+        for power in [-40, -10, 20, 100] {
+            let scale = libm::scalbnf(1.0, power);
+            let [points, curves] =
+                [&points, &curves].map(|all| -> Vec<Vec3> { all.iter().map(|p| p.map(|x| x * scale)).collect() });
+            let how = Shield { offset: how.offset * scale, ..how };
+            let found = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
+            assert_eq!(found, expected, "{scale}");
+        }
+    }
+}
+
+#[test]
+fn any_input_gives_a_share() {
+    let inf = f32::INFINITY;
+    let points = [[f32::NAN, 0.0, 0.0], [inf, 0.0, 0.0], [1e38, -1e38, 1e38], [1e-45, 0.0, 0.0], [0.5, 0.0, 0.0]];
+    let (mut wall, triangles) = wall(0.0);
+    for cone in [0.0, 0.1] {
+        for offset in [1e-45, 10.0, f32::MAX] {
+            let how = Shield { offset, cone, ..STILL };
+            for mesh in [wall.clone(), vec![[0.0; 3]; 4], vec![[f32::NAN; 3]; 4], vec![[3e38, -3e38, 3e38]; 4]] {
+                let colliders = [Collider::of(&mesh, &triangles)];
+                let found = shield(&[0, 3, 3, 5], &points, &colliders, &how);
+                assert!(found.len() == 3 && found.iter().all(|share| (0.0..=1.0).contains(share)), "{found:?}");
+            }
+        }
+    }
+    wall.clear();
+    let nothing = [Collider::of(&wall, &[])];
+    assert_eq!(shield(&[0, 1], &points[4..], &nothing, &STILL), [0.0]);
+    assert!(shield(&[], &[], &nothing, &STILL).is_empty());
+    assert!(shield(&[0], &[], &nothing, &STILL).is_empty());
+}
+
+#[test]
+fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
+    let (points, triangles) = sphere(20);
+    let curves: Vec<Vec3> =
+        (0..3000u64).map(|i| [0, 1, 2].map(|axis| Key::new(6).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
+    let starts: Vec<u32> = (0..=600).map(|curve| 5 * curve).collect();
+    let colliders = [Collider::of(&points, &triangles)];
+    for cone in [0.0, 0.07] {
+        let how = Shield { wind: [0.5, 0.4, 0.8], cone, ..STILL };
+        let expected = shield_on(Path::BASELINE, &starts, &curves, &colliders, &how);
+        for path in Path::all() {
+            for threads in [1, 2, 7] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let found = pool.install(|| shield_on(path, &starts, &curves, &colliders, &how));
+                assert_eq!(found, expected, "{} on {threads}", path.name());
+            }
+        }
+    }
+}
+
+mod cones {
+    use super::*;
+
+    /// The share of 20,000 rays of a cone, evenly spread over its disc, that meet the sphere.
+    fn sampled(p: Vec3, mesh: &(Vec<Vec3>, Vec<[u32; 3]>), cone: f64) -> f32 {
+        let slope = libm::tan(cone);
+        let n = 2000;
+        let mut met = 0.0;
+        for k in 0..n {
+            let radius = slope * ((f64::from(k) + 0.5) / f64::from(n)).sqrt();
+            let angle = 2.399_963 * f64::from(k);
+            let wind = [1.0, radius * libm::cos(angle), radius * libm::sin(angle)];
+            met += shares(&[p], mesh, &Shield { wind, offset: 100.0, ..STILL })[0];
+        }
+        met / n as f32
+    }
+
+    #[test]
+    fn a_cone_s_share_is_that_of_many_rays() {
+        let mesh = sphere(8);
+        for p in [
+            [3.0, 0.9, 0.1],
+            [3.0, 1.0, 0.0],
+            [2.5, -0.8, 0.75],
+            [6.0, 0.5, 0.7],
+            [1.2, 0.9, 0.3],
+            [20.0, 0.3, 0.2],
+            [3.0, 0.0, 0.0],
+            [3.0, 2.0, 0.0],
+            [-3.0, 0.0, 0.0],
+        ] {
+            for cone in [0.02_f32, 0.1, 0.3] {
+                let how = Shield { offset: 1e6, cone, ..STILL };
+                let (found, expected) = (shares(&[p], &mesh, &how)[0], sampled(p, &mesh, f64::from(cone)));
+                assert!((found - expected).abs() < 3e-3, "{p:?}, {cone}: {found}, expected {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn half_a_cone_behind_an_edge_is_half_covered_whichever_way_it_is_wound() {
+        let (points, triangles) = wall(0.0);
+        let turned: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+        let loose: Vec<Vec3> = triangles.iter().flatten().map(|point| points[*point as usize]).collect();
+        for mesh in [(points.clone(), triangles), (points, turned), (loose, vec![[0, 1, 2], [3, 4, 5]])] {
+            let how = Shield { cone: 0.1, offset: 1e6, ..STILL };
+            let slope = libm::tan(0.1) as f32;
+            // At the edge; half a radius in (1 − 0.1955); a quarter at the corner; all, and nothing.
+            let at = |y: f32, z: f32| shares(&[[2.0, y, z]], &mesh, &how)[0];
+            for (y, z, expected) in [
+                (1.0, 0.3, 0.5),
+                (1.0 - slope, 0.3, 0.804_5),
+                (1.0 + slope, 0.3, 0.195_5),
+                (1.0, 1.0, 0.25),
+                (0.0, 0.0, 1.0),
+                (1.5, 0.0, 0.0),
+            ] {
+                assert!((at(y, z) - expected).abs() < 1e-4, "{y} {z}: {}, expected {expected}", at(y, z));
+            }
+        }
+    }
+
+    #[test]
+    fn a_share_never_jumps_as_the_wind_turns() {
+        // A hundred thousandth of a turn at a time past a tumbled cube: a ray's share would jump by 1.
+        let cube = shapes::block([1.0; 3], [1; 3]);
+        let triangles = cube.triangles();
+        let points: Vec<Vec3> = cube
+            .points
+            .iter()
+            .map(|[x, y, z]| [0.8 * x - 0.6 * y, 0.48 * x + 0.64 * y - 0.6 * z, 0.36 * x + 0.48 * y + 0.8 * z])
+            .map(|p| p.map(|x| x as f32))
+            .collect();
+        let mesh = (points, triangles);
+        let cvs = [[1.0, 0.0, 0.0], [2.0, 0.2, 0.1], [1.0, -0.4, 0.5]];
+        let mut before: Option<Vec<f32>> = None;
+        let (mut least, mut most) = (1.0_f32, 0.0_f32);
+        let mut largest = 0.0_f32;
+        for step in 0..20_000 {
+            let angle = f64::from(step) * 1e-4 - 1.0;
+            let wind = [libm::cos(angle), libm::sin(angle), 0.2 * libm::sin(3.0 * angle)];
+            let now = shares(&cvs, &mesh, &Shield { wind, cone: 0.1, ..STILL });
+            if let Some(before) = before {
+                largest = before.iter().zip(&now).fold(largest, |largest, (a, b)| largest.max((a - b).abs()));
+            }
+            least = now.iter().copied().fold(least, f32::min);
+            most = now.iter().copied().fold(most, f32::max);
+            before = Some(now);
+        }
+        // An edge sweeps 1.17e-4 rad of a disc 0.2 rad wide at a time: 2 ÷ (π · 0.1) of that.
+        assert!(largest < 1.5e-3, "{largest}");
+        assert_eq!((least, most), (0.0, 1.0));
+    }
+}

@@ -1,0 +1,191 @@
+//! The CVs in the frame, sorted so that sixteen that follow each other see the same triangles.
+//!
+//! Curves may lie in memory in any order and their CVs reach far, so it is CVs that are sorted, into the cells
+//! of a grid across the wind, along a Z-curve: two passes over them.
+
+use super::frame::{Frame, Gap};
+use numerics::vec3::Vec3;
+use rayon::prelude::*;
+
+/// A CV that looks upwind.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub(super) at: Vec3,
+    pub(super) gap: Gap,
+}
+
+/// The CVs of some curves.
+pub(super) struct Views {
+    sorted: Vec<View>,
+    /// Where in `sorted` each CV is, one curve after the other.
+    places: Vec<u32>,
+    /// Where in `places` each curve starts, and where the last ends.
+    starts: Vec<u32>,
+}
+
+/// Curves that a task turns into the frame.
+const TASK: usize = 256;
+
+/// CVs a cell of the grid holds on average.
+const IN_CELL: usize = 4;
+
+/// Most halvings of the grid's side.
+const FINEST: u32 = 8;
+
+impl Views {
+    /// The CVs `points[starts[i]..starts[i + 1]]`.
+    pub(super) fn of(frame: &Frame, starts: &[u32], points: &[Vec3], skin_gap: f32) -> Self {
+        let Some(base) = starts.first().copied() else {
+            return Self { sorted: Vec::new(), places: Vec::new(), starts: vec![0] };
+        };
+        let points = &points[base as usize..starts[starts.len() - 1] as usize];
+        let starts: Vec<u32> = starts.iter().map(|start| start - base).collect();
+        let still = View { at: [0.0; 3], gap: Gap::default() };
+        let mut views = vec![still; points.len()];
+        let tasks = split(&mut views, &starts);
+        tasks.into_par_iter().for_each(|(curves, mut views)| {
+            for ends in curves.windows(2) {
+                let cvs = &points[ends[0] as usize..ends[1] as usize];
+                let gap = frame.gap(cvs, skin_gap);
+                let (mine, rest) = views.split_at_mut(cvs.len());
+                for (view, cv) in mine.iter_mut().zip(cvs) {
+                    *view = View { at: frame.at(*cv), gap };
+                }
+                views = rest;
+            }
+        });
+        let (sorted, places) = sorted(&views);
+        Self { sorted, places, starts }
+    }
+
+    /// All CVs, near ones next to each other.
+    pub(super) fn sorted(&self) -> &[View] {
+        &self.sorted
+    }
+
+    /// Where in [`Views::sorted`] the CVs of each curve are.
+    pub(super) fn curves(&self) -> impl IndexedParallelIterator<Item = &[u32]> {
+        self.starts.par_windows(2).map(|ends| &self.places[ends[0] as usize..ends[1] as usize])
+    }
+}
+
+/// Some curves' starts, and the room for their CVs.
+type Task<'a> = (&'a [u32], &'a mut [View]);
+
+/// The curves in tasks, each with its part of `views`.
+fn split<'a>(mut views: &'a mut [View], starts: &'a [u32]) -> Vec<Task<'a>> {
+    let curves = starts.len() - 1;
+    let mut tasks = Vec::with_capacity(curves.div_ceil(TASK));
+    for first in (0..curves).step_by(TASK) {
+        let end = curves.min(first + TASK);
+        let (mine, rest) = views.split_at_mut((starts[end] - starts[first]) as usize);
+        tasks.push((&starts[first..=end], mine));
+        views = rest;
+    }
+    tasks
+}
+
+/// The views cell by cell, in one cell as they came; and where each went.
+fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
+    let mut bits = 1;
+    while bits < FINEST && IN_CELL << (2 * bits) < views.len() {
+        bits += 1;
+    }
+    let grid = Grid::around(views, bits);
+    let cells: Vec<u32> = views.par_iter().map(|view| grid.cell(view.at)).collect();
+    let mut next = vec![0_u32; (1 << (2 * bits)) + 1];
+    for cell in &cells {
+        next[*cell as usize + 1] += 1;
+    }
+    let mut sum = 0;
+    for count in &mut next {
+        sum += *count;
+        *count = sum;
+    }
+    let mut out = views.to_vec();
+    let mut places = cells;
+    for (place, view) in places.iter_mut().zip(views) {
+        let next = &mut next[*place as usize];
+        *place = *next;
+        out[*next as usize] = *view;
+        *next += 1;
+    }
+    (out, places)
+}
+
+/// Cells across the wind.
+struct Grid {
+    low: [f32; 2],
+    /// Cells a unit.
+    fine: [f32; 2],
+    /// Number of the last cell along an axis.
+    last: f32,
+}
+
+impl Grid {
+    /// 2^`bits` cells along each axis.
+    fn around(views: &[View], bits: u32) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for view in views {
+            for axis in 0..2 {
+                let x = view.at[axis];
+                low[axis] = if x < low[axis] { x } else { low[axis] };
+                high[axis] = if x > high[axis] { x } else { high[axis] };
+            }
+        }
+        let last = ((1_u32 << bits) - 1) as f32;
+        let size = (high[0] - low[0]).max(high[1] - low[1]);
+        let fine = if size > 0.0 && size < f32::INFINITY { (last + 1.0) / size } else { 0.0 };
+        Self { low, fine: [fine; 2], last }
+    }
+
+    /// The number of a point's cell along a Z-curve; a point that is no number may be in any.
+    fn cell(&self, at: Vec3) -> u32 {
+        let mut cell = 0;
+        for axis in 0..2 {
+            let along = ((at[axis] - self.low[axis]) * self.fine[axis]).clamp(0.0, self.last);
+            cell |= spread(along as u32) << axis;
+        }
+        cell
+    }
+}
+
+/// Sixteen bits, a zero between each two.
+fn spread(x: u32) -> u32 {
+    let x = (x | x << 8) & 0x00ff_00ff;
+    let x = (x | x << 4) & 0x0f0f_0f0f;
+    let x = (x | x << 2) & 0x3333_3333;
+    (x | x << 1) & 0x5555_5555
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cvs_are_sorted_by_place_and_found_again() {
+        // Two curves of a row of CVs across the wind, their numbers shuffled.
+        let along = [5, 2, 7, 0, 3, 6, 1, 4];
+        let points: Vec<Vec3> = along.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
+        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]);
+        let views = Views::of(&frame, &[0, 3, 8], &points, 0.0);
+        let at = |place: &u32| views.sorted()[*place as usize].at;
+        let found: Vec<Vec3> = views.curves().collect::<Vec<_>>().into_iter().flatten().map(at).collect();
+        assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
+        let cells: Vec<u32> = {
+            let grid = Grid::around(views.sorted(), 1);
+            views.sorted().iter().map(|view| grid.cell(view.at)).collect()
+        };
+        assert!(cells.is_sorted() && cells[0] < cells[7], "{cells:?}");
+    }
+
+    #[test]
+    fn points_that_are_no_numbers_or_all_one_are_sorted_too() {
+        let points = [[f32::NAN; 3], [f32::INFINITY, 0.0, 0.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0]];
+        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]);
+        for n in 0..=4 {
+            let starts: Vec<u32> = (0..=n).collect();
+            assert_eq!(Views::of(&frame, &starts, &points, 0.0).sorted().len(), n as usize);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! What has turned so far down a curve: one quaternion and one offset.
+
+use super::Bend;
+use super::group::Unit;
+use super::share::gather;
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::trig;
+use numerics::vec3::{self, IDENTITY, Vec3};
+
+/// Sine of the angle short of π below which the vector product of two directions is rounding noise
+/// (its error is 2e-7), and the axis of their turn is taken from the curve instead.
+const OPPOSITE: f32 = 1e-6;
+
+/// A curve encloses more than this share of its size² with its chord where its own bend is not the
+/// rounding of a straight one.
+const STRAIGHT: f32 = 1e-5;
+
+/// The state of sixteen curves at a pivot.
+pub(super) struct Chain {
+    /// All turns of this and earlier pivots.
+    turned: Lanes<4>,
+    /// From where the CV came in to where it is, in units, and what its sum has lost to rounding.
+    offset: Lanes<3>,
+    carry: Lanes<3>,
+    /// The axes that curves bend about by themselves, where one was asked for.
+    bulges: [Option<Vec3>; LANES],
+}
+
+impl Chain {
+    pub(super) fn new() -> Self {
+        let still = [F32x16::splat(0.0); 3];
+        Self { turned: IDENTITY.map(F32x16::splat), offset: still, carry: still, bulges: [None; LANES] }
+    }
+
+    /// Turns what is beyond the pivot by `share` of the angle from its tip to `towards`; `chord` is
+    /// the tip less the pivot as they came in. `bulge` gives a lane's axis of bending, or 0.
+    #[inline(always)]
+    pub(super) fn turn(&mut self, chord: &Lanes<3>, towards: &Lanes<3>, share: &F32x16, bulge: impl Fn(usize) -> Vec3) {
+        let mut tip = [F32x16::splat(0.0); 3];
+        let mut axis = tip;
+        let mut half = F32x16::splat(0.0);
+        let mut opposite = [0; LANES];
+        for lane in 0..LANES {
+            let from = vec3::turned(get(&self.turned, lane), get(chord, lane));
+            let to = get(towards, lane);
+            let between = Between::of(from, to);
+            set(&mut tip, lane, from);
+            set(&mut axis, lane, between.axis);
+            half.0[lane] = 0.5 * share.0[lane] * between.angle;
+            opposite[lane] = u32::from(between.opposite && share.0[lane] != 0.0);
+        }
+        if opposite != [0; LANES] {
+            for lane in (0..LANES).filter(|lane| opposite[*lane] != 0) {
+                let own = *self.bulges[lane].get_or_insert_with(|| bulge(lane));
+                let own = vec3::turned(get(&self.turned, lane), own);
+                set(&mut axis, lane, own_axis(own, get(&tip, lane)));
+            }
+        }
+        let (sine, cosine) = trig::sin_cos_lanes(&half);
+        for lane in 0..LANES {
+            let [x, y, z] = vec3::scale(get(&axis, lane), sine.0[lane]);
+            let turn = [x, y, z, cosine.0[lane]];
+            let turned = vec3::compose(turn, get(&self.turned, lane));
+            set(&mut self.turned, lane, turned);
+        }
+    }
+
+    /// Goes on to the next CV, at the end of `segment`; gives how far the segment's turn moves it.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, bend: &Bend<'_>, segment: &Lanes<3>, at: &[usize; LANES]) -> Lanes<3> {
+        let whole = bend.blend >= 1.0 && bend.blend_mask.is_none();
+        let turned = if whole { self.turned } else { self.blended(bend, at) };
+        let mut moved = [F32x16::splat(0.0); 3];
+        for lane in 0..LANES {
+            set(&mut moved, lane, vec3::moved(get(&turned, lane), get(segment, lane)));
+        }
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let term = moved[axis].0[lane] - self.carry[axis].0[lane];
+                let before = self.offset[axis].0[lane];
+                let after = before + term;
+                self.carry[axis].0[lane] = (after - before) - term;
+                self.offset[axis].0[lane] = after;
+            }
+        }
+        moved
+    }
+
+    /// The share `blend` of all turns so far: their axis, less of their angle.
+    #[inline(always)]
+    fn blended(&self, bend: &Bend<'_>, at: &[usize; LANES]) -> Lanes<4> {
+        let mut share = gather(bend.blend_mask, at);
+        let mut half = F32x16::splat(0.0);
+        let mut sine = half;
+        for lane in 0..LANES {
+            let [x, y, z, w] = get(&self.turned, lane);
+            let blend = bend.blend * share.0[lane];
+            let blend = if blend > 0.0 { blend } else { 0.0 };
+            let blend = if blend < 1.0 { blend } else { 1.0 };
+            share.0[lane] = blend;
+            sine.0[lane] = vec3::length([x, y, z]);
+            half.0[lane] = blend * trig::atan2(sine.0[lane], w.abs());
+        }
+        let (part, cosine) = trig::sin_cos_lanes(&half);
+        let mut out = self.turned;
+        for lane in 0..LANES {
+            let [x, y, z, w] = get(&self.turned, lane);
+            // The shorter way round: a turn past π is one of less than π the other way.
+            let part = if w < 0.0 { -part.0[lane] } else { part.0[lane] };
+            let part = if sine.0[lane] > 0.0 { part / sine.0[lane] } else { 0.0 };
+            let whole = share.0[lane] >= 1.0;
+            let [px, py, pz] = vec3::scale([x, y, z], part);
+            let blended = [px, py, pz, cosine.0[lane]];
+            set(&mut out, lane, if whole { [x, y, z, w] } else { blended });
+        }
+        out
+    }
+
+    /// Where the CVs that came in at `points` are now: the same bits where nothing has moved.
+    #[inline(always)]
+    pub(super) fn displace(&self, points: &Lanes<3>, unit: &Unit) -> Lanes<3> {
+        let mut out = *points;
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let offset = self.offset[axis].0[lane];
+                let moved = out[axis].0[lane] + offset * unit.from.0[lane];
+                out[axis].0[lane] = if offset == 0.0 { out[axis].0[lane] } else { moved };
+            }
+        }
+        out
+    }
+}
+
+/// The turn from one direction to another.
+struct Between {
+    /// Of length 1, or 0 where it has none.
+    axis: Vec3,
+    /// 0..π.
+    angle: f32,
+    /// Whether the directions are so opposite that `axis` is noise.
+    opposite: bool,
+}
+
+impl Between {
+    /// From `from` to `to`, of any lengths; no turn where one is zero.
+    #[inline(always)]
+    fn of(from: Vec3, to: Vec3) -> Self {
+        let normal = vec3::cross(from, to);
+        // Between near-opposite directions its rounding leans towards them: bring it upright.
+        let square = vec3::dot(from, from);
+        let lean = if square > 0.0 { vec3::dot(normal, from) / square } else { 0.0 };
+        let normal = vec3::sub(normal, vec3::scale(from, lean));
+        let (sine, cosine) = (vec3::length(normal), vec3::dot(from, to));
+        let inverse = if sine > 0.0 { 1.0 / sine } else { 0.0 };
+        Self {
+            axis: vec3::scale(normal, inverse),
+            angle: trig::atan2(sine, cosine),
+            opposite: sine < -OPPOSITE * cosine,
+        }
+    }
+}
+
+/// An axis to turn `tip` about: as the curve bends already, `bulge`, or perpendicular to `tip`
+/// where it is straight.
+fn own_axis(bulge: Vec3, tip: Vec3) -> Vec3 {
+    let along = vec3::dot(bulge, tip) / vec3::dot(tip, tip);
+    let upright = vec3::sub(bulge, vec3::scale(tip, along));
+    let size = vec3::length(upright);
+    if size > STRAIGHT { vec3::scale(upright, 1.0 / size) } else { vec3::perpendicular(tip) }
+}

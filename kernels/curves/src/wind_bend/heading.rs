@@ -1,0 +1,71 @@
+//! Where the wind blows at each pivot: its own direction, and noise.
+
+use super::group::{Curves, Group, Unit};
+use super::{Bend, BendNoise};
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::vec3;
+
+/// Largest amplitude: the wind's own part is long below rounding, squares still far from overflow.
+const LARGEST: f32 = 1e12;
+
+/// The wind at the CVs of sixteen curves.
+pub(super) struct Heading<'a> {
+    wind: [f32; 3],
+    noise: Option<&'a BendNoise<'a>>,
+    /// Where the roots sample, in metres, an axis an array.
+    roots: [[f64; LANES]; 3],
+    /// Metres of the lanes' unit.
+    unit: &'a F32x16,
+}
+
+impl<'a> Heading<'a> {
+    #[inline(always)]
+    pub(super) fn new(bend: &'a Bend<'a>, group: &Group<'_>, curves: &Curves, unit: &'a Unit) -> Self {
+        let noise = bend.noise.as_ref().filter(|noise| noise.amplitude.abs() > 0.0);
+        let mut roots = [[0.0; LANES]; 3];
+        if let Some(noise) = noise {
+            let at = curves.at(0);
+            let last = group.starts.len() - 2;
+            for lane in 0..LANES {
+                let root = match noise.roots {
+                    Some(roots) => roots[group.first + lane.min(last)],
+                    None => group.points[at[lane]],
+                };
+                for axis in 0..3 {
+                    roots[axis][lane] = f64::from(root[axis]) + noise.origin[axis];
+                }
+            }
+        }
+        Self { wind: bend.wind, noise, roots, unit: &unit.from }
+    }
+
+    /// Whether it differs from CV to CV of a curve.
+    #[inline(always)]
+    pub(super) fn varies(&self) -> bool {
+        self.noise.is_some_and(|noise| noise.waviness != 0.0)
+    }
+
+    /// The direction at CVs this arc length from their roots; of length 1…4, not 1.
+    #[inline(always)]
+    pub(super) fn at(&self, arc: &F32x16) -> Lanes<3> {
+        let mut towards = self.wind.map(F32x16::splat);
+        let Some(noise) = self.noise else { return towards };
+        let mut points = [[0.0; LANES]; 3];
+        for axis in 0..3 {
+            let along = f64::from(self.wind[axis]) * f64::from(noise.waviness);
+            for lane in 0..LANES {
+                let way = f64::from(arc.0[lane]) * f64::from(self.unit.0[lane]) * along;
+                points[axis][lane] = (self.roots[axis][lane] + way) * noise.frequency;
+            }
+        }
+        let field = noise.field.at_lanes(&points);
+        let amplitude = noise.amplitude.clamp(-LARGEST, LARGEST);
+        for lane in 0..LANES {
+            let gust = vec3::scale(get(&field, lane), amplitude);
+            let sum = vec3::add(get(&towards, lane), gust);
+            let unit = vec3::power_of_two_to_one(vec3::largest(sum)).0;
+            set(&mut towards, lane, vec3::scale(sum, unit));
+        }
+        towards
+    }
+}

@@ -1,0 +1,172 @@
+//! Wind on curves: the kernel of Curve_Wind (W2), sixteen curves side by side.
+//!
+//! Root to tip, one pivot at a time, the rest of the curve turns about the pivot from the direction
+//! of its *current* tip towards the wind. All that has turned so far is one quaternion carried down
+//! the curve, so the cost is linear in CVs where moving all later points would be quadratic.
+//!
+//! Promise: the root keeps its bits; segments keep their lengths within 1e-5 of the curve's plus 4 ulp
+//! of the positions, at any number of CVs; what does not turn keeps its bits; the same bits on every
+//! SIMD path and number of threads; finite for any finite positions below 1e37. All arithmetic is on
+//! differences of CVs, brought to 1…2 by a power of two, so position and scale of the scene cost no
+//! digit but those its f32 positions have lost. Limits: near two directions exactly opposite the turn
+//! has no axis of its own; within 1e-6 rad it is taken from the curve. Positions in metres, radians.
+
+mod chain;
+mod group;
+mod heading;
+mod share;
+mod tally;
+
+use group::{Group, Scratch, bend_group};
+use numerics::lanes::LANES;
+use numerics::noise::Field;
+use numerics::ramp::Ramp;
+use numerics::simd::Path;
+use rayon::prelude::*;
+
+/// Which share of the angle to the wind a pivot turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// The paper's: g at every pivot. Segment k of a straight curve is left with θ₀(1−g)ᵏ⁺¹, k from
+    /// 0, so more CVs bend more.
+    Paper,
+    /// θ₀(1−g)^(u·n) at a segment whose middle is at u, n this number: the same curve for any CVs.
+    /// g ≥ 1 lies along the wind at once.
+    ResolutionFree {
+        /// CVs' worth of bending over the whole curve.
+        reference_segments: f32,
+    },
+}
+
+/// What bends the curves. Slices are one value a CV unless said.
+#[derive(Clone, Debug)]
+pub struct Bend<'a> {
+    /// Where wind blows to, of length 1.
+    pub wind: [f32; 3],
+    /// Share g of the angle that a pivot turns: 0 none, 1 all of it.
+    pub rotate: f32,
+    /// Scales `rotate`.
+    pub rotate_mask: Option<&'a [f32]>,
+    /// Scales `rotate`; below 0 or NaN counts as 0.
+    pub envelope: Option<&'a [f32]>,
+    /// Scales `rotate` along u, the rest arc length ÷ curve length.
+    pub ramp: &'a Ramp,
+    /// How g is applied.
+    pub mode: Mode,
+    /// Share of each segment's whole turn that is kept, 0..1; 0 gives the incoming bits.
+    pub blend: f32,
+    /// Scales `blend`.
+    pub blend_mask: Option<&'a [f32]>,
+    /// What varies the wind's direction.
+    pub noise: Option<BendNoise<'a>>,
+}
+
+/// Noise added to the wind's direction: `wind + amplitude · field(frequency · (root + origin +
+/// waviness · arc length · wind))`.
+#[derive(Clone, Debug)]
+pub struct BendNoise<'a> {
+    /// The field.
+    pub field: &'a Field,
+    /// Of the noise, against a wind of 1; 0 costs nothing.
+    pub amplitude: f32,
+    /// Cells of the field a metre.
+    pub frequency: f64,
+    /// Share of the arc length by which a CV samples downwind of its root; 0 costs one sample a curve.
+    pub waviness: f32,
+    /// Added to the root, in metres: the scene's origin less the scroll's offset.
+    pub origin: [f64; 3],
+    /// Where to sample a curve, one a curve; none: at its own root.
+    pub roots: Option<&'a [[f32; 3]]>,
+}
+
+/// Bent curves, and what was reached.
+#[must_use]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bent {
+    /// One point for every incoming one.
+    pub points: Vec<[f32; 3]>,
+    /// Largest turn of a segment, in radians, 0..π.
+    pub max_angle: f32,
+    /// Largest |length − incoming| ÷ curve length, of segments and of whole curves as written.
+    pub length_error: f32,
+}
+
+/// What a group of curves, or all of them, reached.
+#[derive(Clone, Copy, Default)]
+struct Reached {
+    max_angle: f32,
+    length_error: f32,
+}
+
+impl Reached {
+    fn max(self, other: Self) -> Self {
+        Self { max_angle: self.max_angle.max(other.max_angle), length_error: self.length_error.max(other.length_error) }
+    }
+}
+
+/// CVs a task has at least: some 30 µs of work, against a few for handing it to a thread.
+const TASK_CVS: usize = 2048;
+
+/// Bends curves `points[starts[i]..starts[i + 1]]` as `bend` says; curves of one CV pass through.
+///
+/// # Panics
+/// Where `starts` falls or does not run from 0 to the number of points, or a slice of `bend` is
+/// shorter than its points or curves.
+pub fn bend(starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
+    bend_on(Path::chosen(), starts, points, bend)
+}
+
+/// [`bend()`] on a given SIMD path.
+///
+/// # Panics
+/// As [`bend()`].
+pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
+    if bend.rotate == 0.0 || bend.blend <= 0.0 || bend.ramp.is_constant() == Some(0.0) {
+        return Bent { points: points.to_vec(), max_angle: 0.0, length_error: 0.0 };
+    }
+    let mut out = vec![[0.0; 3]; points.len()];
+    let reached = tasks(starts, &mut out)
+        .into_par_iter()
+        .map(|task| {
+            let mut scratch = Scratch::default();
+            let (mut reached, mut out) = (Reached::default(), task.out);
+            for first in (task.first..task.end).step_by(LANES) {
+                let end = task.end.min(first + LANES);
+                let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
+                let group = Group { first, starts: &starts[first..=end], points };
+                reached = reached.max(bend_group(path, bend, &group, &mut scratch, mine));
+                out = rest;
+            }
+            reached
+        })
+        .reduce(Reached::default, Reached::max);
+    Bent { points: out, max_angle: reached.max_angle, length_error: reached.length_error }
+}
+
+/// Whole groups of curves for one thread, and the points that it writes.
+struct Task<'a> {
+    first: usize,
+    end: usize,
+    out: &'a mut [[f32; 3]],
+}
+
+/// Splits the curves, and `out` with them, into tasks of at least `TASK_CVS` points.
+fn tasks<'a>(starts: &[u32], mut out: &'a mut [[f32; 3]]) -> Vec<Task<'a>> {
+    let curves = starts.len().saturating_sub(1);
+    let mut tasks = Vec::new();
+    let mut first = 0;
+    while first < curves {
+        let mut end = first;
+        while end < curves && ((starts[end] - starts[first]) as usize) < TASK_CVS {
+            end = curves.min(end + LANES);
+        }
+        let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
+        tasks.push(Task { first, end, out: mine });
+        (out, first) = (rest, end);
+    }
+    assert!(out.is_empty(), "`starts` covers all but {} points", out.len());
+    tasks
+}
+
+#[cfg(test)]
+mod tests;

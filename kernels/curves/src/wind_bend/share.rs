@@ -1,0 +1,99 @@
+//! Which share of its angle to the wind each pivot turns.
+
+use super::{Bend, Mode};
+use numerics::lanes::{F32x16, LANES, Lanes, get};
+use numerics::trig;
+use numerics::vec3;
+
+/// Largest share: beyond 1 a segment swings past the wind, beyond thousands its angle is noise; up
+/// to here sine and cosine of half of it are still good.
+const LARGEST: f32 = 5e5;
+
+/// The share of one pivot after another.
+pub(super) struct Share<'a> {
+    bend: &'a Bend<'a>,
+    /// The curves' lengths.
+    length: F32x16,
+    /// Where along u the middle of the segment before this one was.
+    middle: F32x16,
+}
+
+impl<'a> Share<'a> {
+    pub(super) fn new(bend: &'a Bend<'a>, length: F32x16) -> Self {
+        Self { bend, length, middle: F32x16::splat(0.0) }
+    }
+
+    /// The shares at the pivot whose segment runs between two `arcs`; `at` are its CVs' indices.
+    /// 0 for a segment of no length.
+    #[inline(always)]
+    pub(super) fn at(&mut self, arcs: [&F32x16; 2], segment: &Lanes<3>, at: &[usize; LANES]) -> F32x16 {
+        let mut u = F32x16::splat(0.0);
+        for lane in 0..LANES {
+            u.0[lane] = along(arcs[0].0[lane], self.length.0[lane]);
+        }
+        let mut share = match self.bend.ramp.is_constant() {
+            Some(value) => F32x16::splat(value),
+            None => self.bend.ramp.eval_lanes(&u),
+        };
+        let mask = gather(self.bend.rotate_mask, at);
+        let envelope = gather(self.bend.envelope, at);
+        for lane in 0..LANES {
+            let envelope = if envelope.0[lane] > 0.0 { envelope.0[lane] } else { 0.0 };
+            let product = self.bend.rotate * share.0[lane] * mask.0[lane] * envelope;
+            // An infinity times a 0 is no number: nothing was asked for.
+            share.0[lane] = if product.is_nan() { 0.0 } else { product };
+        }
+        if let Mode::ResolutionFree { reference_segments } = self.bend.mode {
+            self.free_of_resolution(&mut share, arcs, segment, reference_segments);
+        }
+        for lane in 0..LANES {
+            let value = share.0[lane];
+            let still = vec3::largest(get(segment, lane)) == 0.0;
+            let value = if still { 0.0 } else { value };
+            let value = if value < LARGEST { value } else { LARGEST };
+            share.0[lane] = if value > -LARGEST { value } else { -LARGEST };
+        }
+        share
+    }
+
+    /// Replaces g by 1 − (1 − g)^(Δ·n), Δ the way along u from the middle of the segment before.
+    #[inline(always)]
+    fn free_of_resolution(
+        &mut self,
+        share: &mut F32x16,
+        arcs: [&F32x16; 2],
+        segment: &Lanes<3>,
+        reference_segments: f32,
+    ) {
+        let mut exponent = F32x16::splat(0.0);
+        for lane in 0..LANES {
+            let middle = 0.5 * arcs[0].0[lane] + 0.5 * arcs[1].0[lane];
+            let middle = along(middle, self.length.0[lane]);
+            // A segment of no length does not turn, so its part of the way is left to the next.
+            let still = vec3::largest(get(segment, lane)) == 0.0;
+            let middle = if still { self.middle.0[lane] } else { middle };
+            exponent.0[lane] = (middle - self.middle.0[lane]) * reference_segments;
+            self.middle.0[lane] = middle;
+        }
+        for lane in 0..LANES {
+            let left = 1.0 - share.0[lane];
+            let left = if left > 0.0 { left } else { 0.0 };
+            share.0[lane] = trig::one_minus_pow(left, exponent.0[lane]);
+        }
+    }
+}
+
+/// Arc length as a share of a curve's length; 0 on a curve of no length.
+#[inline(always)]
+fn along(arc: f32, length: f32) -> f32 {
+    if length > 0.0 { arc / length } else { 0.0 }
+}
+
+/// One value a lane of `values`, or 1 where there are none.
+#[inline(always)]
+pub(super) fn gather(values: Option<&[f32]>, at: &[usize; LANES]) -> F32x16 {
+    match values {
+        Some(values) => F32x16::from_fn(|lane| values[at[lane]]),
+        None => F32x16::splat(1.0),
+    }
+}

@@ -1,0 +1,59 @@
+//! What a bend did to its curves, measured on what it writes.
+
+use super::Reached;
+use numerics::lanes::{F32x16, LANES, Lanes, get};
+use numerics::trig;
+use numerics::vec3;
+
+/// Running measures of sixteen curves, in units.
+pub(super) struct Tally {
+    /// Squares of the difference and the sum of a segment before and after, where their ratio, the
+    /// squared tangent of half the angle between them, is largest: exact from 0 to π.
+    difference: F32x16,
+    sum: F32x16,
+    /// Largest change of a segment's length, and all changes added up.
+    largest: F32x16,
+    total: F32x16,
+}
+
+impl Tally {
+    pub(super) fn new() -> Self {
+        let [zero, one] = [0.0, 1.0].map(F32x16::splat);
+        Self { difference: zero, sum: one, largest: zero, total: zero }
+    }
+
+    /// Adds a segment: as it came in, how its turn moved its end, and as written.
+    #[inline(always)]
+    pub(super) fn add(&mut self, segment: &Lanes<3>, moved: &Lanes<3>, written: &Lanes<3>) {
+        for lane in 0..LANES {
+            let (segment, moved) = (get(segment, lane), get(moved, lane));
+            let both = vec3::add(vec3::add(segment, segment), moved);
+            let (difference, sum) = (vec3::dot(moved, moved), vec3::dot(both, both));
+            let more = difference * self.sum.0[lane] > self.difference.0[lane] * sum;
+            self.difference.0[lane] = if more { difference } else { self.difference.0[lane] };
+            self.sum.0[lane] = if more { sum } else { self.sum.0[lane] };
+
+            let length = vec3::length(segment);
+            let change = vec3::length(get(written, lane)) - length;
+            let change = if length > 0.0 { change } else { 0.0 };
+            self.total.0[lane] += change;
+            let size = change.abs();
+            self.largest.0[lane] = if size > self.largest.0[lane] { size } else { self.largest.0[lane] };
+        }
+    }
+
+    /// The largest of the lanes, whose curves are this long.
+    pub(super) fn reached(&self, length: &F32x16) -> Reached {
+        let (mut difference, mut sum, mut length_error) = (0.0, 1.0, 0.0f32);
+        for lane in 0..LANES {
+            let change = self.largest.0[lane].max(self.total.0[lane].abs());
+            if length.0[lane] > 0.0 {
+                length_error = length_error.max(change / length.0[lane]);
+            }
+            if self.difference.0[lane] * sum > difference * self.sum.0[lane] {
+                (difference, sum) = (self.difference.0[lane], self.sum.0[lane]);
+            }
+        }
+        Reached { max_angle: 2.0 * trig::atan2(difference.sqrt(), sum.sqrt()), length_error }
+    }
+}

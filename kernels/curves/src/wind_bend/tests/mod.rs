@@ -1,0 +1,131 @@
+//! Shared by the bend's tests: curves, a plain bend to start from, measures of a result.
+
+mod extremes;
+mod laws;
+mod reference;
+
+use super::*;
+use numerics::ramp::Interpolation;
+use numerics::random::Key;
+use numerics::vec3::{self, Vec3};
+
+/// Curves as CVs a curve, joined.
+struct Groom {
+    starts: Vec<u32>,
+    points: Vec<Vec3>,
+}
+
+impl Groom {
+    fn of(curves: &[Vec<Vec3>]) -> Self {
+        let mut starts = vec![0];
+        for curve in curves {
+            starts.push(starts[starts.len() - 1] + curve.len() as u32);
+        }
+        Self { starts, points: curves.concat() }
+    }
+
+    fn bend(&self, with: &Bend<'_>) -> Bent {
+        bend(&self.starts, &self.points, with)
+    }
+
+    /// Positions of every CV changed.
+    fn map(&self, change: impl Fn(Vec3) -> Vec3) -> Self {
+        Self { starts: self.starts.clone(), points: self.points.iter().map(|cv| change(*cv)).collect() }
+    }
+}
+
+/// A straight curve from `root` along `direction`, whose length is the curve's.
+fn straight(root: Vec3, direction: Vec3, segments: usize) -> Vec<Vec3> {
+    let cv = |k| vec3::add(root, vec3::scale(direction, k as f32 / segments as f32));
+    (0..=segments).map(cv).collect()
+}
+
+/// Curves of 1…`most` CVs about 1 m long with random bends, up to 3 m from the origin.
+fn tangled(curves: u64, most: u64) -> Groom {
+    let curve = |i: u64| {
+        let key = Key::new(11).of(i);
+        let cvs = 1 + key.of(0).u64() % most;
+        let mut at = [1, 2, 3].map(|axis| key.of(axis).between([-3.0, 3.0]));
+        let mut way = [0.3, 1.0, -0.2];
+        (0..cvs)
+            .map(|cv| {
+                let before = at;
+                let turn = [0, 1, 2].map(|axis| key.of(4).of(cv).of(axis).between([-0.5, 0.5]));
+                way = vec3::add(way, turn);
+                at = vec3::add(at, vec3::scale(way, 1.0 / cvs as f32));
+                before
+            })
+            .collect()
+    };
+    Groom::of(&(0..curves).map(curve).collect::<Vec<_>>())
+}
+
+/// Half of the angle at every pivot, wind along x, nothing else.
+fn plain(ramp: &Ramp) -> Bend<'_> {
+    Bend {
+        wind: [1.0, 0.0, 0.0],
+        rotate: 0.5,
+        rotate_mask: None,
+        envelope: None,
+        ramp,
+        mode: Mode::Paper,
+        blend: 1.0,
+        blend_mask: None,
+        noise: None,
+    }
+}
+
+fn one() -> Ramp {
+    Ramp::constant(1.0)
+}
+
+fn bits(points: &[Vec3]) -> Vec<[u32; 3]> {
+    points.iter().map(|point| point.map(f32::to_bits)).collect()
+}
+
+/// Angles of the segments of one curve to `direction`, from their f64 differences.
+fn angles(points: &[Vec3], direction: [f64; 3]) -> Vec<f64> {
+    let angle = |pair: &[Vec3]| {
+        let s: [f64; 3] = std::array::from_fn(|i| f64::from(pair[1][i]) - f64::from(pair[0][i]));
+        let d = direction;
+        let cross = [s[1] * d[2] - s[2] * d[1], s[2] * d[0] - s[0] * d[2], s[0] * d[1] - s[1] * d[0]];
+        let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+        libm::atan2(sine, s.iter().zip(d).map(|(a, b)| a * b).sum())
+    };
+    points.windows(2).map(angle).collect()
+}
+
+fn distance(a: Vec3, b: Vec3) -> f64 {
+    (0..3).map(|i| f64::from(a[i]) - f64::from(b[i])).map(|d| d * d).sum::<f64>().sqrt()
+}
+
+fn farthest(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
+}
+
+fn length(points: &[Vec3]) -> f64 {
+    points.windows(2).map(|pair| distance(pair[0], pair[1])).sum()
+}
+
+/// Distance of a position this large from the next.
+fn ulp(largest: f32) -> f64 {
+    f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
+}
+
+/// Roots keep their bits, all is finite, and every segment and curve its length to 1e-5 of the
+/// curve's and 4 ulp of the positions.
+fn assert_kept(groom: &Groom, bent: &Bent) {
+    assert!(bent.max_angle.is_finite() && bent.length_error.is_finite());
+    for ends in groom.starts.windows(2) {
+        let curve = ends[0] as usize..ends[1] as usize;
+        let (before, after) = (&groom.points[curve.clone()], &bent.points[curve]);
+        let largest = before.iter().chain(after).map(|cv| vec3::largest(*cv)).fold(0.0, f32::max);
+        assert!(largest.is_finite() && after.iter().flatten().all(|x| x.is_finite()));
+        let tolerance = 1e-5 * length(before) + 4.0 * ulp(largest);
+        for (before, after) in before.windows(2).zip(after.windows(2)) {
+            let change = distance(before[0], before[1]) - distance(after[0], after[1]);
+            assert!(change.abs() <= tolerance, "a segment changed by {change}");
+        }
+        assert_eq!(bits(&before[..before.len().min(1)]), bits(&after[..after.len().min(1)]));
+    }
+}

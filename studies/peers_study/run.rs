@@ -1,0 +1,120 @@
+//! One method on one scene: what it takes, and where it leaves the body frame after frame.
+
+use crate::model::Model;
+use crate::scene::{FRAME, GRAVITY, Scene, Touched, V3};
+use crate::vbd::Vbd;
+use crate::xpbd::Xpbd;
+use bodies::mass_spring::{Frame, Integrator, Solver, State};
+use cpu_time::ProcessTime;
+
+/// How time is stepped through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Method {
+    Ours {
+        integrator: Integrator,
+        steps: u32,
+    },
+    Xpbd {
+        steps: u32,
+        iterations: u32,
+    },
+    /// `radius` is Chebyshev's ρ; 0: no acceleration.
+    Vbd {
+        steps: u32,
+        iterations: u32,
+        radius: f64,
+    },
+}
+
+/// What came of it.
+pub(crate) struct Run {
+    /// Processor time a frame, milliseconds.
+    pub(crate) ms: f64,
+    /// How often a frame looks at all springs.
+    pub(crate) passes: f64,
+    /// Of all particles, at the end of each frame.
+    pub(crate) trace: Vec<Vec<V3>>,
+    /// Of all frames: how far below its gap the deepest particle is, as a share of it.
+    pub(crate) overlap: f64,
+    /// Of all frames: the largest share of its volume that the body lacks; the least a tetrahedron has.
+    pub(crate) lost: f64,
+    pub(crate) least: f64,
+}
+
+impl Run {
+    pub(crate) fn new(scene: &Scene, method: Method) -> Self {
+        let model = || Model::new(scene);
+        match method {
+            Method::Ours { integrator, steps } => Self::ours(scene, integrator, steps),
+            Method::Xpbd { steps, iterations } => {
+                let mut xpbd = Xpbd::new(model(), &scene.points, steps, iterations);
+                Self::frames(scene, |frame, x| {
+                    let passes = xpbd.frame(frame);
+                    x.copy_from_slice(xpbd.positions());
+                    passes
+                })
+            }
+            Method::Vbd { steps, iterations, radius } => {
+                let mut vbd = Vbd::new(model(), &scene.points, steps, iterations, radius);
+                Self::frames(scene, |frame, x| {
+                    let passes = vbd.frame(frame);
+                    x.copy_from_slice(vbd.positions());
+                    passes
+                })
+            }
+        }
+    }
+
+    fn ours(scene: &Scene, integrator: Integrator, substeps: u32) -> Self {
+        /// Looks at all springs: to linearise and to look at the outcome, and as much for the line search.
+        const NEWTON: u32 = 4;
+        /// For the first force and the energies.
+        const STEP: u32 = 2;
+        let mut state = State::at_rest(&scene.body);
+        let mut solver = Solver::new(&scene.body);
+        Self::frames(scene, |frame, x| {
+            let touched = Touched { scene, frame };
+            let touches = scene.tools.ground || scene.tools.roller.is_some();
+            let asked = Frame {
+                seconds: FRAME,
+                gravity: GRAVITY.into(),
+                pins: &scene.pins,
+                contacts: touches.then_some(&touched),
+                integrator,
+                substeps,
+                ..Frame::default()
+            };
+            let report = solver.step(&scene.body, &mut state, &asked);
+            x.iter_mut().zip(&state.positions).for_each(|(x, p)| *x = V3::from(*p));
+            f64::from(report.cg + NEWTON * report.newton + STEP * report.substeps)
+        })
+    }
+
+    fn frames(scene: &Scene, mut go: impl FnMut(u32, &mut [V3]) -> f64) -> Self {
+        let mut x = scene.points.clone();
+        let mut run = Self { ms: 0.0, passes: 0.0, trace: Vec::new(), overlap: 0.0, lost: 0.0, least: f64::INFINITY };
+        let each = 1.0 / f64::from(scene.frames);
+        for frame in 0..scene.frames {
+            let clock = ProcessTime::now();
+            run.passes += go(frame, &mut x) * each;
+            run.ms += clock.elapsed().as_secs_f64() * 1e3 * each;
+            let (ratio, least) = scene.volume(&x);
+            run.overlap = run.overlap.max(scene.overlap(&x, FRAME * f64::from(frame + 1)));
+            run.lost = run.lost.max(1.0 - ratio);
+            run.least = run.least.min(least);
+            run.trace.push(x.clone());
+        }
+        run
+    }
+
+    /// How far it is from another of the same scene ÷ the body's size: root mean square over particles and frames, and over
+    /// particles at the end.
+    pub(crate) fn error(&self, other: &Self, size: f64) -> (f64, f64) {
+        let square = |(a, b): (&Vec<V3>, &Vec<V3>)| {
+            a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len().max(1) as f64
+        };
+        let squares: Vec<f64> = self.trace.iter().zip(&other.trace).map(square).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        (mean.sqrt() / size, squares.last().copied().unwrap_or(0.0).sqrt() / size)
+    }
+}

@@ -1,0 +1,197 @@
+//! What is simulated: a body, what holds it, what it touches.
+//!
+//! Ground and pin are exact shapes rather than meshes, and the same for every method: a search costs none of them anything,
+//! and no facet tells one from the other.
+
+use bodies::mass_spring::{Body, Contact, Contacts, Material, Mesh, Pin, Query, Scaled};
+use bodies::tets::{boundary, cubes};
+use nalgebra::Vector3;
+
+pub(crate) type V3 = Vector3<f64>;
+
+pub(crate) const FRAME: f64 = 1.0 / 24.0;
+pub(crate) const GRAVITY: V3 = V3::new(0.0, -9.81, 0.0);
+/// Distance kept from ground and pin, metres.
+pub(crate) const GAP: f64 = 1e-3;
+/// Coulomb's μ of both.
+pub(crate) const FRICTION: f64 = 0.5;
+
+/// A body and its surroundings.
+pub(crate) struct Scene {
+    pub(crate) title: &'static str,
+    pub(crate) frames: u32,
+    pub(crate) points: Vec<V3>,
+    pub(crate) tets: Vec<[u32; 4]>,
+    /// Particles of the surface, rising.
+    pub(crate) skin: Vec<u32>,
+    pub(crate) body: Body,
+    /// E, Pa.
+    pub(crate) modulus: f64,
+    /// β = c ÷ k, seconds.
+    pub(crate) damping: f64,
+    pub(crate) pins: Vec<Pin>,
+    pub(crate) tools: Tools,
+}
+
+/// What can be touched.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tools {
+    /// The half space below y = 0.
+    pub(crate) ground: bool,
+    pub(crate) roller: Option<Roller>,
+}
+
+/// A pin along z, as long as need be, that rolls along x.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Roller {
+    /// Its axis at the start, metres.
+    start: V3,
+    /// m/s.
+    pace: V3,
+    radius: f64,
+}
+
+/// A surface as a point sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// Unit, to the free side.
+    pub(crate) normal: V3,
+    /// How far the point is from it, metres.
+    pub(crate) distance: f64,
+    /// Its velocity where it is nearest, m/s.
+    pub(crate) velocity: V3,
+}
+
+impl Tools {
+    /// Surfaces there can be.
+    pub(crate) const MOST: usize = 2;
+
+    /// The surfaces as seen from `x`, at a time in seconds.
+    #[inline(always)]
+    pub(crate) fn around(&self, x: V3, time: f64) -> [Option<Surface>; Self::MOST] {
+        let ground =
+            self.ground.then_some(Surface { normal: V3::new(0.0, 1.0, 0.0), distance: x.y, velocity: V3::zeros() });
+        let roller = self.roller.map(|roller| {
+            let arm = x - (roller.start + roller.pace * time);
+            let reach = (arm.x * arm.x + arm.y * arm.y).sqrt();
+            let normal = V3::new(arm.x / reach, arm.y / reach, 0.0);
+            // It turns by −pace ÷ radius about z, so where it meets a floor it stands still.
+            let turn = V3::new(normal.y, -normal.x, 0.0) * roller.pace.x;
+            Surface { normal, distance: reach - roller.radius, velocity: roller.pace + turn }
+        });
+        [ground, roller]
+    }
+}
+
+/// The tools in one frame, as ours asks for them.
+pub(crate) struct Touched<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) frame: u32,
+}
+
+impl Contacts for Touched<'_> {
+    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+        let times = query.times.map(|share| (f64::from(self.frame) + share) * FRAME);
+        for particle in &self.scene.skin {
+            let [from, to] = [query.from, query.to].map(|x| V3::from(x[*particle as usize]));
+            let before = self.scene.tools.around(from, times[0]);
+            let after = self.scene.tools.around(to, times[1]);
+            for (before, after) in before.into_iter().zip(after).filter_map(|(before, after)| before.zip(after)) {
+                if before.distance.min(after.distance) < 2.0 * GAP {
+                    // The side it comes from, where it would go through the axis.
+                    let passed = before.normal.dot(&after.normal) <= 0.0;
+                    let normal = if passed { before.normal } else { after.normal };
+                    let offset = normal.dot(&(to - after.normal * after.distance));
+                    out.push(Contact {
+                        particles: [*particle, 0, 0, 0],
+                        weights: [1.0, 0.0, 0.0, 0.0],
+                        normal: normal.into(),
+                        offset,
+                        gap: GAP,
+                        velocity: after.velocity.into(),
+                        friction: FRICTION,
+                    });
+                }
+            }
+        }
+    }
+}
+
+impl Scene {
+    /// The scene of that name: `free`, `drop`, `roll` or `stiff`.
+    pub(crate) fn new(name: &'static str) -> Self {
+        const DOUGH: [f64; 3] = [0.24, 0.06, 0.12];
+        const CELLS: [u32; 3] = [26, 7, 12];
+        let ground = Tools { ground: true, roller: None };
+        // Ten thicknesses a frame, 1 cm into the dough.
+        let roller =
+            Roller { start: V3::new(-0.08, 0.1, 0.06), pace: V3::new(10.0 * GAP / FRAME, 0.0, 0.0), radius: 0.05 };
+        let above = |height: f64| [0.0, GAP + height, 0.0];
+        let made = |title, frames, tools, (size, cells, at), modulus, damping| {
+            Self::block(title, frames, tools, (size, cells, at), modulus, damping)
+        };
+        match name {
+            "free" => {
+                let beam = ([2.0, 0.5, 0.5], [32, 8, 8], [0.0; 3]);
+                let mut scene = made("free: cantilever, no contact", 16, Tools::default(), beam, 3.04e6, 1e-3);
+                scene.pins = scene.clamped();
+                scene
+            }
+            "drop" => made("drop: dough falls 2 cm and rests", 22, ground, (DOUGH, CELLS, above(0.02)), 5e3, 0.01),
+            "stiff" => made("stiff: the drop, E times 100", 22, ground, (DOUGH, CELLS, above(0.02)), 5e5, 1e-4),
+            "roll" => {
+                let tools = Tools { roller: Some(roller), ..ground };
+                made("roll: a pin rolls over dough", 24, tools, (DOUGH, CELLS, above(0.0)), 5e3, 0.01)
+            }
+            _ => panic!("`{name}`; expected free, drop, roll or stiff"),
+        }
+    }
+
+    /// Cells of six tetrahedra, the lowest corner at `at`.
+    fn block(
+        title: &'static str,
+        frames: u32,
+        tools: Tools,
+        (size, cells, at): ([f64; 3], [u32; 3], [f64; 3]),
+        modulus: f64,
+        damping: f64,
+    ) -> Self {
+        let (places, tets) = cubes(cells.map(|n| n as usize), at, size);
+        let points: Vec<V3> = places.iter().map(|p| V3::from(*p)).collect();
+        let narrow: Vec<[f32; 3]> = places.iter().map(|p| p.map(|x| x as f32)).collect();
+        let mut skin: Vec<u32> = boundary(&tets, &narrow).iter().flat_map(|face| face.corners).collect();
+        skin.sort_unstable();
+        skin.dedup();
+        let plain = |value| Scaled { value, mask: None };
+        let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
+        let mesh = Mesh { points: &places, tets: &tets, ..Mesh::default() };
+        let body = Body::new(&mesh, &material, &[]).expect("a block");
+        Self { title, frames, points, tets, skin, body, modulus, damping, pins: Vec::new(), tools }
+    }
+
+    /// Pins of all particles at x = 0.
+    fn clamped(&self) -> Vec<Pin> {
+        let held = (0u32..).zip(&self.points).filter(|(_, p)| p.x == 0.0);
+        held.map(|(particle, p)| Pin { particle, between: [(*p).into(); 2] }).collect()
+    }
+
+    /// How far below its gap the deepest particle is at a time in seconds, as a share of it: 1 touches, more is inside.
+    pub(crate) fn overlap(&self, x: &[V3], time: f64) -> f64 {
+        let distances = self.skin.iter().flat_map(|particle| self.tools.around(x[*particle as usize], time));
+        distances.flatten().map(|surface| 1.0 - surface.distance / GAP).fold(0.0, f64::max)
+    }
+
+    /// Volume ÷ volume at rest, and the least of a tetrahedron.
+    pub(crate) fn volume(&self, x: &[V3]) -> (f64, f64) {
+        let six = |x: &[V3], tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|corner| x[corner as usize]);
+            (b - a).dot(&(c - a).cross(&(d - a)))
+        };
+        let (mut now, mut rest, mut least) = (0.0, 0.0, f64::INFINITY);
+        for tet in &self.tets {
+            let (after, before) = (six(x, tet), six(&self.points, tet));
+            (now, rest, least) = (now + after, rest + before, least.min(after / before));
+        }
+        (now / rest, least)
+    }
+}
