@@ -8,7 +8,7 @@ use curves::wind_bend::{Bend, Mode, bend};
 use numerics::ramp::Ramp;
 use numerics::shapes::icosphere;
 use numerics::tree::TriangleTree;
-use numerics::vec3::{Vec3, scale};
+use numerics::vector::{Vec3, scale};
 use std::time::Duration;
 
 /// Rounds of each case, and how many cases: `cargo bench --bench collide -- 1 1` is a run to profile.

@@ -22,5 +22,5 @@ pub mod simd;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;
-pub mod vec3;
+pub mod vector;
 pub mod volume;

@@ -5,7 +5,7 @@
 //! there, which magnifies how that one deforms.
 
 use numerics::tree::TriangleTree;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 
 type V3 = nalgebra::Vector3<f64>;

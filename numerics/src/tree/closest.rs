@@ -3,7 +3,7 @@
 use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
 use crate::lanes::{F32x16, get};
 use crate::simd::{Path, kernel};
-use crate::vec3::{self, Vec3, cross, dot, scale, sub};
+use crate::vector::{self, Vec3, cross, dot, scale, sub};
 use rayon::prelude::*;
 
 /// The nearest point of a surface.
@@ -84,7 +84,7 @@ impl TriangleTree {
             }
         }
         let Found { triangle, weights, towards, .. } = best;
-        let found = Closest { triangle, weights, point: vec3::add(p, towards), distance: vec3::length(towards) };
+        let found = Closest { triangle, weights, point: vector::add(p, towards), distance: vector::length(towards) };
         (triangle != NONE).then_some(found)
     }
 }
@@ -213,7 +213,7 @@ fn square_at(corners: [Vec3; 3], u: f32, v: f32) -> f32 {
 /// The point of a triangle with weights `u` and `v` of its second and third corner.
 #[inline(always)]
 fn between([a, b, c]: [Vec3; 3], u: f32, v: f32) -> Vec3 {
-    vec3::add(a, vec3::add(scale(sub(b, a), u), scale(sub(c, a), v)))
+    vector::add(a, vector::add(scale(sub(b, a), u), scale(sub(c, a), v)))
 }
 
 /// How far along `side` from `start` is nearest to the origin, 0..1; 0 on a side of no length.

@@ -15,7 +15,7 @@ mod split;
 mod visit;
 
 use crate::lanes::{F32x16, LANES, Lanes, set};
-use crate::vec3::Vec3;
+use crate::vector::Vec3;
 pub use closest::Closest;
 use rayon::prelude::*;
 pub use visit::{Cuboid, Region, Walk};

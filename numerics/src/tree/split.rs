@@ -1,7 +1,7 @@
 //! In which order the triangles lie in the tree: sixteen after sixteen that are close together.
 
 use super::{LANES, least, most};
-use crate::vec3::Vec3;
+use crate::vector::Vec3;
 
 /// Triangles below which a half is not worth handing to another thread.
 const TASK: usize = 1024;

@@ -1,7 +1,7 @@
 //! Which blocks a part of space meets.
 
 use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
-use crate::vec3::Vec3;
+use crate::vector::Vec3;
 
 /// A part of space that asks which boxes it meets.
 pub trait Region {

@@ -5,7 +5,7 @@ use super::surface::{Moment, NONE, Surface};
 use super::swept::Elements;
 use super::{TouchError, V3};
 use numerics::tree::TriangleTree;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// A mesh that moves through the frame as its poses say, as rigidly as they allow.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::surface::Places;
 use numerics::lanes::{F32x16, LANES, set};
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 
 /// Levels that 2³² elements need, at most.

@@ -1,6 +1,6 @@
 //! The faces that tets have to the outside.
 
-use numerics::vec3::{Vec3, cross, dot, sub};
+use numerics::vector::{Vec3, cross, dot, sub};
 
 /// A face of one tet alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

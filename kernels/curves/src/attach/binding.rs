@@ -5,7 +5,7 @@ use super::rotation::nearest_rotation;
 use super::vectors::{IDENTITY, Matrix, Vec3, add, cross, dot, length, mix, moved, scale, sub, unit, wide};
 use crate::scatter::Spot;
 use numerics::tree::TriangleTree;
-use numerics::vec3::{largest, power_of_two_to_one};
+use numerics::vector::{largest, power_of_two_to_one};
 use rayon::prelude::*;
 
 /// Rows that a task takes at least: some 20 µs of work.
@@ -74,7 +74,7 @@ impl Binding {
         }
         // The tree squares squares, so it sees a skin of about 1 m around the origin, whatever its place and size.
         let corner = points[*triangles.as_flattened().iter().min()? as usize];
-        let from_corner = |p: &[f32; 3]| numerics::vec3::sub(*p, corner);
+        let from_corner = |p: &[f32; 3]| numerics::vector::sub(*p, corner);
         let all = triangles.as_flattened().iter().map(|corner| largest(from_corner(&points[*corner as usize])));
         let (to, _) = power_of_two_to_one(all.fold(0.0, f32::max));
         let near = |p: &[f32; 3]| {

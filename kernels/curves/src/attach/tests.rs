@@ -82,7 +82,7 @@ fn farthest(a: &[Point], b: &[Point]) -> f64 {
 
 /// What rounding to f32 alone makes of a length, as a share of its curve's: 4 ulp, as for every length in this crate.
 fn rounding(starts: &[u32], points: &[Point]) -> f64 {
-    let size = points.iter().fold(0.0, |most: f32, p| most.max(numerics::vec3::largest(*p)));
+    let size = points.iter().fold(0.0, |most: f32, p| most.max(numerics::vector::largest(*p)));
     let whole = |pair: &[u32]| {
         let curve = &points[pair[0] as usize..pair[1] as usize];
         curve.windows(2).map(|pair| length(sub(wide(pair[1]), wide(pair[0])))).sum::<f64>()

@@ -4,7 +4,7 @@ use super::near::may_cross;
 use super::sector::V3;
 use numerics::lanes::get;
 use numerics::tree::{Block, TriangleTree};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// A segment through a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use super::sector::V3;
 use super::turn::{Nearby, Segment};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::{Quaternion, UnitQuaternion};
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 
 /// Of the first segment, the part not tested where the root may lie on the skin: this many gaps.
 const SKIPPED_GAPS: f64 = 5.0;
@@ -46,7 +46,7 @@ impl Hair<'_> {
         if moved {
             self.out[0] = narrow(&goal[0]);
         }
-        let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vec3::largest(*cv)));
+        let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
         let mut turned = UnitQuaternion::identity();
         let (mut axis, mut before) = (V3::zeros(), V3::zeros());
         for k in 0..cvs - 1 {

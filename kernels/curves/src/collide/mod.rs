@@ -22,7 +22,7 @@ use coherence::Ground;
 use hair::{Hair, Scratch};
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};

@@ -3,7 +3,7 @@
 use super::sector::{Sector, V3};
 use numerics::lanes::LANES;
 use numerics::tree::Block;
-use numerics::vec3::{self, Vec3, cross, dot, sub};
+use numerics::vector::{self, Vec3, cross, dot, sub};
 
 /// Rounding of a few products of differences, as a share of the largest difference.
 const ROUNDING: f32 = 2e-6;
@@ -34,7 +34,7 @@ impl Wedge {
             until: [cosine as f32, sine as f32],
             half: sector.half as f32,
             back: sector.back as f32,
-            slack: ROUNDING * (sector.reach as f32 + 0.1 * vec3::largest(pivot)),
+            slack: ROUNDING * (sector.reach as f32 + 0.1 * vector::largest(pivot)),
             pivot,
         }
     }
@@ -47,7 +47,7 @@ impl Wedge {
         for lane in 0..LANES {
             let corners = block.around(lane, self.pivot);
             let (x, y, s) = (along(corners, self.axes[0]), along(corners, self.axes[1]), along(corners, self.axes[2]));
-            let size = most(most(vec3::largest(x), vec3::largest(y)), vec3::largest(s));
+            let size = most(most(vector::largest(x), vector::largest(y)), vector::largest(s));
             let slack = slack + ROUNDING * size;
             let across = (most3(s) >= -(self.half + slack)) & (least3(s) <= self.half + slack);
             let ahead = most3(y) >= -(self.back + slack);
@@ -67,20 +67,20 @@ impl Wedge {
 #[inline(always)]
 pub(super) fn may_cross(block: &Block, a: Vec3, b: Vec3) -> u16 {
     let way = sub(b, a);
-    let slack = ROUNDING * (vec3::largest(way) + 0.1 * vec3::largest(a));
+    let slack = ROUNDING * (vector::largest(way) + 0.1 * vector::largest(a));
     let mut mask = 0;
     for lane in 0..LANES {
         let [p, q, r] = block.around(lane, a);
         let (pq, pr) = (sub(q, p), sub(r, p));
         let normal = cross(pq, pr);
-        let size = most3([vec3::largest(p), vec3::largest(q), vec3::largest(r)]);
+        let size = most3([vector::largest(p), vector::largest(q), vector::largest(r)]);
         // Heights over the plane, times twice the area; volumes with each edge.
         let start = -dot(normal, p);
         let end = dot(normal, sub(way, p));
-        let doubt = (ROUNDING * size + slack) * (most(vec3::largest(pq), vec3::largest(pr))) * 4.0 * size;
+        let doubt = (ROUNDING * size + slack) * (most(vector::largest(pq), vector::largest(pr))) * 4.0 * size;
         let passes = !((start > doubt) & (end > doubt)) & !((start < -doubt) & (end < -doubt));
         let volumes = [dot(way, cross(p, q)), dot(way, cross(q, r)), dot(way, cross(r, p))];
-        let doubt = (ROUNDING * size + slack) * vec3::largest(way) * 8.0 * size;
+        let doubt = (ROUNDING * size + slack) * vector::largest(way) * 8.0 * size;
         let around = !((most3(volumes) > doubt) & (least3(volumes) < -doubt));
         mask |= u16::from(passes & around) << lane;
     }

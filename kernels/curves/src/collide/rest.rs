@@ -6,7 +6,7 @@ use super::near::narrow;
 use super::sector::V3;
 use super::turn::{Nearby, gather};
 use numerics::simd::{Path, kernel};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 
 /// Segments that ask the trees together.

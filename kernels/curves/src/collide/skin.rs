@@ -4,7 +4,7 @@ use super::coherence::Ground;
 use super::crossing::wide;
 use super::sector::V3;
 use numerics::tree::{Closest, TriangleTree};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// How often a root is lifted again where the surface bends away below it.
 const LIFTS: usize = 4;

@@ -4,7 +4,7 @@ use super::crossing::wide;
 use super::sector::{Sector, V3};
 use super::*;
 use numerics::random::Key;
-use numerics::vec3;
+use numerics::vector;
 
 mod hairs;
 mod sectors;

@@ -5,7 +5,7 @@ use super::near::{Wedge, narrow};
 use super::sector::{Blocked, Sector, V3};
 use super::{Method, perpendicular};
 use numerics::tree::{Block, TriangleTree};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use std::f64::consts::PI;
 
 /// How straight into a surface a segment has to stick for the curve to say which way out is taken.

@@ -5,7 +5,7 @@ use crate::attach::vectors::{cross, dot, wide};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Block, NONE, TriangleTree};
-use numerics::vec3::{self, Vec3, largest, power_of_two_to_one};
+use numerics::vector::{self, Vec3, largest, power_of_two_to_one};
 use rayon::prelude::*;
 
 /// Most guides that a hair is mixed of.
@@ -64,7 +64,7 @@ pub fn mix(guides: &[Stand], hairs: &[Stand], count: usize) -> Mix {
 /// [`mix()`] on a given SIMD path.
 pub(super) fn mix_on(path: Path, guides: &[Stand], hairs: &[Stand], count: usize) -> Mix {
     let per_hair = count.clamp(1, MOST_GUIDES).min(guides.len());
-    let blank = Share { guide: 0, weight: 0.0, turn: vec3::IDENTITY };
+    let blank = Share { guide: 0, weight: 0.0, turn: vector::IDENTITY };
     let mut shares = vec![blank; per_hair * hairs.len()];
     if per_hair > 0 {
         let field = Field::new(guides, hairs);
@@ -84,7 +84,7 @@ fn chunk(field: &Field<'_>, hairs: &[Stand], per_hair: usize, shares: &mut [Shar
     let mut before = hairs.first().map_or([0.0; 3], |hair| hair.at);
     for (hair, shares) in hairs.iter().zip(shares.chunks_mut(per_hair)) {
         // As far as the hair before had to look, and as far as this one is from it: a guess, which changes no answer.
-        let moved = vec3::length(vec3::scale(vec3::sub(hair.at, before), field.unit));
+        let moved = vector::length(vector::scale(vector::sub(hair.at, before), field.unit));
         let moved = if moved < reach { moved } else { reach };
         let nearest = field.nearest(hair, per_hair + 1, (reach + moved) * GUESS);
         reach = nearest.reach();
@@ -115,9 +115,9 @@ impl<'a> Field<'a> {
         let finite = |stand: &&Stand| stand.at.iter().all(|x| x.is_finite());
         let from = guides.iter().find(finite).map_or([0.0; 3], |stand| stand.at);
         let all = guides.iter().chain(hairs).filter(finite);
-        let size = all.map(|stand| largest(vec3::sub(stand.at, from))).fold(0.0, f32::max);
+        let size = all.map(|stand| largest(vector::sub(stand.at, from))).fold(0.0, f32::max);
         let (unit, _) = power_of_two_to_one(size);
-        let points: Vec<Vec3> = guides.iter().map(|guide| vec3::scale(vec3::sub(guide.at, from), unit)).collect();
+        let points: Vec<Vec3> = guides.iter().map(|guide| vector::scale(vector::sub(guide.at, from), unit)).collect();
         let spots: Vec<[u32; 3]> = (0..guides.len() as u32).map(|guide| [guide; 3]).collect();
         let tree = TriangleTree::build(&points, &spots);
         let mut normals = vec![[F32x16::splat(0.0); 3]; tree.blocks().len()];
@@ -135,7 +135,7 @@ impl<'a> Field<'a> {
     /// The `count` nearest guides (all, where they are fewer), of equals the first.
     #[inline(always)]
     fn nearest(&self, hair: &Stand, count: usize, guess: f32) -> Nearest {
-        let at = vec3::scale(vec3::sub(hair.at, self.from), self.unit);
+        let at = vector::scale(vector::sub(hair.at, self.from), self.unit);
         let mut reach = guess;
         loop {
             // Everything lies within 8 of everything else.
@@ -166,8 +166,8 @@ impl<'a> Field<'a> {
         let normals = &self.normals[guide.map_or(0, |guide| self.row_of[guide as usize] as usize)];
         let mut distances = F32x16::splat(0.0);
         for lane in 0..LANES {
-            let away = vec3::length(vec3::sub(get(&block.corners[0], lane), at));
-            let cosine = vec3::dot(get(normals, lane), normal);
+            let away = vector::length(vector::sub(get(&block.corners[0], lane), at));
+            let cosine = vector::dot(get(normals, lane), normal);
             let cosine = if cosine < 1.0 { cosine } else { 1.0 };
             let cosine = if cosine > -1.0 { cosine } else { -1.0 };
             distances.0[lane] = away * ((2.0 + BEHIND) / (1.0 + cosine + BEHIND));
@@ -260,14 +260,14 @@ fn weights(found: &[(f32, u32)], beyond: Option<f32>) -> [f64; MOST_GUIDES] {
 /// is unknown.
 fn least_turn(from: Vec3, to: Vec3) -> [f32; 4] {
     if from == to || from == [0.0; 3] || to == [0.0; 3] {
-        return vec3::IDENTITY;
+        return vector::IDENTITY;
     }
     let (a, b) = (wide(from), wide(to));
     let [x, y, z] = cross(a, b);
     let w = 1.0 + dot(a, b);
     let square = x * x + y * y + z * z + w * w;
     if square < OPPOSITE {
-        let [x, y, z] = vec3::perpendicular(from);
+        let [x, y, z] = vector::perpendicular(from);
         return [x, y, z, 0.0];
     }
     let length = square.sqrt();

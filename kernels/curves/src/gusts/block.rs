@@ -6,7 +6,7 @@ use super::{BLOCK, LUMPS, Scene, Sphere};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::noise;
 use numerics::simd::kernel;
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 
 /// The least share of a radius that noise leaves: a boundary at the centre itself has no inside.
 const LEAST_LEFT: f32 = 1e-3;
@@ -80,7 +80,7 @@ fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: 
 fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
     for (points, at) in points.chunks(LANES).zip(at) {
         for lane in 0..LANES {
-            set(at, lane, vec3::sub(points[lane.min(points.len() - 1)], origin));
+            set(at, lane, vector::sub(points[lane.min(points.len() - 1)], origin));
         }
     }
 }
@@ -158,9 +158,9 @@ impl Ball {
         let mut share = F32x16::splat(0.0);
         let mut inside = 0;
         for lane in 0..LANES {
-            let d = vec3::scale(vec3::sub(get(at, lane), self.centre), self.inverse);
+            let d = vector::scale(vector::sub(get(at, lane), self.centre), self.inverse);
             set(&mut away, lane, d);
-            let square = vec3::dot(d, d);
+            let square = vector::dot(d, d);
             inside |= u32::from(square < 1.0);
             share.0[lane] = square;
         }

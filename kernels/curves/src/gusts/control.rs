@@ -10,7 +10,7 @@
 
 use numerics::lanes::{F32x16, LANES, Lanes};
 use numerics::ramp::Ramp;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// What a control looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

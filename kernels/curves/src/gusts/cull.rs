@@ -4,7 +4,7 @@
 
 use numerics::lanes::LANES;
 use numerics::simd::kernel;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// A low and a high corner.
 pub(super) type Bounds = [Vec3; 2];

@@ -6,7 +6,7 @@ use super::carry::Carry;
 use super::response::Response;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// Sixteen `f64`, aligned as the widest vector.
 #[derive(Clone, Copy, Debug)]

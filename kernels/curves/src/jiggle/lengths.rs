@@ -1,6 +1,6 @@
 //! Curves between two shapes given back the lengths between theirs.
 
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 
 /// Turns `points`, curves somewhere between the shapes `near[0]` and `near[1]`, into ones whose segments are `share` of
 /// the way between the lengths of those; directions and roots stay. Segments without a direction stay as they are.

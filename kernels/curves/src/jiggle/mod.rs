@@ -25,7 +25,7 @@ use group::{Blend, Curves, F64x16, Responses, Slot, shape_group, step_group};
 use numerics::lanes::LANES;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 use response::Response;
 use std::f64::consts::PI;

@@ -18,7 +18,7 @@ use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::simd::kernel;
 use numerics::tree::{Boxes, Region};
 use numerics::trig;
-use numerics::vec3::{self, Vec3, cross, sub};
+use numerics::vector::{self, Vec3, cross, sub};
 use std::f32::consts::PI;
 
 /// Of the offset, the part at its far end over which shelter fades out: a collider that reaches
@@ -123,7 +123,7 @@ impl Cone {
             for side in 0..3 {
                 let (from, to) = (at[side], at[(side + 1) % 3]);
                 let third = get(&thirds[side], lane);
-                let volume = vec3::dot(cross(to, from), third);
+                let volume = vector::dot(cross(to, from), third);
                 let goes_on = self.counts(volume, [to, from, third]) & ((volume > 0.0) == (seen.volume > 0.0));
                 open[side][lane] = counts & !goes_on;
             }
@@ -152,7 +152,7 @@ impl Cone {
     /// Whether a triangle, from its volume with the tip, is one, and not one that the CV lies on.
     #[inline(always)]
     fn counts(&self, volume: f32, [a, b, c]: [Vec3; 3]) -> bool {
-        let area = vec3::length(cross(sub(b, a), sub(c, a)));
+        let area = vector::length(cross(sub(b, a), sub(c, a)));
         (area > 0.0) & (volume.abs() > self.gap * area)
     }
 
@@ -171,8 +171,8 @@ impl Cone {
         let (start, end) = self.near_the_cone(from, to);
         let along = sub(to, from);
         // An end that is not cut keeps its bits: the next edge begins there.
-        let p = vec3::add(from, vec3::scale(along, start));
-        let q = vec3::sub(to, vec3::scale(along, 1.0 - end));
+        let p = vector::add(from, vector::scale(along, start));
+        let q = vector::sub(to, vector::scale(along, 1.0 - end));
         let in_front = (start < end) & (p[2] > 0.0) & (q[2] > 0.0);
         let (near, far) = (1.0 / (p[2] * self.slope), 1.0 / (q[2] * self.slope));
         let ([px, py], [qx, qy]) = ([p[0] * near, p[1] * near], [q[0] * far, q[1] * far]);

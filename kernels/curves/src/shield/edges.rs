@@ -3,7 +3,7 @@
 
 use numerics::lanes::{Lanes, set};
 use numerics::tree::{NONE, TriangleTree};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 
 /// Neighbours' third corners, a block of the tree an entry. Side k runs from corner k to the next; one

@@ -2,7 +2,7 @@
 //! power of two of metres that brings the scene below 2.
 
 use super::Collider;
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 
 /// From a point of the scene to the frame.
 pub(super) struct Frame {
@@ -47,7 +47,7 @@ impl Frame {
         let unit = libm::scalbn(1.0, -exponent);
 
         let upwind = unit_vector(wind.map(|x| -x));
-        let across = unit_vector(vec3::perpendicular(upwind.map(|x| x as f32)).map(f64::from));
+        let across = unit_vector(vector::perpendicular(upwind.map(|x| x as f32)).map(f64::from));
         // The axis found in f32 is at a right angle to the wind to its rounding; this takes the rest.
         let along = dot(across, upwind);
         let across = unit_vector([0, 1, 2].map(|k| across[k] - along * upwind[k]));
@@ -73,7 +73,7 @@ impl Frame {
     pub(super) fn gap(&self, cvs: &[Vec3], asked: f32) -> Gap {
         let Bounds { low, high } = Bounds::of(cvs);
         let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
-        let largest = vec3::largest(low).max(vec3::largest(high)) * (ULPS * f32::EPSILON);
+        let largest = vector::largest(low).max(vector::largest(high)) * (ULPS * f32::EPSILON);
         Gap {
             least: self.length(asked.max(largest)),
             most: if size > 0.0 { self.length(size) * HAIR } else { f32::INFINITY },

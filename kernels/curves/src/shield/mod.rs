@@ -26,7 +26,7 @@ use frame::Frame;
 use numerics::lanes::{F32x16, LANES, get};
 use numerics::simd::Path;
 use numerics::tree::{Block, TriangleTree};
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 use rayon::prelude::*;
 use views::Views;
 
@@ -169,7 +169,7 @@ impl Obstacle {
             let [a, b, c] = &block.corners;
             F32x16::from_fn(|lane| {
                 let [a, b, c] = [get(a, lane), get(b, lane), get(c, lane)];
-                vec3::length(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
+                vector::length(vector::cross(vector::sub(b, a), vector::sub(c, a)))
             })
         };
         let areas = tree.blocks().par_iter().with_min_len(TASK_GROUPS).map(area).collect();

@@ -5,7 +5,7 @@ use super::views::View;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
 use numerics::tree::Cuboid;
-use numerics::vec3::{Vec3, sub};
+use numerics::vector::{Vec3, sub};
 
 kernel! {
     /// 1 in `covered` for each of up to sixteen CVs that has a collider within `reach` upwind.

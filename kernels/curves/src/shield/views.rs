@@ -4,7 +4,7 @@
 //! of a grid across the wind, along a Z-curve: two passes over them.
 
 use super::frame::{Frame, Gap};
-use numerics::vec3::Vec3;
+use numerics::vector::Vec3;
 use rayon::prelude::*;
 
 /// A CV that looks upwind.

@@ -5,7 +5,7 @@ use super::group::Unit;
 use super::share::gather;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::trig;
-use numerics::vec3::{self, IDENTITY, Vec3};
+use numerics::vector::{self, IDENTITY, Vec3};
 
 /// Sine of the angle short of π below which the vector product of two directions is rounding noise
 /// (its error is 2e-7), and the axis of their turn is taken from the curve instead.
@@ -41,7 +41,7 @@ impl Chain {
         let mut half = F32x16::splat(0.0);
         let mut opposite = [0; LANES];
         for lane in 0..LANES {
-            let from = vec3::turned(get(&self.turned, lane), get(chord, lane));
+            let from = vector::turned(get(&self.turned, lane), get(chord, lane));
             let to = get(towards, lane);
             let between = Between::of(from, to);
             set(&mut tip, lane, from);
@@ -52,15 +52,15 @@ impl Chain {
         if opposite != [0; LANES] {
             for lane in (0..LANES).filter(|lane| opposite[*lane] != 0) {
                 let own = *self.bulges[lane].get_or_insert_with(|| bulge(lane));
-                let own = vec3::turned(get(&self.turned, lane), own);
+                let own = vector::turned(get(&self.turned, lane), own);
                 set(&mut axis, lane, own_axis(own, get(&tip, lane)));
             }
         }
         let (sine, cosine) = trig::sin_cos_lanes(&half);
         for lane in 0..LANES {
-            let [x, y, z] = vec3::scale(get(&axis, lane), sine.0[lane]);
+            let [x, y, z] = vector::scale(get(&axis, lane), sine.0[lane]);
             let turn = [x, y, z, cosine.0[lane]];
-            let turned = vec3::compose(turn, get(&self.turned, lane));
+            let turned = vector::compose(turn, get(&self.turned, lane));
             set(&mut self.turned, lane, turned);
         }
     }
@@ -72,7 +72,7 @@ impl Chain {
         let turned = if whole { self.turned } else { self.blended(bend, at) };
         let mut moved = [F32x16::splat(0.0); 3];
         for lane in 0..LANES {
-            set(&mut moved, lane, vec3::moved(get(&turned, lane), get(segment, lane)));
+            set(&mut moved, lane, vector::moved(get(&turned, lane), get(segment, lane)));
         }
         for axis in 0..3 {
             for lane in 0..LANES {
@@ -98,7 +98,7 @@ impl Chain {
             let blend = if blend > 0.0 { blend } else { 0.0 };
             let blend = if blend < 1.0 { blend } else { 1.0 };
             share.0[lane] = blend;
-            sine.0[lane] = vec3::length([x, y, z]);
+            sine.0[lane] = vector::length([x, y, z]);
             half.0[lane] = blend * trig::atan2(sine.0[lane], w.abs());
         }
         let (part, cosine) = trig::sin_cos_lanes(&half);
@@ -109,7 +109,7 @@ impl Chain {
             let part = if w < 0.0 { -part.0[lane] } else { part.0[lane] };
             let part = if sine.0[lane] > 0.0 { part / sine.0[lane] } else { 0.0 };
             let whole = share.0[lane] >= 1.0;
-            let [px, py, pz] = vec3::scale([x, y, z], part);
+            let [px, py, pz] = vector::scale([x, y, z], part);
             let blended = [px, py, pz, cosine.0[lane]];
             set(&mut out, lane, if whole { [x, y, z, w] } else { blended });
         }
@@ -145,15 +145,15 @@ impl Between {
     /// From `from` to `to`, of any lengths; no turn where one is zero.
     #[inline(always)]
     fn of(from: Vec3, to: Vec3) -> Self {
-        let normal = vec3::cross(from, to);
+        let normal = vector::cross(from, to);
         // Between near-opposite directions its rounding leans towards them: bring it upright.
-        let square = vec3::dot(from, from);
-        let lean = if square > 0.0 { vec3::dot(normal, from) / square } else { 0.0 };
-        let normal = vec3::sub(normal, vec3::scale(from, lean));
-        let (sine, cosine) = (vec3::length(normal), vec3::dot(from, to));
+        let square = vector::dot(from, from);
+        let lean = if square > 0.0 { vector::dot(normal, from) / square } else { 0.0 };
+        let normal = vector::sub(normal, vector::scale(from, lean));
+        let (sine, cosine) = (vector::length(normal), vector::dot(from, to));
         let inverse = if sine > 0.0 { 1.0 / sine } else { 0.0 };
         Self {
-            axis: vec3::scale(normal, inverse),
+            axis: vector::scale(normal, inverse),
             angle: trig::atan2(sine, cosine),
             opposite: sine < -OPPOSITE * cosine,
         }
@@ -163,8 +163,8 @@ impl Between {
 /// An axis to turn `tip` about: as the curve bends already, `bulge`, or perpendicular to `tip`
 /// where it is straight.
 fn own_axis(bulge: Vec3, tip: Vec3) -> Vec3 {
-    let along = vec3::dot(bulge, tip) / vec3::dot(tip, tip);
-    let upright = vec3::sub(bulge, vec3::scale(tip, along));
-    let size = vec3::length(upright);
-    if size > STRAIGHT { vec3::scale(upright, 1.0 / size) } else { vec3::perpendicular(tip) }
+    let along = vector::dot(bulge, tip) / vector::dot(tip, tip);
+    let upright = vector::sub(bulge, vector::scale(tip, along));
+    let size = vector::length(upright);
+    if size > STRAIGHT { vector::scale(upright, 1.0 / size) } else { vector::perpendicular(tip) }
 }

@@ -10,7 +10,7 @@ use super::tally::Tally;
 use super::{Bend, Reached};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 
 /// Up to sixteen curves of `points`.
 pub(super) struct Group<'a> {
@@ -122,8 +122,8 @@ impl Curves {
             }
             scratch.points[step] = cvs;
             for lane in 0..LANES {
-                let away = vec3::sub(get(&cvs, lane), get(&scratch.points[0], lane));
-                let away = vec3::largest(away);
+                let away = vector::sub(get(&cvs, lane), get(&scratch.points[0], lane));
+                let away = vector::largest(away);
                 size.0[lane] = if away > size.0[lane] { away } else { size.0[lane] };
             }
         }
@@ -143,10 +143,10 @@ impl Curves {
     /// the area that it encloses with its chord ÷ its size²; 0 where it is straight.
     fn bulge(&self, lane: usize, points: &[Vec3]) -> Vec3 {
         let cvs = &points[self.first[lane]..=self.last[lane]];
-        let size = cvs.iter().map(|cv| vec3::largest(vec3::sub(*cv, cvs[0]))).fold(0.0, f32::max);
-        let unit = vec3::power_of_two_to_one(size).0;
-        let from_root = |cv: Vec3| vec3::scale(vec3::sub(cv, cvs[0]), unit);
-        cvs.windows(2).map(|pair| vec3::cross(from_root(pair[0]), from_root(pair[1]))).fold([0.0; 3], vec3::add)
+        let size = cvs.iter().map(|cv| vector::largest(vector::sub(*cv, cvs[0]))).fold(0.0, f32::max);
+        let unit = vector::power_of_two_to_one(size).0;
+        let from_root = |cv: Vec3| vector::scale(vector::sub(cv, cvs[0]), unit);
+        cvs.windows(2).map(|pair| vector::cross(from_root(pair[0]), from_root(pair[1]))).fold([0.0; 3], vector::add)
     }
 }
 
@@ -162,7 +162,7 @@ impl Unit {
     fn of(size: &F32x16) -> Self {
         let mut unit = Self { to: F32x16::splat(1.0), from: F32x16::splat(1.0) };
         for lane in 0..LANES {
-            (unit.to.0[lane], unit.from.0[lane]) = vec3::power_of_two_to_one(size.0[lane]);
+            (unit.to.0[lane], unit.from.0[lane]) = vector::power_of_two_to_one(size.0[lane]);
         }
         unit
     }
@@ -190,7 +190,7 @@ fn measure(longest: usize, unit: &Unit, scratch: &mut Scratch) -> F32x16 {
     for step in 1..longest {
         let segment = unit.between(&scratch.points[step - 1], &scratch.points[step]);
         for lane in 0..LANES {
-            let term = vec3::length(get(&segment, lane)) - carry.0[lane];
+            let term = vector::length(get(&segment, lane)) - carry.0[lane];
             let next = sum.0[lane] + term;
             carry.0[lane] = (next - sum.0[lane]) - term;
             sum.0[lane] = next;

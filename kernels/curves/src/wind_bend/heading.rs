@@ -3,7 +3,7 @@
 use super::group::{Curves, Group, Unit};
 use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
-use numerics::vec3;
+use numerics::vector;
 
 /// Largest amplitude: the wind's own part is long below rounding, squares still far from overflow.
 const LARGEST: f32 = 1e12;
@@ -61,10 +61,10 @@ impl<'a> Heading<'a> {
         let field = noise.field.at_lanes(&points);
         let amplitude = noise.amplitude.clamp(-LARGEST, LARGEST);
         for lane in 0..LANES {
-            let gust = vec3::scale(get(&field, lane), amplitude);
-            let sum = vec3::add(get(&towards, lane), gust);
-            let unit = vec3::power_of_two_to_one(vec3::largest(sum)).0;
-            set(&mut towards, lane, vec3::scale(sum, unit));
+            let gust = vector::scale(get(&field, lane), amplitude);
+            let sum = vector::add(get(&towards, lane), gust);
+            let unit = vector::power_of_two_to_one(vector::largest(sum)).0;
+            set(&mut towards, lane, vector::scale(sum, unit));
         }
         towards
     }

@@ -3,7 +3,7 @@
 use super::{Bend, Mode};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
-use numerics::vec3;
+use numerics::vector;
 
 /// Largest share: beyond 1 a segment swings past the wind, beyond thousands its angle is noise; up
 /// to here sine and cosine of half of it are still good.
@@ -48,7 +48,7 @@ impl<'a> Share<'a> {
         }
         for lane in 0..LANES {
             let value = share.0[lane];
-            let still = vec3::largest(get(segment, lane)) == 0.0;
+            let still = vector::largest(get(segment, lane)) == 0.0;
             let value = if still { 0.0 } else { value };
             let value = if value < LARGEST { value } else { LARGEST };
             share.0[lane] = if value > -LARGEST { value } else { -LARGEST };
@@ -70,7 +70,7 @@ impl<'a> Share<'a> {
             let middle = 0.5 * arcs[0].0[lane] + 0.5 * arcs[1].0[lane];
             let middle = along(middle, self.length.0[lane]);
             // A segment of no length does not turn, so its part of the way is left to the next.
-            let still = vec3::largest(get(segment, lane)) == 0.0;
+            let still = vector::largest(get(segment, lane)) == 0.0;
             let middle = if still { self.middle.0[lane] } else { middle };
             exponent.0[lane] = (middle - self.middle.0[lane]) * reference_segments;
             self.middle.0[lane] = middle;

@@ -3,7 +3,7 @@
 use super::Reached;
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
-use numerics::vec3;
+use numerics::vector;
 
 /// Running measures of sixteen curves, in units.
 pub(super) struct Tally {
@@ -27,14 +27,14 @@ impl Tally {
     pub(super) fn add(&mut self, segment: &Lanes<3>, moved: &Lanes<3>, written: &Lanes<3>) {
         for lane in 0..LANES {
             let (segment, moved) = (get(segment, lane), get(moved, lane));
-            let both = vec3::add(vec3::add(segment, segment), moved);
-            let (difference, sum) = (vec3::dot(moved, moved), vec3::dot(both, both));
+            let both = vector::add(vector::add(segment, segment), moved);
+            let (difference, sum) = (vector::dot(moved, moved), vector::dot(both, both));
             let more = difference * self.sum.0[lane] > self.difference.0[lane] * sum;
             self.difference.0[lane] = if more { difference } else { self.difference.0[lane] };
             self.sum.0[lane] = if more { sum } else { self.sum.0[lane] };
 
-            let length = vec3::length(segment);
-            let change = vec3::length(get(written, lane)) - length;
+            let length = vector::length(segment);
+            let change = vector::length(get(written, lane)) - length;
             let change = if length > 0.0 { change } else { 0.0 };
             self.total.0[lane] += change;
             let size = change.abs();

@@ -211,7 +211,7 @@ fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
     let error = |steps: u32| {
         let how = Collide { method: Method::Steps(steps), gap: 1e-9, ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &how).points;
-        out.iter().zip(&exact).map(|(a, b)| f64::from(vec3::length(vec3::sub(*a, *b)))).sum::<f64>()
+        out.iter().zip(&exact).map(|(a, b)| f64::from(vector::length(vector::sub(*a, *b)))).sum::<f64>()
     };
     let errors = [2, 4, 8, 16, 32, 64, 128, 256].map(error);
     let slope = libm::log(errors[7] / errors[1]) / libm::log(256.0 / 4.0);
@@ -228,7 +228,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     let (starts, rest, goal) = fur(200, 5, 0.3, V3::x());
     let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&obstacles) };
     let out = collide(&starts, &rest, &goal, &lifted);
-    let height = |p: &Vec3| f64::from(vec3::length(*p)) - 1.0;
+    let height = |p: &Vec3| f64::from(vector::length(*p)) - 1.0;
     let roots: Vec<f64> = out.points.iter().step_by(5).map(height).collect();
     // A facet of π/48 by π/48 lies up to 2 (1 − cos(π/96)) below the sphere.
     assert!(roots.iter().all(|height| (0.0089..0.0101).contains(height)), "{roots:?}");

@@ -1,7 +1,7 @@
 //! Whole curves: lengths, roots, masks, determinism.
 
 use super::*;
-use numerics::vec3;
+use numerics::vector;
 
 fn distance(a: Vec3, b: Vec3) -> f64 {
     (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|d| d * d).sum::<f64>().sqrt()
@@ -9,7 +9,7 @@ fn distance(a: Vec3, b: Vec3) -> f64 {
 
 /// Distance of a position this large from the next.
 fn ulp(points: &[Vec3]) -> f64 {
-    let largest = points.iter().map(|point| vec3::largest(*point)).fold(0.0, f32::max);
+    let largest = points.iter().map(|point| vector::largest(*point)).fold(0.0, f32::max);
     f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
 }
 

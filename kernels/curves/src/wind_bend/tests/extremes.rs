@@ -126,7 +126,7 @@ fn denormal_tiny_and_huge_scenes_are_finite() {
     let ramp = one();
     let groom = tangled(64, 9);
     for factor in [1e-44, 1e-38, 1e-30, 1e-6, 1e6, 1e30, 1e36] {
-        let scaled = groom.map(|cv| vec3::scale(cv, factor));
+        let scaled = groom.map(|cv| vector::scale(cv, factor));
         let bent = scaled.bend(&plain(&ramp));
         assert_kept(&scaled, &bent);
     }
@@ -135,7 +135,7 @@ fn denormal_tiny_and_huge_scenes_are_finite() {
 #[test]
 fn ten_thousand_kilometres_away_only_the_storage_is_coarse() {
     let ramp = one();
-    let groom = tangled(64, 9).map(|cv| vec3::add(cv, [1e7, -1e7, 1e7]));
+    let groom = tangled(64, 9).map(|cv| vector::add(cv, [1e7, -1e7, 1e7]));
     assert_kept(&groom, &groom.bend(&plain(&ramp)));
 }
 

@@ -16,7 +16,7 @@ const DOWNWIND: [f64; 3] = [1.0, 0.0, 0.0];
 fn check_angles(theta: f64, root: Vec3, segments: usize, with: &Bend<'_>, law: impl Fn(usize, f64) -> f64) {
     let groom = Groom::of(&[straight(root, leaning(theta), segments)]);
     let bent = groom.bend(with);
-    let largest = bent.points.iter().map(|cv| vec3::largest(*cv)).fold(0.0, f32::max);
+    let largest = bent.points.iter().map(|cv| vector::largest(*cv)).fold(0.0, f32::max);
     let tolerance = 2e-6 + 4.0 * ulp(largest) * segments as f64;
     for (k, angle) in angles(&bent.points, DOWNWIND).into_iter().enumerate() {
         let expected = law(k, (k as f64 + 0.5) / segments as f64);
@@ -121,18 +121,18 @@ fn scene_and_wind_turned_moved_or_scaled_together_give_the_same_shape() {
         let (s, c) = numerics::trig::sin_cos(0.7);
         [0.48 * s, 0.6 * s, 0.64 * s, c]
     };
-    let turned = |cv| vec3::turned(turn, cv);
+    let turned = |cv| vector::turned(turn, cv);
     let with = Bend { wind: turned([1.0, 0.0, 0.0]), ..plain(&ramp) };
     let expected: Vec<_> = bent.iter().map(|cv| turned(*cv)).collect();
     assert!(farthest(&groom.map(turned).bend(&with).points, &expected) < 1e-5);
 
     // Moved by powers of two, so that the input keeps its digits but for those beyond 2⁻²¹.
-    let moved = |cv| vec3::add(cv, [8.0, -4.0, 16.0]);
+    let moved = |cv| vector::add(cv, [8.0, -4.0, 16.0]);
     let expected: Vec<_> = bent.iter().map(|cv| moved(*cv)).collect();
     assert!(farthest(&groom.map(moved).bend(&plain(&ramp)).points, &expected) < 1e-5 + 4.0 * ulp(16.0));
 
     for factor in [1e-3, 1e3, 1e-6, 1e6] {
-        let scaled = |cv| vec3::scale(cv, factor);
+        let scaled = |cv| vector::scale(cv, factor);
         let expected: Vec<_> = bent.iter().map(|cv| scaled(*cv)).collect();
         let found = groom.map(scaled).bend(&plain(&ramp)).points;
         assert!(farthest(&found, &expected) < 1e-5 * f64::from(factor), "× {factor}");
@@ -146,8 +146,8 @@ fn scaling_by_a_power_of_two_changes_no_digit() {
     let bent = groom.bend(&plain(&ramp)).points;
     for exponent in [-80, -10, 10, 80] {
         let factor = libm::exp2(f64::from(exponent)) as f32;
-        let expected: Vec<_> = bent.iter().map(|cv| vec3::scale(*cv, factor)).collect();
-        let found = groom.map(|cv| vec3::scale(cv, factor)).bend(&plain(&ramp)).points;
+        let expected: Vec<_> = bent.iter().map(|cv| vector::scale(*cv, factor)).collect();
+        let found = groom.map(|cv| vector::scale(cv, factor)).bend(&plain(&ramp)).points;
         assert_eq!(bits(&found), bits(&expected), "× 2^{exponent}");
     }
 }
@@ -174,7 +174,7 @@ fn the_pattern_scrolls_downwind() {
     let at = |x| Groom::of(&[straight([x, 0.25, 0.625], [0.0, 1.0, 0.0], 4)]);
     let shape = |groom: Groom, noise| {
         let bent = groom.bend(&Bend { noise: Some(noise), ..plain(&ramp) });
-        bent.points.iter().map(|cv| vec3::sub(*cv, groom.points[0])).collect::<Vec<_>>()
+        bent.points.iter().map(|cv| vector::sub(*cv, groom.points[0])).collect::<Vec<_>>()
     };
     let scrolled = BendNoise { origin: [-2.0, 0.0, 0.0], ..noisy(&field) };
     let before = shape(at(0.375), noisy(&field));
@@ -190,9 +190,9 @@ fn noise_sits_where_the_rest_roots_are_asked_to_be() {
         |roots: &[Vec3]| Groom::of(&roots.iter().map(|root| straight(*root, [0.0, 1.0, 0.1], 3)).collect::<Vec<_>>());
     let own = curves(&roots).bend(&Bend { noise: Some(noisy(&field)), ..plain(&ramp) });
     let given = BendNoise { roots: Some(&roots), ..noisy(&field) };
-    let moved: Vec<_> = roots.iter().map(|root| vec3::add(*root, [4.0, 8.0, -2.0])).collect();
+    let moved: Vec<_> = roots.iter().map(|root| vector::add(*root, [4.0, 8.0, -2.0])).collect();
     let found = curves(&moved).bend(&Bend { noise: Some(given), ..plain(&ramp) });
-    let back: Vec<_> = found.points.iter().map(|cv| vec3::sub(*cv, [4.0, 8.0, -2.0])).collect();
+    let back: Vec<_> = found.points.iter().map(|cv| vector::sub(*cv, [4.0, 8.0, -2.0])).collect();
     assert!(farthest(&back, &own.points) < 4e-6);
 }
 

@@ -7,7 +7,7 @@ mod reference;
 use super::*;
 use numerics::ramp::Interpolation;
 use numerics::random::Key;
-use numerics::vec3::{self, Vec3};
+use numerics::vector::{self, Vec3};
 
 /// Curves as CVs a curve, joined.
 struct Groom {
@@ -36,7 +36,7 @@ impl Groom {
 
 /// A straight curve from `root` along `direction`, whose length is the curve's.
 fn straight(root: Vec3, direction: Vec3, segments: usize) -> Vec<Vec3> {
-    let cv = |k| vec3::add(root, vec3::scale(direction, k as f32 / segments as f32));
+    let cv = |k| vector::add(root, vector::scale(direction, k as f32 / segments as f32));
     (0..=segments).map(cv).collect()
 }
 
@@ -51,8 +51,8 @@ fn tangled(curves: u64, most: u64) -> Groom {
             .map(|cv| {
                 let before = at;
                 let turn = [0, 1, 2].map(|axis| key.of(4).of(cv).of(axis).between([-0.5, 0.5]));
-                way = vec3::add(way, turn);
-                at = vec3::add(at, vec3::scale(way, 1.0 / cvs as f32));
+                way = vector::add(way, turn);
+                at = vector::add(at, vector::scale(way, 1.0 / cvs as f32));
                 before
             })
             .collect()
@@ -119,7 +119,7 @@ fn assert_kept(groom: &Groom, bent: &Bent) {
     for ends in groom.starts.windows(2) {
         let curve = ends[0] as usize..ends[1] as usize;
         let (before, after) = (&groom.points[curve.clone()], &bent.points[curve]);
-        let largest = before.iter().chain(after).map(|cv| vec3::largest(*cv)).fold(0.0, f32::max);
+        let largest = before.iter().chain(after).map(|cv| vector::largest(*cv)).fold(0.0, f32::max);
         assert!(largest.is_finite() && after.iter().flatten().all(|x| x.is_finite()));
         let tolerance = 1e-5 * length(before) + 4.0 * ulp(largest);
         for (before, after) in before.windows(2).zip(after.windows(2)) {

@@ -1,8 +1,50 @@
-//! Vectors of three `f32` and unit quaternions, as plain arrays and branch-free functions, for one
-//! value or inside a loop over lanes. Right-handed; a quaternion is `[x, y, z, w]`, w its cosine.
+//! Vectors of three and rotations: one definition a width for the whole workspace.
 //!
-//! Limit: squares are taken as they come. Lengths between 1e-18 and 1e18 are safe; a caller with
-//! others brings them there by [`power_of_two_to_one`] first, which changes no digit.
+//! `f32`, for geometry and lanes: plain arrays and branch-free functions, for one value or inside a loop over lanes; a
+//! quaternion is `[x, y, z, w]`, w its cosine. `f64`, where precision counts: nalgebra's types under short names, whose
+//! `dot`, `cross` and `norm` add up in the order of the axes; [`rotation`] is here because nalgebra's own takes the
+//! platform's sine. Right-handed.
+//!
+//! Limit: squares are taken as they come. In `f32` lengths between 1e-18 and 1e18 are safe; a caller with others brings
+//! them there by [`power_of_two_to_one`] first, which changes no digit. [`direction`] is safe for any length.
+
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
+
+/// x, y, z in `f64`: metres unless said otherwise.
+pub type DVec3 = Vector3<f64>;
+
+/// Rows and columns in `f64`.
+pub type DMat3 = Matrix3<f64>;
+
+/// A rotation in `f64`.
+pub type DQuat = UnitQuaternion<f64>;
+
+/// `v` in `f64`, exactly.
+#[inline(always)]
+pub fn to_f64(v: Vec3) -> DVec3 {
+    DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
+}
+
+/// `v` rounded to `f32`.
+#[inline(always)]
+pub fn to_f32(v: DVec3) -> Vec3 {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+/// The unit vector along `v`, however short or long that is; `None` where it is zero or not finite.
+pub fn direction(v: DVec3) -> Option<DVec3> {
+    let largest = v.amax();
+    (largest > 0.0 && v.iter().all(|x| x.is_finite())).then(|| {
+        let v = v / largest;
+        v / v.norm()
+    })
+}
+
+/// The rotation by `radians` about `axis`, a unit vector; the same bits on any platform.
+pub fn rotation(axis: DVec3, radians: f64) -> DQuat {
+    let (sine, cosine) = libm::sincos(0.5 * radians);
+    Unit::new_unchecked(Quaternion::from_parts(cosine, axis * sine))
+}
 
 /// x, y, z.
 pub type Vec3 = [f32; 3];
@@ -163,5 +205,24 @@ mod tests {
             let along = dot(side, scale(v, power_of_two_to_one(largest(v)).0));
             assert!((length(side) - 1.0).abs() < 1e-6 && along.abs() < 1e-6, "{v:?} {side:?}");
         }
+    }
+
+    #[test]
+    fn a_direction_is_found_at_any_length_and_not_where_there_is_none() {
+        for size in [1e-300, 1.0, 1e300] {
+            let along = direction(DVec3::new(3.0 * size, 0.0, -4.0 * size)).unwrap();
+            assert!((along - DVec3::new(0.6, 0.0, -0.8)).norm() < 1e-15, "{size} {along}");
+        }
+        assert_eq!(direction(DVec3::zeros()), None);
+        assert_eq!(direction(DVec3::new(f64::INFINITY, 1.0, 0.0)), None);
+        assert_eq!(direction(DVec3::new(1.0, f64::NAN, 0.0)), None);
+    }
+
+    #[test]
+    fn a_third_of_a_turn_about_the_diagonal_brings_x_to_y() {
+        let diagonal = direction(DVec3::new(1.0, 1.0, 1.0)).unwrap();
+        let turned = rotation(diagonal, std::f64::consts::TAU / 3.0) * DVec3::x();
+        assert!((turned - DVec3::y()).norm() < 1e-15, "{turned}");
+        assert_eq!(to_f32(to_f64([0.1, -2.0, 3e-40])), [0.1, -2.0, 3e-40]);
     }
 }
