@@ -3,7 +3,7 @@
 //! Fur on a sphere of 20,480 triangles, its curves bent by wind across it.
 
 use cpu_time::ProcessTime;
-use curves::collide::{Collide, Method, Scaled, Skin, at_rest, collide, normals};
+use curves::collide::{Collide, Method, Skin, at_rest, collide, normals};
 use curves::wind_bend::{Bend, Mode, bend};
 use numerics::ramp::Ramp;
 use numerics::shapes::icosphere;
@@ -43,13 +43,11 @@ fn main() {
         let ramp = Ramp::constant(1.0);
         let wind = Bend {
             wind: [1.0, 0.0, 0.0],
-            rotate: 0.5,
-            rotate_mask: None,
+            rotate: 0.5.into(),
             envelope: None,
             ramp: &ramp,
             mode: Mode::ResolutionFree { reference_segments: 4.0 },
-            blend: 1.0,
-            blend_mask: None,
+            blend: 1.0.into(),
             noise: None,
         };
         let goal = bend(&starts, &rest, &wind).points;
@@ -63,8 +61,8 @@ fn main() {
                 offset_scale: None,
                 coherence: 0.0,
                 at_rest: None,
-                blend: Scaled { value: 1.0, mask: None },
-                width: Scaled { value: 0.0, mask: None },
+                blend: 1.0.into(),
+                width: 0.0.into(),
             };
             let (looking, grown) = least(|| at_rest(&starts, &rest, &how));
             let how = Collide { at_rest: Some(&grown), ..how };

@@ -5,6 +5,7 @@
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
 use curves::jiggle::{Carry, Drag, Jiggle, Roots, Spring};
+use numerics::masked::Masked;
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 use numerics::simd::Path;
@@ -52,10 +53,8 @@ fn main() {
         let roots: Vec<[f32; 3]> = starts[..curves as usize].iter().map(|start| frames[0][*start as usize]).collect();
         for path in Path::all() {
             let spring = |frequency| Spring {
-                frequency,
-                frequency_mask: None,
-                damping: 0.3,
-                damping_mask: None,
+                frequency: Masked::uniform(frequency),
+                damping: 0.3.into(),
                 softness: &ramp,
                 drag: Drag::Target,
             };
@@ -72,7 +71,7 @@ fn main() {
                 jiggle.step_on(path, &frames[turn % 2], &spring(3.0 + 0.01 * turn as f64), 1.0 / 24.0, None);
             });
             let shape = least(ROUNDS, || {
-                let shaped = jiggle.shape_on(path, 1.0, None);
+                let shaped = jiggle.shape_on(path, 1.0.into());
                 assert!(shaped.max_offset.is_finite());
             });
             let bind = least(3, || assert!(Roots::bind(&faces, &corners, &skin, &roots).is_some()));

@@ -56,13 +56,11 @@ fn main() {
     for (name, (starts, points), noise, mode) in &cases {
         let bend = Bend {
             wind: [1.0, 0.0, 0.0],
-            rotate: 0.5,
-            rotate_mask: None,
+            rotate: 0.5.into(),
             envelope: None,
             ramp: &ramp,
             mode: *mode,
-            blend: 1.0,
-            blend_mask: None,
+            blend: 1.0.into(),
             noise: noise.clone(),
         };
         let paths = Path::all();

@@ -27,7 +27,7 @@ pub mod prelude {
         AttrDecl, AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past,
         StepCx, Times, Wires,
     };
-    pub use crate::param::{Clock, Code, Masked, Param, Params, Seed, Span, Turn, Unit};
+    pub use crate::param::{Clock, Code, Maskable, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;
     pub use crate::{choice, inputs, params};
 }

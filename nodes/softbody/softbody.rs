@@ -22,13 +22,13 @@ use crate::shared::attributes::{
     GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER, SURFACE_POINT,
 };
 use goals::Goals;
-use made::{Given, Made, Stuff, masked, refusal};
+use setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 
 mod goals;
 mod joints;
-mod made;
 mod obstacles;
 mod pins;
+mod setup;
 
 choice! {
     /// Which particles goals pull.
@@ -71,12 +71,12 @@ params! { PARAMS:
         "The frame at which bodies are as they come in.").unit(Unit::Frame).default_scene_start().fixed();
     GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "What pulls on everything.")
         .unit(Unit::MetresPerSecondSquared);
-    DENSITY: Param<Masked> = Param::masked("density", 1000.0, "How heavy a body is for its volume.")
+    DENSITY: Param<Maskable> = Param::maskable("density", 1000.0, "How heavy a body is for its volume.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
-    STIFFNESS: Param<Masked> = Param::masked("stiffness", 5e3,
+    STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
         "How much it resists being stretched (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
-    DAMPING: Param<Masked> = Param::masked("damping", 0.01,
+    DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
         "How soon wobbling dies away: the time by which springs lag behind their stretch. 0 rings on.")
         .unit(Unit::Seconds).at_least(0.0).soft(0.0, 0.1);
     DRAG: Param<f32> = Param::float("drag", 0.0, "Against all motion, as in thick air.")
@@ -107,7 +107,7 @@ params! { PARAMS:
     THICKNESS: Param<f32> = Param::float("thickness", 1e-3,
         "Distance that surfaces keep from each other. About a tenth of the tets' edges is easy; thinner costs more steps.")
         .unit(Unit::Metres).above(0.0).soft(1e-4, 1e-2);
-    FRICTION: Param<Masked> = Param::masked("friction", 0.5,
+    FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
         "How much touching surfaces hold on to each other: 0 slides, 1 holds on a slope of 45 degrees.")
         .at_least(0.0).soft(0.0, 1.0);
     SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether a body's surface cannot pass itself.");
@@ -197,13 +197,13 @@ pub static NODE: Node = Node::new(
 /// Bodies on their way.
 #[derive(Serialize, Deserialize)]
 struct Run {
-    given: Given,
+    inputs: StartInputs,
     state: State,
     /// Values of the metrics at the frame it stands at; none at the start.
     said: Vec<f64>,
     /// What only hangs on what was given: made anew after a checkpoint.
     #[serde(skip)]
-    made: OnceLock<Arc<Made>>,
+    setup: OnceLock<Arc<SimulationSetup>>,
     #[serde(skip)]
     solving: Option<Solving>,
 }
@@ -218,45 +218,45 @@ struct Solving {
 
 impl Chain for Run {
     fn start(cx: &FrameCx) -> Result<Self> {
-        let given = Given::at(cx);
-        let made = Made::of(cx, &given)?;
-        let solving = Solving::new(&made, &Stuff::at(cx, &given)?)?;
+        let inputs = StartInputs::at(cx);
+        let setup = SimulationSetup::of(cx, &inputs)?;
+        let solving = Solving::new(&setup, &MaterialFields::at(cx, &inputs)?)?;
         let mut state = State::at_rest(&solving.body);
         state.velocities.fill(cx.get(INITIAL_VELOCITY).map(f64::from));
-        let made = OnceLock::from(Arc::new(made));
-        Ok(Self { given, state, said: Vec::new(), made, solving: Some(solving) })
+        let setup = OnceLock::from(Arc::new(setup));
+        Ok(Self { inputs, state, said: Vec::new(), setup, solving: Some(solving) })
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
-        let made = self.made(cx)?;
-        let stuff = Stuff::at(cx, &self.given)?;
+        let setup = self.setup(cx)?;
+        let material = MaterialFields::at(cx, &self.inputs)?;
         let mut solving = match self.solving.take() {
-            Some(solving) => solving.of(&stuff)?,
-            None => Solving::new(&made, &stuff)?,
+            Some(solving) => solving.of(&material)?,
+            None => Solving::new(&setup, &material)?,
         };
         let times = [cx.previous(), cx.frame()].map(Frame::number);
         let seconds = cx.dt() * f64::from(cx.get(TIME_SCALE));
         let on = cx.get(GOAL_ON);
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
-        let goals = Goals::of(&self.given, &made, cx.input(GOALS), cx.get(START_FRAME) as f64)?;
+        let goals = Goals::of(&self.inputs, &setup, cx.input(GOALS), cx.get(START_FRAME) as f64)?;
         let (mut pulled, mut held) = (Vec::new(), Vec::new());
         goals.pull(times, on, &mut pulled);
         let drawn = pulled.len();
         if let [(_, before), .., (_, now)] = cx.samples(PINS) {
-            pins::pull(&made.holds, [before, now], cx.frame(), &mut held, &mut pulled)?;
+            pins::pull(&setup.holds, [before, now], cx.frame(), &mut held, &mut pulled)?;
         }
         let pinned = held.len() + pulled.len() - drawn;
-        let (friction, mask) = masked(cx, &self.given, || FRICTION)?;
-        let (friction, thickness) = (f64::from(friction), f64::from(cx.get(THICKNESS)));
+        let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
+        let (friction, thickness) = (f64::from(contact_friction.value), f64::from(cx.get(THICKNESS)));
         let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
         let rub = Rub { thickness, friction };
         let ground = Ground { up: [0.0, 1.0, 0.0], height: f64::from(cx.get(GROUND_HEIGHT)), thickness, friction };
         let scene = Scene {
-            skins: &made.skins,
-            friction: mask.as_deref(),
+            skins: &setup.skins,
+            friction: contact_friction.mask.as_deref(),
             ground: cx.get(GROUND).then_some(ground),
             obstacles: &obstacles,
-            between: (cx.get(BODY_COLLISION) && made.skins.len() > 1).then_some(rub),
+            between: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
             own: cx.get(SELF_COLLISION).then_some(rub),
         };
         let touches = scene.ground.is_some() || !obstacles.is_empty() || scene.between.is_some() || scene.own.is_some();
@@ -287,24 +287,24 @@ impl Chain for Run {
             brought += reset(&solving.body, &mut self.state, shape, share, keep);
         });
         let stretch = f64::from(cx.get(COUPLING_BREAK));
-        if made.joints() > 0 && stretch > 0.0 {
+        if setup.joints() > 0 && stretch > 0.0 {
             let _ = tear(&solving.body, &mut self.state, stretch, NEAR * solving.body.size());
         }
         let far = goals.distance(times[1], on, &self.state.positions);
-        let let_go = if obstacles.is_empty() { 0 } else { made.let_go(&self.state.positions) };
+        let let_go = if obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
         self.said = said(&report, brought, let_go, far.unwrap_or(0.0), pinned, &self.state);
         self.solving = Some(solving);
         Ok(())
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
-        let made = self.made(cx)?;
+        let setup = self.setup(cx)?;
         for (metric, value) in METRICS.iter().zip(&self.said) {
             cx.publish(**metric, *value);
         }
         let narrow = |p: [f64; 3]| p.map(|x| x as f32);
-        let (mut surface, mut tets) = (made.surface.clone(), made.body.clone());
-        surface.set(P, made.carriers.iter().map(|carrier| narrow(carrier.at(&self.state.positions))).collect())?;
+        let (mut surface, mut tets) = (setup.surface.clone(), setup.body.clone());
+        surface.set(P, setup.carriers.iter().map(|carrier| narrow(carrier.at(&self.state.positions))).collect())?;
         tets.set(P, self.state.positions.iter().map(|p| narrow(*p)).collect())?;
         Ok(SURFACE.with(Geometry::from(surface)).and(TETS, Geometry::from(tets)))
     }
@@ -314,26 +314,26 @@ impl Chain for Run {
 const NEAR: f64 = 1e-6;
 
 impl Run {
-    fn made(&self, cx: &Cx) -> Result<Arc<Made>> {
-        if let Some(made) = self.made.get() {
-            return Ok(made.clone());
+    fn setup(&self, cx: &Cx) -> Result<Arc<SimulationSetup>> {
+        if let Some(setup) = self.setup.get() {
+            return Ok(setup.clone());
         }
-        let made = Arc::new(Made::of(cx, &self.given)?);
-        Ok(self.made.get_or_init(|| made).clone())
+        let setup = Arc::new(SimulationSetup::of(cx, &self.inputs)?);
+        Ok(self.setup.get_or_init(|| setup).clone())
     }
 }
 
 impl Solving {
-    fn new(made: &Made, stuff: &Stuff) -> Result<Self> {
-        let body = made.body(stuff)?;
-        Ok(Self { solver: Solver::new(&body), body, values: stuff.values() })
+    fn new(setup: &SimulationSetup, material: &MaterialFields) -> Result<Self> {
+        let body = setup.body(material)?;
+        Ok(Self { solver: Solver::new(&body), body, values: material.values() })
     }
 
     /// With what bodies consist of now.
-    fn of(mut self, stuff: &Stuff) -> Result<Self> {
-        if self.values != stuff.values() {
-            self.body.set_material(&stuff.material()).map_err(refusal)?;
-            self.values = stuff.values();
+    fn of(mut self, material: &MaterialFields) -> Result<Self> {
+        if self.values != material.values() {
+            self.body.set_material(&material.material()).map_err(refusal)?;
+            self.values = material.values();
         }
         Ok(self)
     }

@@ -15,7 +15,8 @@
 //! * While `blend` is 0 or `ramp` nowhere above 0 nothing swings: when they rise, curves start from rest.
 
 use curves::jiggle::{
-    Carry, Drag as SpringDrag, Frame as FaceFrame, Jiggle, MASKED, Roots, Spring, steps_to_forget, with_lengths_between,
+    Carry, Drag as SpringDrag, Frame as FaceFrame, Jiggle, MASK_RANGE, Roots, Spring, steps_to_forget,
+    with_lengths_between,
 };
 use engine::prelude::*;
 use numerics::ramp::Ramp;
@@ -39,10 +40,10 @@ inputs! { INPUTS:
 }
 
 params! { PARAMS:
-    FREQUENCY: Param<Masked> = Param::masked("frequency", 3.0,
+    FREQUENCY: Param<Maskable> = Param::maskable("frequency", 3.0,
         "How many times a second a free tip swings: low is long and soft, high is short and stiff. Its mask counts from \
          ¼ to 4.").unit(Unit::Hertz).above(0.0).soft(0.5, 12.0);
-    DAMPING: Param<Masked> = Param::masked("damping", 0.3,
+    DAMPING: Param<Maskable> = Param::maskable("damping", 0.3,
         "How soon swings die away: 0.05 rings on for many swings, 1 comes to rest without one, more creeps. Its mask \
          counts from ¼ to 4.").above(0.0).soft(0.05, 2.0);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 0.0], [1.0, 1.0]],
@@ -58,7 +59,7 @@ params! { PARAMS:
     PREROLL: Param<i64> = Param::int("preroll", 0,
         "Frames before the scene's first that already set the curves swinging, if the inputs move there. 0 starts the \
          scene at rest.").unit(Unit::Frames).within(0.0, 1e6).soft(0.0, 48.0);
-    BLEND: Param<Masked> = Param::masked("blend", 1.0,
+    BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of the swing shows: 0 gives the incoming curves, 1 all of it. Lengths are kept at any value. While it \
          is 0 nothing swings: as it rises, curves start from rest.").within(0.0, 1.0);
 }
@@ -129,14 +130,10 @@ impl Chain for Swing {
                 let [rest, before] = [&self.rest, &self.before].map(positions);
                 Jiggle::at_rest(curves.runs().starts(), rest, before)
             });
-            let (frequency, frequency_mask) = cx.mask(FREQUENCY, curves)?;
-            let (damping, damping_mask) = cx.mask(DAMPING, curves)?;
             let ramp = cx.get(RAMP);
             let spring = Spring {
-                frequency: f64::from(frequency),
-                frequency_mask,
-                damping: f64::from(damping),
-                damping_mask,
+                frequency: cx.mask(FREQUENCY, curves)?.map(f64::from),
+                damping: cx.mask(DAMPING, curves)?.map(f64::from),
                 softness: &ramp,
                 drag: match cx.get(DRAG) {
                     Drag::Target => SpringDrag::Target,
@@ -152,12 +149,12 @@ impl Chain for Swing {
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let mut out = cx.input(CURVES).clone();
-        let (blend, mask) = cx.mask(BLEND, cx.part(CURVES))?;
+        let blend = cx.mask(BLEND, cx.part(CURVES))?;
         let clock = Clock { fps: cx.fps(), seed: 0 };
         cx.publish(WINDOW_FRAMES, f64::from(past(cx.params(), clock).frames));
         let mut farthest = 0.0;
         if let Some(springs) = &self.springs {
-            let shaped = springs.shape(blend, mask);
+            let shaped = springs.shape(blend);
             farthest = shaped.max_offset;
             let curves = out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves");
             curves.set(P, shaped.points)?;
@@ -244,8 +241,8 @@ fn past(params: &Params, clock: Clock) -> Past {
     if stands_still(params).is_some() {
         return Past { frames: 0, preroll };
     }
-    let range = |masked: &Masked| match masked.attribute {
-        Some(_) => MASKED.map(|share| f64::from(share) * f64::from(masked.value)),
+    let range = |masked: &Maskable| match masked.attribute {
+        Some(_) => MASK_RANGE.map(|share| f64::from(share) * f64::from(masked.value)),
         None => [f64::from(masked.value); 2],
     };
     let slowest = range(&params.get(FREQUENCY))[0] / f64::from(params.get(RAMP).max());

@@ -74,7 +74,7 @@ params! { PARAMS:
         "How far along the wind noise is sampled, as a share of the arc length from the root: 0 bends a curve as one, \
          1 and more make waves run through it.")
         .soft(0.0, 4.0).when(has_noise);
-    GLOBAL_ROTATE: Param<Masked> = Param::masked("global_rotate", 0.5,
+    GLOBAL_ROTATE: Param<Maskable> = Param::maskable("global_rotate", 0.5,
         "Share of the angle to the wind by which each CV turns the rest of the curve: 0 leaves the curves alone, 1 lays \
          them along the wind.").soft(0.0, 1.0);
     RAMP_ROTATE: Param<Arc<Ramp>> = Param::ramp("ramp_rotate", &[[0.0, 1.0]],
@@ -83,7 +83,7 @@ params! { PARAMS:
     REFERENCE_SEGMENTS: Param<i64> = Param::int("reference_segments", 4,
         "Segments of a curve that bends as much in the paper's mode.")
         .within(1.0, 10_000.0).soft(1.0, 32.0).when(|params| params.get(MODE) == Mode::ResolutionFree);
-    BLEND: Param<Masked> = Param::masked("blend", 1.0,
+    BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "Share of each segment's turn that is kept: 0 leaves the curves alone, 1 is the whole wind. Lengths are kept at \
          any value.").within(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Picks another pattern of noise.").when(has_noise);
@@ -116,9 +116,8 @@ pub static NODE: Node = Node::new(
 fn cook(cx: &FrameCx) -> Result<Outputs> {
     let mut out = cx.input(CURVES).clone();
     let curves = cx.part(CURVES);
-    let (rotate, rotate_mask) = cx.mask(GLOBAL_ROTATE, curves)?;
-    let (blend, blend_mask) = cx.mask(BLEND, curves)?;
-    if rotate == 0.0 || blend == 0.0 {
+    let (rotate, blend) = (cx.mask(GLOBAL_ROTATE, curves)?, cx.mask(BLEND, curves)?);
+    if rotate.value == 0.0 || blend.value == 0.0 {
         return still(cx, out);
     }
     let field = noise_kind(cx.params())
@@ -131,7 +130,6 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         &Bend {
             wind: direction(cx.params()).map(|x| x as f32),
             rotate,
-            rotate_mask,
             envelope: curves.get(ENVELOPE),
             ramp: &ramp,
             mode: match cx.get(MODE) {
@@ -141,7 +139,6 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
                 }
             },
             blend,
-            blend_mask,
             noise: field.as_ref().map(|field| BendNoise {
                 field,
                 amplitude: cx.get(AMPLITUDE),
@@ -277,7 +274,7 @@ mod tests {
     fn segment_k_is_left_with_the_share_one_minus_g_to_the_k_of_the_angle() {
         // W2 by hand: at every CV the rest of a straight curve turns by g of what is left, so segment k = 1… has
         // 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
-        let out = calm(upright(4)).set(GLOBAL_ROTATE, Masked { value: 0.5, attribute: None }).cook();
+        let out = calm(upright(4)).set(GLOBAL_ROTATE, Maskable { value: 0.5, attribute: None }).cook();
         for (k, angle) in angles(&out).iter().enumerate() {
             let left = RIGHT / f64::from(2 << k);
             assert!((angle - left).abs() < 4e-6, "segment {}: {angle} rad, expected {left}", k + 1);
@@ -316,7 +313,7 @@ mod tests {
     fn masks_scale_point_by_point_and_say_when_they_are_missing() {
         let mut curves = upright(1);
         curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::point("soft"), vec![0.5, 1.0]).unwrap();
-        let masked = Masked { value: 0.5, attribute: Some("soft".into()) };
+        let masked = Maskable { value: 0.5, attribute: Some("soft".into()) };
         let out = calm(curves).set(GLOBAL_ROTATE, masked.clone()).cook();
         assert!((angles(&out)[0] - RIGHT * 0.75).abs() < 1e-6);
         let error = calm(upright(1)).set(GLOBAL_ROTATE, masked.clone()).try_cook().unwrap_err();
@@ -333,7 +330,7 @@ mod tests {
     #[test]
     fn half_a_blend_is_half_the_turn_and_keeps_lengths() {
         let whole = angles(&calm(upright(4)).cook());
-        let out = calm(upright(4)).set(BLEND, Masked { value: 0.5, attribute: None }).cook();
+        let out = calm(upright(4)).set(BLEND, Maskable { value: 0.5, attribute: None }).cook();
         for (half, whole) in angles(&out).iter().zip(whole) {
             assert!((RIGHT - half - 0.5 * (RIGHT - whole)).abs() < 4e-6);
         }
@@ -345,7 +342,7 @@ mod tests {
         let curves = field(2);
         for share in [GLOBAL_ROTATE, BLEND] {
             let out =
-                bench(&NODE).input(CURVES, curves.clone()).set(share, Masked { value: 0.0, attribute: None }).cook();
+                bench(&NODE).input(CURVES, curves.clone()).set(share, Maskable { value: 0.0, attribute: None }).cook();
             let column = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
             assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
         }

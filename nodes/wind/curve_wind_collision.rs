@@ -16,7 +16,7 @@
 
 use std::sync::Arc;
 
-use curves::collide::{Collide, Method as Turn, Scaled, at_rest, collide};
+use curves::collide::{Collide, Method as Turn, at_rest, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
@@ -54,14 +54,14 @@ params! { PARAMS:
         .soft(-1.0, 1.0);
     GAP: Param<f64> = Param::double("gap", 1e-4, "The way that a turn stops short of what it meets.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
-    WIDTH: Param<Masked> = Param::masked("width", 0.0, "How thick curves are when they collide.")
+    WIDTH: Param<Maskable> = Param::maskable("width", 0.0, "How thick curves are when they collide.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<f64> = Param::double("coherence", 0.0,
         "How far what wind blows into the skin is led out of it before it collides, so that it does not jump from one \
          side to another as the wind turns: 0 is the paper's collision, 1 has hardly more jumps than the wind itself. \
          What lies flat in the wind at 0 stands up a little the more the wind blows straight into the skin.")
         .within(0.0, 1.0);
-    BLEND: Param<Masked> = Param::masked("blend", 1.0,
+    BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "Share of each segment's collision that is kept: 0 leaves the curves to the wind, 1 lets nothing through. \
          Lengths are kept at any value.").within(0.0, 1.0);
 }
@@ -111,10 +111,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         ))
         .hint("give `rest` the curves as they were before the wind nodes"));
     }
-    let (width, width_mask) = cx.mask(WIDTH, curves)?;
-    let (blend, blend_mask) = cx.mask(BLEND, curves)?;
+    let (width, blend) = (cx.mask(WIDTH, curves)?, cx.mask(BLEND, curves)?);
     let colliders: Vec<&Component> = cx.input(COLLIDERS).iter().filter_map(|wire| wire.mesh()).collect();
-    let Some(first) = colliders.first().filter(|_| blend > 0.0) else {
+    let Some(first) = colliders.first().filter(|_| blend.value > 0.0) else {
         for metric in [CROSSINGS_LEFT, UNFREED, STARTED_INSIDE, CONTACTS, DEEPEST, LENGTH_ERROR] {
             cx.publish(metric, 0.0);
         }
@@ -135,8 +134,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         offset_root: cx.get(OFFSET_ROOT),
         offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
         at_rest: None,
-        blend: Scaled { value: blend, mask: blend_mask },
-        width: Scaled { value: width, mask: width_mask },
+        blend,
+        width,
     };
     let starts = curves.runs().starts();
     // While nothing moves, what is so at rest is looked at once.

@@ -10,9 +10,10 @@
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
 use bodies::collision::{Ground, Obstacle, Pose, Rub, Scene, Skin};
-use bodies::mass_spring::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+use bodies::mass_spring::{Body, Frame, Material, Mesh, Solver, State};
 use bodies::tets::{boundary, cubes};
 use nalgebra::Vector3;
+use numerics::masked::Masked;
 use numerics::shapes::{Polygons, block, cylinder, sphere};
 use std::time::Instant;
 
@@ -144,7 +145,7 @@ fn run(
     [pascal, volume]: [u32; 2],
     [own, quiet]: [bool; 2],
 ) {
-    let plain = |value| Scaled { value, mask: None };
+    let plain = |value| Masked::uniform(value);
     let (points, tets) = cubes(cells, [0.0, THICKNESS, 0.0], SIZE);
     let narrow: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let faces: Vec<[u32; 3]> = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();

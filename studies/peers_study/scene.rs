@@ -3,9 +3,10 @@
 //! Ground and pin are exact shapes rather than meshes, and the same for every method: a search costs none of them anything,
 //! and no facet tells one from the other.
 
-use bodies::mass_spring::{Body, Contact, Contacts, Material, Mesh, Pin, Query, Scaled};
+use bodies::mass_spring::{Body, Contact, Contacts, Material, Mesh, Pin, Query};
 use bodies::tets::{boundary, cubes};
 use nalgebra::Vector3;
+use numerics::masked::Masked;
 
 pub(crate) type V3 = Vector3<f64>;
 
@@ -162,7 +163,7 @@ impl Scene {
         let mut skin: Vec<u32> = boundary(&tets, &narrow).iter().flat_map(|face| face.corners).collect();
         skin.sort_unstable();
         skin.dedup();
-        let plain = |value| Scaled { value, mask: None };
+        let plain = |value| Masked::uniform(value);
         let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
         let mesh = Mesh { points: &places, tets: &tets, ..Mesh::default() };
         let body = Body::new(&mesh, &material, &[]).expect("a block");

@@ -7,8 +7,9 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::mass_spring::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Scaled, Solver, State};
+use bodies::mass_spring::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Solver, State};
 use bodies::tets::cubes;
+use numerics::masked::Masked;
 use std::time::Instant;
 
 const ROUNDS: usize = 3;
@@ -26,7 +27,7 @@ fn beam(cells: [usize; 3], times: f64, beta: f64) -> Beam {
     let at = |x: f64| points.iter().zip(0..).filter(move |(p, _)| p[0] == x);
     let pins = at(0.0).map(|(p, particle)| Pin { particle, between: [*p; 2] }).collect();
     let tip = at(SIZE[0]).map(|(_, particle)| particle as usize).collect();
-    let plain = |value| Scaled { value, mask: None };
+    let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(3.04e6 * times), damping: plain(beta) };
     let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
     Beam { body: Body::new(&mesh, &material, &[]).expect("a beam"), pins, tip }

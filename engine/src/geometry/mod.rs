@@ -92,6 +92,14 @@ impl Geometry {
         self.parts.get(kind as usize)?.as_deref()
     }
 
+    /// The component of that kind, where it must be there.
+    ///
+    /// # Errors
+    /// Where it is absent. The engine refuses such a wire before a node sees it, so a node may pass the error on.
+    pub fn require(&self, kind: Kind) -> crate::Result<&Component> {
+        self.part(kind).ok_or_else(|| crate::Error::contract(format!("there is no {kind} where the input needs one")))
+    }
+
     /// The component of that kind for writing; its tables are copied only where they are written and shared.
     pub fn part_mut(&mut self, kind: Kind) -> Option<&mut Component> {
         self.parts.get_mut(kind as usize)?.as_mut().map(Arc::make_mut)

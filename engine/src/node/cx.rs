@@ -8,8 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{Metric, Node, Output};
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::{Attr, ColumnType, Component, Geometry, Item, Name, Owner};
-use crate::param::{Clock, Masked, Param, ParamType, Params};
+use crate::param::{Clock, Maskable, Param, ParamType, Params};
 use crate::time::Frame;
+use numerics::masked::Masked;
 
 /// What came in through one input.
 #[derive(Clone, Debug, Default)]
@@ -58,12 +59,12 @@ impl Cx<'_> {
     ///
     /// # Errors
     /// Where the attribute is missing or not one number a point.
-    pub fn mask<'c>(&self, param: Param<Masked>, part: &'c Component) -> Result<(f32, Option<&'c [f32]>)> {
+    pub fn mask<'c>(&self, param: Param<Maskable>, part: &'c Component) -> Result<Masked<'c, f32>> {
         let name = param.name();
-        let Masked { value, attribute } = self.get(param);
-        let Some(attribute) = attribute else { return Ok((value, None)) };
+        let Maskable { value, attribute } = self.get(param);
+        let Some(attribute) = attribute else { return Ok(Masked::uniform(value)) };
         if let Some(mask) = part.table(Owner::Point).get(&attribute) {
-            return Ok((value, Some(mask)));
+            return Ok(Masked { value, mask: Some(mask) });
         }
         let kind = part.kind();
         let what = match part.describe(&attribute) {

@@ -4,7 +4,7 @@
 use super::code::Code;
 use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
 use super::unit::Unit;
-use super::value::{Masked, Seed, Span, Turn, Value};
+use super::value::{Maskable, Seed, Span, Turn, Value};
 use super::{Params, choice::Choice};
 use crate::files::File;
 use crate::geometry::{Column, Name};
@@ -32,6 +32,14 @@ pub struct Param<T: ParamType> {
     default: T::Default,
     facts: Facts,
 }
+
+impl<T: ParamType> Clone for Param<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: ParamType> Copy for Param<T> {}
 
 /// A param whatever its type.
 pub trait ParamDecl: Sync {
@@ -164,8 +172,8 @@ types! {
         |texts: &[&str]| Value::Texts(Arc::new(texts.iter().map(|text| (*text).into()).collect())),
         Value::Texts(texts) => texts.clone(), Value::Texts;
     Option<File>, (), Shape::File, |()| Value::File(None), Value::File(file) => file.clone(), Value::File;
-    Masked, f32, Shape::Masked, |x: f32| Value::Masked(shortest(x), None),
-        Value::Masked(x, attribute) => Masked { value: *x as f32, attribute: attribute.clone() },
+    Maskable, f32, Shape::Masked, |x: f32| Value::Masked(shortest(x), None),
+        Value::Masked(x, attribute) => Maskable { value: *x as f32, attribute: attribute.clone() },
         |masked: Self| Value::Masked(shortest(masked.value), masked.attribute);
     Arc<Ramp>, RampDefault, Shape::Ramp, |ramp: RampDefault| Value::Ramp(Arc::new(ramp.build())),
         Value::Ramp(ramp) => ramp.clone(), Value::Ramp;
@@ -348,9 +356,9 @@ impl Param<Option<File>> {
     }
 }
 
-impl Param<Masked> {
+impl Param<Maskable> {
     /// A number that a point attribute may scale (⊗).
-    pub const fn masked(name: &'static str, default: f32, help: &'static str) -> Self {
+    pub const fn maskable(name: &'static str, default: f32, help: &'static str) -> Self {
         Self::new(name, default, help)
     }
 }

@@ -23,7 +23,7 @@ pub use source::{Clock, Keyframe, Keyframes, Source};
 pub use spec::{Bounds, Facts, ParamSpec, Shape, Unset};
 pub use turn::euler_to_turn;
 pub use unit::Unit;
-pub use value::{Masked, Seed, Span, Turn, Value};
+pub use value::{Maskable, Seed, Span, Turn, Value};
 
 /// Which params of a node were ever read; the conformance suite asks.
 #[derive(Debug, Default)]

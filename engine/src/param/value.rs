@@ -27,7 +27,7 @@ impl Span {
 
 /// A number that an attribute may scale point by point (⊗): the factor is `value` × the attribute.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Masked {
+pub struct Maskable {
     /// The number where nothing masks it.
     pub value: f32,
     /// The point attribute that scales it.

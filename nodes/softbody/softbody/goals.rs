@@ -8,7 +8,7 @@ use bodies::mass_spring;
 use engine::prelude::*;
 
 use super::GoalOn;
-use super::made::{Given, Made};
+use super::setup::{SimulationSetup, StartInputs};
 use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH};
 
 /// A goal of a body.
@@ -22,7 +22,7 @@ struct Aim<'a> {
 /// The goals of each wire of bodies, by frame.
 pub(super) struct Goals<'a> {
     of: Vec<Vec<Aim<'a>>>,
-    made: &'a Made,
+    setup: &'a SimulationSetup,
     start: f64,
 }
 
@@ -45,11 +45,16 @@ impl<'a> Goals<'a> {
     ///
     /// # Errors
     /// Where one is of no body, or of two, or lacks what Softbody_Goal writes.
-    pub(super) fn of(given: &Given, made: &'a Made, goals: &'a [Arc<Geometry>], start: f64) -> Result<Self> {
-        let mut of: Vec<Vec<Aim<'a>>> = made.wires.iter().map(|_| Vec::new()).collect();
+    pub(super) fn of(
+        inputs: &StartInputs,
+        setup: &'a SimulationSetup,
+        goals: &'a [Arc<Geometry>],
+        start: f64,
+    ) -> Result<Self> {
+        let mut of: Vec<Vec<Aim<'a>>> = setup.wires.iter().map(|_| Vec::new()).collect();
         for (index, geometry) in goals.iter().enumerate() {
             let shape = geometry.tets().expect("the engine refuses a wire without tets");
-            let wire = owner(given, index, shape)?;
+            let wire = owner(inputs, index, shape)?;
             let number = |attribute: Attr<f32>| {
                 shape.get(attribute).and_then(|rows| rows.first()).map(|x| f64::from(*x)).ok_or_else(|| {
                     Error::refused(format!("`goals` {index} has no `{}`", attribute.name))
@@ -65,12 +70,12 @@ impl<'a> Goals<'a> {
             of[wire].push(aim);
         }
         of.iter_mut().for_each(|aims| aims.sort_by(|a, b| a.frame.total_cmp(&b.frame)));
-        Ok(Self { of, made, start })
+        Ok(Self { of, setup, start })
     }
 
     /// Adds what pulls in a step between two frames.
     pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<mass_spring::Goal>) {
-        for (wire, particles) in self.made.wires.iter().enumerate() {
+        for (wire, particles) in self.setup.wires.iter().enumerate() {
             let Some(now) = self.drawn(wire, times[1]) else { continue };
             let before = self.drawn(wire, times[0]);
             let damping = damping(now.strength);
@@ -86,15 +91,15 @@ impl<'a> Goals<'a> {
 
     fn is_pulled(&self, particle: usize, on: GoalOn) -> bool {
         match on {
-            GoalOn::Interior => !self.made.outer[particle],
-            GoalOn::Surface => self.made.outer[particle],
+            GoalOn::Interior => !self.setup.outer[particle],
+            GoalOn::Surface => self.setup.outer[particle],
             GoalOn::All => true,
         }
     }
 
     fn place(&self, drawn: &Drawn<'_>, particle: usize, point: usize) -> [f64; 3] {
         let wide = |shape: &[[f32; 3]]| shape[point].map(f64::from);
-        let from = drawn.from.map_or(self.made.rest[particle], wide);
+        let from = drawn.from.map_or(self.setup.rest[particle], wide);
         let to = wide(drawn.to);
         if drawn.share >= 1.0 { to } else { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * drawn.share) }
     }
@@ -124,9 +129,9 @@ impl<'a> Goals<'a> {
     /// is drawn.
     pub(super) fn shape(&self, frame: f64) -> Option<Vec<[f64; 3]>> {
         let mut shape = None;
-        for (wire, particles) in self.made.wires.iter().enumerate() {
+        for (wire, particles) in self.setup.wires.iter().enumerate() {
             let Some(now) = self.drawn(wire, frame) else { continue };
-            let shape = shape.get_or_insert_with(|| vec![[f64::NAN; 3]; self.made.rest.len()]);
+            let shape = shape.get_or_insert_with(|| vec![[f64::NAN; 3]; self.setup.rest.len()]);
             for (point, particle) in particles.clone().enumerate() {
                 shape[particle] = self.place(&now, particle, point);
             }
@@ -139,8 +144,8 @@ impl<'a> Goals<'a> {
     pub(super) fn resets(&self, frame: f64, whole: f64, frames: f64, mut reset: impl FnMut(&[[f64; 3]], f64)) {
         for (wire, aim, step) in self.passed(frame) {
             let Some(share) = share_of_step(step, whole, frames) else { continue };
-            let mut shape = vec![[f64::NAN; 3]; self.made.rest.len()];
-            for (place, at) in shape[self.made.wires[wire].clone()].iter_mut().zip(aim.places) {
+            let mut shape = vec![[f64::NAN; 3]; self.setup.rest.len()];
+            for (place, at) in shape[self.setup.wires[wire].clone()].iter_mut().zip(aim.places) {
                 *place = at.map(f64::from);
             }
             reset(&shape, share);
@@ -162,7 +167,7 @@ impl<'a> Goals<'a> {
     /// Mean distance of particles to where they are drawn at a frame, metres; none where none is.
     pub(super) fn distance(&self, frame: f64, on: GoalOn, places: &[[f64; 3]]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0.0);
-        for (wire, particles) in self.made.wires.iter().enumerate() {
+        for (wire, particles) in self.setup.wires.iter().enumerate() {
             let Some(now) = self.drawn(wire, frame) else { continue };
             for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
             {
@@ -187,14 +192,14 @@ fn share_of_step(step: f64, whole: f64, frames: f64) -> Option<f64> {
 }
 
 /// The wire of bodies that has the tets of a goal.
-fn owner(given: &Given, index: usize, shape: &Component) -> Result<usize> {
+fn owner(inputs: &StartInputs, index: usize, shape: &Component) -> Result<usize> {
     let fits = |geometry: &Arc<Geometry>| {
         geometry.tets().is_some_and(|body| {
             body.point_count() == shape.point_count()
                 && (body.topology().same(shape.topology()) || body.topology() == shape.topology())
         })
     };
-    let bodies = &given.bodies;
+    let bodies = &inputs.bodies;
     let found: Vec<usize> = (0..bodies.len()).filter(|wire| fits(&bodies[*wire])).collect();
     match found[..] {
         [wire] => Ok(wire),

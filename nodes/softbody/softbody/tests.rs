@@ -44,8 +44,8 @@ fn simulating(bodies: impl Into<Geometry>) -> Bench {
     bench(&NODE).input(BODIES, bodies)
 }
 
-fn all(value: f32) -> Masked {
-    Masked { value, attribute: None }
+fn all(value: f32) -> Maskable {
+    Maskable { value, attribute: None }
 }
 
 fn height(tasted: &Tasted) -> f32 {

@@ -47,8 +47,8 @@ fn jiggled() -> Bench {
     bench(&NODE).moving(CURVES, blown)
 }
 
-fn plain(value: f32) -> Masked {
-    Masked { value, attribute: None }
+fn plain(value: f32) -> Maskable {
+    Maskable { value, attribute: None }
 }
 
 fn bits(out: &Tasted) -> Vec<u8> {
@@ -151,7 +151,7 @@ fn any_frame_alone_or_backwards_has_the_bits_it_has_in_order() {
         .moving(CURVES, moving)
         .moving(SKIN, skin)
         .scene(scene)
-        .set(FREQUENCY, Masked { value: 4.0, attribute: Some("soft".into()) })
+        .set(FREQUENCY, Maskable { value: 4.0, attribute: Some("soft".into()) })
         .set(INHERIT_MOTION, 0.7)
         .keyed(DAMPING, &[(1.0, plain(0.8)), (60.0, plain(0.3)), (120.0, plain(2.0))]);
     let in_order = windy.frames(1..=120);
@@ -284,9 +284,9 @@ fn masks_swing_point_by_point_and_say_when_they_are_missing() {
             curves
         }
     };
-    let by = |value: f32| Masked { value, attribute: Some("mask".into()) };
+    let by = |value: f32| Maskable { value, attribute: Some("mask".into()) };
     let with = |mask: f32| bench(&NODE).moving(CURVES, masked(mask)).at(12.0);
-    let constant = |value: Masked| Source::Constant(value.value());
+    let constant = |value: Maskable| Source::Constant(value.value());
     for param in ["frequency", "damping", "blend"] {
         let [scaled, plainly] = [by(0.8), plain(0.4)].map(|value| with(0.5).source(param, constant(value)));
         // Windows differ, for a mask may be ¼ elsewhere; both reach the scene's start here.
@@ -294,7 +294,7 @@ fn masks_swing_point_by_point_and_say_when_they_are_missing() {
         let error = jiggled().source(param, constant(by(0.5))).at(3.0).try_cook().unwrap_err();
         assert_eq!(error.fact, format!("`{param}` is masked by `mask`, which the curves do not have"));
     }
-    let window = |value: Masked| with(1.0).set(FREQUENCY, value).cook().metrics["window_frames"];
+    let window = |value: Maskable| with(1.0).set(FREQUENCY, value).cook().metrics["window_frames"];
     assert_eq!(window(by(2.0)), window(plain(0.5)));
 }
 

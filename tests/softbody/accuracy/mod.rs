@@ -10,7 +10,8 @@ mod settled;
 mod springs;
 mod touch;
 
-use bodies::mass_spring::{Body, Frame, Material, Mesh, Report, Scaled, Solver, Spring, State};
+use bodies::mass_spring::{Body, Frame, Material, Mesh, Report, Solver, Spring, State};
+use numerics::masked::Masked;
 
 use super::laws::{Figure, hold, storage};
 use super::{distance, shapes};
@@ -47,7 +48,7 @@ fn block(cells: [u32; 3], side: f64, modulus: f64, damping: f64) -> Body {
 }
 
 fn made(points: &[V], tets: &[[u32; 4]], modulus: f64, damping: f64, joints: &[Spring]) -> Body {
-    let plain = |value| Scaled { value, mask: None };
+    let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
     Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, joints).unwrap()
 }

@@ -17,13 +17,11 @@ fn bent(root: Point, theta: f64, segments: usize, g: f32, mode: Mode) -> Vec<Poi
     let ramp = Ramp::constant(1.0);
     let with = Bend {
         wind: [1.0, 0.0, 0.0],
-        rotate: g,
-        rotate_mask: None,
+        rotate: g.into(),
         envelope: None,
         ramp: &ramp,
         mode,
-        blend: 1.0,
-        blend_mask: None,
+        blend: 1.0.into(),
         noise: None,
     };
     bend(&[0, segments as u32 + 1], &points, &with).points

@@ -62,17 +62,10 @@ const TALL: f32 = 1e5;
 /// Where the tip of a tall segment is, ω·`dt` = `phase` a step.
 fn swung(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     let ramp = Ramp::constant(1.0);
-    let spring = Spring {
-        frequency: phase / (2.0 * PI),
-        frequency_mask: None,
-        damping: zeta,
-        damping_mask: None,
-        softness: &ramp,
-        drag,
-    };
+    let spring = Spring { frequency: (phase / (2.0 * PI)).into(), damping: zeta.into(), softness: &ramp, drag };
     let at = |x: f32| [[0.0; 3], [x, TALL, 0.0]];
     let mut jiggle = Jiggle::at_rest(&[0, 2], &at(targets[0]), &at(targets[0]));
-    let tip = |jiggle: &Jiggle| f64::from(jiggle.shape(1.0, None).points[1][0]);
+    let tip = |jiggle: &Jiggle| f64::from(jiggle.shape(1.0.into()).points[1][0]);
     let mut found = vec![tip(&jiggle)];
     for x in &targets[1..] {
         jiggle.step(&at(*x), &spring, 1.0, None);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::geometry::{Attr, Column, Kind, Name, V};
 use crate::graph::Catalogue;
 use crate::node::{Cook, Cx, FrameCx, Input, Many, Node, Opt, Output, Outputs};
-use crate::param::{Code, Masked, Param, Seed, Span, Turn, Unit};
+use crate::param::{Code, Maskable, Param, Seed, Span, Turn, Unit};
 use crate::{Error, Result, choice, files::File, inputs, params};
 use numerics::ramp::Ramp;
 
@@ -70,9 +70,9 @@ params! { WIND:
     AMPLITUDE: Param<f32> = Param::float("amplitude", 0.5, "How strong the noise is.").at_least(0.0);
     FREQUENCY: Param<f32> = Param::float("frequency", 2.0, "How fine the noise is.").above(0.0).unit(Unit::PerMetre);
     OCTAVES: Param<i64> = Param::int("octaves", 2, "How many layers of noise.").within(1.0, 16.0);
-    GLOBAL_ROTATE: Param<Masked> = Param::masked("global_rotate", 0.5, "How far curves turn.");
+    GLOBAL_ROTATE: Param<Maskable> = Param::maskable("global_rotate", 0.5, "How far curves turn.");
     RAMP_ROTATE: Param<Arc<Ramp>> = Param::ramp("ramp_rotate", &[[0.0, 1.0]], "How far, along the curve.");
-    BLEND: Param<Masked> = Param::masked("blend", 1.0, "How much of the wind.").within(0.0, 1.0);
+    BLEND: Param<Maskable> = Param::maskable("blend", 1.0, "How much of the wind.").within(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Another seed, another wind.");
 }
 const BENT_OUT: Output = Output::like("curves", &CURVES, "Bent curves.");
@@ -123,7 +123,7 @@ params! { SHAPES:
     OFFSETS: Param<Arc<Vec<[f32; 3]>>> = Param::inline("offsets", "Vectors.");
     TETS: Param<Arc<Vec<[u32; 4]>>> = Param::inline("tets", "Tets.");
     COLUMNS: Param<Arc<Vec<(Name, Column)>>> = Param::inline("columns", "Attributes.");
-    MASKED: Param<Masked> = Param::masked("masked", 1.0, "A masked number.");
+    MASKED: Param<Maskable> = Param::maskable("masked", 1.0, "A masked number.");
     CODE: Param<Code> = Param::code("code", "Assignments.");
     CHANCE: Param<Seed> = Param::seed("A seed.");
 }

@@ -9,7 +9,7 @@ use crate::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, S
 use crate::node::{
     AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
 };
-use crate::param::{Masked, Param, Params, Seed, Unit};
+use crate::param::{Maskable, Param, Params, Seed, Unit};
 use crate::{Error, Result, choice};
 
 choice! {
@@ -220,17 +220,17 @@ fn a_param_that_is_read_in_one_rare_mixture_matters() {
     assert_eq!(said(node.params(&[&AMOUNT, &WAY, &TWICE, &RARE])), [""; 0]);
 }
 
-const BLEND: Param<Masked> = Param::masked("blend", 1.0, "Share of the way.").within(0.0, 1.0);
+const BLEND: Param<Maskable> = Param::maskable("blend", 1.0, "Share of the way.").within(0.0, 1.0);
 
 #[test]
 fn a_mask_must_matter() {
     let deaf = shift(|cx| {
-        let (blend, _) = cx.mask(BLEND, cx.part(CURVES))?;
+        let blend = cx.mask(BLEND, cx.part(CURVES))?.value;
         Ok(OUT.with(up(cx, cx.get(AMOUNT) * blend)?))
     });
     only(deaf.params(&[&AMOUNT, &BLEND]), "the mask of `blend` never changes anything");
     let masked = shift(|cx| {
-        let (blend, mask) = cx.mask(BLEND, cx.part(CURVES))?;
+        let numerics::masked::Masked { value: blend, mask } = cx.mask(BLEND, cx.part(CURVES))?;
         let mut curves = cx.input(CURVES).clone();
         if let Some(part) = curves.part_mut(Kind::Curves) {
             for (row, p) in part.edit(P).into_iter().flatten().enumerate() {

@@ -13,6 +13,7 @@ use super::hanging::Hanging;
 use super::order::Order;
 use super::parts::Parts;
 use super::regions::Regions;
+use numerics::masked::Masked;
 
 /// Shortest spring that k = E·ΣV/L² is taken of, as a share of the mean: k of a doubled point stays within 1e6 of others'.
 pub const SHORTEST: f64 = 1e-3;
@@ -21,23 +22,12 @@ pub const LIGHTEST: f64 = 1e-3;
 /// Share of L³ below which a tetrahedron is flat, L its longest edge: rounding of positions given in f32 reaches 1e-7.
 const FLAT: f64 = 1e-6;
 
-/// A number for all particles, scaled particle by particle where there is a mask.
-#[derive(Clone, Copy, Debug)]
-pub struct Scaled<'a> {
-    /// The number.
-    pub value: f64,
-    /// What scales it, a value a particle.
-    pub mask: Option<&'a [f32]>,
-}
-
-impl Scaled<'_> {
-    /// The mean over some particles.
-    fn over<const N: usize>(&self, particles: [u32; N]) -> f64 {
-        let scale = self.mask.map_or(1.0, |mask| {
-            particles.iter().map(|particle| f64::from(mask[*particle as usize])).sum::<f64>() / N as f64
-        });
-        (self.value * scale).max(0.0)
-    }
+/// The mean of a masked number over some particles, 0 or more.
+fn mean_over<const N: usize>(number: &Masked<'_, f64>, particles: [u32; N]) -> f64 {
+    let scale = number.mask.map_or(1.0, |mask| {
+        particles.iter().map(|particle| f64::from(mask[*particle as usize])).sum::<f64>() / N as f64
+    });
+    (number.value * scale).max(0.0)
 }
 
 /// The shape of a body at rest.
@@ -57,11 +47,11 @@ pub struct Mesh<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Material<'a> {
     /// Density, kg/m³.
-    pub density: Scaled<'a>,
+    pub density: Masked<'a, f64>,
     /// Young's modulus E, Pa.
-    pub stiffness: Scaled<'a>,
+    pub stiffness: Masked<'a, f64>,
     /// β = c ÷ k, seconds.
-    pub damping: Scaled<'a>,
+    pub damping: Masked<'a, f64>,
 }
 
 /// A spring given as such, between particles of one body or two.
@@ -251,8 +241,8 @@ impl Body {
         let meshed = self.meshed;
         let mut stored = vec![0.0; meshed];
         for tet in &self.given {
-            let quarter = 0.25 * tet.volume * material.density.over(tet.corners);
-            let energy = tet.volume * material.stiffness.over(tet.corners);
+            let quarter = 0.25 * tet.volume * mean_over(&material.density, tet.corners);
+            let energy = tet.volume * mean_over(&material.stiffness, tet.corners);
             tet.corners.iter().for_each(|corner| masses[*corner as usize] += quarter);
             tet.springs.iter().for_each(|spring| stored[*spring as usize] += energy);
         }
@@ -266,11 +256,12 @@ impl Body {
             let k = if length > 0.0 { stored[spring] / (length * length) } else { 0.0 };
             let ends = self.ends[spring].map(|end| self.order.callers[end as usize]);
             self.stiffness[spring] = stiffness(spring, k)?;
-            self.damping[spring] = number("damping", spring, material.damping.over(ends) * k)?;
+            self.damping[spring] = number("damping", spring, mean_over(&material.damping, ends) * k)?;
         }
-        self.moduli = self.kept.iter().map(|tet| material.stiffness.over(self.given[*tet as usize].corners)).collect();
+        self.moduli =
+            self.kept.iter().map(|tet| mean_over(&material.stiffness, self.given[*tet as usize].corners)).collect();
         let corners = |tet: &u32| self.given[*tet as usize].corners;
-        let damping: Vec<f64> = self.kept.iter().map(|tet| material.damping.over(corners(tet))).collect();
+        let damping: Vec<f64> = self.kept.iter().map(|tet| mean_over(&material.damping, corners(tet))).collect();
         self.regions.set_material(&self.volumes, &self.moduli, &damping);
         self.set_masses(&masses)
     }

@@ -38,7 +38,7 @@ mod step;
 mod system;
 mod volume;
 
-pub use body::{Body, BodyError, LIGHTEST, Material, Mesh, SHORTEST, Scaled, Spring};
+pub use body::{Body, BodyError, LIGHTEST, Material, Mesh, SHORTEST, Spring};
 pub use contact::{Contact, Contacts, Query};
 pub use drive::{Goal, Pin};
 pub use frame::{Frame, Integrator, Report, Solver};

@@ -20,6 +20,7 @@ mod turn;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
+use numerics::masked::Masked;
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
 use numerics::vector::Vec3;
@@ -37,23 +38,6 @@ pub enum Method {
     Exact,
     /// The paper's: at the last of so many equal steps that crosses nothing.
     Steps(u32),
-}
-
-/// A number for all CVs, scaled CV by CV where there is a mask.
-#[derive(Clone, Copy, Debug)]
-pub struct Scaled<'a> {
-    /// The number.
-    pub value: f32,
-    /// What scales it.
-    pub mask: Option<&'a [f32]>,
-}
-
-impl Scaled<'_> {
-    /// The number at a CV.
-    #[inline(always)]
-    fn at(&self, cv: usize) -> f32 {
-        self.value * self.mask.map_or(1.0, |mask| mask[cv])
-    }
 }
 
 /// What curves collide with, and how.
@@ -76,9 +60,9 @@ pub struct Collide<'a> {
     /// What [`at_rest`] said of the same curves, if it was asked.
     pub at_rest: Option<&'a AtRest>,
     /// Share of each segment's collision that is kept, 0..1.
-    pub blend: Scaled<'a>,
+    pub blend: Masked<'a, f32>,
     /// Thickness of the curves, metres, one value a CV where masked.
-    pub width: Scaled<'a>,
+    pub width: Masked<'a, f32>,
 }
 
 impl Collide<'_> {

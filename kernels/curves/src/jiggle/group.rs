@@ -5,6 +5,7 @@
 use super::carry::Carry;
 use super::response::Response;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::masked::Masked;
 use numerics::simd::kernel;
 use numerics::vector::Vec3;
 
@@ -224,24 +225,16 @@ impl Carried {
     }
 }
 
-/// How much of the offset is shown.
-#[derive(Clone, Copy)]
-pub(super) struct Blend<'a> {
-    pub(super) share: f32,
-    pub(super) mask: Option<&'a [f32]>,
-}
-
-impl Blend<'_> {
-    #[inline(always)]
-    fn at(&self, curves: &Curves, step: usize) -> F64x16 {
-        let Some(mask) = self.mask else { return F64x16([f64::from(self.share); LANES]) };
-        let at = curves.at(step);
-        F64x16::from_fn(|lane| {
-            let share = self.share * mask[at[lane]];
-            let share = if share > 0.0 { share } else { 0.0 };
-            f64::from(if share < 1.0 { share } else { 1.0 })
-        })
-    }
+/// How much of the offset is shown at a CV of each curve, 0..1.
+#[inline(always)]
+fn shown_at(blend: &Masked<'_, f32>, curves: &Curves, step: usize) -> F64x16 {
+    let Some(mask) = blend.mask else { return F64x16([f64::from(blend.value); LANES]) };
+    let at = curves.at(step);
+    F64x16::from_fn(|lane| {
+        let share = blend.value * mask[at[lane]];
+        let share = if share > 0.0 { share } else { 0.0 };
+        f64::from(if share < 1.0 { share } else { 1.0 })
+    })
 }
 
 kernel! {
@@ -250,14 +243,14 @@ kernel! {
     pub(super) fn shape_group(
         curves: &Curves,
         slots: &[Slot],
-        blend: Blend<'_>,
+        blend: Masked<'_, f32>,
         base: usize,
         out: &mut [Vec3],
     ) -> f64 = shape;
 }
 
 #[inline(always)]
-fn shape(curves: &Curves, slots: &[Slot], blend: Blend<'_>, base: usize, out: &mut [Vec3]) -> f64 {
+fn shape(curves: &Curves, slots: &[Slot], blend: Masked<'_, f32>, base: usize, out: &mut [Vec3]) -> f64 {
     let mut farthest = F64x16::ZERO;
     let mut moved = [F64x16::ZERO; 3];
     let Some(root) = slots.first() else { return 0.0 };
@@ -265,7 +258,7 @@ fn shape(curves: &Curves, slots: &[Slot], blend: Blend<'_>, base: usize, out: &m
     let (mut target, mut shown) = (&root.target, [F64x16::ZERO; 3]);
     curves.write(0, target, base, out);
     for (step, slot) in slots.iter().enumerate().skip(1) {
-        let shares = blend.at(curves, step);
+        let shares = shown_at(&blend, curves, step);
         let next = axes(|axis| F64x16::from_fn(|lane| slot.offset[axis].0[lane] * shares.0[lane]));
         let rest = between(target, &slot.target);
         let swung =

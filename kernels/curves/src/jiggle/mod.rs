@@ -21,8 +21,9 @@ pub use lengths::with_lengths_between;
 pub use response::{Drag, steps_to_forget};
 pub use roots::Roots;
 
-use group::{Blend, Curves, F64x16, Responses, Slot, shape_group, step_group};
+use group::{Curves, F64x16, Responses, Slot, shape_group, step_group};
 use numerics::lanes::LANES;
+use numerics::masked::Masked;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use numerics::vector::Vec3;
@@ -32,19 +33,15 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// How far a mask may scale frequency and damping, either way.
-pub const MASKED: [f32; 2] = [0.25, 4.0];
+pub const MASK_RANGE: [f32; 2] = [0.25, 4.0];
 
-/// What each CV hangs on. Masks are one value a CV, and count within [`MASKED`].
+/// What each CV hangs on. Masks are one value a CV, and count within [`MASK_RANGE`].
 #[derive(Clone, Debug)]
 pub struct Spring<'a> {
     /// Swings a second at a softness of 1, without damping.
-    pub frequency: f64,
-    /// Scales `frequency`.
-    pub frequency_mask: Option<&'a [f32]>,
+    pub frequency: Masked<'a, f64>,
     /// Damping ratio: 1 comes to rest soonest.
-    pub damping: f64,
-    /// Scales `damping`.
-    pub damping_mask: Option<&'a [f32]>,
+    pub damping: Masked<'a, f64>,
     /// Divides the frequency along u, the arc length ÷ curve length at rest; 0 or less follows exactly.
     pub softness: &'a Ramp,
     /// What the damper resists.
@@ -146,20 +143,20 @@ impl Jiggle {
         });
     }
 
-    /// Where the curves are: `blend` of the way from their targets to where they swing (0…1, scaled by `mask`), with
+    /// Where the curves are: `blend` of the way from their targets to where they swing (0…1), with
     /// their targets' lengths.
     ///
     /// # Panics
-    /// Where `mask` is shorter than the points.
-    pub fn shape(&self, blend: f32, mask: Option<&[f32]>) -> Shaped {
-        self.shape_on(Path::chosen(), blend, mask)
+    /// Where the mask is shorter than the points.
+    pub fn shape(&self, blend: Masked<'_, f32>) -> Shaped {
+        self.shape_on(Path::chosen(), blend)
     }
 
     /// [`Jiggle::shape`] on a given SIMD path.
     ///
     /// # Panics
     /// As [`Jiggle::shape`].
-    pub fn shape_on(&self, path: Path, blend: f32, mask: Option<&[f32]>) -> Shaped {
+    pub fn shape_on(&self, path: Path, blend: Masked<'_, f32>) -> Shaped {
         let mut points = vec![[0.0; 3]; self.along.len()];
         let mut left = points.as_mut_slice();
         let parts = self.parts.iter().map(|part| {
@@ -173,7 +170,6 @@ impl Jiggle {
             let mut farthest = 0.0_f64;
             for curves in &part.groups {
                 let (mine, rest) = slots.split_at(curves.longest);
-                let blend = Blend { share: blend, mask };
                 farthest = farthest.max(shape_group(path, curves, mine, blend, part.points.start, out));
                 slots = rest;
             }
@@ -189,13 +185,13 @@ impl Jiggle {
             return;
         }
         let along = &self.along;
-        let masked =
-            |mask: Option<&[f32]>, cv: usize| f64::from(mask.map_or(1.0, |mask| mask[cv].clamp(MASKED[0], MASKED[1])));
+        let factor =
+            |number: &Masked<'_, f64>, cv: usize| f64::from(number.factor(cv).clamp(MASK_RANGE[0], MASK_RANGE[1]));
         let response = |cv: usize| {
             let softness = f64::from(spring.softness.eval(along[cv]));
             if softness > 0.0 {
-                let frequency = spring.frequency * masked(spring.frequency_mask, cv);
-                let zeta = spring.damping * masked(spring.damping_mask, cv);
+                let frequency = spring.frequency.value * factor(&spring.frequency, cv);
+                let zeta = spring.damping.value * factor(&spring.damping, cv);
                 Response::new(2.0 * PI * frequency / softness * dt, zeta, spring.drag)
             } else {
                 Response::RIGID
@@ -231,18 +227,18 @@ impl Part {
 impl Tuned {
     fn of(spring: &Spring<'_>, dt: f64) -> Self {
         Self {
-            numbers: [spring.frequency, spring.damping, dt],
-            frequency_mask: spring.frequency_mask.map(<[f32]>::to_vec),
-            damping_mask: spring.damping_mask.map(<[f32]>::to_vec),
+            numbers: [spring.frequency.value, spring.damping.value, dt],
+            frequency_mask: spring.frequency.mask.map(<[f32]>::to_vec),
+            damping_mask: spring.damping.mask.map(<[f32]>::to_vec),
             softness: spring.softness.clone(),
             drag: spring.drag,
         }
     }
 
     fn is(&self, spring: &Spring<'_>, dt: f64) -> bool {
-        self.numbers == [spring.frequency, spring.damping, dt]
-            && self.frequency_mask.as_deref() == spring.frequency_mask
-            && self.damping_mask.as_deref() == spring.damping_mask
+        self.numbers == [spring.frequency.value, spring.damping.value, dt]
+            && self.frequency_mask.as_deref() == spring.frequency.mask
+            && self.damping_mask.as_deref() == spring.damping.mask
             && self.softness == *spring.softness
             && self.drag == spring.drag
     }

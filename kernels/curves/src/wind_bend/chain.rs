@@ -68,7 +68,7 @@ impl Chain {
     /// Goes on to the next CV, at the end of `segment`; gives how far the segment's turn moves it.
     #[inline(always)]
     pub(super) fn advance(&mut self, bend: &Bend<'_>, segment: &Lanes<3>, at: &[usize; LANES]) -> Lanes<3> {
-        let whole = bend.blend >= 1.0 && bend.blend_mask.is_none();
+        let whole = bend.blend.value >= 1.0 && bend.blend.mask.is_none();
         let turned = if whole { self.turned } else { self.blended(bend, at) };
         let mut moved = [F32x16::splat(0.0); 3];
         for lane in 0..LANES {
@@ -89,12 +89,12 @@ impl Chain {
     /// The share `blend` of all turns so far: their axis, less of their angle.
     #[inline(always)]
     fn blended(&self, bend: &Bend<'_>, at: &[usize; LANES]) -> Lanes<4> {
-        let mut share = gather(bend.blend_mask, at);
+        let mut share = gather(bend.blend.mask, at);
         let mut half = F32x16::splat(0.0);
         let mut sine = half;
         for lane in 0..LANES {
             let [x, y, z, w] = get(&self.turned, lane);
-            let blend = bend.blend * share.0[lane];
+            let blend = bend.blend.value * share.0[lane];
             let blend = if blend > 0.0 { blend } else { 0.0 };
             let blend = if blend < 1.0 { blend } else { 1.0 };
             share.0[lane] = blend;

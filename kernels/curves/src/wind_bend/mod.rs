@@ -19,6 +19,7 @@ mod tally;
 
 use group::{Group, Scratch, bend_group};
 use numerics::lanes::LANES;
+use numerics::masked::Masked;
 use numerics::noise::Field;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
@@ -44,9 +45,7 @@ pub struct Bend<'a> {
     /// Where wind blows to, of length 1.
     pub wind: [f32; 3],
     /// Share g of the angle that a pivot turns: 0 none, 1 all of it.
-    pub rotate: f32,
-    /// Scales `rotate`.
-    pub rotate_mask: Option<&'a [f32]>,
+    pub rotate: Masked<'a, f32>,
     /// Scales `rotate`; below 0 or NaN counts as 0.
     pub envelope: Option<&'a [f32]>,
     /// Scales `rotate` along u, the rest arc length ÷ curve length.
@@ -54,9 +53,7 @@ pub struct Bend<'a> {
     /// How g is applied.
     pub mode: Mode,
     /// Share of each segment's whole turn that is kept, 0..1; 0 gives the incoming bits.
-    pub blend: f32,
-    /// Scales `blend`.
-    pub blend_mask: Option<&'a [f32]>,
+    pub blend: Masked<'a, f32>,
     /// What varies the wind's direction.
     pub noise: Option<BendNoise<'a>>,
 }
@@ -121,7 +118,7 @@ pub fn bend(starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
 /// # Panics
 /// As [`bend()`].
 pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
-    if bend.rotate == 0.0 || bend.blend <= 0.0 || bend.ramp.is_constant() == Some(0.0) {
+    if bend.rotate.value == 0.0 || bend.blend.value <= 0.0 || bend.ramp.is_constant() == Some(0.0) {
         return Bent { points: points.to_vec(), max_angle: 0.0, length_error: 0.0 };
     }
     let mut out = vec![[0.0; 3]; points.len()];

@@ -35,11 +35,11 @@ impl<'a> Share<'a> {
             Some(value) => F32x16::splat(value),
             None => self.bend.ramp.eval_lanes(&u),
         };
-        let mask = gather(self.bend.rotate_mask, at);
+        let mask = gather(self.bend.rotate.mask, at);
         let envelope = gather(self.bend.envelope, at);
         for lane in 0..LANES {
             let envelope = if envelope.0[lane] > 0.0 { envelope.0[lane] } else { 0.0 };
-            let product = self.bend.rotate * share.0[lane] * mask.0[lane] * envelope;
+            let product = self.bend.rotate.value * share.0[lane] * mask.0[lane] * envelope;
             // An infinity times a 0 is no number: nothing was asked for.
             share.0[lane] = if product.is_nan() { 0.0 } else { product };
         }

@@ -8,7 +8,7 @@ mod round;
 mod sharp;
 mod steps;
 
-use curves::collide::{Collide, Method, Scaled, collide};
+use curves::collide::{Collide, Method, collide};
 use numerics::random::Key;
 use numerics::tree::TriangleTree;
 use std::f64::consts::{PI, TAU};
@@ -113,8 +113,8 @@ fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: Method, gap: f64) -> Col
         offset_root: gap,
         offset_scale: None,
         at_rest: None,
-        blend: Scaled { value: 1.0, mask: None },
-        width: Scaled { value: 0.0, mask: None },
+        blend: 1.0.into(),
+        width: 0.0.into(),
     }
 }
 

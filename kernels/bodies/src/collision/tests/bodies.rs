@@ -1,8 +1,9 @@
 //! Bodies under the solver: what rests, and what is rolled over.
 
 use super::*;
-use crate::mass_spring::{Body, Frame, Material, Mesh, Scaled, Solver, State};
+use crate::mass_spring::{Body, Frame, Material, Mesh, Solver, State};
 use crate::tets::{boundary, cubes};
+use numerics::masked::Masked;
 
 const FRAME: f64 = 1.0 / 24.0;
 
@@ -17,7 +18,7 @@ fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
 }
 
 fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> Body {
-    let plain = |value| Scaled { value, mask: None };
+    let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(stiffness), damping: plain(0.02) };
     Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, &[]).unwrap()
 }

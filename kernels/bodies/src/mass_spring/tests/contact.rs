@@ -1,6 +1,7 @@
 //! Contact and friction against ground, plates, a rolling pin and another body.
 
 use super::*;
+use numerics::masked::Masked;
 
 const THICKNESS: f64 = 1e-3;
 
@@ -353,7 +354,7 @@ fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
         for (ratio, turned) in [(1.0, false), (1e6, false), (1.0, true), (1e6, true)] {
             let (points, tets) = block([3, 3, 3], 0.1);
             let mask: Vec<f32> = (0..points.len()).map(|i| if i % 2 == 0 { 1.0 } else { 1.0 / ratio as f32 }).collect();
-            let density = Scaled { value: 1000.0, mask: Some(&mask) };
+            let density = Masked { value: 1000.0, mask: Some(&mask) };
             let material = Material { density, ..material(1000.0, stiffness, 0.01) };
             let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
             let mut state = State::at_rest(&body);

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::tets::cubes;
+use numerics::masked::Masked;
 use numerics::random::Key;
 
 mod contact;
@@ -24,8 +25,8 @@ const BARE: Frame<'static> = Frame {
     rough: false,
 };
 
-fn plain(value: f64) -> Scaled<'static> {
-    Scaled { value, mask: None }
+fn plain(value: f64) -> Masked<'static, f64> {
+    Masked::uniform(value)
 }
 
 fn material(density: f64, stiffness: f64, damping: f64) -> Material<'static> {

@@ -1,9 +1,10 @@
 //! Whole curves.
 
 use super::*;
+use numerics::masked::Masked;
 
-const PLAIN: Scaled<'static> = Scaled { value: 0.0, mask: None };
-const WHOLE: Scaled<'static> = Scaled { value: 1.0, mask: None };
+const PLAIN: Masked<'static, f32> = Masked::uniform(0.0);
+const WHOLE: Masked<'static, f32> = Masked::uniform(1.0);
 
 fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
     Collide {
@@ -274,7 +275,7 @@ fn blend_turns_back_towards_the_goal() {
     let obstacles = [&tree];
     let (rest, goal) = ([[0.0, 0.5, 0.0], [0.0, 1.5, 0.0]], [[0.0, 0.5, 0.0], [0.8, -0.1, 0.0]]);
     let angle = |value: f32| {
-        let how = Collide { blend: Scaled { value, mask: None }, ..on(&obstacles) };
+        let how = Collide { blend: Masked::uniform(value), ..on(&obstacles) };
         let tip = collide(&[0, 2], &rest, &goal, &how).points[1];
         (libm::atan2(f64::from(0.5 - tip[1]), f64::from(tip[0])), tip)
     };
@@ -316,12 +317,7 @@ fn any_threads_and_any_path_give_the_same_bits() {
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(500, 5, 0.4, V3::x());
-    let how = Collide {
-        skin: Some(skin),
-        offset_scale: Some(0.3),
-        width: Scaled { value: 1e-3, mask: None },
-        ..on(&obstacles)
-    };
+    let how = Collide { skin: Some(skin), offset_scale: Some(0.3), width: Masked::uniform(1e-3), ..on(&obstacles) };
     let expected = collide(&starts, &rest, &goal, &how);
     for path in Path::all() {
         for threads in [1, 2, 7] {

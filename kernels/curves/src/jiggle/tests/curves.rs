@@ -1,6 +1,7 @@
 //! Whole curves: lengths, roots, masks, determinism.
 
 use super::*;
+use numerics::masked::Masked;
 use numerics::vector;
 
 fn distance(a: Vec3, b: Vec3) -> f64 {
@@ -34,7 +35,7 @@ fn swung(path: Path, most: u64, frames: u32) -> Vec<Shaped> {
     let frames = (1..=frames).map(|frame| {
         let targets = wobbling(700, most, frame as f32).1;
         jiggle.step_on(path, &targets, &spring(0.6, 0.2, &ramp, Drag::World), 1.0, None);
-        let shaped = jiggle.shape_on(path, 1.0, None);
+        let shaped = jiggle.shape_on(path, 1.0.into());
         assert_kept(&starts, &targets, &shaped.points);
         shaped
     });
@@ -63,17 +64,21 @@ fn lengths_are_restored_root_to_tip_by_hand() {
         jiggle.parts[0].slots[cv].offset[0].0[0] = 1.0;
     }
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    let shaped = jiggle.shape(1.0, None);
+    let shaped = jiggle.shape(1.0.into());
     let expected = [[0.0; 3], [half, half, 0.0], [half, half + 1.0, 0.0]];
     assert!(shaped.points.iter().zip(expected).all(|(a, b)| distance(*a, b) < 2e-7), "{shaped:?}");
     let far = 2.0 - f64::sqrt(2.0);
     assert!((shaped.max_offset - far.sqrt()).abs() < 1e-12);
     // Half of the push: (½, 1) ÷ √1.25. A mask of ½ does the same; nothing of it the very bits.
-    let half = jiggle.shape(0.5, None);
+    let half = jiggle.shape(0.5.into());
     assert!((half.points[1][0] - 0.5 / 1.25_f32.sqrt()).abs() < 1e-7);
-    assert_eq!(jiggle.shape(1.0, Some(&[0.5; 3])), half);
-    assert_eq!(jiggle.shape(0.25, Some(&[9.0; 3])).points, jiggle.shape(1.0, None).points, "a mask ends at the whole");
-    assert_eq!(jiggle.shape(1.0, Some(&[0.0, -1.0, 0.0])).points, points);
+    assert_eq!(jiggle.shape(Masked { value: 1.0, mask: Some(&[0.5; 3]) }), half);
+    assert_eq!(
+        jiggle.shape(Masked { value: 0.25, mask: Some(&[9.0; 3]) }).points,
+        jiggle.shape(1.0.into()).points,
+        "a mask ends at the whole"
+    );
+    assert_eq!(jiggle.shape(Masked { value: 1.0, mask: Some(&[0.0, -1.0, 0.0]) }).points, points);
     // Nothing was fed back.
     assert_eq!(jiggle.parts[0].slots[1].offset[0].0[0], 1.0);
 }
@@ -87,7 +92,7 @@ fn what_stands_still_keeps_its_bits() {
     for _ in 0..50 {
         jiggle.step(&points, &spring(0.3, 0.1, &ramp, Drag::World), 1.0, Some(&vec![Carry::NONE; 60]));
     }
-    let shaped = jiggle.shape(0.7, None);
+    let shaped = jiggle.shape(0.7.into());
     assert_eq!(bits(&shaped.points), bits(&points));
     assert_eq!(shaped.max_offset, 0.0);
 }
@@ -116,10 +121,11 @@ fn masks_scale_frequency_and_damping_from_a_quarter_to_four() {
         let [frequency, damping] = masks.map(|mask| mask.map(|mask| [1.0, mask]));
         let mut jiggle = Jiggle::at_rest(&ONE, &at(0.0), &at(0.0));
         for x in [1.0, 2.0, 1.5, -1.0] {
+            let plain = spring(phase, zeta, &ramp, Drag::World);
             let spring = Spring {
-                frequency_mask: frequency.as_ref().map(|mask| &mask[..]),
-                damping_mask: damping.as_ref().map(|mask| &mask[..]),
-                ..spring(phase, zeta, &ramp, Drag::World)
+                frequency: Masked { mask: frequency.as_ref().map(|mask| &mask[..]), ..plain.frequency },
+                damping: Masked { mask: damping.as_ref().map(|mask| &mask[..]), ..plain.damping },
+                ..plain
             };
             jiggle.step(&at(x), &spring, 1.0, None);
         }
@@ -156,11 +162,11 @@ fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_come_out() {
     for frame in 1..20 {
         let targets: Vec<Vec3> = points.iter().map(|p| [p[0] + 0.1 * frame as f32 * p[1], p[1], p[2]]).collect();
         jiggle.step(&targets, &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
-        assert_kept(&starts, &targets, &jiggle.shape(1.0, None).points);
+        assert_kept(&starts, &targets, &jiggle.shape(1.0.into()).points);
     }
     let mut none = Jiggle::at_rest(&[0], &[], &[]);
     none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
-    assert_eq!(none.shape(1.0, None), Shaped { points: vec![], max_offset: 0.0 });
+    assert_eq!(none.shape(1.0.into()), Shaped { points: vec![], max_offset: 0.0 });
     let mut none = Jiggle::at_rest(&[], &[], &[]);
     none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
 }
@@ -174,7 +180,7 @@ fn a_scene_scaled_by_a_power_of_two_swings_the_same_bits() {
         for k in 1..9 {
             jiggle.step(&frame(k as f32), &spring(0.6, 0.2, &ramp, Drag::World), 1.0, None);
         }
-        jiggle.shape(1.0, None).points.iter().map(|p| p.map(|x| x / scale)).collect::<Vec<_>>()
+        jiggle.shape(1.0.into()).points.iter().map(|p| p.map(|x| x / scale)).collect::<Vec<_>>()
     };
     let expected = bits(&run(1.0));
     for power in [-60, -20, 20, 60] {

@@ -18,7 +18,7 @@ fn rising() -> Ramp {
 
 /// ω·dt = `phase` in steps of a second.
 fn spring(phase: f64, damping: f64, softness: &Ramp, drag: Drag) -> Spring<'_> {
-    Spring { frequency: phase / (2.0 * PI), frequency_mask: None, damping, damping_mask: None, softness, drag }
+    Spring { frequency: (phase / (2.0 * PI)).into(), damping: damping.into(), softness, drag }
 }
 
 /// Two CVs; the second is free where softness is 1.

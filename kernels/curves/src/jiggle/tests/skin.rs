@@ -39,7 +39,7 @@ fn run(frames: u32, share: f64, skinned: bool, motion: impl Fn(u32) -> (f64, [f6
         jiggle.step(&at(&curve(frame), frame), &spring(0.7, 0.15, &ramp, Drag::World), 1.0, carries);
         before = now;
     }
-    jiggle.shape(1.0, None).points
+    jiggle.shape(1.0.into()).points
 }
 
 fn farthest(a: &[Vec3], b: &[Vec3]) -> f64 {
@@ -80,7 +80,7 @@ fn rigid_motion_of_skin_and_curves_alone_leaves_no_swing() {
         jiggle.step(&targets, &spring(0.7, 0.15, &ramp, Drag::World), 1.0, Some(&carry));
         before = now;
         let ulps = 4.0 * 2e-6;
-        assert!(farthest(&jiggle.shape(1.0, None).points, &targets) < 1e-6 + ulps, "frame {frame}");
+        assert!(farthest(&jiggle.shape(1.0.into()).points, &targets) < 1e-6 + ulps, "frame {frame}");
     }
 }
 

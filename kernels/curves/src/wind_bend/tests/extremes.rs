@@ -1,6 +1,7 @@
 //! Stiff, empty and absurd input: finite output, kept lengths, no panic.
 
 use super::*;
+use numerics::masked::Masked;
 use numerics::noise::Kind;
 use std::f64::consts::PI;
 
@@ -106,7 +107,7 @@ fn lengths_hold_from_2_to_10_000_cvs() {
                     origin: [0.0; 3],
                     roots: None,
                 });
-                let bent = groom.bend(&Bend { mode, rotate, noise, ..plain(&ramp) });
+                let bent = groom.bend(&Bend { mode, rotate: rotate.into(), noise, ..plain(&ramp) });
                 assert_kept(&groom, &bent);
                 let whole = [0, cvs].map(|start| {
                     let curve = start..start + cvs;
@@ -166,9 +167,9 @@ fn parameters_at_absurd_ends_are_finite() {
                     let waviness = frequency as f32;
                     let origin = [frequency, 0.0, 0.0];
                     let noise = BendNoise { field: &field, amplitude, frequency, waviness, origin, roots: None };
-                    let with = Bend { rotate, mode, noise: Some(noise), ..plain(&ramp) };
+                    let with = Bend { rotate: rotate.into(), mode, noise: Some(noise), ..plain(&ramp) };
                     assert_kept(&groom, &groom.bend(&with));
-                    let masked = groom.bend(&Bend { rotate_mask: Some(&zeros), ..with });
+                    let masked = groom.bend(&Bend { rotate: Masked { value: rotate, mask: Some(&zeros) }, ..with });
                     assert!(bits(&masked.points) == bits(&groom.points), "g {rotate}, {mode:?}");
                 }
             }
@@ -195,6 +196,6 @@ fn ten_thousand_pivots_against_the_wind_take_linear_time() {
     let ramp = one();
     let curve = straight([0.0; 3], [-1.0, 0.0, 0.0], 10_000);
     let groom = Groom::of(&vec![curve; 32]);
-    let bent = groom.bend(&Bend { rotate: 1e-15, ..plain(&ramp) });
+    let bent = groom.bend(&Bend { rotate: 1e-15.into(), ..plain(&ramp) });
     assert_kept(&groom, &bent);
 }

@@ -1,6 +1,7 @@
 //! Laws with a closed form, and those of symmetry.
 
 use super::*;
+use numerics::masked::Masked;
 use numerics::noise::Kind;
 use std::f64::consts::PI;
 
@@ -30,7 +31,7 @@ fn check_angles(theta: f64, root: Vec3, segments: usize, with: &Bend<'_>, law: i
 fn a_quarter_turn_at_once_lays_the_curve_along_the_wind() {
     let ramp = one();
     let groom = Groom::of(&[straight([0.0; 3], [0.0, 2.0, 0.0], 2)]);
-    let bent = groom.bend(&Bend { rotate: 1.0, ..plain(&ramp) });
+    let bent = groom.bend(&Bend { rotate: 1.0.into(), ..plain(&ramp) });
     assert!(farthest(&bent.points, &[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]) < 3e-7);
     assert!((f64::from(bent.max_angle) - PI / 2.0).abs() < 3e-7);
     assert!(bent.length_error < 2e-7);
@@ -42,7 +43,7 @@ fn segment_k_of_a_straight_curve_makes_theta_0_times_1_minus_g_to_the_k() {
     for theta in [1e-3, 0.3, 1.2, PI / 2.0, 2.7, 3.1] {
         for g in [0.05f32, 0.3, 0.5, 0.9, 1.0] {
             for segments in 1..=8 {
-                let with = Bend { rotate: g, ..plain(&ramp) };
+                let with = Bend { rotate: g.into(), ..plain(&ramp) };
                 let left = 1.0 - f64::from(g);
                 check_angles(theta, [0.0; 3], segments, &with, |k, _| theta * libm::pow(left, k as f64 + 1.0));
                 check_angles(theta, [900.0, -7.0, 400.0], segments, &with, |k, _| {
@@ -56,8 +57,8 @@ fn segment_k_of_a_straight_curve_makes_theta_0_times_1_minus_g_to_the_k() {
 #[test]
 fn a_negative_share_turns_away_and_one_above_1_past_the_wind() {
     let ramp = one();
-    check_angles(1.0, [0.0; 3], 1, &Bend { rotate: -0.5, ..plain(&ramp) }, |_, _| 1.5);
-    check_angles(1.0, [0.0; 3], 1, &Bend { rotate: 1.25, ..plain(&ramp) }, |_, _| 0.25);
+    check_angles(1.0, [0.0; 3], 1, &Bend { rotate: (-0.5).into(), ..plain(&ramp) }, |_, _| 1.5);
+    check_angles(1.0, [0.0; 3], 1, &Bend { rotate: 1.25.into(), ..plain(&ramp) }, |_, _| 0.25);
 }
 
 #[test]
@@ -65,7 +66,7 @@ fn ramp_mask_and_envelope_scale_the_share_at_the_pivot() {
     let keys = vec![[0.0, 1.0], [1.0, 0.5]];
     let ramp = Ramp::new(keys, Interpolation::Linear).unwrap();
     let (mask, envelope) = ([0.5, 1.0, 9.0], [1.0, 0.4, 9.0]);
-    let with = Bend { rotate_mask: Some(&mask), envelope: Some(&envelope), ..plain(&ramp) };
+    let with = Bend { rotate: Masked { value: 0.5, mask: Some(&mask) }, envelope: Some(&envelope), ..plain(&ramp) };
     // g is 0.5·1·0.5·1 at the root, and 0.5·0.75·1·0.4 in the middle.
     check_angles(1.0, [0.0; 3], 2, &with, |k, _| [0.75, 0.75 * 0.85][k]);
 }
@@ -76,7 +77,7 @@ fn resolution_free_angles_follow_the_middle_of_each_segment() {
     for g in [0.1f32, 0.5, 0.9] {
         for segments in [1, 2, 4, 8, 32, 128, 1024] {
             let mode = Mode::ResolutionFree { reference_segments: 4.0 };
-            let with = Bend { rotate: g, mode, ..plain(&ramp) };
+            let with = Bend { rotate: g.into(), mode, ..plain(&ramp) };
             let left = 1.0 - f64::from(g);
             check_angles(1.5, [0.0; 3], segments, &with, |_, u| 1.5 * libm::pow(left, 4.0 * u));
         }
@@ -88,7 +89,7 @@ fn resolution_free_lies_along_the_wind_at_once_from_g_1_on() {
     let ramp = one();
     let mode = Mode::ResolutionFree { reference_segments: 4.0 };
     for g in [1.0, 3.0] {
-        check_angles(2.0, [0.0; 3], 5, &Bend { rotate: g, mode, ..plain(&ramp) }, |_, _| 0.0);
+        check_angles(2.0, [0.0; 3], 5, &Bend { rotate: g.into(), mode, ..plain(&ramp) }, |_, _| 0.0);
     }
 }
 
@@ -99,7 +100,7 @@ fn resolution_free_tips_converge_with_order_2_and_are_within_a_hundredth_at_9_cv
     for g in [0.3, 0.5, 0.7] {
         let tip = |segments| {
             let groom = Groom::of(&[straight([0.0; 3], leaning(2.0), segments)]);
-            *groom.bend(&Bend { rotate: g, mode, ..plain(&ramp) }).points.last().unwrap()
+            *groom.bend(&Bend { rotate: g.into(), mode, ..plain(&ramp) }).points.last().unwrap()
         };
         let finest = tip(1024);
         let error = |segments| distance(tip(segments), finest);
@@ -202,7 +203,7 @@ fn waviness_varies_the_wind_down_the_curve() {
     let groom = Groom::of(&[straight([0.3, 0.2, 0.1], [0.0, 4.0, 0.0], 6)]);
     let wavy = |waviness| {
         let noise = BendNoise { waviness, ..noisy(&field) };
-        groom.bend(&Bend { noise: Some(noise), rotate: 1.0, ..plain(&ramp) })
+        groom.bend(&Bend { noise: Some(noise), rotate: 1.0.into(), ..plain(&ramp) })
     };
     // With one direction for all pivots a straight curve at g = 1 stays straight.
     let (still, waves) = (wavy(0.0), wavy(1.0));
@@ -215,14 +216,14 @@ fn waviness_varies_the_wind_down_the_curve() {
 fn blend_0_keeps_the_bits_1_turns_in_full_and_a_half_by_half() {
     let (ramp, groom) = (one(), tangled(100, 9));
     let full = groom.bend(&plain(&ramp));
-    let with = |blend, mask| groom.bend(&Bend { blend, blend_mask: mask, ..plain(&ramp) });
+    let with = |blend, mask| groom.bend(&Bend { blend: Masked { value: blend, mask }, ..plain(&ramp) });
     let ones = vec![1.0; groom.points.len()];
     let zeros = vec![0.0; groom.points.len()];
     assert_eq!(bits(&with(0.0, None).points), bits(&groom.points));
     assert_eq!(bits(&with(1.0, Some(&zeros)).points), bits(&groom.points));
     assert_eq!(with(1.0, Some(&ones)), full);
     assert_eq!(with(7.0, Some(&ones)), full);
-    check_angles(1.0, [0.0; 3], 4, &Bend { blend: 0.5, ..plain(&ramp) }, |k, _| {
+    check_angles(1.0, [0.0; 3], 4, &Bend { blend: 0.5.into(), ..plain(&ramp) }, |k, _| {
         0.5 + 0.5 * libm::pow(0.5, k as f64 + 1.0)
     });
     assert_kept(&groom, &with(0.3, None));
@@ -233,7 +234,9 @@ fn what_has_no_wind_keeps_its_bits() {
     let (ramp, zero) = (one(), Ramp::constant(0.0));
     let groom = tangled(100, 9);
     let calm: Vec<f32> = (0..groom.points.len()).map(|cv| if cv % 2 == 0 { 0.0 } else { -1.0 }).collect();
-    for with in [Bend { rotate: 0.0, ..plain(&ramp) }, plain(&zero), Bend { envelope: Some(&calm), ..plain(&ramp) }] {
+    for with in
+        [Bend { rotate: 0.0.into(), ..plain(&ramp) }, plain(&zero), Bend { envelope: Some(&calm), ..plain(&ramp) }]
+    {
         let bent = groom.bend(&with);
         assert_eq!(bits(&bent.points), bits(&groom.points));
         assert_eq!((bent.max_angle, bent.length_error), (0.0, 0.0));

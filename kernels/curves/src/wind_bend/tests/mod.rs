@@ -64,13 +64,11 @@ fn tangled(curves: u64, most: u64) -> Groom {
 fn plain(ramp: &Ramp) -> Bend<'_> {
     Bend {
         wind: [1.0, 0.0, 0.0],
-        rotate: 0.5,
-        rotate_mask: None,
+        rotate: 0.5.into(),
         envelope: None,
         ramp,
         mode: Mode::Paper,
-        blend: 1.0,
-        blend_mask: None,
+        blend: 1.0.into(),
         noise: None,
     }
 }

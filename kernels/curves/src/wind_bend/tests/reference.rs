@@ -2,6 +2,7 @@
 //! runs the kernel.
 
 use super::*;
+use numerics::masked::Masked;
 use numerics::noise::Kind;
 
 type Vec64 = [f64; 3];
@@ -93,8 +94,8 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
             let field = Field::new(kind, 2, 0.5, 5);
             let with = Bend {
                 wind: [0.0, -1.0, 0.0],
-                rotate_mask: Some(&mask),
-                blend_mask: Some(&mask),
+                rotate: Masked { value: 0.5, mask: Some(&mask) },
+                blend: Masked { value: 1.0, mask: Some(&mask) },
                 mode,
                 noise: Some(BendNoise {
                     field: &field,

@@ -1,10 +1,11 @@
-//! What is made of the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
+//! What is computed from the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
 
 use bodies::carry::{Carrier, carry};
 use bodies::collision::Skin;
-use bodies::mass_spring::{Body, BodyError, Material, Mesh, Scaled, Spring};
+use bodies::mass_spring::{Body, BodyError, Material, Mesh, Spring};
 use bodies::tets::{boundary, edges, missing_edges};
 use engine::prelude::*;
+use numerics::masked::Masked;
 
 use super::joints::{Couple, couple};
 use super::pins::{Hold, holds};
@@ -15,19 +16,19 @@ use std::sync::Arc;
 
 /// What came in at the start. A chain sees it once, so it is part of what checkpoints keep.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Given {
+pub(super) struct StartInputs {
     pub(super) bodies: Vec<Arc<Geometry>>,
     pub(super) pins: Vec<Arc<Geometry>>,
 }
 
-impl Given {
+impl StartInputs {
     pub(super) fn at(cx: &FrameCx) -> Self {
         Self { bodies: cx.at_start(BODIES).to_vec(), pins: cx.at_start(PINS).to_vec() }
     }
 }
 
 /// All bodies as one: their particles in the order of the wires.
-pub(super) struct Made {
+pub(super) struct SimulationSetup {
     /// Particles at the start, metres.
     pub(super) rest: Vec<[f64; 3]>,
     pub(super) tets: Vec<[u32; 4]>,
@@ -56,57 +57,63 @@ struct Surface {
     carriers: Vec<Carrier>,
 }
 
-/// What bodies consist of at a frame: numbers, and what scales them particle by particle.
-pub(super) struct Stuff {
-    values: [f32; 3],
-    masks: [Option<Vec<f32>>; 3],
+/// A masked param over the particles of all bodies, which may come through several wires.
+pub(super) struct ParticleNumber {
+    pub(super) value: f32,
+    pub(super) mask: Option<Vec<f32>>,
 }
 
-impl Stuff {
-    pub(super) fn at(cx: &Cx, given: &Given) -> Result<Self> {
-        let of = |param: fn() -> Param<Masked>| masked(cx, given, param);
-        let (density, stiffness, damping) = (of(|| DENSITY)?, of(|| STIFFNESS)?, of(|| DAMPING)?);
-        Ok(Self { values: [density.0, stiffness.0, damping.0], masks: [density.1, stiffness.1, damping.1] })
+impl ParticleNumber {
+    /// A masked param over the particles of all bodies.
+    ///
+    /// # Errors
+    /// Where a body lacks the attribute.
+    pub(super) fn of(cx: &Cx, inputs: &StartInputs, param: Param<Maskable>) -> Result<Self> {
+        let mut mask = None;
+        for geometry in &inputs.bodies {
+            if let Some(own) = cx.mask(param, geometry.require(Kind::Tets)?)?.mask {
+                mask.get_or_insert_with(Vec::new).extend_from_slice(own);
+            }
+        }
+        Ok(Self { value: cx.get(param).value, mask })
     }
 
+    fn masked(&self) -> Masked<'_, f64> {
+        Masked { value: f64::from(self.value), mask: self.mask.as_deref() }
+    }
+}
+
+/// What bodies are made of at a frame.
+pub(super) struct MaterialFields {
+    density: ParticleNumber,
+    stiffness: ParticleNumber,
+    damping: ParticleNumber,
+}
+
+impl MaterialFields {
+    pub(super) fn at(cx: &Cx, inputs: &StartInputs) -> Result<Self> {
+        let of = |param| ParticleNumber::of(cx, inputs, param);
+        Ok(Self { density: of(DENSITY)?, stiffness: of(STIFFNESS)?, damping: of(DAMPING)? })
+    }
+
+    /// The numbers without their masks, which stand still.
     pub(super) fn values(&self) -> [f32; 3] {
-        self.values
+        [self.density.value, self.stiffness.value, self.damping.value]
     }
 
     pub(super) fn material(&self) -> Material<'_> {
-        let scaled = |k: usize| Scaled { value: f64::from(self.values[k]), mask: self.masks[k].as_deref() };
-        Material { density: scaled(0), stiffness: scaled(1), damping: scaled(2) }
+        Material { density: self.density.masked(), stiffness: self.stiffness.masked(), damping: self.damping.masked() }
     }
 }
 
-/// A masked param over the particles of all bodies.
-///
-/// # Errors
-/// Where a body lacks the attribute.
-pub(super) fn masked(cx: &Cx, given: &Given, param: fn() -> Param<Masked>) -> Result<(f32, Option<Vec<f32>>)> {
-    let (mut value, mut all) = (cx.get(param()).value, None);
-    for geometry in &given.bodies {
-        let (number, mask) = cx.mask(param(), tets(geometry))?;
-        value = number;
-        if let Some(mask) = mask {
-            all.get_or_insert_with(Vec::new).extend_from_slice(mask);
-        }
-    }
-    Ok((value, all))
-}
-
-fn tets(geometry: &Geometry) -> &Component {
-    geometry.tets().expect("the engine refuses a wire without tets")
-}
-
-impl Made {
-    pub(super) fn of(cx: &Cx, given: &Given) -> Result<Self> {
+impl SimulationSetup {
+    pub(super) fn of(cx: &Cx, inputs: &StartInputs) -> Result<Self> {
         let (mut surface, mut body): (Option<Component>, Option<Component>) = (None, None);
         let (mut rest, mut all, mut slivers, mut missing) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut wires, mut triangles, mut carriers) = (Vec::new(), Vec::new(), Vec::new());
         let mut outer = Vec::new();
-        for (wire, geometry) in given.bodies.iter().enumerate() {
-            let own = tets(geometry);
+        for (wire, geometry) in inputs.bodies.iter().enumerate() {
+            let own = geometry.require(Kind::Tets)?;
             let first = rest.len() as u32;
             let found = Surface::of(wire, own, geometry.mesh())?;
             rest.extend(own.positions().iter().map(|p| p.map(f64::from)));
@@ -131,7 +138,7 @@ impl Made {
         }
         triangles.iter().flatten().for_each(|corner: &u32| outer[*corner as usize] = true);
         let parts = parts(rest.len(), &all);
-        let stuff = Stuff::at(cx, given)?;
+        let material = MaterialFields::at(cx, inputs)?;
         let joints = couple(&Couple {
             points: &rest,
             triangles: &triangles,
@@ -140,10 +147,10 @@ impl Made {
             stiffness: cx.get(COUPLING_STIFFNESS),
             damping: f64::from(cx.get(DAMPING).value),
         });
-        let mut made = Self {
+        let mut setup = Self {
             outer,
             skins: Vec::new(),
-            holds: holds(&given.pins, &rest)?,
+            holds: holds(&inputs.pins, &rest)?,
             surface: surface.map_or_else(|| Component::mesh(Vec::new(), Vec::new(), Vec::new()), Ok)?,
             body: body.map_or_else(|| Component::tets(Vec::new(), Vec::new()), Ok)?,
             carriers,
@@ -154,15 +161,15 @@ impl Made {
             joints,
             wires,
         };
-        let links = made.body(&stuff)?.springs();
-        made.skins = skins(&made.rest, &triangles, &parts, &links)?;
-        Ok(made)
+        let links = setup.body(&material)?.springs();
+        setup.skins = skins(&setup.rest, &triangles, &parts, &links)?;
+        Ok(setup)
     }
 
     /// The body that is solved for.
-    pub(super) fn body(&self, stuff: &Stuff) -> Result<Body> {
+    pub(super) fn body(&self, material: &MaterialFields) -> Result<Body> {
         let mesh = Mesh { points: &self.rest, tets: &self.tets, slivers: &self.slivers, missing: &self.missing };
-        Body::new(&mesh, &stuff.material(), &self.joints).map_err(refusal)
+        Body::new(&mesh, &material.material(), &self.joints).map_err(refusal)
     }
 
     /// Edges of the skins that colliders let go with particles at `x`.
