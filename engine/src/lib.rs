@@ -11,7 +11,6 @@ pub mod key;
 pub mod node;
 pub mod param;
 pub mod plan;
-pub mod testing;
 pub mod time;
 
 pub use error::{Error, ErrorKind, Result};

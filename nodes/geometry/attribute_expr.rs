@@ -214,8 +214,8 @@ fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{Bench, BenchResult, bench, conformance, cook_all};
     use engine::cook::{Engine, Settings};
-    use engine::testing::{Bench, Tasted, bench, conformance, cook_all};
 
     fn curves() -> Component {
         let points = vec![[0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [3.0, 1.0, 0.0]];
@@ -228,7 +228,7 @@ mod tests {
         bench(&NODE).input(GEOMETRY, curves()).set(CODE, text.into())
     }
 
-    fn floats<'a>(out: &'a Tasted, name: &'static str) -> &'a [f32] {
+    fn floats<'a>(out: &'a BenchResult, name: &'static str) -> &'a [f32] {
         out.curves().get(Attr::point(name)).unwrap()
     }
 

@@ -69,7 +69,7 @@ fn inline(cx: &Cx) -> Result<Component> {
 mod tests {
     use super::*;
     use crate::shared::source::numbered_files;
-    use engine::testing::{bench, conformance};
+    use conformance::{bench, conformance};
 
     fn points(rows: &[[f32; 3]]) -> Option<Arc<Vec<[f32; 3]>>> {
         Some(Arc::new(rows.to_vec()))

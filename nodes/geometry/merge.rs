@@ -106,8 +106,8 @@ fn completed(part: &Component, names: &[(Owner, Name)]) -> Result<Component> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{bench, conforms};
     use engine::geometry::Grid;
-    use engine::testing::{bench, conforms};
 
     fn curve(x: f32) -> Component {
         Component::curves(vec![2], vec![[x, 0.0, 0.0], [x, 1.0, 0.0]]).unwrap()

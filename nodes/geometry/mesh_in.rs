@@ -67,9 +67,9 @@ fn inline(cx: &Cx) -> Result<Component> {
 mod tests {
     use super::*;
     use crate::shared::source::numbered_files;
-    use engine::testing::{bench, conformance};
+    use conformance::{bench, conformance};
 
-    fn square() -> engine::testing::Bench {
+    fn square() -> conformance::Bench {
         let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
         bench(&NODE).set(POINTS, Some(Arc::new(points.to_vec())))
     }

@@ -108,8 +108,8 @@ fn no_hollow(params: &Params) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{bench, conforms};
     use engine::param::Choice;
-    use engine::testing::{bench, conforms};
 
     const SOLIDS: [Solid; 7] =
         [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Bowl, Solid::Plate];
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn sizes_and_divisions_out_of_range_are_refused() {
-        let error = |bench: engine::testing::Bench| bench.try_cook().unwrap_err().fact;
+        let error = |bench: conformance::Bench| bench.try_cook().unwrap_err().fact;
         assert_eq!(error(bench(&NODE).set(SIZE, [1.0, -1.0, 1.0])), "`size` is [1, -1, 1]");
         assert_eq!(error(bench(&NODE).set(DIVISIONS, 0)), "`divisions` is 0");
         assert_eq!(error(bench(&NODE).set(DIVISIONS, 513)), "`divisions` is 513");

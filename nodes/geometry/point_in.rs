@@ -47,7 +47,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 mod tests {
     use super::*;
     use crate::shared::source::numbered_files;
-    use engine::testing::{bench, conformance};
+    use conformance::{bench, conformance};
 
     #[test]
     fn conforms_to_its_declaration() {

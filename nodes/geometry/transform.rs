@@ -153,8 +153,8 @@ fn moved_volume(volume: &Volume, affine: &Affine, cx: &Cx) -> Result<Volume> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{bench, conforms};
     use engine::param::{Value, euler_to_turn};
-    use engine::testing::{bench, conforms};
 
     fn degrees(x: f64, y: f64, z: f64) -> Turn {
         let Value::Turn(turn) = euler_to_turn([x, y, z]) else { panic!("a rotation") };

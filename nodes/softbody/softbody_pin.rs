@@ -56,7 +56,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::{bench, conforms};
+    use conformance::{bench, conforms};
 
     #[test]
     fn every_point_is_a_pin_and_stays_where_it_is() {

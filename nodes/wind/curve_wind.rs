@@ -234,8 +234,8 @@ fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{Bench, BenchResult, bench, conforms};
     use engine::graph::Scene;
-    use engine::testing::{Bench, Tasted, bench, conforms};
 
     /// A straight curve up from the origin, of `segments` segments and length 1.
     fn upright(segments: usize) -> Geometry {
@@ -254,7 +254,7 @@ mod tests {
     }
 
     /// Angle of each segment of the first curve to the wind along x, radians.
-    fn angles(out: &Tasted) -> Vec<f64> {
+    fn angles(out: &BenchResult) -> Vec<f64> {
         let cvs = &out.curves().positions()[out.curves().runs().range(0)];
         let angle = |pair: &[[f32; 3]]| {
             let d: [f64; 3] = std::array::from_fn(|k| f64::from(pair[1][k]) - f64::from(pair[0][k]));
@@ -352,7 +352,7 @@ mod tests {
     fn noise_scrolls_downwind() {
         // After a second at 2 m/s, what stood at x now stands at x + 2: curve 2 bends as curve 0 did.
         let windy = bench(&NODE).input(CURVES, field(4)).set(SCROLL, 2.0);
-        let shape = |out: &Tasted, curve: usize| {
+        let shape = |out: &BenchResult, curve: usize| {
             let cvs = &out.curves().positions()[out.curves().runs().range(curve)];
             cvs.iter().map(|cv| std::array::from_fn::<f32, 3, _>(|k| cv[k] - cvs[0][k])).collect::<Vec<_>>()
         };
@@ -369,7 +369,7 @@ mod tests {
         let windy =
             bench(&NODE).input(CURVES, field(3)).set(FREQUENCY, 0.001).keyed(SCROLL, &[(10.0, 1.0), (11.0, 100.0)]);
         let frames = windy.frames(8..=14);
-        let moved = |pair: &[Tasted]| {
+        let moved = |pair: &[BenchResult]| {
             let points = pair.iter().map(|out| out.curves().positions()).collect::<Vec<_>>();
             points[0].iter().zip(points[1]).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max)
         };
@@ -383,7 +383,7 @@ mod tests {
             .input(CURVES, field(5))
             .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
             .keyed(SCROLL, &[(1.0, 0.5), (20.0, 3.0)]);
-        let bits = |out: &Tasted| out.curves().table(Owner::Point).column("P").unwrap().to_bytes();
+        let bits = |out: &BenchResult| out.curves().table(Owner::Point).column("P").unwrap().to_bytes();
         let in_order = windy.frames(1..=20);
         for frame in [20_i64, 7, 13, 1] {
             let alone = windy.clone().threads(if frame == 7 { 1 } else { 7 }).at(frame as f64).cook();

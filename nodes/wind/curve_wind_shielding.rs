@@ -164,7 +164,7 @@ fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use engine::testing::{Bench, bench, conforms};
+    use conformance::{Bench, bench, conforms};
 
     #[test]
     fn conforms_to_its_declaration() {

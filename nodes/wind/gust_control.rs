@@ -82,9 +82,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use conformance::{Bench, BenchResult, bench, conforms};
     use curves::gusts::{Gusts, feel};
     use engine::param::{Source, Value};
-    use engine::testing::{Bench, Tasted, bench, conforms};
     use numerics::ramp::Interpolation;
 
     fn degrees(x: f64, y: f64, z: f64) -> Turn {
@@ -93,7 +93,7 @@ mod tests {
     }
 
     /// What points feel of the controls that came out.
-    fn felt(out: &Tasted, points: &[[f32; 3]]) -> Vec<f32> {
+    fn felt(out: &BenchResult, points: &[[f32; 3]]) -> Vec<f32> {
         let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
         let none = Ramp::constant(0.0);
         feel(points, &Gusts { base: 0.0, falloff: &none, spheres: &[], controls: &controls, incoming: None }).values

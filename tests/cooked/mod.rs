@@ -7,10 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use conformance::cook_all;
 use engine::cook::{Engine, Report, Settings};
 use engine::geometry::Geometry;
 use engine::graph::{Graph, GraphOutput, Link, probe};
-use engine::testing::cook_all;
 use engine::time::Frame;
 
 /// The bear, and its fur.

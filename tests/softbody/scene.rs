@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::sync::Arc;
 
+use conformance::cook_all;
 use engine::cook::{Engine, Settings};
 use engine::error::ErrorKind;
 use engine::geometry::{Attr, Component, Geometry};
 use engine::graph::Body;
-use engine::testing::cook_all;
 use engine::time::Frame;
 
 use super::cooked::{fault, graph, metrics};

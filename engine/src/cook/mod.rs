@@ -134,14 +134,12 @@ impl Engine {
         self.pool.install(|| sweep::Sweep::new(self, &plan, disk, cancel, false).run(sink))
     }
 
-    /// Cooks a plan for a test that wants to look at the plan afterwards; `reload` writes the state of every solver and
-    /// reads it back after each step, which must not change a bit.
-    pub(crate) fn try_plan<E: Send>(
-        &self,
-        plan: &Plan,
-        reload: bool,
-        sink: &mut Sink<'_, E>,
-    ) -> Result<Report, Stopped<E>> {
+    /// Cooks a plan that the caller keeps. With `reload`, the state of every solver is serialised and read back after each
+    /// step: a check that checkpoints are complete, as it must not change a bit of the results.
+    ///
+    /// # Errors
+    /// Where the sink refuses.
+    pub fn cook_plan<E: Send>(&self, plan: &Plan, reload: bool, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
         let cancel = AtomicBool::new(false);
         self.pool.install(|| {
             let mut sweep = sweep::Sweep::new(self, plan, None, &cancel, false);

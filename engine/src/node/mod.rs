@@ -286,6 +286,14 @@ impl Node {
         self.inputs.iter().map(|input| input.spec()).collect()
     }
 
+    /// Where a solver's state starts, given its params; `None` for the scene's first frame, and for nodes without one.
+    pub fn start_frame(&self, params: &Params) -> Option<i64> {
+        match &self.cook {
+            Cook::Solver(_, solver) => (solver.start_frame)(params),
+            Cook::Pure(_) | Cook::Frame { .. } | Cook::Window(..) => None,
+        }
+    }
+
     /// The help's first sentence.
     pub fn summary(&self) -> &'static str {
         self.help.split_inclusive(". ").next().unwrap_or(self.help).trim_end()

@@ -25,18 +25,13 @@ pub use turn::euler_to_turn;
 pub use unit::Unit;
 pub use value::{Maskable, Seed, Span, Turn, Value};
 
-/// Which params of a node were ever read; the conformance suite asks.
+/// Which params of a node were ever read.
 #[derive(Debug, Default)]
-pub struct ReadLog(Box<[AtomicBool]>);
+pub(crate) struct ReadLog(Box<[AtomicBool]>);
 
 impl ReadLog {
     pub(crate) fn new(params: usize) -> Self {
         Self((0..params).map(|_| AtomicBool::new(false)).collect())
-    }
-
-    /// Whether the param at `place` was read.
-    pub fn was_read(&self, place: usize) -> bool {
-        self.0.get(place).is_some_and(|read| read.load(Ordering::Relaxed))
     }
 }
 
@@ -49,6 +44,23 @@ pub struct Params {
 }
 
 impl Params {
+    /// Params with a value for each of `specs`, none of them read yet: for calling functions of a declaration outside a
+    /// cook.
+    ///
+    /// # Panics
+    /// Where there are not as many values as specs.
+    pub fn new(specs: Arc<[ParamSpec]>, values: Vec<Value>) -> Self {
+        assert_eq!(specs.len(), values.len(), "a value for each param");
+        let log = Arc::new(ReadLog::new(specs.len()));
+        Self { specs, values: values.into(), log }
+    }
+
+    /// Whether the param at `index` of the declaration was ever read. Shared by clones, and by all that one plan resolved
+    /// for one node, at whatever frame.
+    pub fn was_read(&self, index: usize) -> bool {
+        self.log.0.get(index).is_some_and(|read| read.load(Ordering::Relaxed))
+    }
+
     /// The value of a param.
     ///
     /// # Panics

@@ -7,6 +7,7 @@
 mod keys;
 mod live;
 mod resolve;
+mod result_keys;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub use keys::Window;
 pub(crate) use keys::{Keys, Stretch};
 pub(crate) use resolve::{Resolver, numbered_path};
+pub use result_keys::result_keys;
 
 use crate::cook::CookError;
 use crate::error::Error;
@@ -166,6 +168,14 @@ impl<'g> Plan<'g> {
             }
         }
         Ok(())
+    }
+
+    /// The params of a node (its index in [`Graph::nodes`]) at a frame, as a cook would resolve them.
+    ///
+    /// # Errors
+    /// Where a value is refused or a file cannot be read.
+    pub fn params(&self, node: usize, frame: Frame) -> crate::Result<Params> {
+        self.nodes[node].resolver.at(frame)
     }
 
     pub(crate) fn error(&self, node: usize, frame: Frame, error: Error) -> CookError {

@@ -75,11 +75,6 @@ impl Resolver {
         self.specs.iter().zip(&self.sources).any(|(spec, source)| spec.facts.history && source.is_animated())
     }
 
-    /// Which params were ever read.
-    pub(crate) fn log(&self) -> &Arc<ReadLog> {
-        &self.log
-    }
-
     /// The params at `frame`.
     pub(crate) fn at(&self, frame: Frame) -> Result<Params> {
         match &self.constant {

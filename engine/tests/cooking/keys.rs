@@ -3,13 +3,13 @@
 use engine::graph::{Body, Scene};
 use engine::key::Key;
 use engine::param::{ParamType, Source};
-use engine::testing;
+use engine::plan::result_keys;
 
 use crate::net::{Net, at, keyed};
 use crate::nodes::{ADD, BOUNCE, CLOCK, DRIFT, FOLLOW, FROM_START, SOURCE, SUM};
 
 fn key(net: &Net, node: &str, frame: f64) -> Key {
-    testing::keys(&net.0, node, &[at(frame)]).unwrap_or_else(|error| panic!("{error}"))[0]
+    result_keys(&net.0, node, &[at(frame)]).unwrap_or_else(|error| panic!("{error}"))[0]
 }
 
 fn constant<T: ParamType>(value: T) -> Source {
@@ -198,7 +198,7 @@ fn a_key_does_not_hang_on_which_frames_were_asked_before() {
     net.add("again", &FOLLOW).set("frames", 5_i64).wire("points", follow).out();
     let frames = [-5.0, -2.5, 0.0, 7.0, 3.0, 7.5, 30.25, 12.0].map(at);
     for node in ["drift", "follow", "again"] {
-        let together = testing::keys(&net.0, node, &frames).unwrap_or_else(|error| panic!("{error}"));
+        let together = result_keys(&net.0, node, &frames).unwrap_or_else(|error| panic!("{error}"));
         for (frame, together) in frames.iter().zip(together) {
             assert_eq!(key(&net, node, frame.number()), together, "{node} at {frame}");
         }

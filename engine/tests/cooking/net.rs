@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Once};
 
 use engine::cook::{Delivered, DiskCache, Engine, NodeReport, Report, Settings};
 use engine::geometry::{Component, Geometry};
@@ -149,9 +149,18 @@ pub(crate) fn engine(threads: usize, memory: usize) -> Engine {
     Engine::new(&Settings { threads, memory }).expect("threads")
 }
 
-/// Runs what panics on purpose without the words of the panic on the terminal.
+/// Runs what panics on purpose; from then on panics of threads that cook are not printed, those of tests are.
 pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> T {
-    engine::testing::quietly(work)
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !std::thread::current().name().is_some_and(|name| name.starts_with("convect ")) {
+                print(panic);
+            }
+        }));
+    });
+    work()
 }
 
 pub(crate) fn at(frame: f64) -> Frame {

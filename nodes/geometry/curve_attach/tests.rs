@@ -1,7 +1,7 @@
 //! Laws of attached curves.
 
 use super::*;
-use engine::testing::{Bench, Tasted, bench, conforms};
+use conformance::{Bench, BenchResult, bench, conforms};
 use numerics::trig::sin_cos;
 
 type Point = [f32; 3];
@@ -197,7 +197,7 @@ fn the_order_of_frames_and_the_number_of_threads_change_no_bit() {
     let curves = |frame: Frame| moved(&hair(), |[x, y, z]| [x + 0.1 * frame.number() * y, y, z]).into();
     let moving = bench(&NODE).moving(CURVES, curves).input(REST_SKIN, floor()).moving(SKIN, skin);
     let in_order = moving.frames(1..=5);
-    let back: Vec<Tasted> = moving.clone().threads(7).frames((1..=5).rev());
+    let back: Vec<BenchResult> = moving.clone().threads(7).frames((1..=5).rev());
     for (frame, expected) in (1..=5).zip(&in_order) {
         let alone = moving.clone().threads(1).at(f64::from(frame)).cook();
         assert_eq!(alone.geometry, expected.geometry, "{frame}");

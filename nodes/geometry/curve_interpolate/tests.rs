@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::curve_scatter;
-use engine::testing::{Bench, Tasted, bench, conforms};
+use conformance::{Bench, BenchResult, bench, conforms};
 use numerics::shapes;
 
 type Point = [f32; 3];
@@ -50,7 +50,7 @@ fn apart(a: &[Point], b: &[Point]) -> f64 {
     a.iter().zip(b).map(one).fold(0.0, f64::max)
 }
 
-fn roots(out: &Tasted) -> Vec<Point> {
+fn roots(out: &BenchResult) -> Vec<Point> {
     Roots::of(out.curves()).0
 }
 
@@ -82,7 +82,8 @@ fn roots_and_ids_do_not_hang_on_how_guides_are_blown() {
         assert_eq!(out.curves().get(PREF), Some(still.curves().positions()));
     }
     // They follow: at frame 9 every tip has gone its guides' way.
-    let tips = |out: &Tasted| -> Vec<Point> { out.curves().positions().iter().skip(4).step_by(5).copied().collect() };
+    let tips =
+        |out: &BenchResult| -> Vec<Point> { out.curves().positions().iter().skip(4).step_by(5).copied().collect() };
     let (before, after) = (tips(&still), tips(&frames[2]));
     assert!(before.iter().zip(&after).all(|(a, b)| b[0] > a[0] + 1e-3), "{before:?} {after:?}");
 }

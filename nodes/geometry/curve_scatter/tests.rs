@@ -1,7 +1,7 @@
 //! Laws of scattered curves.
 
 use super::*;
-use engine::testing::{Bench, Tasted, bench, conforms};
+use conformance::{Bench, BenchResult, bench, conforms};
 
 /// A square in x and z around the origin, `size` wide, facing up.
 fn square(size: f32) -> Component {
@@ -13,11 +13,11 @@ fn meadow(skin: Component) -> Bench {
     bench(&NODE).input(SKIN, skin)
 }
 
-fn roots(out: &Tasted) -> Vec<[f32; 3]> {
+fn roots(out: &BenchResult) -> Vec<[f32; 3]> {
     out.curves().runs().ranges().map(|cvs| out.curves().positions()[cvs.start]).collect()
 }
 
-fn ids(out: &Tasted) -> &[i32] {
+fn ids(out: &BenchResult) -> &[i32] {
     out.curves().get(CURVE_ID).unwrap()
 }
 

@@ -1,6 +1,6 @@
 use super::*;
+use conformance::{Bench, bench, conformance};
 use engine::geometry::Grid;
-use engine::testing::{Bench, bench, conformance};
 use numerics::shapes::{self, Polygons};
 
 type Point = [f32; 3];

@@ -1,5 +1,5 @@
 use super::*;
-use engine::testing::{Bench, Tasted, bench, conformance};
+use conformance::{Bench, BenchResult, bench, conformance};
 
 const G: f64 = 9.81;
 /// Seconds of a frame.
@@ -48,7 +48,7 @@ fn all(value: f32) -> Maskable {
     Maskable { value, attribute: None }
 }
 
-fn height(tasted: &Tasted) -> f32 {
+fn height(tasted: &BenchResult) -> f32 {
     tasted.mesh().positions().iter().map(|p| p[1]).fold(f32::NEG_INFINITY, f32::max)
 }
 
@@ -171,7 +171,7 @@ fn a_goal_that_was_reached_becomes_the_shape_at_rest() {
 fn a_block_rests_on_the_ground() {
     let frames =
         simulating(block([3; 3], [0.0; 3], [0.1; 3])).set(GROUND, true).set(STIFFNESS, all(1e5)).frames([1, 120, 121]);
-    let lowest = |frame: &Tasted| frame.mesh().positions().iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
+    let lowest = |frame: &BenchResult| frame.mesh().positions().iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
     assert!((0.0..=1e-3).contains(&lowest(&frames[1])), "{}", lowest(&frames[1]));
     let moved = frames[1].mesh().positions().iter().zip(frames[2].mesh().positions()).map(|(p, q)| (p[1] - q[1]).abs());
     assert!(moved.fold(0.0, f32::max) < 1e-6);
@@ -218,8 +218,9 @@ fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
             .set(STIFFNESS, all(1e5))
             .frames([1, 24])
     };
-    let drop =
-        |frames: &[Tasted]| frames[0].part(Kind::Mesh).positions()[0][1] - frames[1].part(Kind::Mesh).positions()[0][1];
+    let drop = |frames: &[BenchResult]| {
+        frames[0].part(Kind::Mesh).positions()[0][1] - frames[1].part(Kind::Mesh).positions()[0][1]
+    };
     let held = coupled(2e4);
     assert!(held[1].metrics["torn"] == 0.0 && drop(&held) < 0.01, "{} {:?}", drop(&held), held[1].metrics);
     let torn = coupled(1.0);

@@ -1,6 +1,6 @@
 use super::*;
 use bodies::tets::{Closed, Fill, Surface};
-use engine::testing::{Bench, bench, conformance};
+use conformance::{Bench, bench, conformance};
 use numerics::shapes::{self, Polygons};
 
 type Map = fn([f64; 3]) -> [f64; 3];

@@ -1,5 +1,5 @@
 use super::*;
-use engine::testing::{Bench, Tasted, bench, conformance};
+use conformance::{Bench, BenchResult, bench, conformance};
 use numerics::shapes;
 
 fn mesh(shape: &shapes::Polygons) -> Component {
@@ -15,7 +15,7 @@ fn filling(surface: impl Into<Geometry>) -> Bench {
     bench(&NODE).input(SURFACE, surface)
 }
 
-fn tets(out: &Tasted) -> &Component {
+fn tets(out: &BenchResult) -> &Component {
     out.part(Kind::Tets)
 }
 

@@ -1,7 +1,7 @@
 use super::*;
+use conformance::{Bench, BenchResult, bench, conforms};
 use engine::graph::Scene;
 use engine::param::{ParamType, Source};
-use engine::testing::{Bench, Tasted, bench, conforms};
 
 /// A field of upright curves of 5 CVs, 1 m long, 3 m apart.
 fn field() -> Geometry {
@@ -51,7 +51,7 @@ fn plain(value: f32) -> Maskable {
     Maskable { value, attribute: None }
 }
 
-fn bits(out: &Tasted) -> Vec<u8> {
+fn bits(out: &BenchResult) -> Vec<u8> {
     out.curves().table(Owner::Point).column("P").unwrap().to_bytes()
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use engine::testing::{Bench, bench, conforms};
+use conformance::{Bench, bench, conforms};
 
 fn floor(height: f32) -> Geometry {
     let points = vec![[-9.0, height, -9.0], [-9.0, height, 9.0], [9.0, height, 9.0], [9.0, height, -9.0]];

@@ -1,6 +1,6 @@
 use super::*;
+use conformance::{Bench, BenchResult, bench, conformance};
 use curves::gusts::{Shape, outline};
-use engine::testing::{Bench, Tasted, bench, conformance};
 use numerics::ramp::Interpolation;
 
 fn span(low: f32, high: f32) -> Span {
@@ -40,12 +40,12 @@ fn single(curves: Geometry) -> Bench {
         .set(LIFE_RANGE, span(1000.0, 1000.0))
 }
 
-fn envelope(out: &Tasted) -> &[f32] {
+fn envelope(out: &BenchResult) -> &[f32] {
     out.curves().get(ENVELOPE).unwrap()
 }
 
 /// Where along a ruler a gust of `falloff` 1…0 over 1 m has its centre.
-fn centre(out: &Tasted) -> f64 {
+fn centre(out: &BenchResult) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for (p, value) in out.curves().positions().iter().zip(envelope(out)) {
         sum += f64::from(p[0] * value);
@@ -54,7 +54,7 @@ fn centre(out: &Tasted) -> f64 {
     sum / weight
 }
 
-fn bits(out: &Tasted) -> Vec<u8> {
+fn bits(out: &BenchResult) -> Vec<u8> {
     out.curves().table(Owner::Point).column("envelope").unwrap().to_bytes()
 }
 
@@ -140,7 +140,7 @@ fn gusts_add_up_to_base_and_scale_what_came_in() {
 fn after_its_life_a_gust_dies_down_while_it_travels() {
     let gust = single(ruler(-8.0, 20.0)).set(LIFE_RANGE, span(24.0, 24.0)).set(DECAY_RANGE, span(12.0, 12.0));
     let at = |frame: f64| gust.clone().at(frame).cook();
-    let most = |out: &Tasted| envelope(out).iter().copied().fold(0.0, f32::max);
+    let most = |out: &BenchResult| envelope(out).iter().copied().fold(0.0, f32::max);
     let [living, dying, gone] = [36.0, 42.0, 48.0].map(at);
     assert!((most(&dying) / most(&living) - 0.5).abs() < 1e-2);
     assert_eq!((most(&gone), gone.metrics["active_gusts"]), (0.0, 0.0));

@@ -12,11 +12,11 @@ mod wind;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use conformance::cook_all;
 use engine::cook::{Engine, Settings};
 use engine::error::ErrorKind;
 use engine::geometry::{Component, ENVELOPE, Geometry, Kind, P};
 use engine::graph::Body;
-use engine::testing::cook_all;
 use engine::time::Frame;
 use numerics::random::Key;
 use numerics::shapes::icosphere;

@@ -2,14 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::trial::{Motion, Outcome, Subject, Trial};
-use super::{Findings, declaration};
-use crate::error::ErrorKind;
-use crate::geometry::{Component, Geometry, Kind, Owner, P, Volume};
-use crate::node::{Arity, AttrNames, Carries, Needs, Output};
-use crate::testing::samples::Form;
+use super::declaration;
+use crate::samples::Form;
+use crate::suite::Findings;
+use crate::trial::{Motion, Outcome, Subject, Trial};
+use engine::error::ErrorKind;
+use engine::geometry::{Component, Geometry, Kind, Owner, P, Volume};
+use engine::node::{Arity, AttrNames, Carries, Needs, Output};
 
-pub(super) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
+pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     for (trial, outcome) in tried {
         check_errors(outcome, trial.form, findings);
         for ((place, _), geometry) in &outcome.found {
@@ -32,7 +33,7 @@ pub(super) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
 }
 
 /// Errors that are the node's own fault, whatever it was given.
-pub(super) fn check_errors(outcome: &Outcome, form: Form, findings: &mut Findings) {
+pub(crate) fn check_errors(outcome: &Outcome, form: Form, findings: &mut Findings) {
     for (_, kind, error) in &outcome.errors {
         let with = if form == Form::Small || form == Form::Other {
             String::new()

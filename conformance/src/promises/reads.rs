@@ -2,16 +2,16 @@
 
 use numerics::random::Key;
 
-use super::Findings;
 use super::declaration;
-use super::trial::{Outcome, Subject, Trial, masks};
-use crate::geometry::Name;
-use crate::node::AttrNames;
-use crate::param::{Shape, Source, Unset, Value};
-use crate::testing::samples::MASK;
-use crate::testing::settings;
+use crate::samples::MASK;
+use crate::suite::Findings;
+use crate::trial::{Outcome, Subject, Trial, masks};
+use crate::values;
+use engine::geometry::Name;
+use engine::node::AttrNames;
+use engine::param::{Shape, Source, Unset, Value};
 
-pub(super) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
+pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     for place in 0..subject.specs.len() {
         check_param(subject, tried, place, findings);
     }
@@ -56,16 +56,16 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], place: usize, find
 
 /// A number `share` of the way through what a masked param may be.
 fn between(subject: &Subject, place: usize, share: f64) -> f64 {
-    let numbers: Vec<f64> = settings::candidates(&subject.specs[place]).iter().map(Value::number).collect();
+    let numbers: Vec<f64> = values::candidates(&subject.specs[place]).iter().map(Value::number).collect();
     let (low, high) = numbers.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
     low + (high - low) * share
 }
 
 fn values(subject: &Subject, place: usize) -> Vec<Value> {
     let spec = &subject.specs[place];
-    let random = (0..3).map(|k| settings::random(spec, Key::new(77).of(k)));
+    let random = (0..3).map(|k| values::random(spec, Key::new(77).of(k)));
     let mut values: Vec<Value> = Vec::new();
-    for value in settings::candidates(spec).into_iter().chain(random).chain([spec.default.clone()]) {
+    for value in values::candidates(spec).into_iter().chain(random).chain([spec.default.clone()]) {
         if !values.contains(&value) {
             values.push(value);
         }
@@ -91,7 +91,7 @@ fn trials<'t>(
         Some(when) => subject.params(trial).is_some_and(|params| when(&params)),
     };
     let at_hand = tried.iter().map(|(trial, outcome)| (trial.clone(), Some(outcome)));
-    let sought = (0..SOUGHT).map(|k| (super::mixture(subject, 1_000 + k), None));
+    let sought = (0..SOUGHT).map(|k| (crate::suite::mixture(subject, 1_000 + k), None));
     at_hand.chain(sought).filter(move |(trial, _)| is_read(trial))
 }
 
@@ -145,7 +145,7 @@ fn check_inputs(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Fi
             let mut fewer = trial.clone();
             fewer.wires[place].pop();
             let before = outcome.whole();
-            let many = matches!(input.arity, crate::node::Arity::Many { .. }) && trial.wires[place].len() > 1;
+            let many = matches!(input.arity, engine::node::Arity::Many { .. }) && trial.wires[place].len() > 1;
             subject.run(&other, &frames).whole() != before || many && subject.run(&fewer, &frames).whole() != before
         });
         if !matters {
@@ -214,7 +214,7 @@ fn check_other_attributes(subject: &Subject, tried: &[(Trial, Outcome)], finding
 fn culprit(subject: &Subject, trial: &Trial, ignore: &dyn Fn(&str) -> bool) -> Option<String> {
     let frames = subject.frames();
     let before = subject.run(trial, &frames).digest(ignore);
-    let names = crate::testing::samples::usual().into_iter().map(|(name, _, _)| name);
+    let names = crate::samples::usual().into_iter().map(|(name, _, _)| name);
     names.into_iter().find_map(|name| {
         let without = Trial { without: Some(name.clone()), ..trial.clone() };
         (subject.run(&without, &frames).digest(ignore) != before).then(|| format!("`{name}`"))

@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::{conformance, faults};
-use crate::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
-use crate::node::{
+use engine::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
+use engine::node::{
     AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
 };
-use crate::param::{Maskable, Param, Params, Seed, Unit};
-use crate::{Error, Result, choice};
+use engine::param::{Maskable, Param, Params, Seed, Unit};
+use engine::{Error, Result, choice};
 
 choice! {
     /// Which way.
@@ -369,7 +369,7 @@ fn what_is_left_out_still_writes_its_attributes() {
         }
         Ok(OUT.with(curves))
     };
-    let leaves_out: fn(&Params, &crate::node::Wires) -> Vec<LeftOut> =
+    let leaves_out: fn(&Params, &engine::node::Wires) -> Vec<LeftOut> =
         |params, _| if params.get(TWICE) { Vec::new() } else { vec![LeftOut::new("dust", "`twice` is false")] };
     let node = shift(dusty).params(&[&AMOUNT, &TWICE]).writes(&[&P, &DUST]).leaves_out(leaves_out);
     only(node, "it leaves out `dust` and then lacks `dust` on its output `curves`");
@@ -587,7 +587,7 @@ fn a_solver_whose_checkpoints_lose_something_is_found() {
 
 #[test]
 fn a_text_in_a_language_comes_from_the_test() {
-    const CODE: Param<crate::geometry::Name> = Param::text("code", "", "What is done: `up`, or `down`.").fixed();
+    const CODE: Param<engine::geometry::Name> = Param::text("code", "", "What is done: `up`, or `down`.").fixed();
     let node = shift(|cx| match &*cx.get(CODE) {
         "up" => Ok(OUT.with(up(cx, cx.get(AMOUNT))?)),
         "down" => Ok(OUT.with(up(cx, -cx.get(AMOUNT))?)),

@@ -12,14 +12,14 @@ use std::sync::atomic::AtomicBool;
 
 use numerics::ramp::Interpolation;
 
-use crate::cook::{CookError, Delivered, Engine, Report, Settings};
-use crate::error::Error;
-use crate::geometry::{Component, Geometry, Kind};
-use crate::graph::{Body, Graph, GraphNode, GraphOutput, Link, Places, Scene};
-use crate::node::{Input, Node};
-use crate::param::{Keyframes, Param, ParamType, Shape, Source, Unset, Value};
-use crate::plan::Request;
-use crate::time::Frame;
+use engine::cook::{CookError, Delivered, Engine, Report, Settings};
+use engine::error::Error;
+use engine::geometry::{Component, Geometry, Kind};
+use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Places, Scene};
+use engine::node::{Input, Node};
+use engine::param::{Keyframes, Param, ParamType, Shape, Source, Unset, Value};
+use engine::plan::Request;
+use engine::time::Frame;
 
 /// Puts a node on the bench.
 pub fn bench(node: &'static Node) -> Bench {
@@ -90,11 +90,11 @@ impl Bench {
     }
 
     /// Where each param's value comes from, in the order of the declaration.
-    pub(super) fn sources(&self) -> &[Source] {
+    pub(crate) fn sources(&self) -> &[Source] {
         &self.params
     }
 
-    pub(super) fn wire(mut self, input: &str, at: Moving, moves: bool) -> Self {
+    pub(crate) fn wire(mut self, input: &str, at: Moving, moves: bool) -> Self {
         let place = self.node.inputs.iter().position(|declared| declared.spec().name == input);
         let place = place.unwrap_or_else(|| panic!("{} has no input `{input}`", self.node.name));
         self.inputs[place].push((at, moves));
@@ -159,7 +159,7 @@ impl Bench {
     ///
     /// # Panics
     /// Where the node refuses.
-    pub fn cook(&self) -> Tasted {
+    pub fn cook(&self) -> BenchResult {
         self.try_cook().unwrap_or_else(|error| panic!("{error}"))
     }
 
@@ -167,7 +167,7 @@ impl Bench {
     ///
     /// # Errors
     /// Where the node refuses.
-    pub fn try_cook(&self) -> Result<Tasted, Error> {
+    pub fn try_cook(&self) -> Result<BenchResult, Error> {
         let mut frames = self.try_frames(&[self.frame]).map_err(|error| error.error.clone())?;
         Ok(frames.remove(0))
     }
@@ -176,7 +176,7 @@ impl Bench {
     ///
     /// # Panics
     /// Where the node refuses.
-    pub fn frames(&self, frames: impl IntoIterator<Item = i64>) -> Vec<Tasted> {
+    pub fn frames(&self, frames: impl IntoIterator<Item = i64>) -> Vec<BenchResult> {
         let frames: Vec<Frame> = frames.into_iter().map(Frame::whole).collect();
         self.try_frames(&frames).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -185,7 +185,7 @@ impl Bench {
     ///
     /// # Errors
     /// Where the node refuses any of them.
-    pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<Tasted>, Arc<CookError>> {
+    pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<BenchResult>, Arc<CookError>> {
         let graph = self.graph();
         let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
         let (found, report) = cook_all(&engine, &graph, frames);
@@ -199,11 +199,11 @@ impl Bench {
             };
             of_node.into_iter().flatten().filter_map(at).collect()
         };
-        let tasted = |frame: &Frame| Tasted {
+        let result = |frame: &Frame| BenchResult {
             geometry: found.get(&(0, *frame)).expect("every frame was delivered").clone(),
             metrics: metrics(*frame),
         };
-        Ok(frames.iter().map(tasted).collect())
+        Ok(frames.iter().map(result).collect())
     }
 
     /// The graph: the given inputs, then the node; an output for each of the node's.
@@ -259,14 +259,14 @@ pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(
 
 /// What a node made at one frame.
 #[derive(Clone, Debug)]
-pub struct Tasted {
+pub struct BenchResult {
     /// Its first output.
     pub geometry: Arc<Geometry>,
     /// What it published.
     pub metrics: BTreeMap<&'static str, f64>,
 }
 
-impl Tasted {
+impl BenchResult {
     /// The component of a kind.
     ///
     /// # Panics

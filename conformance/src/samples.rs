@@ -5,12 +5,12 @@
 
 use numerics::random::Key;
 
-use crate::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
-use crate::node::AttrDecl;
+use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
+use engine::node::AttrDecl;
 
 /// How points lie, and how many there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+pub(crate) enum Form {
     /// A few curves of 1 to 9 CVs, a closed mesh, a dozen points, a few tets.
     Small,
     /// Another count of everything; the mesh is open.
@@ -31,7 +31,7 @@ pub(super) enum Form {
 
 impl Form {
     /// Forms that no scene should have, and any may.
-    pub(super) const EXTREMES: [Self; 5] = [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far];
+    pub(crate) const EXTREMES: [Self; 5] = [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far];
 
     fn place(self, [x, y, z]: [f32; 3], at: Key) -> [f32; 3] {
         match self {
@@ -46,17 +46,17 @@ impl Form {
 
 /// Which attributes besides `P` a sample has.
 #[derive(Clone, Copy)]
-pub(super) struct Dress<'a> {
+pub(crate) struct Dress<'a> {
     /// Attributes that the node reads, random; their seed.
-    pub(super) declared: Option<u64>,
+    pub(crate) declared: Option<u64>,
     /// Attributes that it does not read, random; their seed.
-    pub(super) others: Option<u64>,
+    pub(crate) others: Option<u64>,
     /// What the node reads.
-    pub(super) reads: &'a [(String, Owner, ColumnType)],
+    pub(crate) reads: &'a [(String, Owner, ColumnType)],
 }
 
 /// A geometry with components of `kinds`. `seed` moves points and changes nothing else.
-pub(super) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
+pub(crate) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
     let mut geometry = Geometry::default();
     for kind in kinds {
         match kind {
@@ -72,7 +72,7 @@ pub(super) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> G
 }
 
 /// What the samples have besides what a node reads: attributes as artists and readers leave them.
-pub(super) fn usual() -> Vec<(String, Owner, ColumnType)> {
+pub(crate) fn usual() -> Vec<(String, Owner, ColumnType)> {
     use ColumnType as T;
     use Owner as O;
     let rows = [
@@ -96,10 +96,10 @@ pub(super) fn usual() -> Vec<(String, Owner, ColumnType)> {
 }
 
 /// The float a point that masks of the suite name.
-pub(super) const MASK: &str = "sample_mask";
+pub(crate) const MASK: &str = "sample_mask";
 
 /// Name, owner and type of declared attributes.
-pub(super) fn described(attributes: &[&dyn AttrDecl]) -> Vec<(String, Owner, ColumnType)> {
+pub(crate) fn described(attributes: &[&dyn AttrDecl]) -> Vec<(String, Owner, ColumnType)> {
     let described = |attribute: &&dyn AttrDecl| {
         let (name, owner, kind) = attribute.spec();
         (name.to_owned(), owner, kind)

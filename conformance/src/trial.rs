@@ -4,34 +4,34 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, LazyLock};
 
-use crate::cook::{Delivered, Engine, Settings, Stopped};
-use crate::error::ErrorKind;
-use crate::geometry::{ColumnType, Geometry, Kind, Name, Owner, P, Topology};
-use crate::graph::{Graph, Scene};
-use crate::key::{Hasher, Key};
-use crate::node::{Arity, AttrNames, Cook, InputSpec, LeftOut, Needs, Node};
-use crate::param::{ParamSpec, Params, Source, Value};
-use crate::plan::{Plan, Request};
-use crate::testing::bench::{Bench, bench};
-use crate::testing::quiet::quietly;
-use crate::testing::samples::{self, Dress, Form};
-use crate::time::Frame;
+use crate::bench::{Bench, bench};
+use crate::panics::quietly;
+use crate::samples::{self, Dress, Form};
+use engine::cook::{Delivered, Engine, Settings, Stopped};
+use engine::error::ErrorKind;
+use engine::geometry::{ColumnType, Geometry, Kind, Name, Owner, P, Topology};
+use engine::graph::{Graph, Scene};
+use engine::key::{Hasher, Key};
+use engine::node::{Arity, AttrNames, Cook, InputSpec, LeftOut, Needs, Node};
+use engine::param::{ParamSpec, Params, Source, Value};
+use engine::plan::{Plan, Request};
+use engine::time::Frame;
 
 /// Sets what the suite cannot invent: files, texts in a language.
-pub(super) type Prepare = Arc<dyn Fn(Bench) -> Bench + Send + Sync>;
+pub(crate) type Prepare = Arc<dyn Fn(Bench) -> Bench + Send + Sync>;
 
 /// The node that is tried, and what is known of it.
-pub(super) struct Subject {
-    pub(super) node: &'static Node,
-    pub(super) specs: Vec<ParamSpec>,
-    pub(super) inputs: Vec<InputSpec>,
-    pub(super) samples: Vec<Prepare>,
+pub(crate) struct Subject {
+    pub(crate) node: &'static Node,
+    pub(crate) specs: Vec<ParamSpec>,
+    pub(crate) inputs: Vec<InputSpec>,
+    pub(crate) samples: Vec<Prepare>,
     reads: Vec<(String, Owner, ColumnType)>,
 }
 
 /// How inputs go with time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Motion {
+pub(crate) enum Motion {
     /// They stand still, and the engine knows.
     Still,
     /// They move.
@@ -42,44 +42,44 @@ pub(super) enum Motion {
 
 /// Settings and inputs.
 #[derive(Clone, Debug)]
-pub(super) struct Trial {
-    pub(super) settings: Vec<Source>,
+pub(crate) struct Trial {
+    pub(crate) settings: Vec<Source>,
     /// Which of the prepared samples, where there are any.
-    pub(super) sample: usize,
+    pub(crate) sample: usize,
     /// By input: the seed of each wire.
-    pub(super) wires: Vec<Vec<u64>>,
-    pub(super) form: Form,
+    pub(crate) wires: Vec<Vec<u64>>,
+    pub(crate) form: Form,
     /// Seed of the attributes that the node declares to read.
-    pub(super) declared: Option<u64>,
+    pub(crate) declared: Option<u64>,
     /// Seed of those that it does not.
-    pub(super) others: Option<u64>,
+    pub(crate) others: Option<u64>,
     /// The one of those that is taken away.
-    pub(super) without: Option<String>,
+    pub(crate) without: Option<String>,
     /// The input whose wires have no row.
-    pub(super) empty: Option<usize>,
+    pub(crate) empty: Option<usize>,
     /// Which components inputs have that take any.
-    pub(super) any: usize,
-    pub(super) motion: Motion,
-    pub(super) first: i64,
+    pub(crate) any: usize,
+    pub(crate) motion: Motion,
+    pub(crate) first: i64,
 }
 
 /// What came out.
-pub(super) struct Outcome {
-    pub(super) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
+pub(crate) struct Outcome {
+    pub(crate) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
     /// By output, the first error of each node.
-    pub(super) errors: Vec<(usize, ErrorKind, String)>,
-    pub(super) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    pub(crate) errors: Vec<(usize, ErrorKind, String)>,
+    pub(crate) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
     /// Which params were read.
-    pub(super) read: Vec<bool>,
-    pub(super) left_out: Vec<LeftOut>,
+    pub(crate) read: Vec<bool>,
+    pub(crate) left_out: Vec<LeftOut>,
     /// Attributes read and written as the params say.
-    pub(super) names: Option<[AttrNames; 2]>,
+    pub(crate) names: Option<[AttrNames; 2]>,
     /// The first geometry of each wire, as it was given; all but `P` is what the node got.
-    pub(super) given: Vec<Vec<Geometry>>,
+    pub(crate) given: Vec<Vec<Geometry>>,
 }
 
 /// How often a cook is tried: on one thread, or more.
-pub(super) fn engine(threads: usize) -> &'static Engine {
+pub(crate) fn engine(threads: usize) -> &'static Engine {
     static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
         // No memory: nothing may be found that an earlier trial left.
         [1, 2, 7].map(|threads| (threads, Engine::new(&Settings { threads, memory: 0 }).expect("threads")))
@@ -89,13 +89,13 @@ pub(super) fn engine(threads: usize) -> &'static Engine {
 }
 
 impl Subject {
-    pub(super) fn new(node: &'static Node, samples: Vec<Prepare>) -> Self {
+    pub(crate) fn new(node: &'static Node, samples: Vec<Prepare>) -> Self {
         let (specs, inputs, reads) = (node.param_specs(), node.input_specs(), samples::described(node.reads));
         Self { node, specs, inputs, samples, reads }
     }
 
     /// Frames that show how a node goes with time.
-    pub(super) fn frames(&self) -> Vec<Frame> {
+    pub(crate) fn frames(&self) -> Vec<Frame> {
         let frames: &[f64] = match self.node.cook {
             Cook::Pure(_) => &[1.0],
             Cook::Frame { .. } => &[1.0, 2.5, 30.0],
@@ -106,12 +106,12 @@ impl Subject {
     }
 
     /// Whether it knows of time at all.
-    pub(super) fn is_timed(&self) -> bool {
+    pub(crate) fn is_timed(&self) -> bool {
         !matches!(self.node.cook, Cook::Pure(_))
     }
 
     /// Defaults; every input wired, lists `many` times.
-    pub(super) fn defaults(&self, many: usize) -> Trial {
+    pub(crate) fn defaults(&self, many: usize) -> Trial {
         let wires = |(place, input): (usize, &InputSpec)| {
             let count = if let Arity::Many { least } = input.arity { many.max(least) } else { 1 };
             (0..count).map(|wire| (place * 10 + wire) as u64).collect()
@@ -133,14 +133,14 @@ impl Subject {
 
     fn unset(&self, spec: &ParamSpec) -> Source {
         match spec.facts.unset {
-            crate::param::Unset::CurrentFrame => Source::CurrentFrame,
-            crate::param::Unset::SceneStart => Source::Constant(Value::Int(1)),
-            crate::param::Unset::Default => Source::Constant(spec.default.clone()),
+            engine::param::Unset::CurrentFrame => Source::CurrentFrame,
+            engine::param::Unset::SceneStart => Source::Constant(Value::Int(1)),
+            engine::param::Unset::Default => Source::Constant(spec.default.clone()),
         }
     }
 
     /// What the prepared sample sets besides: the places of those params.
-    pub(super) fn prepared(&self, sample: usize) -> Vec<usize> {
+    pub(crate) fn prepared(&self, sample: usize) -> Vec<usize> {
         let Some(prepare) = self.samples.get(sample) else { return Vec::new() };
         let (before, after) = (bench(self.node), prepare(bench(self.node)));
         let differs =
@@ -180,19 +180,19 @@ impl Subject {
     }
 
     /// The params of a trial, unless they are refused.
-    pub(super) fn params(&self, trial: &Trial) -> Option<Params> {
+    pub(crate) fn params(&self, trial: &Trial) -> Option<Params> {
         let (graph, _) = self.graph(trial);
         let request = Request::everything(&graph);
         let plan = quietly(|| catch_unwind(AssertUnwindSafe(|| Plan::new(&graph, &request, Arc::default()))));
-        plan.ok()?.ok()?.nodes.last()?.resolver.at(graph.scene.start()).ok()
+        plan.ok()?.ok()?.params(graph.nodes.len() - 1, graph.scene.start()).ok()
     }
 
     /// Cooks a trial at some frames.
-    pub(super) fn run(&self, trial: &Trial, frames: &[Frame]) -> Outcome {
+    pub(crate) fn run(&self, trial: &Trial, frames: &[Frame]) -> Outcome {
         self.run_on(1, false, trial, frames)
     }
 
-    pub(super) fn run_on(&self, threads: usize, reload: bool, trial: &Trial, frames: &[Frame]) -> Outcome {
+    pub(crate) fn run_on(&self, threads: usize, reload: bool, trial: &Trial, frames: &[Frame]) -> Outcome {
         let (graph, given) = self.graph(trial);
         let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
         let mut found = BTreeMap::new();
@@ -212,12 +212,11 @@ impl Subject {
         let cooked = quietly(|| {
             catch_unwind(AssertUnwindSafe(|| {
                 let plan = Plan::new(&graph, &request, Arc::default()).map_err(Stopped::Asked)?;
-                let report = engine(threads).try_plan(&plan, reload, &mut sink)?;
-                let last = plan.nodes.len() - 1;
-                let resolver = &plan.nodes[last].resolver;
-                let names = resolver.at(graph.scene.start()).ok();
-                let names = names.and_then(|params| Some((self.node.attributes?)(&params)));
-                let read = (0..self.specs.len()).map(|place| resolver.log().was_read(place)).collect::<Vec<_>>();
+                let report = engine(threads).cook_plan(&plan, reload, &mut sink)?;
+                let params = plan.params(graph.nodes.len() - 1, graph.scene.start()).ok();
+                let was_read = |index: usize| params.as_ref().is_some_and(|params| params.was_read(index));
+                let read: Vec<bool> = (0..self.specs.len()).map(was_read).collect();
+                let names = params.as_ref().and_then(|params| Some((self.node.attributes?)(params)));
                 Ok::<_, Stopped<std::convert::Infallible>>((report, read, names))
             }))
         });
@@ -287,7 +286,7 @@ fn moved(geometry: &Geometry, frame: Frame) -> Geometry {
 
 impl Outcome {
     /// A key of all that came out, and of all that was refused; attributes that `ignore` names left out.
-    pub(super) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> Key {
+    pub(crate) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> Key {
         let mut key = Hasher::default();
         for ((output, frame), geometry) in &self.found {
             hash_geometry(key.i64(*output as i64).i64(frame.ticks()), geometry, ignore);
@@ -305,12 +304,12 @@ impl Outcome {
     }
 
     /// A key of everything.
-    pub(super) fn whole(&self) -> Key {
+    pub(crate) fn whole(&self) -> Key {
         self.digest(&|_| false)
     }
 
     /// A key of what came out at one frame; where nothing did, of what was refused.
-    pub(super) fn at(&self, frame: Frame) -> Key {
+    pub(crate) fn at(&self, frame: Frame) -> Key {
         let mut key = Hasher::default();
         let mut there = false;
         for ((output, _), geometry) in self.found.iter().filter(|((_, at), _)| *at == frame) {
@@ -324,7 +323,7 @@ impl Outcome {
     }
 
     /// Whether all frames of all outputs came out.
-    pub(super) fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.errors.is_empty()
     }
 }
@@ -366,7 +365,7 @@ fn hash_words(key: &mut Hasher, words: &[u32]) {
 }
 
 /// The attribute that masks a param by its settings.
-pub(super) fn masks(settings: &[Source]) -> impl Iterator<Item = &Name> {
+pub(crate) fn masks(settings: &[Source]) -> impl Iterator<Item = &Name> {
     settings.iter().filter_map(|source| match source {
         Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => Some(attribute),
         _ => None,

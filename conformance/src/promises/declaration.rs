@@ -2,14 +2,14 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::Findings;
-use crate::geometry::{Name, fixed_type};
-use crate::node::{Arity, AttrDecl, Carries, Cook, InputSpec, Node};
-use crate::param::{Bounds, ParamSpec, Params, ReadLog, Shape, Unit, Value};
-use crate::testing::quiet::quietly;
+use crate::panics::quietly;
+use crate::suite::Findings;
+use engine::geometry::{Name, fixed_type};
+use engine::node::{Arity, AttrDecl, Carries, Cook, InputSpec, Node};
+use engine::param::{Bounds, ParamSpec, Params, Shape, Unit, Value};
 
 /// Adds what is wrong; says whether the node can be tried at all.
-pub(super) fn check(node: &'static Node, findings: &mut Findings) -> bool {
+pub(crate) fn check(node: &'static Node, findings: &mut Findings) -> bool {
     if !is_node_name(node.name) {
         findings.add(format!("its name `{}` is not made of capitalised words joined by `_`", node.name));
     }
@@ -157,9 +157,9 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
             findings.add(format!("its attributes hang on `{}`, which may be animated; declare it `fixed`", spec.name));
         }
     }
-    if let Cook::Solver(_, solver) = node.cook {
+    if let Cook::Solver(..) = node.cook {
         let read = read_by(specs, |params| {
-            (solver.start_frame)(params);
+            node.start_frame(params);
         });
         for spec in read.iter().filter(|spec| !fixed(spec)) {
             findings.add(format!("its start hangs on `{}`, which may be animated; declare it `fixed`", spec.name));
@@ -187,21 +187,22 @@ fn read_by(specs: &[ParamSpec], ask: impl Fn(&Params)) -> Vec<ParamSpec> {
         Shape::Bool => 2,
         _ => 1,
     });
-    let log = std::sync::Arc::new(ReadLog::new(specs.len()));
+    let mut read = vec![false; specs.len()];
     for option in 0..options.max().unwrap_or(1) {
         let value = |spec: &ParamSpec| match spec.shape {
             Shape::Choice(options) => Value::Choice(option % options.len()),
             Shape::Bool => Value::Bool(option % 2 == 1),
             _ => spec.default.clone(),
         };
-        let params = Params { specs: specs.into(), values: specs.iter().map(value).collect(), log: log.clone() };
-        // What panics here panics when the node is tried, and is told then.
+        let params = Params::new(specs.into(), specs.iter().map(value).collect());
+        // What panics here panics when the node is tried, and is reported then.
         let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| ask(&params))));
+        read.iter_mut().enumerate().for_each(|(index, read)| *read |= params.was_read(index));
     }
-    specs.iter().enumerate().filter(|(place, _)| log.was_read(*place)).map(|(_, spec)| spec.clone()).collect()
+    specs.iter().zip(read).filter(|(_, read)| *read).map(|(spec, _)| spec.clone()).collect()
 }
 
 /// Whether a list of names has this one.
-pub(super) fn has(names: &[Name], name: &str) -> bool {
+pub(crate) fn has(names: &[Name], name: &str) -> bool {
     names.iter().any(|known| **known == *name)
 }

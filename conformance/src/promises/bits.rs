@@ -1,14 +1,14 @@
 //! That bits hang on what a node was given and nothing else: not on threads, other frames, the clock, or how often it ran.
 
-use super::Findings;
 use super::passes::check_errors;
-use super::trial::{Motion, Outcome, Subject, Trial};
-use crate::node::Cook;
-use crate::param::Source;
-use crate::testing::samples::Form;
-use crate::time::Frame;
+use crate::samples::Form;
+use crate::suite::Findings;
+use crate::trial::{Motion, Outcome, Subject, Trial};
+use engine::node::Cook;
+use engine::param::Source;
+use engine::time::Frame;
 
-pub(super) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
+pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     check_again(subject, tried, findings);
     check_threads(subject, tried, findings);
     check_extremes(subject, tried, findings);

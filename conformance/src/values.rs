@@ -5,12 +5,12 @@ use std::sync::Arc;
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 
-use super::samples::MASK;
-use crate::geometry::Column;
-use crate::param::{ParamSpec, Shape, Value, euler_to_turn};
+use crate::samples::MASK;
+use engine::geometry::Column;
+use engine::param::{ParamSpec, Shape, Value, euler_to_turn};
 
 /// Values worth trying: both ends of the range, each option, what lies between. None is refused.
-pub(super) fn candidates(spec: &ParamSpec) -> Vec<Value> {
+pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     let [low, high] = ends(spec);
     let middle = 0.5 * low + 0.5 * high;
     let ramp = |keys: &[[f32; 2]]| Ramp::new(keys.to_vec(), Interpolation::Linear).ok().map(Arc::new).map(Value::Ramp);
@@ -68,7 +68,7 @@ pub(super) fn candidates(spec: &ParamSpec) -> Vec<Value> {
 }
 
 /// A value at random: often the default, often an end, else anywhere in the usual range.
-pub(super) fn random(spec: &ParamSpec, at: Key) -> Value {
+pub(crate) fn random(spec: &ParamSpec, at: Key) -> Value {
     let candidates = candidates(spec);
     let pick = at.of(1).f32();
     if pick < 0.3 || candidates.is_empty() {
@@ -132,7 +132,7 @@ fn largest(value: &Value) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::param::{Param, ParamDecl, Unit};
+    use engine::param::{Param, ParamDecl, Unit};
 
     #[test]
     fn both_ends_of_a_range_are_tried_and_an_open_end_a_little_inside() {

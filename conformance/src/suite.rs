@@ -6,25 +6,18 @@
 //! than a few hundred rows, or with two params at one rare pair of values, it may not see. What it cannot invent (files,
 //! texts in a language) a test gives it through [`Conformance::with`].
 
-mod bits;
-mod declaration;
-mod passes;
-mod reads;
-#[cfg(test)]
-mod tests;
-mod trial;
-
 use std::sync::Arc;
 
 use numerics::random::Key;
 
-use super::bench::Bench;
-use super::samples::Form;
-use super::settings;
-use crate::error::ErrorKind;
-use crate::node::{Arity, Node};
-use crate::param::{Source, Unset};
-use trial::{Motion, Outcome, Prepare, Subject, Trial};
+use crate::bench::Bench;
+use crate::promises::{bits, declaration, passes, reads};
+use crate::samples::Form;
+use crate::trial::{Motion, Outcome, Prepare, Subject, Trial};
+use crate::values;
+use engine::error::ErrorKind;
+use engine::node::{Arity, Node};
+use engine::param::{Source, Unset};
 
 /// Fails where a node breaks any rule, with everything that was found.
 ///
@@ -94,10 +87,10 @@ impl Conformance {
 
 /// What was found, each once.
 #[derive(Default)]
-struct Findings(Vec<String>);
+pub(crate) struct Findings(Vec<String>);
 
 impl Findings {
-    fn add(&mut self, finding: impl Into<String>) {
+    pub(crate) fn add(&mut self, finding: impl Into<String>) {
         let finding = finding.into();
         if !self.0.contains(&finding) {
             self.0.push(finding);
@@ -136,7 +129,7 @@ fn defaults(subject: &Subject) -> Vec<Trial> {
 }
 
 fn takes_any(subject: &Subject) -> bool {
-    subject.inputs.iter().any(|input| input.needs == crate::node::Needs::Any)
+    subject.inputs.iter().any(|input| input.needs == engine::node::Needs::Any)
 }
 
 /// Each param at each of its values, all else by default.
@@ -144,7 +137,7 @@ fn singles(subject: &Subject) -> Vec<Trial> {
     let full = subject.defaults(2);
     let mut trials = Vec::new();
     for (place, spec) in subject.specs.iter().enumerate() {
-        for value in settings::candidates(spec) {
+        for value in values::candidates(spec) {
             let mut trial = full.clone();
             trial.settings[place] = Source::Constant(value);
             trials.push(trial);
@@ -158,12 +151,12 @@ fn mixtures(subject: &Subject) -> Vec<Trial> {
     (0..MIXTURES).map(|k| mixture(subject, k)).collect()
 }
 
-fn mixture(subject: &Subject, k: u64) -> Trial {
+pub(crate) fn mixture(subject: &Subject, k: u64) -> Trial {
     let at = Key::new(0x00c0_4fec).of(k);
     let mut trial = subject.defaults(k as usize % 3);
     for (place, spec) in subject.specs.iter().enumerate() {
         if spec.facts.unset == Unset::Default {
-            trial.settings[place] = Source::Constant(settings::random(spec, at.of(place as u64)));
+            trial.settings[place] = Source::Constant(values::random(spec, at.of(place as u64)));
         }
     }
     for (place, (wires, input)) in trial.wires.iter_mut().zip(&subject.inputs).enumerate() {
