@@ -6,7 +6,7 @@
 
 use bodies::goals::{Held, Limits, goal};
 use bodies::tets::{Closed, Fill, Surface};
-use curves::lattice::{Basis, Lattice, Outside, control_points};
+use curves::lattice::{DeformationLattice, Extrapolation, LatticeBasis, control_points};
 use numerics::random::Key;
 use numerics::shapes;
 use std::time::Instant;
@@ -30,15 +30,17 @@ fn random(count: usize, range: [f32; 2]) -> Vec<[f32; 3]> {
 fn main() {
     let points = random(1_000_000, [0.0, 1.0]);
     for (basis, cells) in [
-        (Basis::Trilinear, 4),
-        (Basis::Bernstein, 1),
-        (Basis::Bernstein, 2),
-        (Basis::Bernstein, 4),
-        (Basis::Bernstein, 8),
+        (LatticeBasis::Trilinear, 4),
+        (LatticeBasis::Bernstein, 1),
+        (LatticeBasis::Bernstein, 2),
+        (LatticeBasis::Bernstein, 4),
+        (LatticeBasis::Bernstein, 8),
     ] {
         let divisions = [cells; 3];
         let offsets = random(control_points(divisions).unwrap_or(0), [-0.1, 0.1]);
-        let Some(lattice) = Lattice::new([[0.0; 3], [1.0; 3]], divisions, &offsets, basis, Outside::Hold) else {
+        let Some(lattice) =
+            DeformationLattice::new([[0.0; 3], [1.0; 3]], divisions, &offsets, basis, Extrapolation::Hold)
+        else {
             continue;
         };
         let [plain, jacobians] = [false, true].map(|wanted| fastest(|| drop(lattice.deform(&points, wanted))));

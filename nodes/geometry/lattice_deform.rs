@@ -13,9 +13,10 @@
 //!   what becomes of space in the middle of its points. `width`, `thickness` and all else stay as they are.
 //! * The motion of keyed offsets is not added to `v`. A volume's grid lies along the axes: it is refused.
 
-use curves::lattice::{Basis as Shares, Lattice, Matrix, Moved, Outside as Beyond};
-use curves::lattice::{control_points, turn_normals, turn_orientations, turn_vectors};
+use curves::lattice::{DeformationLattice, Deformed, Extrapolation, LatticeBasis};
+use curves::lattice::{control_points, map_normals, map_orientations, map_vectors};
 use engine::prelude::*;
+use numerics::vector::DMat3;
 use numerics::volume;
 use std::sync::Arc;
 
@@ -132,7 +133,7 @@ fn bends(params: &Params) -> bool {
 ///
 /// # Errors
 /// Where there are offsets, and not one a control point, or the box is empty.
-fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<Lattice<'a>>> {
+fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<DeformationLattice<'a>>> {
     let divisions = params.get(DIVISIONS).map(|cells| cells as usize);
     let expected = control_points(divisions).unwrap_or(usize::MAX);
     if !offsets.is_empty() && offsets.len() != expected {
@@ -150,14 +151,14 @@ fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<Lattic
     }
     let (from, to) = (params.get(FROM), params.get(TO));
     let basis = match params.get(BASIS) {
-        Basis::Trilinear => Shares::Trilinear,
-        Basis::Bernstein => Shares::Bernstein,
+        Basis::Trilinear => LatticeBasis::Trilinear,
+        Basis::Bernstein => LatticeBasis::Bernstein,
     };
     let outside = match params.get(OUTSIDE) {
-        Outside::Hold => Beyond::Hold,
-        Outside::Extend => Beyond::Extend,
+        Outside::Hold => Extrapolation::Hold,
+        Outside::Extend => Extrapolation::Extend,
     };
-    Lattice::new([from, to], divisions, offsets, basis, outside).map(Some).ok_or_else(|| {
+    DeformationLattice::new([from, to], divisions, offsets, basis, outside).map(Some).ok_or_else(|| {
         Error::refused(format!("`from` is {from:?} and `to` {to:?}, which is no box"))
             .of(TO.name())
             .hint("expected each number of `to` to be more than that of `from`; around what is flat, too")
@@ -165,7 +166,7 @@ fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<Lattic
 }
 
 /// A component, deformed, and what that came to; columns that stay are shared.
-fn deformed(part: &Component, lattice: &Lattice) -> Result<(Component, Moved)> {
+fn deformed(part: &Component, lattice: &DeformationLattice) -> Result<(Component, Deformed)> {
     let mut out = part.clone();
     let has = |owner: Owner| FOLLOWING.iter().any(|name| part.table(owner).column(name).is_some());
     let mut moved = lattice.deform(part.positions(), has(Owner::Point));
@@ -178,7 +179,7 @@ fn deformed(part: &Component, lattice: &Lattice) -> Result<(Component, Moved)> {
 }
 
 /// Turns vectors, normals and orientations of points or elements.
-fn turn(part: &mut Component, owner: Owner, jacobians: &[Matrix]) {
+fn turn(part: &mut Component, owner: Owner, jacobians: &[DMat3]) {
     let (v, n, orient) = match owner {
         Owner::Element => (Attr::element(V.name), Attr::element(N.name), Attr::element(ORIENT.name)),
         _ => (V, N, ORIENT),
@@ -188,17 +189,17 @@ fn turn(part: &mut Component, owner: Owner, jacobians: &[Matrix]) {
     if there(part, V.name)
         && let Some(rows) = part.edit(v)
     {
-        turn_vectors(rows, jacobians);
+        map_vectors(rows, jacobians);
     }
     if there(part, N.name)
         && let Some(rows) = part.edit(n)
     {
-        turn_normals(rows, jacobians);
+        map_normals(rows, jacobians);
     }
     if there(part, ORIENT.name)
         && let Some(rows) = part.edit(orient)
     {
-        turn_orientations(rows, jacobians);
+        map_orientations(rows, jacobians);
     }
 }
 
@@ -243,11 +244,11 @@ fn volume_ratio(before: &Geometry, after: &Geometry) -> Option<f64> {
     Some(enclosed(after)? / before)
 }
 
-fn publish(cx: &Cx, reached: impl IntoIterator<Item = Moved>, volume_ratio: Option<f64>) {
+fn publish(cx: &Cx, reached: impl IntoIterator<Item = Deformed>, volume_ratio: Option<f64>) {
     let (mut folded, mut least) = (0, f64::INFINITY);
     for moved in reached {
         folded += moved.folded;
-        least = least.min(moved.least);
+        least = least.min(moved.min_determinant);
     }
     cx.publish(FOLDED, folded as f64);
     cx.publish(MIN_JACOBIAN, if least.is_finite() { least } else { 1.0 });

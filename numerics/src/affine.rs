@@ -1,56 +1,54 @@
-//! Scale along the axes, then turn, then move, about a pivot: what it does to positions and to all that hangs on them.
+//! Affine maps: scaling along the axes, then a rotation, then a translation, about a pivot; applied to positions and to
+//! every kind of attribute that goes with them.
 //!
-//! Promise: computed in f64 and rounded once; what is not turned or scaled is not touched, so moving alone adds one
-//! number a coordinate; each row stands alone, on any number of threads. Limit: a quaternion says turns only, so
-//! orientations follow the turn and neither scale nor mirror.
+//! Promise: computed in f64 and rounded once; a translation alone adds one number to each coordinate and leaves all else
+//! untouched; every row is independent, so any number of threads gives the same bits. Limit: a quaternion expresses
+//! rotations only, so orientations follow the rotation and neither scale nor mirror.
 
+use crate::vector::{DMat3, DQuat, DVec3, direction, to_f32, to_f64};
+use nalgebra::{Quaternion, Unit};
 use rayon::prelude::*;
 
 /// Rows a thread takes at a time.
 const CHUNK: usize = 4096;
 
-/// Quaternion x, y, z, w.
-type Quat = [f64; 4];
-
-/// Row by row.
-type Matrix = [[f64; 3]; 3];
-
-/// A map of space: `pivot + move + turn·(scale·(p − pivot))`.
+/// A map of space: `pivot + translation + rotation·(scale·(p − pivot))`.
 #[derive(Clone, Debug)]
 pub struct Affine {
-    pivot: [f64; 3],
-    offset: [f64; 3],
-    /// `None` where nothing is scaled or turned.
+    pivot: DVec3,
+    translation: DVec3,
+    /// `None` where nothing is scaled or rotated.
     linear: Option<Linear>,
 }
 
 #[derive(Clone, Debug)]
 struct Linear {
-    turn: Quat,
-    /// Turn · scale.
-    vectors: Matrix,
+    rotation: DQuat,
+    /// Rotation · scale.
+    vectors: DMat3,
     /// What normals are multiplied by, up to a positive factor.
-    normals: Matrix,
-    /// The turn alone, for normals that `normals` makes zero.
-    turned: Matrix,
+    normals: DMat3,
+    /// The rotation alone, for normals that `normals` maps to zero.
+    rotated: DMat3,
     mirrors: bool,
     size: f64,
 }
 
 impl Affine {
-    /// Scales along x, y and z, turns by the unit quaternion `turn` (x, y, z, w), both about `pivot`, then moves.
-    pub fn new(scale: [f64; 3], turn: Quat, pivot: [f64; 3], offset: [f64; 3]) -> Self {
-        let still = turn[..3].iter().all(|x| *x == 0.0) && scale.iter().all(|factor| *factor == 1.0);
-        let linear = (!still).then(|| Linear::new(scale, turn));
-        Self { pivot, offset, linear }
+    /// Scales along x, y and z, rotates by the unit quaternion `rotation` (x, y, z, w), both about `pivot`, then
+    /// translates; metres.
+    pub fn new(scale: [f64; 3], rotation: [f64; 4], pivot: [f64; 3], translation: [f64; 3]) -> Self {
+        let is_still = rotation[..3].iter().all(|x| *x == 0.0) && scale.iter().all(|factor| *factor == 1.0);
+        let linear = (!is_still).then(|| Linear::new(scale.into(), rotation));
+        Self { pivot: pivot.into(), translation: translation.into(), linear }
     }
 
     /// Whether nothing moves at all.
     pub fn is_identity(&self) -> bool {
-        self.linear.is_none() && self.offset.iter().all(|x| *x == 0.0)
+        self.linear.is_none() && self.translation == DVec3::zeros()
     }
 
-    /// Whether it turns or scales, so that vectors change too.
+    /// Whether it rotates or scales, so that vectors change too.
     pub fn is_linear(&self) -> bool {
         self.linear.is_some()
     }
@@ -60,8 +58,8 @@ impl Affine {
         self.linear.as_ref().is_some_and(|linear| linear.mirrors)
     }
 
-    /// What lengths without a direction are multiplied by: the cube root of how volumes grow, so the scale itself where
-    /// it is the same along all axes.
+    /// What lengths without a direction are multiplied by: the cube root of the factor of volumes, so the scale itself
+    /// where it is the same along all axes.
     pub fn size(&self) -> f64 {
         self.linear.as_ref().map_or(1.0, |linear| linear.size)
     }
@@ -69,36 +67,38 @@ impl Affine {
     /// Maps positions.
     pub fn points(&self, rows: &mut [[f32; 3]]) {
         match &self.linear {
-            None => each(rows, |p| std::array::from_fn(|k| (f64::from(p[k]) + self.offset[k]) as f32)),
-            Some(linear) => each(rows, |p| {
-                let arm = std::array::from_fn(|k| f64::from(p[k]) - self.pivot[k]);
-                let arm = times(&linear.vectors, arm);
-                std::array::from_fn(|k| (arm[k] + (self.pivot[k] + self.offset[k])) as f32)
-            }),
+            None => each(rows, |p| to_f32(to_f64(p) + self.translation)),
+            Some(linear) => {
+                let to = self.pivot + self.translation;
+                each(rows, |p| to_f32(linear.vectors * (to_f64(p) - self.pivot) + to));
+            }
         }
     }
 
-    /// Maps differences of positions, such as velocities: scaled and turned, not moved.
+    /// Maps differences of positions, such as velocities: scaled and rotated, not translated.
     pub fn vectors(&self, rows: &mut [[f32; 3]]) {
         let Some(linear) = &self.linear else { return };
-        each(rows, |v| times(&linear.vectors, v.map(f64::from)).map(|x| x as f32));
+        each(rows, |v| to_f32(linear.vectors * to_f64(v)));
     }
 
     /// Maps normals: still perpendicular to the mapped surface, still outward, of length 1. A zero one stays zero; one
-    /// that lies in a direction scaled to nothing is turned alone.
+    /// along a direction that is scaled to 0 is rotated only.
     pub fn normals(&self, rows: &mut [[f32; 3]]) {
         let Some(linear) = &self.linear else { return };
         each(rows, |n| {
-            let n = n.map(f64::from);
-            let normal = unit(times(&linear.normals, n)).or_else(|| unit(times(&linear.turned, n)));
-            normal.unwrap_or([0.0; 3]).map(|x| x as f32)
+            let n = to_f64(n);
+            let normal = direction(linear.normals * n).or_else(|| direction(linear.rotated * n));
+            normal.map_or([0.0; 3], to_f32)
         });
     }
 
-    /// Maps orientations: quaternions x, y, z, w, turned.
+    /// Maps orientations: quaternions x, y, z, w, rotated.
     pub fn orientations(&self, rows: &mut [[f32; 4]]) {
         let Some(linear) = &self.linear else { return };
-        each(rows, |q| product(linear.turn, q.map(f64::from)).map(|x| x as f32));
+        each(rows, |q| {
+            let rotated = linear.rotation.quaternion() * Quaternion::from(q.map(f64::from));
+            rotated.coords.map(|x| x as f32).into()
+        });
     }
 
     /// Maps lengths without a direction, such as widths; see [`Affine::size`].
@@ -111,21 +111,22 @@ impl Affine {
 }
 
 impl Linear {
-    fn new(scale: [f64; 3], turn: Quat) -> Self {
-        let turned = matrix(turn);
-        let columns = |factors: [f64; 3]| turned.map(|row| [0, 1, 2].map(|k| row[k] * factors[k]));
-        let [x, y, z] = scale.map(f64::abs);
+    fn new(scale: DVec3, rotation: [f64; 4]) -> Self {
+        let rotation = Unit::new_unchecked(Quaternion::from(rotation));
+        let rotated = DMat3::from_columns(&[DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| rotation * axis));
+        let times_columns = |factors: DVec3| DMat3::from_fn(|row, k| rotated[(row, k)] * factors[k]);
+        let [x, y, z] = scale.abs().into();
         let mirrors = scale.iter().filter(|factor| **factor < 0.0).count() % 2 == 1;
-        // Cofactors stay where an inverse ends, at a scale of 0; brought to at most 1 they cannot overflow.
+        // The inverse does not exist at a scale of 0, cofactors do; of factors ≤ 1 they cannot overflow.
         let largest = x.max(y).max(z).max(f64::MIN_POSITIVE);
-        let [a, b, c] = scale.map(|factor| factor / largest);
+        let [a, b, c] = (scale / largest).into();
         let outward = if mirrors { -1.0 } else { 1.0 };
         let size = if x == y && y == z { x } else { libm::cbrt(x) * libm::cbrt(y) * libm::cbrt(z) };
         Self {
-            turn,
-            vectors: columns(scale),
-            normals: columns([b * c, a * c, a * b].map(|cofactor| cofactor * outward)),
-            turned,
+            rotation,
+            vectors: times_columns(scale),
+            normals: times_columns(DVec3::new(b * c, a * c, a * b) * outward),
+            rotated,
             mirrors,
             size,
         }
@@ -136,44 +137,14 @@ fn each<T: Copy + Send + Sync>(rows: &mut [T], map: impl Fn(T) -> T + Sync) {
     rows.par_chunks_mut(CHUNK).for_each(|rows| rows.iter_mut().for_each(|row| *row = map(*row)));
 }
 
-fn times(matrix: &Matrix, v: [f64; 3]) -> [f64; 3] {
-    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
-}
-
-fn matrix([x, y, z, w]: Quat) -> Matrix {
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-}
-
-/// First `b`, then `a`.
-fn product([ax, ay, az, aw]: Quat, [bx, by, bz, bw]: Quat) -> Quat {
-    [
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    ]
-}
-
-/// `v` at length 1; `None` where it is zero.
-fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let largest = v.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-    let v = v.map(|x| x / largest);
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    (largest > 0.0).then(|| v.map(|x| x / length))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const STILL: Quat = [0.0, 0.0, 0.0, 1.0];
+    const STILL: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     const ORIGIN: [f64; 3] = [0.0; 3];
 
-    fn about_z(degrees: f64) -> Quat {
+    fn about_z(degrees: f64) -> [f64; 4] {
         let half = degrees.to_radians() / 2.0;
         [0.0, 0.0, libm::sin(half), libm::cos(half)]
     }
@@ -190,8 +161,8 @@ mod tests {
     }
 
     #[test]
-    fn scales_then_turns_then_moves_about_the_pivot() {
-        // (2, 1, 0) less the pivot (1, 1, 0) is (1, 0, 0); scaled (3, 0, 0); turned (0, 3, 0); back and moved (1, 4, 5).
+    fn scales_then_rotates_then_translates_about_the_pivot() {
+        // (2, 1, 0) less the pivot (1, 1, 0) is (1, 0, 0); scaled (3, 0, 0); rotated (0, 3, 0); back at the pivot and translated (1, 4, 5).
         let map = Affine::new([3.0, 1.0, 1.0], about_z(90.0), [1.0, 1.0, 0.0], [0.0, 0.0, 5.0]);
         assert_close(mapped([2.0, 1.0, 0.0], |p| map.points(p)), [1.0, 4.0, 5.0]);
         assert_close(mapped([1.0, 1.0, 0.0], |p| map.points(p)), [1.0, 1.0, 5.0]);
@@ -199,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn moving_alone_leaves_vectors_and_needs_no_pivot() {
+    fn a_translation_alone_leaves_vectors_and_ignores_the_pivot() {
         let map = Affine::new([1.0; 3], STILL, [1e30, 0.0, 0.0], [0.5, 0.0, 0.0]);
         assert!(!map.is_identity() && !map.is_linear());
         assert_eq!(mapped([0.25, 7.0, 0.0], |p| map.points(p)), [0.75, 7.0, 0.0]);
@@ -222,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_without_direction_stays_so_and_one_in_a_flattened_plane_is_turned() {
+    fn a_zero_normal_stays_zero_and_one_in_a_flattened_plane_is_rotated() {
         let flat = Affine::new([1.0, 0.0, 1.0], about_z(90.0), ORIGIN, ORIGIN);
         assert_eq!(mapped([0.0; 3], |n| flat.normals(n)), [0.0; 3]);
         assert_close(mapped([1.0, 0.0, 0.0], |n| flat.normals(n)), [0.0, 1.0, 0.0]);
@@ -232,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn orientations_are_turned_after_what_they_say() {
+    fn orientations_are_rotated_on_the_left() {
         // About x by 90° first, then about z by 90°: y → z stays.
         let h = std::f32::consts::FRAC_1_SQRT_2;
         let map = Affine::new([2.0; 3], about_z(90.0), ORIGIN, ORIGIN);
@@ -240,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_follow_the_cube_root_of_volume() {
+    fn lengths_scale_by_the_cube_root_of_volume() {
         let width = |scale| mapped(0.5, |w| Affine::new(scale, STILL, ORIGIN, ORIGIN).lengths(w));
         assert_eq!(width([3.0; 3]), 1.5);
         assert_eq!(width([-2.0, 2.0, 2.0]), 1.0);
@@ -249,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn far_from_the_origin_a_turn_about_a_near_pivot_loses_nothing() {
+    fn a_rotation_about_a_near_pivot_is_exact_far_from_the_origin() {
         let map = Affine::new([1.0; 3], about_z(90.0), [1e6, 0.0, 0.0], ORIGIN);
         assert_eq!(mapped([1e6 + 1.0, 0.0, 0.0], |p| map.points(p)), [1e6, 1.0, 0.0]);
     }

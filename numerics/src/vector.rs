@@ -73,6 +73,12 @@ pub fn scale(a: Vec3, s: f32) -> Vec3 {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
+/// a + t·(b − a).
+#[inline(always)]
+pub fn lerp(a: Vec3, b: Vec3, t: f32) -> Vec3 {
+    [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t]
+}
+
 /// The scalar product.
 #[inline(always)]
 pub fn dot(a: Vec3, b: Vec3) -> f32 {

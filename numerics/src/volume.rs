@@ -1,35 +1,34 @@
-//! Volumes of tets and of what a closed surface encloses.
+//! Volumes of tets and of closed surfaces.
 //!
-//! Promise: exact for what is exact in f64 with the coordinates taken from the first point, so a body far from the origin
-//! loses nothing; sums in fixed chunks, so the same bits on any number of threads. Limit: a surface that crosses itself
-//! counts what it winds around as often as it does. m³ from metres; negative where tets or faces are inside out.
+//! Promise: coordinates are taken relative to the first point and multiplied in f64, so a body far from the origin loses
+//! no precision; sums in fixed chunks, so the same bits on any number of threads. Limit: a surface that crosses itself
+//! counts a region as often as it winds around it. m³ from metres; negative where tets or faces are inside out.
 
+use crate::vector::{DVec3, to_f64};
 use rayon::prelude::*;
 
-/// Terms of a sum that are added up by one thread.
+/// Terms of a sum that one thread adds up.
 const CHUNK: usize = 4096;
 
-type Vec3 = [f64; 3];
-
-/// Six times the volume of a tet, its corner `a` the origin.
+/// Six times the volume of a tet, computed relative to its corner `a`.
 pub fn six_volumes([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
     triple(from(a, b), from(a, c), from(a, d))
 }
 
-/// Of all tets together.
+/// The volume of all tets together.
 ///
 /// # Panics
-/// Where a tet has a corner that is no point.
+/// Where a corner is not an index of `points`.
 pub fn of_tets(points: &[[f32; 3]], tets: &[[u32; 4]]) -> f64 {
     sum(tets.par_chunks(CHUNK), |tet| six_volumes(tet.map(|corner| points[corner as usize]))) / 6.0
 }
 
-/// Enclosed by polygons, of which `starts` are the first corners and the number of corners, `corners` the points. A face
-/// that is not flat is a fan from its first corner. `None` where the surface is open: some edge is not passed as often one
-/// way as the other.
+/// The volume enclosed by polygons: face i has the points `corners[starts[i]..starts[i + 1]]`. A face that is not flat
+/// counts as the fan from its first corner. `None` where the surface is open: some edge is not used equally often in both
+/// directions.
 ///
 /// # Panics
-/// Where a polygon has a corner that is no point.
+/// Where a corner is not an index of `points`.
 pub fn enclosed(starts: &[u32], corners: &[u32], points: &[[f32; 3]]) -> Option<f64> {
     if !is_closed(starts, corners) {
         return None;
@@ -44,18 +43,18 @@ pub fn enclosed(starts: &[u32], corners: &[u32], points: &[[f32; 3]]) -> Option<
     Some(sum(faces.par_chunks(CHUNK), fan) / 6.0)
 }
 
-/// Whether every edge of polygons is passed as often one way as the other.
+/// Whether every edge of the polygons is used equally often in both directions.
 fn is_closed(starts: &[u32], corners: &[u32]) -> bool {
-    let way = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
-    let mut there: Vec<u64> = Vec::with_capacity(corners.len());
+    let edge = |from: u32, to: u32| u64::from(from) << 32 | u64::from(to);
+    let mut forward: Vec<u64> = Vec::with_capacity(corners.len());
     for run in starts.windows(2) {
         let face = &corners[run[0] as usize..run[1] as usize];
-        there.extend((0..face.len()).map(|k| way(face[k], face[(k + 1) % face.len()])));
+        forward.extend((0..face.len()).map(|k| edge(face[k], face[(k + 1) % face.len()])));
     }
-    let mut back: Vec<u64> = there.iter().map(|way| way.rotate_left(32)).collect();
-    there.par_sort_unstable();
-    back.par_sort_unstable();
-    there == back
+    let mut backward: Vec<u64> = forward.iter().map(|edge| edge.rotate_left(32)).collect();
+    forward.par_sort_unstable();
+    backward.par_sort_unstable();
+    forward == backward
 }
 
 /// Adds up the terms of each chunk, then the chunks in their order.
@@ -67,12 +66,12 @@ fn sum<'a, T: Sync + 'a>(
     sums.iter().sum()
 }
 
-fn from(origin: [f32; 3], p: [f32; 3]) -> Vec3 {
-    [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(origin[k]))
+fn from(origin: [f32; 3], p: [f32; 3]) -> DVec3 {
+    to_f64(p) - to_f64(origin)
 }
 
-fn triple(a: Vec3, b: Vec3, c: Vec3) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    a.dot(&b.cross(&c))
 }
 
 #[cfg(test)]
@@ -88,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_encloses_its_volume_wherever_it_stands_and_inside_out_less_than_nothing() {
+    fn a_box_encloses_its_volume_anywhere_and_the_negative_inside_out() {
         let mut block = shapes::block([1.0, 2.0, 4.0], [3, 2, 5]);
         assert!((measured(&block, 0.0).unwrap() - 8.0).abs() < 1e-5);
         assert!((measured(&shapes::block([1.0, 2.0, 4.0], [4; 3]), 1024.0).unwrap() - 8.0).abs() < 1e-12);
@@ -98,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_open_encloses_nothing_that_could_be_told() {
+    fn open_surfaces_have_no_volume() {
         assert_eq!(measured(&shapes::grid([1.0, 1.0], 4), 0.0), None);
         let mut block = shapes::block([1.0; 3], [2; 3]);
         block.corners.truncate(block.corners.len() - 4);

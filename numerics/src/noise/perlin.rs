@@ -4,6 +4,7 @@
 //! but the cells' own 2³². Three components share a hash and take bits of their own from it.
 
 use super::lattice::{Point, axis_bits, point_bits};
+use crate::vector::lerp;
 
 /// Three decorrelated components, each within ±1.04, of mean 0 and rms 0.27.
 #[inline(always)]
@@ -20,21 +21,15 @@ pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
         let bits = point_bits(hx[i] ^ hy[j] ^ hz[k]);
         slopes(bits, [x - i as f32, y - j as f32, z - k as f32])
     };
-    let edge = |j: usize, k: usize| mix(corner(0, j, k), corner(1, j, k), u);
-    let face = |k: usize| mix(edge(0, k), edge(1, k), v);
-    mix(face(0), face(1), w)
+    let edge = |j: usize, k: usize| lerp(corner(0, j, k), corner(1, j, k), u);
+    let face = |k: usize| lerp(edge(0, k), edge(1, k), v);
+    lerp(face(0), face(1), w)
 }
 
 /// 6t⁵ − 15t⁴ + 10t³: slope and curvature are 0 at both ends.
 #[inline(always)]
 fn fade(t: f32) -> f32 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
-}
-
-/// Share `t` of the way from `a` to `b`.
-#[inline(always)]
-fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
-    [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t]
 }
 
 /// The ramps of a lattice point's three gradients at `d` from it: ten bits of `bits` each.

@@ -1,6 +1,7 @@
-//! A sphere of triangles that are all nearly alike.
+//! A sphere of nearly equal triangles.
 
 use super::Polygons;
+use crate::vector::DVec3;
 use std::collections::BTreeMap;
 
 /// The golden rectangle's sides, its diagonal 2.
@@ -31,22 +32,20 @@ const FACES: [[u32; 3]; 20] = [
     [9, 8, 1],
 ];
 
-/// A sphere: an icosahedron each of whose triangles is cut in four `times` times, 20 · 4^`times` triangles in all. It
-/// touches its bounds only near.
+/// A sphere: an icosahedron whose triangles are each split in four `times` times, 20 · 4^`times` triangles in all. Its
+/// bounds are only approximately those of the sphere.
 pub fn icosphere(radius: f64, times: usize) -> Polygons {
     let golden = [[-SHORT, LONG], [SHORT, LONG], [-SHORT, -LONG], [SHORT, -LONG]];
-    let mut points: Vec<[f64; 3]> = golden.map(|[s, l]| [s, l, 0.0]).to_vec();
-    points.extend(golden.map(|[s, l]| [0.0, s, l]));
-    points.extend(golden.map(|[s, l]| [l, 0.0, s]));
+    let mut points = golden.map(|[s, l]| DVec3::new(s, l, 0.0)).to_vec();
+    points.extend(golden.map(|[s, l]| DVec3::new(0.0, s, l)));
+    points.extend(golden.map(|[s, l]| DVec3::new(l, 0.0, s)));
     let mut triangles = FACES.to_vec();
     for _ in 0..times {
         let mut middles = BTreeMap::new();
         let mut middle = |a: u32, b: u32| {
             *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                let [a, b] = [a, b].map(|k| points[k as usize]);
-                let sum = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-                let length = (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]).sqrt();
-                points.push(sum.map(|x| x / length));
+                let sum = points[a as usize] + points[b as usize];
+                points.push(sum / sum.norm());
                 points.len() as u32 - 1
             })
         };
@@ -57,7 +56,7 @@ pub fn icosphere(radius: f64, times: usize) -> Polygons {
         }
         triangles = finer;
     }
-    let mut sphere = Polygons { points: points.iter().map(|p| p.map(|x| radius * x)).collect(), ..Polygons::default() };
+    let mut sphere = Polygons { points: points.iter().map(|p| (p * radius).into()).collect(), ..Polygons::default() };
     triangles.iter().for_each(|corners| sphere.face(corners.map(|corner| corner as usize)));
     sphere
 }

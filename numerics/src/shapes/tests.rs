@@ -1,28 +1,19 @@
-//! Laws of shapes: closed, outward, as large as asked.
+//! Shapes are closed, face outward and fill the size asked for.
 
 use super::*;
+use crate::vector::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Triangles of all faces, fanned.
-fn triangles(shape: &Polygons) -> Vec<[[f64; 3]; 3]> {
+fn triangles(shape: &Polygons) -> Vec<[DVec3; 3]> {
     let mut found = Vec::new();
     let mut first = 0;
     for count in &shape.counts {
         let face = &shape.corners[first..first + *count as usize];
-        found.extend((1..face.len() - 1).map(|k| [face[0], face[k], face[k + 1]].map(|c| shape.points[c as usize])));
+        found.extend(
+            (1..face.len() - 1).map(|k| [face[0], face[k], face[k + 1]].map(|c| shape.points[c as usize].into())),
+        );
         first += face.len();
     }
     found
@@ -30,15 +21,11 @@ fn triangles(shape: &Polygons) -> Vec<[[f64; 3]; 3]> {
 
 /// Signed: positive where faces look outwards.
 fn volume(shape: &Polygons) -> f64 {
-    triangles(shape).iter().map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0).sum()
+    triangles(shape).iter().map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0).sum()
 }
 
 fn area(shape: &Polygons) -> f64 {
-    let double = |[a, b, c]: &[[f64; 3]; 3]| {
-        let normal = cross(sub(*b, *a), sub(*c, *a));
-        dot(normal, normal).sqrt()
-    };
-    triangles(shape).iter().map(double).sum::<f64>() / 2.0
+    triangles(shape).iter().map(|[a, b, c]| (b - a).cross(&(c - a)).norm()).sum::<f64>() / 2.0
 }
 
 /// Edges by how often they are walked one way less the other, and in all: a closed surface walks each once either way.
@@ -174,7 +161,7 @@ fn a_grid_faces_up_and_is_open_at_its_border() {
     let shape = grid([2.0, 4.0], 3);
     assert_eq!((shape.counts.len(), shape.points.len()), (9, 16));
     assert!((area(&shape) - 8.0).abs() < 1e-12);
-    assert!(triangles(&shape).iter().all(|[a, b, c]| cross(sub(*b, *a), sub(*c, *a))[1] > 0.0));
+    assert!(triangles(&shape).iter().all(|[a, b, c]| (b - a).cross(&(c - a)).y > 0.0));
     assert_eq!(open_edges(&shape), 12);
     assert_eq!(bounds(&shape), [[-1.0, 0.0, -2.0], [1.0, 0.0, 2.0]]);
 }

@@ -1,6 +1,9 @@
+//! Queries of the tree against going through all triangles one by one.
+
 use super::*;
 use crate::random::Key;
 use crate::simd::Path;
+use crate::vector::{DVec3, to_f64};
 
 /// `count` triangles about `size` large in the unit box.
 fn soup(seed: u64, count: u32, size: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -25,24 +28,19 @@ fn blades(count: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Distance of `p` to a triangle in f64: the nearest of its three sides, or of its plane on the inside.
+/// Distance of `p` to a triangle in f64: to the nearest of its three sides, or to its plane on the inside.
 fn distance(corners: [Vec3; 3], p: Vec3) -> f64 {
-    type V = [f64; 3];
-    let sub = |a: V, b: V| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let dot = |a: V, b: V| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let cross = |a: V, b: V| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let [a, b, c] = corners.map(|corner| sub(corner.map(f64::from), p.map(f64::from)));
-    let side = |a: V, b: V| {
-        let ab = sub(b, a);
-        let t = if dot(ab, ab) > 0.0 { (-dot(a, ab) / dot(ab, ab)).clamp(0.0, 1.0) } else { 0.0 };
-        let at = [0, 1, 2].map(|k| a[k] + t * ab[k]);
-        dot(at, at).sqrt()
+    let [a, b, c] = corners.map(|corner| to_f64(corner) - to_f64(p));
+    let side = |a: DVec3, b: DVec3| {
+        let ab = b - a;
+        let t = if ab.dot(&ab) > 0.0 { (-a.dot(&ab) / ab.dot(&ab)).clamp(0.0, 1.0) } else { 0.0 };
+        (a + ab * t).norm()
     };
     let sides = side(a, b).min(side(b, c)).min(side(c, a));
-    let normal = cross(sub(b, a), sub(c, a));
-    let turns = [(a, b), (b, c), (c, a)].map(|(a, b)| dot(normal, cross(a, b)));
-    if dot(normal, normal) > 0.0 && turns.iter().all(|turn| *turn >= 0.0) {
-        return (dot(normal, a).abs() / dot(normal, normal).sqrt()).min(sides);
+    let normal = (b - a).cross(&(c - a));
+    let turns = [(a, b), (b, c), (c, a)].map(|(a, b)| normal.dot(&a.cross(&b)));
+    if normal.norm() > 0.0 && turns.iter().all(|turn| *turn >= 0.0) {
+        return (normal.dot(&a).abs() / normal.norm()).min(sides);
     }
     sides
 }
@@ -105,7 +103,7 @@ fn check(points: &[Vec3], triangles: &[[u32; 3]], tree: &TriangleTree) {
 }
 
 #[test]
-fn soups_of_any_number_are_met_as_one_by_one() {
+fn any_number_of_random_triangles_gives_what_brute_force_gives() {
     for count in [1, 2, 15, 16, 17, 255, 256, 257, 1000, 4097] {
         for size in [0.02, 0.5] {
             let (points, triangles) = soup(u64::from(count), count, size);
@@ -115,7 +113,7 @@ fn soups_of_any_number_are_met_as_one_by_one() {
 }
 
 #[test]
-fn blades_segments_points_and_doubles_are_met_as_one_by_one() {
+fn slivers_segments_points_and_duplicates_give_what_brute_force_gives() {
     let (points, triangles) = blades(600);
     check(&points, &triangles, &TriangleTree::build(&points, &triangles));
     // Segments and points, and each of them twice.
@@ -132,7 +130,7 @@ fn blades_segments_points_and_doubles_are_met_as_one_by_one() {
 }
 
 #[test]
-fn of_equally_near_triangles_the_lowest_index_is_found() {
+fn equally_near_triangles_give_the_lowest_index() {
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let tree = TriangleTree::build(&points, &[[0, 1, 2]; 100]);
     let found = tree.closest([0.25, 0.25, 3.0], f32::INFINITY).unwrap();
@@ -141,7 +139,7 @@ fn of_equally_near_triangles_the_lowest_index_is_found() {
 }
 
 #[test]
-fn no_triangle_is_no_place() {
+fn an_empty_tree_finds_nothing() {
     let tree = TriangleTree::build(&[], &[]);
     assert!(tree.is_empty() && tree.blocks().is_empty());
     assert_eq!(tree.bounds(), ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]));
@@ -151,7 +149,7 @@ fn no_triangle_is_no_place() {
 }
 
 #[test]
-fn triangles_that_are_not_finite_are_left_out_until_a_refit_brings_them_back() {
+fn non_finite_triangles_are_left_out_until_a_refit_makes_them_finite() {
     let (sound, triangles) = soup(4, 500, 0.1);
     let mut broken = sound.clone();
     for triangle in (0..500).step_by(7) {
@@ -182,7 +180,7 @@ fn check_boxes(points: &[Vec3], triangles: &[[u32; 3]], tree: &TriangleTree) {
 }
 
 #[test]
-fn a_query_that_is_no_number_or_beyond_everything_finds_nothing() {
+fn queries_that_are_nan_or_out_of_reach_find_nothing() {
     let (points, triangles) = soup(5, 100, 0.1);
     let tree = TriangleTree::build(&points, &triangles);
     assert_eq!(tree.closest([f32::NAN, 0.0, 0.0], f32::INFINITY), None);

@@ -6,7 +6,7 @@ use super::{BLOCK, LUMPS, Scene, Sphere};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::noise;
 use numerics::simd::kernel;
-use numerics::vector::{self, Vec3};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
 /// The least share of a radius that noise leaves: a boundary at the centre itself has no inside.
 const LEAST_LEFT: f32 = 1e-3;
@@ -143,7 +143,7 @@ impl Ball {
     #[inline(always)]
     fn of(sphere: &Sphere, origin: Vec3) -> Self {
         Self {
-            centre: [0, 1, 2].map(|axis| (sphere.centre[axis] - f64::from(origin[axis])) as f32),
+            centre: to_f32(DVec3::from(sphere.centre) - to_f64(origin)),
             inverse: 1.0 / sphere.radius,
             strength: sphere.strength,
             noise: sphere.noise,

@@ -10,7 +10,7 @@
 
 use numerics::lanes::{F32x16, LANES, Lanes};
 use numerics::ramp::Ramp;
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// What a control looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,13 +29,13 @@ const FLAT: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
     shape: Shape,
-    centre: [f64; 3],
-    axes: [[f64; 3]; 3],
+    centre: DVec3,
+    axes: [DVec3; 3],
     outer: f64,
     ramp: Ramp,
     strength: f32,
     /// From the scene to the control's own space, row by row; `None` where it is flat.
-    inverse: Option<[[f64; 3]; 3]>,
+    inverse: Option<[DVec3; 3]>,
 }
 
 impl Control {
@@ -43,10 +43,11 @@ impl Control {
     /// inner cube the outer one is (less than 1 counts as 1); `strength` may be negative.
     pub fn new(shape: Shape, centre: [f64; 3], axes: [[f64; 3]; 3], outer: f64, ramp: Ramp, strength: f32) -> Self {
         let outer = if outer > 1.0 { outer } else { 1.0 };
-        Self { shape, centre, axes, outer, ramp, strength, inverse: inverse(axes) }
+        let axes = axes.map(DVec3::from);
+        Self { shape, centre: centre.into(), axes, outer, ramp, strength, inverse: inverse(axes) }
     }
 
-    pub(super) fn centre(&self) -> [f64; 3] {
+    pub(super) fn centre(&self) -> DVec3 {
         self.centre
     }
 
@@ -59,13 +60,14 @@ impl Control {
     }
 
     /// How far it reaches along x, y and z; `None` where it touches nothing.
-    pub(super) fn reach(&self) -> Option<[f64; 3]> {
+    pub(super) fn reach(&self) -> Option<DVec3> {
         self.inverse.filter(|_| self.strength != 0.0)?;
-        let along = |axis: usize| self.axes.map(|end| end[axis]);
-        Some([0, 1, 2].map(|axis| match self.shape {
-            Shape::Sphere => length(along(axis)),
-            Shape::Cubes => self.outer * along(axis).iter().map(|x| x.abs()).sum::<f64>(),
-        }))
+        let ends = |axis: usize| DVec3::from(self.axes.map(|end| end[axis]));
+        let extent = |axis: usize| match self.shape {
+            Shape::Sphere => ends(axis).norm(),
+            Shape::Cubes => self.outer * ends(axis).abs().sum(),
+        };
+        Some(DVec3::new(extent(0), extent(1), extent(2)))
     }
 
     /// Whether its influence is nowhere below 0.
@@ -79,8 +81,8 @@ impl Control {
         let inverse = self.inverse.unwrap_or_default();
         Local {
             shape: self.shape,
-            centre: std::array::from_fn(|axis| (self.centre[axis] - f64::from(origin[axis])) as f32),
-            rows: inverse.map(|row| row.map(|x| x as f32)),
+            centre: to_f32(self.centre - to_f64(origin)),
+            rows: inverse.map(to_f32),
             beyond: (0.5 / (self.outer - 1.0)) as f32,
         }
     }
@@ -131,33 +133,20 @@ impl Local {
     }
 }
 
-/// The inverse of the matrix whose columns are `axes`; `None` where they span no volume.
-fn inverse(axes: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    // Each axis brought to length 1 first: no product overflows, and flatness has no scale.
-    let lengths = axes.map(length);
+/// The inverse of the matrix whose columns are `axes`, row by row; `None` where they span no volume.
+fn inverse(axes: [DVec3; 3]) -> Option<[DVec3; 3]> {
+    // Each axis is normalised first: no product overflows, and flatness does not depend on scale.
+    let lengths = axes.map(|axis| axis.norm());
     if !lengths.iter().all(|length| (1e-150..1e150).contains(length)) {
         return None;
     }
-    let unit: [[f64; 3]; 3] = std::array::from_fn(|k| axes[k].map(|x| x / lengths[k]));
-    let [a, b, c] = unit;
-    let volume = dot(a, cross(b, c));
+    let [a, b, c] = std::array::from_fn(|k| axes[k] / lengths[k]);
+    let volume = a.dot(&b.cross(&c));
     if volume.abs() <= FLAT {
         return None;
     }
-    let rows = [cross(b, c), cross(c, a), cross(a, b)];
-    Some(std::array::from_fn(|k| rows[k].map(|x| x / volume / lengths[k])))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
+    let rows = [b.cross(&c), c.cross(&a), a.cross(&b)];
+    Some(std::array::from_fn(|k| rows[k] / volume / lengths[k]))
 }
 
 /// The first rows of an outline: its centre and the ends of its own x, y and z axis.

@@ -4,7 +4,7 @@
 
 use numerics::lanes::LANES;
 use numerics::simd::kernel;
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3};
 
 /// A low and a high corner.
 pub(super) type Bounds = [Vec3; 2];
@@ -53,7 +53,7 @@ pub(super) struct Boxes {
 
 impl Boxes {
     /// Adds the box `reach` around `centre`, rounded outwards.
-    pub(super) fn push(&mut self, region: u32, centre: [f64; 3], reach: [f64; 3]) {
+    pub(super) fn push(&mut self, region: u32, centre: DVec3, reach: DVec3) {
         self.regions.push(region);
         for axis in 0..3 {
             self.low[axis].push(((centre[axis] - reach[axis]) as f32).next_down());

@@ -25,6 +25,7 @@ pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
+use numerics::vector::DVec3;
 use profile::Profile;
 use rayon::prelude::*;
 
@@ -129,12 +130,12 @@ struct Scene<'a> {
 impl<'a> Scene<'a> {
     fn new(gusts: &'a Gusts<'a>) -> Self {
         let mut boxes = Boxes::default();
-        let mut add = |region: usize, centre: [f64; 3], reach: [f64; 3]| {
-            boxes.push(region as u32, centre, reach.map(|reach| reach * (1.0 + MARGIN)));
+        let mut add = |region: usize, centre: DVec3, reach: DVec3| {
+            boxes.push(region as u32, centre, reach * (1.0 + MARGIN));
         };
         for (region, sphere) in gusts.spheres.iter().enumerate() {
             if sphere.radius >= SMALLEST && sphere.strength != 0.0 {
-                add(region, sphere.centre, [f64::from(sphere.radius); 3]);
+                add(region, sphere.centre.into(), DVec3::repeat(sphere.radius.into()));
             }
         }
         for (place, control) in gusts.controls.iter().enumerate() {

@@ -1,129 +1,130 @@
-//! Free-form deformation: a box of control points, each moved by an offset, and space moves along (Sederberg & Parry,
-//! *Free-Form Deformation of Solid Geometric Models*, 1986).
+//! Free-form deformation: a box of control points, each displaced by an offset, deforms the space in it (Sederberg &
+//! Parry, *Free-Form Deformation of Solid Geometric Models*, 1986).
 //!
-//! A point at u, v, w of the box moves by Σ Bᵢ(u)·Bⱼ(v)·Bₖ(w)·offsetᵢⱼₖ. B are Bernstein polynomials of the degree of the
-//! divisions, so that the whole box bends smoothly, or tents over neighbouring control points, so that each cell does by
-//! itself and they meet without a gap. Both reproduce affine maps.
+//! A point at u, v, w of the box is displaced by Σ Bᵢ(u)·Bⱼ(v)·Bₖ(w)·offsetᵢⱼₖ. B are Bernstein polynomials whose degree
+//! is the number of divisions, so that the whole box bends smoothly, or tent functions, so that each cell depends on its
+//! own corners and cells meet without a gap. Both reproduce affine maps.
 //!
-//! Promise: a point where all offsets that reach it are 0 keeps its bits; offsets that are affine in their control points'
-//! places give that affine map to the rounding of f32 (within the box, and outside with [`Outside::Extend`]); the
-//! Jacobian is the map's own derivative, one-sided where the map has a crease; the same bits on every SIMD path and number
-//! of threads. f64 inside, rounded once. Limits: between cells the trilinear map has creases, as has the border of the
-//! box with [`Outside::Hold`]; nothing keeps a lattice from folding space over, but [`Moved::folded`] tells. Metres.
+//! Promise: a point where all offsets that reach it are 0 keeps its bits; offsets that are an affine function of the
+//! control points' positions give that affine map to the rounding of f32 (within the box, and outside with
+//! [`Extrapolation::Extend`]); the Jacobian is the map's exact derivative, one-sided where the map has a crease; the same
+//! bits on every SIMD path and number of threads. Computed in f64, rounded once. Limits: the trilinear map has creases
+//! between cells, and so has the boundary of the box with [`Extrapolation::Hold`]; a lattice may fold space over, which
+//! [`Deformed::folded`] counts. Metres.
 
-mod group;
-mod turn;
+mod jacobian;
+mod point_group;
 
-use group::{Group, Scratch, move_group};
+pub use jacobian::{map_normals, map_orientations, map_vectors};
 use numerics::lanes::LANES;
 use numerics::simd::Path;
+use numerics::vector::DMat3;
+use point_group::{PointGroup, Scratch, displace_group};
 use rayon::prelude::*;
 
-pub use turn::{Matrix, turn_normals, turn_orientations, turn_vectors};
-
-/// How control points share in what is between them.
+/// How offsets are interpolated between control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Basis {
-    /// Straight from one to the next: the eight around a point move it.
+pub enum LatticeBasis {
+    /// Linear within a cell: the eight control points around a point displace it.
     Trilinear,
-    /// All of them everywhere, the near ones most.
+    /// All control points act everywhere, near ones most.
     Bernstein,
 }
 
-/// What becomes of points outside the box.
+/// How points outside the box are displaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outside {
-    /// They move as the nearest point of the box does.
+pub enum Extrapolation {
+    /// As the nearest point of the box.
     Hold,
-    /// Along each axis the box's edge goes straight on.
+    /// Linearly along each axis, with the slope at the edge of the box.
     Extend,
 }
 
 /// A box of control points with offsets.
 #[derive(Clone, Copy, Debug)]
-pub struct Lattice<'a> {
+pub struct DeformationLattice<'a> {
     from: [f64; 3],
     extent: [f64; 3],
     divisions: [usize; 3],
     offsets: &'a [[f32; 3]],
-    basis: Basis,
-    outside: Outside,
+    basis: LatticeBasis,
+    extrapolation: Extrapolation,
 }
 
-/// Moved points, and what the lattice does to space there.
+/// Deformed points, and the Jacobians there.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moved {
+pub struct Deformed {
     /// One point for every incoming one.
     pub points: Vec<[f32; 3]>,
-    /// The map's derivative at each, row by row; empty where nobody wanted it.
-    pub jacobians: Vec<Matrix>,
-    /// Least determinant of a derivative: how much of its volume the most squeezed place keeps. 1 without points.
-    pub least: f64,
-    /// Points where it is 0 or less: flattened, or turned inside out.
+    /// The Jacobian of the map at each; empty where not asked for.
+    pub jacobians: Vec<DMat3>,
+    /// Least determinant of a Jacobian: the share of its volume that the most compressed spot keeps. 1 without points.
+    pub min_determinant: f64,
+    /// Points with a determinant of 0 or less: space is flattened or inside out there.
     pub folded: usize,
 }
 
-/// Control points of a lattice of so many cells along each axis; none where no memory holds them.
+/// Control points of a lattice with so many cells along each axis; `None` where the number overflows.
 pub fn control_points(divisions: [usize; 3]) -> Option<usize> {
     divisions.iter().try_fold(1_usize, |count, cells| count.checked_mul(cells.checked_add(1)?))
 }
 
-impl<'a> Lattice<'a> {
+impl<'a> DeformationLattice<'a> {
     /// The box between the corners `from` and `to`, cut into `divisions` cells along x, y and z; an offset a control
-    /// point, x running fastest, then y. None where the box is not above 0 in all directions, a division is 0, or there
-    /// are more offsets than control points or fewer.
+    /// point, x running fastest, then y. `None` where the box has no volume, a division is 0, or the number of offsets is
+    /// not that of the control points.
     pub fn new(
         [from, to]: [[f64; 3]; 2],
         divisions: [usize; 3],
         offsets: &'a [[f32; 3]],
-        basis: Basis,
-        outside: Outside,
+        basis: LatticeBasis,
+        extrapolation: Extrapolation,
     ) -> Option<Self> {
         let extent = [0, 1, 2].map(|k| to[k] - from[k]);
-        let sound = extent.iter().all(|x| *x > 0.0 && x.is_finite()) && divisions.iter().all(|cells| *cells > 0);
+        let is_box = extent.iter().all(|x| *x > 0.0 && x.is_finite()) && divisions.iter().all(|cells| *cells > 0);
         let fits = control_points(divisions) == Some(offsets.len());
-        (sound && fits).then_some(Self { from, extent, divisions, offsets, basis, outside })
+        (is_box && fits).then_some(Self { from, extent, divisions, offsets, basis, extrapolation })
     }
 
-    /// Whether no control point is moved.
+    /// Whether all offsets are 0.
     pub fn is_identity(&self) -> bool {
         self.offsets.as_flattened().iter().all(|x| *x == 0.0)
     }
 
-    /// Moves points; with the Jacobians where they are wanted.
-    pub fn deform(&self, points: &[[f32; 3]], jacobians: bool) -> Moved {
+    /// Deforms points; with the Jacobians where asked for.
+    pub fn deform(&self, points: &[[f32; 3]], jacobians: bool) -> Deformed {
         self.deform_on(Path::chosen(), points, jacobians)
     }
 
-    /// [`Lattice::deform`] on a given SIMD path.
-    pub fn deform_on(&self, path: Path, points: &[[f32; 3]], jacobians: bool) -> Moved {
-        let mut moved = Moved {
+    /// [`DeformationLattice::deform`] on a given SIMD path.
+    pub fn deform_on(&self, path: Path, points: &[[f32; 3]], jacobians: bool) -> Deformed {
+        let mut deformed = Deformed {
             points: points.to_vec(),
-            jacobians: if jacobians { vec![turn::IDENTITY; points.len()] } else { Vec::new() },
-            least: 1.0,
+            jacobians: if jacobians { vec![DMat3::identity(); points.len()] } else { Vec::new() },
+            min_determinant: 1.0,
             folded: 0,
         };
         let reached: Vec<Reached> = if jacobians {
-            let tasks = moved.points.par_chunks_mut(TASK).zip(moved.jacobians.par_chunks_mut(TASK));
+            let tasks = deformed.points.par_chunks_mut(TASK).zip(deformed.jacobians.par_chunks_mut(TASK));
             tasks.map(|(points, jacobians)| self.task(path, points, jacobians)).collect()
         } else {
-            moved.points.par_chunks_mut(TASK).map(|points| self.task(path, points, &mut [])).collect()
+            deformed.points.par_chunks_mut(TASK).map(|points| self.task(path, points, &mut [])).collect()
         };
         let reached = reached.into_iter().reduce(Reached::join);
-        if let Some(Reached { least, folded }) = reached {
-            (moved.least, moved.folded) = (least, folded);
+        if let Some(Reached { min_determinant, folded }) = reached {
+            (deformed.min_determinant, deformed.folded) = (min_determinant, folded);
         }
-        moved
+        deformed
     }
 
-    fn task(&self, path: Path, points: &mut [[f32; 3]], jacobians: &mut [Matrix]) -> Reached {
-        let (mut scratch, mut group) = (Scratch::default(), Group::default());
-        let mut reached = Reached { least: f64::INFINITY, folded: 0 };
+    fn task(&self, path: Path, points: &mut [[f32; 3]], jacobians: &mut [DMat3]) -> Reached {
+        let (mut scratch, mut group) = (Scratch::default(), PointGroup::default());
+        let mut reached = Reached { min_determinant: f64::INFINITY, folded: 0 };
         let mut jacobians = jacobians.chunks_mut(LANES);
         for points in points.chunks_mut(LANES) {
             group.load(points);
-            move_group(path, self, &mut scratch, &mut group);
+            displace_group(path, self, &mut scratch, &mut group);
             group.store(points);
             for lane in 0..points.len() {
                 reached = reached.join(Reached::of(group.determinant.0[lane]));
@@ -141,18 +142,18 @@ const TASK: usize = 128 * LANES;
 
 #[derive(Clone, Copy)]
 struct Reached {
-    least: f64,
+    min_determinant: f64,
     folded: usize,
 }
 
 impl Reached {
     fn of(determinant: f64) -> Self {
         let upright = determinant > 0.0;
-        Self { least: determinant, folded: usize::from(!upright) }
+        Self { min_determinant: determinant, folded: usize::from(!upright) }
     }
 
     fn join(self, other: Self) -> Self {
-        Self { least: self.least.min(other.least), folded: self.folded + other.folded }
+        Self { min_determinant: self.min_determinant.min(other.min_determinant), folded: self.folded + other.folded }
     }
 }
 

@@ -1,14 +1,15 @@
-//! The frame of the wind: two axes across it and the third upwind, from the middle of the curves, in a
-//! power of two of metres that brings the scene below 2.
+//! The frame of the wind: two axes across it and the third upwind, from the centre of the curves, in a
+//! power-of-two unit in which all coordinates are below 2.
 
 use super::Collider;
-use numerics::vector::{self, Vec3};
+use numerics::vector::{self, DVec3, Vec3, direction, to_f32, to_f64};
 
 /// From a point of the scene to the frame.
 pub(super) struct Frame {
-    middle: [f64; 3],
-    /// Across, across and upwind, each as long as the frame's unit is short.
-    axes: [[f64; 3]; 3],
+    centre: DVec3,
+    /// Two axes across the wind and the one upwind, each of length `unit`.
+    axes: [DVec3; 3],
+    /// Frame units a metre.
     unit: f64,
 }
 
@@ -38,30 +39,29 @@ const HAIR: f32 = 1e-2;
 const ULPS: f32 = 4.0;
 
 impl Frame {
-    pub(super) fn of(wind: [f64; 3], points: &[Vec3], colliders: &[Collider<'_>]) -> Self {
+    /// `None` where `wind` has no direction.
+    pub(super) fn of(wind: [f64; 3], points: &[Vec3], colliders: &[Collider<'_>]) -> Option<Self> {
+        let upwind = direction(-DVec3::from(wind))?;
         let bounds = Bounds::of(points);
-        let middle = bounds.middle();
-        let reach = colliders.iter().map(|collider| Bounds::of(collider.points).reach(middle));
-        let extent = reach.fold(bounds.reach(middle), f64::max);
+        let centre = bounds.centre();
+        let reach = colliders.iter().map(|collider| Bounds::of(collider.points).reach(centre));
+        let extent = reach.fold(bounds.reach(centre), f64::max);
         let exponent = if extent > 0.0 { libm::ilogb(extent) } else { 0 };
         let unit = libm::scalbn(1.0, -exponent);
 
-        let upwind = unit_vector(wind.map(|x| -x));
-        let across = unit_vector(vector::perpendicular(upwind.map(|x| x as f32)).map(f64::from));
-        // The axis found in f32 is at a right angle to the wind to its rounding; this takes the rest.
-        let along = dot(across, upwind);
-        let across = unit_vector([0, 1, 2].map(|k| across[k] - along * upwind[k]));
-        let other = [1, 2, 0].map(|k| upwind[k] * across[(k + 1) % 3] - upwind[(k + 1) % 3] * across[k]);
-        Self { middle, axes: [across, other, upwind].map(|axis| axis.map(|x| x * unit)), unit }
+        let across = direction(to_f64(vector::perpendicular(to_f32(upwind))))?;
+        // Found in f32, it is perpendicular to the wind to f32 rounding only; this removes the rest.
+        let across = direction(across - upwind * across.dot(&upwind))?;
+        let axes = [across, upwind.cross(&across), upwind].map(|axis| axis * unit);
+        Some(Self { centre, axes, unit })
     }
 
     /// A point of the scene, in the frame.
     #[inline(always)]
     pub(super) fn at(&self, point: Vec3) -> Vec3 {
-        let [x, y, z] = point;
-        let from = [f64::from(x) - self.middle[0], f64::from(y) - self.middle[1], f64::from(z) - self.middle[2]];
+        let from_centre = to_f64(point) - self.centre;
         let [a, b, c] = &self.axes;
-        [dot(*a, from) as f32, dot(*b, from) as f32, dot(*c, from) as f32]
+        [a.dot(&from_centre) as f32, b.dot(&from_centre) as f32, c.dot(&from_centre) as f32]
     }
 
     /// A length of the scene, in the frame.
@@ -102,31 +102,14 @@ impl Bounds {
         Self { low: [0, 1, 2].map(|axis| some(axis, low[axis])), high: [0, 1, 2].map(|axis| some(axis, high[axis])) }
     }
 
-    fn middle(&self) -> [f64; 3] {
-        [0, 1, 2].map(|axis| 0.5 * f64::from(self.low[axis]) + 0.5 * f64::from(self.high[axis]))
+    fn centre(&self) -> DVec3 {
+        to_f64(self.low) * 0.5 + to_f64(self.high) * 0.5
     }
 
-    /// The largest coordinate as seen from `middle`.
-    fn reach(&self, middle: [f64; 3]) -> f64 {
-        let reach = |axis: usize| {
-            let [low, high] = [self.low[axis], self.high[axis]].map(|x| (f64::from(x) - middle[axis]).abs());
-            low.max(high)
-        };
-        reach(0).max(reach(1)).max(reach(2))
+    /// The largest coordinate relative to `centre`.
+    fn reach(&self, centre: DVec3) -> f64 {
+        (to_f64(self.low) - centre).amax().max((to_f64(self.high) - centre).amax())
     }
-}
-
-#[inline(always)]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// `v` at length 1; its numbers are brought near 1 first, so that any length but 0 will do.
-fn unit_vector(v: [f64; 3]) -> [f64; 3] {
-    let largest = v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let v = v.map(|x| x / largest);
-    let length = dot(v, v).sqrt();
-    v.map(|x| x / length)
 }
 
 #[cfg(test)]
@@ -134,14 +117,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_frame_is_a_turn_with_its_third_axis_upwind() {
+    fn the_frame_is_a_rotation_with_its_third_axis_upwind() {
         for wind in [[1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.3, -0.2, 1e-3], [1e300, 1e300, 1.0]] {
-            let frame = Frame::of(wind, &[[-1.0, 0.0, 0.0], [1.0, 0.5, 0.0]], &[]);
-            assert_eq!((frame.unit, frame.middle), (1.0, [0.0, 0.25, 0.0]));
+            let frame = Frame::of(wind, &[[-1.0, 0.0, 0.0], [1.0, 0.5, 0.0]], &[]).unwrap();
+            assert_eq!((frame.unit, frame.centre), (1.0, DVec3::new(0.0, 0.25, 0.0)));
             let [a, b, c] = frame.axes;
-            assert!(dot(a, b).abs() < 1e-15 && dot(b, c).abs() < 1e-15 && dot(c, a).abs() < 1e-15);
-            assert!([a, b, c].iter().all(|axis| (dot(*axis, *axis) - 1.0).abs() < 1e-15));
-            assert!((dot(c, unit_vector(wind)) + 1.0).abs() < 1e-15);
+            assert!(a.dot(&b).abs() < 1e-15 && b.dot(&c).abs() < 1e-15 && c.dot(&a).abs() < 1e-15);
+            assert!([a, b, c].iter().all(|axis| (axis.norm_squared() - 1.0).abs() < 1e-15));
+            assert!((c.dot(&direction(wind.into()).unwrap()) + 1.0).abs() < 1e-15);
         }
     }
 
@@ -149,7 +132,7 @@ mod tests {
     fn any_scene_is_brought_below_two() {
         for scale in [1e-40_f32, 1e-6, 1.0, 1e6, 3e38] {
             let points = [[0.0, 0.0, 0.0], [scale, 0.0, 0.0]];
-            let frame = Frame::of([1.0, 0.0, 0.0], &points, &[]);
+            let frame = Frame::of([1.0, 0.0, 0.0], &points, &[]).unwrap();
             let [.., upwind] = frame.at(points[0]);
             assert!((1.0..2.0).contains(&upwind), "{upwind}");
         }

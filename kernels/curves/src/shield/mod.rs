@@ -53,7 +53,7 @@ impl<'a> Collider<'a> {
 /// How the wind is stopped.
 #[derive(Clone, Copy, Debug)]
 pub struct Shield {
-    /// Where the wind blows to: any length but 0.
+    /// Where the wind blows to, of any length; nothing is sheltered from a wind of 0.
     pub wind: [f64; 3],
     /// How far upwind of a CV something shelters it, metres.
     pub offset: f32,
@@ -100,7 +100,7 @@ pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shiel
 /// As [`shield()`].
 pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
     let curves = starts.len().saturating_sub(1);
-    let frame = Frame::of(shield.wind, points, colliders);
+    let Some(frame) = Frame::of(shield.wind, points, colliders) else { return vec![0.0; curves] };
     let reach = frame.length(shield.offset);
     if curves == 0 || reach.is_nan() || reach <= 0.0 {
         return vec![0.0; curves];

@@ -167,7 +167,7 @@ mod tests {
         // Two curves of a row of CVs across the wind, their numbers shuffled.
         let along = [5, 2, 7, 0, 3, 6, 1, 4];
         let points: Vec<Vec3> = along.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
-        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]);
+        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         let views = Views::of(&frame, &[0, 3, 8], &points, 0.0);
         let at = |place: &u32| views.sorted()[*place as usize].at;
         let found: Vec<Vec3> = views.curves().collect::<Vec<_>>().into_iter().flatten().map(at).collect();
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn points_that_are_no_numbers_or_all_one_are_sorted_too() {
         let points = [[f32::NAN; 3], [f32::INFINITY, 0.0, 0.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0]];
-        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]);
+        let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         for n in 0..=4 {
             let starts: Vec<u32> = (0..=n).collect();
             assert_eq!(Views::of(&frame, &starts, &points, 0.0).sorted().len(), n as usize);
