@@ -15,6 +15,7 @@ use curves::attach::{Binding, Pose};
 use curves::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
 use curves::scatter::Spot;
 use engine::prelude::*;
+use numerics::vector::{to_f32, to_f64};
 
 use crate::shared::kept::{Array, Roots};
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
@@ -223,7 +224,9 @@ fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shape
         let mixed = if let Some(vectors) = table.get::<[f32; 3]>(name).filter(|_| [V.name, N.name].contains(&&**name)) {
             let mut vectors = now.vectors(shapes, vectors, rows);
             if **name == *N.name {
-                vectors.iter_mut().for_each(|normal| *normal = unit(*normal));
+                vectors
+                    .iter_mut()
+                    .for_each(|normal| *normal = to_f64(*normal).try_normalize(0.0).map_or(*normal, to_f32));
             }
             Column::new(vectors)
         } else if let Some(turns) = table.get::<[f32; 4]>(name).filter(|_| **name == *ORIENT.name) {
@@ -241,12 +244,6 @@ fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shape
         hairs.set_column(owner, name.clone(), mixed)?;
     }
     Ok(())
-}
-
-/// At length 1; zero where it has no direction.
-fn unit(v: [f32; 3]) -> [f32; 3] {
-    let length = v.iter().map(|x| f64::from(*x) * f64::from(*x)).sum::<f64>().sqrt();
-    if length > 0.0 { v.map(|x| (f64::from(x) / length) as f32) } else { v }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 //! * A curve of n segments bends more than one of n/2: `resolution_free` takes a share of the angle a length instead.
 //! * `blend` turns each segment back towards where it came from, so that half a wind keeps lengths too.
 
-use crate::shared::direction::unit;
+use crate::shared::direction::unit_direction;
 use curves::wind_bend::{Bend, BendNoise, Mode as BendMode, bend};
 use engine::prelude::*;
 use numerics::noise::{Field, Kind as NoiseKind};
@@ -164,7 +164,7 @@ fn still(cx: &FrameCx, out: Geometry) -> Result<Outputs> {
 
 /// The wind's direction, of length 1.
 fn direction(params: &Params) -> [f64; 3] {
-    unit(params.get(WIND_DIR))
+    unit_direction(params.get(WIND_DIR))
 }
 
 fn has_kind(params: &Params) -> bool {

@@ -12,11 +12,12 @@
 //! * Noise dents a sphere in its own space, by direction: no point beyond the drawn radius is touched, the centre stays 1.
 //! * A gust fades over its decay while it travels on.
 
-use crate::shared::direction::unit;
+use crate::shared::direction::unit_direction;
 use crate::shared::gust_control;
 use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, feel};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
+use numerics::vector::DVec3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -200,9 +201,9 @@ impl Launch {
             let [before] = cx.integrals(Frame::whole(frame - frames));
             difference(toward, before).map(|x| x * cx.fps() / frames as f64)
         };
-        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| length(*mean) > TURNED_ABOUT);
+        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| DVec3::from(*mean).norm() > TURNED_ABOUT);
         Self {
-            wind: wind.map_or_else(|| direction(cx.params()), unit),
+            wind: wind.map_or_else(|| direction(cx.params()), unit_direction),
             upto: [slow, fast],
             step: [difference(slow, slow_before), difference(fast, fast_before)],
         }
@@ -223,13 +224,9 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] - b[axis])
 }
 
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
 /// The wind's direction, of length 1.
 fn direction(params: &Params) -> [f64; 3] {
-    unit(params.get(WIND_DIR))
+    unit_direction(params.get(WIND_DIR))
 }
 
 fn along(params: &Params, speed: f32) -> [f64; 3] {

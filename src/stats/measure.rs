@@ -5,7 +5,9 @@
 
 use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, Table, Topology, Volume};
 
-use super::surface::{Surface, tet_volume};
+use numerics::vector::to_f64;
+
+use super::surface::{SurfaceStats, tet_volume};
 
 /// Least, greatest and sum of some numbers; there is one at least.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +76,7 @@ pub(super) enum Shape {
     /// CVs a curve, and lengths in metres.
     Curves { cvs: Option<Spread>, length: Option<Spread> },
     /// Faces.
-    Mesh(Surface),
+    Mesh(SurfaceStats),
     /// Nothing.
     Points,
     /// Signed volumes in m³; an inverted tet has none above 0.
@@ -137,9 +139,9 @@ fn shape(part: &Component) -> Shape {
     match part.topology() {
         Topology::Curves(runs) => Shape::Curves {
             cvs: Spread::of(runs.counts().map(f64::from)),
-            length: Spread::of(runs.ranges().map(|cvs| length(&positions[cvs]))),
+            length: Spread::of(runs.ranges().map(|cvs| polyline_length(&positions[cvs]))),
         },
-        Topology::Mesh(faces) => Shape::Mesh(Surface::of(faces, positions)),
+        Topology::Mesh(faces) => Shape::Mesh(SurfaceStats::of(faces, positions)),
         Topology::Points => Shape::Points,
         Topology::Tets(tets) => {
             let volumes: Vec<f64> =
@@ -150,13 +152,9 @@ fn shape(part: &Component) -> Shape {
     }
 }
 
-/// Of a polyline.
-fn length(cvs: &[[f32; 3]]) -> f64 {
-    let segment = |pair: &[[f32; 3]]| {
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(pair[1][k]) - f64::from(pair[0][k]));
-        (x * x + y * y + z * z).sqrt()
-    };
-    cvs.windows(2).map(segment).sum()
+/// The length of a polyline.
+fn polyline_length(cvs: &[[f32; 3]]) -> f64 {
+    cvs.windows(2).map(|pair| (to_f64(pair[1]) - to_f64(pair[0])).norm()).sum()
 }
 
 fn volume(volume: &Volume) -> VolumeStats {

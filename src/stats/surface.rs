@@ -5,10 +5,11 @@
 //! corners; it has a sense only where the surface is closed, and is given only there.
 
 use engine::geometry::Faces;
+use numerics::vector::{DVec3, to_f64};
 
 /// Edges, area and volume.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Surface {
+pub(super) struct SurfaceStats {
     /// Corners a face.
     pub(super) corners: Vec<u32>,
     /// Edges, each counted once, whatever the number of its faces.
@@ -28,7 +29,7 @@ pub(super) struct Surface {
     pub(super) volume: Option<f64>,
 }
 
-impl Surface {
+impl SurfaceStats {
     /// Of `faces` between `positions`.
     pub(super) fn of(faces: &Faces, positions: &[[f32; 3]]) -> Self {
         let mut edges = directed_edges(faces);
@@ -58,22 +59,18 @@ impl Surface {
             }
         }
         // About a point near the mesh: far from it, the products would cancel.
-        let about = positions.first().map_or([0.0; 3], |p| p.map(f64::from));
-        let point = |corner: u32| {
-            let p = positions[corner as usize];
-            [0, 1, 2].map(|k| f64::from(p[k]) - about[k])
-        };
+        let about = positions.first().copied().map_or(DVec3::zeros(), to_f64);
+        let point = |corner: u32| to_f64(positions[corner as usize]) - about;
         let mut volume = 0.0;
         for face in faces.iter() {
             let first = point(face[0]);
-            let mut vector_area = [0.0; 3];
+            let mut vector_area = DVec3::zeros();
             for pair in face[1..].windows(2) {
-                let (b, c) = (point(pair[0]), point(pair[1]));
-                let normal = cross(minus(b, first), minus(c, first));
-                vector_area = [0, 1, 2].map(|k| vector_area[k] + normal[k]);
-                volume += dot(first, normal);
+                let normal = (point(pair[0]) - first).cross(&(point(pair[1]) - first));
+                vector_area += normal;
+                volume += first.dot(&normal);
             }
-            surface.area += dot(vector_area, vector_area).sqrt() / 2.0;
+            surface.area += vector_area.norm() / 2.0;
         }
         surface.volume = closed.then_some(volume / 6.0);
         surface
@@ -104,20 +101,8 @@ fn directed_edges(faces: &Faces) -> Vec<Edge> {
 
 /// The volume of a tet in m³, with the sign of (b−a)×(c−a)·(d−a).
 pub(super) fn tet_volume([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
-    let [a, b, c, d] = [a, b, c, d].map(|p| p.map(f64::from));
-    dot(cross(minus(b, a), minus(c, a)), minus(d, a)) / 6.0
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    let [b, c, d] = [b, c, d].map(|corner| to_f64(corner) - to_f64(a));
+    b.cross(&c).dot(&d) / 6.0
 }
 
 #[cfg(test)]
@@ -125,10 +110,10 @@ mod tests {
     use super::*;
     use engine::geometry::Component;
 
-    fn surface(faces: &[&[u32]], positions: &[[f32; 3]]) -> Surface {
+    fn surface(faces: &[&[u32]], positions: &[[f32; 3]]) -> SurfaceStats {
         let counts = faces.iter().map(|face| face.len() as u32).collect();
         let mesh = Component::mesh(counts, faces.concat(), positions.to_vec()).unwrap();
-        Surface::of(mesh.faces().unwrap(), mesh.positions())
+        SurfaceStats::of(mesh.faces().unwrap(), mesh.positions())
     }
 
     /// A cube of edge 2 about `x`, six quads that look outwards.

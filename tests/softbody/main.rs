@@ -16,6 +16,7 @@ mod scene;
 mod shapes;
 
 use engine::geometry::{Geometry, Kind};
+use numerics::vector::DVec3;
 
 /// Points of the only component there is.
 fn points(geometry: &Geometry) -> Vec<[f64; 3]> {
@@ -24,13 +25,13 @@ fn points(geometry: &Geometry) -> Vec<[f64; 3]> {
 }
 
 fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>().sqrt()
+    (DVec3::from(*a) - DVec3::from(*b)).norm()
 }
 
 /// Six times the signed volume of a tet.
 fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
-    let [p, q, r] = [b, c, d].map(|corner| std::array::from_fn::<f64, 3, _>(|k| corner[k] - a[k]));
-    p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0])
+    let [p, q, r] = [b, c, d].map(|corner| DVec3::from(corner) - DVec3::from(a));
+    p.dot(&q.cross(&r))
 }
 
 /// Volume of all tets.

@@ -1,6 +1,7 @@
 //! How many curves jump from a frame to the next in a smooth wind: the figures of Curve_Wind_Collision's `coherence`.
 
 use engine::geometry::Geometry;
+use numerics::vector::{self, Vec3};
 
 use crate::cooked::{BEAR, cook};
 
@@ -19,8 +20,8 @@ fn jumps(frames: &[Geometry]) -> f64 {
     f64::from(jumps) / f64::from(all)
 }
 
-fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f32>().sqrt()
+fn distance(a: Vec3, b: Vec3) -> f32 {
+    vector::length(vector::sub(a, b))
 }
 
 #[test]

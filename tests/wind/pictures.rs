@@ -1,6 +1,7 @@
 //! The numbers beside the pictures of docs/wind.md.
 
 use engine::geometry::{Component, ENVELOPE, SHIELDED};
+use numerics::vector::{self, DVec3, to_f64};
 
 use crate::cooked::cook_file;
 use crate::storm::{crossings, skin};
@@ -31,9 +32,9 @@ fn figure_1_goes_through_the_skin_without_collisions_alone_and_is_calm_in_the_le
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
         for (cvs, share) in part(5).runs().ranges().zip(shares) {
             let [at, grown] = [output, 5].map(|output| part(output).positions()[cvs.end - 1]);
-            let way = (0..3).map(|k| f64::from(at[k] - grown[k])).map(|x| x * x).sum::<f64>().sqrt();
+            let displacement = to_f64(vector::sub(at, grown)).norm();
             let kind = usize::from(*share > 0.9);
-            sums[kind] += way;
+            sums[kind] += displacement;
             counts[kind] += 1.0;
         }
         [sums[0] / counts[0], sums[1] / counts[1]]
@@ -50,10 +51,10 @@ fn figure_2_lets_in_all_wind_at_the_controls_centre_and_none_from_its_boundary()
     let mut worst = 0.0_f64;
     for (frame, geometry) in cooked[0].iter().enumerate() {
         let share = frame as f64 / 47.0;
-        let centre = [0.9 - 1.8 * share, 0.3 + 0.2 * share, 0.1];
+        let centre = DVec3::new(0.9 - 1.8 * share, 0.3 + 0.2 * share, 0.1);
         let curves = geometry.curves().unwrap();
         for (p, envelope) in curves.positions().iter().zip(curves.get(ENVELOPE).unwrap()) {
-            let away = (0..3).map(|k| f64::from(p[k]) - centre[k]).map(|x| x * x).sum::<f64>().sqrt() / 0.35;
+            let away = (to_f64(*p) - centre).norm() / 0.35;
             worst = worst.max((f64::from(*envelope) - (1.0 - away).max(0.0)).abs());
             if away >= 1.0 {
                 beyond = beyond.max(*envelope);

@@ -3,6 +3,7 @@
 use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
 use numerics::trig::sin_cos;
+use numerics::vector::to_f64;
 
 type Point = [f32; 3];
 
@@ -63,9 +64,8 @@ fn apart(a: &[Point], b: &[Point]) -> f64 {
     a.iter().zip(b).map(one).fold(0.0, f64::max)
 }
 
-fn length(a: Point, b: Point) -> f64 {
-    let along = [0, 1, 2].map(|k| f64::from(b[k]) - f64::from(a[k]));
-    along.iter().map(|x| x * x).sum::<f64>().sqrt()
+fn distance(a: Point, b: Point) -> f64 {
+    (to_f64(b) - to_f64(a)).norm()
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn however_the_skin_bends_lengths_are_kept_and_roots_keep_their_height() {
     let out = attach(hair(), floor(), moved(&floor(), rolled)).cook();
     for (now, rest) in out.curves().positions().chunks(3).zip(hair().positions().chunks(3)) {
         for k in 0..2 {
-            assert!((length(now[k], now[k + 1]) - length(rest[k], rest[k + 1])).abs() < 2e-6);
+            assert!((distance(now[k], now[k + 1]) - distance(rest[k], rest[k + 1])).abs() < 2e-6);
         }
     }
     assert!((out.metrics["bound"] - 0.02).abs() < 1e-7);
@@ -175,7 +175,7 @@ fn a_lost_skin_moves_its_curves_and_counts_them() {
     assert_eq!(out.metrics["unturned"], 100.0);
     for (now, rest) in out.curves().positions().chunks(3).zip(hair().positions().chunks(3)) {
         assert!(apart(&now[..1], &[[5.0, 5.0 + rest[0][1], 5.0]]) < 1e-6);
-        assert!((length(now[0], now[2]) - length(rest[0], rest[2])).abs() < 2e-6);
+        assert!((distance(now[0], now[2]) - distance(rest[0], rest[2])).abs() < 2e-6);
     }
 }
 

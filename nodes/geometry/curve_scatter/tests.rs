@@ -2,6 +2,7 @@
 
 use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
+use numerics::vector::{self, to_f64};
 
 /// A square in x and z around the origin, `size` wide, facing up.
 fn square(size: f32) -> Component {
@@ -21,8 +22,8 @@ fn ids(out: &BenchResult) -> &[i32] {
     out.curves().get(CURVE_ID).unwrap()
 }
 
-fn length(a: [f32; 3], b: [f32; 3]) -> f64 {
-    (0..3).map(|k| f64::from(b[k] - a[k]) * f64::from(b[k] - a[k])).sum::<f64>().sqrt()
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    to_f64(vector::sub(b, a)).norm()
 }
 
 #[test]
@@ -57,9 +58,9 @@ fn curves_are_straight_and_as_long_and_as_lean_as_asked() {
     let (mut least, mut most, mut flattest) = (f64::MAX, 0.0_f64, f64::MAX);
     for cvs in out.curves().runs().ranges() {
         let cvs = &out.curves().positions()[cvs];
-        let whole = length(cvs[0], cvs[3]);
+        let whole = distance(cvs[0], cvs[3]);
         for pair in cvs.windows(2) {
-            assert!((length(pair[0], pair[1]) - whole / 3.0).abs() < 1e-6);
+            assert!((distance(pair[0], pair[1]) - whole / 3.0).abs() < 1e-6);
         }
         (least, most) = (least.min(whole), most.max(whole));
         flattest = flattest.min(f64::from(cvs[3][1]) / whole);
@@ -88,7 +89,7 @@ fn roots_lie_on_the_skin_and_apart() {
     }
     let roots = roots(&out);
     let nearest =
-        |i: usize| (0..roots.len()).filter(|j| *j != i).map(|j| length(roots[i], roots[j])).fold(f64::MAX, f64::min);
+        |i: usize| (0..roots.len()).filter(|j| *j != i).map(|j| distance(roots[i], roots[j])).fold(f64::MAX, f64::min);
     let least = (0..roots.len()).map(nearest).fold(f64::MAX, f64::min);
     // A hundred on a square metre are 0.1 apart in rows; at random, the nearest two of 1,200 would be 1.4e-3.
     assert!(least > 0.045, "{least}");

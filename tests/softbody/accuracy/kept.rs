@@ -14,7 +14,7 @@ fn momentum(body: &Body, state: &State) -> V {
 
 fn angular(body: &Body, state: &State) -> V {
     let each = state.positions.iter().zip(&state.velocities).zip(body.masses());
-    each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, cross(*x, *v), mass))
+    each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, DVec3::from(*x).cross(&DVec3::from(*v)).into(), mass))
 }
 
 /// A block that turns, stretches and moves.
@@ -25,7 +25,7 @@ fn thrown(damping: f64) -> (Body, State) {
         let key = Key::new(1).of(index as u64);
         let own: V = std::array::from_fn(|k| 0.2 * (key.of(k as u64).f64() - 0.5));
         let arm = add(state.positions[index], [0.25, 0.2, 0.15], -1.0);
-        *v = add(add([0.3, -0.2, 0.5], cross([0.2, 3.0, -1.0], arm), 1.0), own, 1.0);
+        *v = add(add([0.3, -0.2, 0.5], DVec3::new(0.2, 3.0, -1.0).cross(&DVec3::from(arm)).into(), 1.0), own, 1.0);
     }
     (body, state)
 }
@@ -35,7 +35,7 @@ fn lost_momentum(integrator: Integrator, volume: f64) -> f64 {
     let (body, mut state) = thrown(0.0);
     let before = momentum(&body, &state);
     steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 200);
-    distance(&momentum(&body, &state), &before) / norm(before)
+    distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
 /// The same of two blocks that are joined and pull at each other.
@@ -53,7 +53,7 @@ fn lost_by_a_pair() -> f64 {
     state.velocities[lower as usize..].fill([0.2, 0.3, -0.1]);
     let before = momentum(&body, &state);
     steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 100);
-    distance(&momentum(&body, &state), &before) / norm(before)
+    distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
 /// What a block that turns about z loses of its angular momentum in so many steps, so many of them a turn; and how many
@@ -63,11 +63,11 @@ fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
     let mut state = State::at_rest(&body);
     for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
         *x = add(*x, [0.2, 0.15, 0.15], -1.0);
-        *v = cross([0.0, 0.0, 1.0], *x);
+        *v = DVec3::z().cross(&DVec3::from(*x)).into();
     }
     let before = angular(&body, &state);
     let reports = steps(&body, &mut state, &Frame { seconds: TAU / steps_a_turn, ..BARE }, count);
-    let lost = distance(&angular(&body, &state), &before) / norm(before);
+    let lost = distance(&angular(&body, &state), &before) / DVec3::from(before).norm();
     (lost, reports.iter().map(|report| report.euler_steps).sum())
 }
 
@@ -75,7 +75,12 @@ fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
 fn gained(integrator: Integrator, volume: f64, damping: f64) -> f64 {
     let (body, mut state) = thrown(damping);
     let each = state.velocities.iter().zip(body.masses());
-    let start: f64 = each.map(|(v, mass)| 0.5 * mass * norm(*v) * norm(*v)).sum();
+    let start: f64 = each
+        .map(|(v, mass)| {
+            let speed = DVec3::from(*v).norm();
+            0.5 * mass * speed * speed
+        })
+        .sum();
     let reports = steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 100);
     largest(reports.iter().map(|report| (report.kinetic + report.elastic + report.volume_energy) / start - 1.0))
 }

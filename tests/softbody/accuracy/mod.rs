@@ -12,6 +12,7 @@ mod touch;
 
 use bodies::mass_spring::{Body, Frame, Material, Mesh, Report, Solver, Spring, State};
 use numerics::masked::Masked;
+use numerics::vector::DVec3;
 
 use super::laws::{Figure, hold, storage};
 use super::{distance, shapes};
@@ -61,14 +62,6 @@ fn steps(body: &Body, state: &mut State, frame: &Frame<'_>, frames: usize) -> Ve
 
 fn add(a: V, b: V, share: f64) -> V {
     std::array::from_fn(|k| a[k] + share * b[k])
-}
-
-fn cross(a: V, b: V) -> V {
-    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
-}
-
-fn norm(a: V) -> f64 {
-    distance(&a, &[0.0; 3])
 }
 
 fn mean(points: &[V]) -> V {

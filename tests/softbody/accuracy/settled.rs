@@ -35,7 +35,7 @@ fn balance(springs: &[shapes::Spring], weights: &[V], held: &[bool], near: &[V])
         for spring in springs {
             let [a, b] = spring.ends;
             let way = add(x[b], x[a], -1.0);
-            let size = norm(way);
+            let size = DVec3::from(way).norm();
             let n = way.map(|x| x / size);
             let (pull, k) = (spring.stiffness * (size - spring.length), spring.stiffness);
             let own = |p: usize, q: usize| {

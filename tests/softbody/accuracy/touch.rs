@@ -101,9 +101,9 @@ fn pin(frame: Time) -> Geometry {
 fn within(points: &[V], p: &V) -> bool {
     let depth = |k: usize| {
         let (a, b) = (points[2 * k], points[2 * ((k + 1) % SIDES)]);
-        let out = cross(add(b, a, -1.0), [0.0, 0.0, 1.0]);
+        let out = DVec3::from(add(b, a, -1.0)).cross(&DVec3::z());
         let from = add(*p, a, -1.0);
-        -(out[0] * from[0] + out[1] * from[1]) / norm(out)
+        -(out[0] * from[0] + out[1] * from[1]) / out.norm()
     };
     (-0.09..0.21).contains(&p[2]) && (0..SIDES).all(|k| depth(k) > 1e-7)
 }

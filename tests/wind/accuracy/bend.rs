@@ -2,6 +2,7 @@
 
 use curves::wind_bend::{Bend, Mode, bend};
 use numerics::ramp::Ramp;
+use numerics::vector::to_f64;
 
 use super::{Figure, storage};
 
@@ -53,7 +54,7 @@ fn angle_errors(root: Point, segments: usize, mode: Mode, law: impl Fn(f64, usiz
 fn tip_error(segments: usize, g: f32) -> f64 {
     let tip = |segments| *bent([0.0; 3], 2.0, segments, g, RESOLUTION_FREE).last().unwrap();
     let (tip, finest) = (tip(segments), tip(1024));
-    (0..3).map(|k| f64::from(tip[k]) - f64::from(finest[k])).map(|d| d * d).sum::<f64>().sqrt()
+    (to_f64(tip) - to_f64(finest)).norm()
 }
 
 pub(super) fn figures() -> Vec<Figure> {

@@ -1,6 +1,7 @@
 //! The whole chain, turned, moved and scaled with its scene.
 
 use engine::geometry::Component;
+use numerics::vector::{DVec3, to_f64};
 
 use super::{Figure, storage};
 use crate::cooked::cook;
@@ -84,7 +85,7 @@ fn errors(change: &Change, noise: &str) -> Vec<[f64; 2]> {
         let storage = (storage(there.positions()) / change.scale).max(storage(here.positions())) / SEGMENT;
         errors.extend(here.positions().iter().zip(there.positions()).map(|(a, b)| {
             let a = change.of(*a);
-            let apart = (0..3).map(|k| a[k] - f64::from(b[k])).map(|d| d * d).sum::<f64>().sqrt();
+            let apart = (DVec3::from(a) - to_f64(*b)).norm();
             [apart / (LENGTH * change.scale), storage]
         }));
     }

@@ -20,6 +20,7 @@ use engine::graph::Body;
 use engine::time::Frame;
 use numerics::random::Key;
 use numerics::shapes::icosphere;
+use numerics::vector::{self, DVec3, to_f64};
 
 use super::cooked::{fault, graph, metrics};
 
@@ -220,7 +221,7 @@ fn length_error(made: &Component, fur: &Component) -> f64 {
     for cvs in fur.runs().ranges() {
         let (now, then) = (&made.positions()[cvs.clone()], &fur.positions()[cvs]);
         let lengths = |points: &[Point]| -> Vec<f64> {
-            points.windows(2).map(|ends| norm(difference(wide(ends[1]), wide(ends[0])))).collect()
+            points.windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).collect()
         };
         let largest = now.iter().chain(then).flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
         let allowed = 4.0 * (f64::from(largest.next_up()) - f64::from(largest));
@@ -237,38 +238,18 @@ fn length_error(made: &Component, fur: &Component) -> f64 {
 /// Segments that pass through a triangle: the segment's ends on either side of it, all three edges passed on the same
 /// side; in f64.
 fn crossings(curves: &Component, mesh: &Component) -> usize {
-    let corners = |triangle: &[u32; 3]| triangle.map(|corner| wide(mesh.positions()[corner as usize]));
-    let triangles: Vec<[[f64; 3]; 3]> = mesh.triangles().corners.iter().map(corners).collect();
-    let crosses = |a: [f64; 3], b: [f64; 3], triangle: &[[f64; 3]; 3]| {
-        let [p, q, r] = triangle.map(|corner| difference(corner, a));
-        let way = difference(b, a);
-        let normal = cross(difference(q, p), difference(r, p));
-        let (start, end) = (-dot(normal, p), dot(normal, difference(way, p)));
-        let volumes = [dot(way, cross(p, q)), dot(way, cross(q, r)), dot(way, cross(r, p))];
+    let corners = |triangle: &[u32; 3]| triangle.map(|corner| to_f64(mesh.positions()[corner as usize]));
+    let triangles: Vec<[DVec3; 3]> = mesh.triangles().corners.iter().map(corners).collect();
+    let crosses = |a: DVec3, b: DVec3, triangle: &[DVec3; 3]| {
+        let [p, q, r] = triangle.map(|corner| corner - a);
+        let along = b - a;
+        let normal = (q - p).cross(&(r - p));
+        let (start, end) = (-normal.dot(&p), normal.dot(&(along - p)));
+        let volumes = [along.dot(&p.cross(&q)), along.dot(&q.cross(&r)), along.dot(&r.cross(&p))];
         start * end < 0.0 && (volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0))
     };
     let segments = curves.runs().ranges().flat_map(|cvs| curves.positions()[cvs].windows(2));
-    segments.filter(|ends| triangles.iter().any(|triangle| crosses(wide(ends[0]), wide(ends[1]), triangle))).count()
-}
-
-fn wide(p: Point) -> [f64; 3] {
-    p.map(f64::from)
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    segments.filter(|ends| triangles.iter().any(|triangle| crosses(to_f64(ends[0]), to_f64(ends[1]), triangle))).count()
 }
 
 /// Curves as CVs a curve.
@@ -282,17 +263,16 @@ fn hairs(count: u64, cvs: usize, length: f32) -> Vec<Vec<Point>> {
     let hair = |k: u64| {
         let up = direction(Key::new(5).of(k));
         let lean = direction(Key::new(6).of(k));
-        let way: Point = std::array::from_fn(|d| up[d] + 0.4 * lean[d]);
-        let size = way.iter().map(|x| x * x).sum::<f32>().sqrt();
-        let at = |cv: usize| cv as f32 / (cvs - 1).max(1) as f32 * length / size;
-        (0..cvs).map(|cv| std::array::from_fn(|d| 0.5 * up[d] + at(cv) * way[d])).collect()
+        let along = vector::add(up, vector::scale(lean, 0.4));
+        let at = |cv: usize| cv as f32 / (cvs - 1).max(1) as f32 * length / vector::length(along);
+        (0..cvs).map(|cv| vector::add(vector::scale(up, 0.5), vector::scale(along, at(cv)))).collect()
     };
     (0..count).map(hair).collect()
 }
 
 fn direction(key: Key) -> Point {
     let v: Point = [0, 1, 2].map(|axis| key.of(axis).between([-1.0, 1.0]));
-    let size = v.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let size = vector::length(v);
     if (0.1..1.0).contains(&size) { v.map(|x| x / size) } else { direction(key.of(9)) }
 }
 

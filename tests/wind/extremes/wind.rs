@@ -84,7 +84,7 @@ fn springs_of_any_stiffness_and_damping_swing_and_hold() {
     // So stiff a spring is where the wind is, to the rounding of its positions.
     let apart = |a: &Component, b: &Component| {
         let pairs = a.positions().iter().zip(b.positions());
-        pairs.map(|(a, b)| norm(difference(wide(*a), wide(*b)))).fold(0.0, f64::max)
+        pairs.map(|(a, b)| (to_f64(*a) - to_f64(*b)).norm()).fold(0.0, f64::max)
     };
     assert!(apart(cooked[1].of(2, "swing").unwrap(), cooked[1].of(2, "wind").unwrap()) < 1e-6);
     assert!(apart(cooked[0].of(2, "swing").unwrap(), cooked[0].of(2, "wind").unwrap()) > 0.01);
@@ -133,7 +133,7 @@ fn a_million_curves_are_carried_and_filled_between() {
     let [grown, hairs] = ["grown", "hairs"].map(|node| cooked.of(0, node).unwrap());
     let fur = (million().fur)(Frame::whole(2));
     let turned = fur.curves().unwrap().positions().iter().map(|[x, y, z]| [*z, *y, -*x]);
-    let apart = turned.zip(grown.positions()).map(|(a, b)| norm(difference(wide(a), wide(*b)))).fold(0.0, f64::max);
+    let apart = turned.zip(grown.positions()).map(|(a, b)| (to_f64(a) - to_f64(*b)).norm()).fold(0.0, f64::max);
     assert!(apart < 1e-6, "a quarter turn carries all: {apart}");
     assert!(hairs.element_count() > 30_000);
 }

@@ -6,7 +6,7 @@
 //! these as they are is continuous and also keeps the side; so the deeper a goal lies in the skin, the more upright a
 //! segment is left.
 
-use super::sector::V3;
+use numerics::vector::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
 /// How far upright rather than along the curve wind leaves those that it blows straight into the skin: found to halve
@@ -20,7 +20,7 @@ const ARCH: f64 = 2.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ground {
     /// Outward, unit.
-    pub(super) normal: V3,
+    pub(super) normal: DVec3,
     /// Of the segment's pivot over it.
     pub(super) height: f64,
 }
@@ -28,7 +28,7 @@ pub(super) struct Ground {
 impl Ground {
     /// Where a segment of that length, whose curve leads along `along`, is to point instead of at `goal`: the same where
     /// its end is above the ground, else above it. Continuous in all of them; unit vectors.
-    pub(super) fn lead_out(&self, along: &V3, goal: &V3, length: f64) -> V3 {
+    pub(super) fn lead_out(&self, along: &DVec3, goal: &DVec3, length: f64) -> DVec3 {
         let n = &self.normal;
         // The lowest that it may point, and how low it does.
         let lowest = libm::asin((self.height / length).clamp(0.0, 1.0));
@@ -38,7 +38,7 @@ impl Ground {
         }
         let share = (low - lowest) / (FRAC_PI_2 - lowest);
         let room = 1.0 - lowest / FRAC_PI_2;
-        let edge = |towards: &V3| {
+        let edge = |towards: &DVec3| {
             let aside = (towards - n * towards.dot(n)).try_normalize(1e-9);
             aside.map(|aside| aside * libm::cos(lowest) - n * libm::sin(lowest))
         };
@@ -53,7 +53,7 @@ impl Ground {
     }
 
     /// Where it points with the wind straight into the ground: down as far as there is room.
-    fn left_standing(&self, along: &V3, room: f64) -> V3 {
+    fn left_standing(&self, along: &DVec3, room: f64) -> DVec3 {
         let n = &self.normal;
         let above = along + n * ((-along.dot(n)).max(0.0) + UPRIGHT);
         (above.try_normalize(1e-9).unwrap_or(*n) * room - n * (1.0 - room)).try_normalize(1e-9).unwrap_or(*along)
@@ -65,8 +65,8 @@ mod tests {
     use super::*;
     use numerics::random::Key;
 
-    fn random(key: Key) -> V3 {
-        V3::from_fn(|axis, _| key.of(axis as u64).f64() * 2.0 - 1.0).normalize()
+    fn random(key: Key) -> DVec3 {
+        DVec3::from_fn(|axis, _| key.of(axis as u64).f64() * 2.0 - 1.0).normalize()
     }
 
     #[test]
@@ -76,7 +76,7 @@ mod tests {
             let ground = Ground { normal: random(key.of(0)), height: 1.5 * key.of(9).f64() };
             let (along, goal) = (random(key.of(1)), random(key.of(2)));
             let led = ground.lead_out(&along, &goal, 1.0);
-            let end = |at: &V3| ground.height + at.dot(&ground.normal);
+            let end = |at: &DVec3| ground.height + at.dot(&ground.normal);
             assert!((led.norm() - 1.0).abs() < 1e-12 && end(&led) > -1e-9, "{i}: {}", end(&led));
             assert!(end(&goal) < 0.0 || led == goal, "{i}");
         }
@@ -84,10 +84,10 @@ mod tests {
 
     #[test]
     fn wind_straight_into_the_skin_leaves_curves_half_upright() {
-        let ground = Ground { normal: V3::z(), height: 0.0 };
-        for goal in [-V3::z(), V3::new(1e-12, 0.0, -1.0), V3::new(0.0, -1e-12, -1.0)] {
-            let led = ground.lead_out(&V3::x(), &goal, 1.0);
-            assert!((led - V3::new(1.0, 0.0, 1.0).normalize()).norm() < 1e-9, "{led}");
+        let ground = Ground { normal: DVec3::z(), height: 0.0 };
+        for goal in [-DVec3::z(), DVec3::new(1e-12, 0.0, -1.0), DVec3::new(0.0, -1e-12, -1.0)] {
+            let led = ground.lead_out(&DVec3::x(), &goal, 1.0);
+            assert!((led - DVec3::new(1.0, 0.0, 1.0).normalize()).norm() < 1e-9, "{led}");
         }
     }
 
@@ -97,8 +97,8 @@ mod tests {
             let mut most = 0.0_f64;
             for i in 0..20_000 {
                 let key = Key::new(4).of(i);
-                let ground = Ground { normal: V3::z(), height };
-                let along = V3::new(1.0, 0.0, 0.3 * key.of(5).f64()).normalize();
+                let ground = Ground { normal: DVec3::z(), height };
+                let along = DVec3::new(1.0, 0.0, 0.3 * key.of(5).f64()).normalize();
                 let goal = random(key.of(1));
                 let near = (goal + random(key.of(2)) * 1e-4).normalize();
                 let way = ground.lead_out(&along, &goal, 1.0) - ground.lead_out(&along, &near, 1.0);

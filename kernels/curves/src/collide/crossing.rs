@@ -1,10 +1,9 @@
 //! Whether a segment crosses a triangle: in f64, on the positions as they are written.
 
-use super::near::may_cross;
-use super::sector::V3;
+use super::triangle_filter::may_cross;
 use numerics::lanes::get;
 use numerics::tree::{Block, TriangleTree};
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3, to_f64};
 
 /// A segment through a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,24 +13,18 @@ pub(super) struct Crossing {
     /// How far the end that is less far through has come.
     pub(super) depth: f64,
     /// Unit normal of the triangle, towards the segment's start.
-    pub(super) normal: V3,
-}
-
-/// An f32 position in f64.
-#[inline(always)]
-pub(super) fn wide(p: Vec3) -> V3 {
-    V3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+    pub(super) normal: DVec3,
 }
 
 /// The corners of a block's triangle.
 #[inline(always)]
-pub(super) fn corners(block: &Block, lane: usize) -> [V3; 3] {
+pub(super) fn corners(block: &Block, lane: usize) -> [DVec3; 3] {
     let [a, b, c] = &block.corners;
-    [wide(get(a, lane)), wide(get(b, lane)), wide(get(c, lane))]
+    [to_f64(get(a, lane)), to_f64(get(b, lane)), to_f64(get(c, lane))]
 }
 
 /// Where the segment from `a` to `b` crosses the triangle; touching counts. None in the triangle's own plane.
-pub(super) fn crossing(a: &V3, b: &V3, [p, q, r]: &[V3; 3]) -> Option<Crossing> {
+pub(super) fn crossing(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> Option<Crossing> {
     let normal = (q - p).cross(&(r - p));
     let (start, end) = (normal.dot(&(a - p)), normal.dot(&(b - p)));
     if start * end > 0.0 || start == end {
@@ -80,7 +73,7 @@ fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        if let Some(found) = crossing(&wide(a), &wide(b), &corners(block, lane))
+        if let Some(found) = crossing(&to_f64(a), &to_f64(b), &corners(block, lane))
             && first.is_none_or(|first| found.share < first.share)
         {
             *first = Some(found);

@@ -1,12 +1,10 @@
 //! One curve, root to tip.
 
-use super::crossing::{first_crossing, first_crossing_in, wide};
-use super::near::narrow;
-use super::sector::V3;
-use super::turn::{Nearby, Segment};
+use super::crossing::{first_crossing, first_crossing_in};
+use super::segment_turn::{Nearby, Segment};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::{Quaternion, UnitQuaternion};
-use numerics::vector::{self, Vec3};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
 /// Of the first segment, the part not tested where the root may lie on the skin: this many gaps.
 const SKIPPED_GAPS: f64 = 5.0;
@@ -16,7 +14,7 @@ pub(super) struct Hair<'a> {
     /// Row of its root in the attributes.
     pub(super) first: usize,
     /// How far it is moved for `offset_root`.
-    pub(super) shift: V3,
+    pub(super) shift: DVec3,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -26,7 +24,7 @@ pub(super) struct Hair<'a> {
 #[derive(Default)]
 pub(super) struct Scratch<'t> {
     nearby: Nearby<'t>,
-    goal: Vec<V3>,
+    goal: Vec<DVec3>,
 }
 
 impl Hair<'_> {
@@ -42,25 +40,25 @@ impl Hair<'_> {
         let shift = self.shift;
         self.set_goals(all, &shift, &mut scratch.goal);
         let goal = &scratch.goal;
-        let moved = shift != V3::zeros();
+        let moved = shift != DVec3::zeros();
         if moved {
-            self.out[0] = narrow(&goal[0]);
+            self.out[0] = to_f32(goal[0]);
         }
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
         let mut turned = UnitQuaternion::identity();
-        let (mut axis, mut before) = (V3::zeros(), V3::zeros());
+        let (mut axis, mut before) = (DVec3::zeros(), DVec3::zeros());
         for k in 0..cvs - 1 {
             let way = goal[k + 1] - goal[k];
-            let length = (wide(self.goal[k + 1]) - wide(self.goal[k])).norm();
+            let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
             if length == 0.0 || way.norm() == 0.0 {
                 self.out[k + 1] = self.out[k];
                 continue;
             }
             let wanted = way / way.norm();
-            let rest = wide(self.rest[k + 1]) - wide(self.rest[k]);
+            let rest = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
             let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { wanted };
             axis = perpendicular(&from, &axis);
-            let pivot = wide(self.out[k]);
+            let pivot = to_f64(self.out[k]);
             let (from, to) = match all.ground(&pivot, length) {
                 None => (from, wanted),
                 Some(ground) => {
@@ -85,7 +83,7 @@ impl Hair<'_> {
             let mut end = segment.end(&done.direction);
             // Not where it was led elsewhere.
             let reaches = !done.met && to == wanted;
-            if reaches && self.out[k] == self.goal[k] && goal[k + 1] == wide(self.goal[k + 1]) {
+            if reaches && self.out[k] == self.goal[k] && goal[k + 1] == to_f64(self.goal[k + 1]) {
                 end = self.goal[k + 1];
             }
             if !done.clear && first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
@@ -123,8 +121,8 @@ impl Hair<'_> {
     fn length_error(&self) -> f64 {
         let (mut worst, mut whole) = (0.0_f64, 0.0);
         for k in 1..self.out.len() {
-            let length = (wide(self.goal[k]) - wide(self.goal[k - 1])).norm();
-            worst = worst.max(((wide(self.out[k]) - wide(self.out[k - 1])).norm() - length).abs());
+            let length = (to_f64(self.goal[k]) - to_f64(self.goal[k - 1])).norm();
+            worst = worst.max(((to_f64(self.out[k]) - to_f64(self.out[k - 1])).norm() - length).abs());
             whole += length;
         }
         if whole > 0.0 { worst / whole } else { 0.0 }
@@ -137,16 +135,16 @@ impl Hair<'_> {
 
     /// Where the CVs are to go: as they come in, or kept off the skin by `offset_scale` of their rest distance.
     #[inline(always)]
-    fn set_goals(&self, all: &Collide<'_>, shift: &V3, goals: &mut Vec<V3>) {
+    fn set_goals(&self, all: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
         let (Some(scale), Some(skin)) = (all.offset_scale, &all.skin) else {
-            goals.extend(self.goal.iter().map(|cv| wide(*cv) + shift));
+            goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift));
             return;
         };
-        let mut before = wide(self.goal[0]);
+        let mut before = to_f64(self.goal[0]);
         goals.push(before + shift);
         for k in 1..self.goal.len() {
-            let (from, to) = (wide(self.goal[k - 1]), wide(self.goal[k]));
+            let (from, to) = (to_f64(self.goal[k - 1]), to_f64(self.goal[k]));
             let raised = skin.raised(self.rest[k], &to, scale);
             // Lengths are restored root to tip: the raised CV says a direction only.
             let way = raised - before;
@@ -157,15 +155,15 @@ impl Hair<'_> {
     }
 
     /// Turns each segment back towards its goal by 1 − `blend`; whether that is anything.
-    fn blend(&mut self, all: &Collide<'_>, shift: &V3) -> bool {
+    fn blend(&mut self, all: &Collide<'_>, shift: &DVec3) -> bool {
         let share = |k: usize| f64::from(all.blend.at(self.first + k)).clamp(0.0, 1.0);
         if (0..self.out.len()).all(|k| share(k) == 1.0) {
             return false;
         }
         let mut before = self.out[0];
-        self.out[0] = narrow(&(wide(self.goal[0]) + shift * share(0)));
+        self.out[0] = to_f32(to_f64(self.goal[0]) + shift * share(0));
         for k in 1..self.out.len() {
-            let (goal, end) = (wide(self.goal[k]) - wide(self.goal[k - 1]), wide(self.out[k]) - wide(before));
+            let (goal, end) = (to_f64(self.goal[k]) - to_f64(self.goal[k - 1]), to_f64(self.out[k]) - to_f64(before));
             before = self.out[k];
             let (Some(to), Some(from)) = (end.try_normalize(0.0), goal.try_normalize(0.0)) else {
                 self.out[k] = self.out[k - 1];
@@ -174,9 +172,9 @@ impl Hair<'_> {
             self.out[k] = if share(k - 1) == 0.0 && self.out[k - 1] == self.goal[k - 1] {
                 self.goal[k]
             } else {
-                let axis = perpendicular(&from, &V3::zeros());
+                let axis = perpendicular(&from, &DVec3::zeros());
                 let direction = part_way(&from, &to, &axis, share(k - 1));
-                narrow(&(wide(self.out[k - 1]) + direction * goal.norm()))
+                to_f32(to_f64(self.out[k - 1]) + direction * goal.norm())
             };
         }
         true
@@ -185,7 +183,7 @@ impl Hair<'_> {
 
 /// The unit vector a share of the way from one to another on their great circle; through `axis` × `from` where they are
 /// opposite.
-fn part_way(from: &V3, to: &V3, axis: &V3, share: f64) -> V3 {
+fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     let turn = from.cross(to);
     let (sine, cosine) = (turn.norm(), from.dot(to));
     let n = if sine > 1e-9 { turn / sine } else { *axis };
@@ -194,7 +192,7 @@ fn part_way(from: &V3, to: &V3, axis: &V3, share: f64) -> V3 {
 }
 
 /// The smallest turn from one unit vector to another; about `axis` where they are opposite.
-fn minimal_turn(from: &V3, to: &V3, axis: &V3) -> UnitQuaternion<f64> {
+fn minimal_turn(from: &DVec3, to: &DVec3, axis: &DVec3) -> UnitQuaternion<f64> {
     let real = 1.0 + from.dot(to);
     let imaginary = if real > 1e-12 { from.cross(to) } else { *axis };
     UnitQuaternion::new_normalize(Quaternion::from_parts(if real > 1e-12 { real } else { 0.0 }, imaginary))

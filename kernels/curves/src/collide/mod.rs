@@ -12,22 +12,21 @@
 mod coherence;
 mod crossing;
 mod hair;
-mod near;
 mod rest;
 mod sector;
+mod segment_turn;
 mod skin;
-mod turn;
+mod triangle_filter;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
 use numerics::masked::Masked;
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3};
 use rayon::prelude::*;
 use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};
-use sector::V3;
 pub use skin::{Skin, normals};
 use std::ops::Range;
 
@@ -68,7 +67,7 @@ pub struct Collide<'a> {
 impl Collide<'_> {
     /// The skin that a segment is to be led out of, if any is.
     #[inline(always)]
-    fn ground(&self, pivot: &V3, length: f64) -> Option<Ground> {
+    fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
         self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
     }
 }
@@ -200,7 +199,7 @@ fn task(
 }
 
 /// A unit vector at a right angle to the unit vector `to`: the part of `near` that is, if it has any.
-fn perpendicular(to: &V3, near: &V3) -> V3 {
+fn perpendicular(to: &DVec3, near: &DVec3) -> DVec3 {
     let side = near - to * to.dot(near);
     let length = side.norm();
     if length > 1e-6 {
@@ -208,11 +207,11 @@ fn perpendicular(to: &V3, near: &V3) -> V3 {
     }
     let [x, y, z] = [to.x.abs(), to.y.abs(), to.z.abs()];
     let away = if x <= y && x <= z {
-        V3::x()
+        DVec3::x()
     } else if y <= z {
-        V3::y()
+        DVec3::y()
     } else {
-        V3::z()
+        DVec3::z()
     };
     let side = to.cross(&away);
     side / side.norm()

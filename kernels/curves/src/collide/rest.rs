@@ -1,12 +1,10 @@
 //! Curves as they grow: how far their roots are lifted, and which cross something already.
 
 use super::Collide;
-use super::crossing::{first_crossing, wide};
-use super::near::narrow;
-use super::sector::V3;
-use super::turn::{Nearby, gather};
+use super::crossing::first_crossing;
+use super::segment_turn::{Nearby, gather};
 use numerics::simd::{Path, kernel};
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use rayon::prelude::*;
 
 /// Segments that ask the trees together.
@@ -25,7 +23,7 @@ pub struct AtRest {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Grown {
     /// How far it is moved, so that its root is `offset_root` outside of the skin.
-    pub(super) shift: V3,
+    pub(super) shift: DVec3,
     /// So moved, it crosses something.
     pub(super) inside: bool,
 }
@@ -69,8 +67,8 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
 
 /// Whether a curve crosses something.
 #[inline(always)]
-fn crosses_any<'t>(cvs: &[Vec3], shift: &V3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
-    let at = |k: usize| narrow(&(wide(cvs[k]) + shift));
+fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
+    let at = |k: usize| to_f32(to_f64(cvs[k]) + shift);
     for first in (0..cvs.len() - 1).step_by(GATHERED_SEGMENTS) {
         let last = (first + GATHERED_SEGMENTS).min(cvs.len() - 1);
         let mut low = at(first);
@@ -97,7 +95,7 @@ impl AtRest {
     }
 
     /// How far a curve is moved.
-    pub(super) fn shift(&self, curve: usize) -> V3 {
+    pub(super) fn shift(&self, curve: usize) -> DVec3 {
         self.curves[curve].shift
     }
 }

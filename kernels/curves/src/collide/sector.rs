@@ -6,22 +6,19 @@
 //!
 //! All in f64, relative to the pivot: exact but for f64 rounding. Angles in radians, lengths in metres.
 
-use nalgebra::Vector3;
-
-/// A vector of the kernel.
-pub(super) type V3 = Vector3<f64>;
+use numerics::vector::DVec3;
 
 /// A segment about to turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sector {
     /// About which it turns.
-    pub(super) pivot: V3,
+    pub(super) pivot: DVec3,
     /// Unit: where it points.
-    pub(super) u: V3,
+    pub(super) u: DVec3,
     /// Unit, perpendicular to `u`: which way it turns.
-    pub(super) v: V3,
+    pub(super) v: DVec3,
     /// u × v.
-    pub(super) n: V3,
+    pub(super) n: DVec3,
     /// Length of the segment, and how much farther obstacles count.
     pub(super) reach: f64,
     /// Obstacles nearer to the pivot do not count.
@@ -46,7 +43,7 @@ pub(super) type P2 = [f64; 2];
 
 impl Sector {
     /// Where it points after a turn by `angle`.
-    pub(super) fn direction(&self, angle: f64) -> V3 {
+    pub(super) fn direction(&self, angle: f64) -> DVec3 {
         if angle == 0.0 {
             return self.u;
         }
@@ -56,7 +53,7 @@ impl Sector {
 
     /// Calls `found` with each interval of angles at which the triangle is in the way; may leave out those that lie
     /// behind it, or stop no turn before the direction `until`.
-    pub(super) fn blocked_before(&self, until: P2, corners: &[V3; 3], mut found: impl FnMut(Blocked)) {
+    pub(super) fn blocked_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         // A point that lies over the ray at an angle α by `back`, a radius r out, is by asin(back/r) ≥ back/r past α.
         let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
         let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
@@ -70,12 +67,12 @@ impl Sector {
     }
 
     /// Calls `found` with each interval of angles at which the triangle is in the way.
-    pub(super) fn blocked_by(&self, corners: &[V3; 3], mut found: impl FnMut(Blocked)) {
+    pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         self.blocked(corners, |_, _| true, &mut found);
     }
 
     /// As [`Sector::blocked_by`]; of a plane only by straight pieces that count.
-    fn blocked(&self, corners: &[V3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
+    fn blocked(&self, corners: &[DVec3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
         let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
         let flat = |k: usize| {
             let arm = corners[k] - self.pivot;

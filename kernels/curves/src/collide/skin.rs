@@ -1,10 +1,8 @@
 //! The surface that curves grow on: which way is out, and how far.
 
 use super::coherence::Ground;
-use super::crossing::wide;
-use super::sector::V3;
 use numerics::tree::{Closest, TriangleTree};
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3, to_f64};
 
 /// How often a root is lifted again where the surface bends away below it.
 const LIFTS: usize = 4;
@@ -23,9 +21,9 @@ pub struct Skin<'a> {
 /// Outward normals of the points of a mesh, each the mean of its triangles' by the angle they have there, so that it
 /// does not depend on how faces are cut into triangles; 0 where there is none.
 pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut sums = vec![V3::zeros(); points.len()];
+    let mut sums = vec![DVec3::zeros(); points.len()];
     for corners in triangles {
-        let at = corners.map(|corner| wide(points[corner as usize]));
+        let at = corners.map(|corner| to_f64(points[corner as usize]));
         let normal = (at[1] - at[0]).cross(&(at[2] - at[0]));
         let Some(normal) = normal.try_normalize(0.0).filter(|normal| normal.iter().all(|x| x.is_finite())) else {
             continue;
@@ -40,19 +38,19 @@ pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
 
 impl Skin<'_> {
     /// The outward unit normal at a point of the surface; `None` where it has none.
-    pub(super) fn normal(&self, at: &Closest) -> Option<V3> {
+    pub(super) fn normal(&self, at: &Closest) -> Option<DVec3> {
         let corners = self.triangles[at.triangle as usize];
-        let mixed =
-            (0..3).fold(V3::zeros(), |sum, k| sum + wide(self.normals[corners[k] as usize]) * f64::from(at.weights[k]));
+        let mixed = (0..3)
+            .fold(DVec3::zeros(), |sum, k| sum + to_f64(self.normals[corners[k] as usize]) * f64::from(at.weights[k]));
         mixed.try_normalize(1e-12)
     }
 
     /// Height of a point over the surface, below 0 inside, and the normal it stands on.
     #[inline(always)]
-    fn height(&self, p: &V3, reach: f32) -> Option<(f64, V3)> {
+    fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
         let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
-        let away = p - wide(closest.point);
+        let away = p - to_f64(closest.point);
         // Beside an edge the normal leans: the distance is what counts, the normal says its side.
         let height = away.norm().copysign(away.dot(&normal));
         Some((height, normal))
@@ -60,7 +58,7 @@ impl Skin<'_> {
 
     /// The skin under a segment that stands on `pivot`, if it reaches that.
     #[inline(always)]
-    pub(super) fn ground(&self, pivot: &V3, length: f64) -> Option<Ground> {
+    pub(super) fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
         let (height, normal) = self.height(pivot, length as f32)?;
         Some(Ground { normal, height: height.max(0.0) })
     }
@@ -68,8 +66,8 @@ impl Skin<'_> {
     /// A CV's goal, raised until it is `scale` times as high over the skin as the CV is at rest; as it is where it is
     /// that high.
     #[inline(always)]
-    pub(super) fn raised(&self, rest: Vec3, goal: &V3, scale: f64) -> V3 {
-        let rest = wide(rest);
+    pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
+        let rest = to_f64(rest);
         let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
         // It cannot have come nearer than by the way it went.
         let moved = (goal - rest).norm();
@@ -84,13 +82,13 @@ impl Skin<'_> {
 
     /// How far a root is to be moved until it is `offset` outside of the skin: zero where it is.
     #[inline(always)]
-    pub(super) fn lift(&self, root: Vec3, offset: f64) -> V3 {
-        let mut shift = V3::zeros();
+    pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
+        let mut shift = DVec3::zeros();
         if offset <= 0.0 {
             return shift;
         }
         for _ in 0..LIFTS {
-            let Some((height, normal)) = self.height(&(wide(root) + shift), f32::INFINITY) else { break };
+            let Some((height, normal)) = self.height(&(to_f64(root) + shift), f32::INFINITY) else { break };
             if height >= offset * 0.999 {
                 break;
             }

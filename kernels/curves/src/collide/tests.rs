@@ -1,16 +1,15 @@
 //! First contact against a second closed form; written positions against a second crossing test.
 
-use super::crossing::wide;
-use super::sector::{Sector, V3};
+use super::sector::Sector;
 use super::*;
 use numerics::random::Key;
-use numerics::vector;
+use numerics::vector::{self, to_f64};
 
 mod hairs;
 mod sectors;
 
 /// Whether the segment crosses the triangle: by solving for the point of the plane, in f64. Touching does not count.
-fn crosses(a: &V3, b: &V3, [p, q, r]: &[V3; 3]) -> bool {
+fn crosses(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> bool {
     let (e, f, way) = (q - p, r - p, b - a);
     let h = way.cross(&f);
     let det = e.dot(&h);
@@ -30,11 +29,11 @@ fn coordinate(key: Key) -> f64 {
     2.0 * f64::from(key.f32()) - 1.0
 }
 
-fn vector(key: Key) -> V3 {
-    V3::new(coordinate(key.of(0)), coordinate(key.of(1)), coordinate(key.of(2)))
+fn vector(key: Key) -> DVec3 {
+    DVec3::new(coordinate(key.of(0)), coordinate(key.of(1)), coordinate(key.of(2)))
 }
 
-fn unit(key: Key) -> V3 {
+fn unit(key: Key) -> DVec3 {
     let v = vector(key);
     if v.norm() > 0.1 { v.normalize() } else { unit(key.of(9)) }
 }

@@ -1,8 +1,8 @@
-//! Where segments that turn into something stop.
+//! Where turning segments stop at obstacles.
 //!
-//! Each shape's first contact is a closed form in the angle φ of the turn. Where a mesh stands for a round shape, two
-//! radii bound it: that of its points and that of its faces' middles. Turns that graze (a contact that a hair's breadth
-//! makes or breaks) are left out.
+//! Each shape's first contact is a closed form in the angle φ of the turn. Where a mesh approximates a round shape, two
+//! radii bound it: that of its vertices and that of its face centres. Grazing turns, whose contact depends on rounding,
+//! are left out.
 
 mod round;
 mod sharp;
@@ -11,83 +11,57 @@ mod steps;
 use curves::collide::{Collide, Method, collide};
 use numerics::random::Key;
 use numerics::tree::TriangleTree;
+use numerics::vector::{DVec3, to_f32, to_f64};
 use std::f64::consts::{PI, TAU};
 
 use super::Figure;
 
-type V = [f64; 3];
 type Point = [f32; 3];
 
-fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: V, b: V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// a + t·b.
-fn along(a: V, b: V, t: f64) -> V {
-    std::array::from_fn(|k| a[k] + t * b[k])
-}
-
-fn unit(v: V) -> V {
-    let length = dot(v, v).sqrt();
-    v.map(|x| x / length)
-}
-
-fn random_unit(key: Key) -> V {
-    let v: V = [0, 1, 2].map(|axis| 2.0 * key.of(axis).f64() - 1.0);
-    if (0.01..1.0).contains(&dot(v, v)) { unit(v) } else { random_unit(key.of(9)) }
-}
-
-fn narrow(v: V) -> Point {
-    v.map(|x| x as f32)
-}
-
-fn wide(v: Point) -> V {
-    v.map(f64::from)
+fn random_unit(key: Key) -> DVec3 {
+    let v = DVec3::from([0, 1, 2].map(|axis| 2.0 * key.of(axis).f64() - 1.0));
+    if (0.01..1.0).contains(&v.dot(&v)) { v / v.norm() } else { random_unit(key.of(9)) }
 }
 
 /// A segment of length 1 that is to turn about one end.
 struct Turn {
     rest: [Point; 2],
     goal: [Point; 2],
-    pivot: V,
+    pivot: DVec3,
     /// Where it points, and which way it turns: unit, at a right angle.
-    u: V,
-    v: V,
+    u: DVec3,
+    v: DVec3,
     /// How far.
     goal_angle: f64,
 }
 
 impl Turn {
-    fn new(pivot: V, from: V, to: V) -> Self {
-        let pivot = narrow(pivot);
-        let [rest, goal] = [from, to].map(|way| [pivot, narrow(along(wide(pivot), way, 1.0))]);
-        let pivot = wide(pivot);
-        // As the rounded positions say.
-        let [u, to] = [rest, goal].map(|ends| unit(along(wide(ends[1]), pivot, -1.0)));
-        let v = unit(along(to, u, -dot(to, u)));
+    fn new(pivot: DVec3, from: DVec3, to: DVec3) -> Self {
+        let start = to_f32(pivot);
+        let pivot = to_f64(start);
+        let [rest, goal] = [from, to].map(|direction| [start, to_f32(pivot + direction)]);
+        // Directions of the rounded positions.
+        let [u, to] = [rest, goal].map(|ends| (to_f64(ends[1]) - pivot).normalize());
+        let v = (to - u * to.dot(&u)).normalize();
         let mut turn = Self { rest, goal, pivot, u, v, goal_angle: 0.0 };
         turn.goal_angle = turn.angle(to);
         turn
     }
 
     /// The angle of a direction in the plane of the turn, 0 to 2π.
-    fn angle(&self, way: V) -> f64 {
-        libm::atan2(dot(way, self.v), dot(way, self.u)).rem_euclid(TAU)
+    fn angle(&self, direction: DVec3) -> f64 {
+        libm::atan2(direction.dot(&self.v), direction.dot(&self.u)).rem_euclid(TAU)
     }
 
-    fn direction(&self, angle: f64) -> V {
-        along(self.u.map(|x| libm::cos(angle) * x), self.v, libm::sin(angle))
+    fn direction(&self, angle: f64) -> DVec3 {
+        self.u * libm::cos(angle) + self.v * libm::sin(angle)
     }
 }
 
 /// Where a turn first meets something.
 enum First {
     Never,
-    /// Between these angles, which are one but for what a mesh leaves of a round shape.
+    /// Between these angles, which differ only by how a mesh approximates a round shape.
     At([f64; 2]),
     Grazes,
 }
@@ -99,7 +73,7 @@ struct Case {
     turns: Vec<(Turn, First)>,
 }
 
-/// What is kept from contact: with 1 as the length this is the angle, or so.
+/// Distance kept from contact; with segments of length 1, about the angle too.
 const GAP: f64 = 1e-6;
 
 /// Thin curves without a skin.
@@ -118,7 +92,7 @@ fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: Method, gap: f64) -> Col
     }
 }
 
-/// The largest error of the angle at which turns stop, and the farthest that any goes on past its first contact.
+/// The largest error of the angle at which turns stop, and the farthest that any passes its first contact.
 fn worst(case: &Case) -> [f64; 2] {
     let tree = TriangleTree::build(&case.points, &case.triangles);
     let obstacles = [&tree];
@@ -128,7 +102,7 @@ fn worst(case: &Case) -> [f64; 2] {
         collide(&starts, &ends(|turn| turn.rest), &ends(|turn| turn.goal), &plain(&obstacles, Method::Exact, GAP));
     let (mut error, mut past, mut met) = (0.0_f64, 0.0_f64, 0);
     for ((turn, first), written) in case.turns.iter().zip(out.points.chunks(2)) {
-        let angle = turn.angle(along(wide(written[1]), turn.pivot, -1.0));
+        let angle = turn.angle(to_f64(written[1]) - turn.pivot);
         let angle = if angle > 1.5 * PI { angle - TAU } else { angle };
         let [low, high] = match first {
             First::Grazes => continue,
@@ -147,7 +121,7 @@ fn worst(case: &Case) -> [f64; 2] {
 fn turns(
     count: u64,
     salt: u64,
-    pivot: impl Fn(Key) -> V,
+    pivot: impl Fn(Key) -> DVec3,
     first: impl Fn(&Turn) -> Option<First>,
 ) -> Vec<(Turn, First)> {
     let turn = |k: u64| {

@@ -1,4 +1,4 @@
-//! What is flat or round: first contact in closed form.
+//! Flat and round shapes: first contact in closed form.
 
 use super::*;
 use numerics::shapes::icosphere;
@@ -17,7 +17,7 @@ pub(super) fn floor() -> Case {
             () => First::At([at + libm::acos(-share); 2]),
         })
     };
-    let pivot = |key: Key| [0.3, 0.02 + 0.9 * key.of(1).f64(), -0.2];
+    let pivot = |key: Key| DVec3::new(0.3, 0.02 + 0.9 * key.of(1).f64(), -0.2);
     Case { points, triangles: vec![[0, 1, 2], [0, 2, 3]], turns: turns(4000, 1, pivot, first) }
 }
 
@@ -45,15 +45,15 @@ fn meets_circle(centre: [f64; 2], r: f64) -> Option<f64> {
 pub(super) fn sphere() -> Case {
     let mesh = icosphere(1.0, 7);
     let triangles = mesh.triangles();
-    let middle = |corners: &[u32; 3]| {
-        let sum = corners.iter().fold([0.0; 3], |sum, corner| along(sum, mesh.points[*corner as usize], 1.0 / 3.0));
-        dot(sum, sum).sqrt()
+    let face_centre = |corners: &[u32; 3]| {
+        let third = |corner: &u32| DVec3::from(mesh.points[*corner as usize]) * (1.0 / 3.0);
+        corners.iter().fold(DVec3::zeros(), |sum, corner| sum + third(corner)).norm()
     };
-    // A face is nearest to the centre at most as near as a flat cap through its points.
-    let inner = triangles.iter().map(middle).fold(1.0, f64::min) - 1e-6;
+    // No point of a face is nearer to the centre than the face's own centre.
+    let inner = triangles.iter().map(face_centre).fold(1.0, f64::min) - 1e-6;
     let first = |turn: &Turn| {
-        let centre = [-dot(turn.pivot, turn.u), -dot(turn.pivot, turn.v)];
-        let square = |r: f64| r * r - dot(turn.pivot, turn.pivot) + centre[0] * centre[0] + centre[1] * centre[1];
+        let centre = [-turn.pivot.dot(&turn.u), -turn.pivot.dot(&turn.v)];
+        let square = |r: f64| r * r - turn.pivot.dot(&turn.pivot) + centre[0] * centre[0] + centre[1] * centre[1];
         Some(match square(1.0) {
             outside if outside < -0.02 => First::Never,
             near if near < 0.2 => First::Grazes,
@@ -64,8 +64,8 @@ pub(super) fn sphere() -> Case {
             },
         })
     };
-    let pivot = |key: Key| random_unit(key).map(|x| x * (1.15 + 0.8 * key.of(5).f64()));
-    let points = mesh.points.iter().map(|point| narrow(*point)).collect();
+    let pivot = |key: Key| random_unit(key) * (1.15 + 0.8 * key.of(5).f64());
+    let points = mesh.points.iter().map(|point| to_f32((*point).into())).collect();
     Case { points, triangles, turns: turns(3000, 2, pivot, first) }
 }
 
@@ -76,7 +76,7 @@ pub(super) fn cylinder() -> Case {
     const SIDES: u32 = 2048;
     let ring = |k: u32, z: f64| {
         let (s, c) = libm::sincos(TAU * f64::from(k) / f64::from(SIDES));
-        narrow([RADIUS * c, RADIUS * s, z])
+        to_f32(DVec3::new(RADIUS * c, RADIUS * s, z))
     };
     let points = (0..SIDES).flat_map(|k| [ring(k, -3.0), ring(k, 3.0)]).collect();
     let side = |k: u32| {
@@ -99,14 +99,14 @@ pub(super) fn cylinder() -> Case {
             let root = 0.5 * (at + sign * libm::acos(share));
             [root.rem_euclid(TAU), (root + PI).rem_euclid(TAU)]
         });
-        // Of the line beyond both ends: behind the pivot it meets nothing, beyond the tip it is none of this law's.
+        // Roots are those of the whole line: behind the pivot nothing is met, beyond the tip this test does not apply.
         let ahead = roots.filter_map(|root| {
             let d = turn.direction(root);
-            let way = -flat(p, [d[0], d[1]]) / flat([d[0], d[1]], [d[0], d[1]]);
-            (way > 0.0).then_some((root, way))
+            let distance = -flat(p, [d[0], d[1]]) / flat([d[0], d[1]], [d[0], d[1]]);
+            (distance > 0.0).then_some((root, distance))
         });
-        let (root, way) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(if way < 0.95 { root } else { f64::NAN })
+        let (root, distance) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(if distance < 0.95 { root } else { f64::NAN })
     };
     let first = |turn: &Turn| {
         let (p, d) = (turn.pivot, turn.u);
@@ -124,7 +124,7 @@ pub(super) fn cylinder() -> Case {
     let pivot = |key: Key| {
         let (s, c) = libm::sincos(TAU * key.of(1).f64());
         let away = 0.3 + 0.3 * key.of(2).f64();
-        [away * c, away * s, key.of(3).f64() - 0.5]
+        DVec3::new(away * c, away * s, key.of(3).f64() - 0.5)
     };
     let triangles = (0..SIDES).flat_map(side).collect();
     Case { points, triangles, turns: turns(6000, 3, pivot, first) }

@@ -3,14 +3,14 @@
 use super::*;
 
 /// The angle and distance at which the line from `a` to `b` passes the plane of the turn, if it does.
-fn passes(turn: &Turn, a: V, b: V) -> Option<(f64, f64)> {
-    let n = cross(turn.u, turn.v);
-    let [above, below] = [a, b].map(|end| dot(n, along(end, turn.pivot, -1.0)));
+fn passes(turn: &Turn, a: DVec3, b: DVec3) -> Option<(f64, f64)> {
+    let n = turn.u.cross(&turn.v);
+    let [above, below] = [a, b].map(|end| n.dot(&(end - turn.pivot)));
     if above * below > 0.0 || above == below {
         return None;
     }
-    let x = along(along(a, along(b, a, -1.0), above / (above - below)), turn.pivot, -1.0);
-    Some((turn.angle(x), dot(x, x).sqrt()))
+    let x = a + (b - a) * (above / (above - below)) - turn.pivot;
+    Some((turn.angle(x), x.norm()))
 }
 
 /// Blades that open by 1° behind their edge.
@@ -29,43 +29,43 @@ fn edges(salt: u64, needle: bool) -> [f64; 2] {
     for batch in 0..40 {
         let key = Key::new(salt).of(batch);
         let edge = random_unit(key);
-        let aside = unit(cross(edge, random_unit(key.of(1))));
+        let aside = edge.cross(&random_unit(key.of(1))).normalize();
         let (s, c) = libm::sincos(0.5_f64.to_radians());
-        let [a, b] = [-0.5, 0.5].map(|t| narrow(edge.map(|x| t * x)));
-        let across = cross(edge, aside);
+        let [a, b] = [-0.5, 0.5].map(|t| to_f32(edge * t));
+        let across = edge.cross(&aside);
         let back = |sign: f64, base: Point| {
-            let way = along(aside.map(|x| c * x), across, sign * s);
-            narrow(along(wide(base), way, if needle { 1e-6 } else { 0.6 }))
+            let direction = aside * c + across * (sign * s);
+            to_f32(to_f64(base) + direction * if needle { 1e-6 } else { 0.6 })
         };
         let points = vec![a, b, back(1.0, a), back(1.0, b), back(-1.0, a), back(-1.0, b)];
         let triangles = vec![[0, 1, 3], [0, 3, 2], [0, 1, 5], [0, 5, 4]];
         let turn = |k: u64| {
             let key = key.of(100 + k);
             // About a pivot from which it comes against the edge.
-            let n = unit(along(edge, random_unit(key), 0.8));
-            let radial = unit(cross(aside, n));
+            let n = (edge + random_unit(key) * 0.8).normalize();
+            let radial = aside.cross(&n).normalize();
             let distance = 0.1 + 0.85 * key.of(5).f64();
             let angle = 0.05 + 2.0 * key.of(6).f64();
-            let met = edge.map(|x| (0.8 * key.of(7).f64() - 0.4) * x);
-            let pivot = along(met, radial, -distance);
+            let met = edge * (0.8 * key.of(7).f64() - 0.4);
+            let pivot = met - radial * distance;
             // The direction of turning at the edge is n × radial.
-            let v = cross(n, radial);
+            let v = n.cross(&radial);
             let (s, c) = libm::sincos(angle);
-            let from = along(radial.map(|x| c * x), v, -s);
+            let from = radial * c - v * s;
             let (s, c) = libm::sincos(0.5 * key.of(8).f64());
-            let to = along(radial.map(|x| c * x), v, s);
+            let to = radial * c + v * s;
             let turn = Turn::new(pivot, from, to);
             // Blades lie behind their edge, as seen from the turn.
-            if dot(v, aside) < 0.5 || turn.goal_angle < 0.04 {
+            if v.dot(&aside) < 0.5 || turn.goal_angle < 0.04 {
                 return None;
             }
-            let (angle, distance) = passes(&turn, wide(a), wide(b))?;
+            let (angle, distance) = passes(&turn, to_f64(a), to_f64(b))?;
             let thick = if needle { 2e-6 / distance } else { 0.0 };
             Some((turn, if distance < 0.97 { First::At([angle - thick, angle + thick]) } else { First::Grazes }))
         };
         let mut turns: Vec<(Turn, First)> = (0..400).filter_map(turn).collect();
         // One that stays where it is, so that not all meet something.
-        let still = Turn::new([5.0, 5.0, 5.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]);
+        let still = Turn::new(DVec3::repeat(5.0), DVec3::y(), DVec3::x());
         turns.push((still, First::Never));
         let found = worst(&Case { points, triangles, turns });
         all = [all[0].max(found[0]), all[1].max(found[1])];
@@ -75,23 +75,22 @@ fn edges(salt: u64, needle: bool) -> [f64; 2] {
 
 /// Upright needles at the crossings of a grid: the first of those within reach.
 pub(super) fn grid() -> Case {
-    let feet: Vec<V> =
-        (0..144).map(|k| [0.1 * f64::from(k % 12) - 0.55, 0.0, 0.1 * f64::from(k / 12) - 0.55]).collect();
-    let tip = |foot: V| along(foot, [0.05, 1.0, -0.03], 1.0);
-    let points = feet
-        .iter()
-        .flat_map(|foot| [narrow(*foot), narrow(tip(*foot)), narrow(along(tip(*foot), [1e-7, 0.0, 1e-7], 1.0))]);
-    let points: Vec<Point> = points.collect();
+    let foot = |k: u32| DVec3::new(0.1 * f64::from(k % 12) - 0.55, 0.0, 0.1 * f64::from(k / 12) - 0.55);
+    let needle = |k: u32| {
+        let tip = foot(k) + DVec3::new(0.05, 1.0, -0.03);
+        [foot(k), tip, tip + DVec3::new(1e-7, 0.0, 1e-7)].map(to_f32)
+    };
+    let points: Vec<Point> = (0..144).flat_map(needle).collect();
     let first = |turn: &Turn| {
-        let n = cross(turn.u, turn.v);
+        let n = turn.u.cross(&turn.v);
         let mut first = TAU;
         let mut doubtful = TAU;
         for foot in points.chunks(3) {
-            let [low, high] = [wide(foot[0]), wide(foot[1])];
-            let [above, below] = [low, high].map(|end| dot(n, along(end, turn.pivot, -1.0)));
+            let [low, high] = [to_f64(foot[0]), to_f64(foot[1])];
+            let [above, below] = [low, high].map(|end| n.dot(&(end - turn.pivot)));
             let share = above / (above - below);
-            let x = along(along(low, along(high, low, -1.0), share), turn.pivot, -1.0);
-            let (angle, distance) = (turn.angle(x), dot(x, x).sqrt());
+            let x = low + (high - low) * share - turn.pivot;
+            let (angle, distance) = (turn.angle(x), x.norm());
             let at_its_end = [0.0, 1.0].iter().any(|end| (share - end).abs() < 1e-3);
             if (above - below).abs() < 0.02 || at_its_end || (distance - 1.0).abs() < 1e-3 {
                 let near = distance < 1.1 && (-0.1..1.1).contains(&share);
@@ -111,7 +110,7 @@ pub(super) fn grid() -> Case {
     };
     let pivot = |key: Key| {
         let [x, y, z] = [0, 1, 2].map(|axis| key.of(axis).f64());
-        [x - 0.5, 0.05 + 0.9 * y, z - 0.5]
+        DVec3::new(x - 0.5, 0.05 + 0.9 * y, z - 0.5)
     };
     let triangles = (0..144).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
     let turns = turns(4000, 4, pivot, first);

@@ -6,14 +6,14 @@ use numerics::shapes::icosphere;
 /// Slope of log error against log steps, over 2 to 256 steps, of hairs on a sphere blown along x.
 pub(super) fn slope() -> f64 {
     let mesh = icosphere(1.0, 4);
-    let points: Vec<Point> = mesh.points.iter().map(|point| narrow(*point)).collect();
+    let points: Vec<Point> = mesh.points.iter().map(|point| to_f32((*point).into())).collect();
     let tree = TriangleTree::build(&points, &mesh.triangles());
     let obstacles = [&tree];
     let hair = |k: u64| {
         let up = random_unit(Key::new(5).of(k));
-        let foot = up.map(|x| 1.001 * x);
-        let ends = |way: V| [narrow(foot), narrow(along(foot, unit(way), 0.3))];
-        (ends(along(up, random_unit(Key::new(6).of(k)), 0.3)), ends(along(up, [1.0, 0.0, 0.0], 3.0)))
+        let foot = up * 1.001;
+        let ends = |along: DVec3| [to_f32(foot), to_f32(foot + along.normalize() * 0.3)];
+        (ends(up + random_unit(Key::new(6).of(k)) * 0.3), ends(up + DVec3::x() * 3.0))
     };
     let (rest, goal): (Vec<_>, Vec<_>) = (0..4000).map(hair).unzip();
     let starts: Vec<u32> = (0..=4000).map(|k| 2 * k).collect();
@@ -22,10 +22,7 @@ pub(super) fn slope() -> f64 {
     };
     let exact = end(Method::Exact);
     let error = |steps: u32| {
-        let apart = |(a, b): (&Point, &Point)| {
-            let d = along(wide(*a), wide(*b), -1.0);
-            dot(d, d).sqrt()
-        };
+        let apart = |(a, b): (&Point, &Point)| (to_f64(*a) - to_f64(*b)).norm();
         end(Method::Steps(steps)).iter().zip(&exact).map(apart).sum::<f64>()
     };
     // The line through (log steps, log error) with the least squares.

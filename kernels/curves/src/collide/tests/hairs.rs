@@ -60,7 +60,7 @@ fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 
 /// Upright fur on the unit sphere, and what a wind along `wind` would make of it: each segment turned by half of what
 /// is left.
-fn fur(curves: u64, cvs: usize, long: f64, wind: V3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
+fn fur(curves: u64, cvs: usize, long: f64, wind: DVec3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
     let (mut rest, mut goal) = (Vec::new(), Vec::new());
     for k in 0..curves {
         let up = unit(Key::new(5).of(k));
@@ -81,9 +81,9 @@ fn fur(curves: u64, cvs: usize, long: f64, wind: V3) -> (Vec<u32>, Vec<Vec3>, Ve
 }
 
 fn crossings(starts: &[u32], points: &[Vec3], (mesh, triangles): &(Vec<Vec3>, Vec<[u32; 3]>)) -> usize {
-    let corners: Vec<_> = triangles.iter().map(|t| t.map(|corner| wide(mesh[corner as usize]))).collect();
+    let corners: Vec<_> = triangles.iter().map(|t| t.map(|corner| to_f64(mesh[corner as usize]))).collect();
     let segments = starts.windows(2).flat_map(|ends| points[ends[0] as usize..ends[1] as usize].windows(2));
-    segments.filter(|pair| corners.iter().any(|corners| crosses(&wide(pair[0]), &wide(pair[1]), corners))).count()
+    segments.filter(|pair| corners.iter().any(|corners| crosses(&to_f64(pair[0]), &to_f64(pair[1]), corners))).count()
 }
 
 fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
@@ -91,7 +91,7 @@ fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
     for ends in starts.windows(2) {
         let cvs = ends[0] as usize..ends[1] as usize;
         let lengths = |points: &[Vec3]| -> Vec<f64> {
-            points[cvs.clone()].windows(2).map(|pair| (wide(pair[1]) - wide(pair[0])).norm()).collect()
+            points[cvs.clone()].windows(2).map(|pair| (to_f64(pair[1]) - to_f64(pair[0])).norm()).collect()
         };
         let (before, after) = (lengths(goal), lengths(points));
         let whole: f64 = before.iter().sum();
@@ -169,7 +169,7 @@ fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
-    for (k, wind) in [V3::x(), -V3::y(), unit(Key::new(8))].iter().enumerate() {
+    for (k, wind) in [DVec3::x(), -DVec3::y(), unit(Key::new(8))].iter().enumerate() {
         for (cvs, long) in [(2, 0.2), (5, 0.4), (12, 1.5)] {
             let (starts, rest, goal) = fur(400, cvs, long, *wind);
             assert_eq!(crossings(&starts, &rest, &mesh), 0);
@@ -191,7 +191,7 @@ fn coherent_fur_crosses_nothing_either() {
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
-    for (k, wind) in [V3::x(), -V3::y(), unit(Key::new(8))].iter().enumerate() {
+    for (k, wind) in [DVec3::x(), -DVec3::y(), unit(Key::new(8))].iter().enumerate() {
         for coherence in [0.3, 1.0] {
             let (starts, rest, goal) = fur(1000, 6, 0.5, *wind);
             let out = collide(&starts, &rest, &goal, &Collide { skin: Some(skin), coherence, ..on(&obstacles) });
@@ -207,7 +207,7 @@ fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
-    let (starts, rest, goal) = fur(2000, 2, 0.3, V3::x());
+    let (starts, rest, goal) = fur(2000, 2, 0.3, DVec3::x());
     let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9, ..on(&obstacles) }).points;
     let error = |steps: u32| {
         let how = Collide { method: Method::Steps(steps), gap: 1e-9, ..on(&obstacles) };
@@ -226,7 +226,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
-    let (starts, rest, goal) = fur(200, 5, 0.3, V3::x());
+    let (starts, rest, goal) = fur(200, 5, 0.3, DVec3::x());
     let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&obstacles) };
     let out = collide(&starts, &rest, &goal, &lifted);
     let height = |p: &Vec3| f64::from(vector::length(*p)) - 1.0;
@@ -249,14 +249,14 @@ fn at_no_offset_roots_keep_their_bits_though_they_lie_on_the_skin() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
-    let (starts, mut rest, mut goal) = fur(300, 4, 0.3, V3::x());
+    let (starts, mut rest, mut goal) = fur(300, 4, 0.3, DVec3::x());
     // Roots on corners of the mesh: nothing lies nearer.
     for (k, ends) in starts.windows(2).enumerate() {
-        let corner = wide(mesh.0[k % mesh.0.len()]);
-        let base = wide(goal[ends[0] as usize]);
+        let corner = to_f64(mesh.0[k % mesh.0.len()]);
+        let base = to_f64(goal[ends[0] as usize]);
         let shift = corner - base;
         for cv in ends[0] as usize..ends[1] as usize {
-            goal[cv] = (wide(goal[cv]) + shift).map(|x| x as f32).into();
+            goal[cv] = (to_f64(goal[cv]) + shift).map(|x| x as f32).into();
             let u = 0.1 * (cv - ends[0] as usize) as f64;
             rest[cv] = (corner * (1.0 + u)).map(|x| x as f32).into();
         }
@@ -316,7 +316,7 @@ fn any_threads_and_any_path_give_the_same_bits() {
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
-    let (starts, rest, goal) = fur(500, 5, 0.4, V3::x());
+    let (starts, rest, goal) = fur(500, 5, 0.4, DVec3::x());
     let how = Collide { skin: Some(skin), offset_scale: Some(0.3), width: Masked::uniform(1e-3), ..on(&obstacles) };
     let expected = collide(&starts, &rest, &goal, &how);
     for path in Path::all() {

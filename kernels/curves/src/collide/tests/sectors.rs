@@ -3,11 +3,11 @@
 use super::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
-fn sector(u: V3, v: V3, reach: f64) -> Sector {
-    Sector { pivot: V3::zeros(), u, v, n: u.cross(&v), reach, inner: 0.0, half: 0.0, back: 0.0 }
+fn sector(u: DVec3, v: DVec3, reach: f64) -> Sector {
+    Sector { pivot: DVec3::zeros(), u, v, n: u.cross(&v), reach, inner: 0.0, half: 0.0, back: 0.0 }
 }
 
-fn first(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
+fn first(sector: &Sector, corners: &[DVec3; 3]) -> Option<f64> {
     let mut least = None;
     sector.blocked_by(corners, |blocked| {
         let angle = if blocked.lo <= 0.0 && blocked.hi >= 0.0 { 0.0 } else { blocked.lo };
@@ -20,12 +20,12 @@ fn first(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
 
 /// First contact by its two kinds of event: the tip's circle meets the triangle's plane inside of it, or one of its
 /// edges meets the sector's plane within reach. Angles 0…π.
-fn first_by_events(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
+fn first_by_events(sector: &Sector, corners: &[DVec3; 3]) -> Option<f64> {
     let mut angles = Vec::new();
     let [p, q, r] = corners;
     let normal = (q - p).cross(&(r - p));
-    let inside = |x: &V3| {
-        let side = |a: &V3, b: &V3| normal.dot(&(b - a).cross(&(x - a)));
+    let inside = |x: &DVec3| {
+        let side = |a: &DVec3, b: &DVec3| normal.dot(&(b - a).cross(&(x - a)));
         side(p, q) >= 0.0 && side(q, r) >= 0.0 && side(r, p) >= 0.0
     };
     // normal · (reach (u cos φ + v sin φ) − p) = 0.
@@ -52,7 +52,7 @@ fn first_by_events(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
         }
     }
     // What it stands in from the start is met at once.
-    if crosses(&V3::zeros(), &(sector.u * sector.reach), corners) {
+    if crosses(&DVec3::zeros(), &(sector.u * sector.reach), corners) {
         angles.push(0.0);
     }
     angles.into_iter().reduce(f64::min)
@@ -61,19 +61,19 @@ fn first_by_events(sector: &Sector, corners: &[V3; 3]) -> Option<f64> {
 #[test]
 fn a_level_segment_meets_a_floor_at_the_arcsine_of_its_height() {
     // Pivot half a length over the floor: sin φ = ½.
-    let floor = [V3::new(-9.0, -0.5, -9.0), V3::new(-9.0, -0.5, 9.0), V3::new(20.0, -0.5, 0.0)];
-    let down = sector(V3::x(), -V3::y(), 1.0);
+    let floor = [DVec3::new(-9.0, -0.5, -9.0), DVec3::new(-9.0, -0.5, 9.0), DVec3::new(20.0, -0.5, 0.0)];
+    let down = sector(DVec3::x(), -DVec3::y(), 1.0);
     assert!((first(&down, &floor).unwrap() - FRAC_PI_6).abs() < 1e-12);
-    assert_eq!(first(&sector(V3::x(), V3::y(), 1.0), &floor), Some(PI + FRAC_PI_6).filter(|angle| *angle <= PI));
-    assert_eq!(first(&sector(V3::x(), -V3::y(), 0.4), &floor), None);
+    assert_eq!(first(&sector(DVec3::x(), DVec3::y(), 1.0), &floor), Some(PI + FRAC_PI_6).filter(|angle| *angle <= PI));
+    assert_eq!(first(&sector(DVec3::x(), -DVec3::y(), 0.4), &floor), None);
 }
 
 #[test]
 fn a_needle_is_met_where_it_stands() {
     // An upright sliver at 30° from the start, half way out.
-    let at = V3::new(0.5 * libm::cos(FRAC_PI_6), 0.5 * libm::sin(FRAC_PI_6), 0.0);
-    let needle = [at + V3::new(0.0, 0.0, -1.0), at + V3::new(1e-7, 0.0, 1.0), at + V3::new(0.0, 1e-7, 1.0)];
-    let found = first(&sector(V3::x(), V3::y(), 1.0), &needle).unwrap();
+    let at = DVec3::new(0.5 * libm::cos(FRAC_PI_6), 0.5 * libm::sin(FRAC_PI_6), 0.0);
+    let needle = [at + DVec3::new(0.0, 0.0, -1.0), at + DVec3::new(1e-7, 0.0, 1.0), at + DVec3::new(0.0, 1e-7, 1.0)];
+    let found = first(&sector(DVec3::x(), DVec3::y(), 1.0), &needle).unwrap();
     assert!((found - FRAC_PI_6).abs() < 1e-6, "{found}");
 }
 
@@ -122,8 +122,8 @@ fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
 #[test]
 fn a_thick_segment_is_stopped_by_what_is_beside_its_plane() {
     // The plane of the turn passes 0.01 beside a sheet that stands across it further out.
-    let beside = [V3::new(0.5, 0.5, 0.01), V3::new(0.6, 0.4, 0.5), V3::new(0.4, 0.6, 0.5)];
-    let thin = sector(V3::x(), V3::y(), 1.0);
+    let beside = [DVec3::new(0.5, 0.5, 0.01), DVec3::new(0.6, 0.4, 0.5), DVec3::new(0.4, 0.6, 0.5)];
+    let thin = sector(DVec3::x(), DVec3::y(), 1.0);
     assert_eq!(first(&thin, &beside), None);
     let thick = Sector { half: 0.02, ..thin };
     let found = first(&thick, &beside).unwrap();

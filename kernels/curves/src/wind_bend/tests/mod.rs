@@ -7,7 +7,7 @@ mod reference;
 use super::*;
 use numerics::ramp::Interpolation;
 use numerics::random::Key;
-use numerics::vector::{self, Vec3};
+use numerics::vector::{self, DVec3, Vec3, to_f64};
 
 /// Curves as CVs a curve, joined.
 struct Groom {
@@ -83,18 +83,16 @@ fn bits(points: &[Vec3]) -> Vec<[u32; 3]> {
 
 /// Angles of the segments of one curve to `direction`, from their f64 differences.
 fn angles(points: &[Vec3], direction: [f64; 3]) -> Vec<f64> {
+    let direction = DVec3::from(direction);
     let angle = |pair: &[Vec3]| {
-        let s: [f64; 3] = std::array::from_fn(|i| f64::from(pair[1][i]) - f64::from(pair[0][i]));
-        let d = direction;
-        let cross = [s[1] * d[2] - s[2] * d[1], s[2] * d[0] - s[0] * d[2], s[0] * d[1] - s[1] * d[0]];
-        let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
-        libm::atan2(sine, s.iter().zip(d).map(|(a, b)| a * b).sum())
+        let segment = to_f64(pair[1]) - to_f64(pair[0]);
+        libm::atan2(segment.cross(&direction).norm(), segment.dot(&direction))
     };
     points.windows(2).map(angle).collect()
 }
 
 fn distance(a: Vec3, b: Vec3) -> f64 {
-    (0..3).map(|i| f64::from(a[i]) - f64::from(b[i])).map(|d| d * d).sum::<f64>().sqrt()
+    (to_f64(a) - to_f64(b)).norm()
 }
 
 fn farthest(a: &[Vec3], b: &[Vec3]) -> f64 {

@@ -1,51 +1,37 @@
-//! The paper's own procedure in f64, every later point moved at every pivot; and equal bits whatever
-//! runs the kernel.
+//! The paper's own procedure in f64, which moves every later point at every pivot; and equal bits on all SIMD paths and
+//! numbers of threads.
 
 use super::*;
 use numerics::masked::Masked;
 use numerics::noise::Kind;
+use numerics::vector::{DVec3, to_f32};
 
-type Vec64 = [f64; 3];
-
-fn dot(a: Vec64, b: Vec64) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// `v` rotated by `angle` about the unit vector `axis` (Rodrigues).
+fn rotated(v: DVec3, axis: DVec3, angle: f64) -> DVec3 {
+    let (sine, cosine) = libm::sincos(angle);
+    v * cosine + axis.cross(&v) * sine + axis * (axis.dot(&v) * (1.0 - cosine))
 }
 
-fn cross(a: Vec64, b: Vec64) -> Vec64 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// `v` turned by `angle` about the unit vector `axis` (Rodrigues).
-fn turned(v: Vec64, axis: Vec64, angle: f64) -> Vec64 {
-    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    let (side, along) = (cross(axis, v), dot(axis, v));
-    std::array::from_fn(|i| v[i] * cosine + side[i] * sine + axis[i] * along * (1.0 - cosine))
-}
-
-/// One curve bent as the paper says; `heading` gives the wind at an arc length.
-fn paper(curve: &[Vec3], share: impl Fn(usize, f32) -> f64, heading: impl Fn(f64) -> Vec64) -> Vec<Vec3> {
-    let mut points: Vec<Vec64> = curve.iter().map(|cv| cv.map(f64::from)).collect();
+/// One curve bent as in the paper; `wind` gives the wind's direction at an arc length.
+fn paper(curve: &[Vec3], share: impl Fn(usize, f32) -> f64, wind: impl Fn(f64) -> DVec3) -> Vec<Vec3> {
+    let mut points: Vec<DVec3> = curve.iter().map(|cv| to_f64(*cv)).collect();
     let total = length(curve);
     for k in 0..curve.len() - 1 {
         let arc = length(&curve[..=k]);
-        let tip = points[curve.len() - 1];
-        let from: Vec64 = std::array::from_fn(|i| tip[i] - points[k][i]);
-        let to = heading(arc);
-        let normal = cross(from, to);
-        let sine = dot(normal, normal).sqrt();
-        let angle = libm::atan2(sine, dot(from, to)) * share(k, (arc / total) as f32);
         let pivot = points[k];
+        let (from, to) = (points[curve.len() - 1] - pivot, wind(arc));
+        let normal = from.cross(&to);
+        let sine = normal.norm();
+        let angle = libm::atan2(sine, from.dot(&to)) * share(k, (arc / total) as f32);
         for point in &mut points[k + 1..] {
-            let arm = std::array::from_fn(|i| point[i] - pivot[i]);
-            let arm = turned(arm, normal.map(|x| x / sine), angle);
-            *point = std::array::from_fn(|i| pivot[i] + arm[i]);
+            *point = pivot + rotated(*point - pivot, normal / sine, angle);
         }
     }
-    points.iter().map(|cv| cv.map(|x| x as f32)).collect()
+    points.into_iter().map(to_f32).collect()
 }
 
 #[test]
-fn one_quaternion_down_the_curve_is_moving_all_later_points_at_every_pivot() {
+fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
     let ramp = Ramp::new(vec![[0.0, 0.2], [0.6, 1.0], [1.0, 0.7]], Interpolation::Linear).unwrap();
     let field = Field::new(Kind::Perlin, 2, 0.5, 5);
     let groom = tangled(300, 40);
@@ -67,17 +53,14 @@ fn one_quaternion_down_the_curve_is_moving_all_later_points_at_every_pivot() {
             let (start, end) = (ends[0] as usize, ends[1] as usize);
             let curve = &groom.points[start..end];
             let share = |k, u| f64::from(0.5 * ramp.eval(u) * envelope[start + k]);
-            let heading = |arc: f64| {
-                let wind = wind.map(f64::from);
+            let wind_at = |arc: f64| {
+                let wind = to_f64(wind);
                 let Some(noise) = &with.noise else { return wind };
-                let root = curve[0].map(f64::from);
-                let at = std::array::from_fn(|i| {
-                    (root[i] + noise.origin[i] + wind[i] * arc * f64::from(noise.waviness)) * noise.frequency
-                });
-                let gust = field.at(at);
-                std::array::from_fn(|i| wind[i] + f64::from(noise.amplitude * gust[i]))
+                let displacement = wind * (arc * f64::from(noise.waviness));
+                let at = (to_f64(curve[0]) + DVec3::from(noise.origin) + displacement) * noise.frequency;
+                wind + to_f64(vector::scale(field.at(at.into()), noise.amplitude))
             };
-            let expected = paper(curve, share, heading);
+            let expected = paper(curve, share, wind_at);
             let error = farthest(&bent.points[start..end], &expected);
             assert!(error < 1e-5 * length(curve).max(0.1), "{} CVs: {error}", curve.len());
         }
@@ -121,7 +104,7 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn a_curve_alone_has_the_bits_it_has_among_others() {
+fn a_curve_s_bits_do_not_depend_on_other_curves() {
     let ramp = one();
     let groom = tangled(100, 30);
     let all = groom.bend(&plain(&ramp)).points;

@@ -1,9 +1,9 @@
 //! Which triangles of a block may matter: sixteen at a time, in f32, letting pass what rounding leaves in doubt.
 
-use super::sector::{Sector, V3};
+use super::sector::Sector;
 use numerics::lanes::LANES;
 use numerics::tree::Block;
-use numerics::vector::{self, Vec3, cross, dot, sub};
+use numerics::vector::{self, Vec3, cross, dot, sub, to_f32};
 
 /// Rounding of a few products of differences, as a share of the largest difference.
 const ROUNDING: f32 = 2e-6;
@@ -18,19 +18,13 @@ pub(super) struct Wedge {
     slack: f32,
 }
 
-/// A vector's nearest f32 one.
-#[inline(always)]
-pub(super) fn narrow(v: &V3) -> Vec3 {
-    [v.x as f32, v.y as f32, v.z as f32]
-}
-
 impl Wedge {
     /// The wedge of `sector` up to an angle of this cosine and sine.
     #[inline(always)]
     pub(super) fn new(sector: &Sector, [cosine, sine]: [f64; 2]) -> Self {
-        let pivot = narrow(&sector.pivot);
+        let pivot = to_f32(sector.pivot);
         Self {
-            axes: [narrow(&sector.u), narrow(&sector.v), narrow(&sector.n)],
+            axes: [to_f32(sector.u), to_f32(sector.v), to_f32(sector.n)],
             until: [cosine as f32, sine as f32],
             half: sector.half as f32,
             back: sector.back as f32,

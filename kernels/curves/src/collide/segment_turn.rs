@@ -1,11 +1,11 @@
 //! One segment's turn: from where it points towards its goal until something is met, out of what it stands in first.
 
 use super::crossing::{Crossing, corners, first_crossing};
-use super::near::{Wedge, narrow};
-use super::sector::{Blocked, Sector, V3};
+use super::sector::{Blocked, Sector};
+use super::triangle_filter::Wedge;
 use super::{Method, perpendicular};
 use numerics::tree::{Block, TriangleTree};
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
 
 /// How straight into a surface a segment has to stick for the curve to say which way out is taken.
@@ -15,14 +15,14 @@ const STRAIGHT_IN: f64 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
     /// The end that stays.
-    pub(super) pivot: V3,
+    pub(super) pivot: DVec3,
     /// Where it points, and where it is to point: unit.
-    pub(super) from: V3,
-    pub(super) to: V3,
+    pub(super) from: DVec3,
+    pub(super) to: DVec3,
     /// About which it turns where the two are opposite.
-    pub(super) axis: V3,
+    pub(super) axis: DVec3,
     /// Where the segment before it points; zero at the root.
-    pub(super) before: V3,
+    pub(super) before: DVec3,
     pub(super) length: f64,
     /// Half its thickness.
     pub(super) half: f64,
@@ -38,7 +38,7 @@ pub(super) struct Segment {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turned {
     /// Where it points now.
-    pub(super) direction: V3,
+    pub(super) direction: DVec3,
     /// Something kept it from its goal.
     pub(super) met: bool,
     /// Nothing came near on its way: it crosses nothing, however positions are rounded.
@@ -81,7 +81,7 @@ impl Segment {
             .turn(method, obstacles, nearby)
     }
 
-    fn sector(&self, from: V3, towards: V3) -> Sector {
+    fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
         let axis = from.cross(&towards);
         let sine = axis.norm();
         let n = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &self.axis) };
@@ -118,16 +118,16 @@ impl Segment {
     }
 
     /// The end of the segment where it points to `direction`, as written.
-    pub(super) fn end(&self, direction: &V3) -> Vec3 {
-        narrow(&(self.pivot + direction * self.length))
+    pub(super) fn end(&self, direction: &DVec3) -> Vec3 {
+        to_f32(self.pivot + direction * self.length)
     }
 
     /// Where the part that meets things starts, where it points to `direction`.
-    pub(super) fn start(&self, direction: &V3) -> Vec3 {
-        narrow(&(self.pivot + direction * self.inner))
+    pub(super) fn start(&self, direction: &DVec3) -> Vec3 {
+        to_f32(self.pivot + direction * self.inner)
     }
 
-    fn crosses(&self, direction: &V3, nearby: &Nearby<'_>) -> Option<Crossing> {
+    fn crosses(&self, direction: &DVec3, nearby: &Nearby<'_>) -> Option<Crossing> {
         first_crossing(nearby, self.start(direction), self.end(direction))
     }
 
@@ -151,7 +151,7 @@ impl Segment {
     /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
     /// up to half a turn.
     #[inline(always)]
-    fn way_out<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Option<V3> {
+    fn way_out<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Option<DVec3> {
         let crossed = self.crosses(&self.from, nearby);
         // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
@@ -198,7 +198,7 @@ enum Stop {
 
 /// How far the sector may turn towards the unit vector `to` of its plane.
 #[inline(always)]
-fn first_stop(sector: &Sector, to: &V3, nearby: &Nearby<'_>) -> Stop {
+fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
     let mut wedge = Wedge::new(sector, until);
     let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
@@ -275,12 +275,12 @@ impl Blocked {
 
 impl Sector {
     /// How far it has to turn to the unit vector `to` of its plane: 0…π.
-    fn angle_of(&self, to: &V3) -> f64 {
+    fn angle_of(&self, to: &DVec3) -> f64 {
         libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
     }
 
     /// A box around all that it sweeps while it turns to the unit vector `end` of its plane.
-    fn bounds(&self, end: &V3) -> (Vec3, Vec3) {
+    fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
