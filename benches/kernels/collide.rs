@@ -3,8 +3,8 @@
 //! Fur on a sphere of 20,480 triangles, its curves bent by wind across it.
 
 use cpu_time::ProcessTime;
-use curves::collide::{Collide, Method, Skin, at_rest, collide, normals};
-use curves::wind_bend::{Bend, Mode, bend};
+use curves::collide::{Collide, ContactMethod, SkinSurface, at_rest, collide, normals};
+use curves::wind_bend::{Bend, BendMode, bend};
 use numerics::ramp::Ramp;
 use numerics::shapes::icosphere;
 use numerics::tree::TriangleTree;
@@ -36,7 +36,7 @@ fn main() {
     let points: Vec<Vec3> = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
     let tree = TriangleTree::build(&points, &triangles);
     let normals = normals(&points, &triangles);
-    let skin = Skin { tree: &tree, triangles: &triangles, normals: &normals };
+    let skin = SkinSurface { tree: &tree, triangles: &triangles, normals: &normals };
     for (curves, cvs) in [(10_000, 5), (10_000, 32), (100_000, 5)].into_iter().take(arg(2, 3)) {
         let rest = fur(curves, cvs);
         let starts: Vec<u32> = (0..=curves as u32).map(|k| k * cvs as u32).collect();
@@ -46,12 +46,12 @@ fn main() {
             rotate: 0.5.into(),
             envelope: None,
             ramp: &ramp,
-            mode: Mode::ResolutionFree { reference_segments: 4.0 },
+            mode: BendMode::ResolutionFree { reference_segments: 4.0 },
             blend: 1.0.into(),
             noise: None,
         };
         let goal = bend(&starts, &rest, &wind).points;
-        for method in [Method::Exact, Method::Steps(10)].into_iter().take(arg(2, 2)) {
+        for method in [ContactMethod::Exact, ContactMethod::Steps(10)].into_iter().take(arg(2, 2)) {
             let how = Collide {
                 obstacles: &[&tree],
                 skin: Some(skin),

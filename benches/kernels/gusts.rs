@@ -4,7 +4,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use curves::gusts::{Control, Draw, Gusts, Plane, Shape, Sphere, feel_on};
+use curves::gusts::{Control, ControlShape, Draw, Gusts, Plane, Sphere, evaluate_on};
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::simd::Path;
 use std::hint::black_box;
@@ -20,7 +20,7 @@ fn groom(rows: usize, cvs: usize) -> Vec<[f32; 3]> {
     (0..rows * rows).flat_map(|i| (0..cvs).map(move |k| cv(i, k))).collect()
 }
 
-/// Gusts on their way over the groom, some of them gone by.
+/// Gusts passing over the groom, some of them already past it.
 fn spheres(count: u32, radius: [f32; 2], noise: [f32; 2]) -> Vec<Sphere> {
     let draw = Draw {
         seed: 7,
@@ -34,10 +34,10 @@ fn spheres(count: u32, radius: [f32; 2], noise: [f32; 2]) -> Vec<Sphere> {
     };
     let plane = Plane::new([[0.0; 3], [2.0, 0.1, 2.0]], [1.0, 0.0, 0.0], 0.5, [0.0; 2]);
     let sphere = |gust: &curves::gusts::Gust| {
-        let [x, y, z] = plane.at(gust.place);
-        let way = (48.0 - gust.start) / 24.0 * (0.5 + gust.speed);
+        let [x, y, z] = plane.at(gust.position);
+        let travelled = (48.0 - gust.start) / 24.0 * (0.5 + gust.speed);
         Sphere {
-            centre: [x + way, y, z],
+            centre: [x + travelled, y, z],
             radius: gust.radius,
             strength: gust.strength,
             noise: gust.noise,
@@ -52,7 +52,7 @@ fn main() {
     let axes = [[0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.3]];
     let control = |shape| Control::new(shape, [1.0, 0.0, 1.0], axes, 2.0, falloff.clone(), -0.5);
     let (small, large) = (groom(100, 5), groom(1000, 5));
-    let both = [control(Shape::Sphere), control(Shape::Cubes)];
+    let both = [control(ControlShape::Sphere), control(ControlShape::Cubes)];
     let cases = [
         ("10,000 × 5, no gusts", &small, Vec::new(), &[][..]),
         ("10,000 × 5, 20 gusts, round", &small, spheres(20, [0.3, 0.6], [0.0; 2]), &[]),
@@ -70,12 +70,12 @@ fn main() {
         for _ in 0..rounds {
             for (path, best) in paths.iter().zip(&mut best) {
                 let start = Instant::now();
-                let felt = black_box(feel_on(*path, points, &gusts));
+                let felt = black_box(evaluate_on(*path, points, &gusts));
                 *best = best.min(start.elapsed().as_secs_f64());
                 assert_eq!(felt.values.len(), points.len());
             }
         }
-        let reached = feel_on(Path::BASELINE, points, &gusts).reached;
+        let reached = evaluate_on(Path::BASELINE, points, &gusts).reached;
         print!("{name:36}{:>8.1} % reached", 100.0 * reached as f64 / points.len() as f64);
         for (path, best) in paths.iter().zip(best) {
             print!("{:>9} {:8.3} ms", path.name(), best * 1e3);

@@ -4,8 +4,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use curves::wind_bend::{Bend, BendNoise, Mode, bend_on};
-use numerics::noise::{Field, Kind};
+use curves::wind_bend::{Bend, BendMode, BendNoise, bend_on};
+use numerics::noise::{Field, NoiseKind};
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 use numerics::simd::Path;
@@ -27,7 +27,7 @@ fn groom(curves: u32, cvs: u32) -> (Vec<u32>, Vec<[f32; 3]>) {
 
 fn main() {
     let ramp = Ramp::new(vec![[0.0, 0.2], [1.0, 1.0]], Interpolation::Linear).expect("the keys are in order");
-    let fields = [Kind::Perlin, Kind::Billow, Kind::Wavelet].map(|kind| Field::new(kind, 2, 0.5, 7));
+    let fields = [NoiseKind::Perlin, NoiseKind::Billow, NoiseKind::Wavelet].map(|kind| Field::new(kind, 2, 0.5, 7));
     let noise = |kind: usize, waviness| {
         Some(BendNoise {
             field: &fields[kind],
@@ -38,8 +38,8 @@ fn main() {
             roots: None,
         })
     };
-    let paper = Mode::Paper;
-    let free = Mode::ResolutionFree { reference_segments: 4.0 };
+    let paper = BendMode::Paper;
+    let free = BendMode::ResolutionFree { reference_segments: 4.0 };
     let small = groom(10_275, 5);
     let long = groom(10_275, 32);
     let large = groom(1_000_000, 5);

@@ -11,9 +11,9 @@
 //! * `blend` turns each segment back towards where it came from, so that half a wind keeps lengths too.
 
 use crate::shared::direction::unit_direction;
-use curves::wind_bend::{Bend, BendNoise, Mode as BendMode, bend};
+use curves::wind_bend::{Bend, BendMode, BendNoise, bend};
 use engine::prelude::*;
-use numerics::noise::{Field, Kind as NoiseKind};
+use numerics::noise::{Field, NoiseKind};
 use numerics::ramp::Ramp;
 use std::sync::Arc;
 

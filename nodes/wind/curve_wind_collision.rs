@@ -16,7 +16,7 @@
 
 use std::sync::Arc;
 
-use curves::collide::{Collide, Method as Turn, at_rest, collide};
+use curves::collide::{Collide, ContactMethod, at_rest, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
@@ -126,8 +126,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         obstacles: &obstacles,
         skin: Some(skin.skin()),
         method: match cx.get(METHOD) {
-            Method::Exact => Turn::Exact,
-            Method::Steps => Turn::Steps(cx.get(ROTATION_STEPS) as u32),
+            Method::Exact => ContactMethod::Exact,
+            Method::Steps => ContactMethod::Steps(cx.get(ROTATION_STEPS) as u32),
         },
         coherence: cx.get(COHERENCE),
         gap: cx.get(GAP),

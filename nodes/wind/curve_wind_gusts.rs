@@ -14,7 +14,7 @@
 
 use crate::shared::direction::unit_direction;
 use crate::shared::gust_control;
-use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, feel};
+use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, evaluate};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -116,7 +116,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         (incoming.is_none().then(|| vec![1.0; curves.point_count()]), 0)
     } else {
         let gusts = Gusts { base, falloff: &falloff, spheres: &spheres, controls: &controls, incoming };
-        let felt = feel(curves.positions(), &gusts);
+        let felt = evaluate(curves.positions(), &gusts);
         (Some(felt.values), felt.reached)
     };
     cx.publish(REACHED_POINTS, reached as f64);
@@ -167,7 +167,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
             let launch = Launch::at(cx, whole);
             (Plane::new(bounds, launch.wind, distance, area), launch)
         });
-        let from = plane.at(gust.place);
+        let from = plane.at(gust.position);
         let way = launch.way_to([slow, fast], gust);
         Sphere {
             centre: std::array::from_fn(|axis| from[axis] + way[axis]),

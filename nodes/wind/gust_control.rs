@@ -69,8 +69,8 @@ pub static NODE: Node = Node::new(
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let shape = match cx.get(SHAPE) {
-        Shape::Sphere => gusts::Shape::Sphere,
-        Shape::Cubes => gusts::Shape::Cubes,
+        Shape::Sphere => gusts::ControlShape::Sphere,
+        Shape::Cubes => gusts::ControlShape::Cubes,
     };
     let (outer, ramp) = (cx.get(OUTER), cx.get(RAMP));
     let mut outline = outline(shape, f64::from(outer), ramp.keys().len());
@@ -83,7 +83,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 mod tests {
     use super::*;
     use conformance::{Bench, BenchResult, bench, conforms};
-    use curves::gusts::{Gusts, feel};
+    use curves::gusts::{Gusts, evaluate};
     use engine::param::{Source, Value};
     use numerics::ramp::Interpolation;
 
@@ -92,11 +92,11 @@ mod tests {
         Turn(turn)
     }
 
-    /// What points feel of the controls that came out.
+    /// The influence at points of the controls that came out.
     fn felt(out: &BenchResult, points: &[[f32; 3]]) -> Vec<f32> {
         let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
         let none = Ramp::constant(0.0);
-        feel(points, &Gusts { base: 0.0, falloff: &none, spheres: &[], controls: &controls, incoming: None }).values
+        evaluate(points, &Gusts { base: 0.0, falloff: &none, spheres: &[], controls: &controls, incoming: None }).values
     }
 
     fn linear(bench: Bench) -> Bench {
@@ -161,7 +161,7 @@ mod tests {
                     let out = bench(&NODE).set(SHAPE, shape).set(RAMP, ramp.clone()).cook();
                     let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
                     let expected = gusts::Control::new(
-                        [gusts::Shape::Sphere, gusts::Shape::Cubes][usize::from(shape == Shape::Cubes)],
+                        [gusts::ControlShape::Sphere, gusts::ControlShape::Cubes][usize::from(shape == Shape::Cubes)],
                         [0.0; 3],
                         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
                         2.0,

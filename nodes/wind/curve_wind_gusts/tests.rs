@@ -1,6 +1,6 @@
 use super::*;
 use conformance::{Bench, BenchResult, bench, conformance};
-use curves::gusts::{Shape, outline};
+use curves::gusts::{ControlShape, outline};
 use numerics::ramp::Interpolation;
 
 fn span(low: f32, high: f32) -> Span {
@@ -59,7 +59,7 @@ fn bits(out: &BenchResult) -> Vec<u8> {
 }
 
 /// A Gust_Control as it comes along a wire: a ball or cubes about `centre`.
-fn control(shape: Shape, centre: [f32; 3], radius: f32, strength: f32) -> Component {
+fn control(shape: ControlShape, centre: [f32; 3], radius: f32, strength: f32) -> Component {
     let points = outline(shape, 2.0, 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
     let falling = ramp(&[[0.0, 1.0], [1.0, 0.0]]);
     gust_control::component(points, shape, 2.0, strength, &falling).unwrap()
@@ -73,7 +73,7 @@ fn as_control(_: usize, given: Geometry) -> Geometry {
         return given;
     };
     let (Some(first), Some(_)) = (points.positions().get(1), points.get(gust_control::POINTS)) else { return given };
-    let shape = [Shape::Sphere, Shape::Cubes][shapes[0] as usize % 2];
+    let shape = [ControlShape::Sphere, ControlShape::Cubes][shapes[0] as usize % 2];
     let mut made = control(shape, [first[0], 0.1, first[2]], 0.1, 1.0);
     let rows = made.point_count();
     let number = |attribute: Attr<f32>| points.get(attribute).map_or(1.0, |values| values[0]);
@@ -211,7 +211,7 @@ fn repeated_gusts_come_again_at_any_frame_there_is() {
 fn any_frame_alone_has_the_bits_it_has_in_order() {
     let gusts = bench(&NODE)
         .input(CURVES, field(20))
-        .input(CONTROLS, control(Shape::Cubes, [1.0, 0.0, 1.0], 0.4, -0.5))
+        .input(CONTROLS, control(ControlShape::Cubes, [1.0, 0.0, 1.0], 0.4, -0.5))
         .set(NUM_GUSTS, 30)
         .set(REPEAT_EVERY, 20.0)
         .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
@@ -254,9 +254,9 @@ fn controls_add_their_ramp_and_may_take_away() {
         let out = bench.cook();
         [0, 32, 48, 64, 96].map(|cv| envelope(&out)[cv])
     };
-    let ball = control(Shape::Sphere, [1.0, 0.0, 0.0], 1.0, 1.0);
+    let ball = control(ControlShape::Sphere, [1.0, 0.0, 0.0], 1.0, 1.0);
     assert_eq!(with(std::slice::from_ref(&ball), 0.0), [0.0, 1.0, 0.5, 0.0, 0.0]);
-    let calm = control(Shape::Sphere, [1.5, 0.0, 0.0], 1.0, -0.5);
+    let calm = control(ControlShape::Sphere, [1.5, 0.0, 0.0], 1.0, -0.5);
     assert_eq!(with(&[ball.clone(), calm.clone()], 0.0), [0.0, 0.75, 0.0, 0.0, 0.0]);
     assert_eq!(with(std::slice::from_ref(&calm), 1.0), [1.0, 0.75, 0.5, 0.75, 1.0]);
     // Merged on one wire they are the same.
@@ -266,13 +266,14 @@ fn controls_add_their_ramp_and_may_take_away() {
 #[test]
 fn points_that_are_no_control_are_refused() {
     let with = |points: Component| {
-        let bench = bench(&NODE).input(CURVES, dot(0.0)).input(CONTROLS, control(Shape::Sphere, [0.0; 3], 1.0, 1.0));
+        let bench =
+            bench(&NODE).input(CURVES, dot(0.0)).input(CONTROLS, control(ControlShape::Sphere, [0.0; 3], 1.0, 1.0));
         bench.input(CONTROLS, points).try_cook().unwrap_err()
     };
     let error = with(Component::points(vec![[0.0; 3]; 9]));
     assert_eq!(error.fact, "wire 1 of `controls` is no Gust_Control: its points have no `gust_points`");
     assert!(error.hint.unwrap().contains("Gust_Control"));
-    let ball = control(Shape::Sphere, [0.0; 3], 1.0, 1.0);
+    let ball = control(ControlShape::Sphere, [0.0; 3], 1.0, 1.0);
     let strangers = ball.concat(&Component::points(vec![[0.0; 3]; 2])).unwrap();
     let fact = format!("point {} of wire 1 of `controls` belongs to no whole Gust_Control", ball.point_count());
     assert_eq!(with(strangers).fact, fact);

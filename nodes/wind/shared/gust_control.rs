@@ -6,7 +6,7 @@
 //! inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one a point from the run's first on: x, y, and what
 //! joins them (0 linear, 1 smooth, 2 constant). Once the keys are through, points repeat the last.
 
-use curves::gusts::{AXIS_ROWS, Control, Shape};
+use curves::gusts::{AXIS_ROWS, Control, ControlShape};
 use engine::prelude::*;
 use numerics::ramp::{Interpolation, Ramp};
 
@@ -16,7 +16,7 @@ pub(crate) const OUTER: Attr<f32> = Attr::point("gust_outer");
 pub(crate) const STRENGTH: Attr<f32> = Attr::point("gust_strength");
 pub(crate) const RAMP: Attr<[f32; 3]> = Attr::point("gust_ramp");
 
-const SHAPES: [Shape; 2] = [Shape::Sphere, Shape::Cubes];
+const SHAPES: [ControlShape; 2] = [ControlShape::Sphere, ControlShape::Cubes];
 const INTERPOLATIONS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant];
 
 /// The points of one control: its outline, at least as many as the ramp has keys, and what it does.
@@ -25,7 +25,7 @@ const INTERPOLATIONS: [Interpolation; 3] = [Interpolation::Linear, Interpolation
 /// Where there are more points than an i32 counts.
 pub(crate) fn component(
     outline: Vec<[f32; 3]>,
-    shape: Shape,
+    shape: ControlShape,
     outer: f32,
     strength: f32,
     ramp: &Ramp,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use curves::collide::{Skin, normals};
+use curves::collide::{SkinSurface, normals};
 use engine::geometry::{Component, Triangles};
 use numerics::tree::TriangleTree;
 
@@ -35,7 +35,7 @@ impl Surface {
     }
 
     /// What the kernel takes.
-    pub(crate) fn skin(&self) -> Skin<'_> {
-        Skin { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
+    pub(crate) fn skin(&self) -> SkinSurface<'_> {
+        SkinSurface { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
     }
 }

@@ -16,7 +16,7 @@ use lattice::{Point, Points};
 
 /// What a field is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum NoiseKind {
     /// Gradient noise: 0 on the lattice, C².
     Perlin,
     /// The magnitude of gradient noise, less its mean: rounded lumps with creases between them.
@@ -31,7 +31,7 @@ pub const MAX_OCTAVES: usize = 16;
 /// A noise field: kind, octaves, seed.
 #[derive(Clone, Debug)]
 pub struct Field {
-    kind: Kind,
+    kind: NoiseKind,
     octaves: Vec<Octave>,
 }
 
@@ -52,7 +52,7 @@ const BILLOW_SCALE: f32 = 1.725;
 impl Field {
     /// A field of 1…16 `octaves` (held to that), each `roughness` times the one before (a negative or
     /// NaN one counts as 0, one above 1 as 1).
-    pub fn new(kind: Kind, octaves: u32, roughness: f32, seed: u64) -> Self {
+    pub fn new(kind: NoiseKind, octaves: u32, roughness: f32, seed: u64) -> Self {
         let roughness = f64::from(if roughness > 0.0 { roughness.min(1.0) } else { 0.0 });
         let wanted = (octaves as usize).clamp(1, MAX_OCTAVES);
         let weights: Vec<f64> = std::iter::successors(Some(1.0), |weight| Some(weight * roughness))
@@ -86,9 +86,9 @@ impl Field {
             let points = Points::at(points, octave.scale);
             // A loop a kind: a choice inside of one would keep it from becoming vectors.
             match self.kind {
-                Kind::Perlin => octave.add_lanes(Kind::Perlin, &points, &mut sum),
-                Kind::Billow => octave.add_lanes(Kind::Billow, &points, &mut sum),
-                Kind::Wavelet => octave.add_lanes(Kind::Wavelet, &points, &mut sum),
+                NoiseKind::Perlin => octave.add_lanes(NoiseKind::Perlin, &points, &mut sum),
+                NoiseKind::Billow => octave.add_lanes(NoiseKind::Billow, &points, &mut sum),
+                NoiseKind::Wavelet => octave.add_lanes(NoiseKind::Wavelet, &points, &mut sum),
             }
         }
         sum
@@ -97,11 +97,13 @@ impl Field {
 
 impl Octave {
     #[inline(always)]
-    fn noise(&self, kind: Kind, point: Point) -> [f32; 3] {
+    fn noise(&self, kind: NoiseKind, point: Point) -> [f32; 3] {
         match kind {
-            Kind::Perlin => perlin::noise(point, self.salt),
-            Kind::Billow => perlin::noise(point, self.salt).map(|value| BILLOW_SCALE * (value.abs() - BILLOW_MEAN)),
-            Kind::Wavelet => wavelet::noise(point, self.salt),
+            NoiseKind::Perlin => perlin::noise(point, self.salt),
+            NoiseKind::Billow => {
+                perlin::noise(point, self.salt).map(|value| BILLOW_SCALE * (value.abs() - BILLOW_MEAN))
+            }
+            NoiseKind::Wavelet => wavelet::noise(point, self.salt),
         }
     }
 
@@ -113,7 +115,7 @@ impl Octave {
     }
 
     #[inline(always)]
-    fn add_lanes(&self, kind: Kind, points: &Points, sum: &mut Lanes<3>) {
+    fn add_lanes(&self, kind: NoiseKind, points: &Points, sum: &mut Lanes<3>) {
         for lane in 0..LANES {
             let mut value = get(sum, lane);
             self.add(self.noise(kind, points.lane(lane)), &mut value);

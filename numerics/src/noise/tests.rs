@@ -2,7 +2,7 @@
 
 use super::*;
 
-const KINDS: [Kind; 3] = [Kind::Perlin, Kind::Billow, Kind::Wavelet];
+const KINDS: [NoiseKind; 3] = [NoiseKind::Perlin, NoiseKind::Billow, NoiseKind::Wavelet];
 
 /// Sum over many random points of what `of` gives, divided by their number.
 fn average(of: impl Fn([f64; 3]) -> f64) -> f64 {
@@ -40,7 +40,7 @@ fn every_kind_has_mean_0_and_rms_0_27_at_any_number_of_octaves() {
 
 #[test]
 fn components_seeds_and_points_2_cells_apart_are_uncorrelated() {
-    for kind in [Kind::Perlin, Kind::Billow] {
+    for kind in [NoiseKind::Perlin, NoiseKind::Billow] {
         let field = Field::new(kind, 1, 0.5, 3);
         for distance in [[2.0, 0.0, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 3.0], [4.0, 4.0, -4.0]] {
             let found = correlation(&field, 0, 0, distance);
@@ -62,7 +62,7 @@ fn components_seeds_and_points_2_cells_apart_are_uncorrelated() {
 #[test]
 fn mirrored_and_swapped_places_are_uncorrelated() {
     // A hash that mixes the axes weakly shows itself here.
-    let field = Field::new(Kind::Perlin, 1, 0.5, 3);
+    let field = Field::new(NoiseKind::Perlin, 1, 0.5, 3);
     let value = |p| f64::from(field.at(p)[0]);
     let images: [fn([f64; 3]) -> [f64; 3]; 3] = [|[x, y, z]| [y, x, z], |[x, y, z]| [z, y, x], |[x, y, z]| [-x, y, z]];
     for image in images {
@@ -73,7 +73,7 @@ fn mirrored_and_swapped_places_are_uncorrelated() {
 
 #[test]
 fn gradient_noise_is_0_on_the_lattice_in_any_octave_and_not_beside_it() {
-    let field = Field::new(Kind::Perlin, 6, 0.7, 8);
+    let field = Field::new(NoiseKind::Perlin, 6, 0.7, 8);
     for i in -20..20 {
         let cell = [f64::from(i), f64::from(3 * i), f64::from(1_000_000 - i)];
         assert_eq!(field.at(cell), [0.0; 3]);
@@ -84,12 +84,12 @@ fn gradient_noise_is_0_on_the_lattice_in_any_octave_and_not_beside_it() {
 
 /// Mean third difference over `step` squared across faces of cells: falls like `step` where the
 /// second derivative is whole, stays where it jumps.
-fn third_difference(kind: Kind, step: f64) -> f64 {
+fn third_difference(kind: NoiseKind, step: f64) -> f64 {
     let field = Field::new(kind, 1, 0.5, 8);
     let over = |i: u64| {
         let across = [1, 2].map(|axis| Key::new(4).of(i).of(axis).f64() * 30.0);
         // Wavelet's pieces meet halfway between lattice points.
-        let face = i as f64 + if kind == Kind::Wavelet { 0.5 } else { 0.0 };
+        let face = i as f64 + if kind == NoiseKind::Wavelet { 0.5 } else { 0.0 };
         let at = |x: f64| f64::from(field.at([face + x * step, across[0], across[1]])[0]);
         (at(1.5) - 3.0 * at(0.5) + 3.0 * at(-0.5) - at(-1.5)).abs() / (step * step)
     };
@@ -99,8 +99,8 @@ fn third_difference(kind: Kind, step: f64) -> f64 {
 #[test]
 fn gradient_noise_is_c2_across_faces_and_wavelet_noise_c1_only() {
     let fall = |kind| third_difference(kind, 0.04) / third_difference(kind, 0.01);
-    assert!(fall(Kind::Perlin) > 3.5, "{}", fall(Kind::Perlin));
-    assert!(fall(Kind::Wavelet) < 1.5, "{}", fall(Kind::Wavelet));
+    assert!(fall(NoiseKind::Perlin) > 3.5, "{}", fall(NoiseKind::Perlin));
+    assert!(fall(NoiseKind::Wavelet) < 1.5, "{}", fall(NoiseKind::Wavelet));
 }
 
 #[test]
@@ -139,12 +139,12 @@ fn lanes_give_the_bits_of_one_point() {
 #[test]
 fn roughness_0_is_one_octave_and_odd_numbers_are_held_to_the_range() {
     let point = [0.3, 1.7, -2.2];
-    let one = Field::new(Kind::Perlin, 1, 0.5, 2).at(point);
-    assert_eq!(Field::new(Kind::Perlin, 7, 0.0, 2).at(point), one);
-    assert_eq!(Field::new(Kind::Perlin, 7, f32::NAN, 2).at(point), one);
-    assert_eq!(Field::new(Kind::Perlin, 0, 0.5, 2).at(point), one);
-    let most = Field::new(Kind::Perlin, u32::MAX, 3.0, 2);
-    assert_eq!(most.at(point), Field::new(Kind::Perlin, 16, 1.0, 2).at(point));
+    let one = Field::new(NoiseKind::Perlin, 1, 0.5, 2).at(point);
+    assert_eq!(Field::new(NoiseKind::Perlin, 7, 0.0, 2).at(point), one);
+    assert_eq!(Field::new(NoiseKind::Perlin, 7, f32::NAN, 2).at(point), one);
+    assert_eq!(Field::new(NoiseKind::Perlin, 0, 0.5, 2).at(point), one);
+    let most = Field::new(NoiseKind::Perlin, u32::MAX, 3.0, 2);
+    assert_eq!(most.at(point), Field::new(NoiseKind::Perlin, 16, 1.0, 2).at(point));
 }
 
 #[test]

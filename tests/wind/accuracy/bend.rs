@@ -1,6 +1,6 @@
 //! Straight curves in a wind without noise.
 
-use curves::wind_bend::{Bend, Mode, bend};
+use curves::wind_bend::{Bend, BendMode, bend};
 use numerics::ramp::Ramp;
 use numerics::vector::to_f64;
 
@@ -8,10 +8,10 @@ use super::{Figure, storage};
 
 type Point = [f32; 3];
 
-const RESOLUTION_FREE: Mode = Mode::ResolutionFree { reference_segments: 4.0 };
+const RESOLUTION_FREE: BendMode = BendMode::ResolutionFree { reference_segments: 4.0 };
 
 /// A straight curve of length 1 at an angle of `theta` to x, bent by wind along x.
-fn bent(root: Point, theta: f64, segments: usize, g: f32, mode: Mode) -> Vec<Point> {
+fn bent(root: Point, theta: f64, segments: usize, g: f32, mode: BendMode) -> Vec<Point> {
     let along = [libm::cos(theta), 0.6 * libm::sin(theta), 0.8 * libm::sin(theta)];
     let cv = |k: usize| std::array::from_fn(|d| root[d] + (along[d] * k as f64 / segments as f64) as f32);
     let points: Vec<Point> = (0..=segments).map(cv).collect();
@@ -35,7 +35,7 @@ fn angle_to_x(ends: &[Point]) -> f64 {
 
 /// Errors of segments' angles, each with what storing the positions may turn it by; `law` gives the share of the angle
 /// that is left from the segment's number and its middle's u.
-fn angle_errors(root: Point, segments: usize, mode: Mode, law: impl Fn(f64, usize, f64) -> f64) -> Vec<[f64; 2]> {
+fn angle_errors(root: Point, segments: usize, mode: BendMode, law: impl Fn(f64, usize, f64) -> f64) -> Vec<[f64; 2]> {
     let mut errors = Vec::new();
     for theta in [1e-3, 0.3, 1.2, 1.5, 2.7, 3.1] {
         for g in [0.05_f32, 0.3, 0.5, 0.9] {
@@ -61,7 +61,7 @@ pub(super) fn figures() -> Vec<Figure> {
     let counts = [2, 4, 8, 32, 128];
     // W2: every pivot turns the rest of a straight curve by the share g of what is left.
     let paper = |root: Point| {
-        (1..=8).flat_map(move |n| angle_errors(root, n, Mode::Paper, |left, k, _| libm::pow(left, k as f64 + 1.0)))
+        (1..=8).flat_map(move |n| angle_errors(root, n, BendMode::Paper, |left, k, _| libm::pow(left, k as f64 + 1.0)))
     };
     let free = |root: Point| {
         counts

@@ -1,6 +1,6 @@
 //! Noise, by statistics over many cells.
 
-use numerics::noise::{Field, Kind};
+use numerics::noise::{Field, NoiseKind};
 use numerics::random::Key;
 
 use super::Figure;
@@ -19,7 +19,7 @@ fn average<const N: usize>(of: impl Fn([f64; 3]) -> [f64; N]) -> [f64; N] {
 }
 
 /// Mean and rms of each component, and the largest correlation between any two of them, here and 2 cells apart and more.
-fn statistics(kind: Kind) -> ([f64; 3], [f64; 3], f64) {
+fn statistics(kind: NoiseKind) -> ([f64; 3], [f64; 3], f64) {
     let field = Field::new(kind, 1, 0.5, 3);
     let at = |p: [f64; 3]| field.at(p).map(f64::from);
     let mean = average(at);
@@ -42,7 +42,7 @@ fn statistics(kind: Kind) -> ([f64; 3], [f64; 3], f64) {
 
 /// The order at which the jump of the second derivative across faces of cells falls with the step: 1 where there is
 /// none, 0 where there is one.
-fn smoothness(kind: Kind) -> f64 {
+fn smoothness(kind: NoiseKind) -> f64 {
     let field = Field::new(kind, 1, 0.5, 8);
     let jump = |step: f64| {
         let over = |i: u64| {
@@ -77,7 +77,7 @@ fn each_line(values: &mut [f64], change: impl Fn(&[f64]) -> Vec<f64>) {
 
 /// The share of wavelet noise's energy that is left when it is halved and doubled again (Cook & DeRose 2005, section 3).
 fn left_after_halving() -> f64 {
-    let field = Field::new(Kind::Wavelet, 1, 0.5, 3);
+    let field = Field::new(NoiseKind::Wavelet, 1, 0.5, 3);
     let cell = |i: usize| [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)].map(|x| x as f64);
     let mut values: Vec<f64> = (0..SIDE * SIDE * SIDE).map(|i| f64::from(field.at(cell(i))[0])).collect();
     // On its lattice it is (1, 6, 1)/8 of its coefficients along each axis: what is found is solved for them.
@@ -126,10 +126,10 @@ fn scroll_error() -> f64 {
 }
 
 pub(super) fn figures() -> Vec<Figure> {
-    let lattice = Field::new(Kind::Perlin, 6, 0.7, 8);
+    let lattice = Field::new(NoiseKind::Perlin, 6, 0.7, 8);
     let cells = (-500..500).map(|i| [f64::from(i), f64::from(3 * i), f64::from(1_000_000 - i)]);
     let on_lattice = cells.flat_map(|cell| lattice.at(cell)).fold(0.0_f32, |most, x| most.max(x.abs()));
-    let gradient = [Kind::Perlin, Kind::Billow].map(statistics);
+    let gradient = [NoiseKind::Perlin, NoiseKind::Billow].map(statistics);
     let means = gradient.iter().flat_map(|(mean, _, _)| mean).fold(0.0_f64, |most, x| most.max(x.abs()));
     let rms: Vec<f64> = gradient.iter().flat_map(|(_, rms, _)| *rms).collect();
     let alike = gradient.iter().map(|(_, _, most)| *most).fold(0.0, f64::max);
@@ -140,7 +140,7 @@ pub(super) fn figures() -> Vec<Figure> {
         Figure::error("their correlation between components, and 2 cells apart and more", alike, 5e-2, ""),
         Figure::within(
             "gradient noise is C²: order at which steps of its second derivative across cells vanish",
-            &[smoothness(Kind::Perlin)],
+            &[smoothness(NoiseKind::Perlin)],
             [0.9, 1.1],
         ),
         Figure::error("it scrolls downwind: curves 2 m on, a second later at 2 m/s", scroll_error(), 1e-5, " L"),

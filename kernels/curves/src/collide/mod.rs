@@ -27,12 +27,12 @@ use numerics::vector::{DVec3, Vec3};
 use rayon::prelude::*;
 use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};
-pub use skin::{Skin, normals};
+pub use skin::{SkinSurface, normals};
 use std::ops::Range;
 
 /// How a segment's turn is stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum ContactMethod {
     /// At first contact, in closed form.
     Exact,
     /// The paper's: at the last of so many equal steps that crosses nothing.
@@ -45,9 +45,9 @@ pub struct Collide<'a> {
     /// The obstacles' triangles, a tree an obstacle.
     pub obstacles: &'a [&'a TriangleTree],
     /// The surface that the curves grow on.
-    pub skin: Option<Skin<'a>>,
+    pub skin: Option<SkinSurface<'a>>,
     /// How a turn is stopped.
-    pub method: Method,
+    pub method: ContactMethod,
     /// How far directions that lie in the skin are led out of it before a segment turns, 0..1; see [`coherence`].
     pub coherence: f64,
     /// Arc kept from what is met, metres.

@@ -3,7 +3,7 @@
 use super::crossing::{Crossing, corners, first_crossing};
 use super::sector::{Blocked, Sector};
 use super::triangle_filter::Wedge;
-use super::{Method, perpendicular};
+use super::{ContactMethod, perpendicular};
 use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
@@ -53,7 +53,7 @@ impl Segment {
     #[inline(always)]
     pub(super) fn turn<'t>(
         &self,
-        method: Method,
+        method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
@@ -73,7 +73,7 @@ impl Segment {
     #[inline(always)]
     pub(super) fn turn_wary<'t>(
         &self,
-        method: Method,
+        method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
@@ -98,7 +98,7 @@ impl Segment {
     }
 
     #[inline(always)]
-    fn sweep<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
+    fn sweep<'t>(&self, method: ContactMethod, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
         let sector = self.sector(self.from, self.to);
         let (low, high) = sector.bounds(&self.to);
         gather(obstacles, low, high, nearby);
@@ -106,8 +106,8 @@ impl Segment {
             return Sweep::Free(Turned { direction: self.to, met: false, clear: true });
         }
         let stop = match method {
-            Method::Exact => first_stop(&sector, &self.to, nearby),
-            Method::Steps(steps) => self.last_free_step(&sector, steps, nearby),
+            ContactMethod::Exact => first_stop(&sector, &self.to, nearby),
+            ContactMethod::Steps(steps) => self.last_free_step(&sector, steps, nearby),
         };
         match stop {
             Stop::Stuck => Sweep::Stuck,
@@ -151,7 +151,12 @@ impl Segment {
     /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
     /// up to half a turn.
     #[inline(always)]
-    fn way_out<'t>(&self, method: Method, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Option<DVec3> {
+    fn way_out<'t>(
+        &self,
+        method: ContactMethod,
+        obstacles: &'t [&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Option<DVec3> {
         let crossed = self.crosses(&self.from, nearby);
         // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
@@ -159,8 +164,8 @@ impl Segment {
         let (low, high) = sector.bounds(&-sector.u);
         gather(obstacles, low, high, nearby);
         let angle = match method {
-            Method::Exact => first_gap(&sector, nearby),
-            Method::Steps(steps) => {
+            ContactMethod::Exact => first_gap(&sector, nearby),
+            ContactMethod::Steps(steps) => {
                 let at = |step: u32| PI * f64::from(step) / f64::from(steps);
                 (1..=steps).map(at).find(|angle| self.crosses(&sector.direction(*angle), nearby).is_none())
             }

@@ -9,7 +9,7 @@ const LIFTS: usize = 4;
 
 /// A skin: its tree, triangles and the normals of its points.
 #[derive(Clone, Copy)]
-pub struct Skin<'a> {
+pub struct SkinSurface<'a> {
     /// Over `triangles`.
     pub tree: &'a TriangleTree,
     /// Points of each triangle, counter-clockwise from outside.
@@ -36,7 +36,7 @@ pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     sums.iter().map(|sum| sum.try_normalize(0.0).map_or([0.0; 3], |n| [n.x as f32, n.y as f32, n.z as f32])).collect()
 }
 
-impl Skin<'_> {
+impl SkinSurface<'_> {
     /// The outward unit normal at a point of the surface; `None` where it has none.
     pub(super) fn normal(&self, at: &Closest) -> Option<DVec3> {
         let corners = self.triangles[at.triangle as usize];

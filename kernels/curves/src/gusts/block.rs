@@ -1,35 +1,35 @@
-//! A block of points, sixteen side by side: the influence of each region near by, summed in order.
+//! A block of points, sixteen at a time: the influences of all nearby regions, summed in order.
 
 use super::control::Local;
 use super::cull::{Bounds, Boxes};
-use super::{BLOCK, LUMPS, Scene, Sphere};
+use super::{BLOCK, LUMPS, Prepared, Sphere};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::noise;
 use numerics::simd::kernel;
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
-/// The least share of a radius that noise leaves: a boundary at the centre itself has no inside.
+/// The least share of a radius that noise leaves: a boundary at the centre would enclose nothing.
 const LEAST_LEFT: f32 = 1e-3;
 
-/// Where on the lattice of noise a sphere's centre lies: no lattice point is at its axes' ends.
+/// Position of a sphere's centre on the noise lattice: no lattice point coincides with the ends of its axes.
 const OFF_LATTICE: Vec3 = [0.37, 0.61, 0.13];
 
-/// Sixteens of a block.
+/// Groups of sixteen points in a block.
 const ROWS: usize = BLOCK / LANES;
 
 kernel! {
-    /// Writes what up to [`BLOCK`] points within `bounds` get of the regions of `near` to `out`; gives
-    /// how many of them something reaches.
-    pub(super) fn block_values(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
+    /// Writes the values of up to [`BLOCK`] points within `bounds`, which the regions of `near` may reach, to `out`;
+    /// returns how many points some influence reaches.
+    pub(super) fn block_values(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
 }
 
 #[inline(always)]
-fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize {
-    let spheres = scene.gusts.spheres;
+fn body(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize {
+    let spheres = prepared.gusts.spheres;
     let rows = points.len().div_ceil(LANES);
     let origin = points[0];
     let mut at = [[F32x16::splat(0.0); 3]; ROWS];
-    let mut sums = [Sum { value: F32x16::splat(scene.gusts.base), reached: [0; LANES] }; ROWS];
+    let mut sums = [Sum { value: F32x16::splat(prepared.gusts.base), reached: [0; LANES] }; ROWS];
     let mut loaded = false;
     for first in (0..near.len()).step_by(LANES) {
         let met = near.meet(first, bounds);
@@ -47,21 +47,20 @@ fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: 
                     let ball = Ball::of(sphere, origin);
                     for row in 0..rows {
                         if let Some(share) = ball.share(&at[row]) {
-                            sums[row].add(&share, &scene.falloff.eval(&share), ball.strength);
+                            sums[row].add(&share, &prepared.falloff.eval(&share), ball.strength);
                         }
                     }
                 }
                 None => {
-                    let place = region - spheres.len();
-                    let control = &scene.gusts.controls[place];
-                    let local = control.local(origin);
+                    let index = region - spheres.len();
+                    let local = prepared.gusts.controls[index].local(origin);
                     for row in 0..rows {
-                        add_control(&mut sums[row], &local, scene, place, &at[row]);
+                        add_control(&mut sums[row], &local, prepared, index, &at[row]);
                     }
                 }
             }
         }
-        if scene.only_adds && sums[..rows].iter().all(Sum::is_full) {
+        if prepared.only_adds && sums[..rows].iter().all(Sum::is_full) {
             break;
         }
     }
@@ -75,7 +74,7 @@ fn body(scene: &Scene<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: 
     reached
 }
 
-/// Differences of the points from `origin`; the last one fills its row.
+/// The points relative to `origin`; the last one is repeated to fill its row.
 #[inline(always)]
 fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
     for (points, at) in points.chunks(LANES).zip(at) {
@@ -86,23 +85,23 @@ fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
 }
 
 #[inline(always)]
-fn add_control(sum: &mut Sum, local: &Local, scene: &Scene<'_>, place: usize, at: &Lanes<3>) {
+fn add_control(sum: &mut Sum, local: &Local, prepared: &Prepared<'_>, index: usize, at: &Lanes<3>) {
     let share = local.share(at);
-    sum.add(&share, &scene.ramps[place].eval(&share), scene.gusts.controls[place].strength());
+    sum.add(&share, &prepared.ramps[index].eval(&share), prepared.gusts.controls[index].strength());
 }
 
-/// Within 0..1; 0 where opposite infinities met.
+/// Clamped to 0..1; NaN, the sum of opposite infinities, gives 0.
 #[inline(always)]
 fn clamped(value: f32) -> f32 {
     let value = if value > 0.0 { value } else { 0.0 };
     if value < 1.0 { value } else { 1.0 }
 }
 
-/// What sixteen points have so far.
+/// Sums of sixteen points so far.
 #[derive(Clone, Copy)]
 struct Sum {
     value: F32x16,
-    /// 1 where something was added.
+    /// 1 where some influence was added.
     reached: [u32; LANES],
 }
 
@@ -118,7 +117,7 @@ impl Sum {
         }
     }
 
-    /// Whether all have 1 or more.
+    /// Whether all are 1 or more.
     #[inline(always)]
     fn is_full(&self) -> bool {
         let mut short = 0;
@@ -129,7 +128,7 @@ impl Sum {
     }
 }
 
-/// A sphere as seen from a point near by.
+/// A sphere relative to a nearby point.
 struct Ball {
     centre: Vec3,
     /// One over the radius.
@@ -151,7 +150,7 @@ impl Ball {
         }
     }
 
-    /// How far points are from the centre (0) to the boundary (1); `None` where all are outside.
+    /// Distances of points from the centre (0) to the boundary (1); `None` where all are outside.
     #[inline(always)]
     fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
         let mut away = [F32x16::splat(0.0); 3];
@@ -176,15 +175,15 @@ impl Ball {
         Some(share)
     }
 
-    /// Moves the boundary inwards by noise: from a share of the radius to one of what noise leaves of
-    /// it in that direction. The noise depends on the direction alone, so each ray from the centre
-    /// falls off once, and the centre stays the centre.
+    /// Moves the boundary inwards by noise: rescales shares of the radius to shares of what noise leaves of it in that
+    /// direction. The noise depends on the direction only, so the falloff along each ray from the centre stays
+    /// monotonic.
     #[inline(always)]
     fn dent(&self, away: &Lanes<3>, share: &mut F32x16) {
         let mut cells = *away;
         for lane in 0..LANES {
             let length = share.0[lane];
-            // Outside any direction will do, and far outside there is none.
+            // Points outside are not used; far outside their direction would overflow.
             let inside = length > 0.0 && length < 1.0;
             let inverse = LUMPS / if inside { length } else { 1.0 };
             for axis in 0..3 {

@@ -14,7 +14,7 @@ use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// What a control looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum ControlShape {
     /// A ball.
     Sphere,
     /// A cube within a cube.
@@ -28,7 +28,7 @@ const FLAT: f64 = 1e-6;
 /// A region with its own space and its own ramp.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
-    shape: Shape,
+    shape: ControlShape,
     centre: DVec3,
     axes: [DVec3; 3],
     outer: f64,
@@ -41,7 +41,14 @@ pub struct Control {
 impl Control {
     /// A control at `centre` whose own axes end at `centre + axes[k]`. `outer` is how many times the
     /// inner cube the outer one is (less than 1 counts as 1); `strength` may be negative.
-    pub fn new(shape: Shape, centre: [f64; 3], axes: [[f64; 3]; 3], outer: f64, ramp: Ramp, strength: f32) -> Self {
+    pub fn new(
+        shape: ControlShape,
+        centre: [f64; 3],
+        axes: [[f64; 3]; 3],
+        outer: f64,
+        ramp: Ramp,
+        strength: f32,
+    ) -> Self {
         let outer = if outer > 1.0 { outer } else { 1.0 };
         let axes = axes.map(DVec3::from);
         Self { shape, centre: centre.into(), axes, outer, ramp, strength, inverse: inverse(axes) }
@@ -64,8 +71,8 @@ impl Control {
         self.inverse.filter(|_| self.strength != 0.0)?;
         let ends = |axis: usize| DVec3::from(self.axes.map(|end| end[axis]));
         let extent = |axis: usize| match self.shape {
-            Shape::Sphere => ends(axis).norm(),
-            Shape::Cubes => self.outer * ends(axis).abs().sum(),
+            ControlShape::Sphere => ends(axis).norm(),
+            ControlShape::Cubes => self.outer * ends(axis).abs().sum(),
         };
         Some(DVec3::new(extent(0), extent(1), extent(2)))
     }
@@ -90,7 +97,7 @@ impl Control {
 
 /// A control relative to a point.
 pub(super) struct Local {
-    shape: Shape,
+    shape: ControlShape,
     centre: Vec3,
     rows: [Vec3; 3],
     /// Of the share, a unit beyond the inner cube; infinite where the cubes are one.
@@ -113,13 +120,13 @@ impl Local {
         }
         let mut share = F32x16::splat(0.0);
         match self.shape {
-            Shape::Sphere => {
+            ControlShape::Sphere => {
                 for lane in 0..LANES {
                     let [x, y, z] = [own[0].0[lane], own[1].0[lane], own[2].0[lane]];
                     share.0[lane] = (x * x + y * y + z * z).sqrt();
                 }
             }
-            Shape::Cubes => {
+            ControlShape::Cubes => {
                 for lane in 0..LANES {
                     let [x, y, z] = [own[0].0[lane].abs(), own[1].0[lane].abs(), own[2].0[lane].abs()];
                     let most = if x > y { x } else { y };
@@ -158,11 +165,11 @@ const EDGE: usize = 6;
 
 /// Points that show a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or
 /// the edges of both cubes. At least `least` points.
-pub fn outline(shape: Shape, outer: f64, least: usize) -> Vec<[f32; 3]> {
+pub fn outline(shape: ControlShape, outer: f64, least: usize) -> Vec<[f32; 3]> {
     let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     match shape {
-        Shape::Sphere => circles(CIRCLE.max(least.div_ceil(3)), &mut points),
-        Shape::Cubes => {
+        ControlShape::Sphere => circles(CIRCLE.max(least.div_ceil(3)), &mut points),
+        ControlShape::Cubes => {
             let edge = EDGE.max(least.div_ceil(24));
             edges(1.0, edge, &mut points);
             edges(outer, edge, &mut points);

@@ -1,6 +1,6 @@
-//! Which regions a stretch of points may meet: bounds against bounds, sixteen regions at a time.
+//! Culling: which regions may reach a run of points. Boxes against boxes, sixteen regions at a time.
 //!
-//! Never loses one that reaches a point: boxes of regions are rounded outwards.
+//! Conservative: boxes of regions are rounded outwards.
 
 use numerics::lanes::LANES;
 use numerics::simd::kernel;
@@ -9,10 +9,10 @@ use numerics::vector::{DVec3, Vec3};
 /// A low and a high corner.
 pub(super) type Bounds = [Vec3; 2];
 
-/// Of nothing: meets nothing, and adds nothing to others.
+/// Bounds of no points: they meet nothing, and joining them changes nothing.
 pub(super) const NOWHERE: Bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
 
-/// Floats of sixteen points.
+/// Coordinates of sixteen points.
 const FLOATS: usize = 3 * LANES;
 
 kernel! {
@@ -38,12 +38,12 @@ fn bounds_body(points: &[Vec3]) -> Bounds {
     low.iter().zip(high).fold(NOWHERE, |bounds, (low, high)| join(bounds, [*low, *high]))
 }
 
-/// Around both.
+/// The bounds around both.
 pub(super) fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
     [[0, 1, 2].map(|k| low[k].min(other_low[k])), [0, 1, 2].map(|k| high[k].max(other_high[k]))]
 }
 
-/// Bounds of regions, an axis and an end an array, and which region each is of.
+/// Boxes of regions, an array for each axis and end, and the index of each box's region.
 #[derive(Default)]
 pub(super) struct Boxes {
     low: [Vec<f32>; 3],
@@ -66,12 +66,12 @@ impl Boxes {
         self.regions.len()
     }
 
-    /// The region of the box at `place`.
-    pub(super) fn region(&self, place: usize) -> usize {
-        self.regions[place] as usize
+    /// The region of the box at `index`.
+    pub(super) fn region(&self, index: usize) -> usize {
+        self.regions[index] as usize
     }
 
-    /// Which of the sixteen boxes from `first` on `bounds` meets: 1, else 0.
+    /// 1 for each of the sixteen boxes from `first` on that `bounds` meets, else 0.
     #[inline(always)]
     pub(super) fn meet(&self, first: usize, [low, high]: &Bounds) -> [u32; LANES] {
         let mut met = [0; LANES];
@@ -79,7 +79,7 @@ impl Boxes {
         met[..here].fill(1);
         for axis in 0..3 {
             let (from, to) = (&self.low[axis][first..first + here], &self.high[axis][first..first + here]);
-            // Whole sixteens become vectors.
+            // Full groups of sixteen are vectorised.
             match (<&[f32; LANES]>::try_from(from), <&[f32; LANES]>::try_from(to)) {
                 (Ok(from), Ok(to)) => {
                     for lane in 0..LANES {
@@ -98,7 +98,7 @@ impl Boxes {
 }
 
 kernel! {
-    /// Those of `all` that `bounds` meets, in order.
+    /// The boxes of `all` that `bounds` meets, in order.
     pub(super) fn meeting(all: &Boxes, bounds: &Bounds) -> Boxes = meeting_body;
 }
 
@@ -110,11 +110,11 @@ fn meeting_body(all: &Boxes, bounds: &Bounds) -> Boxes {
         if met == [0; LANES] {
             continue;
         }
-        for place in (0..LANES).filter(|lane| met[*lane] != 0).map(|lane| first + lane) {
-            near.regions.push(all.regions[place]);
+        for index in (0..LANES).filter(|lane| met[*lane] != 0).map(|lane| first + lane) {
+            near.regions.push(all.regions[index]);
             for axis in 0..3 {
-                near.low[axis].push(all.low[axis][place]);
-                near.high[axis].push(all.high[axis][place]);
+                near.low[axis].push(all.low[axis][index]);
+                near.high[axis].push(all.high[axis][index]);
             }
         }
     }

@@ -1,38 +1,37 @@
-//! Which gusts are alive at a moment, and what was drawn for each: a pure function of a seed, a
-//! gust's number, its round and the moment.
+//! Which gusts are alive at a moment, and their random parameters: a pure function of a seed, a gust's index, its round
+//! and the moment.
 //!
-//! A gust's start is drawn once; where it comes again every so many frames, all else is drawn anew
-//! each round. Rounds reach back and forth without end, and those alive are found by a division, so
-//! frame 1,000,000 costs what frame 1 does. Limit: [`MOST_LIVING`] at a moment; beyond it a gust's
-//! newest rounds are kept and the others counted.
+//! A gust's start is drawn once; where it repeats every so many frames, all else is redrawn each round. Rounds extend
+//! without end in both directions of time, and those alive are found by a division, so frame 1,000,000 costs as much as
+//! frame 1. Limit: [`MOST_LIVING`] gusts at a moment; beyond it a gust's newest rounds are kept and the others counted.
 
 use numerics::random::Key;
 
-/// What is drawn from; each range from its lower to its upper end.
+/// Ranges that gusts are drawn from; each from its lower to its upper end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
-    /// Another seed, other gusts.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// How many gusts.
+    /// Number of gusts.
     pub gusts: u32,
     /// Metres.
     pub radius: [f32; 2],
-    /// Share of the radius that noise may take away, held to 0..1.
+    /// Share of the radius that noise may take away, clamped to 0..1.
     pub noise: [f32; 2],
     /// First frame of a gust's first round.
     pub start: [f64; 2],
     /// Frames at full strength.
     pub life: [f64; 2],
-    /// Frames from full strength to none.
+    /// Frames of decay from full strength to 0.
     pub decay: [f64; 2],
-    /// Frames from a round to the next; below [`SHORTEST_ROUND`] there is one round.
+    /// Frames from a round to the next; below [`SHORTEST_ROUND`] there is one round only.
     pub repeat: f64,
 }
 
 /// The shortest time from a round to the next, in frames: the finest step that frames can take.
 const SHORTEST_ROUND: f64 = 1.0 / 5040.0;
 
-/// Most gusts alive at a moment, so that no setting fills the memory.
+/// Most gusts alive at a moment: bounds the memory for any settings.
 pub const MOST_LIVING: u64 = 1 << 16;
 
 /// A gust alive at a moment.
@@ -46,21 +45,21 @@ pub struct Gust {
     pub radius: f32,
     /// Share of the radius that noise may take away, 0..1.
     pub noise: f32,
-    /// How far up the range of speeds it is, 0..1.
+    /// Where in the range of speeds it is, 0..1.
     pub speed: f64,
-    /// Where on the plane it starts: −1..1 each way.
-    pub place: [f64; 2],
-    /// Which noise it has.
+    /// Where on the launch plane it starts: −1..1 along each side.
+    pub position: [f64; 2],
+    /// Seed of its noise.
     pub salt: u32,
 }
 
-/// All gusts alive at a moment, by number, then by round.
+/// All gusts alive at a moment, by index, then by round.
 #[must_use]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Living {
     /// The gusts.
     pub gusts: Vec<Gust>,
-    /// Rounds that may be alive and were left out, beyond [`MOST_LIVING`].
+    /// Rounds beyond [`MOST_LIVING`] that may be alive but were left out.
     pub dropped: u64,
 }
 
@@ -99,18 +98,18 @@ impl Draw {
         living
     }
 
-    /// The first and the last round that may be alive at `frame`; none where the first is later.
+    /// The first and the last round that may be alive at `frame`; none are where the first is after the last.
     fn rounds(&self, start: f64, frame: f64) -> [i64; 2] {
         if self.repeat < SHORTEST_ROUND {
             return [0, 0];
         }
         let longest = self.life[1] + self.decay[1];
         let since = |age: f64| (frame - start - age) / self.repeat;
-        // One more each way: which are alive is asked of each.
+        // One more on each side; each round then checks whether it is alive.
         [since(longest).floor() as i64, since(0.0).ceil() as i64]
     }
 
-    /// One round, where it is alive.
+    /// One round; `None` where it is not alive.
     fn gust(&self, key: Key, start: f64, frame: f64) -> Option<Gust> {
         let of = |draw: Draws| key.of(draw as u64);
         let strength =
@@ -125,7 +124,7 @@ impl Draw {
             radius: of(Draws::Radius).between(self.radius),
             noise: of(Draws::Noise).between(self.noise).clamp(0.0, 1.0),
             speed: of(Draws::Speed).f64(),
-            place: [side(Draws::Across), side(Draws::Up)],
+            position: [side(Draws::Across), side(Draws::Up)],
             salt: of(Draws::Salt).u32(),
         })
     }

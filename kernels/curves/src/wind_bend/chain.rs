@@ -1,7 +1,7 @@
 //! What has turned so far down a curve: one quaternion and one offset.
 
 use super::Bend;
-use super::group::Unit;
+use super::curve_group::Unit;
 use super::share::gather;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::trig;

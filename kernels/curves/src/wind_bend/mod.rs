@@ -12,12 +12,12 @@
 //! has no axis of its own; within 1e-6 rad it is taken from the curve. Positions in metres, radians.
 
 mod chain;
-mod group;
-mod heading;
+mod curve_group;
 mod share;
 mod tally;
+mod wind_direction;
 
-use group::{Group, Scratch, bend_group};
+use curve_group::{CurveGroup, Scratch, bend_group};
 use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::noise::Field;
@@ -27,7 +27,7 @@ use rayon::prelude::*;
 
 /// Which share of the angle to the wind a pivot turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mode {
+pub enum BendMode {
     /// The paper's: g at every pivot. Segment k of a straight curve is left with θ₀(1−g)ᵏ⁺¹, k from
     /// 0, so more CVs bend more.
     Paper,
@@ -51,7 +51,7 @@ pub struct Bend<'a> {
     /// Scales `rotate` along u, the rest arc length ÷ curve length.
     pub ramp: &'a Ramp,
     /// How g is applied.
-    pub mode: Mode,
+    pub mode: BendMode,
     /// Share of each segment's whole turn that is kept, 0..1; 0 gives the incoming bits.
     pub blend: Masked<'a, f32>,
     /// What varies the wind's direction.
@@ -130,7 +130,7 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
             for first in (task.first..task.end).step_by(LANES) {
                 let end = task.end.min(first + LANES);
                 let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
-                let group = Group { first, starts: &starts[first..=end], points };
+                let group = CurveGroup { first, starts: &starts[first..=end], points };
                 reached = reached.max(bend_group(path, bend, &group, &mut scratch, mine));
                 out = rest;
             }

@@ -1,6 +1,6 @@
 //! Which share of its angle to the wind each pivot turns.
 
-use super::{Bend, Mode};
+use super::{Bend, BendMode};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
 use numerics::vector;
@@ -43,7 +43,7 @@ impl<'a> Share<'a> {
             // An infinity times a 0 is no number: nothing was asked for.
             share.0[lane] = if product.is_nan() { 0.0 } else { product };
         }
-        if let Mode::ResolutionFree { reference_segments } = self.bend.mode {
+        if let BendMode::ResolutionFree { reference_segments } = self.bend.mode {
             self.free_of_resolution(&mut share, arcs, segment, reference_segments);
         }
         for lane in 0..LANES {

@@ -8,7 +8,7 @@ mod round;
 mod sharp;
 mod steps;
 
-use curves::collide::{Collide, Method, collide};
+use curves::collide::{Collide, ContactMethod, collide};
 use numerics::random::Key;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, to_f32, to_f64};
@@ -77,7 +77,7 @@ struct Case {
 const GAP: f64 = 1e-6;
 
 /// Thin curves without a skin.
-fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: Method, gap: f64) -> Collide<'a> {
+fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: ContactMethod, gap: f64) -> Collide<'a> {
     Collide {
         obstacles,
         skin: None,
@@ -98,8 +98,12 @@ fn worst(case: &Case) -> [f64; 2] {
     let obstacles = [&tree];
     let starts: Vec<u32> = (0..=case.turns.len() as u32).map(|turn| 2 * turn).collect();
     let ends = |of: fn(&Turn) -> [Point; 2]| case.turns.iter().flat_map(|(turn, _)| of(turn)).collect::<Vec<_>>();
-    let out =
-        collide(&starts, &ends(|turn| turn.rest), &ends(|turn| turn.goal), &plain(&obstacles, Method::Exact, GAP));
+    let out = collide(
+        &starts,
+        &ends(|turn| turn.rest),
+        &ends(|turn| turn.goal),
+        &plain(&obstacles, ContactMethod::Exact, GAP),
+    );
     let (mut error, mut past, mut met) = (0.0_f64, 0.0_f64, 0);
     for ((turn, first), written) in case.turns.iter().zip(out.points.chunks(2)) {
         let angle = turn.angle(to_f64(written[1]) - turn.pivot);

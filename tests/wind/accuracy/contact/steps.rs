@@ -17,13 +17,13 @@ pub(super) fn slope() -> f64 {
     };
     let (rest, goal): (Vec<_>, Vec<_>) = (0..4000).map(hair).unzip();
     let starts: Vec<u32> = (0..=4000).map(|k| 2 * k).collect();
-    let end = |method: Method| {
+    let end = |method: ContactMethod| {
         collide(&starts, rest.as_flattened(), goal.as_flattened(), &plain(&obstacles, method, 1e-9)).points
     };
-    let exact = end(Method::Exact);
+    let exact = end(ContactMethod::Exact);
     let error = |steps: u32| {
         let apart = |(a, b): (&Point, &Point)| (to_f64(*a) - to_f64(*b)).norm();
-        end(Method::Steps(steps)).iter().zip(&exact).map(apart).sum::<f64>()
+        end(ContactMethod::Steps(steps)).iter().zip(&exact).map(apart).sum::<f64>()
     };
     // The line through (log steps, log error) with the least squares.
     let rows: Vec<[f64; 2]> = (1..=8).map(|k| [f64::from(k), libm::log2(error(1 << k))]).collect();

@@ -10,7 +10,7 @@ fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
     Collide {
         obstacles,
         skin: None,
-        method: Method::Exact,
+        method: ContactMethod::Exact,
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
@@ -157,11 +157,11 @@ fn nothing_passes_a_blade_that_steps_miss() {
     let obstacles = [&tree];
     let (rest, goal) = ([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [0.0, 1.0, 0.0]]);
     let with = |method| collide(&[0, 2], &rest, &goal, &Collide { method, ..on(&obstacles) });
-    let exact = with(Method::Exact);
+    let exact = with(ContactMethod::Exact);
     assert_eq!(exact.contacts, 1);
     let angle = libm::atan2(f64::from(exact.points[1][1]), f64::from(exact.points[1][0]));
     assert!(angle < middle && angle > middle - 0.05, "{angle}");
-    assert_eq!(with(Method::Steps(10)).points[1], goal[1]);
+    assert_eq!(with(ContactMethod::Steps(10)).points[1], goal[1]);
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn coherent_fur_crosses_nothing_either() {
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
-    let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
+    let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
     for (k, wind) in [DVec3::x(), -DVec3::y(), unit(Key::new(8))].iter().enumerate() {
         for coherence in [0.3, 1.0] {
             let (starts, rest, goal) = fur(1000, 6, 0.5, *wind);
@@ -210,7 +210,7 @@ fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
     let (starts, rest, goal) = fur(2000, 2, 0.3, DVec3::x());
     let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9, ..on(&obstacles) }).points;
     let error = |steps: u32| {
-        let how = Collide { method: Method::Steps(steps), gap: 1e-9, ..on(&obstacles) };
+        let how = Collide { method: ContactMethod::Steps(steps), gap: 1e-9, ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &how).points;
         out.iter().zip(&exact).map(|(a, b)| f64::from(vector::length(vector::sub(*a, *b)))).sum::<f64>()
     };
@@ -225,7 +225,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
-    let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
+    let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(200, 5, 0.3, DVec3::x());
     let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&obstacles) };
     let out = collide(&starts, &rest, &goal, &lifted);
@@ -315,7 +315,7 @@ fn any_threads_and_any_path_give_the_same_bits() {
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
-    let skin = Skin { tree: &tree, triangles: &mesh.1, normals: &normals };
+    let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(500, 5, 0.4, DVec3::x());
     let how = Collide { skin: Some(skin), offset_scale: Some(0.3), width: Masked::uniform(1e-3), ..on(&obstacles) };
     let expected = collide(&starts, &rest, &goal, &how);

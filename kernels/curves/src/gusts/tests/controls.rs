@@ -11,20 +11,22 @@ fn linear(keys: &[[f32; 2]]) -> Ramp {
 /// Reads off the share itself: 1 − share inside, 0 outside.
 fn felt(control: Control, points: &[[f32; 3]]) -> Vec<f32> {
     let falloff = one();
-    feel(points, &Gusts { base: 0.0, falloff: &falloff, spheres: &[], controls: &[control], incoming: None }).values
+    evaluate(points, &Gusts { base: 0.0, falloff: &falloff, spheres: &[], controls: &[control], incoming: None }).values
 }
 
 #[test]
 fn a_sphere_runs_from_its_centre_to_its_boundary() {
     let axes = UNIT.map(|axis| axis.map(|x| 2.0 * x));
-    let control = Control::new(Shape::Sphere, [1.0, 0.0, 0.0], axes, 9.0, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
+    let control =
+        Control::new(ControlShape::Sphere, [1.0, 0.0, 0.0], axes, 9.0, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
     let points = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, -1.5, 0.0], [1.0, 0.0, 2.0], [1.0, 0.0, 2.5]];
     assert_eq!(felt(control, &points), [1.0, 0.5, 0.25, 0.0, 0.0]);
 }
 
 #[test]
 fn cubes_run_to_a_half_at_the_inner_and_to_1_at_the_outer_boundary() {
-    let control = |outer| Control::new(Shape::Cubes, [0.0; 3], UNIT, outer, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
+    let control =
+        |outer| Control::new(ControlShape::Cubes, [0.0; 3], UNIT, outer, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
     let points = [[0.0; 3], [0.5, 0.1, -0.2], [0.3, -1.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 3.1, 0.0]];
     // Outer 3: m = 0, ½, 1, 2, 3, 3.1; shares 0, ¼, ½, ¾, 1, beyond.
     assert_eq!(felt(control(3.0), &points), [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]);
@@ -46,17 +48,17 @@ fn shares_are_measured_in_the_controls_own_space() {
     });
     let close = |a: Vec<f32>, b: [f32; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
     let corner = 1.0 - 0.375_f32.sqrt();
-    assert!(close(felt(control(Shape::Sphere), &points), [0.5, 0.5, 0.5, corner]));
-    assert!(close(felt(control(Shape::Cubes), &points), [0.75, 0.75, 0.75, 0.75]));
+    assert!(close(felt(control(ControlShape::Sphere), &points), [0.5, 0.5, 0.5, corner]));
+    assert!(close(felt(control(ControlShape::Cubes), &points), [0.75, 0.75, 0.75, 0.75]));
 }
 
 #[test]
 fn strength_may_take_away_and_the_order_of_sums_is_that_of_the_list() {
     let falloff = one();
-    let control = |strength| Control::new(Shape::Sphere, [0.0; 3], UNIT, 2.0, one(), strength);
+    let control = |strength| Control::new(ControlShape::Sphere, [0.0; 3], UNIT, 2.0, one(), strength);
     let with = |controls: &[Control]| {
         let gusts = Gusts { base: 0.75, falloff: &falloff, spheres: &[], controls, incoming: None };
-        feel(&[[0.5, 0.0, 0.0]], &gusts).values[0]
+        evaluate(&[[0.5, 0.0, 0.0]], &gusts).values[0]
     };
     assert_eq!(with(&[control(-0.5)]), 0.25);
     assert_eq!(with(&[control(-2.0)]), 0.0);
@@ -70,21 +72,21 @@ fn a_control_without_volume_touches_nothing() {
     let flat = [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]], [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.3, 0.0]]];
     let broken = [[[f64::NAN, 0.0, 0.0], UNIT[1], UNIT[2]], [[f64::INFINITY, 0.0, 0.0], UNIT[1], UNIT[2]]];
     for axes in flat.into_iter().chain(broken).chain([[[0.0; 3]; 3]]) {
-        for shape in [Shape::Sphere, Shape::Cubes] {
+        for shape in [ControlShape::Sphere, ControlShape::Cubes] {
             let control = Control::new(shape, [0.0; 3], axes, 2.0, one(), 1.0);
             assert_eq!(felt(control, &[[0.0; 3], [0.1, 0.1, 0.0]]), [0.0, 0.0], "{axes:?}");
         }
     }
     // Thin is not flat.
     let thin = [UNIT[0], UNIT[1], [0.0, 0.0, 1e-9]];
-    assert_eq!(felt(Control::new(Shape::Sphere, [0.0; 3], thin, 2.0, one(), 1.0), &[[0.0; 3]]), [1.0]);
+    assert_eq!(felt(Control::new(ControlShape::Sphere, [0.0; 3], thin, 2.0, one(), 1.0), &[[0.0; 3]]), [1.0]);
 }
 
 #[test]
 fn culling_never_loses_a_point() {
     let points = hairs(50);
     let axes = [[0.4, 0.3, 0.0], [-0.3, 0.4, 0.1], [0.05, 0.0, 0.6]];
-    for shape in [Shape::Sphere, Shape::Cubes] {
+    for shape in [ControlShape::Sphere, ControlShape::Cubes] {
         let control = Control::new(shape, [1.1, 0.0, 0.9], axes, 1.7, one(), 1.0);
         let together = felt(control.clone(), &points);
         let alone: Vec<f32> = points.iter().flat_map(|p| felt(control.clone(), &[*p])).collect();
@@ -95,18 +97,18 @@ fn culling_never_loses_a_point() {
 
 #[test]
 fn an_outline_begins_with_its_centre_and_axes_and_lies_on_its_boundaries() {
-    for (shape, outer) in [(Shape::Sphere, 2.0), (Shape::Cubes, 2.0), (Shape::Cubes, 1.0)] {
+    for (shape, outer) in [(ControlShape::Sphere, 2.0), (ControlShape::Cubes, 2.0), (ControlShape::Cubes, 1.0)] {
         for least in [0, 1000] {
             let points = outline(shape, outer, least);
             assert_eq!(points[..AXIS_ROWS], [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
             assert!(points.len() >= least);
             for p in &points[AXIS_ROWS..] {
                 let size = match shape {
-                    Shape::Sphere => p.iter().map(|x| x * x).sum::<f32>().sqrt(),
-                    Shape::Cubes => p.iter().fold(0.0_f32, |most, x| most.max(x.abs())),
+                    ControlShape::Sphere => p.iter().map(|x| x * x).sum::<f32>().sqrt(),
+                    ControlShape::Cubes => p.iter().fold(0.0_f32, |most, x| most.max(x.abs())),
                 };
                 assert!(
-                    [1.0, if shape == Shape::Cubes { outer as f32 } else { 1.0 }]
+                    [1.0, if shape == ControlShape::Cubes { outer as f32 } else { 1.0 }]
                         .iter()
                         .any(|b| (size - b).abs() < 1e-6)
                 );

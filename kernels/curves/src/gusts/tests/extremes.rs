@@ -5,19 +5,19 @@ use super::*;
 #[test]
 fn no_points_and_no_gusts_are_fine() {
     let falloff = smooth();
-    assert_eq!(feel(&[], &only(&falloff, &[sphere([0.0; 3], 1.0)])), Felt { values: vec![], reached: 0 });
-    let felt = feel(&hairs(3), &Gusts { base: 0.3, ..only(&falloff, &[]) });
-    assert_eq!(felt, Felt { values: vec![0.3; 45], reached: 0 });
+    assert_eq!(evaluate(&[], &only(&falloff, &[sphere([0.0; 3], 1.0)])), Influence { values: vec![], reached: 0 });
+    let felt = evaluate(&hairs(3), &Gusts { base: 0.3, ..only(&falloff, &[]) });
+    assert_eq!(felt, Influence { values: vec![0.3; 45], reached: 0 });
 }
 
 #[test]
 fn a_radius_of_0_and_what_is_hardly_more_touch_nothing() {
     let falloff = one();
     for radius in [0.0, f32::MIN_POSITIVE, -1.0, f32::NAN] {
-        assert_eq!(feel(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], radius)])).values, [0.0], "{radius}");
+        assert_eq!(evaluate(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], radius)])).values, [0.0], "{radius}");
     }
-    assert_eq!(feel(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], SMALLEST)])).values, [1.0]);
-    assert_eq!(feel(&[[0.0; 3]], &only(&falloff, &[Sphere { strength: 0.0, ..sphere([0.0; 3], 1.0) }])).reached, 0);
+    assert_eq!(evaluate(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], SMALLEST)])).values, [1.0]);
+    assert_eq!(evaluate(&[[0.0; 3]], &only(&falloff, &[Sphere { strength: 0.0, ..sphere([0.0; 3], 1.0) }])).reached, 0);
 }
 
 #[test]
@@ -29,11 +29,11 @@ fn anything_finite_gives_a_number_from_0_to_1() {
             for noise in [0.0, 1.0] {
                 let gust = Sphere { noise, ..sphere([size, 0.0, 0.0], size.min(3e38) as f32) };
                 let axes = [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]];
-                let controls = [Shape::Sphere, Shape::Cubes]
+                let controls = [ControlShape::Sphere, ControlShape::Cubes]
                     .map(|shape| Control::new(shape, [-size, 0.0, 0.0], axes, 1e30, falloff.clone(), f32::MAX));
                 let gusts =
                     Gusts { base: 0.5, falloff: &falloff, spheres: &[gust, gust], controls: &controls, incoming: None };
-                assert!(feel(&points, &gusts).values.iter().all(|x| (0.0..=1.0).contains(x)), "{size} {noise}");
+                assert!(evaluate(&points, &gusts).values.iter().all(|x| (0.0..=1.0).contains(x)), "{size} {noise}");
             }
         }
     }
@@ -47,10 +47,10 @@ fn ten_thousand_gusts_over_each_other_end_at_1() {
         .iter()
         .map(|c| Sphere { noise: 0.2, ..sphere(c.map(f64::from), 5.0) })
         .collect();
-    let felt = feel(&points, &only(&falloff, &gusts));
+    let felt = evaluate(&points, &only(&falloff, &gusts));
     assert_eq!((felt.values, felt.reached), (vec![1.0; points.len()], points.len()));
     // Weak ones, so that none of them may be left out.
     let weak: Vec<Sphere> = gusts[..1000].iter().map(|gust| Sphere { strength: 1e-5, noise: 0.0, ..*gust }).collect();
-    let felt = feel(&points, &only(&falloff, &weak));
+    let felt = evaluate(&points, &only(&falloff, &weak));
     assert!(felt.values.iter().all(|x| (5e-3..1e-2).contains(x)));
 }

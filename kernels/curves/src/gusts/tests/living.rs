@@ -35,7 +35,7 @@ fn what_is_drawn_lies_in_its_range_and_depends_on_seed_and_number_alone() {
     for gust in &gusts {
         assert!((0.3..=0.6).contains(&gust.radius) && (0.0..=0.3).contains(&gust.noise));
         assert!((1.0..=48.0).contains(&gust.start) && (0.0..1.0).contains(&gust.speed));
-        assert!(gust.place.iter().all(|x| (-1.0..1.0).contains(x)));
+        assert!(gust.position.iter().all(|x| (-1.0..1.0).contains(x)));
     }
     // More gusts leave those that were there alone; another seed does not.
     assert_eq!(Draw { gusts: 60, ..PLAIN }.at(50.0).gusts[..gusts.len()], gusts);

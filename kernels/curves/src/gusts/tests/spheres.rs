@@ -6,7 +6,7 @@ use super::*;
 fn influence_is_1_at_the_centre_0_at_the_boundary_and_a_smoothstep_between() {
     let points =
         [[2.0, 0.0, 0.0], [2.0, 0.25, 0.0], [2.0, 0.0, -0.5], [2.5, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.1, 0.0]];
-    let felt = feel(&points, &only(&smooth(), &[sphere([2.0, 0.0, 0.0], 1.0)]));
+    let felt = evaluate(&points, &only(&smooth(), &[sphere([2.0, 0.0, 0.0], 1.0)]));
     // 1 − (3t² − 2t³) at t = ¼ is 1 − 0.15625.
     assert_eq!(felt.values, [1.0, 0.84375, 0.5, 0.5, 0.0, 0.0]);
     assert_eq!(felt.reached, 4);
@@ -17,12 +17,12 @@ fn influences_add_up_to_base_and_are_clamped() {
     let falloff = Ramp::new(vec![[0.0, 0.5], [1.0, 0.5]], Interpolation::Linear).unwrap();
     let spheres = [sphere([0.0; 3], 1.0), sphere([1.0, 0.0, 0.0], 1.0), sphere([0.5, 0.0, 0.0], 0.25)];
     let points = [[-0.5, 0.0, 0.0], [0.1, 0.0, 0.0], [0.5, 0.0, 0.0], [9.0, 0.0, 0.0]];
-    let with = |base| feel(&points, &Gusts { base, ..only(&falloff, &spheres) });
+    let with = |base| evaluate(&points, &Gusts { base, ..only(&falloff, &spheres) });
     assert_eq!(with(0.0).values, [0.5, 1.0, 1.0, 0.0]);
     assert_eq!(with(0.125).values, [0.625, 1.0, 1.0, 0.125]);
     assert_eq!((with(0.125).reached, with(1.0).values), (3, vec![1.0; 4]));
     let falloff = Ramp::constant(-0.75);
-    let felt = feel(&points, &Gusts { base: 1.0, ..only(&falloff, &spheres) });
+    let felt = evaluate(&points, &Gusts { base: 1.0, ..only(&falloff, &spheres) });
     assert_eq!(felt.values, [0.25, 0.0, 0.0, 1.0]);
 }
 
@@ -34,7 +34,7 @@ fn sums_are_those_of_f64_and_of_every_sphere_whatever_is_culled() {
         .enumerate()
         .map(|(k, c)| Sphere { strength: 0.1 + 0.02 * k as f32, ..sphere(c.map(f64::from), 0.1 + 0.03 * k as f32) })
         .collect();
-    let felt = feel(&points, &only(&smooth(), &spheres));
+    let felt = evaluate(&points, &only(&smooth(), &spheres));
     for (point, value) in points.iter().zip(&felt.values) {
         let sum: f64 = spheres
             .iter()
@@ -53,9 +53,9 @@ fn sums_are_those_of_f64_and_of_every_sphere_whatever_is_culled() {
 fn noise_keeps_the_centre_and_stays_inside_of_the_sphere() {
     let points = strewn(20_000, [0.0; 3], 1.2);
     let falloff = smooth();
-    let round = feel(&points, &only(&falloff, &[sphere([0.0; 3], 1.0)]));
+    let round = evaluate(&points, &only(&falloff, &[sphere([0.0; 3], 1.0)]));
     for noise in [0.1, 0.5, 1.0] {
-        let dented = feel(&points, &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
+        let dented = evaluate(&points, &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
         for (dented, round) in dented.values.iter().zip(&round.values) {
             assert!(dented <= round, "noise took nothing away: {dented} over {round}");
         }
@@ -65,7 +65,7 @@ fn noise_keeps_the_centre_and_stays_inside_of_the_sphere() {
         let inside =
             points.iter().zip(&dented.values).filter(|(p, _)| p.iter().map(|x| x * x).sum::<f32>() < least * least);
         assert!(inside.into_iter().all(|(_, value)| *value > 0.0));
-        let centre = feel(&[[0.0; 3]], &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
+        let centre = evaluate(&[[0.0; 3]], &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
         assert_eq!(centre.values, [1.0]);
     }
 }
@@ -77,7 +77,7 @@ fn noise_is_the_spheres_own_and_moves_along_with_it() {
     let falloff = smooth();
     let at = |points: &[[f32; 3]], x: f64, salt: u32| {
         let with = Sphere { noise: 0.8, salt, ..sphere([x, 0.0, 0.0], 1.0) };
-        feel(points, &only(&falloff, &[with])).values
+        evaluate(points, &only(&falloff, &[with])).values
     };
     let (here, there) = (at(&points, 0.0, 5), at(&moved, 4.0, 5));
     assert!(here.iter().zip(&there).all(|(a, b)| (a - b).abs() < 1e-5));
@@ -90,26 +90,26 @@ fn incoming_scales_what_is_felt_and_less_than_0_or_nan_is_0() {
     let falloff = one();
     let spheres = [sphere([0.0; 3], 1.0)];
     let gusts = Gusts { base: 0.25, incoming: Some(&incoming), ..only(&falloff, &spheres) };
-    assert_eq!(feel(&[[0.0; 3]; 4], &gusts).values, [0.5, 2.0, 0.0, 0.0]);
-    assert_eq!(feel(&[[5.0; 3]; 4], &gusts).values, [0.125, 0.5, 0.0, 0.0]);
+    assert_eq!(evaluate(&[[0.0; 3]; 4], &gusts).values, [0.5, 2.0, 0.0, 0.0]);
+    assert_eq!(evaluate(&[[5.0; 3]; 4], &gusts).values, [0.125, 0.5, 0.0, 0.0]);
 }
 
 #[test]
 fn far_from_the_origin_and_at_any_scale_it_is_the_same() {
     let (points, falloff) = (strewn(500, [0.0; 3], 1.0), smooth());
     let gust = Sphere { noise: 0.5, ..sphere([0.25, 0.0, 0.0], 0.75) };
-    let here = feel(&points, &only(&falloff, &[gust])).values;
+    let here = evaluate(&points, &only(&falloff, &[gust])).values;
     for scale in [1e-6_f32, 1e6] {
         let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x * scale)).collect();
         let gust = Sphere { centre: gust.centre.map(|x| x * f64::from(scale)), radius: gust.radius * scale, ..gust };
-        let scaled = feel(&points, &only(&falloff, &[gust])).values;
+        let scaled = evaluate(&points, &only(&falloff, &[gust])).values;
         assert!(here.iter().zip(&scaled).all(|(a, b)| (a - b).abs() < 1e-5));
     }
     // 2⁻⁷ m of the grid at 100 km are whole numbers of ulp, so nothing is lost.
     let grid = |far: f32| -> Vec<[f32; 3]> { (0..300).map(|k| [far + (k as f32 - 150.0) / 128.0, 0.5, 0.0]).collect() };
-    let near = feel(&grid(0.0), &only(&falloff, &[gust])).values;
+    let near = evaluate(&grid(0.0), &only(&falloff, &[gust])).values;
     let gust = Sphere { centre: [100_000.25, 0.0, 0.0], ..gust };
-    assert_eq!(bits(&feel(&grid(100_000.0), &only(&falloff, &[gust])).values), bits(&near));
+    assert_eq!(bits(&evaluate(&grid(100_000.0), &only(&falloff, &[gust])).values), bits(&near));
 }
 
 #[test]
@@ -121,16 +121,16 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
         .map(|c| Sphere { noise: 0.4, strength: 0.7, salt: c[0].to_bits(), ..sphere(c.map(f64::from), 0.3) })
         .collect();
     let axes = [[0.5, 0.1, 0.0], [0.0, 0.2, 0.0], [-0.1, 0.0, 0.4]];
-    let controls =
-        [Shape::Sphere, Shape::Cubes].map(|shape| Control::new(shape, [1.0, 0.0, 0.5], axes, 1.5, smooth(), -0.4));
+    let controls = [ControlShape::Sphere, ControlShape::Cubes]
+        .map(|shape| Control::new(shape, [1.0, 0.0, 0.5], axes, 1.5, smooth(), -0.4));
     let falloff = smooth();
     let gusts =
         Gusts { base: 0.1, falloff: &falloff, spheres: &spheres, controls: &controls, incoming: Some(&incoming) };
-    let expected = feel_on(Path::BASELINE, &points, &gusts);
+    let expected = evaluate_on(Path::BASELINE, &points, &gusts);
     for path in Path::all() {
         for threads in [1, 2, 7] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let found = pool.install(|| feel_on(path, &points, &gusts));
+            let found = pool.install(|| evaluate_on(path, &points, &gusts));
             assert_eq!(bits(&found.values), bits(&expected.values), "{} × {threads}", path.name());
             assert_eq!(found, expected);
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 use numerics::masked::Masked;
-use numerics::noise::Kind;
+use numerics::noise::NoiseKind;
 use std::f64::consts::PI;
 
 #[test]
@@ -27,7 +27,7 @@ fn equal_cvs_act_as_one_and_a_curve_of_no_length_stays() {
     let mut doubled = plain_curve.clone();
     doubled.insert(2, plain_curve[2]);
     let groom = Groom::of(&[plain_curve, doubled, vec![[3.0, 4.0, 5.0]; 6]]);
-    for mode in [Mode::Paper, Mode::ResolutionFree { reference_segments: 4.0 }] {
+    for mode in [BendMode::Paper, BendMode::ResolutionFree { reference_segments: 4.0 }] {
         let bent = groom.bend(&Bend { mode, ..plain(&ramp) });
         let mut single = bent.points[5..11].to_vec();
         assert_eq!(single.remove(2), single[2]);
@@ -89,7 +89,7 @@ fn wind_turning_by_half_a_circle_is_finite_at_every_step() {
 #[test]
 fn lengths_hold_from_2_to_10_000_cvs() {
     let ramp = one();
-    let field = Field::new(Kind::Perlin, 2, 0.5, 5);
+    let field = Field::new(NoiseKind::Perlin, 2, 0.5, 5);
     for cvs in [2, 3, 10, 100, 1000, 10_000] {
         let curl = |cv: usize| {
             let u = cv as f64 / (cvs - 1) as f64;
@@ -97,7 +97,7 @@ fn lengths_hold_from_2_to_10_000_cvs() {
         };
         let straight_too = straight([0.1, 0.2, 0.3], [0.1, 1.0, 0.1], cvs - 1);
         let groom = Groom::of(&[(0..cvs).map(curl).collect(), straight_too]);
-        for mode in [Mode::Paper, Mode::ResolutionFree { reference_segments: 4.0 }] {
+        for mode in [BendMode::Paper, BendMode::ResolutionFree { reference_segments: 4.0 }] {
             for rotate in [1e-3, 0.1, 1.0, 2.0] {
                 let noise = Some(BendNoise {
                     field: &field,
@@ -157,13 +157,13 @@ fn envelopes_below_0_and_nan_are_none_and_above_1_are_more() {
 
 #[test]
 fn parameters_at_absurd_ends_are_finite() {
-    let field = Field::new(Kind::Billow, 16, 1.0, 5);
+    let field = Field::new(NoiseKind::Billow, 16, 1.0, 5);
     let groom = tangled(32, 9);
     let zeros = vec![0.0; groom.points.len()];
     for ramp in [one(), Ramp::constant(1e30), Ramp::constant(-1e30)] {
         for rotate in [f32::MAX, -f32::MAX, 1e-40, -1.0, 3.0] {
             for (amplitude, frequency) in [(f32::MAX, 1e300), (1e-40, 1e-300), (-5.0, f64::MAX)] {
-                for mode in [Mode::Paper, Mode::ResolutionFree { reference_segments: 1e30 }] {
+                for mode in [BendMode::Paper, BendMode::ResolutionFree { reference_segments: 1e30 }] {
                     let waviness = frequency as f32;
                     let origin = [frequency, 0.0, 0.0];
                     let noise = BendNoise { field: &field, amplitude, frequency, waviness, origin, roots: None };

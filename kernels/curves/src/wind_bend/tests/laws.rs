@@ -2,7 +2,7 @@
 
 use super::*;
 use numerics::masked::Masked;
-use numerics::noise::Kind;
+use numerics::noise::NoiseKind;
 use std::f64::consts::PI;
 
 /// Straight up-ish at `theta` to the wind (along x).
@@ -76,7 +76,7 @@ fn resolution_free_angles_follow_the_middle_of_each_segment() {
     let ramp = one();
     for g in [0.1f32, 0.5, 0.9] {
         for segments in [1, 2, 4, 8, 32, 128, 1024] {
-            let mode = Mode::ResolutionFree { reference_segments: 4.0 };
+            let mode = BendMode::ResolutionFree { reference_segments: 4.0 };
             let with = Bend { rotate: g.into(), mode, ..plain(&ramp) };
             let left = 1.0 - f64::from(g);
             check_angles(1.5, [0.0; 3], segments, &with, |_, u| 1.5 * libm::pow(left, 4.0 * u));
@@ -87,7 +87,7 @@ fn resolution_free_angles_follow_the_middle_of_each_segment() {
 #[test]
 fn resolution_free_lies_along_the_wind_at_once_from_g_1_on() {
     let ramp = one();
-    let mode = Mode::ResolutionFree { reference_segments: 4.0 };
+    let mode = BendMode::ResolutionFree { reference_segments: 4.0 };
     for g in [1.0, 3.0] {
         check_angles(2.0, [0.0; 3], 5, &Bend { rotate: g.into(), mode, ..plain(&ramp) }, |_, _| 0.0);
     }
@@ -96,7 +96,7 @@ fn resolution_free_lies_along_the_wind_at_once_from_g_1_on() {
 #[test]
 fn resolution_free_tips_converge_with_order_2_and_are_within_a_hundredth_at_9_cvs() {
     let ramp = one();
-    let mode = Mode::ResolutionFree { reference_segments: 4.0 };
+    let mode = BendMode::ResolutionFree { reference_segments: 4.0 };
     for g in [0.3, 0.5, 0.7] {
         let tip = |segments| {
             let groom = Groom::of(&[straight([0.0; 3], leaning(2.0), segments)]);
@@ -159,7 +159,7 @@ fn noisy(field: &numerics::noise::Field) -> BendNoise<'_> {
 
 #[test]
 fn gradient_noise_leaves_a_root_on_its_lattice_alone() {
-    let (ramp, field) = (one(), Field::new(Kind::Perlin, 3, 0.5, 1));
+    let (ramp, field) = (one(), Field::new(NoiseKind::Perlin, 3, 0.5, 1));
     let with = Bend { noise: Some(noisy(&field)), ..plain(&ramp) };
     let at = |root| Groom::of(&[straight(root, [0.0, 1.0, 0.0], 4)]);
     let on = at([3.0, -2.0, 5.0]);
@@ -170,7 +170,7 @@ fn gradient_noise_leaves_a_root_on_its_lattice_alone() {
 
 #[test]
 fn the_pattern_scrolls_downwind() {
-    let (ramp, field) = (one(), Field::new(Kind::Perlin, 2, 0.5, 1));
+    let (ramp, field) = (one(), Field::new(NoiseKind::Perlin, 2, 0.5, 1));
     // After 2 m of scroll the wind at a root is what it was 2 m upwind of it (dyadic: no rounding).
     let at = |x| Groom::of(&[straight([x, 0.25, 0.625], [0.0, 1.0, 0.0], 4)]);
     let shape = |groom: Groom, noise| {
@@ -185,7 +185,7 @@ fn the_pattern_scrolls_downwind() {
 
 #[test]
 fn noise_sits_where_the_rest_roots_are_asked_to_be() {
-    let (ramp, field) = (one(), Field::new(Kind::Billow, 2, 0.5, 1));
+    let (ramp, field) = (one(), Field::new(NoiseKind::Billow, 2, 0.5, 1));
     let roots: Vec<_> = (0..20).map(|i| [0.3 * i as f32, 0.1, 0.7]).collect();
     let curves =
         |roots: &[Vec3]| Groom::of(&roots.iter().map(|root| straight(*root, [0.0, 1.0, 0.1], 3)).collect::<Vec<_>>());
@@ -199,7 +199,7 @@ fn noise_sits_where_the_rest_roots_are_asked_to_be() {
 
 #[test]
 fn waviness_varies_the_wind_down_the_curve() {
-    let (ramp, field) = (one(), Field::new(Kind::Perlin, 1, 0.5, 1));
+    let (ramp, field) = (one(), Field::new(NoiseKind::Perlin, 1, 0.5, 1));
     let groom = Groom::of(&[straight([0.3, 0.2, 0.1], [0.0, 4.0, 0.0], 6)]);
     let wavy = |waviness| {
         let noise = BendNoise { waviness, ..noisy(&field) };

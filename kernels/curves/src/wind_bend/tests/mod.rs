@@ -67,7 +67,7 @@ fn plain(ramp: &Ramp) -> Bend<'_> {
         rotate: 0.5.into(),
         envelope: None,
         ramp,
-        mode: Mode::Paper,
+        mode: BendMode::Paper,
         blend: 1.0.into(),
         noise: None,
     }

@@ -3,7 +3,7 @@
 
 use super::*;
 use numerics::masked::Masked;
-use numerics::noise::Kind;
+use numerics::noise::NoiseKind;
 use numerics::vector::{DVec3, to_f32};
 
 /// `v` rotated by `angle` about the unit vector `axis` (Rodrigues).
@@ -33,7 +33,7 @@ fn paper(curve: &[Vec3], share: impl Fn(usize, f32) -> f64, wind: impl Fn(f64) -
 #[test]
 fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
     let ramp = Ramp::new(vec![[0.0, 0.2], [0.6, 1.0], [1.0, 0.7]], Interpolation::Linear).unwrap();
-    let field = Field::new(Kind::Perlin, 2, 0.5, 5);
+    let field = Field::new(NoiseKind::Perlin, 2, 0.5, 5);
     let groom = tangled(300, 40);
     let envelope: Vec<f32> = (0..groom.points.len() as u64).map(|cv| Key::new(4).of(cv).f32()).collect();
     let wind = [0.48, -0.6, 0.64];
@@ -72,8 +72,8 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
     let ramp = Ramp::new(vec![[0.0, 0.2], [1.0, 1.0]], Interpolation::Smooth).unwrap();
     let groom = tangled(3000, 17);
     let mask: Vec<f32> = (0..groom.points.len() as u64).map(|cv| Key::new(8).of(cv).f32()).collect();
-    for kind in [Kind::Perlin, Kind::Billow, Kind::Wavelet] {
-        for mode in [Mode::Paper, Mode::ResolutionFree { reference_segments: 5.0 }] {
+    for kind in [NoiseKind::Perlin, NoiseKind::Billow, NoiseKind::Wavelet] {
+        for mode in [BendMode::Paper, BendMode::ResolutionFree { reference_segments: 5.0 }] {
             let field = Field::new(kind, 2, 0.5, 5);
             let with = Bend {
                 wind: [0.0, -1.0, 0.0],

@@ -1,6 +1,6 @@
 //! Where the wind blows at each pivot: its own direction, and noise.
 
-use super::group::{Curves, Group, Unit};
+use super::curve_group::{CurveGroup, Curves, Unit};
 use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::vector;
@@ -9,7 +9,7 @@ use numerics::vector;
 const LARGEST: f32 = 1e12;
 
 /// The wind at the CVs of sixteen curves.
-pub(super) struct Heading<'a> {
+pub(super) struct WindDirection<'a> {
     wind: [f32; 3],
     noise: Option<&'a BendNoise<'a>>,
     /// Where the roots sample, in metres, an axis an array.
@@ -18,9 +18,9 @@ pub(super) struct Heading<'a> {
     unit: &'a F32x16,
 }
 
-impl<'a> Heading<'a> {
+impl<'a> WindDirection<'a> {
     #[inline(always)]
-    pub(super) fn new(bend: &'a Bend<'a>, group: &Group<'_>, curves: &Curves, unit: &'a Unit) -> Self {
+    pub(super) fn new(bend: &'a Bend<'a>, group: &CurveGroup<'_>, curves: &Curves, unit: &'a Unit) -> Self {
         let noise = bend.noise.as_ref().filter(|noise| noise.amplitude.abs() > 0.0);
         let mut roots = [[0.0; LANES]; 3];
         if let Some(noise) = noise {

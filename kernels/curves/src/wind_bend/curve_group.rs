@@ -4,16 +4,16 @@
 //! so nothing turns and nothing needs a mask.
 
 use super::chain::Chain;
-use super::heading::Heading;
 use super::share::Share;
 use super::tally::Tally;
+use super::wind_direction::WindDirection;
 use super::{Bend, Reached};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
 use numerics::vector::{self, Vec3};
 
 /// Up to sixteen curves of `points`.
-pub(super) struct Group<'a> {
+pub(super) struct CurveGroup<'a> {
     /// The first one's number.
     pub(super) first: usize,
     /// Where each starts, and where the last ends.
@@ -34,21 +34,21 @@ kernel! {
     /// Writes the bent curves of `group` to `out`, which holds their points alone.
     pub(super) fn bend_group(
         bend: &Bend<'_>,
-        group: &Group<'_>,
+        group: &CurveGroup<'_>,
         scratch: &mut Scratch,
         out: &mut [Vec3],
     ) -> Reached = body;
 }
 
 #[inline(always)]
-fn body(bend: &Bend<'_>, group: &Group<'_>, scratch: &mut Scratch, out: &mut [Vec3]) -> Reached {
+fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mut [Vec3]) -> Reached {
     let Some(curves) = Curves::of(group) else { return Reached::default() };
     let unit = curves.load(group.points, scratch);
     let length = measure(curves.longest, &unit, scratch);
     let (points, arc) = (&scratch.points, &scratch.arc);
 
-    let heading = Heading::new(bend, group, &curves, &unit);
-    let mut towards = heading.at(&F32x16::splat(0.0));
+    let wind_direction = WindDirection::new(bend, group, &curves, &unit);
+    let mut towards = wind_direction.at(&F32x16::splat(0.0));
     let mut share = Share::new(bend, length);
     let mut chain = Chain::new();
     let mut tally = Tally::new();
@@ -56,8 +56,8 @@ fn body(bend: &Bend<'_>, group: &Group<'_>, scratch: &mut Scratch, out: &mut [Ve
     curves.write(0, &before, out);
     for step in 0..curves.longest - 1 {
         let (pivot, next) = (&points[step], &points[step + 1]);
-        if heading.varies() {
-            towards = heading.at(&arc[step]);
+        if wind_direction.varies() {
+            towards = wind_direction.at(&arc[step]);
         }
         let at = curves.at(step);
         let segment = unit.between(pivot, next);
@@ -87,7 +87,7 @@ pub(super) struct Curves {
 
 impl Curves {
     /// None where the group has no CV.
-    fn of(group: &Group<'_>) -> Option<Self> {
+    fn of(group: &CurveGroup<'_>) -> Option<Self> {
         let base = group.starts[0] as usize;
         let mut curves = Self { base, first: [base; LANES], last: [base; LANES], count: [0; LANES], longest: 0 };
         for (lane, ends) in group.starts.windows(2).enumerate() {
