@@ -125,7 +125,7 @@ fn attributes_of_guides_are_mixed() {
     guides.set(WIDTH, along.clone()).unwrap();
     guides.set(Attr::<f32>::element("age"), (0..curves).map(|k| k as f32).collect()).unwrap();
     guides.set(Attr::<i32>::element("kind"), (0..curves as i32).map(|k| k + 100).collect()).unwrap();
-    guides.set(N, guides.positions().iter().map(|p| unit(*p)).collect()).unwrap();
+    guides.set(N, guides.positions().iter().map(|p| to_f32(to_f64(*p).normalize())).collect()).unwrap();
     guides.set(Attr::<f32>::once("gain"), vec![3.0]).unwrap();
     let out = interpolate(guides, ball()).cook();
     let hairs = out.curves();
@@ -137,7 +137,7 @@ fn attributes_of_guides_are_mixed() {
     assert!(age.iter().any(|age| (age - age.round()).abs() > 0.1), "they are mixes");
     let kind = hairs.get(Attr::<i32>::element("kind")).unwrap();
     assert!(kind.iter().all(|kind| (100..100 + curves as i32).contains(kind)));
-    assert!(hairs.get(N).unwrap().iter().all(|n| (apart(&[unit(*n)], &[*n])) < 1e-6));
+    assert!(hairs.get(N).unwrap().iter().all(|n| (apart(&[to_f32(to_f64(*n).normalize())], &[*n])) < 1e-6));
     assert_eq!(hairs.get(Attr::<f32>::once("gain")), Some(&[3.0][..]));
 }
 
