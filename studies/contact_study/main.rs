@@ -12,9 +12,9 @@
 use bodies::collision::{Ground, Obstacle, Pose, Rub, Scene, Skin};
 use bodies::mass_spring::{Body, Frame, Material, Mesh, Solver, State};
 use bodies::tets::{boundary, cubes};
-use nalgebra::Vector3;
 use numerics::masked::Masked;
 use numerics::shapes::{Polygons, block, cylinder, sphere};
+use numerics::vector::DVec3;
 use std::time::Instant;
 
 const FRAME: f64 = 1.0 / 24.0;
@@ -22,7 +22,6 @@ const THICKNESS: f64 = 1e-3;
 /// Of the dough.
 const SIZE: [f64; 3] = [0.24, 0.06, 0.12];
 
-type V3 = Vector3<f64>;
 type Points = Vec<[f64; 3]>;
 /// Where a tool is at a frame: a turn about z, then a shift.
 type Place = fn(f64) -> (f64, [f64; 3]);
@@ -100,15 +99,16 @@ impl Tool {
     /// How deep the deepest of `points` is inside of it at `frame`; it is convex.
     fn deepest(&self, points: &Points, frame: f64) -> f64 {
         let pose = self.at(frame);
-        let planes: Vec<(V3, V3)> = self
+        let planes: Vec<(DVec3, DVec3)> = self
             .triangles
             .iter()
             .map(|corners| {
-                let [a, b, c] = corners.map(|corner| V3::from(pose[corner as usize]));
+                let [a, b, c] = corners.map(|corner| DVec3::from(pose[corner as usize]));
                 (a, (b - a).cross(&(c - a)).normalize())
             })
             .collect();
-        let depth = |p: &[f64; 3]| planes.iter().map(|(a, n)| n.dot(&(a - V3::from(*p)))).fold(f64::INFINITY, f64::min);
+        let depth =
+            |p: &[f64; 3]| planes.iter().map(|(a, n)| n.dot(&(a - DVec3::from(*p)))).fold(f64::INFINITY, f64::min);
         points.iter().map(depth).fold(0.0, f64::max)
     }
 }
@@ -187,7 +187,7 @@ fn run(
         let inside = tool.deepest(&outer, f64::from(frame + 1));
         let low = outer.iter().map(|p| -p[1]).fold(0.0, f64::max);
         let inside = inside.max(if tool.ground { low } else { 0.0 });
-        let speed = state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max);
+        let speed = state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max);
         (wall, newton, caps) = (wall + ms, newton + report.newton, caps + report.caps_hit);
         (through, slowest, fastest) = (through.max(inside), slowest.max(ms), fastest.max(speed));
         taken += report.substeps;

@@ -4,7 +4,8 @@
 //! The constants of pressures and contacts are those of `mass_spring::volume` and `mass_spring::contact`; where one is changed there and
 //! not here, the fine limits in the table part. What is not here: the push against tetrahedra that turn over.
 
-use crate::scene::{FRAME, FRICTION, GAP, Scene, Surface, Tools, V3};
+use crate::scene::{FRAME, FRICTION, GAP, Scene, Surface, Tools};
+use numerics::vector::DVec3;
 
 /// κ ÷ what a particle puts up against being moved.
 const FIRM: f64 = 30.0;
@@ -126,7 +127,7 @@ impl Region {
     }
 
     /// m³.
-    pub(crate) fn volume(&self, x: &[V3]) -> f64 {
+    pub(crate) fn volume(&self, x: &[DVec3]) -> f64 {
         let origin = x[self.particles[0] as usize];
         let six = |face: [u32; 3]| {
             let [a, b, c] = face.map(|corner| x[corner as usize] - origin);
@@ -137,8 +138,8 @@ impl Region {
 
     /// That, and how it changes with each of its particles, m².
     #[inline(always)]
-    pub(crate) fn measure(&self, x: &[V3], gradient: &mut [V3]) -> f64 {
-        gradient.fill(V3::zeros());
+    pub(crate) fn measure(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+        gradient.fill(DVec3::zeros());
         let origin = x[self.particles[0] as usize];
         let mut six = 0.0;
         for face in &self.faces {

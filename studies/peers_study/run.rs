@@ -1,11 +1,12 @@
 //! One method on one scene: what it takes, and where it leaves the body frame after frame.
 
 use crate::model::Model;
-use crate::scene::{FRAME, GRAVITY, Scene, Touched, V3};
+use crate::scene::{FRAME, GRAVITY, Scene, Touched};
 use crate::vbd::Vbd;
 use crate::xpbd::Xpbd;
 use bodies::mass_spring::{Frame, Integrator, Solver, State};
 use cpu_time::ProcessTime;
+use numerics::vector::DVec3;
 
 /// How time is stepped through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +34,7 @@ pub(crate) struct Run {
     /// How often a frame looks at all springs.
     pub(crate) passes: f64,
     /// Of all particles, at the end of each frame.
-    pub(crate) trace: Vec<Vec<V3>>,
+    pub(crate) trace: Vec<Vec<DVec3>>,
     /// Of all frames: how far below its gap the deepest particle is, as a share of it.
     pub(crate) overlap: f64,
     /// Of all frames: the largest share of its volume that the body lacks; the least a tetrahedron has.
@@ -85,12 +86,12 @@ impl Run {
                 ..Frame::default()
             };
             let report = solver.step(&scene.body, &mut state, &asked);
-            x.iter_mut().zip(&state.positions).for_each(|(x, p)| *x = V3::from(*p));
+            x.iter_mut().zip(&state.positions).for_each(|(x, p)| *x = DVec3::from(*p));
             f64::from(report.cg + NEWTON * report.newton + STEP * report.substeps)
         })
     }
 
-    fn frames(scene: &Scene, mut go: impl FnMut(u32, &mut [V3]) -> f64) -> Self {
+    fn frames(scene: &Scene, mut go: impl FnMut(u32, &mut [DVec3]) -> f64) -> Self {
         let mut x = scene.points.clone();
         let mut run = Self { ms: 0.0, passes: 0.0, trace: Vec::new(), overlap: 0.0, lost: 0.0, least: f64::INFINITY };
         let each = 1.0 / f64::from(scene.frames);
@@ -110,7 +111,7 @@ impl Run {
     /// How far it is from another of the same scene ÷ the body's size: root mean square over particles and frames, and over
     /// particles at the end.
     pub(crate) fn error(&self, other: &Self, size: f64) -> (f64, f64) {
-        let square = |(a, b): (&Vec<V3>, &Vec<V3>)| {
+        let square = |(a, b): (&Vec<DVec3>, &Vec<DVec3>)| {
             a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len().max(1) as f64
         };
         let squares: Vec<f64> = self.trace.iter().zip(&other.trace).map(square).collect();

@@ -5,13 +5,11 @@
 
 use bodies::mass_spring::{Body, Contact, Contacts, Material, Mesh, Pin, Query};
 use bodies::tets::{boundary, cubes};
-use nalgebra::Vector3;
 use numerics::masked::Masked;
-
-pub(crate) type V3 = Vector3<f64>;
+use numerics::vector::DVec3;
 
 pub(crate) const FRAME: f64 = 1.0 / 24.0;
-pub(crate) const GRAVITY: V3 = V3::new(0.0, -9.81, 0.0);
+pub(crate) const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
 /// Distance kept from ground and pin, metres.
 pub(crate) const GAP: f64 = 1e-3;
 /// Coulomb's μ of both.
@@ -21,7 +19,7 @@ pub(crate) const FRICTION: f64 = 0.5;
 pub(crate) struct Scene {
     pub(crate) title: &'static str,
     pub(crate) frames: u32,
-    pub(crate) points: Vec<V3>,
+    pub(crate) points: Vec<DVec3>,
     pub(crate) tets: Vec<[u32; 4]>,
     /// Particles of the surface, rising.
     pub(crate) skin: Vec<u32>,
@@ -46,9 +44,9 @@ pub(crate) struct Tools {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Roller {
     /// Its axis at the start, metres.
-    start: V3,
+    start: DVec3,
     /// m/s.
-    pace: V3,
+    pace: DVec3,
     radius: f64,
 }
 
@@ -56,11 +54,11 @@ pub(crate) struct Roller {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
     /// Unit, to the free side.
-    pub(crate) normal: V3,
+    pub(crate) normal: DVec3,
     /// How far the point is from it, metres.
     pub(crate) distance: f64,
     /// Its velocity where it is nearest, m/s.
-    pub(crate) velocity: V3,
+    pub(crate) velocity: DVec3,
 }
 
 impl Tools {
@@ -69,15 +67,18 @@ impl Tools {
 
     /// The surfaces as seen from `x`, at a time in seconds.
     #[inline(always)]
-    pub(crate) fn around(&self, x: V3, time: f64) -> [Option<Surface>; Self::MOST] {
-        let ground =
-            self.ground.then_some(Surface { normal: V3::new(0.0, 1.0, 0.0), distance: x.y, velocity: V3::zeros() });
+    pub(crate) fn around(&self, x: DVec3, time: f64) -> [Option<Surface>; Self::MOST] {
+        let ground = self.ground.then_some(Surface {
+            normal: DVec3::new(0.0, 1.0, 0.0),
+            distance: x.y,
+            velocity: DVec3::zeros(),
+        });
         let roller = self.roller.map(|roller| {
             let arm = x - (roller.start + roller.pace * time);
             let reach = (arm.x * arm.x + arm.y * arm.y).sqrt();
-            let normal = V3::new(arm.x / reach, arm.y / reach, 0.0);
+            let normal = DVec3::new(arm.x / reach, arm.y / reach, 0.0);
             // It turns by −pace ÷ radius about z, so where it meets a floor it stands still.
-            let turn = V3::new(normal.y, -normal.x, 0.0) * roller.pace.x;
+            let turn = DVec3::new(normal.y, -normal.x, 0.0) * roller.pace.x;
             Surface { normal, distance: reach - roller.radius, velocity: roller.pace + turn }
         });
         [ground, roller]
@@ -94,7 +95,7 @@ impl Contacts for Touched<'_> {
     fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
         let times = query.times.map(|share| (f64::from(self.frame) + share) * FRAME);
         for particle in &self.scene.skin {
-            let [from, to] = [query.from, query.to].map(|x| V3::from(x[*particle as usize]));
+            let [from, to] = [query.from, query.to].map(|x| DVec3::from(x[*particle as usize]));
             let before = self.scene.tools.around(from, times[0]);
             let after = self.scene.tools.around(to, times[1]);
             for (before, after) in before.into_iter().zip(after).filter_map(|(before, after)| before.zip(after)) {
@@ -125,8 +126,11 @@ impl Scene {
         const CELLS: [u32; 3] = [26, 7, 12];
         let ground = Tools { ground: true, roller: None };
         // Ten thicknesses a frame, 1 cm into the dough.
-        let roller =
-            Roller { start: V3::new(-0.08, 0.1, 0.06), pace: V3::new(10.0 * GAP / FRAME, 0.0, 0.0), radius: 0.05 };
+        let roller = Roller {
+            start: DVec3::new(-0.08, 0.1, 0.06),
+            pace: DVec3::new(10.0 * GAP / FRAME, 0.0, 0.0),
+            radius: 0.05,
+        };
         let above = |height: f64| [0.0, GAP + height, 0.0];
         let made = |title, frames, tools, (size, cells, at), modulus, damping| {
             Self::block(title, frames, tools, (size, cells, at), modulus, damping)
@@ -158,7 +162,7 @@ impl Scene {
         damping: f64,
     ) -> Self {
         let (places, tets) = cubes(cells.map(|n| n as usize), at, size);
-        let points: Vec<V3> = places.iter().map(|p| V3::from(*p)).collect();
+        let points: Vec<DVec3> = places.iter().map(|p| DVec3::from(*p)).collect();
         let narrow: Vec<[f32; 3]> = places.iter().map(|p| p.map(|x| x as f32)).collect();
         let mut skin: Vec<u32> = boundary(&tets, &narrow).iter().flat_map(|face| face.corners).collect();
         skin.sort_unstable();
@@ -177,14 +181,14 @@ impl Scene {
     }
 
     /// How far below its gap the deepest particle is at a time in seconds, as a share of it: 1 touches, more is inside.
-    pub(crate) fn overlap(&self, x: &[V3], time: f64) -> f64 {
+    pub(crate) fn overlap(&self, x: &[DVec3], time: f64) -> f64 {
         let distances = self.skin.iter().flat_map(|particle| self.tools.around(x[*particle as usize], time));
         distances.flatten().map(|surface| 1.0 - surface.distance / GAP).fold(0.0, f64::max)
     }
 
     /// Volume ÷ volume at rest, and the least of a tetrahedron.
-    pub(crate) fn volume(&self, x: &[V3]) -> (f64, f64) {
-        let six = |x: &[V3], tet: &[u32; 4]| {
+    pub(crate) fn volume(&self, x: &[DVec3]) -> (f64, f64) {
+        let six = |x: &[DVec3], tet: &[u32; 4]| {
             let [a, b, c, d] = tet.map(|corner| x[corner as usize]);
             (b - a).dot(&(c - a).cross(&(d - a)))
         };

@@ -7,8 +7,8 @@
 //! out where a surface pushes.
 
 use crate::model::{Model, Region, Spring};
-use crate::scene::{FRAME, GRAVITY, V3};
-use nalgebra::Matrix3;
+use crate::scene::{FRAME, GRAVITY};
+use numerics::vector::{DMat3, DVec3};
 
 /// A spring as one end sees it.
 #[derive(Clone, Copy)]
@@ -45,30 +45,30 @@ pub(crate) struct Vbd {
     iterations: u32,
     /// Chebyshev's ρ; 0: no acceleration.
     radius: f64,
-    x: Vec<V3>,
-    v: Vec<V3>,
-    before: Vec<V3>,
-    inertial: Vec<V3>,
+    x: Vec<DVec3>,
+    v: Vec<DVec3>,
+    before: Vec<DVec3>,
+    inertial: Vec<DVec3>,
     /// How velocities changed in the step before, m/s².
-    trend: Vec<V3>,
+    trend: Vec<DVec3>,
     /// Two sweeps ago, and one.
-    earlier: [Vec<V3>; 2],
+    earlier: [Vec<DVec3>; 2],
     touched: Vec<bool>,
     /// How the regions around the particle at hand change with it, m².
-    gradients: Vec<V3>,
+    gradients: Vec<DVec3>,
     /// Of regions now, and where the step began, m³.
     volumes: Vec<f64>,
     volumes_before: Vec<f64>,
 }
 
 impl Vbd {
-    pub(crate) fn new(model: Model, points: &[V3], substeps: u32, iterations: u32, radius: f64) -> Self {
-        let still = || vec![V3::zeros(); points.len()];
+    pub(crate) fn new(model: Model, points: &[DVec3], substeps: u32, iterations: u32, radius: f64) -> Self {
+        let still = || vec![DVec3::zeros(); points.len()];
         let around = Around::new(&model);
         let most = around.fan_starts.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0);
         Self {
             around,
-            gradients: vec![V3::zeros(); most],
+            gradients: vec![DVec3::zeros(); most],
             substeps,
             iterations,
             radius,
@@ -85,7 +85,7 @@ impl Vbd {
         }
     }
 
-    pub(crate) fn positions(&self) -> &[V3] {
+    pub(crate) fn positions(&self) -> &[DVec3] {
         &self.x
     }
 
@@ -143,7 +143,7 @@ impl Vbd {
         let moved = mine - self.before[particle];
         let inertia = self.model.mass[particle] / (h * h);
         let mut force = (self.inertial[particle] - mine) * inertia;
-        let mut block = Matrix3::from_diagonal_element(inertia);
+        let mut block = DMat3::from_diagonal_element(inertia);
         for link in &around.links[around.link_starts[particle]..around.link_starts[particle + 1]] {
             let other = link.other as usize;
             let way = mine - self.x[other];
@@ -183,7 +183,7 @@ impl Vbd {
                 let grip = Model::friction(push.force) / slip.norm().max(self.model.creep);
                 force += surface.normal * push.force - slip * grip;
                 add_square(&mut block, surface.normal, push.slope - grip / h);
-                block += Matrix3::from_diagonal_element(grip / h);
+                block += DMat3::from_diagonal_element(grip / h);
             }
         }
         self.touched[particle] = touched;
@@ -248,9 +248,9 @@ impl Around {
 
     /// How a region's volume changes with a particle that is at `mine`, m².
     #[inline(always)]
-    fn gradient(&self, fan: &Fan, mine: V3, x: &[V3]) -> V3 {
+    fn gradient(&self, fan: &Fan, mine: DVec3, x: &[DVec3]) -> DVec3 {
         let side = |[b, c]: &[u32; 2]| (x[*b as usize] - mine).cross(&(x[*c as usize] - mine));
-        self.sides[fan.sides.clone()].iter().map(side).sum::<V3>() * (1.0 / 6.0)
+        self.sides[fan.sides.clone()].iter().map(side).sum::<DVec3>() * (1.0 / 6.0)
     }
 }
 
@@ -266,12 +266,12 @@ fn colours(links: &[Vec<Link>]) -> Vec<u32> {
     order
 }
 
-fn measure(regions: &[Region], x: &[V3], volumes: &mut [f64]) {
+fn measure(regions: &[Region], x: &[DVec3], volumes: &mut [f64]) {
     regions.iter().zip(volumes).for_each(|(region, volume)| *volume = region.volume(x));
 }
 
 #[inline(always)]
-fn add_square(block: &mut Matrix3<f64>, way: V3, weight: f64) {
+fn add_square(block: &mut DMat3, way: DVec3, weight: f64) {
     let scaled = way * weight;
     block.m11 += scaled.x * way.x;
     block.m21 += scaled.y * way.x;

@@ -6,41 +6,42 @@
 //! step, bounded by μ times the contact's own impulse (Müller et al. 2020).
 
 use crate::model::{Law, Model, Spring};
-use crate::scene::{FRAME, GRAVITY, Tools, V3};
+use crate::scene::{FRAME, GRAVITY, Tools};
+use numerics::vector::DVec3;
 
 /// A body on its way, with all memory that its steps need.
 pub(crate) struct Xpbd {
     model: Model,
     substeps: u32,
     iterations: u32,
-    x: Vec<V3>,
-    v: Vec<V3>,
-    before: Vec<V3>,
+    x: Vec<DVec3>,
+    v: Vec<DVec3>,
+    before: Vec<DVec3>,
     /// Impulses × h of springs, regions, and of each surface on each particle of the skin: along its normal, and across.
     of_springs: Vec<f64>,
     of_regions: Vec<f64>,
-    of_surfaces: Vec<[(f64, V3); Tools::MOST]>,
-    gradient: Vec<V3>,
+    of_surfaces: Vec<[(f64, DVec3); Tools::MOST]>,
+    gradient: Vec<DVec3>,
 }
 
 impl Xpbd {
-    pub(crate) fn new(model: Model, points: &[V3], substeps: u32, iterations: u32) -> Self {
+    pub(crate) fn new(model: Model, points: &[DVec3], substeps: u32, iterations: u32) -> Self {
         let widest = model.regions.iter().map(|region| region.particles.len()).max().unwrap_or(0);
         Self {
             substeps,
             iterations,
             x: points.to_vec(),
-            v: vec![V3::zeros(); points.len()],
+            v: vec![DVec3::zeros(); points.len()],
             before: points.to_vec(),
             of_springs: vec![0.0; model.springs.len()],
             of_regions: vec![0.0; model.regions.len()],
-            of_surfaces: vec![[(0.0, V3::zeros()); Tools::MOST]; model.skin.len()],
-            gradient: vec![V3::zeros(); widest],
+            of_surfaces: vec![[(0.0, DVec3::zeros()); Tools::MOST]; model.skin.len()],
+            gradient: vec![DVec3::zeros(); widest],
             model,
         }
     }
 
-    pub(crate) fn positions(&self) -> &[V3] {
+    pub(crate) fn positions(&self) -> &[DVec3] {
         &self.x
     }
 
@@ -58,7 +59,7 @@ impl Xpbd {
             }
             self.of_springs.fill(0.0);
             self.of_regions.fill(0.0);
-            self.of_surfaces.fill([(0.0, V3::zeros()); Tools::MOST]);
+            self.of_surfaces.fill([(0.0, DVec3::zeros()); Tools::MOST]);
             for _ in 0..self.iterations {
                 self.springs(h);
                 self.regions(h);
@@ -121,7 +122,7 @@ impl Xpbd {
                 let mut pull = -*along;
                 self.x[particle] -= surface.normal * (impulse(push, h, weight, &mut pull) * weight);
                 *along = (-pull).max(0.0);
-                if *along > 0.0 || *across != V3::zeros() {
+                if *along > 0.0 || *across != DVec3::zeros() {
                     let slip = self.x[particle] - self.before[particle] - surface.velocity * h;
                     let slip = slip - surface.normal * surface.normal.dot(&slip);
                     let wanted = *across - slip / weight;

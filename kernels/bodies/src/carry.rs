@@ -5,10 +5,8 @@
 //! there, which magnifies how that one deforms.
 
 use numerics::tree::TriangleTree;
-use numerics::vector::Vec3;
+use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 use rayon::prelude::*;
-
-type V3 = nalgebra::Vector3<f64>;
 
 /// What a point hangs on: particles and their shares, which sum to 1. Unused ones have weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +74,8 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
 
 /// What makes barycentric coordinates of places.
 struct Inverse {
-    first: V3,
-    rows: nalgebra::Matrix3<f64>,
+    first: DVec3,
+    rows: DMat3,
 }
 
 impl Inverse {
@@ -85,14 +83,14 @@ impl Inverse {
     fn of(points: &[Vec3], tet: [u32; 4]) -> Option<Self> {
         /// Least volume ÷ the product of its edges that counts: rounding of f32 positions.
         const FLAT: f64 = 1e-6;
-        let [a, b, c, d] = tet.map(|corner| wide(points[corner as usize]));
+        let [a, b, c, d] = tet.map(|corner| to_f64(points[corner as usize]));
         let (p, q, r) = (b - a, c - a, d - a);
         let volume = p.dot(&q.cross(&r));
         let solid = volume.abs() > FLAT * p.norm() * q.norm() * r.norm();
         if !solid {
             return None;
         }
-        let rows = nalgebra::Matrix3::from_rows(&[
+        let rows = DMat3::from_rows(&[
             (q.cross(&r) / volume).transpose(),
             (r.cross(&p) / volume).transpose(),
             (p.cross(&q) / volume).transpose(),
@@ -101,13 +99,9 @@ impl Inverse {
     }
 
     fn shares(&self, p: &Vec3) -> [f64; 4] {
-        let [b, c, d]: [f64; 3] = (self.rows * (wide(*p) - self.first)).into();
+        let [b, c, d]: [f64; 3] = (self.rows * (to_f64(*p) - self.first)).into();
         [1.0 - b - c - d, b, c, d]
     }
-}
-
-fn wide(p: Vec3) -> V3 {
-    V3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
 #[cfg(test)]

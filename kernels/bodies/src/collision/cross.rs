@@ -3,7 +3,7 @@
 //! Promise: every change of sign within the way is found, to rounding of the time. Limit: a plane touched and left again
 //! within rounding may be two or none.
 
-use super::V3;
+use numerics::vector::DVec3;
 
 /// Up to three times in 0…1, rising, and whether the value was above 0 before.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,7 +33,7 @@ pub(super) enum Apart {
 /// What the normal of a triangle where it starts says, then the ways across its sides within its plane and across how the
 /// point passes them: its two sides and the way to the point from where they meet.
 #[inline]
-pub(super) fn face_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+pub(super) fn face_apart(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
     let normal = start[0].cross(&start[1]);
     let said = face_along(&normal, start, end, reach);
     if said == Apart::Unknown {
@@ -51,8 +51,8 @@ pub(super) fn face_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
 
 /// What `axis` says of a point and a triangle.
 #[inline]
-fn face_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
-    let range = |[b, c, p]: &[V3; 3]| {
+fn face_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+    let range = |[b, c, p]: &[DVec3; 3]| {
         let (one, two, way) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
         (way + one.min(two).min(0.0), way + one.max(two).max(0.0))
     };
@@ -65,7 +65,7 @@ fn face_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
 ///
 /// Edges that stay parallel go through each other nowhere that their ends do not.
 #[inline]
-pub(super) fn edges_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
+pub(super) fn edges_apart(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
     /// Sine within which edges are parallel.
     const PARALLEL: f64 = 1e-9;
     let normal = start[0].cross(&start[1]);
@@ -79,14 +79,14 @@ pub(super) fn edges_apart(start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
         return Apart::Far;
     }
     let parallel =
-        |[d, e, _]: &[V3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
+        |[d, e, _]: &[DVec3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
     if parallel(start) && parallel(end) { Apart::Near } else { Apart::Unknown }
 }
 
 /// What `axis` says of two edges.
 #[inline]
-fn edges_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
-    let range = |[d, e, r]: &[V3; 3]| {
+fn edges_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+    let range = |[d, e, r]: &[DVec3; 3]| {
         let (one, two, way) = (-axis.dot(d), axis.dot(e), axis.dot(r));
         (way + one.min(0.0) + two.min(0.0), way + one.max(0.0) + two.max(0.0))
     };
@@ -96,7 +96,7 @@ fn edges_along(axis: &V3, start: &[V3; 3], end: &[V3; 3], reach: f64) -> Apart {
 
 /// Of heights within `low` and `high` times the normal's length.
 #[inline]
-fn verdict(low: f64, high: f64, reach: f64, normal: &V3) -> Apart {
+fn verdict(low: f64, high: f64, reach: f64, normal: &DVec3) -> Apart {
     let nearest = low.max(-high);
     let far = reach * (1.0 + 1e-9);
     if nearest > 0.0 && nearest * nearest > far * far * normal.norm_squared() {
@@ -108,13 +108,13 @@ fn verdict(low: f64, high: f64, reach: f64, normal: &V3) -> Apart {
     }
 }
 
-fn det(a: &V3, b: &V3, c: &V3) -> f64 {
+fn det(a: &DVec3, b: &DVec3, c: &DVec3) -> f64 {
     a.cross(b).dot(c)
 }
 
 /// When the determinant of three vectors that go straight from `start` to `end` changes its sign.
 #[inline]
-pub(super) fn sign_changes(start: &[V3; 3], end: &[V3; 3]) -> Roots {
+pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     let [a, b, c] = start;
     let [p, q, r] = [end[0] - a, end[1] - b, end[2] - c];
     let (ab, aq, pb, pq) = (a.cross(b), a.cross(&q), p.cross(b), p.cross(&q));
@@ -198,7 +198,7 @@ mod tests {
     fn product(roots: [f64; 3]) -> Vec<(f64, bool)> {
         let at = |t: f64| {
             let [a, b, c] = roots.map(|root| t - root);
-            [V3::x() * a, V3::y() * b, V3::z() * c]
+            [DVec3::x() * a, DVec3::y() * b, DVec3::z() * c]
         };
         sign_changes(&at(0.0), &at(1.0)).iter().collect()
     }

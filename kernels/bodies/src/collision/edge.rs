@@ -3,11 +3,11 @@
 //! Two edges touch where each is what its own surface has nearest to the other. So a pair counts where the way from one
 //! to the other points out of both surfaces and away from the triangles beside the edges.
 
-use super::V3;
 use super::cross::{Apart, edges_apart, sign_changes};
 use super::near::along;
 use super::surface::{Edge, Moment, NONE, Surface};
 use super::vertex::{Moving, ON, Rules};
+use numerics::vector::DVec3;
 
 /// Two edges that may touch.
 #[derive(Clone, Copy, Debug)]
@@ -15,7 +15,7 @@ pub(super) struct Hit {
     /// How far along the first and the second edge, from their first ends.
     pub(super) shares: [f64; 2],
     /// Unit, from the second to the first, at the end of the way.
-    pub(super) normal: V3,
+    pub(super) normal: DVec3,
 }
 
 /// Sine of the angle by which triangles beside edges that went through each other may lean over: more than a dent that
@@ -53,7 +53,7 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn segments(&self, pose: usize) -> [[V3; 2]; 2] {
+    fn segments(&self, pose: usize) -> [[DVec3; 2]; 2] {
         [
             self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).place(end)),
             self.other.ends.map(|end| Moment::of(self.second.poses[pose]).place(end)),
@@ -62,19 +62,19 @@ impl Pair<'_> {
 
     /// Both edges and the way from the start of the first to that of the second.
     #[inline]
-    fn ways(&self, pose: usize) -> [V3; 3] {
+    fn ways(&self, pose: usize) -> [DVec3; 3] {
         let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
-        let [p, q] = [V3::from(one[self.edge.ends[0] as usize]), V3::from(one[self.edge.ends[1] as usize])];
-        let [a, b] = [V3::from(two[self.other.ends[0] as usize]), V3::from(two[self.other.ends[1] as usize])];
+        let [p, q] = [DVec3::from(one[self.edge.ends[0] as usize]), DVec3::from(one[self.edge.ends[1] as usize])];
+        let [a, b] = [DVec3::from(two[self.other.ends[0] as usize]), DVec3::from(two[self.other.ends[1] as usize])];
         [q - p, b - a, a - p]
     }
 
     /// Where they went through each other within a piece of the way.
-    fn through(&self, piece: usize, [start, end]: &[[V3; 3]; 2]) -> Option<Hit> {
+    fn through(&self, piece: usize, [start, end]: &[[DVec3; 3]; 2]) -> Option<Hit> {
         for (t, above) in sign_changes(start, end).iter() {
             let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
             let size = d.norm().max(e.norm()).max(start[2].norm()).max(end[2].norm());
-            let [s, u] = along([V3::zeros(), d], [r, r + e]);
+            let [s, u] = along([DVec3::zeros(), d], [r, r + e]);
             let side = if above { -1.0 } else { 1.0 };
             let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
             let time = piece as f64 + t;
@@ -109,18 +109,18 @@ impl Pair<'_> {
     }
 
     /// Whether the second edge points out of its surface along `normal`, and the first against it.
-    fn faces(&self, time: f64, [s, u]: [f64; 2], normal: V3, lean: f64) -> bool {
+    fn faces(&self, time: f64, [s, u]: [f64; 2], normal: DVec3, lean: f64) -> bool {
         is_ridge(self.second.surface, &self.second.moment(time), self.other, u, normal, lean)
             && is_ridge(self.first.surface, &self.first.moment(time), self.edge, s, -normal, lean)
     }
 }
 
-fn between([[p, q], [a, b]]: [[V3; 2]; 2], [s, u]: [f64; 2]) -> V3 {
+fn between([[p, q], [a, b]]: [[DVec3; 2]; 2], [s, u]: [f64; 2]) -> DVec3 {
     p.lerp(&q, s) - a.lerp(&b, u)
 }
 
 /// Whether the triangles at an edge fall away from it, seen along `out`, and have that outside.
-fn is_ridge(surface: &Surface, at: &Moment<'_>, edge: &Edge, share: f64, out: V3, lean: f64) -> bool {
+fn is_ridge(surface: &Surface, at: &Moment<'_>, edge: &Edge, share: f64, out: DVec3, lean: f64) -> bool {
     let point = at.place(edge.ends[0]).lerp(&at.place(edge.ends[1]), share);
     let falls = |third: u32| {
         let way = at.place(third) - point;
@@ -129,6 +129,6 @@ fn is_ridge(surface: &Surface, at: &Moment<'_>, edge: &Edge, share: f64, out: V3
     if !edge.opposite.into_iter().all(|third| third == NONE || falls(third)) {
         return false;
     }
-    let outward = || edge.faces.into_iter().filter_map(|face| surface.normal(at, face)).sum::<V3>();
+    let outward = || edge.faces.into_iter().filter_map(|face| surface.normal(at, face)).sum::<DVec3>();
     !surface.closed || outward().dot(&out) > 0.0
 }

@@ -27,6 +27,7 @@ use crate::mass_spring::{Contact, Contacts, Query};
 pub use motion::Pose;
 use near::Nearest;
 use numerics::tree::{Cuboid, TriangleTree};
+use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::Rub;
 use rayon::prelude::*;
@@ -36,8 +37,6 @@ use std::sync::OnceLock;
 use surface::{Moment, Places};
 use swept::BoxTree;
 use vertex::{Moving, Rules};
-
-type V3 = nalgebra::Vector3<f64>;
 
 /// Vertices or edges that a task looks after: some 20 µs of work.
 const TASK: usize = 64;
@@ -164,8 +163,9 @@ impl Scene<'_> {
         let mut found = Found { contacts: seen.len() as u32, deepest_overlap: 0.0 };
         for Seen { contact, start } in &seen {
             let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
-            let apart: V3 = sides.map(|(particle, weight)| V3::from(query.from[*particle as usize]) * weight).sum();
-            let height = V3::from(contact.normal).dot(&apart) - start;
+            let apart: DVec3 =
+                sides.map(|(particle, weight)| DVec3::from(query.from[*particle as usize]) * weight).sum();
+            let height = DVec3::from(contact.normal).dot(&apart) - start;
             found.deepest_overlap = found.deepest_overlap.max(contact.gap - height);
         }
         out.extend(seen.iter().map(|seen| seen.contact));
@@ -174,9 +174,9 @@ impl Scene<'_> {
 
     fn on_ground(&self, query: &Query<'_>, out: &mut Vec<Seen>) {
         let Some(ground) = self.ground else { return };
-        let up = V3::from(ground.up);
+        let up = DVec3::from(ground.up);
         for particle in self.skins.iter().flat_map(|skin| &skin.surface.vertices) {
-            let height = |x: &[[f64; 3]]| up.dot(&V3::from(x[*particle as usize])) - ground.height;
+            let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
             if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
                 let contact = Contact {
                     particles: [*particle, 0, 0, 0],
@@ -250,7 +250,7 @@ fn between(query: &Query<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
     let at = |time: &f64| {
         let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
         let each = query.from.par_iter().zip(query.to).with_min_len(1024);
-        each.map(|(from, to)| V3::from(*from).lerp(&V3::from(*to), share).into()).collect()
+        each.map(|(from, to)| DVec3::from(*from).lerp(&DVec3::from(*to), share).into()).collect()
     };
     times[1..times.len() - 1].iter().map(at).collect()
 }
@@ -286,9 +286,9 @@ fn in_order<T: Sync, S>(
 }
 
 /// The places of a point in all poses.
-fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<V3>) {
+fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<DVec3>) {
     path.clear();
-    path.extend(poses.iter().map(|pose| V3::from(pose[point as usize])));
+    path.extend(poses.iter().map(|pose| DVec3::from(pose[point as usize])));
 }
 
 impl Meeting<'_> {
@@ -322,8 +322,8 @@ impl Meeting<'_> {
 
     /// The nearest triangle where the way begins, of a vertex within the obstacle's `bounds`; `solid` are its triangles
     /// then, put where they are once they are asked.
-    fn sunk(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: V3) -> Option<Nearest> {
-        let p = [start.x as f32, start.y as f32, start.z as f32];
+    fn sunk(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<Nearest> {
+        let p = to_f32(start);
         if !swept::meet(&Cuboid { low: p, high: p }, bounds) {
             return None;
         }
@@ -388,11 +388,11 @@ impl Meeting<'_> {
         &self,
         (particles, weights): ([u32; 4], [f64; 4]),
         (points, shares): (&[u32], &[f64]),
-        normal: V3,
+        normal: DVec3,
         shift: f64,
     ) -> Option<Seen> {
         let touched = |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.place(*point) * *share).sum();
-        let (start, end): (V3, V3) = (touched(&self.still.start()), touched(&self.still.end()));
+        let (start, end): (DVec3, DVec3) = (touched(&self.still.start()), touched(&self.still.end()));
         let gap = self.rules.gap;
         let normal = self.scene.above_ground(normal, end, gap)?;
         let contact = Contact {
@@ -410,11 +410,11 @@ impl Meeting<'_> {
 
 impl Scene<'_> {
     /// A normal that pushes nothing at `point` below the ground: along it where it would, none where nothing is left.
-    fn above_ground(&self, normal: V3, point: V3, gap: f64) -> Option<V3> {
+    fn above_ground(&self, normal: DVec3, point: DVec3, gap: f64) -> Option<DVec3> {
         /// Share of a normal that is left above the rounding of one straight down.
         const LEFT: f64 = 1e-3;
         let Some(ground) = self.ground else { return Some(normal) };
-        let up = V3::from(ground.up);
+        let up = DVec3::from(ground.up);
         let down = -normal.dot(&up);
         let pushed = (point + normal * gap).dot(&up) - ground.height;
         if down <= 0.0 || pushed >= ground.thickness {

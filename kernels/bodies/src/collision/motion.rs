@@ -5,8 +5,8 @@
 //! poses are met to the bit, and what turns as a whole keeps its size. Limit: between two poses it turns less than half
 //! a turn; a middle that swings goes by the chord.
 
-use super::V3;
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::Matrix4;
+use numerics::vector::{DMat3, DVec3};
 
 /// Positions at a share of the frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub(super) struct Motion {
 
 #[derive(Clone, Debug)]
 struct Span {
-    middles: [V3; 2],
-    axis: V3,
+    middles: [DVec3; 2],
+    axis: DVec3,
     /// Radians.
     angle: f64,
     /// Of the point farthest from the axis, metres.
@@ -59,7 +59,7 @@ impl Motion {
                 let span = &self.spans[index];
                 if span.is_still() {
                     let ends = self.poses[index].positions.iter().zip(&self.poses[index + 1].positions);
-                    return ends.map(|(a, b)| V3::from(*a).lerp(&V3::from(*b), along).into()).collect();
+                    return ends.map(|(a, b)| DVec3::from(*a).lerp(&DVec3::from(*b), along).into()).collect();
                 }
                 let middle = span.middles[0].lerp(&span.middles[1], along);
                 let (turn, back) = (span.turn(along), span.turn(1.0).transpose());
@@ -70,16 +70,16 @@ impl Motion {
     }
 
     /// How fast a point is, metres a frame; before the first pose and after the last it stands still.
-    pub(super) fn pace(&self, share: f64, point: u32) -> V3 {
+    pub(super) fn pace(&self, share: f64, point: u32) -> DVec3 {
         let (first, last) = (self.poses[0].share, self.poses[self.poses.len() - 1].share);
         let Some((index, along)) = self.span(share).filter(|_| first <= share && share <= last) else {
-            return V3::zeros();
+            return DVec3::zeros();
         };
         let span = &self.spans[index];
         let [from, to] = [index, index + 1].map(|pose| &self.poses[pose].positions[point as usize]);
         let back = span.turn(1.0).transpose();
         let turn = span.turn(along);
-        let left = back * (V3::from(*to) - span.middles[1]) - (V3::from(*from) - span.middles[0]);
+        let left = back * (DVec3::from(*to) - span.middles[1]) - (DVec3::from(*from) - span.middles[0]);
         let spun = span.axis.cross(&(turn * span.arm(&back, from, to, along))) * span.angle;
         let way = span.middles[1] - span.middles[0] + spun + turn * left;
         way / (self.poses[index + 1].share - self.poses[index].share)
@@ -111,20 +111,21 @@ impl Motion {
 
 impl Span {
     fn between(from: &[[f64; 3]], to: &[[f64; 3]]) -> Self {
-        let mean = |points: &[[f64; 3]]| points.iter().map(|p| V3::from(*p)).sum::<V3>() / (points.len().max(1) as f64);
+        let mean =
+            |points: &[[f64; 3]]| points.iter().map(|p| DVec3::from(*p)).sum::<DVec3>() / (points.len().max(1) as f64);
         let middles = [mean(from), mean(to)];
-        let mut spread = Matrix3::zeros();
+        let mut spread = DMat3::zeros();
         for (a, b) in from.iter().zip(to) {
-            spread += (V3::from(*a) - middles[0]) * (V3::from(*b) - middles[1]).transpose();
+            spread += (DVec3::from(*a) - middles[0]) * (DVec3::from(*b) - middles[1]).transpose();
         }
         let [w, x, y, z] = fit(&spread);
-        let (axis, length) = (V3::new(x, y, z), V3::new(x, y, z).norm());
+        let (axis, length) = (DVec3::new(x, y, z), DVec3::new(x, y, z).norm());
         let angle = 2.0 * libm::atan2(length, w.abs());
         if angle <= 1e-15 {
-            return Self { middles, axis: V3::z(), angle: 0.0, radius: 0.0 };
+            return Self { middles, axis: DVec3::z(), angle: 0.0, radius: 0.0 };
         }
         let axis = axis * (w.signum() / length);
-        let radius = from.iter().map(|a| axis.cross(&(V3::from(*a) - middles[0])).norm()).fold(0.0, f64::max);
+        let radius = from.iter().map(|a| axis.cross(&(DVec3::from(*a) - middles[0])).norm()).fold(0.0, f64::max);
         Self { middles, axis, angle, radius }
     }
 
@@ -133,21 +134,21 @@ impl Span {
     }
 
     /// The turn after a share of the span (Rodrigues).
-    fn turn(&self, along: f64) -> Matrix3<f64> {
+    fn turn(&self, along: f64) -> DMat3 {
         let (sine, cosine) = libm::sincos(self.angle * along);
         let cross = self.axis.cross_matrix();
-        Matrix3::identity() + cross * sine + cross * cross * (1.0 - cosine)
+        DMat3::identity() + cross * sine + cross * cross * (1.0 - cosine)
     }
 
     /// A point about the middle, not turned yet.
-    fn arm(&self, back: &Matrix3<f64>, from: &[f64; 3], to: &[f64; 3], along: f64) -> V3 {
-        (V3::from(*from) - self.middles[0]).lerp(&(back * (V3::from(*to) - self.middles[1])), along)
+    fn arm(&self, back: &DMat3, from: &[f64; 3], to: &[f64; 3], along: f64) -> DVec3 {
+        (DVec3::from(*from) - self.middles[0]).lerp(&(back * (DVec3::from(*to) - self.middles[1])), along)
     }
 }
 
 /// The quaternion (cosine first) of the rotation that brings the first points of a spread Σ a bᵀ nearest to the second:
 /// the first eigenvector of Horn's matrix, by Jacobi's rotations; no turn where every one does as well.
-fn fit(spread: &Matrix3<f64>) -> [f64; 4] {
+fn fit(spread: &DMat3) -> [f64; 4] {
     /// Share of the spread by which no turn is preferred: above rounding of what has no width.
     const CALM: f64 = 1e-13;
     /// Sweeps; each squares what is off the diagonal.

@@ -1,7 +1,7 @@
 //! Nearest points of triangles and segments, f64.
 
-use super::V3;
 use super::surface::Feature;
+use numerics::vector::DVec3;
 
 /// The nearest point of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -9,14 +9,14 @@ pub(super) struct Nearest {
     pub(super) face: u32,
     /// Of the corners, ≥ 0, together 1; exactly 0 off a side or corner.
     pub(super) weights: [f64; 3],
-    pub(super) point: V3,
+    pub(super) point: DVec3,
     pub(super) distance: f64,
 }
 
 impl Nearest {
     /// Of `face` with these corners, to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
     #[inline]
-    pub(super) fn on(face: u32, p: V3, corners: [V3; 3]) -> Self {
+    pub(super) fn on(face: u32, p: DVec3, corners: [DVec3; 3]) -> Self {
         let weights = weights(p, corners);
         let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
         Self { face, weights, point, distance: (p - point).norm() }
@@ -40,7 +40,7 @@ fn share(part: f64, whole: f64) -> f64 {
 }
 
 #[inline]
-fn weights(p: V3, [a, b, c]: [V3; 3]) -> [f64; 3] {
+fn weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -78,7 +78,7 @@ fn weights(p: V3, [a, b, c]: [V3; 3]) -> [f64; 3] {
 }
 
 /// Weights of the corners where `p` falls on a triangle's plane; negative beyond a side.
-pub(super) fn projected(p: V3, [a, b, c]: [V3; 3], normal: V3) -> [f64; 3] {
+pub(super) fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64; 3] {
     let area = (b - a).cross(&(c - a)).dot(&normal);
     let v = (p - a).cross(&(c - a)).dot(&normal) / area;
     let w = (b - a).cross(&(p - a)).dot(&normal) / area;
@@ -86,7 +86,7 @@ pub(super) fn projected(p: V3, [a, b, c]: [V3; 3], normal: V3) -> [f64; 3] {
 }
 
 /// How far along two segments their nearest points are, 0…1 (Ericson, 5.1.9).
-pub(super) fn along([p, q]: [V3; 2], [a, b]: [V3; 2]) -> [f64; 2] {
+pub(super) fn along([p, q]: [DVec3; 2], [a, b]: [DVec3; 2]) -> [f64; 2] {
     let (d, e, r) = (q - p, b - a, p - a);
     let (dd, ee, er) = (d.norm_squared(), e.norm_squared(), e.dot(&r));
     let dr = d.dot(&r);
@@ -112,16 +112,16 @@ mod tests {
     use super::*;
     use numerics::random::Key;
 
-    fn random(seed: u64, k: u64) -> V3 {
+    fn random(seed: u64, k: u64) -> DVec3 {
         let key = Key::new(seed).of(k);
-        V3::new(key.of(0).f64(), key.of(1).f64(), key.of(2).f64())
+        DVec3::new(key.of(0).f64(), key.of(1).f64(), key.of(2).f64())
     }
 
     #[test]
     fn nearest_points_beat_a_thousand_others() {
         for case in 0..300 {
             let corners = [0, 1, 2].map(|k| random(1, 4 * case + k));
-            let p = random(1, 4 * case + 3) * 3.0 - V3::repeat(1.0);
+            let p = random(1, 4 * case + 3) * 3.0 - DVec3::repeat(1.0);
             let best = Nearest::on(0, p, corners);
             assert!((best.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             for k in 0..400 {
@@ -141,8 +141,12 @@ mod tests {
 
     #[test]
     fn nothing_of_no_area_or_length_is_divided_by() {
-        let p = V3::new(1.0, 2.0, 3.0);
-        for corners in [[V3::zeros(); 3], [V3::zeros(), V3::x(), V3::x()], [V3::zeros(), V3::x(), V3::x() * 2.0]] {
+        let p = DVec3::new(1.0, 2.0, 3.0);
+        for corners in [
+            [DVec3::zeros(); 3],
+            [DVec3::zeros(), DVec3::x(), DVec3::x()],
+            [DVec3::zeros(), DVec3::x(), DVec3::x() * 2.0],
+        ] {
             assert!(Nearest::on(0, p, corners).distance.is_finite());
         }
         assert_eq!(along([p, p], [p, p]), [0.0, 0.0]);

@@ -1,11 +1,11 @@
 //! What bodies touch that they do not move: animated meshes, and the ground.
 
+use super::TouchError;
 use super::motion::{Motion, Pose};
 use super::surface::{Moment, NONE, Surface};
 use super::swept::Elements;
-use super::{TouchError, V3};
 use numerics::tree::TriangleTree;
-use numerics::vector::Vec3;
+use numerics::vector::{DVec3, Vec3};
 
 /// A mesh that moves through the frame as its poses say, as rigidly as they allow.
 #[derive(Clone, Debug)]
@@ -97,12 +97,12 @@ impl Obstacle {
         self.velocity_of(share, &self.surface.triangles[triangle as usize], &weights).into()
     }
 
-    pub(super) fn velocity_of(&self, share: f64, points: &[u32], weights: &[f64]) -> V3 {
+    pub(super) fn velocity_of(&self, share: f64, points: &[u32], weights: &[f64]) -> DVec3 {
         if self.seconds <= 0.0 {
-            return V3::zeros();
+            return DVec3::zeros();
         }
         let sides = points.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
-        sides.map(|(point, weight)| self.motion.pace(share, *point) * *weight).sum::<V3>() / self.seconds
+        sides.map(|(point, weight)| self.motion.pace(share, *point) * *weight).sum::<DVec3>() / self.seconds
     }
 }
 

@@ -4,9 +4,10 @@ use super::edge;
 use super::skin::Skin;
 use super::swept::{self, BoxTree};
 use super::vertex::{self, Moving, Rules};
-use super::{REACH, Scene, Seen, V3, in_order};
+use super::{REACH, Scene, Seen, in_order};
 use crate::mass_spring::{Contact, Query};
 use numerics::tree::Cuboid;
+use numerics::vector::DVec3;
 
 /// How surfaces of bodies touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,7 +120,7 @@ impl Pair<'_> {
                     continue;
                 }
                 hits.clear();
-                let path = ways.map(|way| V3::from(way[*vertex as usize]));
+                let path = ways.map(|way| DVec3::from(way[*vertex as usize]));
                 vertex::hits(&path, &on, &faces, || None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
@@ -166,7 +167,7 @@ impl Pair<'_> {
         if self.own { self.rub.thickness.min(at_rest()) } else { self.rub.thickness }
     }
 
-    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: V3, shift: f64, gap: f64) -> Option<Seen> {
+    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Seen> {
         if gap < JOINED * self.rub.thickness {
             return None;
         }

@@ -41,7 +41,8 @@ impl Skin {
             faces: Elements::new(surface.triangles.clone(), rest),
             edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
             rest: rest.to_vec(),
-            mean: surface.edges.iter().map(|edge| length(edge, rest)).sum::<f64>() / surface.edges.len().max(1) as f64,
+            mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
+                / surface.edges.len().max(1) as f64,
             surface,
             starts,
             rings,
@@ -89,7 +90,7 @@ impl Skin {
     }
 
     fn is_drawn_out(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
-        length(edge, x) > LONG * length(edge, &self.rest).max(self.mean)
+        edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean)
     }
 
     /// How far two edges are apart at rest, metres.
@@ -128,7 +129,7 @@ impl LetGo {
     }
 }
 
-fn length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
+fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     let at = Moment::of(places);
     (at.place(edge.ends[0]) - at.place(edge.ends[1])).norm()
 }

@@ -3,8 +3,8 @@
 //! Positions are given at each call, so that one surface serves every pose. An edge with more than two triangles keeps
 //! the first two.
 
-use super::V3;
 use super::near::Nearest;
+use numerics::vector::DVec3;
 
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
@@ -55,9 +55,9 @@ impl<'a> Moment<'a> {
 
     /// Where a point is.
     #[inline(always)]
-    pub(super) fn place(&self, point: u32) -> V3 {
-        let to = V3::from(self.to[point as usize]);
-        if self.share >= 1.0 { to } else { V3::from(self.from[point as usize]).lerp(&to, self.share) }
+    pub(super) fn place(&self, point: u32) -> DVec3 {
+        let to = DVec3::from(self.to[point as usize]);
+        if self.share >= 1.0 { to } else { DVec3::from(self.from[point as usize]).lerp(&to, self.share) }
     }
 }
 
@@ -124,13 +124,13 @@ impl Surface {
     }
 
     #[inline]
-    pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [V3; 3] {
+    pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[face as usize];
         [at.place(a), at.place(b), at.place(c)]
     }
 
     /// Unit; none where there is no area.
-    pub(super) fn normal(&self, at: &Moment<'_>, face: u32) -> Option<V3> {
+    pub(super) fn normal(&self, at: &Moment<'_>, face: u32) -> Option<DVec3> {
         let [a, b, c] = self.corners(at, face);
         let (ab, ac) = (b - a, c - a);
         let normal = ab.cross(&ac);
@@ -146,18 +146,18 @@ impl Surface {
 
     /// Which way is out at a point of a triangle: the angle-weighted mean of the triangles there (Bærentzen & Aanæs
     /// 2005), so that its side is that of any point to which this one is the nearest.
-    pub(super) fn outward(&self, at: &Moment<'_>, nearest: &Nearest) -> V3 {
+    pub(super) fn outward(&self, at: &Moment<'_>, nearest: &Nearest) -> DVec3 {
         let corners = self.triangles[nearest.face as usize];
-        let normal = |face: u32| if face == NONE { V3::zeros() } else { self.normal(at, face).unwrap_or_default() };
+        let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
         match nearest.feature() {
             Feature::Inside => normal(nearest.face),
             Feature::Side(k) => match self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize) {
                 Some(edge) => normal(edge.faces[0]) + normal(edge.faces[1]),
-                None => V3::zeros(),
+                None => DVec3::zeros(),
             },
             Feature::Corner(k) => {
                 let here = at.place(corners[k]);
-                let mut sum = V3::zeros();
+                let mut sum = DVec3::zeros();
                 for edge in self.edges_at(corners[k]) {
                     let other = if edge.ends[0] == corners[k] { edge.ends[1] } else { edge.ends[0] };
                     let along = at.place(other) - here;
@@ -172,7 +172,7 @@ impl Surface {
     }
 
     /// Whether no triangle around is nearer than `nearest` to a point that is `away` from it.
-    pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &Nearest, away: &V3) -> bool {
+    pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &Nearest, away: &DVec3) -> bool {
         /// Sine of the angle by which it may lie on a neighbour's side: above rounding, below any real one.
         const SLACK: f64 = 1e-9;
         let corners = self.triangles[nearest.face as usize];
@@ -195,7 +195,7 @@ impl Surface {
 
     /// Goes from triangle to triangle, over edges that bend little, to one that has `point` above or below it: the plane
     /// that is the surface for a point that slid on from where it came through.
-    pub(super) fn settle(&self, at: &Moment<'_>, face: u32, point: V3) -> Settled {
+    pub(super) fn settle(&self, at: &Moment<'_>, face: u32, point: DVec3) -> Settled {
         /// Triangles passed, at most.
         const MOST: usize = 64;
         /// Cosine of the angle at an edge beyond which the other triangle is another side.
@@ -223,7 +223,7 @@ impl Surface {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Settled {
     pub(super) nearest: Nearest,
-    pub(super) normal: Option<V3>,
+    pub(super) normal: Option<DVec3>,
 }
 
 /// Which part of a triangle a point of it is on.

@@ -3,10 +3,10 @@
 //! What counts is the side it came from. A closed surface is only ever entered from outside; an open one has two sides.
 //! After the first triangle it goes through, only that is what it meets: what else it was near to is judged there.
 
-use super::V3;
 use super::cross::{Apart, face_apart, sign_changes};
 use super::near::Nearest;
 use super::surface::{Moment, Places, Settled, Surface};
+use numerics::vector::DVec3;
 
 /// Share of the lengths involved within which a point is on a triangle's plane: above rounding.
 pub(super) const ON: f64 = 1e-9;
@@ -54,7 +54,7 @@ pub(super) struct Hit {
     /// Of the triangle's corners.
     pub(super) weights: [f64; 3],
     /// Unit, from the triangle to the point, at the end of the way.
-    pub(super) normal: V3,
+    pub(super) normal: DVec3,
     /// How much deeper than the triangle's plane it may stay.
     pub(super) shift: f64,
     /// Distance at the end.
@@ -64,7 +64,7 @@ pub(super) struct Hit {
 /// Adds what the point on `path` (as many places as there are poses) meets among `faces`, which rise; `sunk` is the
 /// nearest triangle at the start where none of them is near then and the point may be inside.
 pub(super) fn hits(
-    path: &[V3],
+    path: &[DVec3],
     on: &Moving<'_>,
     faces: &[u32],
     sunk: impl FnOnce() -> Option<Nearest>,
@@ -133,13 +133,13 @@ pub(super) fn hits(
     merge(out, first);
 }
 
-fn point_at(path: &[V3], time: f64) -> V3 {
+fn point_at(path: &[DVec3], time: f64) -> DVec3 {
     let piece = (time as usize).min(path.len() - 2);
     path[piece].lerp(&path[piece + 1], time - piece as f64)
 }
 
 /// Whether a point is inside, seen from its nearest of a closed surface.
-fn is_behind(surface: &Surface, at: &Moment<'_>, nearest: &Nearest, point: V3) -> bool {
+fn is_behind(surface: &Surface, at: &Moment<'_>, nearest: &Nearest, point: DVec3) -> bool {
     surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
 }
 
@@ -153,10 +153,10 @@ enum Way {
     Through(f64, bool),
 }
 
-fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
+fn crossing(path: &[DVec3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
     let [a, b, c] = on.surface.triangles[face as usize];
     let ways = |pose: usize| {
-        let at = |point: u32| V3::from(on.poses[pose][point as usize]);
+        let at = |point: u32| DVec3::from(on.poses[pose][point as usize]);
         let origin = at(a);
         [at(b) - origin, at(c) - origin, path[pose] - origin]
     };
@@ -170,7 +170,7 @@ fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
             for (t, above) in sign_changes(&start, &end).iter().filter(|root| root.1 || !on.surface.closed) {
                 let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
                 let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());
-                if Nearest::on(face, p, [V3::zeros(), b, c]).distance <= ON * size {
+                if Nearest::on(face, p, [DVec3::zeros(), b, c]).distance <= ON * size {
                     return Way::Through(piece as f64 + t, above);
                 }
             }
@@ -181,7 +181,14 @@ fn crossing(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
 }
 
 /// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
-fn close(surface: &Surface, at: &Moment<'_>, last: &Moment<'_>, nearest: Nearest, here: V3, end: V3) -> Option<Hit> {
+fn close(
+    surface: &Surface,
+    at: &Moment<'_>,
+    last: &Moment<'_>,
+    nearest: Nearest,
+    here: DVec3,
+    end: DVec3,
+) -> Option<Hit> {
     let away = here - nearest.point;
     if (surface.closed && is_behind(surface, at, &nearest, here)) || !surface.is_nearest_around(at, &nearest, &away) {
         return None;
@@ -195,20 +202,20 @@ fn close(surface: &Surface, at: &Moment<'_>, last: &Moment<'_>, nearest: Nearest
     };
     let normal = match (away.try_normalize(0.0), frame(at), frame(last)) {
         (Some(away), Some(then), Some(now)) => {
-            (0..3).map(|k| now[k] * then[k].dot(&away)).sum::<V3>().try_normalize(0.0)?
+            (0..3).map(|k| now[k] * then[k].dot(&away)).sum::<DVec3>().try_normalize(0.0)?
         }
         (Some(away), _, _) => away,
         (None, Some(_), Some(now)) => now[2],
         _ => return None,
     };
     let corners = surface.corners(last, face);
-    let point: V3 = (0..3).map(|k| corners[k] * nearest.weights[k]).sum();
+    let point: DVec3 = (0..3).map(|k| corners[k] * nearest.weights[k]).sum();
     Some(Hit { face, weights: nearest.weights, normal, shift: 0.0, clearance: normal.dot(&(end - point)) })
 }
 
 /// Whether the point comes nearer than `reach` to a triangle: on by what is left of the way at their top speed, which
 /// leaps over nothing.
-fn approaches(path: &[V3], on: &Moving<'_>, face: u32, reach: f64) -> bool {
+fn approaches(path: &[DVec3], on: &Moving<'_>, face: u32, reach: f64) -> bool {
     /// Steps a piece; what is not decided by then counts.
     const MOST: usize = 64;
     for piece in 0..path.len() - 1 {

@@ -5,9 +5,8 @@
 //! products of one vector a corner: their matrix has no negative eigenvalue, whatever the volume is taken to be.
 
 use super::FLAT;
+use numerics::vector::{DVec3, Vec3, to_f64};
 use rayon::prelude::*;
-
-type Vec3 = [f64; 3];
 
 /// Rows that a thread takes at a time.
 pub(super) const CHUNK: usize = 1024;
@@ -22,14 +21,14 @@ pub(super) struct Equations {
     entries: Vec<(u32, f64)>,
     pub(super) diagonal: Vec<f64>,
     /// What held points exert on each row.
-    pub(super) forces: Vec<Vec3>,
+    pub(super) forces: Vec<DVec3>,
 }
 
 impl Equations {
     /// Of points that are moved by `held_by` or free.
-    pub(super) fn of(points: &[[f32; 3]], tets: &[[u32; 4]], held_by: &[Option<Vec3>]) -> Self {
+    pub(super) fn of(points: &[Vec3], tets: &[[u32; 4]], held_by: &[Option<DVec3>]) -> Self {
         let mut rows = 0_u32;
-        let number = |held: &Option<Vec3>| {
+        let number = |held: &Option<DVec3>| {
             held.is_none().then(|| {
                 rows += 1;
                 rows - 1
@@ -49,7 +48,7 @@ impl Equations {
         (0..rows).for_each(|row| starts[row + 1] += starts[row]);
         let mut next = starts.clone();
         let mut entries = vec![(0, 0.0); starts[rows] as usize];
-        let (mut diagonal, mut forces) = (vec![0.0; rows], vec![[0.0; 3]; rows]);
+        let (mut diagonal, mut forces) = (vec![0.0; rows], vec![DVec3::zeros(); rows]);
         for (edge, weight) in edges {
             for (row, other) in ends(edge) {
                 let Some(row) = row.map(|row| row as usize) else { continue };
@@ -59,10 +58,7 @@ impl Equations {
                         entries[next[row] as usize] = (other, weight);
                         next[row] += 1;
                     }
-                    (None, by) => {
-                        let by = by.unwrap_or_default();
-                        (0..3).for_each(|k| forces[row][k] += weight * by[k]);
-                    }
+                    (None, by) => forces[row] += by.unwrap_or_default() * weight,
                 }
             }
         }
@@ -70,14 +66,13 @@ impl Equations {
     }
 
     /// The matrix times `x`.
-    pub(super) fn times(&self, x: &[Vec3], out: &mut [Vec3]) {
+    pub(super) fn times(&self, x: &[DVec3], out: &mut [DVec3]) {
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             for (place, out) in out.iter_mut().enumerate() {
                 let row = chunk * CHUNK + place;
-                let mut sum = x[row].map(|x| self.diagonal[row] * x);
+                let mut sum = x[row] * self.diagonal[row];
                 for (other, weight) in &self.entries[self.starts[row] as usize..self.starts[row + 1] as usize] {
-                    let other = &x[*other as usize];
-                    (0..3).for_each(|k| sum[k] -= weight * other[k]);
+                    sum -= x[*other as usize] * *weight;
                 }
                 *out = sum;
             }
@@ -86,7 +81,7 @@ impl Equations {
 }
 
 /// Weights of the edges with a free end, each edge once, sorted; those of its tets are added up in their order.
-fn edges(points: &[[f32; 3]], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
+fn edges(points: &[Vec3], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
     const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     let of_tet = |tet: &[u32; 4]| {
         let weights = weights(&tet.map(|corner| points[corner as usize]));
@@ -106,47 +101,29 @@ fn edges(points: &[[f32; 3]], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([
 }
 
 /// What joins the corners of a tet, two by two; 0 where all lie on one spot.
-fn weights(corners: &[[f32; 3]; 4]) -> [[f64; 4]; 4] {
+fn weights(corners: &[Vec3; 4]) -> [[f64; 4]; 4] {
     let edge = longest_edge(corners);
     if edge == 0.0 {
         return [[0.0; 4]; 4];
     }
     // A unit of an edge, so that no power of a length is too small or too large.
-    let [a, b, c, d] = corners.map(|p| [0, 1, 2].map(|k| (f64::from(p[k]) - f64::from(corners[0][k])) / edge));
-    let normals = [
-        cross(sub(d, b), sub(c, b)),
-        cross(sub(c, a), sub(d, a)),
-        cross(sub(d, a), sub(b, a)),
-        cross(sub(b, a), sub(c, a)),
-    ];
-    let six_volumes = dot(sub(b, a), normals[1]).abs().max(FLAT);
-    let weight = |k: usize, l: usize| -dot(normals[k], normals[l]) / (6.0 * six_volumes) * edge;
+    let [a, b, c, d] = corners.map(|p| (to_f64(p) - to_f64(corners[0])) / edge);
+    let normals = [(d - b).cross(&(c - b)), (c - a).cross(&(d - a)), (d - a).cross(&(b - a)), (b - a).cross(&(c - a))];
+    let six_volumes = (b - a).dot(&normals[1]).abs().max(FLAT);
+    let weight = |k: usize, l: usize| -normals[k].dot(&normals[l]) / (6.0 * six_volumes) * edge;
     std::array::from_fn(|k| std::array::from_fn(|l| weight(k, l)))
 }
 
 /// The length of a tet's longest edge.
-pub(super) fn longest_edge(corners: &[[f32; 3]; 4]) -> f64 {
-    let wide = corners.map(|p| p.map(f64::from));
+pub(super) fn longest_edge(corners: &[Vec3; 4]) -> f64 {
+    let wide = corners.map(to_f64);
     let mut longest = 0.0_f64;
     for k in 1..4 {
         for l in 0..k {
-            let edge = sub(wide[k], wide[l]);
-            longest = longest.max(dot(edge, edge));
+            longest = longest.max((wide[k] - wide[l]).norm_squared());
         }
     }
     longest.sqrt()
-}
-
-fn sub(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: Vec3, b: Vec3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

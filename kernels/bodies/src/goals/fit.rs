@@ -1,7 +1,7 @@
 //! The affine map that brings the held points of a piece nearest to where they belong.
 
 use super::{Held, Pieces, target};
-use nalgebra::Matrix3;
+use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Of the trace of the held points' scatter: in directions thinner than this share's root, a fit follows the rest shape.
 /// Squared coordinates keep 16 digits, so what is above is known to 4; what is taken off too little, the solve does.
@@ -9,10 +9,10 @@ const THIN: f64 = 1e-12;
 
 /// An affine map.
 pub(super) struct Affine {
-    from: [f64; 3],
-    to: [f64; 3],
-    /// The linear part less the identity, row by row.
-    stretch: [[f64; 3]; 3],
+    from: DVec3,
+    to: DVec3,
+    /// The linear part less the identity.
+    stretch: DMat3,
     rests: bool,
 }
 
@@ -20,13 +20,13 @@ pub(super) struct Affine {
 #[derive(Clone, Default)]
 struct Sums {
     count: f64,
-    rest: [f64; 3],
-    goal: [f64; 3],
+    rest: DVec3,
+    goal: DVec3,
     moved: bool,
     /// Rest · restᵀ, from the middles.
-    scatter: [[f64; 3]; 3],
+    scatter: DMat3,
     /// (Goal − rest) · restᵀ, from the middles.
-    change: [[f64; 3]; 3],
+    change: DMat3,
 }
 
 impl Affine {
@@ -41,41 +41,32 @@ impl Affine {
             let sums = &mut sums[piece];
             sums.count += 1.0;
             sums.moved |= rest != goal;
-            for k in 0..3 {
-                sums.rest[k] += f64::from(rest[k]);
-                sums.goal[k] += f64::from(goal[k]);
-            }
+            sums.rest += to_f64(rest);
+            sums.goal += to_f64(goal);
         }
         for sums in &mut sums {
-            for k in 0..3 {
-                sums.rest[k] /= sums.count;
-                sums.goal[k] /= sums.count;
-            }
+            sums.rest /= sums.count;
+            sums.goal /= sums.count;
         }
         for (piece, rest, goal) in held_points() {
             let sums = &mut sums[piece];
-            let arm = [0, 1, 2].map(|k| f64::from(rest[k]) - sums.rest[k]);
-            let goal = [0, 1, 2].map(|k| f64::from(goal[k]) - sums.goal[k]);
-            for row in 0..3 {
-                for column in 0..3 {
-                    sums.scatter[row][column] += arm[row] * arm[column];
-                    sums.change[row][column] += (goal[row] - arm[row]) * arm[column];
-                }
-            }
+            let offset = to_f64(rest) - sums.rest;
+            let goal = to_f64(goal) - sums.goal;
+            sums.scatter += offset * offset.transpose();
+            sums.change += (goal - offset) * offset.transpose();
         }
         sums.into_iter().map(|sums| (sums.count > 0.0).then(|| Self::of(&sums))).collect()
     }
 
     fn of(sums: &Sums) -> Self {
-        let trace = sums.scatter[0][0] + sums.scatter[1][1] + sums.scatter[2][2];
-        let share = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|row, column| rows[row][column] / trace);
-        let scatter = share(&sums.scatter) + Matrix3::identity() * THIN;
+        let trace = sums.scatter.trace();
+        let scatter = sums.scatter / trace + DMat3::identity() * THIN;
         let stretch = match scatter.try_inverse().filter(|_| trace > 0.0) {
-            Some(inverse) => share(&sums.change) * inverse,
-            None => Matrix3::zeros(),
+            Some(inverse) => sums.change / trace * inverse,
+            None => DMat3::zeros(),
         };
         let finite = stretch.iter().all(|x| x.is_finite());
-        let stretch = [0, 1, 2].map(|row| [0, 1, 2].map(|k| if finite { stretch[(row, k)] } else { 0.0 }));
+        let stretch = if finite { stretch } else { DMat3::zeros() };
         Self { from: sums.rest, to: sums.goal, stretch, rests: !sums.moved }
     }
 
@@ -85,15 +76,12 @@ impl Affine {
     }
 
     /// Where it brings a point.
-    pub(super) fn map(&self, rest: [f32; 3]) -> [f64; 3] {
-        let rest = rest.map(f64::from);
+    pub(super) fn map(&self, rest: Vec3) -> DVec3 {
+        let rest = to_f64(rest);
         if self.rests {
             return rest;
         }
-        let arm = [0, 1, 2].map(|k| rest[k] - self.from[k]);
-        [0, 1, 2].map(|k| {
-            let [x, y, z] = self.stretch[k];
-            self.to[k] + arm[k] + (x * arm[0] + y * arm[1] + z * arm[2])
-        })
+        let offset = rest - self.from;
+        self.to + offset + self.stretch * offset
     }
 }

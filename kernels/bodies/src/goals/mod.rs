@@ -19,6 +19,7 @@ mod solve;
 
 use equations::Equations;
 use fit::Affine;
+use numerics::vector::{DVec3, to_f32, to_f64};
 use numerics::volume::{of_tets, six_volumes};
 use pieces::Pieces;
 use solve::solve;
@@ -69,17 +70,17 @@ pub fn goal(held: &Held<'_>, limits: Limits) -> Goal {
     let fits = Affine::of_pieces(held, &pieces);
     let mut loose = 0;
     // The affine part of each point's place; what is held differs from it by `held_by`.
-    let mut places: Vec<[f64; 3]> = Vec::with_capacity(held.points.len());
-    let mut held_by: Vec<Option<[f64; 3]>> = Vec::with_capacity(held.points.len());
+    let mut places: Vec<DVec3> = Vec::with_capacity(held.points.len());
+    let mut held_by: Vec<Option<DVec3>> = Vec::with_capacity(held.points.len());
     for (point, rest) in held.points.iter().enumerate() {
         let fit = &fits[pieces.of_point[point] as usize];
-        let place = fit.as_ref().map_or(rest.map(f64::from), |fit| fit.map(*rest));
+        let place = fit.as_ref().map_or(to_f64(*rest), |fit| fit.map(*rest));
         let target = target(held, point);
         loose += usize::from(target.is_none() && fit.is_none());
         held_by.push(match target {
-            Some(target) => Some([0, 1, 2].map(|k| f64::from(target[k]) - place[k])),
+            Some(target) => Some(to_f64(target) - place),
             // Nothing pulls where the surface rests, or nothing is held.
-            None if fit.as_ref().is_none_or(Affine::rests) => Some([0.0; 3]),
+            None if fit.as_ref().is_none_or(Affine::rests) => Some(DVec3::zeros()),
             None => None,
         });
         places.push(place);
@@ -91,8 +92,8 @@ pub fn goal(held: &Held<'_>, limits: Limits) -> Goal {
     for (point, place) in places.iter().enumerate() {
         points.push(match (target(held, point), equations.free[point]) {
             (Some(target), _) => target,
-            (None, None) => place.map(|x| x as f32),
-            (None, Some(row)) => [0, 1, 2].map(|k| (place[k] + solved.rows[row as usize][k]) as f32),
+            (None, None) => to_f32(*place),
+            (None, Some(row)) => to_f32(place + solved.rows[row as usize]),
         });
     }
     let rest_volume = of_tets(held.points, held.tets);

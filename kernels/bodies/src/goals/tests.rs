@@ -111,7 +111,7 @@ fn affine_maps_take_the_inside_along_without_a_step_that_counts() {
 #[test]
 fn the_equations_alone_have_linear_precision() {
     for body in [Body::ball(6), Body::filled(&shapes::block([1.0, 0.2, 0.6], [5, 1, 3]), 0.11)] {
-        let at = |point: usize| sheared(body.points[point].map(f64::from));
+        let at = |point: usize| DVec3::from(sheared(body.points[point].map(f64::from)));
         let held: Vec<_> = (0..body.points.len()).map(|point| (body.rows[point] >= 0).then(|| at(point))).collect();
         let equations = Equations::of(&body.points, &body.tets, &held);
         let solved = solve(&equations, Limits::default());

@@ -1,12 +1,12 @@
 //! Forces, residual and linear system of a stage at some positions.
 
-use super::V3;
 use super::contact::Mode;
 use super::parts::{Parts, Several};
 use super::rows::Rows;
 use super::springs::{self, Sums};
 use super::stage::{Setting, Stage, Work};
 use super::system::{halfway, smoother};
+use numerics::vector::DVec3;
 
 /// Times as much as they resist one particle that regions count in its own block: what is moved by its own block alone moves
 /// with some of the region's others, and a tenth fewer iterations are needed.
@@ -27,11 +27,11 @@ impl Work {
     }
 
     /// The force on each particle at `x` and `v`.
-    pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) -> Vec<V3> {
+    pub(super) fn forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3], v: &[DVec3]) -> Vec<DVec3> {
         self.loose_forces(on, stage, x, v);
-        let mut out = vec![V3::zeros(); x.len()];
+        let mut out = vec![DVec3::zeros(); x.len()];
         let (body, work) = (on.body, &*self);
-        body.order.clusters.each(&mut out[..], |cluster, out: &mut [V3]| {
+        body.order.clusters.each(&mut out[..], |cluster, out: &mut [DVec3]| {
             let places = body.order.clusters.range(cluster);
             for place in places.clone() {
                 springs::pull(body.hanging.of(place, &work.links), x, place, places.start, out);
@@ -42,7 +42,7 @@ impl Work {
     }
 
     /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
-    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], v: &[V3]) {
+    fn loose_forces(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3], v: &[DVec3]) {
         let body = on.body;
         if !std::mem::take(&mut self.measured) {
             self.volumes.measure(body, x);
@@ -52,7 +52,7 @@ impl Work {
         self.touches.extend(stage.contacts.iter().map(|contact| contact.at(x, v, stage.early, body.size)));
         self.extra.clear();
         if !self.thin.is_empty() || !self.touches.is_empty() {
-            self.extra.resize(x.len(), V3::zeros());
+            self.extra.resize(x.len(), DVec3::zeros());
             for thin in &self.thin {
                 for (corner, gradient) in thin.corners.iter().zip(&thin.gradient) {
                     self.extra[*corner as usize] += gradient * thin.pressure;
@@ -68,7 +68,7 @@ impl Work {
 
     /// All but springs.
     #[inline(always)]
-    fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, x: &[V3], v: &[V3]) -> V3 {
+    fn own_force(&self, on: &Setting<'_>, time: f64, place: usize, x: &[DVec3], v: &[DVec3]) -> DVec3 {
         let mut sum = on.drive.force(place, on.body.mass[place], time, x[place], v[place]);
         if !self.system.regions.is_empty() {
             sum -= self.system.regions.gather(place, &self.volumes.pressures, &self.volumes.gradients);
@@ -80,7 +80,7 @@ impl Work {
     }
 
     /// The residual at `x`, and where `linear` the system there.
-    pub(super) fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], linear: bool) {
+    pub(super) fn assemble(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3], linear: bool) {
         let (body, a) = (on.body, stage.a);
         let clusters = &body.order.clusters;
         let mut v = std::mem::take(&mut self.v);
@@ -103,7 +103,7 @@ impl Work {
             clusters.each(parts, |cluster, (r, inertia, smooth, mut records)| {
                 let places = clusters.range(cluster);
                 let first = places.start;
-                r.fill(V3::zeros());
+                r.fill(DVec3::zeros());
                 let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; places.len()] };
                 for (((place, inertia), smooth), records) in places.zip(inertia).zip(smooth).zip(records.iter_mut()) {
                     let links = body.hanging.of(place, &work.links);
@@ -125,7 +125,7 @@ impl Work {
                     *inertia = mass + on.drive.inertia(place, mass, a);
                     [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
                     sums.forces[place - first] = if held[place] {
-                        V3::zeros()
+                        DVec3::zeros()
                     } else {
                         (own + pull) * (a * a) - (x[place] - stage.y[place]) * mass
                     };
@@ -135,14 +135,14 @@ impl Work {
             self.system = system;
         } else {
             let work = &*self;
-            clusters.each(&mut r[..], |cluster, r: &mut [V3]| {
+            clusters.each(&mut r[..], |cluster, r: &mut [DVec3]| {
                 let places = clusters.range(cluster);
-                r.fill(V3::zeros());
+                r.fill(DVec3::zeros());
                 for place in places.clone() {
                     springs::pull(body.hanging.of(place, &work.links), x, place, places.start, r);
                     let r = &mut r[place - places.start];
                     *r = if work.system.held[place] {
-                        V3::zeros()
+                        DVec3::zeros()
                     } else {
                         let force = *r + work.own_force(on, stage.time, place, x, &v);
                         force * (a * a) - (x[place] - stage.y[place]) * body.mass[place]
@@ -228,16 +228,16 @@ impl Work {
     }
 
     /// That of its difference to another.
-    pub(super) fn distance(&self, clusters: &Parts, other: &[V3]) -> f64 {
+    pub(super) fn distance(&self, clusters: &Parts, other: &[DVec3]) -> f64 {
         let own = |place: usize| halfway(&self.system.smoother[place], self.r[place] - other[place]).norm_squared();
         clusters.sum((), |cluster, ()| clusters.range(cluster).map(own).sum())
     }
 }
 
 /// (x − z)/a.
-pub(super) fn velocities(clusters: &Parts, x: &[V3], stage: &Stage<'_>, v: &mut Vec<V3>) {
-    v.resize(x.len(), V3::zeros());
-    clusters.each(&mut v[..], |cluster, v: &mut [V3]| {
+pub(super) fn velocities(clusters: &Parts, x: &[DVec3], stage: &Stage<'_>, v: &mut Vec<DVec3>) {
+    v.resize(x.len(), DVec3::zeros());
+    clusters.each(&mut v[..], |cluster, v: &mut [DVec3]| {
         for (place, v) in clusters.range(cluster).zip(v) {
             *v = (x[place] - stage.z[place]) / stage.a;
         }

@@ -7,13 +7,13 @@
 //! for their stiffness; particles without mass get [`LIGHTEST`]; a tetrahedron whose corners turn the other way at rest
 //! is taken as its mirror image, a flat one has no volume to keep. Metres, seconds, kilograms.
 
-use super::V3;
 use super::edges::{EDGES, edges, neighbours_of_missing};
 use super::hanging::Hanging;
 use super::order::Order;
 use super::parts::Parts;
 use super::regions::Regions;
 use numerics::masked::Masked;
+use numerics::vector::DVec3;
 
 /// Shortest spring that k = E·ΣV/L² is taken of, as a share of the mean: k of a doubled point stays within 1e6 of others'.
 pub const SHORTEST: f64 = 1e-3;
@@ -105,7 +105,7 @@ pub enum BodyError {
 pub struct Body {
     pub(super) order: Order,
     /// Particles at rest, the solver's order.
-    pub(super) rest: Vec<V3>,
+    pub(super) rest: Vec<DVec3>,
     pub(super) mass: Vec<f64>,
     /// Ends by place; those of tetrahedra first, then missing edges, then springs given as such.
     pub(super) ends: Vec<[u32; 2]>,
@@ -282,7 +282,7 @@ impl Body {
     /// All but masses and the stiffnesses of the mesh's springs.
     fn shaped(mesh: &Mesh<'_>, joints: &[Spring]) -> Result<Self, BodyError> {
         let count = mesh.points.len();
-        let points: Vec<V3> = mesh.points.iter().map(|p| V3::from(*p)).collect();
+        let points: Vec<DVec3> = mesh.points.iter().map(|p| DVec3::from(*p)).collect();
         if let Some(index) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
             return Err(BodyError::Point(index));
         }
@@ -317,11 +317,11 @@ impl Body {
             })
             .collect();
         let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.places[end as usize])).collect();
-        let rest: Vec<V3> = order.callers.iter().map(|caller| points[*caller as usize]).collect();
+        let rest: Vec<DVec3> = order.callers.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
-        let low = rest.iter().fold(V3::repeat(f64::INFINITY), |low, p| low.inf(p));
-        let high = rest.iter().fold(V3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
+        let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
+        let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
         let regions = Regions::new(&rest, &tets);
         let zeros = std::iter::repeat_n(0.0, meshed);
         Ok(Self {
@@ -350,7 +350,7 @@ impl Body {
 }
 
 /// Six times the volume is a determinant; positive where the corners turn counter-clockwise seen from the first.
-pub(super) fn volume([a, b, c, d]: [V3; 4]) -> f64 {
+pub(super) fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
 }
 
@@ -376,7 +376,7 @@ fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -
 }
 
 /// Tetrahedra with a volume to keep: their indices, and their corners by place.
-fn with_volume(mesh: &Mesh<'_>, points: &[V3], order: &Order) -> (Vec<u32>, Vec<[u32; 4]>) {
+fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &Order) -> (Vec<u32>, Vec<[u32; 4]>) {
     let keep = |(index, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|corner| points[corner as usize]);
         let signed = volume(corners);

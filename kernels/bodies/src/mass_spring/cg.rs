@@ -4,12 +4,12 @@
 //! Promise: at most the given iterations; what was reached is returned, measured in the preconditioner's norm; the same
 //! bits for any number of threads. Sums run by cluster, in order.
 
-use super::V3;
 use super::body::Body;
 use super::cholesky::Lower;
-use super::coarse::{Anchors, lever, moved};
+use super::coarse::{Anchors, moved};
 use super::system::{System, halfway, rest_of_the_way};
 use numerics::simd::Path;
+use numerics::vector::{DVec3, Vec3, to_f64};
 
 /// Least share of a residual that is worth asking for where its square has a bound of its own.
 const FINEST: f64 = 1e-4;
@@ -38,8 +38,8 @@ pub(super) struct Reached {
 /// Vectors that solves use again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
-    p: Vec<V3>,
-    ap: Vec<V3>,
+    p: Vec<DVec3>,
+    ap: Vec<DVec3>,
     modes: Vec<f64>,
 }
 
@@ -47,7 +47,7 @@ pub(super) struct Scratch {
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
     pub(super) factor: &'a Lower,
-    pub(super) arms: &'a [[f32; 3]],
+    pub(super) arms: &'a [Vec3],
     pub(super) anchors: &'a Anchors,
 }
 
@@ -65,20 +65,20 @@ impl Coarse<'_> {
 
     /// What the clusters' motions do to a particle.
     #[inline(always)]
-    fn moved(&self, modes: &[f64], cluster: usize, place: usize) -> V3 {
+    fn moved(&self, modes: &[f64], cluster: usize, place: usize) -> DVec3 {
         if modes.is_empty() {
-            V3::zeros()
+            DVec3::zeros()
         } else {
-            let free = moved(&modes[6 * cluster..6 * cluster + 6], lever(self.arms[place]));
+            let free = moved(&modes[6 * cluster..6 * cluster + 6], to_f64(self.arms[place]));
             self.anchors.at(place).map_or(free, |way| way * free)
         }
     }
 
     /// A particle's share of the force on its cluster, added to `sums`.
     #[inline(always)]
-    fn restrict(&self, place: usize, r: V3, sums: &mut [f64; 6]) {
+    fn restrict(&self, place: usize, r: DVec3, sums: &mut [f64; 6]) {
         let r = self.anchors.at(place).map_or(r, |way| way.tr_mul(&r));
-        let torque = lever(self.arms[place]).cross(&r);
+        let torque = to_f64(self.arms[place]).cross(&r);
         for axis in 0..3 {
             sums[axis] += r[axis];
             sums[3 + axis] += torque[axis];
@@ -93,14 +93,14 @@ pub(super) fn solve(
     coarse: Coarse<'_>,
     limits: Limits,
     scratch: &mut Scratch,
-    x: &mut [V3],
-    r: &mut [V3],
+    x: &mut [DVec3],
+    r: &mut [DVec3],
 ) -> Reached {
     let clusters = &body.order.clusters;
     let Scratch { p, ap, modes } = scratch;
     p.clear();
-    p.resize(r.len(), V3::zeros());
-    ap.resize(r.len(), V3::zeros());
+    p.resize(r.len(), DVec3::zeros());
+    ap.resize(r.len(), DVec3::zeros());
 
     // A residual's square in the preconditioner's norm, and the forces on clusters.
     let smoother = &system.smoother;
@@ -124,7 +124,7 @@ pub(super) fn solve(
     let enough = asked.min(limits.square).max(asked.min(FINEST * FINEST * start));
     loop {
         let smoother = &system.smoother;
-        clusters.each(&mut p[..], |cluster, mine: &mut [V3]| {
+        clusters.each(&mut p[..], |cluster, mine: &mut [DVec3]| {
             for (place, p) in clusters.range(cluster).zip(mine) {
                 if !system.held[place] {
                     let fine = rest_of_the_way(&smoother[place], halfway(&smoother[place], r[place]));
@@ -140,7 +140,7 @@ pub(super) fn solve(
         }
         let alpha = rz / curvature;
         let smoother = &system.smoother;
-        let next = clusters.map((&mut x[..], &mut r[..]), |cluster, (x, r): (&mut [V3], &mut [V3])| {
+        let next = clusters.map((&mut x[..], &mut r[..]), |cluster, (x, r): (&mut [DVec3], &mut [DVec3])| {
             let (mut square, mut sums) = (0.0, [0.0; 6]);
             for ((place, x), r) in clusters.range(cluster).zip(x).zip(r) {
                 *x += p[place] * alpha;
@@ -171,7 +171,7 @@ pub(super) fn solve(
 }
 
 /// Replaces `r` by the preconditioner's answer to it: near A⁻¹r, in one go.
-pub(super) fn precondition(system: &System, body: &Body, coarse: Coarse<'_>, r: &mut [V3]) {
+pub(super) fn precondition(system: &System, body: &Body, coarse: Coarse<'_>, r: &mut [DVec3]) {
     let clusters = &body.order.clusters;
     let forces = {
         let r = &*r;
@@ -183,11 +183,11 @@ pub(super) fn precondition(system: &System, body: &Body, coarse: Coarse<'_>, r: 
     };
     let mut modes = Vec::new();
     coarse.solve(&forces, &mut modes);
-    clusters.each(r, |cluster, r: &mut [V3]| {
+    clusters.each(r, |cluster, r: &mut [DVec3]| {
         for (place, r) in clusters.range(cluster).zip(r) {
             let w = &system.smoother[place];
             let fine = rest_of_the_way(w, halfway(w, *r));
-            *r = if system.held[place] { V3::zeros() } else { fine + coarse.moved(&modes, cluster, place) };
+            *r = if system.held[place] { DVec3::zeros() } else { fine + coarse.moved(&modes, cluster, place) };
         }
     });
 }

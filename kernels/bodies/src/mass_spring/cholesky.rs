@@ -78,7 +78,7 @@ impl Lower {
                 let (above, mine) = done.split_at_mut(starts[i]);
                 let (own, from) = (i - first(starts, i), first(starts, i));
                 finish(path, (starts, above), &mut mine[..own], from, begin);
-                let pivot = mine[own] - dot(path, &mine[..own], &mine[..own]);
+                let pivot = mine[own] - inner_product(path, &mine[..own], &mine[..own]);
                 let counts = pivot > NOTHING * mine[own].abs().max(f64::MIN_POSITIVE);
                 mine[own] = if counts { 1.0 / pivot.sqrt() } else { 0.0 };
             }
@@ -122,24 +122,24 @@ fn finish_body((starts, above): (&[usize], &[f64]), mine: &mut [f64], from: usiz
         let both = low.max(from);
         if both < begin {
             let (head, tail) = mine.split_at_mut(begin - from);
-            tail[j - begin] -= dot_body(&head[both - from..], &other[both - low..begin - low]);
+            tail[j - begin] -= inner_product_body(&head[both - from..], &other[both - low..begin - low]);
         }
     }
     for j in begin..end {
         let (other, low) = (&above[starts[j]..starts[j + 1]], first(starts, j));
         let both = low.max(begin);
-        let sum = dot_body(&mine[both - from..j - from], &other[both - low..j - low]);
+        let sum = inner_product_body(&mine[both - from..j - from], &other[both - low..j - low]);
         mine[j - from] = (mine[j - from] - sum) * other[j - low];
     }
 }
 
 kernel! {
     /// The scalar product.
-    fn dot(a: &[f64], b: &[f64]) -> f64 = dot_body;
+    fn inner_product(a: &[f64], b: &[f64]) -> f64 = inner_product_body;
 }
 
 #[inline(always)]
-fn dot_body(a: &[f64], b: &[f64]) -> f64 {
+fn inner_product_body(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let tail: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
@@ -165,7 +165,7 @@ fn solve_body(starts: &[usize], values: &[f64], x: &mut [f64]) {
     };
     for i in 0..x.len() {
         let (from, mine, inverse) = row(i);
-        x[i] = (x[i] - dot_body(mine, &x[from..i])) * inverse;
+        x[i] = (x[i] - inner_product_body(mine, &x[from..i])) * inverse;
     }
     for i in (0..x.len()).rev() {
         let (from, mine, inverse) = row(i);

@@ -5,14 +5,11 @@
 //! do not resist them. Clusters stand in an order in which neighbours are near each other, so that the factor is a narrow
 //! band; a thousand small bodies cost what they are.
 
-use super::V3;
 use super::body::Body;
 use super::parts::Parts;
 use super::system::{System, halfway, rest_of_the_way, times};
-use nalgebra::Matrix3;
+use numerics::vector::{DMat3, DVec3, Vec3, to_f32};
 use serde::{Deserialize, Serialize};
-
-type M3 = Matrix3<f64>;
 
 /// Motions of a cluster: three shifts, three turns.
 pub(super) const MODES: usize = 6;
@@ -52,7 +49,7 @@ impl Anchors {
                 continue;
             }
             let smoother = &system.smoother[place];
-            let taken = [V3::x(), V3::y(), V3::z()]
+            let taken = [DVec3::x(), DVec3::y(), DVec3::z()]
                 .map(|axis| rest_of_the_way(smoother, halfway(smoother, times(&block, axis))));
             if taken.iter().all(|column| column.amax() < LITTLE) {
                 continue;
@@ -76,7 +73,7 @@ impl Anchors {
     /// How much others differ from these: 1 where all of them let go, say.
     pub(super) fn change(&self, others: &Self) -> f64 {
         let most = self.ways.len().max(others.ways.len());
-        let way = |anchors: &Self, place: usize| anchors.at(place).unwrap_or_else(M3::identity);
+        let way = |anchors: &Self, place: usize| anchors.at(place).unwrap_or_else(DMat3::identity);
         let held = |place: &usize| [self, others].iter().any(|anchors| anchors.at(*place).is_some());
         let places = (0..self.of.len().max(others.of.len())).filter(held);
         let sum: f64 = places.map(|place| (way(self, place) - way(others, place)).norm()).sum();
@@ -85,9 +82,9 @@ impl Anchors {
 
     /// F of a particle that is held.
     #[inline(always)]
-    pub(super) fn at(&self, place: usize) -> Option<M3> {
+    pub(super) fn at(&self, place: usize) -> Option<DMat3> {
         let way = self.ways.get(*self.of.get(place)? as usize)?;
-        Some(M3::from_columns(&way.map(V3::from)))
+        Some(DMat3::from_columns(&way.map(DVec3::from)))
     }
 }
 
@@ -146,27 +143,21 @@ impl Layout {
 }
 
 /// Where each particle is seen from its cluster's middle, in units of the cluster's radius; the turns' lever.
-pub(super) fn arms(clusters: &Parts, x: &[V3], arms: &mut Vec<[f32; 3]>) {
+pub(super) fn arms(clusters: &Parts, x: &[DVec3], arms: &mut Vec<Vec3>) {
     arms.resize(x.len(), [0.0; 3]);
-    clusters.each(&mut arms[..], |cluster, mine: &mut [[f32; 3]]| {
+    clusters.each(&mut arms[..], |cluster, mine: &mut [Vec3]| {
         let points = &x[clusters.range(cluster)];
-        let middle = points.iter().sum::<V3>() / points.len().max(1) as f64;
+        let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
         let radius = points.iter().map(|p| (p - middle).amax()).fold(0.0, f64::max);
         let scale = if radius > 0.0 { 1.0 / radius } else { 0.0 };
         for (arm, p) in mine.iter_mut().zip(points) {
-            let lever = (p - middle) * scale;
-            *arm = [lever.x as f32, lever.y as f32, lever.z as f32];
+            *arm = to_f32((p - middle) * scale);
         }
     });
 }
 
-#[inline(always)]
-pub(super) fn lever(arm: [f32; 3]) -> V3 {
-    V3::new(f64::from(arm[0]), f64::from(arm[1]), f64::from(arm[2]))
-}
-
 /// What a cluster's motion does to a particle.
 #[inline(always)]
-pub(super) fn moved(modes: &[f64], arm: V3) -> V3 {
-    V3::new(modes[0], modes[1], modes[2]) + V3::new(modes[3], modes[4], modes[5]).cross(&arm)
+pub(super) fn moved(modes: &[f64], arm: DVec3) -> DVec3 {
+    DVec3::new(modes[0], modes[1], modes[2]) + DVec3::new(modes[3], modes[4], modes[5]).cross(&arm)
 }

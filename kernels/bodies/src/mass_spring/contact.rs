@@ -7,9 +7,9 @@
 //!
 //! Limit: the surfaces a contact was found for are planes within the stage.
 
-use super::V3;
 use super::body::Body;
 use super::rows::add_square;
+use numerics::vector::DVec3;
 
 /// κ ÷ what the particles put up against being moved: springs and inertia together. More holds the gap better in one
 /// iteration, less converges faster.
@@ -73,10 +73,10 @@ pub trait Contacts: Sync {
 pub(super) struct Touching {
     pub(super) places: [u32; 4],
     pub(super) weights: [f64; 4],
-    pub(super) normal: V3,
+    pub(super) normal: DVec3,
     offset: f64,
     gap: f64,
-    pub(super) velocity: V3,
+    pub(super) velocity: DVec3,
     friction: f64,
     /// κ, N/m.
     firm: f64,
@@ -109,7 +109,7 @@ pub(super) enum Mode {
 pub(super) struct Touch {
     pub(super) mode: Mode,
     /// On the first surface, newtons.
-    pub(super) force: V3,
+    pub(super) force: DVec3,
     /// How far below the gap, metres.
     pub(super) depth: f64,
     /// N, and its slope with the depth.
@@ -117,7 +117,7 @@ pub(super) struct Touch {
     slope: f64,
     /// Resistance to slip, N·s/m, and the share of all friction that the slip rouses: of length 1 where it slides.
     grip: f64,
-    slip: V3,
+    slip: DVec3,
     pub(super) energy: f64,
 }
 
@@ -125,7 +125,7 @@ impl Touching {
     /// A contact as found, for frames of `seconds`; `firmness` is each particle's Σk.
     pub(super) fn new(body: &Body, contact: &Contact, seconds: f64, firmness: &[f64]) -> Option<Self> {
         let finite = contact.weights.iter().chain(&contact.normal).chain(&contact.velocity).all(|x| x.is_finite());
-        let normal = V3::from(contact.normal).try_normalize(1e-12)?;
+        let normal = DVec3::from(contact.normal).try_normalize(1e-12)?;
         if !finite || !contact.offset.is_finite() || !contact.gap.is_finite() {
             return None;
         }
@@ -135,7 +135,7 @@ impl Touching {
             normal,
             offset: contact.offset,
             gap: contact.gap.max(0.0),
-            velocity: V3::from(contact.velocity),
+            velocity: DVec3::from(contact.velocity),
             friction: contact.friction.max(0.0),
             firm: 0.0,
             hold: 0.0,
@@ -169,19 +169,19 @@ impl Touching {
     }
 
     /// Whether it is deeper than it may stay.
-    pub(super) fn too_near(&self, x: &[V3]) -> bool {
+    pub(super) fn too_near(&self, x: &[DVec3]) -> bool {
         let depth = self.depth(x, 0.0);
         depth > 0.0 && self.taken(depth) > DEEP
     }
 
     /// Whether it begins a step of `seconds` at `x` so deep that its push is a way out, not a spring's.
-    pub(super) fn is_through(&self, x: &[V3], seconds: f64) -> bool {
+    pub(super) fn is_through(&self, x: &[DVec3], seconds: f64) -> bool {
         self.taken(self.depth(x, seconds)) >= STRAIGHT
     }
 
     /// How far what goes from `x` `to` there has to stay back where it would get deep into the contact: a step further is seen
     /// how it pushes.
-    pub(super) fn stops(&self, x: &[V3], to: &[V3]) -> Option<f64> {
+    pub(super) fn stops(&self, x: &[DVec3], to: &[DVec3]) -> Option<f64> {
         let (before, after) = (self.depth(x, 0.0), self.depth(to, 0.0));
         let [most, stop] = if before > 0.0 { PRESSED } else { CLOSED };
         let left = before.max(stop * self.gap);
@@ -195,36 +195,36 @@ impl Touching {
     }
 
     /// Σ w·values.
-    pub(super) fn between(&self, values: &[V3]) -> V3 {
-        self.sides().fold(V3::zeros(), |sum, (place, weight)| sum + values[place] * weight)
+    pub(super) fn between(&self, values: &[DVec3]) -> DVec3 {
+        self.sides().fold(DVec3::zeros(), |sum, (place, weight)| sum + values[place] * weight)
     }
 
     /// Distance above the gap, `seconds` before the time it was found for.
-    pub(super) fn clearance(&self, x: &[V3], seconds: f64) -> f64 {
+    pub(super) fn clearance(&self, x: &[DVec3], seconds: f64) -> f64 {
         let offset = self.offset - self.normal.dot(&self.velocity) * seconds;
         self.normal.dot(&self.between(x)) - offset - self.gap
     }
 
     /// How far below the gap it pushes, likewise.
-    fn depth(&self, x: &[V3], seconds: f64) -> f64 {
+    fn depth(&self, x: &[DVec3], seconds: f64) -> f64 {
         -self.clearance(x, seconds) - self.slack
     }
 
     /// Takes it to be on its way out where surfaces are through each other as a step of `seconds` begins at `x`: by `way` in
     /// that step. All at once, within a short step, they would leave each other like a shot.
-    pub(super) fn on_its_way(self, x: &[V3], seconds: f64, way: f64) -> Self {
+    pub(super) fn on_its_way(self, x: &[DVec3], seconds: f64, way: f64) -> Self {
         let through = -self.clearance(x, seconds) - self.gap;
         Self { slack: (through - way).max(0.0), ..self }
     }
 
     /// Takes it to go on as at `x` and `v`, `seconds` before the time it was found for: to push or not, stick or slide, with
     /// the push a straight line of the depth. A step that only pushes one way is no step of order 2; one that goes on is.
-    pub(super) fn frozen(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Self {
+    pub(super) fn frozen(&self, x: &[DVec3], v: &[DVec3], seconds: f64, size: f64) -> Self {
         Self { frozen: Some(self.at(x, v, seconds, size)), ..*self }
     }
 
     /// Whether what a frozen contact was taken to do is what it does at `x` and `v`.
-    pub(super) fn goes_on(&self, x: &[V3], v: &[V3]) -> bool {
+    pub(super) fn goes_on(&self, x: &[DVec3], v: &[DVec3]) -> bool {
         let Some(then) = self.frozen else { return true };
         let depth = self.depth(x, 0.0);
         let push = then.push + then.slope * (depth - then.depth);
@@ -239,34 +239,34 @@ impl Touching {
     }
 
     /// How fast the surfaces slip.
-    fn slip(&self, v: &[V3]) -> V3 {
+    fn slip(&self, v: &[DVec3]) -> DVec3 {
         let pace = self.between(v) - self.velocity;
         pace - self.normal * self.normal.dot(&pace)
     }
 
     /// What it does at `x` and `v`, `seconds` before the time it was found for; `size` is the body's.
-    pub(super) fn at(&self, x: &[V3], v: &[V3], seconds: f64, size: f64) -> Touch {
+    pub(super) fn at(&self, x: &[DVec3], v: &[DVec3], seconds: f64, size: f64) -> Touch {
         let depth = self.depth(x, seconds);
         if let Some(then) = self.frozen {
             let push = then.push + then.slope * (depth - then.depth);
             let drag = match then.mode {
-                Mode::Apart | Mode::Pushes => V3::zeros(),
+                Mode::Apart | Mode::Pushes => DVec3::zeros(),
                 Mode::Sticks => self.slip(v) * then.grip,
                 Mode::Slides => then.slip * (self.friction * self.load),
             };
-            let force = if then.mode == Mode::Apart { V3::zeros() } else { self.normal * push - drag };
+            let force = if then.mode == Mode::Apart { DVec3::zeros() } else { self.normal * push - drag };
             // Sliding goes on whatever its speed: nothing resists across it either.
             let grip = if then.mode == Mode::Slides { 0.0 } else { then.grip };
             return Touch { depth, push, force, grip, ..then };
         }
         let mut touch = Touch {
             mode: Mode::Apart,
-            force: V3::zeros(),
+            force: DVec3::zeros(),
             depth,
             push: 0.0,
             slope: 0.0,
             grip: 0.0,
-            slip: V3::zeros(),
+            slip: DVec3::zeros(),
             energy: 0.0,
         };
         if depth > 0.0 {
@@ -290,7 +290,7 @@ impl Touching {
     /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
     /// of its own, and what is solved stays convex. A contact that begins has none yet. Where the surface moves so far that
     /// its plane then is not known it is what the particle was under at last, of `loads`.
-    pub(super) fn loaded(&self, x: &[V3], loads: &[f64], seconds: f64) -> Self {
+    pub(super) fn loaded(&self, x: &[DVec3], loads: &[f64], seconds: f64) -> Self {
         let near = self.velocity.norm() * seconds <= self.gap;
         let last = self.sides().map(|(place, _)| loads[place]).fold(0.0, f64::max);
         let now = if near {
@@ -304,7 +304,7 @@ impl Touching {
     }
 
     /// The push at `x`, as a load.
-    pub(super) fn push(&self, x: &[V3]) -> f64 {
+    pub(super) fn push(&self, x: &[DVec3]) -> f64 {
         self.load_at(self.depth(x, 0.0))
     }
 
@@ -349,7 +349,7 @@ impl Touching {
     }
 
     /// The push where particles are a `share` of `dx` on.
-    pub(super) fn expected(&self, touch: &Touch, dx: &[V3], share: f64) -> f64 {
+    pub(super) fn expected(&self, touch: &Touch, dx: &[DVec3], share: f64) -> f64 {
         if touch.depth <= 0.0 {
             return 0.0;
         }
@@ -357,7 +357,7 @@ impl Touching {
     }
 
     /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does.
-    pub(super) fn friction_energy(&self, v: &[V3], a: f64, size: f64) -> f64 {
+    pub(super) fn friction_energy(&self, v: &[DVec3], a: f64, size: f64) -> f64 {
         let most = self.friction * self.load;
         let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.hold));
         let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
@@ -369,20 +369,20 @@ impl Touching {
     /// Friction grows no further once surfaces slide, so that Newton's method alone would turn slips round and back. It is
     /// made linear together with what it is (Chan, Golub & Mulet 1999): with no `drag` it resists as slower surfaces would,
     /// which never overshoots, and with the drag that belongs to the slip exactly.
-    pub(super) fn resisted(&self, touch: &Touch, a: f64, drag: &V3) -> ([V3; 3], usize) {
+    pub(super) fn resisted(&self, touch: &Touch, a: f64, drag: &DVec3) -> ([DVec3; 3], usize) {
         let n = self.normal;
-        let mut out = [n * (a * a * touch.slope).max(0.0).sqrt(), V3::zeros(), V3::zeros()];
+        let mut out = [n * (a * a * touch.slope).max(0.0).sqrt(), DVec3::zeros(), DVec3::zeros()];
         let (along, [least, most]) = match touch.mode {
             Mode::Apart => return (out, 0),
             Mode::Pushes => return (out, 1),
-            Mode::Sticks => (V3::zeros(), [1.0, 1.0]),
+            Mode::Sticks => (DVec3::zeros(), [1.0, 1.0]),
             Mode::Slides => {
                 let (length, common) = (drag.norm(), drag.dot(&touch.slip));
                 let middle = if length > 0.0 { drag / length + touch.slip } else { touch.slip };
                 (middle, [1.0 - 0.5 * (common + length), 1.0 - 0.5 * (common - length)])
             }
         };
-        let any = || n.cross(&if n.x.abs() < 0.7 { V3::x() } else { V3::y() }).normalize();
+        let any = || n.cross(&if n.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() }).normalize();
         let along = along.try_normalize(OPPOSITE).unwrap_or_else(any);
         out[1] = along * (a * touch.grip * least).max(0.0).sqrt();
         out[2] = n.cross(&along) * (a * touch.grip * most).max(0.0).sqrt();
@@ -392,16 +392,16 @@ impl Touching {
     /// The drag that belongs to where particles are a `share` of `dx` on in a stage of `a`, of length 1 at most, as the
     /// system that [`Self::resisted`] with `drag` stands for has it. None where all of a step that was too long would have
     /// turned the slip round.
-    pub(super) fn drag(&self, touch: &Touch, drag: &V3, dx: &[V3], share: f64, a: f64) -> V3 {
+    pub(super) fn drag(&self, touch: &Touch, drag: &DVec3, dx: &[DVec3], share: f64, a: f64) -> DVec3 {
         let most = self.friction * self.load;
         if most <= 0.0 || touch.mode == Mode::Apart {
-            return V3::zeros();
+            return DVec3::zeros();
         }
         let way = self.between(dx);
         let more = (way - self.normal * self.normal.dot(&way)) * (touch.grip / (a * most));
         let slides = touch.mode == Mode::Slides;
         if slides && share < 1.0 && touch.slip.dot(&(touch.slip + more)) < 0.0 {
-            return V3::zeros();
+            return DVec3::zeros();
         }
         let turned = if slides { more - drag * touch.slip.dot(&more) } else { more };
         let next = drag.lerp(&(touch.slip + turned), share);
@@ -409,7 +409,7 @@ impl Touching {
     }
 
     /// That, as the block of a particle alone in it.
-    pub(super) fn add_block(&self, resisted: &([V3; 3], usize), weight: f64, block: &mut [f64; 6]) {
+    pub(super) fn add_block(&self, resisted: &([DVec3; 3], usize), weight: f64, block: &mut [f64; 6]) {
         resisted.0[..resisted.1].iter().for_each(|way| add_square(block, *way, weight * weight));
     }
 }

@@ -3,8 +3,8 @@
 //! All are evaluated within each stage, at the stage's own time; goals and pins go straight from where they are at the
 //! step's start to where they are at its end.
 
-use super::V3;
 use super::body::Body;
+use numerics::vector::DVec3;
 
 /// Draws a particle towards a place: a spring of `strength`·mass N/m, and a dashpot beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ const NONE: u32 = u32::MAX;
 /// The drive of one frame, in the solver's order.
 #[derive(Clone, Debug)]
 pub(super) struct Drive {
-    pub(super) gravity: V3,
+    pub(super) gravity: DVec3,
     pub(super) drag: f64,
     /// Seconds the frame has.
     seconds: f64,
@@ -41,19 +41,19 @@ pub(super) struct Drive {
     goal_of: Vec<u32>,
     goals: Vec<Track>,
     pub(super) held: Vec<bool>,
-    pins: Vec<(u32, [V3; 2])>,
+    pins: Vec<(u32, [DVec3; 2])>,
 }
 
 /// A goal, or several of one particle joined: their forces add up to its.
 #[derive(Clone, Copy, Debug)]
 struct Track {
-    between: [V3; 2],
+    between: [DVec3; 2],
     strength: f64,
     damping: f64,
 }
 
 impl Drive {
-    pub(super) fn new(body: &Body, gravity: V3, drag: f64, seconds: f64, goals: &[Goal], pins: &[Pin]) -> Self {
+    pub(super) fn new(body: &Body, gravity: DVec3, drag: f64, seconds: f64, goals: &[Goal], pins: &[Pin]) -> Self {
         let mut drive = Self {
             gravity,
             drag,
@@ -65,8 +65,11 @@ impl Drive {
         };
         for goal in goals.iter().filter(|goal| goal.strength > 0.0) {
             let place = body.order.places[goal.particle as usize] as usize;
-            let track =
-                Track { between: goal.between.map(V3::from), strength: goal.strength, damping: goal.damping.max(0.0) };
+            let track = Track {
+                between: goal.between.map(DVec3::from),
+                strength: goal.strength,
+                damping: goal.damping.max(0.0),
+            };
             if drive.goal_of[place] == NONE {
                 drive.goal_of[place] = drive.goals.len() as u32;
                 drive.goals.push(track);
@@ -77,7 +80,7 @@ impl Drive {
         for pin in pins {
             let place = body.order.places[pin.particle as usize];
             if !std::mem::replace(&mut drive.held[place as usize], true) {
-                drive.pins.push((place, pin.between.map(V3::from)));
+                drive.pins.push((place, pin.between.map(DVec3::from)));
             }
         }
         drive
@@ -85,12 +88,12 @@ impl Drive {
 
     /// Whether something moves by itself, so that energy may rise.
     pub(super) fn moves(&self) -> bool {
-        let moves = |between: &[V3; 2]| between[0] != between[1];
+        let moves = |between: &[DVec3; 2]| between[0] != between[1];
         self.pins.iter().any(|pin| moves(&pin.1)) || self.goals.iter().any(|goal| moves(&goal.between))
     }
 
     /// Puts pinned particles where they are at `time`, a share of the frame, and `z` where (x − z)/a is their pins' velocity.
-    pub(super) fn hold(&self, time: f64, x: &mut [V3], z: &mut [V3], a: f64) {
+    pub(super) fn hold(&self, time: f64, x: &mut [DVec3], z: &mut [DVec3], a: f64) {
         for (place, between) in &self.pins {
             let place = *place as usize;
             x[place] = lerp(between, time);
@@ -100,7 +103,7 @@ impl Drive {
 
     /// What acts on a particle apart from springs, volumes and contacts, newtons.
     #[inline(always)]
-    pub(super) fn force(&self, place: usize, mass: f64, time: f64, x: V3, v: V3) -> V3 {
+    pub(super) fn force(&self, place: usize, mass: f64, time: f64, x: DVec3, v: DVec3) -> DVec3 {
         let mut sum = self.gravity - v * self.drag;
         if let Some(goal) = self.goal(place) {
             sum += (lerp(&goal.between, time) - x) * goal.strength;
@@ -120,7 +123,7 @@ impl Drive {
     }
 
     /// The energy whose slope is [`Drive::force`] where `v` changes by 1/a of what `x` does; with `a` 0 what is stored.
-    pub(super) fn energy(&self, place: usize, mass: f64, time: f64, a: f64, x: V3, v: V3) -> f64 {
+    pub(super) fn energy(&self, place: usize, mass: f64, time: f64, a: f64, x: DVec3, v: DVec3) -> f64 {
         let mut sum = -self.gravity.dot(&x) + 0.5 * a * self.drag * v.norm_squared();
         sum += self.goal_energy(place, time, x);
         if let Some(goal) = self.goal(place) {
@@ -130,7 +133,7 @@ impl Drive {
     }
 
     /// What a particle's goal stores, joules a kilogram.
-    pub(super) fn goal_energy(&self, place: usize, time: f64, x: V3) -> f64 {
+    pub(super) fn goal_energy(&self, place: usize, time: f64, x: DVec3) -> f64 {
         self.goal(place).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
     }
 
@@ -139,8 +142,8 @@ impl Drive {
         self.goals.get(*self.goal_of.get(place)? as usize)
     }
 
-    fn velocity(&self, between: &[V3; 2]) -> V3 {
-        if self.seconds > 0.0 { (between[1] - between[0]) / self.seconds } else { V3::zeros() }
+    fn velocity(&self, between: &[DVec3; 2]) -> DVec3 {
+        if self.seconds > 0.0 { (between[1] - between[0]) / self.seconds } else { DVec3::zeros() }
     }
 }
 
@@ -156,6 +159,6 @@ impl Track {
 
 /// Exact at both ends.
 #[inline(always)]
-fn lerp(between: &[V3; 2], time: f64) -> V3 {
+fn lerp(between: &[DVec3; 2], time: f64) -> DVec3 {
     if time >= 1.0 { between[1] } else { between[0] + (between[1] - between[0]) * time }
 }

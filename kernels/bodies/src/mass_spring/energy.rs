@@ -1,9 +1,9 @@
 //! The energies of a body, and its worst spring: what a frame reports and what its steps are watched by.
 
-use super::V3;
 use super::springs;
 use super::stage::{Setting, Work};
 use super::step::Moving;
+use numerics::vector::DVec3;
 
 /// Joules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,12 +58,12 @@ pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Mov
 }
 
 /// The largest length ÷ length at rest of a spring, or its reciprocal; of springs that have a length at rest.
-pub(super) fn worst_stretch(on: &Setting<'_>, x: &[V3]) -> f64 {
+pub(super) fn worst_stretch(on: &Setting<'_>, x: &[DVec3]) -> f64 {
     let body = on.body;
     let worst = body.spring_parts.map((), |part, ()| {
         let springs =
             body.spring_parts.range(part).filter(|at| on.rest.holds(*at as u32) && on.rest.lengths[*at] > 0.0);
-        let stretch = springs.map(|at| springs::length(body, x, at) / on.rest.lengths[at]);
+        let stretch = springs.map(|at| springs::spring_length(body, x, at) / on.rest.lengths[at]);
         stretch.map(|stretch| stretch.max(1.0 / stretch)).fold(1.0, f64::max)
     });
     worst.into_iter().fold(1.0, f64::max)

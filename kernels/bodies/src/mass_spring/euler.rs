@@ -4,12 +4,12 @@
 //! Friction is solved with pushes that are given: those the particles were under at last, then those found on the way down,
 //! until they are about the same. So each step has an objective, and what comes out has Coulomb's friction of its own pushes.
 
-use super::V3;
 use super::contact::{Contact, Query, Touching};
 use super::search::{Enough, reload};
 use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Moving, Stepper, deepest, sum};
+use numerics::vector::DVec3;
 use std::cell::OnceCell;
 
 /// Times that implicit Euler looks for contacts it has missed.
@@ -21,12 +21,13 @@ const EULER_SHARE: f64 = 0.05;
 
 impl Stepper<'_> {
     /// Contacts on the way from `start` `to` there, with the load they have at its start.
-    pub(super) fn contacts(&self, start: &Moving, to: &[V3], times: [f64; 2]) -> Vec<Touching> {
+    pub(super) fn contacts(&self, start: &Moving, to: &[DVec3], times: [f64; 2]) -> Vec<Touching> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.setting.body;
-        let outwards =
-            |x: &[V3]| -> Vec<[f64; 3]> { body.order.places.iter().map(|place| x[*place as usize].into()).collect() };
+        let outwards = |x: &[DVec3]| -> Vec<[f64; 3]> {
+            body.order.places.iter().map(|place| x[*place as usize].into()).collect()
+        };
         let mut found: Vec<Contact> = Vec::new();
         contacts.find(&Query { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
         let known = found.iter().filter_map(|contact| Touching::new(body, contact, self.seconds, &self.work.firmness));
@@ -35,7 +36,7 @@ impl Stepper<'_> {
     }
 
     /// The largest push of an obstacle on each particle at `x`.
-    pub(super) fn loads(&self, contacts: &[Touching], x: &[V3]) -> Vec<f64> {
+    pub(super) fn loads(&self, contacts: &[Touching], x: &[DVec3]) -> Vec<f64> {
         let mut loads = vec![0.0; x.len()];
         for contact in contacts {
             for (place, _) in contact.sides() {
@@ -51,7 +52,7 @@ impl Stepper<'_> {
         &self,
         known: &[Touching],
         start: &Moving,
-        x: &[V3],
+        x: &[DVec3],
         times: [f64; 2],
     ) -> (Vec<Touching>, bool) {
         if self.frame.contacts.is_none() {
@@ -78,7 +79,7 @@ impl Stepper<'_> {
     ) -> (Solved, f64) {
         let h = (times[1] - times[0]) * self.seconds;
         let mut z = moving.x.clone();
-        let y: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
+        let y: Vec<DVec3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
         let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
         let volumes = self.work.volumes.at(self.setting.body, &z);
@@ -111,7 +112,7 @@ impl Stepper<'_> {
                 *contacts = found;
             }
         }
-        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
+        let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
         // What velocities changed by is a whole step late.
         let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
         (moving.x, moving.v) = (x, v);
@@ -119,9 +120,9 @@ impl Stepper<'_> {
     }
 
     /// About the square of the residual of motion on from `x` to `y`, gravity and obstacles within `h`, if nothing gave way.
-    fn scale(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> f64 {
+    fn scale(&self, x: &[DVec3], y: &[DVec3], contacts: &[Touching], h: f64) -> f64 {
         let mass = &self.setting.body.mass;
-        let falls = (V3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let falls = (DVec3::from(self.frame.gravity) * (h * h)).norm_squared();
         let own: f64 = (0..x.len()).map(|place| mass[place] * (falls + (y[place] - x[place]).norm_squared())).sum();
         let given = contacts.iter().flat_map(|contact| {
             let way = (contact.velocity * h).norm_squared();
@@ -132,7 +133,7 @@ impl Stepper<'_> {
     }
 
     /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
-    fn slid(&self, x: &[V3], y: &[V3], contacts: &[Touching], h: f64) -> Vec<V3> {
+    fn slid(&self, x: &[DVec3], y: &[DVec3], contacts: &[Touching], h: f64) -> Vec<DVec3> {
         let mut out = y.to_vec();
         for contact in contacts {
             let Some((place, weight)) = contact.alone() else { continue };

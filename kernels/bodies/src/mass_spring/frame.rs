@@ -1,6 +1,5 @@
 //! One frame of a body: what is asked for, what is reported, and how the steps of a frame are chosen.
 
-use super::V3;
 use super::body::Body;
 use super::contact::Contacts;
 use super::drive::{Drive, Goal, Pin};
@@ -10,6 +9,7 @@ use super::stage::{Setting, Work};
 use super::state::State;
 use super::step::{Moving, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
+use numerics::vector::DVec3;
 
 /// Steps that a frame is cut into, at most, where halving is what helps.
 const MOST_STEPS: u32 = 256;
@@ -140,7 +140,7 @@ impl Solver {
 
     fn step_here(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
         let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
-        let gravity = V3::from(frame.gravity);
+        let gravity = DVec3::from(frame.gravity);
         let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
         let lengths = state.rest_lengths();
         let rest = Rest { lengths: &lengths, torn: &state.torn };
@@ -149,8 +149,9 @@ impl Solver {
         springs::firmness(body, &rest, &mut self.work.firmness);
         self.work.system.set_alone(&self.work.firmness);
         let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
-        let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(V3::from).collect::<Vec<_>>();
-        let trend = if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![V3::zeros(); body.len()] };
+        let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
+        let trend =
+            if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![DVec3::zeros(); body.len()] };
         let mut loads = vec![0.0; body.len()];
         for (place, load) in body.order.places.iter().zip(&state.loads) {
             loads[*place as usize] = *load;

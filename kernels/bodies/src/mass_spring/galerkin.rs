@@ -1,16 +1,13 @@
 //! The coarse matrix: what clusters' motions meet, Pᵀ·A·P, P the shift and turn of each cluster at its particles.
 
-use super::V3;
 use super::body::Body;
 use super::cholesky::Lower;
-use super::coarse::{Anchors, Layout, MODES, lever};
+use super::coarse::{Anchors, Layout, MODES};
 use super::parts::Parts;
 use super::rows::{Rows, add_square};
 use super::springs::Record;
 use super::system::System;
-use nalgebra::Matrix3;
-
-type M3 = Matrix3<f64>;
+use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// What the matrix is made of.
 #[derive(Clone, Copy)]
@@ -18,7 +15,7 @@ pub(super) struct Galerkin<'a> {
     pub(super) layout: &'a Layout,
     pub(super) body: &'a Body,
     pub(super) system: &'a System,
-    pub(super) arms: &'a [[f32; 3]],
+    pub(super) arms: &'a [Vec3],
     /// What of their clusters' motions particles in contact follow.
     pub(super) anchors: &'a Anchors,
 }
@@ -56,7 +53,7 @@ impl Galerkin<'_> {
             if system.held[place] {
                 continue;
             }
-            let mine = lever(arms[place]);
+            let mine = to_f64(arms[place]);
             let anchor = anchors.at(place);
             // What resists the particle itself.
             let mut own = system.blocks.get(place).copied().unwrap_or_default();
@@ -67,7 +64,7 @@ impl Galerkin<'_> {
                 add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
-                    let (block, far) = (&mut blocks[home - first], lever(arms[other]));
+                    let (block, far) = (&mut blocks[home - first], to_f64(arms[other]));
                     if anchor.is_none() && anchors.at(other).is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
@@ -82,7 +79,7 @@ impl Galerkin<'_> {
                 blocks[last].add_alike(alike, mine, mine);
             } else {
                 let [xx, xy, xz, yy, yz, zz] = own;
-                let h = M3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) + M3::from_diagonal_element(alike);
+                let h = DMat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) + DMat3::from_diagonal_element(alike);
                 let motion = motion(anchor, mine);
                 blocks[last].add_product(motion, &h, motion);
             }
@@ -97,7 +94,7 @@ impl Galerkin<'_> {
         let anchors = ends.map(|end| self.anchors.at(end));
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && anchors == [None; 2] {
-            let [here, there] = ends.map(|end| lever(self.arms[end]));
+            let [here, there] = ends.map(|end| to_f64(self.arms[end]));
             block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
@@ -110,9 +107,9 @@ impl Galerkin<'_> {
 
     /// How far the motions of a particle's cluster move it along `way`.
     #[inline(always)]
-    fn along(&self, place: usize, way: V3) -> [f64; MODES] {
+    fn along(&self, place: usize, way: DVec3) -> [f64; MODES] {
         let way = self.anchors.at(place).map_or(way, |follows| follows.tr_mul(&way));
-        let turned = lever(self.arms[place]).cross(&way);
+        let turned = to_f64(self.arms[place]).cross(&way);
         [way.x, way.y, way.z, turned.x, turned.y, turned.z]
     }
 
@@ -168,9 +165,9 @@ struct Push {
 
 /// What a spring resists in, each with how much.
 #[inline(always)]
-fn ways(record: &Record) -> impl Iterator<Item = (f64, V3)> {
+fn ways(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
     let alpha = f64::from(record.alpha);
-    let alike = [V3::x(), V3::y(), V3::z()].map(|axis| (alpha, axis));
+    let alike = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| (alpha, axis));
     std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
 }
 
@@ -186,14 +183,14 @@ fn write(blocks: &[Block], out: &mut [f64]) {
 
 /// −[r]×: what a turn does at `r`.
 #[inline(always)]
-fn turn(r: V3) -> M3 {
-    M3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
+fn turn(r: DVec3) -> DMat3 {
+    DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
 }
 
 /// What a cluster's shifts and turns do to a particle at `arm`, as far as it follows them.
 #[inline(always)]
-fn motion(anchor: Option<M3>, arm: V3) -> [M3; 2] {
-    let shift = anchor.unwrap_or_else(M3::identity);
+fn motion(anchor: Option<DMat3>, arm: DVec3) -> [DMat3; 2] {
+    let shift = anchor.unwrap_or_else(DMat3::identity);
     [shift, shift * turn(arm)]
 }
 
@@ -205,7 +202,7 @@ impl Block {
     /// Springs inside of a cluster, `d` from one end to the other: they resist a turn as far as they are stretched, and no
     /// shift.
     #[inline(always)]
-    fn add_turn(&mut self, alpha: f64, w: V3, d: V3) {
+    fn add_turn(&mut self, alpha: f64, w: DVec3, d: DVec3) {
         let (u, square) = (d.cross(&w), d.norm_squared());
         for i in 0..3 {
             for j in 0..3 {
@@ -217,7 +214,7 @@ impl Block {
 
     /// Pᵀ·αI·Q of particles at `p` and `q` that are free.
     #[inline(always)]
-    fn add_alike(&mut self, alpha: f64, p: V3, q: V3) {
+    fn add_alike(&mut self, alpha: f64, p: DVec3, q: DVec3) {
         let (p, dot) = (p * alpha, p.dot(&q) * alpha);
         let q_alpha = q * alpha;
         let shift_turn = [[0.0, q_alpha.z, -q_alpha.y], [-q_alpha.z, 0.0, q_alpha.x], [q_alpha.y, -q_alpha.x, 0.0]];
@@ -235,7 +232,7 @@ impl Block {
 
     /// Pᵀ·s·wwᵀ·Q of particles at `p` and `q` that are free.
     #[inline(always)]
-    fn add_along(&mut self, s: f64, w: V3, p: V3, q: V3) {
+    fn add_along(&mut self, s: f64, w: DVec3, p: DVec3, q: DVec3) {
         let (p, q) = (p.cross(&w), q.cross(&w));
         self.add(s, &[w.x, w.y, w.z, p.x, p.y, p.z], &[w.x, w.y, w.z, q.x, q.y, q.z]);
     }
@@ -250,7 +247,7 @@ impl Block {
     }
 
     /// Pᵀ·h·Q of two particles' motions, shifts and turns.
-    fn add_product(&mut self, p: [M3; 2], h: &M3, q: [M3; 2]) {
+    fn add_product(&mut self, p: [DMat3; 2], h: &DMat3, q: [DMat3; 2]) {
         for (row, p) in p.iter().enumerate() {
             let left = p.transpose() * h;
             for (column, q) in q.iter().enumerate() {
@@ -269,15 +266,15 @@ mod tests {
 
     #[test]
     fn what_is_short_for_free_particles_is_their_product() {
-        let [p, q, w] = [[0.3, -0.8, 0.5], [-0.9, 0.1, 0.7], [1.2, 0.4, -2.0]].map(V3::from);
+        let [p, q, w] = [[0.3, -0.8, 0.5], [-0.9, 0.1, 0.7], [1.2, 0.4, -2.0]].map(DVec3::from);
         let (mut short, mut long) = (Block::default(), Block::default());
         short.add_alike(1.7, p, q);
         short.add_along(-0.6, w, p, q);
-        let h = M3::from_diagonal_element(1.7) - w * w.transpose() * 0.6;
+        let h = DMat3::from_diagonal_element(1.7) - w * w.transpose() * 0.6;
         long.add_product(motion(None, p), &h, motion(None, q));
         // Both ends of a spring in one cluster, against each other and themselves.
         short.add_turn(0.9, w, p - q);
-        let h = M3::from_diagonal_element(0.9) + w * w.transpose();
+        let h = DMat3::from_diagonal_element(0.9) + w * w.transpose();
         for (a, b, sign) in [(p, p, 1.0), (q, q, 1.0), (p, q, -1.0), (q, p, -1.0)] {
             long.add_product(motion(None, a), &(h * sign), motion(None, b));
         }

@@ -45,7 +45,5 @@ pub use frame::{Frame, Integrator, Report, Solver};
 pub use plastic::{Plasticity, flow, reset, tear};
 pub use state::State;
 
-type V3 = nalgebra::Vector3<f64>;
-
 #[cfg(test)]
 mod tests;

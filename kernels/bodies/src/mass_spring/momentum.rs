@@ -1,25 +1,22 @@
 //! What is kept of the momenta of whole pieces, whatever linear solves leave of a residual.
 
-use super::V3;
 use super::body::Body;
 use super::contact::{Mode, Touching};
 use super::guess::Turn;
 use super::order::pieces;
 use super::stage::{Setting, Stage, Work};
-use nalgebra::Matrix3;
+use numerics::vector::{DMat3, DVec3};
 
 /// Sum of weights above which a contact is with an obstacle: it is 1 there, and 0 between two bodies, which hold each other
 /// only.
 const HELD: f64 = 0.5;
 
-type M3 = Matrix3<f64>;
-
 /// What groups of pieces are to be given, and what they put up against being shifted as a whole.
 pub(super) struct Whole {
     /// Σ of residuals, of each group.
-    wanted: Vec<V3>,
+    wanted: Vec<DVec3>,
     /// Resistance to a shift: inertia, and contacts with obstacles.
-    resisted: Vec<M3>,
+    resisted: Vec<DMat3>,
     holds: Vec<Hold>,
 }
 
@@ -31,12 +28,12 @@ struct Hold {
     /// Σ of its weights.
     weight: f64,
     /// As in [`Touching::resisted`].
-    ways: ([V3; 3], usize),
+    ways: ([DVec3; 3], usize),
 }
 
 impl Hold {
     /// Directions it resists in, each scaled by the root of the stiffness.
-    fn ways(&self) -> impl Iterator<Item = &V3> {
+    fn ways(&self) -> impl Iterator<Item = &DVec3> {
         self.ways.0[..self.ways.1].iter()
     }
 }
@@ -73,11 +70,11 @@ impl Work {
     pub(super) fn whole(&self, body: &Body, stage: &Stage<'_>) -> Whole {
         let inertia = &self.system.inertia;
         let sums = self.sums(body, |place| (self.r[place], inertia[place]));
-        let (wanted, mut resisted): (Vec<V3>, Vec<M3>) =
-            sums.into_iter().map(|(wanted, inertia)| (wanted, M3::identity() * inertia)).unzip();
+        let (wanted, mut resisted): (Vec<DVec3>, Vec<DMat3>) =
+            sums.into_iter().map(|(wanted, inertia)| (wanted, DMat3::identity() * inertia)).unzip();
         let holds = self.holds(stage);
         for hold in &holds {
-            let shift = |way: &V3| way * way.transpose() * (hold.weight * hold.weight);
+            let shift = |way: &DVec3| way * way.transpose() * (hold.weight * hold.weight);
             hold.ways().for_each(|way| resisted[hold.group] += shift(way));
         }
         Whole { wanted, resisted, holds }
@@ -96,11 +93,11 @@ impl Work {
         holds.collect()
     }
 
-    fn sums(&self, body: &Body, of: impl Fn(usize) -> (V3, f64) + Sync) -> Vec<(V3, f64)> {
+    fn sums(&self, body: &Body, of: impl Fn(usize) -> (DVec3, f64) + Sync) -> Vec<(DVec3, f64)> {
         let clusters = &body.order.clusters;
-        let add = |sum: (V3, f64), part: (V3, f64)| (sum.0 + part.0, sum.1 + part.1);
-        let sums = clusters.map((), |cluster, ()| clusters.range(cluster).map(&of).fold((V3::zeros(), 0.0), add));
-        let mut groups = vec![(V3::zeros(), 0.0); body.order.pieces.len()];
+        let add = |sum: (DVec3, f64), part: (DVec3, f64)| (sum.0 + part.0, sum.1 + part.1);
+        let sums = clusters.map((), |cluster, ()| clusters.range(cluster).map(&of).fold((DVec3::zeros(), 0.0), add));
+        let mut groups = vec![(DVec3::zeros(), 0.0); body.order.pieces.len()];
         for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
             if let Some(group) = group {
                 let slot = &mut groups[*group as usize];
@@ -114,16 +111,16 @@ impl Work {
     /// not feel it.
     pub(super) fn shift(&mut self, body: &Body, stage: &Stage<'_>, whole: &Whole) {
         let given = self.sums(body, |place| (self.dx[place] * self.system.inertia[place], 0.0));
-        let mut left: Vec<V3> = whole.wanted.iter().zip(&given).map(|(wanted, (given, _))| wanted - given).collect();
+        let mut left: Vec<DVec3> = whole.wanted.iter().zip(&given).map(|(wanted, (given, _))| wanted - given).collect();
         for hold in &whole.holds {
             let way_of = stage.contacts[hold.contact].between(&self.dx);
             hold.ways().for_each(|way| left[hold.group] -= way * (hold.weight * way.dot(&way_of)));
         }
-        let by = |(left, resisted): (&V3, &M3)| {
+        let by = |(left, resisted): (&DVec3, &DMat3)| {
             let by = resisted.cholesky().map(|factor| factor.solve(left)).unwrap_or_default();
-            if by.iter().all(|by| by.is_finite()) { by } else { V3::zeros() }
+            if by.iter().all(|by| by.is_finite()) { by } else { DVec3::zeros() }
         };
-        let by: Vec<V3> = left.iter().zip(&whole.resisted).map(by).collect();
+        let by: Vec<DVec3> = left.iter().zip(&whole.resisted).map(by).collect();
         for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
             let Some(group) = *group else { continue };
             for place in body.places(piece) {
@@ -133,15 +130,15 @@ impl Work {
         }
         for hold in &whole.holds {
             for (place, weight) in stage.contacts[hold.contact].sides() {
-                let push = |sum: V3, way: &V3| sum + way * (weight * hold.weight * way.dot(&by[hold.group]));
-                self.r[place] -= hold.ways().fold(V3::zeros(), push);
+                let push = |sum: DVec3, way: &DVec3| sum + way * (weight * hold.weight * way.dot(&by[hold.group]));
+                self.r[place] -= hold.ways().fold(DVec3::zeros(), push);
             }
         }
     }
 
     /// Turns each group as a whole so that it has the angular momentum of the stage's equation, whatever linear solves left:
     /// springs and volumes do not feel it, and contacts with obstacles are counted for what they resist.
-    pub(super) fn turn(&self, body: &Body, stage: &Stage<'_>, x: &mut [V3]) {
+    pub(super) fn turn(&self, body: &Body, stage: &Stage<'_>, x: &mut [DVec3]) {
         /// Share of a group's inertia below which it has none about an axis.
         const NOTHING: f64 = 1e-9;
         let inertia = &self.system.inertia;
@@ -151,29 +148,30 @@ impl Work {
             grouped.flat_map(|(group, piece)| body.places(piece).map(move |place| (group, place)))
         };
         let count = body.order.pieces.len();
-        let mut middles = vec![(V3::zeros(), 0.0); count];
+        let mut middles = vec![(DVec3::zeros(), 0.0); count];
         for (group, place) in members() {
             middles[group].0 += x[place] * inertia[place];
             middles[group].1 += inertia[place];
         }
-        let middles: Vec<V3> = middles.into_iter().map(|(sum, mass)| sum / mass).collect();
-        let mut turned = vec![(V3::zeros(), M3::zeros()); count];
+        let middles: Vec<DVec3> = middles.into_iter().map(|(sum, mass)| sum / mass).collect();
+        let mut turned = vec![(DVec3::zeros(), DMat3::zeros()); count];
         for (group, place) in members() {
             let arm = x[place] - middles[group];
             let (torque, tensor) = &mut turned[group];
             *torque += arm.cross(&self.r[place]);
-            *tensor += (M3::identity() * arm.norm_squared() - arm * arm.transpose()) * inertia[place];
+            *tensor += (DMat3::identity() * arm.norm_squared() - arm * arm.transpose()) * inertia[place];
         }
-        turned.iter_mut().for_each(|(_, tensor)| *tensor += M3::identity() * (NOTHING * tensor.trace()));
+        turned.iter_mut().for_each(|(_, tensor)| *tensor += DMat3::identity() * (NOTHING * tensor.trace()));
         for hold in self.holds(stage) {
             let sides = stage.contacts[hold.contact].sides();
-            let arm = sides.fold(V3::zeros(), |sum, (place, weight)| sum + (x[place] - middles[hold.group]) * weight);
+            let arm =
+                sides.fold(DVec3::zeros(), |sum, (place, weight)| sum + (x[place] - middles[hold.group]) * weight);
             for way in hold.ways() {
                 let lever = arm.cross(way);
                 turned[hold.group].1 += lever * lever.transpose();
             }
         }
-        let turn = |(torque, tensor): &(V3, M3)| {
+        let turn = |(torque, tensor): &(DVec3, DMat3)| {
             let angle = tensor.cholesky()?.solve(torque);
             angle.iter().all(|x| x.is_finite()).then(|| Turn::by(angle))
         };

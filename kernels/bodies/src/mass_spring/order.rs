@@ -5,8 +5,8 @@
 //! follow each other so that those joined by springs are few steps apart, for the coarse matrix's sake.
 //! The order hangs on sets alone, never on how a sort orders equals.
 
-use super::V3;
 use super::parts::Parts;
+use numerics::vector::DVec3;
 use std::ops::Range;
 
 /// Clusters of a body of n particles: CLUSTERS·n^GROWTH, which keeps the iterations nearly level from 2,000 particles (80 a
@@ -33,7 +33,7 @@ pub(super) struct Order {
 
 impl Order {
     /// Of particles at `points`, joined by `springs`.
-    pub(super) fn new(points: &[V3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+    pub(super) fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let roots = pieces(points.len(), springs.clone());
         // Pieces by their first particle, particles within by index.
         let mut callers: Vec<u32> = (0..points.len() as u32).collect();
@@ -117,7 +117,7 @@ fn outwards(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<usize>
 }
 
 /// Orders `particles` and adds where their `clusters` end; `base` is where they begin themselves.
-fn halve(points: &[V3], particles: &mut [u32], clusters: usize, base: usize, starts: &mut Vec<usize>) {
+fn halve(points: &[DVec3], particles: &mut [u32], clusters: usize, base: usize, starts: &mut Vec<usize>) {
     let count = particles.len();
     if clusters <= 1 && count <= LEAF {
         particles.sort_unstable();
@@ -139,8 +139,8 @@ fn halve(points: &[V3], particles: &mut [u32], clusters: usize, base: usize, sta
 }
 
 /// Brings the `middle` items that come first along the longest side of their box to the front.
-pub(super) fn split(points: &[V3], items: &mut [u32], middle: usize) {
-    let mut low = V3::repeat(f64::INFINITY);
+pub(super) fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
+    let mut low = DVec3::repeat(f64::INFINITY);
     let mut high = -low;
     for item in items.iter() {
         low = low.inf(&points[*item as usize]);
@@ -175,9 +175,9 @@ pub(super) fn pieces(count: usize, springs: impl Iterator<Item = [u32; 2]>) -> V
 mod tests {
     use super::*;
 
-    fn grid(side: u32) -> Vec<V3> {
+    fn grid(side: u32) -> Vec<DVec3> {
         (0..side * side * side)
-            .map(|i| V3::new(f64::from(i % side), f64::from(i / side % side), f64::from(i / side / side)))
+            .map(|i| DVec3::new(f64::from(i % side), f64::from(i / side % side), f64::from(i / side / side)))
             .collect()
     }
 
@@ -193,8 +193,8 @@ mod tests {
             let range = clusters.range(cluster);
             assert!((90..150).contains(&range.len()), "{} particles", range.len());
             let members = || order.callers[range.clone()].iter().map(|particle| points[*particle as usize]);
-            let high = members().fold(V3::repeat(-1e9), |high, p| high.sup(&p));
-            let low = members().fold(V3::repeat(1e9), |low, p| low.inf(&p));
+            let high = members().fold(DVec3::repeat(-1e9), |high, p| high.sup(&p));
+            let low = members().fold(DVec3::repeat(1e9), |low, p| low.inf(&p));
             assert!((high - low).max() <= 8.0, "a cluster as long as {}", (high - low).max());
         }
     }
@@ -216,8 +216,8 @@ mod tests {
 
     #[test]
     fn joined_clusters_are_few_steps_apart() {
-        let points: Vec<V3> =
-            (0..16 * 400).map(|i| V3::new(f64::from(i / 16), f64::from(i % 4), f64::from(i / 4 % 4))).collect();
+        let points: Vec<DVec3> =
+            (0..16 * 400).map(|i| DVec3::new(f64::from(i / 16), f64::from(i % 4), f64::from(i / 4 % 4))).collect();
         let springs = (0..points.len() as u32).flat_map(|i| [[i, i + 1], [i, i + 4], [i, i + 16]]);
         let inside = springs.filter(|ends| (ends[1] as usize) < points.len());
         let order = Order::new(&points, inside.clone());

@@ -3,10 +3,10 @@
 //! A spring's length at rest is that of the shape times what dents scale it by, kept apart so that a body takes the shape of
 //! a goal and keeps its dents. Each change says what energy it released or stored.
 
-use super::V3;
 use super::body::{Body, volume};
 use super::springs::{self, Rest};
 use super::state::State;
+use numerics::vector::DVec3;
 
 /// Least and most that dents scale a length by: a spring flows no further.
 const DENTS: [f64; 2] = [0.1, 10.0];
@@ -36,13 +36,13 @@ pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64
     for spring in 0..body.ends.len() {
         let (length, dent) = (state.lengths[spring], state.dents[spring]);
         let meant = match &drawn {
-            Some(drawn) if spring < body.meshed() => springs::length(body, drawn, spring),
+            Some(drawn) if spring < body.meshed() => springs::spring_length(body, drawn, spring),
             _ => f64::NAN,
         };
         // The least and the most of a number and NaN are the number.
         let (least, most) = (length.min(meant) * dent, length.max(meant) * dent);
         if least > 0.0 && !state.torn[spring] {
-            let now = springs::length(body, &x, spring);
+            let now = springs::spring_length(body, &x, spring);
             let strain = now / now.clamp(least, most) - 1.0;
             let above = (strain.abs() - plasticity.yield_strain).max(0.0).copysign(strain);
             let dent = dent * (1.0 + share * above).max(0.0);
@@ -63,7 +63,7 @@ pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, kee
     let goal = places(body, shape);
     let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
     for spring in 0..body.meshed() {
-        let length = springs::length(body, &goal, spring);
+        let length = springs::spring_length(body, &goal, spring);
         if !length.is_finite() {
             continue;
         }
@@ -89,7 +89,7 @@ pub fn tear(body: &Body, state: &mut State, stretch: f64, reach: f64) -> u32 {
     let mut torn = 0;
     for spring in body.meshed()..body.ends.len() {
         let most = (stretch * state.lengths[spring] * state.dents[spring]).max(reach);
-        if !state.torn[spring] && springs::length(body, &x, spring) > most {
+        if !state.torn[spring] && springs::spring_length(body, &x, spring) > most {
             state.torn[spring] = true;
             torn += 1;
         }
@@ -97,8 +97,8 @@ pub fn tear(body: &Body, state: &mut State, stretch: f64, reach: f64) -> u32 {
     torn
 }
 
-fn places(body: &Body, points: &[[f64; 3]]) -> Vec<V3> {
-    body.inwards(points).into_iter().map(V3::from).collect()
+fn places(body: &Body, points: &[[f64; 3]]) -> Vec<DVec3> {
+    body.inwards(points).into_iter().map(DVec3::from).collect()
 }
 
 /// What springs store, joules.

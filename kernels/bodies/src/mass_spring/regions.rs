@@ -6,9 +6,9 @@
 //! its volume, so it costs a fraction of what single tetrahedra would. Limit: within a region volume may move about; there
 //! springs resist, and what keeps single tetrahedra from turning over.
 
-use super::V3;
 use super::order::{pieces, split};
 use super::parts::Parts;
+use numerics::vector::DVec3;
 
 /// Tetrahedra in a region: some eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges less
 /// evenly; with 20 it costs a tenth more.
@@ -35,9 +35,9 @@ pub(super) struct Regions {
 
 impl Regions {
     /// Of `tets`, corners by place among the particles `rest`.
-    pub(super) fn new(rest: &[V3], tets: &[[u32; 4]]) -> Self {
-        let centres: Vec<V3> =
-            tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<V3>() * 0.25).collect();
+    pub(super) fn new(rest: &[DVec3], tets: &[[u32; 4]]) -> Self {
+        let centres: Vec<DVec3> =
+            tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<DVec3>() * 0.25).collect();
         let joined = tets.iter().flat_map(|[a, b, c, d]| [[*a, *b], [*a, *c], [*a, *d]]);
         let piece = pieces(rest.len(), joined);
         let piece_of = |tet: &u32| piece[tets[*tet as usize][0] as usize];
@@ -102,9 +102,9 @@ impl Regions {
     }
 
     /// The volume of a region with particles at `x`, and how it changes with each of its own: m² outwards.
-    pub(super) fn measure(&self, region: usize, x: &[V3], gradient: &mut [V3]) -> f64 {
+    pub(super) fn measure(&self, region: usize, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let corners = self.of(region);
-        gradient.fill(V3::zeros());
+        gradient.fill(DVec3::zeros());
         let Some(first) = corners.first() else { return 0.0 };
         for [a, b, c] in &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize] {
             let [a, b, c] = [usize::from(*a), usize::from(*b), usize::from(*c)];
@@ -127,7 +127,7 @@ impl Regions {
 }
 
 /// As for particles: at medians along the longest side.
-fn halve(centres: &[V3], tets: &mut [u32], regions: usize, base: usize, starts: &mut Vec<u32>) {
+fn halve(centres: &[DVec3], tets: &mut [u32], regions: usize, base: usize, starts: &mut Vec<u32>) {
     if regions <= 1 {
         tets.sort_unstable();
         starts.push((base + tets.len()) as u32);
@@ -169,8 +169,8 @@ mod tests {
     use super::*;
 
     /// A unit cube cut into six tetrahedra around its diagonal.
-    fn cube() -> (Vec<V3>, Vec<[u32; 4]>) {
-        let points = (0..8).map(|i| V3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect();
+    fn cube() -> (Vec<DVec3>, Vec<[u32; 4]>) {
+        let points = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect();
         let tets = vec![[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
         (points, tets)
     }
@@ -180,12 +180,12 @@ mod tests {
         let (points, tets) = cube();
         let mut regions = Regions::new(&points, &tets);
         assert_eq!(regions.len(), 1);
-        let far: Vec<V3> = points.iter().map(|p| p * 2.0 + V3::new(1e4, -1e4, 1e4)).collect();
-        let mut gradient = vec![V3::zeros(); 8];
+        let far: Vec<DVec3> = points.iter().map(|p| p * 2.0 + DVec3::new(1e4, -1e4, 1e4)).collect();
+        let mut gradient = vec![DVec3::zeros(); 8];
         assert!((regions.measure(0, &far, &mut gradient) - 8.0).abs() < 1e-9);
         // Six of the twelve triangles, each of area 2, lie on the three faces of the corner where all diagonals start.
-        assert!((gradient[0] - V3::repeat(-4.0 / 3.0)).norm() < 1e-9, "{}", gradient[0]);
-        assert!(gradient.iter().sum::<V3>().norm() < 1e-9);
+        assert!((gradient[0] - DVec3::repeat(-4.0 / 3.0)).norm() < 1e-9, "{}", gradient[0]);
+        assert!(gradient.iter().sum::<DVec3>().norm() < 1e-9);
         regions.set_material(&[1.0 / 6.0; 6], &[30.0; 6], &[0.5; 6]);
         assert!((regions.energy[0] - 30.0).abs() < 1e-12 && (regions.damping[0] - 0.5).abs() < 1e-12);
     }
@@ -205,13 +205,13 @@ mod tests {
     fn a_regions_volume_is_the_sum_of_its_tetrahedra_where_they_overlap_too() {
         // Both stand on the same side of the face 0 1 2: 1 × ½ ÷ 3 and 2 × ½ ÷ 3.
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, 2.0]];
-        let mut points = corners.map(V3::from);
+        let mut points = corners.map(DVec3::from);
         let regions = Regions::new(&points, &[[0, 1, 2, 3], [0, 1, 2, 4]]);
-        let mut gradient = [V3::zeros(); 5];
+        let mut gradient = [DVec3::zeros(); 5];
         assert!((regions.measure(0, &points, &mut gradient) - 0.5).abs() < 1e-15);
         let mut moved = |point: usize, axis: usize, by: f64| {
             points[point][axis] += by;
-            let volume = regions.measure(0, &points, &mut [V3::zeros(); 5]);
+            let volume = regions.measure(0, &points, &mut [DVec3::zeros(); 5]);
             points[point][axis] -= by;
             volume
         };

@@ -4,8 +4,8 @@
 //! first by row (how fast does it change), then by particle (what does that push), so nothing is scattered and the order of
 //! every sum is fixed. In f32: a row that moves with a body rigidly feels it to 1e-7.
 
-use super::V3;
 use super::parts::{Parts, Several};
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Rows by row and by particle.
 #[derive(Clone, Debug, Default)]
@@ -17,7 +17,7 @@ pub(super) struct Rows {
     /// Particle of each entry, by place.
     particles: Vec<u32>,
     /// √weight·gradient of each entry.
-    along: Vec<[f32; 3]>,
+    along: Vec<Vec3>,
     /// Where each particle's entries begin in `at`; empty where there is no row.
     at_starts: Vec<u32>,
     at: Vec<At>,
@@ -31,7 +31,7 @@ pub(super) struct Rows {
 struct At {
     row: u32,
     entry: u32,
-    along: [f32; 3],
+    along: Vec3,
 }
 
 impl Rows {
@@ -91,8 +91,8 @@ impl Rows {
     }
 
     /// The entries' particles and vectors.
-    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (usize, V3)> {
-        self.row(row).map(|entry| (self.particles[entry] as usize, wide(self.along[entry])))
+    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (usize, DVec3)> {
+        self.row(row).map(|entry| (self.particles[entry] as usize, to_f64(self.along[entry])))
     }
 
     /// The rows in parts; none where there is no row that counts.
@@ -101,7 +101,7 @@ impl Rows {
     }
 
     /// Sets what each entry resists: `weight` of the row, times the entry's gradient.
-    pub(super) fn set(&mut self, weights: &[f64], gradients: &[V3], clusters: &Parts) {
+    pub(super) fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Parts) {
         if self.is_empty() {
             return;
         }
@@ -111,8 +111,7 @@ impl Rows {
                 for (row, along) in parts.range(part).zip(along.iter_mut()) {
                     let root = weights[row].max(0.0).sqrt();
                     for (entry, along) in (starts[row] as usize..).zip(along) {
-                        let scaled = gradients[entry] * root;
-                        *along = [scaled.x as f32, scaled.y as f32, scaled.z as f32];
+                        *along = to_f32(gradients[entry] * root);
                     }
                 }
             });
@@ -124,7 +123,7 @@ impl Rows {
     }
 
     /// Measures how `p` changes each row; [`Rows::push`] then gives what that does.
-    pub(super) fn measure(&mut self, p: &[V3]) {
+    pub(super) fn measure(&mut self, p: &[DVec3]) {
         if self.is_empty() {
             return;
         }
@@ -134,42 +133,37 @@ impl Rows {
             for (row, change) in parts.range(part).zip(mine) {
                 let entries = starts[row] as usize..starts[row + 1] as usize;
                 let each = particles[entries.clone()].iter().zip(&along[entries]);
-                *change = each.fold(0.0, |sum, (place, g)| sum + wide(*g).dot(&p[*place as usize]));
+                *change = each.fold(0.0, |sum, (place, g)| sum + to_f64(*g).dot(&p[*place as usize]));
             }
         });
     }
 
     /// Σ g·(its row's change), of the particle at `place`.
     #[inline(always)]
-    pub(super) fn push(&self, place: usize) -> V3 {
+    pub(super) fn push(&self, place: usize) -> DVec3 {
         let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
-        mine.iter().fold(V3::zeros(), |sum, at| sum + wide(at.along) * self.change[at.row as usize])
+        mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
     /// `weight` of Σ g gᵀ of the particle at `place`, added to `block`.
     #[inline(always)]
     pub(super) fn add_block(&self, place: usize, weight: f64, block: &mut [f64; 6]) {
         for at in &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize] {
-            add_square(block, wide(at.along), weight);
+            add_square(block, to_f64(at.along), weight);
         }
     }
 
     /// Σ of `values`, one a row, times `gradients`, one an entry: a force on the particle at `place`.
     #[inline(always)]
-    pub(super) fn gather(&self, place: usize, values: &[f64], gradients: &[V3]) -> V3 {
+    pub(super) fn gather(&self, place: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
         let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
-        mine.iter().fold(V3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
+        mine.iter().fold(DVec3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
     }
-}
-
-#[inline(always)]
-fn wide(g: [f32; 3]) -> V3 {
-    V3::new(f64::from(g[0]), f64::from(g[1]), f64::from(g[2]))
 }
 
 /// Adds s·v vᵀ to a symmetric block: xx, xy, xz, yy, yz, zz.
 #[inline(always)]
-pub(super) fn add_square(block: &mut [f64; 6], v: V3, s: f64) {
+pub(super) fn add_square(block: &mut [f64; 6], v: DVec3, s: f64) {
     block[0] += s * v.x * v.x;
     block[1] += s * v.x * v.y;
     block[2] += s * v.x * v.z;

@@ -1,11 +1,11 @@
 //! The objective that a stage makes least, and the line search on it: with it a stage never ends higher than it began.
 
-use super::V3;
 use super::assemble::velocities;
 use super::contact::Touching;
 use super::springs;
 use super::stage::{Setting, Solved, Stage, Work};
 use super::state::Warm;
+use numerics::vector::DVec3;
 
 /// Halvings of a step that a line search tries.
 const HALVINGS: usize = 16;
@@ -69,7 +69,7 @@ impl Work {
         contacts: &mut [Touching],
         enough: Enough,
         warm: &mut Warm,
-        x: &mut [V3],
+        x: &mut [DVec3],
     ) -> Solved {
         self.begin(on, contacts);
         let most = if contacts.is_empty() { MOST } else { MOST_TOUCHING };
@@ -116,7 +116,7 @@ impl Work {
     }
 
     /// Turns groups as wholes, if that does not lead higher than `base`: contacts that were open may close.
-    fn turn_downhill(&mut self, on: &Setting<'_>, stage: &Stage<'_>, base: Level, x: &mut [V3]) {
+    fn turn_downhill(&mut self, on: &Setting<'_>, stage: &Stage<'_>, base: Level, x: &mut [DVec3]) {
         let mut turned = x.to_vec();
         self.turn(on.body, stage, &mut turned);
         if turned == x {
@@ -134,7 +134,7 @@ impl Work {
 
     /// What all but contacts count in what the stage makes least, ½(x − y)ᵀM(x − y) + a²·(energies), at positions that
     /// [`Self::of_contacts`] was asked about.
-    fn of_others(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
+    fn of_others(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
         let (body, a) = (on.body, stage.a);
         self.volumes.measure(body, x);
         let stored = self.volumes.stored + self.volumes.damped;
@@ -161,7 +161,7 @@ impl Work {
     }
 
     /// What contacts count in it at `x`; makes velocities those there.
-    fn of_contacts(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3]) -> f64 {
+    fn of_contacts(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
         let (body, a) = (on.body, stage.a);
         velocities(&body.order.clusters, x, stage, &mut self.v);
         let of = |contact: &Touching| {
@@ -186,7 +186,7 @@ impl Work {
     ///
     /// Where contacts gain more on the way than all else loses on its slope, nothing else is asked: a step too far into a
     /// contact is the most usual of those that lower nothing.
-    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], base: Level) -> Found {
+    fn search(&mut self, on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3], base: Level) -> Found {
         let mut trial = std::mem::take(&mut self.trial);
         let mut found = Found { share: 0.0, lower: base, stopped: false };
         let most = base.sum() + ROUNDING * base.sum().abs();
@@ -222,7 +222,7 @@ impl Work {
 /// Stops particles that go from `x` to `trial` on their own where they would get too deep into a contact, and says whether
 /// there were any. A direction knows nothing of contacts that it closes, and takes their pushes for straight lines: one
 /// particle that has to stop would hold up all others.
-fn stop(on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], trial: &mut [V3]) -> bool {
+fn stop(on: &Setting<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
     let mut stopped = false;
     for contact in stage.contacts {
         let Some((place, weight)) = contact.alone().filter(|side| !on.drive.held[side.0]) else { continue };
@@ -236,7 +236,7 @@ fn stop(on: &Setting<'_>, stage: &Stage<'_>, x: &[V3], trial: &mut [V3]) -> bool
 
 /// Has friction count the pushes that contacts have at `x`, where velocities are `v`, if what it counted before is another by
 /// more than [`CHANGED`]: then gives how much more it counts in the objective of a stage of `a`.
-pub(super) fn reload(contacts: &mut [Touching], x: &[V3], v: &[V3], a: f64, size: f64) -> Option<f64> {
+pub(super) fn reload(contacts: &mut [Touching], x: &[DVec3], v: &[DVec3], a: f64, size: f64) -> Option<f64> {
     let sums = contacts.iter().map(|contact| (contact.push(x), contact.load));
     let (sum, changed) = sums.fold((0.0, 0.0), |sums, (now, then)| (sums.0 + now, sums.1 + (now - then).abs()));
     (changed > CHANGED * sum).then(|| {

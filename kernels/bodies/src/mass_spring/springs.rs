@@ -7,11 +7,11 @@
 //! Source: H = αI + (a²K − α)nnᵀ, α = a²K·max(0, 1 − R/l), Baraff & Witkin 1998 with what makes H indefinite left out:
 //! positive semi-definite for every length. K and R are those of spring and dashpot together, see [`Link`].
 
-use super::V3;
 use super::body::Body;
 use super::hanging::Hung;
 use super::parts::Several;
 use numerics::random::Key;
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Largest a²k a record holds: α, β and products with displacements stay far inside of f32.
 const STIFFEST: f64 = 1e24;
@@ -22,7 +22,7 @@ const STIFFEST: f64 = 1e24;
 pub(super) struct Record {
     pub(super) other: u32,
     pub(super) alpha: f32,
-    pub(super) w: [f32; 3],
+    pub(super) w: Vec3,
 }
 
 /// Lengths at rest, a spring, and which springs are torn; none where empty.
@@ -42,13 +42,13 @@ impl Rest<'_> {
 impl Record {
     /// w.
     #[inline(always)]
-    pub(super) fn along(&self) -> V3 {
-        V3::new(f64::from(self.w[0]), f64::from(self.w[1]), f64::from(self.w[2]))
+    pub(super) fn along(&self) -> DVec3 {
+        to_f64(self.w)
     }
 
     /// Hd.
     #[inline(always)]
-    pub(super) fn times(&self, d: V3) -> V3 {
+    pub(super) fn times(&self, d: DVec3) -> DVec3 {
         let w = self.along();
         d * f64::from(self.alpha) + w * w.dot(&d)
     }
@@ -120,14 +120,14 @@ pub(super) fn firmness(body: &Body, rest: &Rest<'_>, out: &mut Vec<f64>) {
 /// A spring seen from one end: the way there from the other, its length, and 1 ÷ that.
 #[derive(Clone, Copy)]
 struct Seen {
-    way: V3,
+    way: DVec3,
     length: f64,
     inverse: f64,
 }
 
 impl Seen {
     #[inline(always)]
-    fn from(link: &Link, place: usize, x: &[V3]) -> Self {
+    fn from(link: &Link, place: usize, x: &[DVec3]) -> Self {
         let d = x[place] - x[link.other as usize];
         let squared = d.norm_squared();
         // Outside of these a square has lost its digits, or the length is none.
@@ -151,22 +151,22 @@ impl Seen {
 /// A direction for ends that are in the same place (any: each spring's own, so that doubled particles part), or whose
 /// distance squared is beyond numbers.
 #[cold]
-fn unusual(d: V3, spring: u32, first: bool) -> (V3, f64) {
-    if d != V3::zeros() {
+fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
+    if d != DVec3::zeros() {
         let size = d.amax();
         let scaled = d / size;
         return (scaled.normalize(), size * scaled.norm());
     }
     let key = Key::new(u64::from(spring));
     let component = |axis: u64| 2.0 * key.of(axis).f64() - 1.0;
-    let way = V3::new(component(0), component(1), component(2)).try_normalize(1e-3).unwrap_or_else(V3::x);
+    let way = DVec3::new(component(0), component(1), component(2)).try_normalize(1e-3).unwrap_or_else(DVec3::x);
     (if first { way } else { -way }, 0.0)
 }
 
 impl Link {
     /// What pulls the particle at `place` to the other end, newtons, and H for steps of `a`, in full and as a record.
     #[inline(always)]
-    fn linearise(&self, x: &[V3], a: f64, place: usize, record: &mut Record) -> (V3, [f64; 6]) {
+    fn linearise(&self, x: &[DVec3], a: f64, place: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
         let seen = Seen::from(self, place, x);
         let force = seen.way * seen.tension(self);
         let k = (a * a * f64::from(self.k)).min(STIFFEST);
@@ -178,7 +178,7 @@ impl Link {
             k
         };
         let w = seen.way * (k - alpha).max(0.0).sqrt();
-        *record = Record { other: self.other, alpha: alpha as f32, w: [w.x as f32, w.y as f32, w.z as f32] };
+        *record = Record { other: self.other, alpha: alpha as f32, w: to_f32(w) };
         let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
         (force, h)
     }
@@ -187,7 +187,7 @@ impl Link {
 /// Adds to a cluster's forces, newtons, what the springs that hang at `place` pull with; `first` is the cluster's first place.
 /// After the particles before it, and this one, its own sum is whole.
 #[inline(always)]
-pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[V3], place: usize, first: usize, forces: &mut [V3]) {
+pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], place: usize, first: usize, forces: &mut [DVec3]) {
     let force = |link: &Link| {
         let seen = Seen::from(link, place, x);
         seen.way * seen.tension(link)
@@ -204,7 +204,7 @@ pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[V3], place: usize, first
 
 /// What [`linearise`] adds to, a slot for each particle of a cluster: forces, and sums of H.
 pub(super) struct Sums<'a> {
-    pub(super) forces: &'a mut [V3],
+    pub(super) forces: &'a mut [DVec3],
     pub(super) blocks: &'a mut [[f64; 6]],
 }
 
@@ -213,7 +213,7 @@ pub(super) struct Sums<'a> {
 pub(super) fn linearise(
     [inside, across]: [&[Link]; 2],
     records: &mut [Record],
-    x: &[V3],
+    x: &[DVec3],
     a: f64,
     place: usize,
     first: usize,
@@ -240,24 +240,24 @@ pub(super) fn linearise(
 
 /// The energy that spring `at` holds, joules.
 #[inline(always)]
-pub(super) fn energy(body: &Body, rest: &Rest<'_>, x: &[V3], at: usize) -> f64 {
+pub(super) fn energy(body: &Body, rest: &Rest<'_>, x: &[DVec3], at: usize) -> f64 {
     if !rest.holds(at as u32) {
         return 0.0;
     }
-    let strain = length(body, x, at) - rest.lengths[at];
+    let strain = spring_length(body, x, at) - rest.lengths[at];
     0.5 * body.stiffness[at] * strain * strain
 }
 
 /// How long spring `at` is, metres.
 #[inline(always)]
-pub(super) fn length(body: &Body, x: &[V3], at: usize) -> f64 {
+pub(super) fn spring_length(body: &Body, x: &[DVec3], at: usize) -> f64 {
     let [a, b] = body.ends[at];
     distance(x, a as usize, b as usize)
 }
 
 /// How far two particles are from each other, metres.
 #[inline(always)]
-pub(super) fn distance(x: &[V3], a: usize, b: usize) -> f64 {
+pub(super) fn distance(x: &[DVec3], a: usize, b: usize) -> f64 {
     let d = x[a] - x[b];
     let squared = d.norm_squared();
     if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 }
@@ -265,7 +265,7 @@ pub(super) fn distance(x: &[V3], a: usize, b: usize) -> f64 {
 
 /// That, and how fast it changes, m/s.
 #[inline(always)]
-pub(super) fn drift(x: &[V3], v: &[V3], a: usize, b: usize) -> [f64; 2] {
+pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
     let length = distance(x, a, b);
     let pace = if length > 0.0 { (x[a] - x[b]).dot(&(v[a] - v[b])) / length } else { 0.0 };
     [length, pace]
@@ -273,7 +273,7 @@ pub(super) fn drift(x: &[V3], v: &[V3], a: usize, b: usize) -> [f64; 2] {
 
 /// The energy within a stage of the springs that hang at `place`, each once, and their dashpots, joules.
 #[inline(always)]
-pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[V3], place: usize) -> f64 {
+pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[DVec3], place: usize) -> f64 {
     let energy = |link: &Link| {
         let strain = distance(x, place, link.other as usize) - link.rest;
         f64::from(link.k) * strain * strain

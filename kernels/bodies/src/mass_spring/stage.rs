@@ -4,7 +4,6 @@
 //! iteration goes downhill; with a line search the objective never rises. One iteration is what a step has by default;
 //! it goes on where the force turned out otherwise than its derivative said, and with contacts until they are met.
 
-use super::V3;
 use super::body::Body;
 use super::cg::{self, Coarse, Limits};
 use super::coarse::{self, Anchors, Layout};
@@ -15,6 +14,7 @@ use super::springs::{Link, Record, Rest};
 use super::state::Warm;
 use super::system::System;
 use super::volume::{Inventory, Thin, Volumes};
+use numerics::vector::{DVec3, Vec3};
 
 /// Share of the first residual that linear equations may leave.
 const CG_SHARE: f64 = 0.1;
@@ -40,8 +40,8 @@ const RISE: f64 = 100.0;
 /// What a stage is to solve.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
-    pub(super) y: &'a [V3],
-    pub(super) z: &'a [V3],
+    pub(super) y: &'a [DVec3],
+    pub(super) z: &'a [DVec3],
     /// Seconds.
     pub(super) a: f64,
     /// Share of the frame passed at its end.
@@ -105,30 +105,30 @@ pub(super) struct Work {
     /// Tetrahedra as the step began, and where they were looked over since.
     pub(super) inventory: Inventory,
     pub(super) seen: Option<Inventory>,
-    pub(super) arms: Vec<[f32; 3]>,
+    pub(super) arms: Vec<Vec3>,
     /// The springs as the frame has them.
     pub(super) links: Vec<Link>,
     /// Σk of those at each particle, N/m.
     pub(super) firmness: Vec<f64>,
     pub(super) scratch: cg::Scratch,
     /// Velocities at the positions looked at.
-    pub(super) v: Vec<V3>,
+    pub(super) v: Vec<DVec3>,
     /// −(M(x − y) − a²f).
-    pub(super) r: Vec<V3>,
+    pub(super) r: Vec<DVec3>,
     /// What of it is not of contacts.
-    pub(super) pull: Vec<V3>,
-    pub(super) dx: Vec<V3>,
-    pub(super) trial: Vec<V3>,
+    pub(super) pull: Vec<DVec3>,
+    pub(super) dx: Vec<DVec3>,
+    pub(super) trial: Vec<DVec3>,
     pub(super) thin: Vec<Thin>,
     pub(super) touches: Vec<Touch>,
     /// What friction each contact is taken to have, as a share of all that it can.
-    pub(super) drags: Vec<V3>,
+    pub(super) drags: Vec<DVec3>,
     /// What push each contact is expected to have, newtons.
     pub(super) pushes: Vec<f64>,
     /// Contacts whose push is linear from another than it has, and how much more that is.
     pub(super) unlike: Vec<(usize, f64)>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
-    pub(super) extra: Vec<V3>,
+    pub(super) extra: Vec<DVec3>,
     /// The group of pieces that hang together by contacts, of each piece in one that is nowhere held; and pieces that nothing
     /// holds or touches.
     pub(super) groups: Vec<Option<u32>>,
@@ -147,14 +147,14 @@ impl Work {
         };
         let regions = &body.regions;
         system.regions.set_topology(count, &regions.starts, &regions.particles, regions.parts());
-        Self { system, layout: Layout::new(body), r: vec![V3::zeros(); count], ..Self::default() }
+        Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
     /// Makes ready for a stage's first look at `contacts`.
     pub(super) fn begin(&mut self, on: &Setting<'_>, contacts: &[Touching]) {
         self.find_free(on, contacts);
         self.drags.clear();
-        self.drags.resize(contacts.len(), V3::zeros());
+        self.drags.resize(contacts.len(), DVec3::zeros());
         self.pushes.clear();
         self.pushes.extend(contacts.iter().map(|contact| contact.load));
     }
@@ -167,7 +167,7 @@ impl Work {
         stage: &Stage<'_>,
         newton: Newton,
         warm: &mut Warm,
-        x: &mut [V3],
+        x: &mut [DVec3],
     ) -> Solved {
         self.begin(on, stage.contacts);
         let solved = self.iterate(on, stage, newton, warm, x);
@@ -181,7 +181,7 @@ impl Work {
         stage: &Stage<'_>,
         newton: Newton,
         warm: &mut Warm,
-        x: &mut [V3],
+        x: &mut [DVec3],
     ) -> Solved {
         let clusters = &on.body.order.clusters;
         let mut solved = Solved::default();
@@ -197,7 +197,7 @@ impl Work {
             }
             let foreseen = std::mem::take(&mut self.r);
             self.follow(stage, 1.0, x);
-            self.r = vec![V3::zeros(); x.len()];
+            self.r = vec![DVec3::zeros(); x.len()];
             self.assemble(on, stage, x, false);
             let after = self.square(clusters);
             solved.failed = after > RISE * before || !after.is_finite();
@@ -214,7 +214,7 @@ impl Work {
     }
 
     /// Goes a `share` of `dx`, with what contacts are expected to do there.
-    pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [V3]) {
+    pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
         let known = stage.contacts.iter().zip(&self.touches).zip(&mut self.drags).zip(&mut self.pushes);
         for (((contact, touch), drag), push) in known {
             *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
@@ -224,16 +224,16 @@ impl Work {
     }
 
     /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
-    pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [V3]) {
+    pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [DVec3]) {
         let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         cg::precondition(&self.system, body, coarse, r);
     }
 
     /// A⁻¹r, by conjugate gradients.
-    pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<V3>) -> cg::Reached {
+    pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<DVec3>) -> cg::Reached {
         let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
-        let mut out = vec![V3::zeros(); r.len()];
+        let mut out = vec![DVec3::zeros(); r.len()];
         let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
         *r = out;
         reached
@@ -251,12 +251,12 @@ impl Work {
         on: &Setting<'_>,
         stage: &Stage<'_>,
         warm: &mut Warm,
-        x: &[V3],
+        x: &[DVec3],
         solved: &mut Solved,
     ) -> bool {
         let body = on.body;
         self.dx.clear();
-        self.dx.resize(x.len(), V3::zeros());
+        self.dx.resize(x.len(), DVec3::zeros());
         let whole = self.whole(body, stage);
         self.shift(body, stage, &whole);
         coarse::arms(&body.order.clusters, x, &mut self.arms);

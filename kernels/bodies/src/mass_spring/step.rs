@@ -9,7 +9,6 @@
 //! back from it 1.4 times as fast, as any method of order 2 continues forces. So is one in which contacts change or that
 //! turned out bad, again from the start.
 
-use super::V3;
 use super::body::Body;
 use super::contact::{Mode, Touching};
 use super::energy::{Energies, measure};
@@ -19,6 +18,7 @@ use super::springs::{distance, drift};
 use super::stage::{Newton, Setting, Solved, Stage, Work};
 use super::state::Warm;
 use super::volume::Inventory;
+use numerics::vector::DVec3;
 
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 /// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
@@ -35,10 +35,10 @@ const UNSETTLED: u32 = 4;
 /// Positions and velocities, the solver's order.
 #[derive(Clone, Debug)]
 pub(super) struct Moving {
-    pub(super) x: Vec<V3>,
-    pub(super) v: Vec<V3>,
+    pub(super) x: Vec<DVec3>,
+    pub(super) v: Vec<DVec3>,
     /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
-    pub(super) trend: Vec<V3>,
+    pub(super) trend: Vec<DVec3>,
     /// The push of an obstacle that each particle was under at last, newtons.
     pub(super) loads: Vec<f64>,
 }
@@ -92,7 +92,7 @@ impl Stepper<'_> {
 
         let mut full = match self.frame.contacts {
             Some(_) => {
-                let ahead: Vec<V3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+                let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
                 self.contacts(&start, &ahead, times)
             }
             None => Vec::new(),
@@ -138,7 +138,7 @@ impl Stepper<'_> {
         (stepped.contacts, stepped.overlap) = self.work.touching();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
         let touches = stepped.euler || stepped.contacts > 0;
-        let trend = |(v, before): (&V3, &V3)| if touches { V3::zeros() } else { (v - before) / h };
+        let trend = |(v, before): (&DVec3, &DVec3)| if touches { DVec3::zeros() } else { (v - before) / h };
         moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
         moving.loads = self.loads(&full, &moving.x);
         self.keep_finite(&start, moving, &mut stepped);
@@ -163,7 +163,7 @@ impl Stepper<'_> {
     }
 
     /// Looks them over within a step, and says whether any got thin at `x` that were not watched.
-    pub(super) fn thinned(&mut self, x: &[V3]) -> bool {
+    pub(super) fn thinned(&mut self, x: &[DVec3]) -> bool {
         if self.work.volumes.is_off() {
             return false;
         }
@@ -218,20 +218,20 @@ impl Stepper<'_> {
         on_from_start(self.work, -a);
         let force = self.work.forces(&self.setting, &stage, &moving.x, &moving.v);
         on_from_start(self.work, a);
-        let mut z: Vec<V3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
-        let y: Vec<V3> = (0..x.len())
+        let mut z: Vec<DVec3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
+        let y: Vec<DVec3> = (0..x.len())
             .map(|place| z[place] + moving.v[place] * a + force[place] * (a * a / body.mass[place]))
             .collect();
         self.pin(&mut x, &mut z, middle, a);
         (stage.y, stage.z, stage.time, stage.early) = (&y, &z, middle, (1.0 - GAMMA) * h);
         let first = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
-        let v_middle: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        let v_middle: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
         let x_middle = x;
 
         // Of the second backward difference: what the middle and the start count.
         let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
         let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
-        let mix = |middle: &[V3], start: &[V3]| -> Vec<V3> {
+        let mix = |middle: &[DVec3], start: &[DVec3]| -> Vec<DVec3> {
             middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
         };
         let swollen = self.work.volumes.at(body, &x_middle);
@@ -241,19 +241,19 @@ impl Stepper<'_> {
         };
         self.work.come_from(&self.setting, a, length, swollen);
         let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
-        let y: Vec<V3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
+        let y: Vec<DVec3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
         let mut x = guess.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
         let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning: &spinning, index: 1 };
         let second = self.work.solve(&self.setting, &stage, newton, self.warm, &mut x);
-        let v: Vec<V3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
 
         let scale = 2.0 * h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
         let raw = |place: usize| {
             let bent = moving.v[place] / GAMMA - v_middle[place] / (GAMMA * (1.0 - GAMMA)) + v[place] / (1.0 - GAMMA);
-            if self.setting.drive.held[place] { V3::zeros() } else { bent * (scale * body.mass[place]) }
+            if self.setting.drive.held[place] { DVec3::zeros() } else { bent * (scale * body.mass[place]) }
         };
-        let mut error: Vec<V3> = (0..x.len()).map(raw).collect();
+        let mut error: Vec<DVec3> = (0..x.len()).map(raw).collect();
         let mut solved = sum(first, second);
         if tolerance.is_some() {
             let reached = self.work.filter(body, self.warm, &mut error);
@@ -261,7 +261,7 @@ impl Stepper<'_> {
         } else {
             self.work.smooth(body, self.warm, &mut error);
         }
-        let estimate = error.iter().map(V3::norm_squared).fold(0.0, f64::max).sqrt();
+        let estimate = error.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         (moving.x, moving.v) = (x, v);
         (solved, estimate)
     }
@@ -273,7 +273,7 @@ impl Stepper<'_> {
     }
 
     /// Puts held particles where they are at `time`, and where (x − z)/a is their velocity.
-    pub(super) fn pin(&self, x: &mut [V3], z: &mut [V3], time: f64, a: f64) {
+    pub(super) fn pin(&self, x: &mut [DVec3], z: &mut [DVec3], time: f64, a: f64) {
         self.setting.drive.hold(time, x, z, a);
     }
 
@@ -281,8 +281,8 @@ impl Stepper<'_> {
     fn keep_finite(&mut self, start: &Moving, moving: &mut Moving, stepped: &mut Stepped) {
         for place in 0..moving.x.len() {
             if !moving.x[place].iter().chain(moving.v[place].iter()).all(|x| x.is_finite()) {
-                (moving.x[place], moving.v[place]) = (start.x[place], V3::zeros());
-                moving.trend[place] = V3::zeros();
+                (moving.x[place], moving.v[place]) = (start.x[place], DVec3::zeros());
+                moving.trend[place] = DVec3::zeros();
                 stepped.stopped += 1;
                 self.work.seen = None;
             }
@@ -314,7 +314,7 @@ impl Stepper<'_> {
                     moved[place] = rigid.velocity(moving.x[place]);
                 }
             }
-            let own = |v: &[V3], place: usize| v[place] - moved[place];
+            let own = |v: &[DVec3], place: usize| v[place] - moved[place];
             let inner: f64 =
                 (0..body.len()).map(|place| 0.5 * body.mass[place] * own(&moving.v, place).norm_squared()).sum();
             if !(gained > 0.0 && inner > 0.0) {
@@ -333,12 +333,12 @@ impl Stepper<'_> {
 }
 
 /// Joules.
-fn kinetic(body: &Body, v: &[V3]) -> f64 {
+fn kinetic(body: &Body, v: &[DVec3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
 }
 
 /// How far the worst contact is below its gap at `x`, metres; 0 where none is.
-pub(super) fn deepest(contacts: &[Touching], x: &[V3]) -> f64 {
+pub(super) fn deepest(contacts: &[Touching], x: &[DVec3]) -> f64 {
     contacts.iter().map(|contact| -contact.clearance(x, 0.0)).fold(0.0, f64::max)
 }
 

@@ -3,11 +3,11 @@
 //! Springs are records by particle, in f32 and as differences: a rigid motion meets no resistance in any bit, however stiff
 //! the springs are against the masses (an assembled matrix would lose the masses at a²k ÷ m of 1e7). Vectors are f64.
 
-use super::V3;
 use super::body::Body;
 use super::parts::Parts;
 use super::rows::Rows;
 use super::springs::Record;
+use numerics::vector::DVec3;
 
 /// M + a²K + aC around some positions.
 #[derive(Clone, Debug, Default)]
@@ -32,15 +32,15 @@ pub(super) struct System {
 
 impl System {
     /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at held particles.
-    pub(super) fn apply(&mut self, body: &Body, clusters: &Parts, p: &[V3], out: &mut [V3]) -> f64 {
+    pub(super) fn apply(&mut self, body: &Body, clusters: &Parts, p: &[DVec3], out: &mut [DVec3]) -> f64 {
         self.regions.measure(p);
         self.loose.measure(p);
         let system = &*self;
         let (regions, loose) = (!system.regions.is_empty(), !system.loose.is_empty());
-        clusters.sum(out, |cluster, out: &mut [V3]| {
+        clusters.sum(out, |cluster, out: &mut [DVec3]| {
             let places = clusters.range(cluster);
             let first = places.start;
-            out.fill(V3::zeros());
+            out.fill(DVec3::zeros());
             let mut sum = 0.0;
             for place in places {
                 let mine = p[place];
@@ -56,7 +56,7 @@ impl System {
                     total += record.times(mine - p[record.other as usize]);
                 }
                 if system.held[place] {
-                    out[place - first] = V3::zeros();
+                    out[place - first] = DVec3::zeros();
                     continue;
                 }
                 if !system.blocks.is_empty() {
@@ -86,8 +86,8 @@ impl System {
 
 /// A symmetric block times a vector.
 #[inline(always)]
-pub(super) fn times([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: V3) -> V3 {
-    V3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+pub(super) fn times([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: DVec3) -> DVec3 {
+    DVec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
 }
 
 /// The inverse of the lower factor of a symmetric block that is positive definite: l⁻¹ by rows, so that its square is the
@@ -112,14 +112,14 @@ pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
 
 /// W·r, whose square is rᵀ·(block)⁻¹·r.
 #[inline(always)]
-pub(super) fn halfway(w: &[f32; 6], r: V3) -> V3 {
+pub(super) fn halfway(w: &[f32; 6], r: DVec3) -> DVec3 {
     let [a, low, b, corner, left, c] = w.map(f64::from);
-    V3::new(a * r.x, low * r.x + b * r.y, corner * r.x + left * r.y + c * r.z)
+    DVec3::new(a * r.x, low * r.x + b * r.y, corner * r.x + left * r.y + c * r.z)
 }
 
 /// Wᵀ·h.
 #[inline(always)]
-pub(super) fn rest_of_the_way(w: &[f32; 6], h: V3) -> V3 {
+pub(super) fn rest_of_the_way(w: &[f32; 6], h: DVec3) -> DVec3 {
     let [a, low, b, corner, left, c] = w.map(f64::from);
-    V3::new(a * h.x + low * h.y + corner * h.z, b * h.y + left * h.z, c * h.z)
+    DVec3::new(a * h.x + low * h.y + corner * h.z, b * h.y + left * h.z, c * h.z)
 }

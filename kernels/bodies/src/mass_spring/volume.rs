@@ -5,9 +5,9 @@
 //! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
 //! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
 
-use super::V3;
 use super::body::{Body, volume};
 use super::parts::{Parts, Several};
+use numerics::vector::DVec3;
 
 /// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
@@ -36,7 +36,7 @@ pub(super) struct Volumes {
     /// Regions in parts.
     parts: Option<Parts>,
     /// How each region's volume changes with its particles.
-    pub(super) gradients: Vec<V3>,
+    pub(super) gradients: Vec<DVec3>,
     /// Pressure each region has, Pa.
     pub(super) pressures: Vec<f64>,
     /// How each region's pressure grows with its volume within the stage, Pa/m³.
@@ -54,7 +54,7 @@ pub(super) struct Volumes {
 pub(super) struct Thin {
     pub(super) corners: [u32; 4],
     /// How its volume changes with its corners.
-    pub(super) gradient: [V3; 4],
+    pub(super) gradient: [DVec3; 4],
     /// μ ÷ V₀, and what that opens it with, Pa.
     pub(super) stiffness: f64,
     pub(super) pressure: f64,
@@ -81,7 +81,7 @@ impl Volumes {
             rest: rest_sums,
             share,
             parts: Some(parts),
-            gradients: vec![V3::zeros(); regions.particles.len()],
+            gradients: vec![DVec3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
             slopes: vec![0.0; regions.len()],
             a: f64::INFINITY,
@@ -97,12 +97,12 @@ impl Volumes {
     }
 
     /// The volume of each region with particles at `x`.
-    pub(super) fn at(&self, body: &Body, x: &[V3]) -> Vec<f64> {
+    pub(super) fn at(&self, body: &Body, x: &[DVec3]) -> Vec<f64> {
         self.drift(body, x, &[]).into_iter().map(|[volume, _]| volume).collect()
     }
 
     /// That, and how fast it changes, m³/s; all still where there is no `v`.
-    pub(super) fn drift(&self, body: &Body, x: &[V3], v: &[V3]) -> Vec<[f64; 2]> {
+    pub(super) fn drift(&self, body: &Body, x: &[DVec3], v: &[DVec3]) -> Vec<[f64; 2]> {
         let regions = &body.regions;
         let mut out = vec![[0.0; 2]; self.before.len()];
         if let Some(parts) = &self.parts {
@@ -110,9 +110,9 @@ impl Volumes {
                 let mut gradient = Vec::new();
                 for (region, out) in parts.range(part).zip(out) {
                     let particles = regions.of(region);
-                    gradient.resize(particles.len(), V3::zeros());
+                    gradient.resize(particles.len(), DVec3::zeros());
                     let volume = regions.measure(region, x, &mut gradient);
-                    let pace = |(g, place): (&V3, &u32)| v.get(*place as usize).map_or(0.0, |v| g.dot(v));
+                    let pace = |(g, place): (&DVec3, &u32)| v.get(*place as usize).map_or(0.0, |v| g.dot(v));
                     *out = [volume, gradient.iter().zip(particles).map(pace).sum()];
                 }
             });
@@ -126,7 +126,7 @@ impl Volumes {
     }
 
     /// Measures pressures, gradients and energies.
-    pub(super) fn measure(&mut self, body: &Body, x: &[V3]) {
+    pub(super) fn measure(&mut self, body: &Body, x: &[DVec3]) {
         let Some(parts) = &self.parts else { return };
         let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
         let gradients = Several::new(&regions.starts, &mut self.gradients);
@@ -155,7 +155,7 @@ impl Volumes {
     }
 
     /// Those of the `watched` tetrahedra that are thin.
-    pub(super) fn thin(&self, body: &Body, x: &[V3], rest: &[f64], watched: &[u32]) -> Vec<Thin> {
+    pub(super) fn thin(&self, body: &Body, x: &[DVec3], rest: &[f64], watched: &[u32]) -> Vec<Thin> {
         if self.is_off() {
             return Vec::new();
         }
@@ -194,7 +194,7 @@ fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
 }
 
 /// How a tetrahedron's volume changes with each corner.
-pub(super) fn opening([a, b, c, d]: [V3; 4]) -> [V3; 4] {
+pub(super) fn opening([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     let (ab, ac, ad) = (b - a, c - a, d - a);
     let [b, c, d] = [ac.cross(&ad) / 6.0, ad.cross(&ab) / 6.0, ab.cross(&ac) / 6.0];
     [-(b + c + d), b, c, d]
@@ -213,7 +213,7 @@ pub(super) struct Inventory {
 
 impl Inventory {
     /// With particles at `x`.
-    pub(super) fn new(body: &Body, x: &[V3], rest: &[f64]) -> Self {
+    pub(super) fn new(body: &Body, x: &[DVec3], rest: &[f64]) -> Self {
         let parts = body.tet_parts.map((), |part, ()| {
             let (mut turned, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
             for tet in body.tet_parts.range(part) {
@@ -239,7 +239,7 @@ impl Inventory {
     }
 
     /// Watches those too that turn out thin in `later`, of `rest` and with particles at `x`, and says whether there are such.
-    pub(super) fn watch(&mut self, later: &Self, body: &Body, x: &[V3], rest: &[f64]) -> bool {
+    pub(super) fn watch(&mut self, later: &Self, body: &Body, x: &[DVec3], rest: &[f64]) -> bool {
         let thin = |tet: &&u32| {
             let at = **tet as usize;
             let left = volume(body.tets[at].map(|corner| x[corner as usize]));

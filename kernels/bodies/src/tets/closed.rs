@@ -1,5 +1,6 @@
 //! A surface that is known to be closed, in order, and around a volume.
 
+use numerics::vector::to_f64;
 use rayon::prelude::*;
 
 use super::cross::crossing;
@@ -96,7 +97,7 @@ impl Closed {
     /// Mean length of the edges, metres; 0 without one.
     pub fn mean_edge(&self) -> f64 {
         let edges = self.edges();
-        let length = |[a, b]: &[u32; 2]| distance(self.points[*a as usize], self.points[*b as usize]);
+        let length = |[a, b]: &[u32; 2]| (to_f64(self.points[*a as usize]) - to_f64(self.points[*b as usize])).norm();
         edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64
     }
 
@@ -112,14 +113,11 @@ impl Closed {
 
     /// Volume between the faces, m³.
     pub fn volume(&self) -> f64 {
-        let Some(origin) = self.points.first().map(|point| point.map(f64::from)) else { return 0.0 };
-        let from_origin = |corner: u32| {
-            let point = self.points[corner as usize];
-            [0, 1, 2].map(|k| f64::from(point[k]) - origin[k])
-        };
+        let Some(origin) = self.points.first().map(|point| to_f64(*point)) else { return 0.0 };
+        let from_origin = |corner: u32| to_f64(self.points[corner as usize]) - origin;
         let six = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(from_origin);
-            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+            a.dot(&b.cross(&c))
         };
         self.shells.triangles.iter().map(six).sum::<f64>() / 6.0
     }
@@ -141,9 +139,4 @@ fn corners(polygons: &Polygons, pieces: &[(u32, bool)], name: &[u32]) -> Vec<u32
         corners[run[0] as usize + 1..run[1] as usize].reverse();
     }
     corners
-}
-
-fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
-    let d = [0, 1, 2].map(|k| f64::from(a[k]) - f64::from(b[k]));
-    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }

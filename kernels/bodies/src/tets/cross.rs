@@ -25,7 +25,9 @@ pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &Triangle
                     continue;
                 }
                 let theirs = triangles[*other as usize];
-                if own.iter().filter(|corner| theirs.contains(corner)).count() < 2 && cross(places, own, theirs) {
+                if own.iter().filter(|corner| theirs.contains(corner)).count() < 2
+                    && triangles_cross(places, own, theirs)
+                {
                     least = least.min(*other);
                     count += 1;
                 }
@@ -37,8 +39,8 @@ pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &Triangle
     all.first().map(|(pair, _)| (*pair, all.iter().map(|(_, count)| count).sum()))
 }
 
-fn cross(places: &[Place], a: [u32; 3], b: [u32; 3]) -> bool {
-    let at = |triangle: [u32; 3]| triangle.map(|corner| places[corner as usize].map(f64::from));
+fn triangles_cross(places: &[Place], a: [u32; 3], b: [u32; 3]) -> bool {
+    let at = |triangle: [u32; 3]| triangle.map(|corner| At::from(places[corner as usize].map(f64::from)));
     let (at_a, at_b) = (at(a), at(b));
     let (Some(a_sides), Some(b_sides)) = (sides(&at_b, &at_a), sides(&at_a, &at_b)) else { return false };
     pierces(&at_a, a_sides, &at_b) || pierces(&at_b, b_sides, &at_a)

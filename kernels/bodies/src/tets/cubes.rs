@@ -27,6 +27,7 @@ pub fn cubes(cells: [usize; 3], low: [f64; 3], size: [f64; 3]) -> (Vec<[f64; 3]>
 mod tests {
     use super::*;
     use crate::tets::boundary;
+    use numerics::vector::DVec3;
 
     #[test]
     fn tets_fill_the_block_and_all_turn_the_same_way() {
@@ -34,10 +35,8 @@ mod tests {
         assert_eq!((points.len(), tets.len()), (24, 36));
         assert_eq!((points[0], points[23]), ([1.0, -2.0, 0.5], [1.5, -1.25, 2.5]));
         let volume = |tet: &[u32; 4]| {
-            let [o, a, b, c] = tet.map(|corner| points[corner as usize]);
-            let [a, b, c] = [a, b, c].map(|p| [0, 1, 2].map(|k| p[k] - o[k]));
-            let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-            (0..3).map(|k| cross[k] * c[k]).sum::<f64>() / 6.0
+            let [o, a, b, c] = tet.map(|corner| DVec3::from(points[corner as usize]));
+            (a - o).cross(&(b - o)).dot(&(c - o)) / 6.0
         };
         // A block of 0.75 m³ in 36 equal parts.
         assert!(tets.iter().all(|tet| (volume(tet) - 0.75 / 36.0).abs() < 1e-15));

@@ -49,23 +49,19 @@ pub fn delaunay(places: &[Place]) -> Delaunay {
 
 /// Four places that are the corners of a positive tet, the earliest that are in `order`.
 fn first_tet(places: &[Place], order: &[u32]) -> Option<[u32; 4]> {
-    let at = |index: &u32| places[*index as usize].map(f64::from);
+    let at = |index: &u32| At::from(places[*index as usize].map(f64::from));
     let mut rest = order.iter();
     let a = rest.next()?;
     let b = rest.find(|b| at(b) != at(a))?;
     // On a line with a and b: below all three planes through it along an axis, so all minors are exactly 0.
     let on_line = |c: &u32| {
-        let (u, v) = (sub(at(b), at(a)), sub(at(c), at(a)));
+        let (u, v) = (at(b) - at(a), at(c) - at(a));
         [(0, 1), (1, 2), (2, 0)].iter().all(|(i, j)| u[*i] * v[*j] == u[*j] * v[*i])
     };
     let c = rest.find(|c| !on_line(c))?;
     let d = rest.find(|d| orient(&at(a), &at(b), &at(c), &at(d)) != 0.0)?;
     let positive = orient(&at(a), &at(b), &at(c), &at(d)) > 0.0;
     Some(if positive { [*a, *b, *c, *d] } else { [*a, *c, *b, *d] })
-}
-
-fn sub(a: At, b: At) -> At {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// The vertex at infinity; places are vertices from 1 on, in the order of insertion.
@@ -113,8 +109,8 @@ struct Complex {
 impl Complex {
     /// The tet of the first four places, and its four ghosts.
     fn of(places: &[Place], order: &[u32]) -> Self {
-        let mut at = vec![[0.0; 3]];
-        at.extend(order.iter().map(|index| places[*index as usize].map(f64::from)));
+        let mut at = vec![At::zeros()];
+        at.extend(order.iter().map(|index| At::from(places[*index as usize].map(f64::from))));
         let vertices = at.len();
         let mut complex = Self {
             at,

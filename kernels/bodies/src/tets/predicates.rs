@@ -4,8 +4,10 @@
 //! approximate. Differences of places have 24 bits, 2 × 2 minors 49 and squared distances 50, all exact in f64; what is
 //! rounded after them is bounded, and where the bound decides nothing, whole numbers of 128 bits do.
 
+use numerics::vector::DVec3;
+
 /// A place as f64.
-pub(crate) type At = [f64; 3];
+pub(crate) type At = DVec3;
 
 /// Above the rounding of [`orient`]: three products below 2⁷³ and two sums below 2⁷⁵, each off by 2⁻⁵³ of itself.
 const ORIENT_ROUNDING: f64 = (1_u64 << 24) as f64;
@@ -17,17 +19,11 @@ const SPHERE_ROUNDING: f64 = (1_u128 << 77) as f64;
 /// The same for differences of up to m, as a share of m⁵: the determinant is of degree 5.
 const SPHERE_SHARE: f64 = SPHERE_ROUNDING / (1_u128 << 120) as f64;
 
-#[inline(always)]
-fn sub(a: &At, b: &At) -> At {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 /// (b−a)×(c−a)·(d−a): six times the volume of a tet, positive where `d` sees `abc` clockwise.
 #[inline(always)]
 pub(crate) fn orient(a: &At, b: &At, c: &At, d: &At) -> f64 {
-    let (b, c, d) = (sub(b, a), sub(c, a), sub(d, a));
-    let det =
-        b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0]);
+    let (b, c, d) = (b - a, c - a, d - a);
+    let det = b.dot(&c.cross(&d));
     if det.abs() > ORIENT_ROUNDING { det } else { orient_exactly(b, c, d) }
 }
 
@@ -42,7 +38,7 @@ fn orient_exactly(b: At, c: At, d: At) -> f64 {
 /// Positive where `e` is inside the sphere around the positive tet `abcd`, 0 on it.
 #[inline(always)]
 pub(crate) fn in_sphere(a: &At, b: &At, c: &At, d: &At, e: &At) -> f64 {
-    let rows = [sub(a, e), sub(b, e), sub(c, e), sub(d, e)];
+    let rows = [a - e, b - e, c - e, d - e];
     let [a, b, c, d] = &rows;
     let minor = |p: &At, q: &At| p[0] * q[1] - q[0] * p[1];
     let (ab, bc, cd, da, ac, bd) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a), minor(a, c), minor(b, d));
@@ -50,15 +46,14 @@ pub(crate) fn in_sphere(a: &At, b: &At, c: &At, d: &At, e: &At) -> f64 {
     let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
     let cda = c[2] * da + d[2] * ac + a[2] * cd;
     let dab = d[2] * ab + a[2] * bd + b[2] * da;
-    let square = |p: &At| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-    let det = (square(a) * bcd - square(b) * cda) + (square(c) * dab - square(d) * abc);
+    let det = (a.norm_squared() * bcd - b.norm_squared() * cda) + (c.norm_squared() * dab - d.norm_squared() * abc);
     if det.abs() > SPHERE_ROUNDING { det } else { in_small_sphere(&rows, det) }
 }
 
 /// A bound that fits the size of the differences; else the exact sum.
 #[inline(never)]
 fn in_small_sphere(rows: &[At; 4], det: f64) -> f64 {
-    let m = rows.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let m = rows.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
     if det.abs() > SPHERE_SHARE * (m * m) * (m * m) * m { det } else { in_sphere_exactly(rows) }
 }
 
@@ -76,5 +71,5 @@ fn in_sphere_exactly(rows: &[At; 4]) -> f64 {
 }
 
 fn whole(p: At) -> [i64; 3] {
-    p.map(|x| x as i64)
+    [p.x as i64, p.y as i64, p.z as i64]
 }

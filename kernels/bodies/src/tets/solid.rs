@@ -1,5 +1,6 @@
 //! Tets of what is inside of a closed surface.
 
+use numerics::vector::{DVec3, to_f64};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -132,7 +133,7 @@ impl Closed {
         sides.resize(points.len(), Side::Interior);
         // In steps, so that no square of a length is too large or too small.
         let step = self.lattice.step();
-        let steps = |corner: &u32| points[*corner as usize].map(|x| f64::from(x) / step);
+        let steps = |corner: &u32| to_f64(points[*corner as usize]) / step;
         let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
         let slivers: Vec<bool> = measures.iter().map(|tet| !(tet.volume > 0.0 && tet.quality >= SLIVER)).collect();
         let volume = measures.iter().map(|tet| tet.volume).sum::<f64>() * step * step * step;
@@ -206,9 +207,9 @@ impl Carved<'_> {
             // No surface is between an interior point and what is nearer to it than the surface.
             let near = |(corner, at): (&u32, &[i64; 3])| {
                 inner(points[*corner as usize]).is_some_and(|inner| {
-                    let away = [0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64);
+                    let away = DVec3::from([0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64));
                     let clear = 4.0 * f64::from(inner.clear) * CLEAR_FOR_SURE;
-                    away[0] * away[0] + away[1] * away[1] + away[2] * away[2] < clear * clear
+                    away.norm_squared() < clear * clear
                 })
             };
             if tet.iter().zip(&corners).any(near) {

@@ -54,7 +54,7 @@ fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
 }
 
 fn fastest(state: &State) -> f64 {
-    state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
+    state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max)
 }
 
 const THICKNESS: f64 = 1e-3;
@@ -71,11 +71,12 @@ fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
 /// The deepest that any of `points` is in the pin.
 fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
     let side = |face: &[u32; 3]| {
-        let [a, b, c] = face.map(|corner| V3::from(pin[corner as usize]));
+        let [a, b, c] = face.map(|corner| DVec3::from(pin[corner as usize]));
         (a, (b - a).cross(&(c - a)).normalize())
     };
-    let sides: Vec<(V3, V3)> = faces.iter().map(side).collect();
-    let depth = |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(V3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
+    let sides: Vec<(DVec3, DVec3)> = faces.iter().map(side).collect();
+    let depth =
+        |p: &[f64; 3]| -sides.iter().map(|(a, n)| n.dot(&(DVec3::from(*p) - a))).fold(f64::NEG_INFINITY, f64::max);
     points.iter().map(depth).fold(0.0, f64::max)
 }
 
@@ -103,7 +104,7 @@ fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
         contacts.retain(|contact| contact.weights[1] == 0.0);
         for _ in 0..50 {
             for contact in &contacts {
-                let (p, n) = (V3::from(now[contact.particles[0] as usize]), V3::from(contact.normal));
+                let (p, n) = (DVec3::from(now[contact.particles[0] as usize]), DVec3::from(contact.normal));
                 let lacks = (contact.offset + contact.gap - n.dot(&p)).max(0.0);
                 now[contact.particles[0] as usize] = (p + n * lacks).into();
             }

@@ -59,7 +59,7 @@ fn edges_that_cross_push_where_they_cross() {
     let Contact { particles, weights, normal, offset, .. } = contacts[0];
     assert_eq!(particles, [0, 1, 0, 0]);
     assert!((weights[0] - 0.75).abs() < 1e-12 && (weights[1] - 0.25).abs() < 1e-12);
-    assert!((V3::from(normal) - V3::y()).norm() < 1e-12 && offset.abs() < 1e-12);
+    assert!((DVec3::from(normal) - DVec3::y()).norm() < 1e-12 && offset.abs() < 1e-12);
 }
 
 #[test]
@@ -76,8 +76,8 @@ fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
     assert_eq!(contacts.len(), 1, "{contacts:?}");
     let Contact { weights, normal, offset, velocity, .. } = contacts[0];
     assert!(weights[..3].iter().all(|weight| (weight - 1.0 / 3.0).abs() < 1e-12) && weights[3] == 0.0);
-    assert!((V3::from(normal) - V3::y()).norm() < 1e-12 && (offset - 0.3).abs() < 1e-12);
-    assert!((V3::from(velocity) - V3::y() * 0.3).norm() < 1e-12);
+    assert!((DVec3::from(normal) - DVec3::y()).norm() < 1e-12 && (offset - 0.3).abs() < 1e-12);
+    assert!((DVec3::from(velocity) - DVec3::y() * 0.3).norm() < 1e-12);
 }
 
 #[test]
@@ -102,10 +102,10 @@ fn points_of_a_spinning_cylinder_keep_their_radius_and_meet_their_poses() {
         let step = 1e-6;
         let side = faces.len() / 2;
         let corner = faces[side][0] as usize;
-        let [before, after] = [share - step, share + step].map(|share| V3::from(pin.at(share)[corner]));
+        let [before, after] = [share - step, share + step].map(|share| DVec3::from(pin.at(share)[corner]));
         let change = (after - before) / (2.0 * step * 0.04);
         let velocity = pin.velocity(share, side as u32, [1.0, 0.0, 0.0]);
-        assert!((V3::from(velocity) - change).norm() < 1e-6 * change.norm());
+        assert!((DVec3::from(velocity) - change).norm() < 1e-6 * change.norm());
     }
     assert_eq!(pin.at(-1.0), poses[0].positions);
     assert_eq!(pin.velocity(2.0, 0, [1.0, 0.0, 0.0]), [0.0; 3]);

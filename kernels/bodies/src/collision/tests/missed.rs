@@ -4,7 +4,7 @@ use super::*;
 use nalgebra::Matrix3;
 
 /// Whether the straight way from `p` goes through a triangle (Möller & Trumbore), and from above.
-fn goes_through(p: V3, way: V3, [a, b, c]: [V3; 3]) -> Option<bool> {
+fn goes_through(p: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<bool> {
     let system = Matrix3::from_columns(&[-way, b - a, c - a]);
     let x = system.try_inverse()? * (p - a);
     let inside = x.iter().all(|x| (0.0..=1.0).contains(x)) && x[1] + x[2] <= 1.0;
@@ -12,10 +12,10 @@ fn goes_through(p: V3, way: V3, [a, b, c]: [V3; 3]) -> Option<bool> {
 }
 
 /// Specks of three vertices each, and where they go.
-fn specks(count: u64, size: f64, start: impl Fn(u64) -> V3, way: impl Fn(u64) -> V3) -> [Vec<[f64; 3]>; 2] {
+fn specks(count: u64, size: f64, start: impl Fn(u64) -> DVec3, way: impl Fn(u64) -> DVec3) -> [Vec<[f64; 3]>; 2] {
     let from = (0..count).flat_map(|k| [0, 1, 2].map(|corner| (start(k) + random(77, 3 * k + corner) * size).into()));
     let from: Vec<[f64; 3]> = from.collect();
-    let to = from.iter().zip(0..).map(|(p, index)| (V3::from(*p) + way(index / 3)).into()).collect();
+    let to = from.iter().zip(0..).map(|(p, index)| (DVec3::from(*p) + way(index / 3)).into()).collect();
     [from, to]
 }
 
@@ -28,14 +28,14 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
     const COUNT: u64 = 33_334;
     for (size, thickness) in [([1.0, 1e-3, 1.0], 1e-3), ([0.5, 1e-5, 0.05], 1e-3)] {
         let (points, faces) = cuboid(size);
-        let way = V3::new(0.02, 0.1, -0.01);
-        let moved: Vec<[f64; 3]> = points.iter().map(|p| (V3::from(*p) + way).into()).collect();
+        let way = DVec3::new(0.02, 0.1, -0.01);
+        let moved: Vec<[f64; 3]> = points.iter().map(|p| (DVec3::from(*p) + way).into()).collect();
         let plate = Obstacle::new(&faces, &[pose(0.0, &points), pose(1.0, &moved)], 1.0, thickness, 0.5).unwrap();
         let above = |k: u64| {
-            let p = random(1, k).component_mul(&V3::new(1.4 * size[0], 0.3, 1.4 * size[2]));
-            V3::new(p.x, p.y + p.y.signum() * (0.5 * size[1] + 2e-5), p.z)
+            let p = random(1, k).component_mul(&DVec3::new(1.4 * size[0], 0.3, 1.4 * size[2]));
+            DVec3::new(p.x, p.y + p.y.signum() * (0.5 * size[1] + 2e-5), p.z)
         };
-        let [from, to] = specks(COUNT, 1e-5, above, |k| random(2, k).component_mul(&V3::new(0.3, 0.6, 0.3)));
+        let [from, to] = specks(COUNT, 1e-5, above, |k| random(2, k).component_mul(&DVec3::new(0.3, 0.6, 0.3)));
         let skin = Skin::new(&from, &triples(COUNT), &[]).unwrap();
         let scene = Scene { skins: &[skin], obstacles: &[plate], ..Scene::default() };
         let (contacts, _) = find(&scene, &from, &to, [0.0, 1.0]);
@@ -45,22 +45,23 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
         }
         let (mut through, mut near) = (0, 0);
         for vertex in 0..from.len() {
-            let p = V3::from(from[vertex]);
-            let relative = V3::from(to[vertex]) - p - way;
+            let p = DVec3::from(from[vertex]);
+            let relative = DVec3::from(to[vertex]) - p - way;
             let entered = faces.iter().any(|face| {
-                goes_through(p, relative, face.map(|corner| V3::from(points[corner as usize]))) == Some(true)
+                goes_through(p, relative, face.map(|corner| DVec3::from(points[corner as usize]))) == Some(true)
             });
             if entered {
                 through += 1;
                 let holds = |contact: &&Contact| {
-                    let n = V3::from(contact.normal);
-                    n.dot(&(p + way)) - contact.offset > -1e-12 && n.dot(&V3::from(to[vertex])) - contact.offset < 0.0
+                    let n = DVec3::from(contact.normal);
+                    n.dot(&(p + way)) - contact.offset > -1e-12
+                        && n.dot(&DVec3::from(to[vertex])) - contact.offset < 0.0
                 };
                 // It may have come round a corner; then it is inside or past, and held at one side at least.
                 assert!(of[vertex].iter().any(holds), "{vertex} went through: {:?}", of[vertex]);
             } else if vertex % 50 == 0 {
                 let distance = |t: f64| {
-                    let at = |face: &[u32; 3]| face.map(|corner| V3::from(points[corner as usize]));
+                    let at = |face: &[u32; 3]| face.map(|corner| DVec3::from(points[corner as usize]));
                     let each = faces.iter().map(|face| Nearest::on(0, p + relative * t, at(face)).distance);
                     each.fold(f64::INFINITY, f64::min)
                 };
@@ -77,16 +78,16 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
 fn no_fast_edge_goes_through_a_ridge_unseen() {
     const COUNT: u64 = 20_000;
     let tent = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.4], [0.0, -1.0, -0.4]];
-    let up = V3::new(0.03, 0.1, 0.02);
-    let moved = tent.map(|p| (V3::from(p) + up).into());
+    let up = DVec3::new(0.03, 0.1, 0.02);
+    let moved = tent.map(|p| (DVec3::from(p) + up).into());
     let ridge = Obstacle::new(&[[0, 2, 1], [0, 1, 3]], &[pose(0.0, &tent), pose(1.0, &moved)], 1.0, 1e-3, 0.5).unwrap();
     let mut from: Vec<[f64; 3]> = Vec::new();
     let mut to: Vec<[f64; 3]> = Vec::new();
     for k in 0..COUNT {
         let (at, along, way) = (random(3, k), random(4, k), random(5, k));
-        let middle = V3::new(2.2 * at.x, 0.01 + 0.2 * (at.y + 0.5), 0.2 * at.z);
-        let half = V3::new(0.1 * along.x, 0.05 * along.y, 0.1);
-        let way = V3::new(0.2 * way.x, -0.2 * (way.y + 0.5), 0.2 * way.z);
+        let middle = DVec3::new(2.2 * at.x, 0.01 + 0.2 * (at.y + 0.5), 0.2 * at.z);
+        let half = DVec3::new(0.1 * along.x, 0.05 * along.y, 0.1);
+        let way = DVec3::new(0.2 * way.x, -0.2 * (way.y + 0.5), 0.2 * way.z);
         let trailing = middle - (way - up).normalize();
         for p in [middle - half, middle + half, trailing] {
             from.push(p.into());
@@ -98,8 +99,8 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
         find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
     let mut through = 0;
     for k in 0..COUNT as usize {
-        let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(V3::from);
-        let [a, b] = [V3::from(tent[0]), V3::from(tent[1])];
+        let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(DVec3::from);
+        let [a, b] = [DVec3::from(tent[0]), DVec3::from(tent[1])];
         let way = end - p - up;
         // p + s(q − p) + t·way = a + u(b − a).
         let Some(inverse) = Matrix3::from_columns(&[q - p, way, a - b]).try_inverse() else { continue };
@@ -110,7 +111,9 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
             let mut mine =
                 contacts.iter().filter(|contact| contact.particles[..2] == pair && contact.weights[1] != 0.0);
             assert!(
-                mine.any(|contact| V3::from(contact.normal).dot(&way) < 0.0 && (contact.weights[1] - x[0]).abs() < 1e-6),
+                mine.any(
+                    |contact| DVec3::from(contact.normal).dot(&way) < 0.0 && (contact.weights[1] - x[0]).abs() < 1e-6
+                ),
                 "{k} went through at {x:?}"
             );
         }
@@ -141,7 +144,9 @@ fn any_number_of_threads_finds_the_same_bits() {
     let alone = with(1);
     assert!(alone.len() > 1000, "{}", alone.len());
     assert!(
-        alone.iter().all(|contact| contact.offset.is_finite() && (V3::from(contact.normal).norm() - 1.0).abs() < 1e-9)
+        alone
+            .iter()
+            .all(|contact| contact.offset.is_finite() && (DVec3::from(contact.normal).norm() - 1.0).abs() < 1e-9)
     );
     assert_eq!(with(2), alone);
     assert_eq!(with(7), alone);
@@ -155,7 +160,7 @@ fn a_scene_a_thousand_times_larger_or_smaller_has_the_same_contacts() {
         assert_eq!(scaled.len(), plain.len(), "{scale}");
         for (a, b) in scaled.iter().zip(&plain) {
             assert_eq!(a.particles, b.particles);
-            assert!((V3::from(a.normal) - V3::from(b.normal)).norm() < 1e-5, "{a:?} {b:?}");
+            assert!((DVec3::from(a.normal) - DVec3::from(b.normal)).norm() < 1e-5, "{a:?} {b:?}");
             assert!((a.offset / scale - b.offset).abs() < 1e-6);
         }
     }

@@ -18,9 +18,9 @@ fn find(scene: &Scene<'_>, from: &[[f64; 3]], to: &[[f64; 3]], times: [f64; 2]) 
     (out, found)
 }
 
-fn random(seed: u64, index: u64) -> V3 {
+fn random(seed: u64, index: u64) -> DVec3 {
     let key = Key::new(seed).of(index);
-    V3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
+    DVec3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
 }
 
 /// A box about the origin with these sides, facing outwards.

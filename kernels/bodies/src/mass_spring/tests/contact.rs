@@ -11,12 +11,12 @@ struct Planes(Vec<([f64; 3], [f64; 2], f64)>, f64);
 impl Contacts for Planes {
     fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
         for (normal, heights, friction) in &self.0 {
-            let n = V3::from(*normal);
+            let n = DVec3::from(*normal);
             let at = |time: f64| heights[0] + (heights[1] - heights[0]) * time;
             let offset = at(query.times[1]);
             for (particle, to) in query.to.iter().enumerate() {
-                let nearest =
-                    (n.dot(&V3::from(*to)) - offset).min(n.dot(&V3::from(query.from[particle])) - at(query.times[0]));
+                let nearest = (n.dot(&DVec3::from(*to)) - offset)
+                    .min(n.dot(&DVec3::from(query.from[particle])) - at(query.times[0]));
                 if nearest < 2.0 * THICKNESS {
                     out.push(Contact {
                         particles: [particle as u32, 0, 0, 0],
@@ -52,13 +52,13 @@ impl Contacts for RollingPin {
         let axis: [f64; 2] = std::array::from_fn(|k| self.axis[0][k] + (self.axis[1][k] - self.axis[0][k]) * time);
         for (particle, to) in query.to.iter().enumerate() {
             let from = query.from[particle];
-            let near = |p: &[f64; 3]| V3::new(p[0] - axis[0], p[1] - axis[1], 0.0);
+            let near = |p: &[f64; 3]| DVec3::new(p[0] - axis[0], p[1] - axis[1], 0.0);
             let (d, d_from) = (near(to), near(&from));
             if d.norm().min(d_from.norm()) < self.radius + 2.0 * THICKNESS {
                 // The side it comes from, where it would pass through.
                 let n = if d.dot(&d_from) > 0.0 { d.normalize() } else { d_from.normalize() };
-                let middle = V3::new(axis[0], axis[1], 0.0);
-                let pace = V3::new(
+                let middle = DVec3::new(axis[0], axis[1], 0.0);
+                let pace = DVec3::new(
                     (self.axis[1][0] - self.axis[0][0]) / self.seconds,
                     (self.axis[1][1] - self.axis[0][1]) / self.seconds,
                     0.0,
@@ -69,7 +69,7 @@ impl Contacts for RollingPin {
                     normal: n.into(),
                     offset: n.dot(&middle) + self.radius,
                     gap: THICKNESS,
-                    velocity: (pace + V3::z().cross(&n) * (self.spin * self.radius)).into(),
+                    velocity: (pace + DVec3::z().cross(&n) * (self.spin * self.radius)).into(),
                     friction: self.friction,
                 });
             }
@@ -91,12 +91,12 @@ fn lowest(state: &State) -> f64 {
 }
 
 fn fastest(state: &State) -> f64 {
-    state.velocities.iter().map(|v| V3::from(*v).norm()).fold(0.0, f64::max)
+    state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max)
 }
 
-fn centre(body: &Body, state: &State) -> V3 {
+fn centre(body: &Body, state: &State) -> DVec3 {
     let masses = body.masses();
-    let sum = state.positions.iter().zip(&masses).fold(V3::zeros(), |sum, (x, m)| sum + V3::from(*x) * *m);
+    let sum = state.positions.iter().zip(&masses).fold(DVec3::zeros(), |sum, (x, m)| sum + DVec3::from(*x) * *m);
     sum / masses.iter().sum::<f64>()
 }
 
@@ -348,7 +348,7 @@ fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
     let ground = ground(0.5);
     let from = |index: usize, turned: bool| {
         let out = random(7, index) * 0.2;
-        if turned { out } else { V3::zeros() }
+        if turned { out } else { DVec3::zeros() }
     };
     for stiffness in [1e-6, 1.0, 1e3, 1e6, 1e9, 1e12] {
         for (ratio, turned) in [(1.0, false), (1e6, false), (1.0, true), (1e6, true)] {
@@ -359,7 +359,7 @@ fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
             let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
             let mut state = State::at_rest(&body);
             for (index, x) in state.positions.iter_mut().enumerate() {
-                *x = (V3::from(*x) + V3::y() * 0.12 + from(index, turned)).into();
+                *x = (DVec3::from(*x) + DVec3::y() * 0.12 + from(index, turned)).into();
             }
             let mut solver = Solver::new(&body);
             for number in 0..48 {
@@ -415,8 +415,8 @@ fn what_is_through_a_surface_comes_out_at_a_pace() {
             let _ = solver.step(&body, &mut state, &frame);
             most = most.max(fastest(&state));
             if number == 0 {
-                let momenta = state.velocities.iter().zip(body.masses()).map(|(v, mass)| V3::from(*v) * mass);
-                let momentum: V3 = momenta.sum();
+                let momenta = state.velocities.iter().zip(body.masses()).map(|(v, mass)| DVec3::from(*v) * mass);
+                let momentum: DVec3 = momenta.sum();
                 let aside = momentum.xz().norm() / momentum.y;
                 assert!(aside < 1e-6, "{substeps} substeps: {aside} aside of one upwards");
             }

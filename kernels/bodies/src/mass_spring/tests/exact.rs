@@ -34,7 +34,7 @@ fn a_dashpot_leaves_a_spring_alone_that_turns() {
             let mut solver = Solver::new(&body);
             for frame in 0..24 {
                 let _ = solver.step(&body, &mut state, &Frame { integrator, ..BARE });
-                let length = (V3::from(state.positions[1]) - V3::from(state.positions[0])).norm();
+                let length = (DVec3::from(state.positions[1]) - DVec3::from(state.positions[0])).norm();
                 assert!((length - 1.0).abs() < 2.5e-3, "{integrator:?}, {damping}: {length} long in frame {frame}");
             }
         }

@@ -54,7 +54,7 @@ fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
     }
     let report = steps(&body, &mut state, &Frame { goals: &[], ..drawn }, 96);
     for (x, goal) in state.positions.iter().zip(&shape) {
-        assert!((V3::from(*x) - V3::from(*goal)).norm() < 1e-4, "{x:?} for {goal:?}");
+        assert!((DVec3::from(*x) - DVec3::from(*goal)).norm() < 1e-4, "{x:?} for {goal:?}");
     }
     assert!(report.elastic < 1e-6 && (report.volume_ratio - 1.0).abs() < 1e-6, "{report:?}");
 }
@@ -66,8 +66,9 @@ fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
     state.dents.iter_mut().for_each(|dent| *dent = 0.9);
     let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| x.map(|x| 2.0 * x)).collect();
     let energy = |state: &State| {
-        let length =
-            |[a, b]: [u32; 2]| (V3::from(state.positions[a as usize]) - V3::from(state.positions[b as usize])).norm();
+        let length = |[a, b]: [u32; 2]| {
+            (DVec3::from(state.positions[a as usize]) - DVec3::from(state.positions[b as usize])).norm()
+        };
         let each = body.springs().into_iter().enumerate();
         each.map(|(i, ends)| {
             let strain = length(ends) - state.lengths[i] * state.dents[i];

@@ -28,7 +28,7 @@ fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> Body 
 /// Moves particles by up to `cells` cells.
 fn scramble(state: &mut State, cells: f64) {
     for (index, x) in state.positions.iter_mut().enumerate() {
-        *x = (V3::from(*x) + random(11, index) * (2.0 * cells * 0.1)).into();
+        *x = (DVec3::from(*x) + random(11, index) * (2.0 * cells * 0.1)).into();
     }
 }
 
@@ -133,9 +133,9 @@ fn springs_of_no_length_and_particles_in_one_place() {
         let body = Body::of_springs(&points, &[1.0; 4], &springs).unwrap();
         let mut state = State::at_rest(&body);
         let report = survives(&body, &mut state, &Frame { integrator, ..BARE }, 5.0);
-        let length = (V3::from(state.positions[1]) - V3::from(state.positions[2])).norm();
+        let length = (DVec3::from(state.positions[1]) - DVec3::from(state.positions[2])).norm();
         assert!(report.kinetic.is_finite() && length > 0.3, "doubled particles part: {length}");
-        let tight = (V3::from(state.positions[0]) - V3::from(state.positions[1])).norm();
+        let tight = (DVec3::from(state.positions[0]) - DVec3::from(state.positions[1])).norm();
         assert!(tight < 0.1, "{tight}");
     }
 }
@@ -178,7 +178,7 @@ fn pins_pulled_a_hundred_lengths_in_a_frame_and_back() {
                 assert!(pins.iter().all(|pin| state.positions[pin.particle as usize] == pin.between[1]));
                 x = to;
             }
-            let tip = V3::from(state.positions[4]).norm();
+            let tip = DVec3::from(state.positions[4]).norm();
             assert!(tip < 5.0, "{integrator:?} {stiffness}: the tip is at {tip}");
         }
     }

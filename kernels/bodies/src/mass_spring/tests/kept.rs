@@ -6,13 +6,13 @@ use super::*;
 fn a_rigid_turn_and_shift_meets_no_force() {
     let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e9, 0.01));
     let mut state = State::at_rest(&body);
-    let turn = nalgebra::Rotation3::from_scaled_axis(V3::new(0.3, -1.2, 0.7));
+    let turn = nalgebra::Rotation3::from_scaled_axis(DVec3::new(0.3, -1.2, 0.7));
     let turned: Vec<[f64; 3]> =
-        state.positions.iter().map(|x| (turn * V3::from(*x) + V3::new(5.0, -3.0, 2.0)).into()).collect();
+        state.positions.iter().map(|x| (turn * DVec3::from(*x) + DVec3::new(5.0, -3.0, 2.0)).into()).collect();
     state.positions.clone_from(&turned);
     let report = steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 5);
     for (a, b) in state.positions.iter().zip(&turned) {
-        assert!((V3::from(*a) - V3::from(*b)).norm() < 1e-12);
+        assert!((DVec3::from(*a) - DVec3::from(*b)).norm() < 1e-12);
     }
     assert!(report.elastic < 1e-12 && report.volume_energy < 1e-12 && (report.volume_ratio - 1.0).abs() < 1e-12);
 }

@@ -4,6 +4,7 @@ use super::*;
 use crate::tets::cubes;
 use numerics::masked::Masked;
 use numerics::random::Key;
+use numerics::vector::DVec3;
 
 mod contact;
 mod exact;
@@ -57,18 +58,18 @@ fn is_finite(state: &State) -> bool {
     state.positions.iter().chain(&state.velocities).flatten().all(|x| x.is_finite())
 }
 
-fn momentum(body: &Body, state: &State) -> V3 {
+fn momentum(body: &Body, state: &State) -> DVec3 {
     let each = state.velocities.iter().zip(body.masses());
-    each.fold(V3::zeros(), |sum, (v, mass)| sum + V3::from(*v) * mass)
+    each.fold(DVec3::zeros(), |sum, (v, mass)| sum + DVec3::from(*v) * mass)
 }
 
 /// About the origin.
-fn angular_momentum(body: &Body, state: &State) -> V3 {
+fn angular_momentum(body: &Body, state: &State) -> DVec3 {
     let moving = state.positions.iter().zip(&state.velocities).zip(body.masses());
-    moving.map(|((x, v), mass)| V3::from(*x).cross(&V3::from(*v)) * mass).sum()
+    moving.map(|((x, v), mass)| DVec3::from(*x).cross(&DVec3::from(*v)) * mass).sum()
 }
 
-fn random(seed: u64, index: usize) -> V3 {
+fn random(seed: u64, index: usize) -> DVec3 {
     let key = Key::new(seed).of(index as u64);
-    V3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
+    DVec3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
 }

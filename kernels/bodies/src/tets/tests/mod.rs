@@ -10,9 +10,10 @@ use super::predicates::{in_sphere, orient};
 use super::{Delaunay, NONE};
 use numerics::random::Key;
 use numerics::shapes;
+use numerics::vector::DVec3;
 
-fn at(place: Place) -> [f64; 3] {
-    place.map(f64::from)
+fn at(place: Place) -> DVec3 {
+    DVec3::from(place.map(f64::from))
 }
 
 /// Random places, each coordinate below `side`.

@@ -4,6 +4,7 @@ use super::super::lattice::{Place, SIDE};
 use super::super::predicates::{in_sphere, orient};
 use super::{at, random};
 use numerics::random::Key;
+use numerics::vector::DVec3;
 
 /// A whole number of any size: negative or not, and digits of 32 bits, lowest first.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,11 +114,11 @@ fn the_oracle_counts() {
 
 #[test]
 fn a_corner_tet_is_positive_and_its_sphere_passes_through_the_cube() {
-    let [o, x, y, z] = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+    let [o, x, y, z] = [DVec3::zeros(), DVec3::x() * 2.0, DVec3::y() * 2.0, DVec3::z() * 2.0];
     assert_eq!(orient(&o, &x, &y, &z), 8.0);
-    assert!(in_sphere(&o, &x, &y, &z, &[1.0; 3]) > 0.0);
-    assert_eq!(in_sphere(&o, &x, &y, &z, &[2.0; 3]), 0.0);
-    assert!(in_sphere(&o, &x, &y, &z, &[3.0, 2.0, 2.0]) < 0.0);
+    assert!(in_sphere(&o, &x, &y, &z, &DVec3::repeat(1.0)) > 0.0);
+    assert_eq!(in_sphere(&o, &x, &y, &z, &DVec3::repeat(2.0)), 0.0);
+    assert!(in_sphere(&o, &x, &y, &z, &DVec3::new(3.0, 2.0, 2.0)) < 0.0);
 }
 
 #[test]
