@@ -2,8 +2,8 @@
 //!
 //! `-- 200 pin` is 200 rounds of one case. A pin of 2,048 triangles rolls over a slab of dough whose surface has some 2,200 vertices, and the dough over itself.
 
-use bodies::collision::{Found, Ground, Obstacle, Pose, Rub, Scene, Skin};
-use bodies::mass_spring::Query;
+use bodies::collision::{BodySkin, CollisionScene, ContactParams, ContactSummary, Ground, Obstacle, ObstaclePose};
+use bodies::mass_spring::ContactQuery;
 use cpu_time::ProcessTime;
 use std::time::Duration;
 
@@ -11,9 +11,9 @@ const THICKNESS: f64 = 1e-3;
 const FRAME: f64 = 1.0 / 24.0;
 
 #[allow(clippy::disallowed_methods, reason = "a clock is what this bench reads")]
-fn least(mut run: impl FnMut() -> Found) -> (Duration, Found) {
+fn least(mut run: impl FnMut() -> ContactSummary) -> (Duration, ContactSummary) {
     let rounds = std::env::args().nth(1).and_then(|word| word.parse().ok()).unwrap_or(200);
-    let mut best = (Duration::MAX, Found::default());
+    let mut best = (Duration::MAX, ContactSummary::default());
     for _ in 0..rounds {
         let start = ProcessTime::now();
         let found = run();
@@ -24,26 +24,26 @@ fn least(mut run: impl FnMut() -> Found) -> (Duration, Found) {
 
 fn main() {
     let (points, triangles) = slab(32);
-    let skin = Skin::new(&points, &triangles, &[]).expect("the slab is sound");
+    let skin = BodySkin::new(&points, &triangles, &[]).expect("the slab is sound");
     // It sinks in by 5 mm, turns by 10° and goes on by 9 mm within the frame.
     let (pin, faces) = pin(32, 31);
     let poses = [(0.0, 0.0, 0.009), (1.0, 0.175, -0.005)].map(|(share, turn, sink)| {
         let (sine, cosine) = libm::sincos(turn);
         let put = |[x, y, z]: [f64; 3]| [cosine * x - sine * y + 0.009 * share, sine * x + cosine * y + 0.08 + sink, z];
-        Pose { share, positions: pin.iter().copied().map(put).collect() }
+        ObstaclePose { share, positions: pin.iter().copied().map(put).collect() }
     });
     let obstacle = [Obstacle::new(&faces, &poses, FRAME, THICKNESS, 0.5).expect("the pin is sound")];
     let to: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [*x, y - 0.002, *z]).collect();
-    let query = Query { from: &points, to: &to, times: [0.0, 1.0] };
+    let query = ContactQuery { from: &points, to: &to, times: [0.0, 1.0] };
     println!("{} vertices, {} triangles; pin of {}", points.len(), triangles.len(), faces.len());
 
-    let rub = Rub { thickness: THICKNESS, friction: 0.5 };
+    let params = ContactParams { thickness: THICKNESS, friction: 0.5 };
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 };
     let skins = [skin];
     let scenes = [
-        ("pin", Scene { skins: &skins, obstacles: &obstacle, ..Scene::default() }),
-        ("ground", Scene { skins: &skins, ground: Some(ground), ..Scene::default() }),
-        ("itself", Scene { skins: &skins, own: Some(rub), ..Scene::default() }),
+        ("pin", CollisionScene { skins: &skins, obstacles: &obstacle, ..CollisionScene::default() }),
+        ("ground", CollisionScene { skins: &skins, ground: Some(ground), ..CollisionScene::default() }),
+        ("itself", CollisionScene { skins: &skins, self_contact: Some(params), ..CollisionScene::default() }),
     ];
     let only = std::env::args().nth(2);
     for (name, scene) in scenes.into_iter().filter(|scene| only.as_ref().is_none_or(|only| only == scene.0)) {

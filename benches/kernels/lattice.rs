@@ -4,8 +4,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::goals::{Held, Limits, goal};
-use bodies::tets::{Closed, Fill, Surface};
+use bodies::goals::{HeldBody, GoalLimits, goal_shape};
+use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use curves::lattice::{DeformationLattice, Extrapolation, LatticeBasis, control_points};
 use numerics::random::Key;
 use numerics::shapes;
@@ -51,14 +51,15 @@ fn main() {
         let mut starts = vec![0];
         ball.counts.iter().for_each(|count| starts.push(starts[starts.len() - 1] + count));
         let surface: Vec<[f32; 3]> = ball.points.iter().map(|p| p.map(|x| x as f32)).collect();
-        let closed = Closed::of(&Surface { starts: &starts, corners: &ball.corners, points: &surface }, false);
-        let solid = closed.and_then(|closed| closed.fill(&Fill { spacing, interior: true }));
+        let closed =
+            ClosedSurface::of(&PolygonSurface { starts: &starts, corners: &ball.corners, points: &surface }, false);
+        let solid = closed.and_then(|closed| closed.fill(&FillSettings { spacing, interior: true }));
         let Ok(solid) = solid else { continue };
         let rows: Vec<i32> = (0..solid.points.len()).map(|k| if k < surface.len() { k as i32 } else { -1 }).collect();
         let shape: Vec<[f32; 3]> = surface.iter().map(|[x, y, z]| [x + y * y, 0.5 * y, z - 0.5 * x * y]).collect();
-        let held = Held { points: &solid.points, tets: &solid.tets, rows: &rows, shape: &shape };
+        let held = HeldBody { points: &solid.points, tets: &solid.tets, rows: &rows, shape: &shape };
         let mut steps = 0;
-        let time = fastest(|| steps = goal(&held, Limits::default()).steps);
+        let time = fastest(|| steps = goal_shape(&held, GoalLimits::default()).steps);
         println!(
             "goal of {} points, {} of them inside, {} tets: {time:.1} ms, {steps} steps",
             solid.points.len(),

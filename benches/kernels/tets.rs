@@ -5,24 +5,24 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::tets::lattice::Place;
-use bodies::tets::{Closed, Fill, Surface, delaunay};
+use bodies::tets::grid::GridPoint;
+use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, delaunay};
 use cpu_time::{ProcessTime, ThreadTime};
 use numerics::random::Key;
 use std::time::Instant;
 
 const ROUNDS: usize = 7;
 
-fn random(n: u64) -> Vec<Place> {
+fn random(n: u64) -> Vec<GridPoint> {
     (0..n).map(|k| [0, 1, 2].map(|axis| (Key::new(1).of(k).of(axis).u64() >> 40) as i32)).collect()
 }
 
-fn grid(n: i32) -> Vec<Place> {
+fn grid(n: i32) -> Vec<GridPoint> {
     (0..n * n * n).map(|k| [k % n, k / n % n, k / n / n].map(|x| x * 1000)).collect()
 }
 
 /// Random places near a sphere.
-fn sphere(n: u64) -> Vec<Place> {
+fn sphere(n: u64) -> Vec<GridPoint> {
     let on_sphere = |k: u64| {
         // A sum of twelve uniform numbers is nearly normal, so its direction is nearly uniform.
         let sum = |axis: u64| (0..12).map(|j| Key::new(2).of(k).of(axis).of(j).f64()).sum::<f64>() - 6.0;
@@ -99,14 +99,14 @@ fn main() {
     ];
     for (name, (points, triangles), rounds) in &meshes {
         let starts: Vec<u32> = (0..=triangles.len() as u32).map(|k| 3 * k).collect();
-        let surface = Surface { starts: &starts, corners: triangles.as_flattened(), points };
+        let surface = PolygonSurface { starts: &starts, corners: triangles.as_flattened(), points };
         for interior in [false, true] {
             let mut best = [f64::INFINITY; 2];
             let mut solid = None;
             for _ in 0..*rounds {
                 let (cpu, wall) = (ProcessTime::now(), Instant::now());
-                let closed = Closed::of(&surface, true).expect("the asset is closed");
-                solid = Some(closed.fill(&Fill { spacing: 0.0, interior }).expect("there is room"));
+                let closed = ClosedSurface::of(&surface, true).expect("the asset is closed");
+                solid = Some(closed.fill(&FillSettings { spacing: 0.0, interior }).expect("there is room"));
                 best = [best[0].min(cpu.elapsed().as_secs_f64()), best[1].min(wall.elapsed().as_secs_f64())];
             }
             let Some(solid) = solid else { continue };

@@ -13,8 +13,10 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bodies::collision::{Ground, Rub, Scene};
-use bodies::mass_spring::{Body, Frame as Step, Integrator, Plasticity, Report, Solver, State, flow, reset, tear};
+use bodies::collision::{CollisionScene, ContactParams, Ground};
+use bodies::mass_spring::{
+    BodySolver, FrameReport, Integrator, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
+};
 use engine::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -210,8 +212,8 @@ struct Run {
 
 /// The solver's memory.
 struct Solving {
-    body: Body,
-    solver: Solver,
+    body: SoftBody,
+    solver: BodySolver,
     /// Density, stiffness and damping that the body has.
     values: [f32; 3],
 }
@@ -249,18 +251,21 @@ impl Chain for Run {
         let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
         let (friction, thickness) = (f64::from(contact_friction.value), f64::from(cx.get(THICKNESS)));
         let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
-        let rub = Rub { thickness, friction };
+        let rub = ContactParams { thickness, friction };
         let ground = Ground { up: [0.0, 1.0, 0.0], height: f64::from(cx.get(GROUND_HEIGHT)), thickness, friction };
-        let scene = Scene {
+        let scene = CollisionScene {
             skins: &setup.skins,
             friction: contact_friction.mask.as_deref(),
             ground: cx.get(GROUND).then_some(ground),
             obstacles: &obstacles,
-            between: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
-            own: cx.get(SELF_COLLISION).then_some(rub),
+            body_contact: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
+            self_contact: cx.get(SELF_COLLISION).then_some(rub),
         };
-        let touches = scene.ground.is_some() || !obstacles.is_empty() || scene.between.is_some() || scene.own.is_some();
-        let frame = Step {
+        let touches = scene.ground.is_some()
+            || !obstacles.is_empty()
+            || scene.body_contact.is_some()
+            || scene.self_contact.is_some();
+        let frame = SolverFrame {
             seconds,
             gravity: cx.get(GRAVITY).map(f64::from),
             drag: f64::from(cx.get(DRAG)),
@@ -274,7 +279,7 @@ impl Chain for Run {
                 Stepping::Euler => Integrator::Euler,
             },
             substeps: cx.get(SUBSTEPS) as u32,
-            rough: goals.reset_at(times[0], whole, frames),
+            force_implicit_euler: goals.reset_at(times[0], whole, frames),
         };
         let report = solving.solver.step(&solving.body, &mut self.state, &frame);
         let plasticity =
@@ -304,7 +309,8 @@ impl Chain for Run {
         }
         let narrow = |p: [f64; 3]| p.map(|x| x as f32);
         let (mut surface, mut tets) = (setup.surface.clone(), setup.body.clone());
-        surface.set(P, setup.carriers.iter().map(|carrier| narrow(carrier.at(&self.state.positions))).collect())?;
+        surface
+            .set(P, setup.carriers.iter().map(|carrier| narrow(carrier.position(&self.state.positions))).collect())?;
         tets.set(P, self.state.positions.iter().map(|p| narrow(*p)).collect())?;
         Ok(SURFACE.with(Geometry::from(surface)).and(TETS, Geometry::from(tets)))
     }
@@ -326,7 +332,7 @@ impl Run {
 impl Solving {
     fn new(setup: &SimulationSetup, material: &MaterialFields) -> Result<Self> {
         let body = setup.body(material)?;
-        Ok(Self { solver: Solver::new(&body), body, values: material.values() })
+        Ok(Self { solver: BodySolver::new(&body), body, values: material.values() })
     }
 
     /// With what bodies consist of now.
@@ -341,7 +347,7 @@ impl Solving {
 
 /// Values in the order of [`METRICS`].
 fn said(
-    report: &Report,
+    report: &FrameReport,
     reset_energy: f64,
     let_go: usize,
     goal_distance: f64,
@@ -359,7 +365,7 @@ fn said(
         report.elastic,
         report.goal_energy,
         reset_energy,
-        report.energy_shed,
+        report.energy_removed,
         report.volume_ratio,
         report.worst_stretch,
         f64::from(report.inverted_tets),

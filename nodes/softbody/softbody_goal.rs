@@ -9,7 +9,7 @@
 //! The shape has the points of the body's surface, in their order: the surface that comes out of Tetrahedralize, moved by
 //! Lattice_Deform or modelled. Where a body brings its surface along, faces are compared too; else points are counted.
 
-use bodies::goals::{Goal, Held, Limits, goal};
+use bodies::goals::{GoalLimits, GoalShape, HeldBody, goal_shape};
 use engine::prelude::*;
 
 use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, SURFACE_POINT};
@@ -72,9 +72,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let (body, shape) = (cx.part(BODY), cx.part(SHAPE));
     let rows = surface(body, cx.input(BODY).mesh(), shape)?;
     cx.check_cancelled()?;
-    let held = Held { points: body.positions(), tets: body.tet_corners(), rows, shape: shape.positions() };
+    let held = HeldBody { points: body.positions(), tets: body.tet_corners(), rows, shape: shape.positions() };
     // Keyed strengths ask again every frame.
-    let found = body.kept(Asked::of(body, shape), || Ok(goal(&held, Limits::default())))?;
+    let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
     publish(cx, &found);
     let mut out = body.clone();
     out.set(P, found.points.clone())?;
@@ -140,7 +140,7 @@ impl PartialEq for Asked {
     }
 }
 
-fn publish(cx: &Cx, found: &Goal) {
+fn publish(cx: &Cx, found: &GoalShape) {
     cx.publish(INVERTED, found.inverted as f64);
     cx.publish(CG, found.steps as f64);
     cx.publish(RESIDUAL, found.residual);

@@ -13,7 +13,7 @@
 //!   [`bodies::tets::missing_edges`] tells which the tets lack, so that they cannot fall out of step.
 //! * Flat tets, whose volume says nothing, stay, as their edges are good springs, and are marked `sliver`.
 
-use bodies::tets::{Closed, Fault, Fill, Side, Solid, Surface};
+use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use engine::prelude::*;
 
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
@@ -113,10 +113,10 @@ pub static NODE: Node = Node::new(
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mesh = cx.part(SURFACE);
     let faces = mesh.faces().expect("a mesh has faces");
-    let surface = Surface { starts: faces.runs.starts(), corners: &faces.corners, points: mesh.positions() };
-    let closed = Closed::of(&surface, cx.get(REPAIR) == Repair::Safe).map_err(refusal)?;
+    let surface = PolygonSurface { starts: faces.runs.starts(), corners: &faces.corners, points: mesh.positions() };
+    let closed = ClosedSurface::of(&surface, cx.get(REPAIR) == Repair::Safe).map_err(refusal)?;
     cx.check_cancelled()?;
-    let fill = Fill { spacing: cx.get(SPACING), interior: cx.get(INTERIOR) };
+    let fill = FillSettings { spacing: cx.get(SPACING), interior: cx.get(INTERIOR) };
     let solid = closed.fill(&fill).map_err(refusal)?;
     publish(cx, &closed, &solid);
     let repaired = repaired(mesh, &closed)?;
@@ -124,7 +124,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 }
 
 /// The bodies, with what the node writes on them.
-fn tets(cx: &Cx, closed: &Closed, solid: Solid) -> Result<Component> {
+fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
     let mut tets = Component::tets(solid.tets, solid.points)?;
     if cx.wants(SURFACE_POINT) {
         let of_surface = closed.points.len() as i32;
@@ -132,10 +132,10 @@ fn tets(cx: &Cx, closed: &Closed, solid: Solid) -> Result<Component> {
         tets.set(SURFACE_POINT, points.map(|point| if point < of_surface { point } else { -1 }).collect())?;
     }
     if cx.wants(SIDE) {
-        let number = |side: &Side| match side {
-            Side::Interior => 0,
-            Side::Outer => 1,
-            Side::Inner => 2,
+        let number = |side: &ShellSide| match side {
+            ShellSide::Interior => 0,
+            ShellSide::Outer => 1,
+            ShellSide::Inner => 2,
         };
         tets.set(SIDE, solid.sides.iter().map(number).collect())?;
     }
@@ -149,7 +149,7 @@ fn tets(cx: &Cx, closed: &Closed, solid: Solid) -> Result<Component> {
 }
 
 /// The mesh with its repairs and all its attributes; the very one that came in where none was needed.
-fn repaired(mesh: &Component, closed: &Closed) -> Result<Component> {
+fn repaired(mesh: &Component, closed: &ClosedSurface) -> Result<Component> {
     if closed.changes.is_none() {
         return Ok(mesh.clone());
     }
@@ -166,7 +166,7 @@ fn repaired(mesh: &Component, closed: &Closed) -> Result<Component> {
     Ok(repaired)
 }
 
-fn publish(cx: &Cx, closed: &Closed, solid: &Solid) {
+fn publish(cx: &Cx, closed: &ClosedSurface, solid: &TetMesh) {
     let measured = &solid.measured;
     cx.publish(COUNT, solid.tets.len() as f64);
     cx.publish(BODIES, closed.bodies as f64);
@@ -180,7 +180,7 @@ fn publish(cx: &Cx, closed: &Closed, solid: &Solid) {
     cx.publish(REPAIRS, closed.changes.count() as f64);
 }
 
-fn refusal(fault: Fault) -> Error {
+fn refusal(fault: SurfaceFault) -> Error {
     let hint = fault.hint();
     Error::refused(fault.to_string()).hint(hint)
 }

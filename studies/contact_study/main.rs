@@ -9,8 +9,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::collision::{Ground, Obstacle, Pose, Rub, Scene, Skin};
-use bodies::mass_spring::{Body, Frame, Material, Mesh, Solver, State};
+use bodies::collision::{BodySkin, CollisionScene, ContactParams, Ground, Obstacle, ObstaclePose};
+use bodies::mass_spring::{BodySolver, Material, Mesh, SoftBody, SolverFrame, State};
 use bodies::tets::{boundary, cubes};
 use numerics::masked::Masked;
 use numerics::shapes::{Polygons, block, cylinder, sphere};
@@ -143,22 +143,22 @@ fn run(
     steps: u32,
     limit: u32,
     [pascal, volume]: [u32; 2],
-    [own, quiet]: [bool; 2],
+    [self_contact, quiet]: [bool; 2],
 ) {
     let plain = |value| Masked::uniform(value);
     let (points, tets) = cubes(cells, [0.0, THICKNESS, 0.0], SIZE);
     let narrow: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let faces: Vec<[u32; 3]> = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
     let material = Material { density: plain(1000.0), stiffness: plain(f64::from(pascal)), damping: plain(0.01) };
-    let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).expect("dough");
-    let skins = [Skin::new(&points, &faces, &body.springs()).expect("dough")];
+    let body = SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).expect("dough");
+    let skins = [BodySkin::new(&points, &faces, &body.springs()).expect("dough")];
     let mut skin_points: Vec<u32> = faces.iter().flatten().copied().collect();
     skin_points.sort_unstable();
     skin_points.dedup();
     let tool = Tool::of(case);
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 };
     let mut state = State::at_rest(&body);
-    let mut solver = Solver::new(&body);
+    let mut solver = BodySolver::new(&body);
     let (mut wall, mut newton, mut caps, mut through, mut taken) = (0.0, 0, 0, 0.0_f64, 0);
     let (mut slowest, mut fastest, mut resting) = (0.0_f64, 0.0_f64, 0.0_f64);
     if !quiet {
@@ -168,17 +168,18 @@ fn run(
     }
     let frames = tool.frames.min(limit);
     for frame in 0..frames {
-        let poses = [0.0, 1.0].map(|share| Pose { share, positions: tool.at(f64::from(frame) + share) });
+        let poses = [0.0, 1.0].map(|share| ObstaclePose { share, positions: tool.at(f64::from(frame) + share) });
         let obstacles = [Obstacle::new(&tool.triangles, &poses, FRAME, THICKNESS, 0.5).expect("a tool")];
-        let own = own.then_some(Rub { thickness: THICKNESS, friction: 0.5 });
+        let self_contact = self_contact.then_some(ContactParams { thickness: THICKNESS, friction: 0.5 });
         let ground = tool.ground.then_some(ground);
-        let scene = Scene { skins: &skins, obstacles: &obstacles, ground, own, ..Scene::default() };
-        let asked = Frame {
+        let scene =
+            CollisionScene { skins: &skins, obstacles: &obstacles, ground, self_contact, ..CollisionScene::default() };
+        let asked = SolverFrame {
             seconds: FRAME,
             contacts: Some(&scene),
             substeps: steps,
             volume: f64::from(volume),
-            ..Frame::default()
+            ..SolverFrame::default()
         };
         let clock = Instant::now();
         let report = solver.step(&body, &mut state, &asked);

@@ -4,7 +4,7 @@ use crate::model::Model;
 use crate::scene::{FRAME, GRAVITY, Scene, Touched};
 use crate::vbd::Vbd;
 use crate::xpbd::Xpbd;
-use bodies::mass_spring::{Frame, Integrator, Solver, State};
+use bodies::mass_spring::{BodySolver, Integrator, SolverFrame, State};
 use cpu_time::ProcessTime;
 use numerics::vector::DVec3;
 
@@ -72,18 +72,18 @@ impl Run {
         /// For the first force and the energies.
         const STEP: u32 = 2;
         let mut state = State::at_rest(&scene.body);
-        let mut solver = Solver::new(&scene.body);
+        let mut solver = BodySolver::new(&scene.body);
         Self::frames(scene, |frame, x| {
             let touched = Touched { scene, frame };
             let touches = scene.tools.ground || scene.tools.roller.is_some();
-            let asked = Frame {
+            let asked = SolverFrame {
                 seconds: FRAME,
                 gravity: GRAVITY.into(),
                 pins: &scene.pins,
                 contacts: touches.then_some(&touched),
                 integrator,
                 substeps,
-                ..Frame::default()
+                ..SolverFrame::default()
             };
             let report = solver.step(&scene.body, &mut state, &asked);
             x.iter_mut().zip(&state.positions).for_each(|(x, p)| *x = DVec3::from(*p));

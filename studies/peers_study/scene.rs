@@ -3,7 +3,7 @@
 //! Ground and pin are exact shapes rather than meshes, and the same for every method: a search costs none of them anything,
 //! and no facet tells one from the other.
 
-use bodies::mass_spring::{Body, Contact, Contacts, Material, Mesh, Pin, Query};
+use bodies::mass_spring::{Contact, ContactFinder, ContactQuery, Material, Mesh, Pin, SoftBody};
 use bodies::tets::{boundary, cubes};
 use numerics::masked::Masked;
 use numerics::vector::DVec3;
@@ -23,7 +23,7 @@ pub(crate) struct Scene {
     pub(crate) tets: Vec<[u32; 4]>,
     /// Particles of the surface, rising.
     pub(crate) skin: Vec<u32>,
-    pub(crate) body: Body,
+    pub(crate) body: SoftBody,
     /// E, Pa.
     pub(crate) modulus: f64,
     /// β = c ÷ k, seconds.
@@ -91,8 +91,8 @@ pub(crate) struct Touched<'a> {
     pub(crate) frame: u32,
 }
 
-impl Contacts for Touched<'_> {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for Touched<'_> {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let times = query.times.map(|share| (f64::from(self.frame) + share) * FRAME);
         for particle in &self.scene.skin {
             let [from, to] = [query.from, query.to].map(|x| DVec3::from(x[*particle as usize]));
@@ -170,7 +170,7 @@ impl Scene {
         let plain = |value| Masked::uniform(value);
         let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
         let mesh = Mesh { points: &places, tets: &tets, ..Mesh::default() };
-        let body = Body::new(&mesh, &material, &[]).expect("a block");
+        let body = SoftBody::new(&mesh, &material, &[]).expect("a block");
         Self { title, frames, points, tets, skin, body, modulus, damping, pins: Vec::new(), tools }
     }
 

@@ -7,7 +7,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::mass_spring::{Body, Frame, Integrator, Material, Mesh, Pin, Report, Solver, State};
+use bodies::mass_spring::{BodySolver, FrameReport, Integrator, Material, Mesh, Pin, SoftBody, SolverFrame, State};
 use bodies::tets::cubes;
 use numerics::masked::Masked;
 use std::time::Instant;
@@ -16,7 +16,7 @@ const ROUNDS: usize = 3;
 const SIZE: [f64; 3] = [2.0, 0.5, 0.5];
 
 struct Beam {
-    body: Body,
+    body: SoftBody,
     pins: Vec<Pin>,
     tip: Vec<usize>,
 }
@@ -30,7 +30,7 @@ fn beam(cells: [usize; 3], times: f64, beta: f64) -> Beam {
     let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(3.04e6 * times), damping: plain(beta) };
     let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
-    Beam { body: Body::new(&mesh, &material, &[]).expect("a beam"), pins, tip }
+    Beam { body: SoftBody::new(&mesh, &material, &[]).expect("a beam"), pins, tip }
 }
 
 struct Run {
@@ -40,14 +40,14 @@ struct Run {
     cg: u32,
     caps: u32,
     estimate: f64,
-    last: Report,
+    last: FrameReport,
 }
 
-fn run(beam: &Beam, frames: usize, frame: &Frame<'_>) -> Run {
+fn run(beam: &Beam, frames: usize, frame: &SolverFrame<'_>) -> Run {
     let mut state = State::at_rest(&beam.body);
-    let mut solver = Solver::new(&beam.body);
+    let mut solver = BodySolver::new(&beam.body);
     let mut out =
-        Run { tips: Vec::new(), wall: 0.0, newton: 0, cg: 0, caps: 0, estimate: 0.0, last: Report::default() };
+        Run { tips: Vec::new(), wall: 0.0, newton: 0, cg: 0, caps: 0, estimate: 0.0, last: FrameReport::default() };
     for _ in 0..frames {
         let clock = Instant::now();
         let report = solver.step(&beam.body, &mut state, frame);
@@ -81,9 +81,9 @@ fn main() {
         for (times, beta, frames) in [(1.0, 1e-3, frames), (1e4, 1e-5, 6)] {
             let beam = beam(cells, times, beta);
             for volume in [0.0, 1.0] {
-                let frame = Frame { volume, pins: &beam.pins, ..Frame::default() };
+                let frame = SolverFrame { volume, pins: &beam.pins, ..SolverFrame::default() };
                 let accurate = Integrator::Accurate { tolerance: 1e-6 };
-                let reference = run(&beam, frames, &Frame { substeps: fine, integrator: accurate, ..frame });
+                let reference = run(&beam, frames, &SolverFrame { substeps: fine, integrator: accurate, ..frame });
                 let mut cases = vec![
                     ("default", Integrator::Default, 0),
                     ("default", Integrator::Default, 2),
@@ -96,7 +96,7 @@ fn main() {
                     }
                 }
                 for (integrator, how, substeps) in cases {
-                    let frame = Frame { integrator: how, substeps, ..frame };
+                    let frame = SolverFrame { integrator: how, substeps, ..frame };
                     let runs: Vec<Run> = (0..ROUNDS).map(|_| run(&beam, frames, &frame)).collect();
                     let one = &runs[0];
                     println!(

@@ -6,8 +6,8 @@
 #![deny(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
-pub mod carry;
 pub mod collision;
+pub mod embedding;
 pub mod goals;
 pub mod mass_spring;
 pub mod tets;

@@ -74,7 +74,7 @@ impl<'a> Goals<'a> {
     }
 
     /// Adds what pulls in a step between two frames.
-    pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<mass_spring::Goal>) {
+    pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<mass_spring::GoalSpring>) {
         for (wire, particles) in self.setup.wires.iter().enumerate() {
             let Some(now) = self.drawn(wire, times[1]) else { continue };
             let before = self.drawn(wire, times[0]);
@@ -84,7 +84,12 @@ impl<'a> Goals<'a> {
                 let to = self.place(&now, particle, point);
                 let from = before.as_ref().map_or(to, |before| self.place(before, particle, point));
                 let between = [from, to];
-                out.push(mass_spring::Goal { particle: particle as u32, between, strength: now.strength, damping });
+                out.push(mass_spring::GoalSpring {
+                    particle: particle as u32,
+                    between,
+                    strength: now.strength,
+                    damping,
+                });
             }
         }
     }

@@ -4,7 +4,7 @@
 //! those is seen by where surfaces face: a particle is joined with the nearest particles of other bodies within the radius
 //! that it sees outside of its own surface and that see it outside of theirs, or both inside where surfaces overlap.
 
-use bodies::mass_spring::Spring;
+use bodies::mass_spring::BodySpring;
 
 /// Springs that a particle asks for, at most.
 const MOST: usize = 4;
@@ -25,7 +25,7 @@ pub(super) struct Couple<'a> {
 }
 
 /// Springs as long as their particles are apart, by their particles.
-pub(super) fn couple(with: &Couple<'_>) -> Vec<Spring> {
+pub(super) fn couple(with: &Couple<'_>) -> Vec<BodySpring> {
     if with.radius <= 0.0 || with.points.as_flattened().iter().any(|x| !x.is_finite()) {
         return Vec::new();
     }
@@ -65,7 +65,7 @@ pub(super) fn couple(with: &Couple<'_>) -> Vec<Spring> {
     pairs.dedup();
     let spring = |ends: &[u32; 2]| {
         let [p, q] = ends.map(at);
-        Spring {
+        BodySpring {
             ends: *ends,
             stiffness: with.stiffness,
             damping: with.damping * with.stiffness,

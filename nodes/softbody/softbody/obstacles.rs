@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bodies::collision::{Obstacle, Pose};
+use bodies::collision::{Obstacle, ObstaclePose};
 use engine::prelude::*;
 
 /// What bodies cannot pass in a step of `seconds` whose `samples` are the wires at rising times.
@@ -31,12 +31,12 @@ pub(super) fn obstacles(
             meshes.iter().all(|mesh| mesh.table(Owner::Point).column("P") == meshes[0].table(Owner::Point).column("P"));
         let span = last.number() - first.number();
         let share = |frame: Frame| if span > 0.0 { (frame.number() - first.number()) / span } else { 1.0 };
-        let pose = |(sample, mesh): (&(Frame, Vec<Arc<Geometry>>), &Component)| Pose {
+        let pose = |(sample, mesh): (&(Frame, Vec<Arc<Geometry>>), &Component)| ObstaclePose {
             share: share(sample.0),
             positions: mesh.positions().iter().map(|p| p.map(f64::from)).collect(),
         };
         let poses = samples.iter().zip(&meshes).map(pose).take(if still { 1 } else { samples.len() });
-        let poses: Vec<Pose> = poses.collect();
+        let poses: Vec<ObstaclePose> = poses.collect();
         let obstacle = Obstacle::new(&meshes[0].triangles().corners, &poses, seconds, thickness, friction);
         obstacles.push(obstacle.map_err(|error| Error::refused(format!("`colliders` {wire}: {error}")))?);
     }

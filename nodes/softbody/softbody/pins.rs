@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bodies::mass_spring::{Goal, Pin};
+use bodies::mass_spring::{GoalSpring, Pin};
 use engine::prelude::*;
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
@@ -41,7 +41,7 @@ pub(super) fn pull(
     [before, now]: [&[Arc<Geometry>]; 2],
     frame: Frame,
     pins: &mut Vec<Pin>,
-    goals: &mut Vec<Goal>,
+    goals: &mut Vec<GoalSpring>,
 ) -> Result<()> {
     let of = |wires: &[Arc<Geometry>]| -> Result<Vec<[Vec<f32>; 2]>> {
         let each = wires.iter().enumerate().map(|(wire, geometry)| {
@@ -68,7 +68,7 @@ pub(super) fn pull(
         let strength = f64::from(strengths[hold.point]);
         if strength > 0.0 {
             let damping = super::goals::damping(strength);
-            goals.push(Goal { particle: hold.particle, between, strength, damping });
+            goals.push(GoalSpring { particle: hold.particle, between, strength, damping });
         } else {
             pins.push(Pin { particle: hold.particle, between });
         }

@@ -1,8 +1,8 @@
 //! What is computed from the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
 
-use bodies::carry::{Carrier, carry};
-use bodies::collision::Skin;
-use bodies::mass_spring::{Body, BodyError, Material, Mesh, Spring};
+use bodies::collision::BodySkin;
+use bodies::embedding::{EmbeddedPoint, embed};
+use bodies::mass_spring::{BodyError, BodySpring, Material, Mesh, SoftBody};
 use bodies::tets::{boundary, edges, missing_edges};
 use engine::prelude::*;
 use numerics::masked::Masked;
@@ -34,19 +34,19 @@ pub(super) struct SimulationSetup {
     pub(super) tets: Vec<[u32; 4]>,
     slivers: Vec<bool>,
     missing: Vec<[u32; 2]>,
-    joints: Vec<Spring>,
+    joints: Vec<BodySpring>,
     /// The particles of each wire.
     pub(super) wires: Vec<std::ops::Range<usize>>,
     /// Which particles are on a surface.
     pub(super) outer: Vec<bool>,
     /// The surface of each connected body, for contacts.
-    pub(super) skins: Vec<Skin>,
+    pub(super) skins: Vec<BodySkin>,
     pub(super) holds: Vec<Hold>,
     /// What comes out, but for places.
     pub(super) surface: Component,
     pub(super) body: Component,
     /// What each point of the surface hangs on.
-    pub(super) carriers: Vec<Carrier>,
+    pub(super) carriers: Vec<EmbeddedPoint>,
 }
 
 /// One wire's surface: triangles of its particles, and the mesh that comes out of it with what carries its points.
@@ -54,7 +54,7 @@ struct Surface {
     triangles: Vec<[u32; 3]>,
     missing: Vec<[u32; 2]>,
     mesh: Component,
-    carriers: Vec<Carrier>,
+    carriers: Vec<EmbeddedPoint>,
 }
 
 /// A masked param over the particles of all bodies, which may come through several wires.
@@ -124,12 +124,10 @@ impl SimulationSetup {
             }
             missing.extend(found.missing.iter().map(|edge| edge.map(|end| end + first)));
             triangles.extend(found.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
-            carriers.extend(
-                found.carriers.iter().map(|carrier| Carrier {
-                    particles: carrier.particles.map(|particle| particle + first),
-                    ..*carrier
-                }),
-            );
+            carriers.extend(found.carriers.iter().map(|carrier| EmbeddedPoint {
+                particles: carrier.particles.map(|particle| particle + first),
+                ..*carrier
+            }));
             let surface_points = own.get(SURFACE_POINT);
             outer.extend((0..own.point_count()).map(|point| surface_points.is_some_and(|rows| rows[point] >= 0)));
             wires.push(first as usize..rest.len());
@@ -167,14 +165,14 @@ impl SimulationSetup {
     }
 
     /// The body that is solved for.
-    pub(super) fn body(&self, material: &MaterialFields) -> Result<Body> {
+    pub(super) fn body(&self, material: &MaterialFields) -> Result<SoftBody> {
         let mesh = Mesh { points: &self.rest, tets: &self.tets, slivers: &self.slivers, missing: &self.missing };
-        Body::new(&mesh, &material.material(), &self.joints).map_err(refusal)
+        SoftBody::new(&mesh, &material.material(), &self.joints).map_err(refusal)
     }
 
     /// Edges of the skins that colliders let go with particles at `x`.
     pub(super) fn let_go(&self, x: &[[f64; 3]]) -> usize {
-        self.skins.iter().map(|skin| skin.count_let_go(x)).sum()
+        self.skins.iter().map(|skin| skin.released_edges(x)).sum()
     }
 
     /// Springs between bodies.
@@ -219,7 +217,7 @@ impl Surface {
             triangles: mesh.triangles().corners.iter().map(particles).collect(),
             missing: missing_edges(&edges, tets.tet_corners()),
             mesh: mesh.clone(),
-            carriers: rows.iter().map(|row| Carrier::on(*row)).collect(),
+            carriers: rows.iter().map(|row| EmbeddedPoint::at_particle(*row)).collect(),
         }
     }
 
@@ -229,7 +227,7 @@ impl Surface {
         let triangles: Vec<[u32; 3]> = boundary(corners, points).iter().map(|face| face.corners).collect();
         let (mesh, carriers) = match mesh {
             Some(mesh) => {
-                let carriers = carry(points, corners, mesh.positions());
+                let carriers = embed(points, corners, mesh.positions());
                 let carriers = carriers.or_else(|| (mesh.point_count() == 0).then(Vec::new)).ok_or_else(|| {
                     Error::refused(format!(
                         "no tet of `bodies` {wire} has a volume, so none carries the mesh beside them"
@@ -246,7 +244,7 @@ impl Surface {
                 let places = used.iter().map(|point| points[*point as usize]).collect();
                 let flat = triangles.as_flattened().iter().map(row).collect();
                 let mesh = Component::mesh(vec![3; triangles.len()], flat, places)?;
-                (mesh, used.iter().map(|point| Carrier::on(*point)).collect())
+                (mesh, used.iter().map(|point| EmbeddedPoint::at_particle(*point)).collect())
             }
         };
         Ok(Self { triangles, missing: Vec::new(), mesh, carriers })
@@ -281,10 +279,10 @@ fn parts(count: usize, tets: &[[u32; 4]]) -> Vec<u32> {
     (0..count as u32).map(|particle| root(&mut parent, particle)).collect()
 }
 
-fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<Skin>> {
+fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<BodySkin>> {
     let part = |corners: &[u32; 3]| parts[corners[0] as usize];
     let mut sorted = triangles.to_vec();
     sorted.sort_by_key(part);
-    let skins = sorted.chunk_by(|a, b| part(a) == part(b)).map(|own| Skin::new(rest, own, links));
+    let skins = sorted.chunk_by(|a, b| part(a) == part(b)).map(|own| BodySkin::new(rest, own, links));
     skins.map(|skin| skin.map_err(|error| Error::refused(format!("`bodies`: {error}")))).collect()
 }

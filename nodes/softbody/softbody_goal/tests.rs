@@ -1,5 +1,5 @@
 use super::*;
-use bodies::tets::{Closed, Fill, Surface};
+use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use conformance::{Bench, bench, conformance};
 use numerics::shapes::{self, Polygons};
 
@@ -18,8 +18,9 @@ fn ball() -> Component {
 fn body() -> Geometry {
     let ball = ball();
     let faces = ball.faces().unwrap();
-    let surface = Surface { starts: faces.runs.starts(), corners: &faces.corners, points: ball.positions() };
-    let solid = Closed::of(&surface, false).unwrap().fill(&Fill { spacing: 0.0, interior: true }).unwrap();
+    let surface = PolygonSurface { starts: faces.runs.starts(), corners: &faces.corners, points: ball.positions() };
+    let solid =
+        ClosedSurface::of(&surface, false).unwrap().fill(&FillSettings { spacing: 0.0, interior: true }).unwrap();
     let skin = ball.point_count() as i32;
     let mut tets = Component::tets(solid.tets, solid.points).unwrap();
     let rows = (0..tets.point_count() as i32).map(|k| if k < skin { k } else { -1 }).collect();

@@ -7,18 +7,18 @@ use numerics::random::Key;
 
 use super::*;
 
-fn momentum(body: &Body, state: &State) -> V {
+fn momentum(body: &SoftBody, state: &State) -> V {
     let each = state.velocities.iter().zip(body.masses());
     each.fold([0.0; 3], |sum, (v, mass)| add(sum, *v, mass))
 }
 
-fn angular(body: &Body, state: &State) -> V {
+fn angular(body: &SoftBody, state: &State) -> V {
     let each = state.positions.iter().zip(&state.velocities).zip(body.masses());
     each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, DVec3::from(*x).cross(&DVec3::from(*v)).into(), mass))
 }
 
 /// A block that turns, stretches and moves.
-fn thrown(damping: f64) -> (Body, State) {
+fn thrown(damping: f64) -> (SoftBody, State) {
     let body = block([5, 4, 3], 0.1, 1e5, damping);
     let mut state = State::at_rest(&body);
     for (index, v) in state.velocities.iter_mut().enumerate() {
@@ -34,7 +34,7 @@ fn thrown(damping: f64) -> (Body, State) {
 fn lost_momentum(integrator: Integrator, volume: f64) -> f64 {
     let (body, mut state) = thrown(0.0);
     let before = momentum(&body, &state);
-    steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 200);
+    steps(&body, &mut state, &SolverFrame { integrator, volume, ..BARE }, 200);
     distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
@@ -46,13 +46,13 @@ fn lost_by_a_pair() -> f64 {
     let lower = points.len() as u32;
     points.extend(points.clone().iter().map(|[x, y, z]| [*x, y + 0.25, *z]));
     tets.extend(one.tet_corners().iter().map(|tet| tet.map(|corner| corner + lower)));
-    let joint = |i: u32| Spring { ends: [i + 6, lower + i], stiffness: 500.0, damping: 1.0, length: 0.05 };
-    let joints: Vec<Spring> = [0, 1, 2, 9, 10, 11, 18, 19, 20].map(joint).into();
+    let joint = |i: u32| BodySpring { ends: [i + 6, lower + i], stiffness: 500.0, damping: 1.0, length: 0.05 };
+    let joints: Vec<BodySpring> = [0, 1, 2, 9, 10, 11, 18, 19, 20].map(joint).into();
     let body = made(&points, &tets, 1e5, 0.01, &joints);
     let mut state = State::at_rest(&body);
     state.velocities[lower as usize..].fill([0.2, 0.3, -0.1]);
     let before = momentum(&body, &state);
-    steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 100);
+    steps(&body, &mut state, &SolverFrame { volume: 1.0, ..BARE }, 100);
     distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
@@ -66,7 +66,7 @@ fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
         *v = DVec3::z().cross(&DVec3::from(*x)).into();
     }
     let before = angular(&body, &state);
-    let reports = steps(&body, &mut state, &Frame { seconds: TAU / steps_a_turn, ..BARE }, count);
+    let reports = steps(&body, &mut state, &SolverFrame { seconds: TAU / steps_a_turn, ..BARE }, count);
     let lost = distance(&angular(&body, &state), &before) / DVec3::from(before).norm();
     (lost, reports.iter().map(|report| report.euler_steps).sum())
 }
@@ -81,7 +81,7 @@ fn gained(integrator: Integrator, volume: f64, damping: f64) -> f64 {
             0.5 * mass * speed * speed
         })
         .sum();
-    let reports = steps(&body, &mut state, &Frame { integrator, volume, ..BARE }, 100);
+    let reports = steps(&body, &mut state, &SolverFrame { integrator, volume, ..BARE }, 100);
     largest(reports.iter().map(|report| (report.kinetic + report.elastic + report.volume_energy) / start - 1.0))
 }
 
@@ -91,7 +91,7 @@ fn fall(integrator: Integrator, fallen: f64) -> f64 {
     let start = State::at_rest(&body);
     let mut state = start.clone();
     let gravity = [0.0, -9.81, 2.0];
-    steps(&body, &mut state, &Frame { gravity, volume: 1.0, integrator, ..BARE }, 24);
+    steps(&body, &mut state, &SolverFrame { gravity, volume: 1.0, integrator, ..BARE }, 24);
     let each = state.positions.iter().zip(&start.positions);
     largest(each.map(|(after, before)| distance(after, &add(*before, gravity, fallen))))
 }

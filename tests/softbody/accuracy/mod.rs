@@ -10,7 +10,7 @@ mod settled;
 mod springs;
 mod touch;
 
-use bodies::mass_spring::{Body, Frame, Material, Mesh, Report, Solver, Spring, State};
+use bodies::mass_spring::{BodySolver, BodySpring, FrameReport, Material, Mesh, SoftBody, SolverFrame, State};
 use numerics::masked::Masked;
 use numerics::vector::DVec3;
 
@@ -28,7 +28,7 @@ fn every_law_of_soft_bodies_is_met_or_said_to_be_missed_and_is_in_the_docs() {
 }
 
 /// No gravity, no volume: springs alone.
-const BARE: Frame<'static> = Frame {
+const BARE: SolverFrame<'static> = SolverFrame {
     seconds: 1.0 / 24.0,
     gravity: [0.0; 3],
     drag: 0.0,
@@ -38,25 +38,25 @@ const BARE: Frame<'static> = Frame {
     contacts: None,
     integrator: bodies::mass_spring::Integrator::Default,
     substeps: 0,
-    rough: false,
+    force_implicit_euler: false,
 };
 
 /// A block for the solver: cells, their side, E and β; as heavy as water.
-fn block(cells: [u32; 3], side: f64, modulus: f64, damping: f64) -> Body {
+fn block(cells: [u32; 3], side: f64, modulus: f64, damping: f64) -> SoftBody {
     let block = shapes::block(cells, side, [0.0; 3]);
     let points: Vec<V> = block.positions().iter().map(|p| p.map(f64::from)).collect();
     made(&points, block.tet_corners(), modulus, damping, &[])
 }
 
-fn made(points: &[V], tets: &[[u32; 4]], modulus: f64, damping: f64, joints: &[Spring]) -> Body {
+fn made(points: &[V], tets: &[[u32; 4]], modulus: f64, damping: f64, joints: &[BodySpring]) -> SoftBody {
     let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(modulus), damping: plain(damping) };
-    Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, joints).unwrap()
+    SoftBody::new(&Mesh { points, tets, ..Mesh::default() }, &material, joints).unwrap()
 }
 
 /// Steps through so many frames; gives what each reports.
-fn steps(body: &Body, state: &mut State, frame: &Frame<'_>, frames: usize) -> Vec<Report> {
-    let mut solver = Solver::new(body);
+fn steps(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, frames: usize) -> Vec<FrameReport> {
+    let mut solver = BodySolver::new(body);
     (0..frames).map(|_| solver.step(body, state, frame)).collect()
 }
 

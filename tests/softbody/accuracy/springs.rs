@@ -10,9 +10,9 @@ use super::*;
 const STRETCH: f64 = 0.1;
 
 /// Two particles of `mass`, joined by a stretched spring of length 1.
-fn pair(mass: f64, stiffness: f64, damping: f64) -> (Body, State) {
-    let spring = Spring { ends: [0, 1], stiffness, damping, length: 1.0 };
-    let body = Body::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[mass, mass], &[spring]).unwrap();
+fn pair(mass: f64, stiffness: f64, damping: f64) -> (SoftBody, State) {
+    let spring = BodySpring { ends: [0, 1], stiffness, damping, length: 1.0 };
+    let body = SoftBody::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[mass, mass], &[spring]).unwrap();
     let mut state = State::at_rest(&body);
     state.positions[1][0] += STRETCH;
     (body, state)
@@ -27,8 +27,8 @@ fn error(mass: f64, stiffness: f64, zeta: f64, steps: u32, integrator: Integrato
     let reduced = 0.5 * mass;
     let omega = (stiffness / reduced).sqrt();
     let (body, mut state) = pair(mass, stiffness, 2.0 * zeta * omega * reduced);
-    let frame = Frame { seconds: TAU / omega / f64::from(steps), integrator, ..BARE };
-    let mut solver = Solver::new(&body);
+    let frame = SolverFrame { seconds: TAU / omega / f64::from(steps), integrator, ..BARE };
+    let mut solver = BodySolver::new(&body);
     largest((1..=steps).map(|step| {
         let _ = solver.step(&body, &mut state, &frame);
         let phase = TAU * f64::from(step) / f64::from(steps);
@@ -58,8 +58,8 @@ fn beyond_start() -> f64 {
     let start = 0.5 * STRETCH * STRETCH;
     let one = |seconds: f64, integrator: Integrator| {
         let (body, mut state) = pair(1.0, 1.0, 0.0);
-        let frame = Frame { seconds, integrator, ..BARE };
-        let mut solver = Solver::new(&body);
+        let frame = SolverFrame { seconds, integrator, ..BARE };
+        let mut solver = BodySolver::new(&body);
         largest((0..50).map(|_| {
             let report = solver.step(&body, &mut state, &frame);
             ((report.kinetic + report.elastic) / start).max(stretch(&state).abs() / STRETCH) - 1.0
@@ -93,14 +93,14 @@ fn chain(light: f64) -> f64 {
     }
     let amplitude = 1e-3;
     let points: Vec<V> = (0..=COUNT).map(|i| [i as f64, 0.0, 0.0]).collect();
-    let link = |i: u32| Spring { ends: [i, i + 1], stiffness: 1.0, damping: 0.0, length: 1.0 };
-    let springs: Vec<Spring> = (0..COUNT as u32).map(link).collect();
-    let body = Body::of_springs(&points, &[&[1.0], &masses[..]].concat(), &springs).unwrap();
+    let link = |i: u32| BodySpring { ends: [i, i + 1], stiffness: 1.0, damping: 0.0, length: 1.0 };
+    let springs: Vec<BodySpring> = (0..COUNT as u32).map(link).collect();
+    let body = SoftBody::of_springs(&points, &[&[1.0], &masses[..]].concat(), &springs).unwrap();
     let mut state = State::at_rest(&body);
     (0..COUNT).for_each(|i| state.positions[i + 1][0] += amplitude * u[i]);
     let pins = [bodies::mass_spring::Pin { particle: 0, between: [[0.0; 3]; 2] }];
-    let frame = Frame { seconds: TAU / slowest.sqrt() / 200.0, pins: &pins, ..BARE };
-    let mut solver = Solver::new(&body);
+    let frame = SolverFrame { seconds: TAU / slowest.sqrt() / 200.0, pins: &pins, ..BARE };
+    let mut solver = BodySolver::new(&body);
     largest((1..=200).map(|step| {
         let _ = solver.step(&body, &mut state, &frame);
         let swing = amplitude * libm::cos(TAU * f64::from(step) / 200.0);

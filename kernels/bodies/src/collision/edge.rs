@@ -3,10 +3,10 @@
 //! Two edges touch where each is what its own surface has nearest to the other. So a pair counts where the way from one
 //! to the other points out of both surfaces and away from the triangles beside the edges.
 
-use super::cross::{Apart, edges_apart, sign_changes};
-use super::near::along;
-use super::surface::{Edge, Moment, NONE, Surface};
-use super::vertex::{Moving, ON, Rules};
+use super::closest_point::along;
+use super::coplanarity::{Separation, edge_separation, sign_changes};
+use super::surface::{Edge, Moment, NONE, TriangleSurface};
+use super::vertex::{ContactRules, MovingSurface, ON};
 use numerics::vector::DVec3;
 
 /// Two edges that may touch.
@@ -25,16 +25,22 @@ const LEAN_THROUGH: f64 = 0.5;
 const LEAN_NEAR: f64 = 0.1;
 
 /// How `edge` and `other`, each of its surface, meet.
-pub(super) fn hit(first: &Moving<'_>, edge: &Edge, second: &Moving<'_>, other: &Edge, rules: &Rules) -> Option<Hit> {
+pub(super) fn hit(
+    first: &MovingSurface<'_>,
+    edge: &Edge,
+    second: &MovingSurface<'_>,
+    other: &Edge,
+    rules: &ContactRules,
+) -> Option<Hit> {
     let pair = Pair { first: *first, edge, second: *second, other };
     let last = first.poses.len() - 1;
     let mut far = true;
     for piece in 0..last {
-        let ways = [pair.ways(piece), pair.ways(piece + 1)];
-        let apart = edges_apart(&ways[0], &ways[1], rules.reach);
-        far &= apart == Apart::Far;
-        if apart == Apart::Unknown
-            && let Some(hit) = pair.through(piece, &ways)
+        let configuration = [pair.configuration(piece), pair.configuration(piece + 1)];
+        let apart = edge_separation(&configuration[0], &configuration[1], rules.reach);
+        far &= apart == Separation::Far;
+        if apart == Separation::Unknown
+            && let Some(hit) = pair.through(piece, &configuration)
         {
             return Some(hit);
         }
@@ -46,23 +52,23 @@ pub(super) fn hit(first: &Moving<'_>, edge: &Edge, second: &Moving<'_>, other: &
 }
 
 struct Pair<'a> {
-    first: Moving<'a>,
+    first: MovingSurface<'a>,
     edge: &'a Edge,
-    second: Moving<'a>,
+    second: MovingSurface<'a>,
     other: &'a Edge,
 }
 
 impl Pair<'_> {
     fn segments(&self, pose: usize) -> [[DVec3; 2]; 2] {
         [
-            self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).place(end)),
-            self.other.ends.map(|end| Moment::of(self.second.poses[pose]).place(end)),
+            self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).position(end)),
+            self.other.ends.map(|end| Moment::of(self.second.poses[pose]).position(end)),
         ]
     }
 
     /// Both edges and the way from the start of the first to that of the second.
     #[inline]
-    fn ways(&self, pose: usize) -> [DVec3; 3] {
+    fn configuration(&self, pose: usize) -> [DVec3; 3] {
         let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
         let [p, q] = [DVec3::from(one[self.edge.ends[0] as usize]), DVec3::from(one[self.edge.ends[1] as usize])];
         let [a, b] = [DVec3::from(two[self.other.ends[0] as usize]), DVec3::from(two[self.other.ends[1] as usize])];
@@ -79,7 +85,7 @@ impl Pair<'_> {
             let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
             let time = piece as f64 + t;
             if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
-                let [d, e, _] = self.ways(self.first.poses.len() - 1);
+                let [d, e, _] = self.configuration(self.first.poses.len() - 1);
                 let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
                 // Turned that far they may have passed each other's direction: the way they met holds.
                 let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
@@ -120,11 +126,11 @@ fn between([[p, q], [a, b]]: [[DVec3; 2]; 2], [s, u]: [f64; 2]) -> DVec3 {
 }
 
 /// Whether the triangles at an edge fall away from it, seen along `out`, and have that outside.
-fn is_ridge(surface: &Surface, at: &Moment<'_>, edge: &Edge, share: f64, out: DVec3, lean: f64) -> bool {
-    let point = at.place(edge.ends[0]).lerp(&at.place(edge.ends[1]), share);
+fn is_ridge(surface: &TriangleSurface, at: &Moment<'_>, edge: &Edge, share: f64, out: DVec3, lean: f64) -> bool {
+    let point = at.position(edge.ends[0]).lerp(&at.position(edge.ends[1]), share);
     let falls = |third: u32| {
-        let way = at.place(third) - point;
-        out.dot(&way) <= lean * way.norm()
+        let direction = at.position(third) - point;
+        out.dot(&direction) <= lean * direction.norm()
     };
     if !edge.opposite.into_iter().all(|third| third == NONE || falls(third)) {
         return false;

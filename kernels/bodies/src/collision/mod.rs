@@ -12,31 +12,31 @@
 //! edges that were near within the way but neither at its ends nor through each other are not told; positions beyond f32
 //! are not found.
 
-mod cross;
+mod body_skin;
+mod closest_point;
+mod coplanarity;
 mod edge;
 mod motion;
-mod near;
 mod obstacle;
 mod pair;
-mod skin;
 mod surface;
 mod swept;
 mod vertex;
 
-use crate::mass_spring::{Contact, Contacts, Query};
-pub use motion::Pose;
-use near::Nearest;
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+pub use body_skin::BodySkin;
+use body_skin::ReleasedElements;
+use closest_point::ClosestPoint;
+pub use motion::ObstaclePose;
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
-pub use pair::Rub;
+pub use pair::ContactParams;
 use rayon::prelude::*;
-use skin::LetGo;
-pub use skin::Skin;
 use std::sync::OnceLock;
-use surface::{Moment, Places};
+use surface::{Moment, Positions};
 use swept::BoxTree;
-use vertex::{Moving, Rules};
+use vertex::{ContactRules, MovingSurface};
 
 /// Vertices or edges that a task looks after: some 20 µs of work.
 const TASK: usize = 64;
@@ -47,7 +47,7 @@ const SAG: f64 = 0.25;
 
 /// Why there is nothing to touch.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TouchError {
+pub enum CollisionError {
     /// An obstacle is nowhere.
     #[error("an obstacle has no pose; expected one at least")]
     NoPose,
@@ -104,9 +104,9 @@ pub enum TouchError {
 
 /// All that may touch.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Scene<'a> {
+pub struct CollisionScene<'a> {
     /// Surfaces of bodies.
-    pub skins: &'a [Skin],
+    pub skins: &'a [BodySkin],
     /// What each particle's friction is scaled by; 1 where there is none.
     pub friction: Option<&'a [f32]>,
     /// First of all.
@@ -114,54 +114,54 @@ pub struct Scene<'a> {
     /// Animated meshes.
     pub obstacles: &'a [Obstacle],
     /// How skins touch each other; none: they do not.
-    pub between: Option<Rub>,
+    pub body_contact: Option<ContactParams>,
     /// How skins touch themselves; none: they do not.
-    pub own: Option<Rub>,
+    pub self_contact: Option<ContactParams>,
 }
 
 /// What a search found.
 #[must_use]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Found {
+pub struct ContactSummary {
     /// Contacts.
     pub contacts: u32,
     /// How far below its gap the worst of them was where the way began, along its normal at the end, metres.
     pub deepest_overlap: f64,
 }
 
-impl Contacts for Scene<'_> {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for CollisionScene<'_> {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let _ = self.search(query, out);
     }
 }
 
 /// A contact and where its second side was when the way began: n·u is that less what was kept.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct FoundContact {
     contact: Contact,
     /// n·u at which surfaces touched at the start.
     start: f64,
 }
 
-impl Scene<'_> {
+impl CollisionScene<'_> {
     /// [`Contacts::find`], with what it found: the ground's contacts by particle; each obstacle's by particle, then
     /// by its own points, then by edges; then pairs of bodies; then each body's own.
-    pub fn search(&self, query: &Query<'_>, out: &mut Vec<Contact>) -> Found {
+    pub fn search(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> ContactSummary {
         let mut seen = Vec::new();
         self.on_ground(query, &mut seen);
-        let boxes = swept::boxes(&[query.from, query.to]);
+        let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for skin in self.skins {
                 let faces = skin.faces.sweep(&boxes, 0.0);
-                let let_go = skin.let_go(query.from);
+                let released = skin.released(query.from);
                 for obstacle in self.obstacles {
-                    self.against(query, (skin, &let_go), &boxes, &faces, obstacle, &mut seen);
+                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, &mut seen);
                 }
             }
         }
         self.pairs(query, &boxes, &mut seen);
-        let mut found = Found { contacts: seen.len() as u32, deepest_overlap: 0.0 };
-        for Seen { contact, start } in &seen {
+        let mut found = ContactSummary { contacts: seen.len() as u32, deepest_overlap: 0.0 };
+        for FoundContact { contact, start } in &seen {
             let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
             let apart: DVec3 =
                 sides.map(|(particle, weight)| DVec3::from(query.from[*particle as usize]) * weight).sum();
@@ -172,7 +172,7 @@ impl Scene<'_> {
         found
     }
 
-    fn on_ground(&self, query: &Query<'_>, out: &mut Vec<Seen>) {
+    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<FoundContact>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
         for particle in self.skins.iter().flat_map(|skin| &skin.surface.vertices) {
@@ -185,15 +185,15 @@ impl Scene<'_> {
                     offset: ground.height,
                     gap: ground.thickness,
                     velocity: [0.0; 3],
-                    friction: ground.friction * self.mask(&[*particle], &[1.0]),
+                    friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                 };
-                out.push(Seen { contact, start: ground.height });
+                out.push(FoundContact { contact, start: ground.height });
             }
         }
     }
 
     /// What friction is scaled by where particles have `weights`.
-    fn mask(&self, particles: &[u32], weights: &[f64]) -> f64 {
+    fn friction_scale(&self, particles: &[u32], weights: &[f64]) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
         let of = |particle: &u32| mask.get(*particle as usize).map_or(1.0, |scale| f64::from(*scale));
         let (mut sum, mut whole) = (0.0, 0.0);
@@ -205,37 +205,37 @@ impl Scene<'_> {
     }
 
     /// What a skin, but for what is let go of it, meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
-    fn against(
+    fn against_obstacle(
         &self,
-        query: &Query<'_>,
-        (skin, let_go): (&Skin, &LetGo),
+        query: &ContactQuery<'_>,
+        (skin, released): (&BodySkin, &ReleasedElements),
         boxes: &[Cuboid],
         faces: &BoxTree<'_>,
         obstacle: &Obstacle,
-        out: &mut Vec<Seen>,
+        out: &mut Vec<FoundContact>,
     ) {
-        let rules = Rules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
+        let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
-        let poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
-        let poses: Vec<Places<'_>> = poses.iter().map(Vec::as_slice).collect();
-        let still_boxes = swept::boxes(&poses);
+        let obstacle_poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
+        let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
+        let still_boxes = swept::swept_boxes(&obstacle_poses);
         let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
-        if !swept::meet(&faces.bounds, &tree.bounds) {
+        if !swept::overlap(&faces.bounds, &tree.bounds) {
             return;
         }
-        let between = between(query, &times);
-        let mut ways: Vec<Places<'_>> = vec![query.from];
-        ways.extend(between.iter().map(Vec::as_slice));
-        ways.push(query.to);
-        let meeting = Meeting {
+        let between = poses_between(query, &times);
+        let mut body_poses: Vec<Positions<'_>> = vec![query.from];
+        body_poses.extend(between.iter().map(Vec::as_slice));
+        body_poses.push(query.to);
+        let meeting = SkinObstaclePair {
             scene: self,
             query,
             skin,
-            let_go,
+            released,
             obstacle,
             boxes: [boxes, &still_boxes],
-            body: Moving { surface: &skin.surface, poses: &ways },
-            still: Moving { surface: &obstacle.surface, poses: &poses },
+            body: MovingSurface { surface: &skin.surface, poses: &body_poses },
+            still: MovingSurface { surface: &obstacle.surface, poses: &obstacle_poses },
             rules,
         };
         meeting.vertices(&tree, out);
@@ -245,7 +245,7 @@ impl Scene<'_> {
 }
 
 /// Where particles are between the first and the last of `times`.
-fn between(query: &Query<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
+fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
     let whole = query.times[1] - query.times[0];
     let at = |time: &f64| {
         let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
@@ -256,60 +256,60 @@ fn between(query: &Query<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
 }
 
 /// A skin and an obstacle, both on their way.
-struct Meeting<'a> {
-    scene: &'a Scene<'a>,
-    query: &'a Query<'a>,
-    skin: &'a Skin,
-    let_go: &'a LetGo,
+struct SkinObstaclePair<'a> {
+    scene: &'a CollisionScene<'a>,
+    query: &'a ContactQuery<'a>,
+    skin: &'a BodySkin,
+    released: &'a ReleasedElements,
     obstacle: &'a Obstacle,
     /// Of particles and of the obstacle's points, on their way.
     boxes: [&'a [Cuboid]; 2],
-    body: Moving<'a>,
-    still: Moving<'a>,
-    rules: Rules,
+    body: MovingSurface<'a>,
+    still: MovingSurface<'a>,
+    rules: ContactRules,
 }
 
 /// Tells what each of `things` meets, in their order, whatever the number of threads; `scratch` is memory to use again.
-fn in_order<T: Sync, S>(
+fn collect_in_order<T: Sync, S>(
     things: &[T],
     scratch: impl Fn() -> S + Sync + Send,
-    tell: impl Fn(&mut S, &[T], &mut Vec<Seen>) + Sync,
-    out: &mut Vec<Seen>,
+    find_in: impl Fn(&mut S, &[T], &mut Vec<FoundContact>) + Sync,
+    out: &mut Vec<FoundContact>,
 ) {
     let part = |scratch: &mut S, part: &[T]| {
         let mut seen = Vec::new();
-        tell(scratch, part, &mut seen);
+        find_in(scratch, part, &mut seen);
         seen
     };
-    let parts: Vec<Vec<Seen>> = things.par_chunks(TASK).map_init(scratch, part).collect();
+    let parts: Vec<Vec<FoundContact>> = things.par_chunks(TASK).map_init(scratch, part).collect();
     out.extend(parts.into_iter().flatten());
 }
 
 /// The places of a point in all poses.
-fn path_of(poses: &[Places<'_>], point: u32, path: &mut Vec<DVec3>) {
+fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
     path.clear();
     path.extend(poses.iter().map(|pose| DVec3::from(pose[point as usize])));
 }
 
-impl Meeting<'_> {
+impl SkinObstaclePair<'_> {
     /// The skin's vertices against the obstacle's triangles.
-    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
+    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
         // Of where it is at all, as nothing less is at hand; what is not closed has no inside.
         let (solid, bounds) = (OnceLock::new(), tree.bounds);
         let has_inside = self.obstacle.surface.closed;
-        let tell = |(): &mut (), vertices: &[u32], out: &mut Vec<Seen>| {
+        let find_in = |(): &mut (), vertices: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for vertex in vertices.iter().filter(|vertex| !self.let_go.has_particle(**vertex)) {
-                tree.meeting(&self.boxes[0][*vertex as usize], &mut faces);
+            for vertex in vertices.iter().filter(|vertex| !self.released.has_particle(**vertex)) {
+                tree.overlapping(&self.boxes[0][*vertex as usize], &mut faces);
                 let own = &self.boxes[0][*vertex as usize];
-                if faces.is_empty() && !(has_inside && swept::meet(own, &bounds)) {
+                if faces.is_empty() && !(has_inside && swept::overlap(own, &bounds)) {
                     continue;
                 }
                 path_of(self.body.poses, *vertex, &mut path);
                 let start = path[0];
                 hits.clear();
-                let sunk = || self.sunk(&solid, &bounds, start);
-                vertex::hits(&path, &self.still, &faces, sunk, &self.rules, &mut hits);
+                let starts_inside = || self.starts_inside(&solid, &bounds, start);
+                vertex::hits(&path, &self.still, &faces, starts_inside, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
@@ -317,14 +317,14 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&self.skin.surface.vertices, || (), tell, out);
+        collect_in_order(&self.skin.surface.vertices, || (), find_in, out);
     }
 
     /// The nearest triangle where the way begins, of a vertex within the obstacle's `bounds`; `solid` are its triangles
     /// then, put where they are once they are asked.
-    fn sunk(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<Nearest> {
+    fn starts_inside(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);
-        if !swept::meet(&Cuboid { low: p, high: p }, bounds) {
+        if !swept::overlap(&Cuboid { low: p, high: p }, bounds) {
             return None;
         }
         let solid = solid.get_or_init(|| {
@@ -333,17 +333,17 @@ impl Meeting<'_> {
             tree
         });
         let face = solid.closest(p, f32::INFINITY)?.triangle;
-        Some(Nearest::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
+        Some(ClosestPoint::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
     }
 
     /// The obstacle's sharp points against the skin's triangles.
-    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Seen>) {
-        let tell = |(): &mut (), points: &[u32], out: &mut Vec<Seen>| {
+    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
+        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
-                let region = swept::wider(&self.boxes[1][*point as usize], self.rules.reach);
-                tree.meeting(&region, &mut faces);
-                faces.retain(|face| !self.let_go.has_face(*face));
+                let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
+                tree.overlapping(&region, &mut faces);
+                faces.retain(|face| !self.released.has_face(*face));
                 if faces.is_empty() {
                     continue;
                 }
@@ -358,18 +358,18 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&self.obstacle.sharp_points, || (), tell, out);
+        collect_in_order(&self.obstacle.sharp_points, || (), find_in, out);
     }
 
     /// The skin's edges against the obstacle's sharp ones.
-    fn edges(&self, out: &mut Vec<Seen>) {
+    fn edges(&self, out: &mut Vec<FoundContact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let tell = |(): &mut (), edges: &[u32], out: &mut Vec<Seen>| {
+        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<FoundContact>| {
             let mut others = Vec::new();
-            for index in edges.iter().filter(|edge| !self.let_go.has_edge(**edge)) {
+            for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
-                tree.meeting(&swept::around(&edge.ends, self.boxes[0]), &mut others);
+                tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {
                     let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
                     if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
@@ -380,7 +380,7 @@ impl Meeting<'_> {
                 }
             }
         };
-        in_order(&indices, || (), tell, out);
+        collect_in_order(&indices, || (), find_in, out);
     }
 
     /// A contact of particles with points of the obstacle; none where it would only push into the ground.
@@ -390,8 +390,9 @@ impl Meeting<'_> {
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
-    ) -> Option<Seen> {
-        let touched = |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.place(*point) * *share).sum();
+    ) -> Option<FoundContact> {
+        let touched =
+            |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
         let (start, end): (DVec3, DVec3) = (touched(&self.still.start()), touched(&self.still.end()));
         let gap = self.rules.gap;
         let normal = self.scene.above_ground(normal, end, gap)?;
@@ -402,13 +403,13 @@ impl Meeting<'_> {
             offset: normal.dot(&end) - shift,
             gap,
             velocity: self.obstacle.velocity_of(self.query.times[1], points, shares).into(),
-            friction: self.obstacle.friction * self.scene.mask(&particles, &weights),
+            friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
         };
-        Some(Seen { contact, start: normal.dot(&start) })
+        Some(FoundContact { contact, start: normal.dot(&start) })
     }
 }
 
-impl Scene<'_> {
+impl CollisionScene<'_> {
     /// A normal that pushes nothing at `point` below the ground: along it where it would, none where nothing is left.
     fn above_ground(&self, normal: DVec3, point: DVec3, gap: f64) -> Option<DVec3> {
         /// Share of a normal that is left above the rounding of one straight down.

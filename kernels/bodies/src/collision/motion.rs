@@ -10,7 +10,7 @@ use numerics::vector::{DMat3, DVec3};
 
 /// Positions at a share of the frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pose {
+pub struct ObstaclePose {
     /// 0 the frame's start, 1 its end.
     pub share: f64,
     /// Metres.
@@ -20,12 +20,12 @@ pub struct Pose {
 /// Poses in time and how one becomes the next.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    poses: Vec<Pose>,
-    spans: Vec<Span>,
+    poses: Vec<ObstaclePose>,
+    intervals: Vec<PoseInterval>,
 }
 
 #[derive(Clone, Debug)]
-struct Span {
+struct PoseInterval {
     middles: [DVec3; 2],
     axis: DVec3,
     /// Radians.
@@ -36,14 +36,15 @@ struct Span {
 
 impl Motion {
     /// Of poses with rising shares and equally many finite points.
-    pub(super) fn new(poses: &[Pose]) -> Self {
-        let spans = poses.windows(2).map(|pair| Span::between(&pair[0].positions, &pair[1].positions)).collect();
-        Self { poses: poses.to_vec(), spans }
+    pub(super) fn new(poses: &[ObstaclePose]) -> Self {
+        let intervals =
+            poses.windows(2).map(|pair| PoseInterval::between(&pair[0].positions, &pair[1].positions)).collect();
+        Self { poses: poses.to_vec(), intervals }
     }
 
     /// The span that a share is in, the earlier of two, and how far along it is.
-    fn span(&self, share: f64) -> Option<(usize, f64)> {
-        let last = self.spans.len().checked_sub(1)?;
+    fn interval(&self, share: f64) -> Option<(usize, f64)> {
+        let last = self.intervals.len().checked_sub(1)?;
         let index = self.poses[1..].iter().position(|pose| share <= pose.share).unwrap_or(last);
         let (from, to) = (self.poses[index].share, self.poses[index + 1].share);
         Some((index, ((share - from) / (to - from)).clamp(0.0, 1.0)))
@@ -51,38 +52,39 @@ impl Motion {
 
     /// Where all points are.
     pub(super) fn at(&self, share: f64) -> Vec<[f64; 3]> {
-        match self.span(share) {
+        match self.interval(share) {
             None => self.poses[0].positions.clone(),
             Some((index, 0.0)) => self.poses[index].positions.clone(),
             Some((index, 1.0)) => self.poses[index + 1].positions.clone(),
             Some((index, along)) => {
-                let span = &self.spans[index];
-                if span.is_still() {
+                let interval = &self.intervals[index];
+                if interval.is_still() {
                     let ends = self.poses[index].positions.iter().zip(&self.poses[index + 1].positions);
                     return ends.map(|(a, b)| DVec3::from(*a).lerp(&DVec3::from(*b), along).into()).collect();
                 }
-                let middle = span.middles[0].lerp(&span.middles[1], along);
-                let (turn, back) = (span.turn(along), span.turn(1.0).transpose());
-                let point = |(a, b): (&[f64; 3], &[f64; 3])| (middle + turn * span.arm(&back, a, b, along)).into();
+                let middle = interval.middles[0].lerp(&interval.middles[1], along);
+                let (turn, back) = (interval.rotation(along), interval.rotation(1.0).transpose());
+                let point =
+                    |(a, b): (&[f64; 3], &[f64; 3])| (middle + turn * interval.offset(&back, a, b, along)).into();
                 self.poses[index].positions.iter().zip(&self.poses[index + 1].positions).map(point).collect()
             }
         }
     }
 
     /// How fast a point is, metres a frame; before the first pose and after the last it stands still.
-    pub(super) fn pace(&self, share: f64, point: u32) -> DVec3 {
+    pub(super) fn velocity_per_frame(&self, share: f64, point: u32) -> DVec3 {
         let (first, last) = (self.poses[0].share, self.poses[self.poses.len() - 1].share);
-        let Some((index, along)) = self.span(share).filter(|_| first <= share && share <= last) else {
+        let Some((index, along)) = self.interval(share).filter(|_| first <= share && share <= last) else {
             return DVec3::zeros();
         };
-        let span = &self.spans[index];
+        let interval = &self.intervals[index];
         let [from, to] = [index, index + 1].map(|pose| &self.poses[pose].positions[point as usize]);
-        let back = span.turn(1.0).transpose();
-        let turn = span.turn(along);
-        let left = back * (DVec3::from(*to) - span.middles[1]) - (DVec3::from(*from) - span.middles[0]);
-        let spun = span.axis.cross(&(turn * span.arm(&back, from, to, along))) * span.angle;
-        let way = span.middles[1] - span.middles[0] + spun + turn * left;
-        way / (self.poses[index + 1].share - self.poses[index].share)
+        let back = interval.rotation(1.0).transpose();
+        let turn = interval.rotation(along);
+        let left = back * (DVec3::from(*to) - interval.middles[1]) - (DVec3::from(*from) - interval.middles[0]);
+        let spun = interval.axis.cross(&(turn * interval.offset(&back, from, to, along))) * interval.angle;
+        let displacement = interval.middles[1] - interval.middles[0] + spun + turn * left;
+        displacement / (self.poses[index + 1].share - self.poses[index].share)
     }
 
     /// Shares from one of `times` to the other, between which no point leaves the straight line by more than `allowed`.
@@ -90,11 +92,11 @@ impl Motion {
         /// Pieces a span is cut into, at most.
         const MOST: f64 = 16.0;
         let mut out = vec![times[0]];
-        for (span, pair) in self.spans.iter().zip(self.poses.windows(2)) {
+        for (interval, pair) in self.intervals.iter().zip(self.poses.windows(2)) {
             let (from, to) = (pair[0].share.max(times[0]), pair[1].share.min(times[1]));
             if to > from {
-                let angle = span.angle * (to - from) / (pair[1].share - pair[0].share);
-                let sag = span.radius * angle * angle / 8.0;
+                let angle = interval.angle * (to - from) / (pair[1].share - pair[0].share);
+                let sag = interval.radius * angle * angle / 8.0;
                 let pieces = if sag > 0.0 { (sag / allowed).sqrt().ceil().clamp(1.0, MOST) } else { 1.0 };
                 out.extend((1..=pieces as u32).map(|piece| from + (to - from) * (f64::from(piece) / pieces)));
             }
@@ -109,7 +111,7 @@ impl Motion {
     }
 }
 
-impl Span {
+impl PoseInterval {
     fn between(from: &[[f64; 3]], to: &[[f64; 3]]) -> Self {
         let mean =
             |points: &[[f64; 3]]| points.iter().map(|p| DVec3::from(*p)).sum::<DVec3>() / (points.len().max(1) as f64);
@@ -118,7 +120,7 @@ impl Span {
         for (a, b) in from.iter().zip(to) {
             spread += (DVec3::from(*a) - middles[0]) * (DVec3::from(*b) - middles[1]).transpose();
         }
-        let [w, x, y, z] = fit(&spread);
+        let [w, x, y, z] = best_rotation(&spread);
         let (axis, length) = (DVec3::new(x, y, z), DVec3::new(x, y, z).norm());
         let angle = 2.0 * libm::atan2(length, w.abs());
         if angle <= 1e-15 {
@@ -134,21 +136,21 @@ impl Span {
     }
 
     /// The turn after a share of the span (Rodrigues).
-    fn turn(&self, along: f64) -> DMat3 {
+    fn rotation(&self, along: f64) -> DMat3 {
         let (sine, cosine) = libm::sincos(self.angle * along);
         let cross = self.axis.cross_matrix();
         DMat3::identity() + cross * sine + cross * cross * (1.0 - cosine)
     }
 
     /// A point about the middle, not turned yet.
-    fn arm(&self, back: &DMat3, from: &[f64; 3], to: &[f64; 3], along: f64) -> DVec3 {
+    fn offset(&self, back: &DMat3, from: &[f64; 3], to: &[f64; 3], along: f64) -> DVec3 {
         (DVec3::from(*from) - self.middles[0]).lerp(&(back * (DVec3::from(*to) - self.middles[1])), along)
     }
 }
 
 /// The quaternion (cosine first) of the rotation that brings the first points of a spread Σ a bᵀ nearest to the second:
 /// the first eigenvector of Horn's matrix, by Jacobi's rotations; no turn where every one does as well.
-fn fit(spread: &DMat3) -> [f64; 4] {
+fn best_rotation(spread: &DMat3) -> [f64; 4] {
     /// Share of the spread by which no turn is preferred: above rounding of what has no width.
     const CALM: f64 = 1e-13;
     /// Sweeps; each squares what is off the diagonal.

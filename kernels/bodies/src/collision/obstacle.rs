@@ -1,8 +1,8 @@
 //! What bodies touch that they do not move: animated meshes, and the ground.
 
-use super::TouchError;
-use super::motion::{Motion, Pose};
-use super::surface::{Moment, NONE, Surface};
+use super::CollisionError;
+use super::motion::{Motion, ObstaclePose};
+use super::surface::{Moment, NONE, TriangleSurface};
 use super::swept::Elements;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
@@ -10,7 +10,7 @@ use numerics::vector::{DVec3, Vec3};
 /// A mesh that moves through the frame as its poses say, as rigidly as they allow.
 #[derive(Clone, Debug)]
 pub struct Obstacle {
-    pub(super) surface: Surface,
+    pub(super) surface: TriangleSurface,
     pub(super) motion: Motion,
     /// Boxes of triangles, of sharp edges, and which edges those are.
     pub(super) faces: Elements<3>,
@@ -36,26 +36,26 @@ impl Obstacle {
     /// Where there is no pose, a triangle names no point, or a number is not finite or below 0.
     pub fn new(
         triangles: &[[u32; 3]],
-        poses: &[Pose],
+        poses: &[ObstaclePose],
         seconds: f64,
         thickness: f64,
         friction: f64,
-    ) -> Result<Self, TouchError> {
-        let points = poses.first().ok_or(TouchError::NoPose)?.positions.len();
+    ) -> Result<Self, CollisionError> {
+        let points = poses.first().ok_or(CollisionError::NoPose)?.positions.len();
         check_triangles(points, triangles)?;
         for (index, pose) in poses.iter().enumerate() {
             if pose.positions.len() != points {
-                return Err(TouchError::Points { index, count: pose.positions.len(), expected: points });
+                return Err(CollisionError::Points { index, count: pose.positions.len(), expected: points });
             }
             if !pose.share.is_finite() || (index > 0 && pose.share <= poses[index - 1].share) {
-                return Err(TouchError::Share { index, share: pose.share });
+                return Err(CollisionError::Share { index, share: pose.share });
             }
             check_points(&pose.positions)?;
         }
         for (what, value) in [("seconds", seconds), ("thickness", thickness), ("friction", friction)] {
             check_number(what, value)?;
         }
-        let surface = Surface::new(points, triangles);
+        let surface = TriangleSurface::new(points, triangles);
         let first = &poses[0].positions[..];
         let flat = |index: u32| poses.iter().all(|pose| is_flat(&surface, &Moment::of(&pose.positions), index));
         let sharp_edges: Vec<u32> = (0..surface.edges.len() as u32).filter(|index| !flat(*index)).collect();
@@ -102,7 +102,8 @@ impl Obstacle {
             return DVec3::zeros();
         }
         let sides = points.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
-        sides.map(|(point, weight)| self.motion.pace(share, *point) * *weight).sum::<DVec3>() / self.seconds
+        sides.map(|(point, weight)| self.motion.velocity_per_frame(share, *point) * *weight).sum::<DVec3>()
+            / self.seconds
     }
 }
 
@@ -123,26 +124,26 @@ pub(super) fn narrow(pose: &[[f64; 3]]) -> Vec<Vec3> {
     pose.iter().map(|p| p.map(|x| x as f32)).collect()
 }
 
-pub(super) fn check_triangles(points: usize, triangles: &[[u32; 3]]) -> Result<(), TouchError> {
+pub(super) fn check_triangles(points: usize, triangles: &[[u32; 3]]) -> Result<(), CollisionError> {
     match triangles.iter().position(|corners| corners.iter().any(|corner| *corner as usize >= points)) {
-        Some(index) => Err(TouchError::Triangle { index, corners: triangles[index], count: points }),
+        Some(index) => Err(CollisionError::Triangle { index, corners: triangles[index], count: points }),
         None => Ok(()),
     }
 }
 
-pub(super) fn check_points(points: &[[f64; 3]]) -> Result<(), TouchError> {
+pub(super) fn check_points(points: &[[f64; 3]]) -> Result<(), CollisionError> {
     match points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
-        Some(index) => Err(TouchError::Point(index)),
+        Some(index) => Err(CollisionError::Point(index)),
         None => Ok(()),
     }
 }
 
-pub(super) fn check_number(what: &'static str, value: f64) -> Result<(), TouchError> {
-    if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(TouchError::Number { what, value }) }
+pub(super) fn check_number(what: &'static str, value: f64) -> Result<(), CollisionError> {
+    if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(CollisionError::Number { what, value }) }
 }
 
 /// Whether the two triangles of an edge are one plane.
-fn is_flat(surface: &Surface, at: &Moment<'_>, edge: u32) -> bool {
+fn is_flat(surface: &TriangleSurface, at: &Moment<'_>, edge: u32) -> bool {
     /// 1 − cosine of the bend: 5e-5 of a radian, above the rounding of f32 meshes, below any bend that is meant.
     const BEND: f64 = 1e-9;
     let faces = surface.edges[edge as usize].faces;

@@ -1,17 +1,17 @@
 //! Skins against each other and against themselves.
 
+use super::body_skin::BodySkin;
 use super::edge;
-use super::skin::Skin;
 use super::swept::{self, BoxTree};
-use super::vertex::{self, Moving, Rules};
-use super::{REACH, Scene, Seen, in_order};
-use crate::mass_spring::{Contact, Query};
+use super::vertex::{self, ContactRules, MovingSurface};
+use super::{CollisionScene, FoundContact, REACH, collect_in_order};
+use crate::mass_spring::{Contact, ContactQuery};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
 
 /// How surfaces of bodies touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rub {
+pub struct ContactParams {
     /// Distance kept, metres.
     pub thickness: f64,
     /// Coulomb's μ.
@@ -23,15 +23,15 @@ const JOINED: f64 = 1e-6;
 
 /// Two skins, or one twice, on their way.
 struct Pair<'a> {
-    scene: &'a Scene<'a>,
-    query: &'a Query<'a>,
+    scene: &'a CollisionScene<'a>,
+    query: &'a ContactQuery<'a>,
     /// Boxes of particles on their way.
     points: &'a [Cuboid],
-    skins: [&'a Skin; 2],
+    skins: [&'a BodySkin; 2],
     /// Whether both are one.
-    own: bool,
-    rub: Rub,
-    rules: Rules,
+    self_contact: bool,
+    params: ContactParams,
+    rules: ContactRules,
 }
 
 /// Which particles are around some: those with the number of the last that asked.
@@ -42,7 +42,7 @@ struct Marks {
 }
 
 impl Marks {
-    fn put(&mut self, skin: &Skin, particles: &[u32]) {
+    fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
         if self.of.is_empty() || self.last == u32::MAX {
             self.of = vec![0; skin.particles()];
             self.last = 0;
@@ -64,37 +64,37 @@ struct Boxes<'a> {
     edges: BoxTree<'a>,
 }
 
-impl Scene<'_> {
+impl CollisionScene<'_> {
     /// All pairs of skins, then each with itself.
-    pub(super) fn pairs(&self, query: &Query<'_>, points: &[Cuboid], out: &mut Vec<Seen>) {
+    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<FoundContact>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let faces = self.skins.iter().map(|skin| skin.faces.sweep(points, reach));
             faces.zip(self.skins).map(|(faces, skin)| Boxes { faces, edges: skin.edges.sweep(points, reach) }).collect()
         };
-        let pair = |skins: [usize; 2], own: bool, rub: Rub| Pair {
+        let pair = |skins: [usize; 2], self_contact: bool, params: ContactParams| Pair {
             scene: self,
             query,
             points,
             skins: skins.map(|skin| &self.skins[skin]),
-            own,
-            rub,
-            rules: Rules { gap: rub.thickness, reach: REACH * rub.thickness, push: !own },
+            self_contact,
+            params,
+            rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
         };
-        if let Some(rub) = self.between.filter(|_| self.skins.len() > 1) {
-            let boxes = boxes(REACH * rub.thickness);
+        if let Some(params) = self.body_contact.filter(|_| self.skins.len() > 1) {
+            let boxes = boxes(REACH * params.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
-                    if swept::meet(&boxes[first].faces.bounds, &boxes[second].faces.bounds) {
-                        pair([first, second], false, rub).vertices(&boxes[second], out);
-                        pair([second, first], false, rub).vertices(&boxes[first], out);
-                        pair([first, second], false, rub).edges(&boxes[second], out);
+                    if swept::overlap(&boxes[first].faces.bounds, &boxes[second].faces.bounds) {
+                        pair([first, second], false, params).vertices(&boxes[second], out);
+                        pair([second, first], false, params).vertices(&boxes[first], out);
+                        pair([first, second], false, params).edges(&boxes[second], out);
                     }
                 }
             }
         }
-        if let Some(rub) = self.own {
-            for (skin, boxes) in boxes(REACH * rub.thickness).iter().enumerate() {
-                let pair = pair([skin, skin], true, rub);
+        if let Some(params) = self.self_contact {
+            for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
+                let pair = pair([skin, skin], true, params);
                 pair.vertices(boxes, out);
                 pair.edges(boxes, out);
             }
@@ -104,15 +104,15 @@ impl Scene<'_> {
 
 impl Pair<'_> {
     /// The first skin's vertices against the second's triangles.
-    fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<Seen>) {
-        let ways = [self.query.from, self.query.to];
+    fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+        let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
-        let on = Moving { surface: &second.surface, poses: &ways };
-        let tell = |marks: &mut Marks, vertices: &[u32], out: &mut Vec<Seen>| {
+        let on = MovingSurface { surface: &second.surface, poses: &poses };
+        let find_in = |marks: &mut Marks, vertices: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
             for vertex in vertices {
-                boxes.faces.meeting(&self.points[*vertex as usize], &mut faces);
-                if self.own {
+                boxes.faces.overlapping(&self.points[*vertex as usize], &mut faces);
+                if self.self_contact {
                     marks.put(first, &[*vertex]);
                     faces.retain(|face| !marks.have(&first.surface.triangles[*face as usize]));
                 }
@@ -120,7 +120,7 @@ impl Pair<'_> {
                     continue;
                 }
                 hits.clear();
-                let path = ways.map(|way| DVec3::from(way[*vertex as usize]));
+                let path = poses.map(|pose| DVec3::from(pose[*vertex as usize]));
                 vertex::hits(&path, &on, &faces, || None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
@@ -130,21 +130,21 @@ impl Pair<'_> {
                 }
             }
         };
-        in_order(&first.surface.vertices, Marks::default, tell, out);
+        collect_in_order(&first.surface.vertices, Marks::default, find_in, out);
     }
 
     /// The first skin's edges against the second's.
-    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<Seen>) {
-        let ways = [self.query.from, self.query.to];
+    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+        let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
-        let [one, two] = [first, second].map(|skin| Moving { surface: &skin.surface, poses: &ways });
+        let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let tell = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Seen>| {
+        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<FoundContact>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &first.surface.edges[*index as usize];
-                boxes.edges.meeting(&swept::around(&edge.ends, self.points), &mut others);
-                if self.own {
+                boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut others);
+                if self.self_contact {
                     marks.put(first, &edge.ends);
                     others.retain(|other| *other > *index && !marks.have(&first.surface.edges[*other as usize].ends));
                 }
@@ -159,16 +159,23 @@ impl Pair<'_> {
                 }
             }
         };
-        in_order(&indices, Marks::default, tell, out);
+        collect_in_order(&indices, Marks::default, find_in, out);
     }
 
     /// The gap of a pair: no more than how far it is apart `at_rest`, where both are of one body.
     fn gap(&self, at_rest: impl FnOnce() -> f64) -> f64 {
-        if self.own { self.rub.thickness.min(at_rest()) } else { self.rub.thickness }
+        if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
     }
 
-    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Seen> {
-        if gap < JOINED * self.rub.thickness {
+    fn contact(
+        &self,
+        particles: [u32; 4],
+        weights: [f64; 4],
+        normal: DVec3,
+        shift: f64,
+        gap: f64,
+    ) -> Option<FoundContact> {
+        if gap < JOINED * self.params.thickness {
             return None;
         }
         let contact = Contact {
@@ -178,8 +185,8 @@ impl Pair<'_> {
             offset: -shift,
             gap,
             velocity: [0.0; 3],
-            friction: self.rub.friction * self.scene.mask(&particles, &weights),
+            friction: self.params.friction * self.scene.friction_scale(&particles, &weights),
         };
-        Some(Seen { contact, start: 0.0 })
+        Some(FoundContact { contact, start: 0.0 })
     }
 }

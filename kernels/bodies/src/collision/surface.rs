@@ -3,7 +3,7 @@
 //! Positions are given at each call, so that one surface serves every pose. An edge with more than two triangles keeps
 //! the first two.
 
-use super::near::Nearest;
+use super::closest_point::ClosestPoint;
 use numerics::vector::DVec3;
 
 /// No triangle.
@@ -11,7 +11,7 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// Triangles and what joins them; a triangle that names a point twice has no part in it.
 #[derive(Clone, Debug)]
-pub(super) struct Surface {
+pub(super) struct TriangleSurface {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) edges: Vec<Edge>,
     /// The edges of each triangle, from its corner k to k + 1.
@@ -36,32 +36,32 @@ pub(super) struct Edge {
 }
 
 /// Positions of points, metres.
-pub(super) type Places<'a> = &'a [[f64; 3]];
+pub(super) type Positions<'a> = &'a [[f64; 3]];
 
 /// Positions somewhere on the straight way from one pose to another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moment<'a> {
-    pub(super) from: Places<'a>,
-    pub(super) to: Places<'a>,
+    pub(super) from: Positions<'a>,
+    pub(super) to: Positions<'a>,
     /// Of the way.
     pub(super) share: f64,
 }
 
 impl<'a> Moment<'a> {
     /// A pose itself.
-    pub(super) fn of(pose: Places<'a>) -> Self {
+    pub(super) fn of(pose: Positions<'a>) -> Self {
         Self { from: pose, to: pose, share: 1.0 }
     }
 
     /// Where a point is.
     #[inline(always)]
-    pub(super) fn place(&self, point: u32) -> DVec3 {
+    pub(super) fn position(&self, point: u32) -> DVec3 {
         let to = DVec3::from(self.to[point as usize]);
         if self.share >= 1.0 { to } else { DVec3::from(self.from[point as usize]).lerp(&to, self.share) }
     }
 }
 
-impl Surface {
+impl TriangleSurface {
     /// Of `triangles` of `points` points, all of which exist.
     pub(super) fn new(points: usize, triangles: &[[u32; 3]]) -> Self {
         let mut halves: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(3 * triangles.len());
@@ -126,7 +126,7 @@ impl Surface {
     #[inline]
     pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[face as usize];
-        [at.place(a), at.place(b), at.place(c)]
+        [at.position(a), at.position(b), at.position(c)]
     }
 
     /// Unit; none where there is no area.
@@ -146,7 +146,7 @@ impl Surface {
 
     /// Which way is out at a point of a triangle: the angle-weighted mean of the triangles there (Bærentzen & Aanæs
     /// 2005), so that its side is that of any point to which this one is the nearest.
-    pub(super) fn outward(&self, at: &Moment<'_>, nearest: &Nearest) -> DVec3 {
+    pub(super) fn outward(&self, at: &Moment<'_>, nearest: &ClosestPoint) -> DVec3 {
         let corners = self.triangles[nearest.face as usize];
         let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
         match nearest.feature() {
@@ -156,13 +156,13 @@ impl Surface {
                 None => DVec3::zeros(),
             },
             Feature::Corner(k) => {
-                let here = at.place(corners[k]);
+                let here = at.position(corners[k]);
                 let mut sum = DVec3::zeros();
                 for edge in self.edges_at(corners[k]) {
                     let other = if edge.ends[0] == corners[k] { edge.ends[1] } else { edge.ends[0] };
-                    let along = at.place(other) - here;
+                    let along = at.position(other) - here;
                     for (face, third) in edge.faces.into_iter().zip(edge.opposite).filter(|(face, _)| *face != NONE) {
-                        let side = at.place(third) - here;
+                        let side = at.position(third) - here;
                         sum += normal(face) * libm::atan2(along.cross(&side).norm(), along.dot(&side));
                     }
                 }
@@ -172,14 +172,14 @@ impl Surface {
     }
 
     /// Whether no triangle around is nearer than `nearest` to a point that is `away` from it.
-    pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &Nearest, away: &DVec3) -> bool {
+    pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &ClosestPoint, away: &DVec3) -> bool {
         /// Sine of the angle by which it may lie on a neighbour's side: above rounding, below any real one.
         const SLACK: f64 = 1e-9;
         let corners = self.triangles[nearest.face as usize];
         let length = away.norm();
         let behind = |to: u32| {
-            let way = at.place(to) - nearest.point;
-            away.dot(&way) <= SLACK * length * way.norm()
+            let direction = at.position(to) - nearest.point;
+            away.dot(&direction) <= SLACK * length * direction.norm()
         };
         match nearest.feature() {
             Feature::Inside => true,
@@ -195,7 +195,7 @@ impl Surface {
 
     /// Goes from triangle to triangle, over edges that bend little, to one that has `point` above or below it: the plane
     /// that is the surface for a point that slid on from where it came through.
-    pub(super) fn settle(&self, at: &Moment<'_>, face: u32, point: DVec3) -> Settled {
+    pub(super) fn walk_to(&self, at: &Moment<'_>, face: u32, point: DVec3) -> Settled {
         /// Triangles passed, at most.
         const MOST: usize = 64;
         /// Cosine of the angle at an edge beyond which the other triangle is another side.
@@ -204,7 +204,7 @@ impl Surface {
         let mut normal = self.normal(at, face);
         for _ in 0..MOST {
             let Some(here) = normal else { break };
-            let weights = super::near::projected(point, self.corners(at, face), here);
+            let weights = super::closest_point::projected(point, self.corners(at, face), here);
             let mut sides = [0, 1, 2];
             sides.sort_by(|a, b| weights[*a].total_cmp(&weights[*b]));
             let outside = sides.into_iter().filter(|k| weights[*k] < 0.0);
@@ -215,14 +215,14 @@ impl Surface {
             let Some((next, there)) = next else { break };
             (before, face, normal) = (face, next, Some(there));
         }
-        Settled { nearest: Nearest::on(face, point, self.corners(at, face)), normal }
+        Settled { nearest: ClosestPoint::on(face, point, self.corners(at, face)), normal }
     }
 }
 
 /// Where [`Surface::settle`] came to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Settled {
-    pub(super) nearest: Nearest,
+    pub(super) nearest: ClosestPoint,
     pub(super) normal: Option<DVec3>,
 }
 

@@ -1,6 +1,6 @@
 //! Boxes around what moves, in a tree sixteen wide, f32, rounded outwards: nothing that may meet is left out.
 
-use super::surface::Places;
+use super::surface::Positions;
 use numerics::lanes::{F32x16, LANES, set};
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
@@ -32,11 +32,11 @@ const NOWHERE: Cuboid = Cuboid { low: [f32::INFINITY; 3], high: [f32::NEG_INFINI
 
 impl<const N: usize> Elements<N> {
     /// Of elements that are about where they are in `pose`.
-    pub(super) fn new(points: Vec<[u32; N]>, pose: Places<'_>) -> Self {
+    pub(super) fn new(points: Vec<[u32; N]>, pose: Positions<'_>) -> Self {
         // A triangle without area from the lowest to the highest corner of each, sorted by the tree of triangles.
         let boxes: Vec<Cuboid> = pose.iter().map(box_of).collect();
         let corners: Vec<Vec3> =
-            points.iter().map(|element| around(element, &boxes)).flat_map(|own| [own.low, own.high]).collect();
+            points.iter().map(|element| bounds_of(element, &boxes)).flat_map(|own| [own.low, own.high]).collect();
         let members: Vec<[u32; 3]> = (0..points.len() as u32).map(|k| [2 * k, 2 * k + 1, 2 * k]).collect();
         let tree = TriangleTree::build(&corners, &members);
         Self { order: tree.blocks().iter().map(|block| block.triangle).collect(), points }
@@ -44,7 +44,7 @@ impl<const N: usize> Elements<N> {
 
     /// Their boxes around the boxes of their points, wider by `reach`.
     pub(super) fn sweep(&self, boxes: &[Cuboid], reach: f64) -> BoxTree<'_> {
-        let own = |element: u32| wider(&around(&self.points[element as usize], boxes), reach);
+        let own = |element: u32| inflated(&bounds_of(&self.points[element as usize], boxes), reach);
         let leaf =
             |lanes: &[u32; LANES]| row(lanes.iter().map(|lane| if *lane == NONE { NOWHERE } else { own(*lane) }));
         let mut levels: Vec<Vec<Boxes>> = vec![self.order.iter().map(leaf).collect()];
@@ -81,7 +81,7 @@ fn bounds(boxes: &Boxes) -> Cuboid {
 }
 
 /// The box of each point in all poses.
-pub(super) fn boxes(poses: &[Places<'_>]) -> Vec<Cuboid> {
+pub(super) fn swept_boxes(poses: &[Positions<'_>]) -> Vec<Cuboid> {
     let (first, others) = poses.split_first().map_or((&[][..], &[][..]), |(first, others)| (*first, others));
     let of = |point: usize| others.iter().fold(box_of(&first[point]), |own, pose| join(&own, &box_of(&pose[point])));
     (0..first.len()).into_par_iter().with_min_len(1024).map(of).collect()
@@ -111,14 +111,14 @@ fn join(a: &Cuboid, b: &Cuboid) -> Cuboid {
 
 /// The box around the boxes of some points.
 #[inline]
-pub(super) fn around(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
+pub(super) fn bounds_of(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
     let first = boxes[points[0] as usize];
     points[1..].iter().fold(first, |all, point| join(&all, &boxes[*point as usize]))
 }
 
 /// A box wider by `reach` on every side.
 #[inline]
-pub(super) fn wider(a: &Cuboid, reach: f64) -> Cuboid {
+pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
     let mut out = *a;
     for axis in 0..3 {
         out.low[axis] = below(f64::from(a.low[axis]) - reach);
@@ -134,15 +134,15 @@ fn below(x: f64) -> f32 {
 }
 
 /// Whether two boxes have a point in common.
-pub(super) fn meet(a: &Cuboid, b: &Cuboid) -> bool {
+pub(super) fn overlap(a: &Cuboid, b: &Cuboid) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
 impl BoxTree<'_> {
     /// Elements whose boxes meet `region`, rising.
-    pub(super) fn meeting(&self, region: &Cuboid, out: &mut Vec<u32>) {
+    pub(super) fn overlapping(&self, region: &Cuboid, out: &mut Vec<u32>) {
         out.clear();
-        if meet(region, &self.bounds) {
+        if overlap(region, &self.bounds) {
             gather(Path::chosen(), self, region, out);
             out.sort_unstable();
         }

@@ -3,9 +3,9 @@
 //! What counts is the side it came from. A closed surface is only ever entered from outside; an open one has two sides.
 //! After the first triangle it goes through, only that is what it meets: what else it was near to is judged there.
 
-use super::cross::{Apart, face_apart, sign_changes};
-use super::near::Nearest;
-use super::surface::{Moment, Places, Settled, Surface};
+use super::closest_point::ClosestPoint;
+use super::coplanarity::{Separation, face_separation, sign_changes};
+use super::surface::{Moment, Positions, Settled, TriangleSurface};
 use numerics::vector::DVec3;
 
 /// Share of the lengths involved within which a point is on a triangle's plane: above rounding.
@@ -15,12 +15,12 @@ const PUSH: f64 = 10.0;
 
 /// A surface on its way: its poses at a few times, straight between.
 #[derive(Clone, Copy)]
-pub(super) struct Moving<'a> {
-    pub(super) surface: &'a Surface,
-    pub(super) poses: &'a [Places<'a>],
+pub(super) struct MovingSurface<'a> {
+    pub(super) surface: &'a TriangleSurface,
+    pub(super) poses: &'a [Positions<'a>],
 }
 
-impl<'a> Moving<'a> {
+impl<'a> MovingSurface<'a> {
     pub(super) fn start(&self) -> Moment<'a> {
         Moment::of(self.poses[0])
     }
@@ -38,7 +38,7 @@ impl<'a> Moving<'a> {
 
 /// How far things count, and which sides there are.
 #[derive(Clone, Copy)]
-pub(super) struct Rules {
+pub(super) struct ContactRules {
     /// Distance kept.
     pub(super) gap: f64,
     /// What comes nearer counts.
@@ -65,16 +65,16 @@ pub(super) struct Hit {
 /// nearest triangle at the start where none of them is near then and the point may be inside.
 pub(super) fn hits(
     path: &[DVec3],
-    on: &Moving<'_>,
+    on: &MovingSurface<'_>,
     faces: &[u32],
-    sunk: impl FnOnce() -> Option<Nearest>,
-    rules: &Rules,
+    starts_inside: impl FnOnce() -> Option<ClosestPoint>,
+    rules: &ContactRules,
     out: &mut Vec<Hit>,
 ) {
     let first = out.len();
     let (surface, end) = (on.surface, path[path.len() - 1]);
     let plane = |face: u32, side: f64, shift: f64| {
-        let Settled { nearest, normal } = surface.settle(&on.end(), face, end);
+        let Settled { nearest, normal } = surface.walk_to(&on.end(), face, end);
         let normal = normal.or_else(|| surface.normal(&on.start(), face))? * side;
         let clearance = normal.dot(&(end - nearest.point)) + shift;
         Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })
@@ -84,9 +84,9 @@ pub(super) fn hits(
     let mut near: Vec<u32> = Vec::new();
     for face in faces {
         match crossing(path, on, *face, rules.reach) {
-            Way::Far => continue,
-            Way::Near => {}
-            Way::Through(time, above) => {
+            Approach::Far => continue,
+            Approach::Near => {}
+            Approach::Crosses(time, above) => {
                 through.push((*face, if above { 1.0 } else { -1.0 }));
                 met = met.min(time);
             }
@@ -95,9 +95,9 @@ pub(super) fn hits(
     }
     if surface.closed && rules.push {
         let start = on.start();
-        let each = near.iter().map(|face| Nearest::on(*face, path[0], surface.corners(&start, *face)));
+        let each = near.iter().map(|face| ClosestPoint::on(*face, path[0], surface.corners(&start, *face)));
         let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
-        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(sunk);
+        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(starts_inside);
         if let Some(nearest) = nearest.filter(|nearest| is_behind(surface, &start, nearest, path[0])) {
             out.extend(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
             return;
@@ -107,7 +107,7 @@ pub(super) fn hits(
     let at = on.moment(met);
     let here = point_at(path, met);
     for face in &near {
-        let nearest = Nearest::on(*face, here, surface.corners(&at, *face));
+        let nearest = ClosestPoint::on(*face, here, surface.corners(&at, *face));
         // What it goes through then is its contact already.
         let least = if !through.is_empty() { 1e-6 * rules.reach } else { 0.0 };
         if nearest.distance <= rules.reach && nearest.distance >= least {
@@ -116,7 +116,7 @@ pub(super) fn hits(
     }
     if out.len() == first {
         let passed = near.iter().filter(|face| approaches(path, on, **face, rules.reach));
-        let each = passed.map(|face| Nearest::on(*face, end, surface.corners(&on.end(), *face)));
+        let each = passed.map(|face| ClosestPoint::on(*face, end, surface.corners(&on.end(), *face)));
         let near = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
         if let Some(nearest) = near.filter(|nearest| !surface.closed || !is_behind(surface, &on.end(), nearest, end)) {
             let normal = (end - nearest.point).try_normalize(0.0).or_else(|| surface.normal(&on.end(), nearest.face));
@@ -139,53 +139,53 @@ fn point_at(path: &[DVec3], time: f64) -> DVec3 {
 }
 
 /// Whether a point is inside, seen from its nearest of a closed surface.
-fn is_behind(surface: &Surface, at: &Moment<'_>, nearest: &Nearest, point: DVec3) -> bool {
+fn is_behind(surface: &TriangleSurface, at: &Moment<'_>, nearest: &ClosestPoint, point: DVec3) -> bool {
     surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
 }
 
 /// What a point may do with a triangle on its way.
-enum Way {
+enum Approach {
     /// Does not come near.
     Far,
     /// May come near.
     Near,
     /// Goes through it then, first, from above or not; where closed, into it.
-    Through(f64, bool),
+    Crosses(f64, bool),
 }
 
-fn crossing(path: &[DVec3], on: &Moving<'_>, face: u32, reach: f64) -> Way {
+fn crossing(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> Approach {
     let [a, b, c] = on.surface.triangles[face as usize];
-    let ways = |pose: usize| {
+    let configuration = |pose: usize| {
         let at = |point: u32| DVec3::from(on.poses[pose][point as usize]);
         let origin = at(a);
         [at(b) - origin, at(c) - origin, path[pose] - origin]
     };
     let mut far = true;
-    let mut start = ways(0);
+    let mut start = configuration(0);
     for piece in 0..path.len() - 1 {
-        let end = ways(piece + 1);
-        let apart = face_apart(&start, &end, reach);
-        far &= apart == Apart::Far;
-        if apart == Apart::Unknown {
+        let end = configuration(piece + 1);
+        let apart = face_separation(&start, &end, reach);
+        far &= apart == Separation::Far;
+        if apart == Separation::Unknown {
             for (t, above) in sign_changes(&start, &end).iter().filter(|root| root.1 || !on.surface.closed) {
                 let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
                 let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());
-                if Nearest::on(face, p, [DVec3::zeros(), b, c]).distance <= ON * size {
-                    return Way::Through(piece as f64 + t, above);
+                if ClosestPoint::on(face, p, [DVec3::zeros(), b, c]).distance <= ON * size {
+                    return Approach::Crosses(piece as f64 + t, above);
                 }
             }
         }
         start = end;
     }
-    if far { Way::Far } else { Way::Near }
+    if far { Approach::Far } else { Approach::Near }
 }
 
 /// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
 fn close(
-    surface: &Surface,
+    surface: &TriangleSurface,
     at: &Moment<'_>,
     last: &Moment<'_>,
-    nearest: Nearest,
+    nearest: ClosestPoint,
     here: DVec3,
     end: DVec3,
 ) -> Option<Hit> {
@@ -215,18 +215,18 @@ fn close(
 
 /// Whether the point comes nearer than `reach` to a triangle: on by what is left of the way at their top speed, which
 /// leaps over nothing.
-fn approaches(path: &[DVec3], on: &Moving<'_>, face: u32, reach: f64) -> bool {
+fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> bool {
     /// Steps a piece; what is not decided by then counts.
     const MOST: usize = 64;
     for piece in 0..path.len() - 1 {
         let corners = |pose: usize| on.surface.corners(&Moment::of(on.poses[pose]), face);
         let (from, to) = (corners(piece), corners(piece + 1));
-        let way = path[piece + 1] - path[piece];
-        let speed = (0..3).map(|k| (way - (to[k] - from[k])).norm()).fold(0.0, f64::max);
+        let displacement = path[piece + 1] - path[piece];
+        let speed = (0..3).map(|k| (displacement - (to[k] - from[k])).norm()).fold(0.0, f64::max);
         let (mut time, mut decided) = (0.0, false);
         for _ in 0..MOST {
             let p = path[piece].lerp(&path[piece + 1], time);
-            let distance = Nearest::on(face, p, [0, 1, 2].map(|k| from[k].lerp(&to[k], time))).distance;
+            let distance = ClosestPoint::on(face, p, [0, 1, 2].map(|k| from[k].lerp(&to[k], time))).distance;
             if distance <= reach * (1.0 + 1e-6) {
                 return true;
             }

@@ -68,8 +68,8 @@ impl Equations {
     /// The matrix times `x`.
     pub(super) fn times(&self, x: &[DVec3], out: &mut [DVec3]) {
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
-            for (place, out) in out.iter_mut().enumerate() {
-                let row = chunk * CHUNK + place;
+            for (position, out) in out.iter_mut().enumerate() {
+                let row = chunk * CHUNK + position;
                 let mut sum = x[row] * self.diagonal[row];
                 for (other, weight) in &self.entries[self.starts[row] as usize..self.starts[row + 1] as usize] {
                     sum -= x[*other as usize] * *weight;

@@ -1,6 +1,6 @@
 //! The affine map that brings the held points of a piece nearest to where they belong.
 
-use super::{Held, Pieces, target};
+use super::{ConnectedPieces, HeldBody, target};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Of the trace of the held points' scatter: in directions thinner than this share's root, a fit follows the rest shape.
@@ -31,7 +31,7 @@ struct Sums {
 
 impl Affine {
     /// One a piece; none where nothing of it is held.
-    pub(super) fn of_pieces(held: &Held<'_>, pieces: &Pieces) -> Vec<Option<Self>> {
+    pub(super) fn of_pieces(held: &HeldBody<'_>, pieces: &ConnectedPieces) -> Vec<Option<Self>> {
         let mut sums = vec![Sums::default(); pieces.count];
         let held_points = || {
             let all = held.points.iter().enumerate();

@@ -21,10 +21,10 @@ use equations::Equations;
 use fit::Affine;
 use numerics::vector::{DVec3, to_f32, to_f64};
 use numerics::volume::{of_tets, six_volumes};
-use pieces::Pieces;
+use pieces::ConnectedPieces;
 use solve::solve;
 
-pub use solve::Limits;
+pub use solve::GoalLimits;
 
 /// Of the cube of a tet's longest edge, a sixth of it: what is flatter has no say in volumes, and no more weight than
 /// this gives it. The rounding of f32 moves a point by 1e-7 of a body, so by 1e-5 of an edge of one in a hundred.
@@ -32,7 +32,7 @@ pub const FLAT: f64 = 1e-6;
 
 /// A body at rest, and which of its points are held where.
 #[derive(Clone, Copy, Debug)]
-pub struct Held<'a> {
+pub struct HeldBody<'a> {
     /// Positions at rest.
     pub points: &'a [[f32; 3]],
     /// Four points each.
@@ -46,7 +46,7 @@ pub struct Held<'a> {
 /// The body in its goal shape, and what was reached.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Goal {
+pub struct GoalShape {
     /// One point for every one at rest.
     pub points: Vec<[f32; 3]>,
     /// Steps of conjugate gradients.
@@ -65,50 +65,50 @@ pub struct Goal {
 ///
 /// # Panics
 /// Where a tet has a corner that is no point, a point has no row, or a row is not of the shape.
-pub fn goal(held: &Held<'_>, limits: Limits) -> Goal {
-    let pieces = Pieces::of(held.points.len(), held.tets);
+pub fn goal_shape(held: &HeldBody<'_>, limits: GoalLimits) -> GoalShape {
+    let pieces = ConnectedPieces::of(held.points.len(), held.tets);
     let fits = Affine::of_pieces(held, &pieces);
     let mut loose = 0;
     // The affine part of each point's place; what is held differs from it by `held_by`.
-    let mut places: Vec<DVec3> = Vec::with_capacity(held.points.len());
+    let mut positions: Vec<DVec3> = Vec::with_capacity(held.points.len());
     let mut held_by: Vec<Option<DVec3>> = Vec::with_capacity(held.points.len());
     for (point, rest) in held.points.iter().enumerate() {
         let fit = &fits[pieces.of_point[point] as usize];
-        let place = fit.as_ref().map_or(to_f64(*rest), |fit| fit.map(*rest));
+        let position = fit.as_ref().map_or(to_f64(*rest), |fit| fit.map(*rest));
         let target = target(held, point);
         loose += usize::from(target.is_none() && fit.is_none());
         held_by.push(match target {
-            Some(target) => Some(to_f64(target) - place),
+            Some(target) => Some(to_f64(target) - position),
             // Nothing pulls where the surface rests, or nothing is held.
             None if fit.as_ref().is_none_or(Affine::rests) => Some(DVec3::zeros()),
             None => None,
         });
-        places.push(place);
+        positions.push(position);
     }
 
     let equations = Equations::of(held.points, held.tets, &held_by);
     let solved = solve(&equations, limits);
-    let mut points: Vec<[f32; 3]> = Vec::with_capacity(places.len());
-    for (point, place) in places.iter().enumerate() {
+    let mut points: Vec<[f32; 3]> = Vec::with_capacity(positions.len());
+    for (point, position) in positions.iter().enumerate() {
         points.push(match (target(held, point), equations.free[point]) {
             (Some(target), _) => target,
-            (None, None) => to_f32(*place),
-            (None, Some(row)) => to_f32(place + solved.rows[row as usize]),
+            (None, None) => to_f32(*position),
+            (None, Some(row)) => to_f32(position + solved.rows[row as usize]),
         });
     }
     let rest_volume = of_tets(held.points, held.tets);
     let volume_ratio = (rest_volume != 0.0).then(|| of_tets(&points, held.tets) / rest_volume);
     let inverted = inverted(held, &points);
-    Goal { points, steps: solved.steps, residual: solved.residual, inverted, loose, volume_ratio }
+    GoalShape { points, steps: solved.steps, residual: solved.residual, inverted, loose, volume_ratio }
 }
 
 /// Where a point is held.
-fn target(held: &Held<'_>, point: usize) -> Option<[f32; 3]> {
+fn target(held: &HeldBody<'_>, point: usize) -> Option<[f32; 3]> {
     usize::try_from(held.rows[point]).ok().map(|row| held.shape[row])
 }
 
 /// Tets that were upright at rest and are not in `points`.
-fn inverted(held: &Held<'_>, points: &[[f32; 3]]) -> usize {
+fn inverted(held: &HeldBody<'_>, points: &[[f32; 3]]) -> usize {
     let corners = |points: &[[f32; 3]], tet: &[u32; 4]| tet.map(|corner| points[corner as usize]);
     let upright = |tet: &&[u32; 4]| {
         let corners = corners(held.points, tet);

@@ -1,13 +1,13 @@
 //! Which points of a body hang together.
 
 /// Pieces of a body, numbered by their first points.
-pub(super) struct Pieces {
+pub(super) struct ConnectedPieces {
     pub(super) count: usize,
     /// The piece of each point; a point in no tet is one by itself.
     pub(super) of_point: Vec<u32>,
 }
 
-impl Pieces {
+impl ConnectedPieces {
     pub(super) fn of(points: usize, tets: &[[u32; 4]]) -> Self {
         // A point's entry leads to a point before it in its piece, and that of the first to itself.
         let mut towards: Vec<u32> = (0..points as u32).collect();
@@ -45,7 +45,7 @@ mod tests {
     #[test]
     fn pieces_are_numbered_by_their_first_points_whatever_the_order_of_tets() {
         for tets in [[[9, 3, 5, 7], [0, 8, 2, 4], [7, 1, 3, 5]], [[7, 1, 3, 5], [4, 2, 8, 0], [5, 9, 7, 3]]] {
-            let pieces = Pieces::of(10, &tets);
+            let pieces = ConnectedPieces::of(10, &tets);
             assert_eq!((pieces.count, pieces.of_point), (3, vec![0, 1, 0, 1, 0, 1, 2, 1, 0, 1]));
         }
     }

@@ -6,14 +6,14 @@ use rayon::prelude::*;
 
 /// When a solve may stop, and when it must.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct GoalLimits {
     /// Share of the forces that may be left.
     pub relative: f64,
     /// Most steps.
     pub steps: usize,
 }
 
-impl Default for Limits {
+impl Default for GoalLimits {
     /// Below the rounding of f32 for any body: what is left of a place is at most the condition (1e5 for a body a hundred
     /// points across) times this.
     fn default() -> Self {
@@ -31,7 +31,7 @@ pub(super) struct Solved {
 
 /// Finds the rows whose forces among each other hold those from outside. Each coordinate takes its own step, as if it were
 /// solved alone.
-pub(super) fn solve(equations: &Equations, limits: Limits) -> Solved {
+pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
     let count = equations.forces.len();
     let inverse: Vec<f64> = equations.diagonal.iter().map(|d| if *d > 0.0 { 1.0 / d } else { 0.0 }).collect();
     let mut rows = vec![DVec3::zeros(); count];

@@ -1,5 +1,5 @@
 use super::*;
-use crate::tets::{Closed, Fill, Surface};
+use crate::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use numerics::random::Key;
 use numerics::shapes::{self, Polygons};
 
@@ -15,8 +15,10 @@ impl Body {
         let mut starts = vec![0];
         shape.counts.iter().for_each(|count| starts.push(starts[starts.len() - 1] + count));
         let points: Vec<_> = shape.points.iter().map(|p| p.map(|x| x as f32)).collect();
-        let closed = Closed::of(&Surface { starts: &starts, corners: &shape.corners, points: &points }, false).unwrap();
-        let solid = closed.fill(&Fill { spacing, interior: true }).unwrap();
+        let closed =
+            ClosedSurface::of(&PolygonSurface { starts: &starts, corners: &shape.corners, points: &points }, false)
+                .unwrap();
+        let solid = closed.fill(&FillSettings { spacing, interior: true }).unwrap();
         let skin = points.len();
         let rows = (0..solid.points.len()).map(|k| if k < skin { k as i32 } else { -1 }).collect();
         Self { points: solid.points, tets: solid.tets, rows }
@@ -50,16 +52,16 @@ impl Body {
         self.points[..self.skin()].iter().map(|p| map(p.map(f64::from)).map(|x| x as f32)).collect()
     }
 
-    fn goal(&self, shape: &[[f32; 3]]) -> Goal {
-        self.within(shape, Limits::default())
+    fn goal(&self, shape: &[[f32; 3]]) -> GoalShape {
+        self.within(shape, GoalLimits::default())
     }
 
-    fn within(&self, shape: &[[f32; 3]], limits: Limits) -> Goal {
-        goal(&Held { points: &self.points, tets: &self.tets, rows: &self.rows, shape }, limits)
+    fn within(&self, shape: &[[f32; 3]], limits: GoalLimits) -> GoalShape {
+        goal_shape(&HeldBody { points: &self.points, tets: &self.tets, rows: &self.rows, shape }, limits)
     }
 
     /// Farthest that a point lies from where a map brings it.
-    fn away(&self, goal: &Goal, map: impl Fn([f64; 3]) -> [f64; 3]) -> f64 {
+    fn away(&self, goal: &GoalShape, map: impl Fn([f64; 3]) -> [f64; 3]) -> f64 {
         let mut most = 0.0_f64;
         for (rest, point) in self.points.iter().zip(&goal.points) {
             let at = map(rest.map(f64::from));
@@ -114,7 +116,7 @@ fn the_equations_alone_have_linear_precision() {
         let at = |point: usize| DVec3::from(sheared(body.points[point].map(f64::from)));
         let held: Vec<_> = (0..body.points.len()).map(|point| (body.rows[point] >= 0).then(|| at(point))).collect();
         let equations = Equations::of(&body.points, &body.tets, &held);
-        let solved = solve(&equations, Limits::default());
+        let solved = solve(&equations, GoalLimits::default());
         assert!(solved.residual <= 1e-9);
         for point in body.skin()..body.points.len() {
             let found = solved.rows[equations.free[point].unwrap() as usize];
@@ -182,7 +184,7 @@ fn what_is_held_nowhere_stays_and_is_counted() {
 fn spent_steps_are_said() {
     let body = Body::ball(6);
     let shape = body.shape(|[x, y, z]| [x + y * y, y, z]);
-    let short = body.within(&shape, Limits { relative: 1e-10, steps: 2 });
+    let short = body.within(&shape, GoalLimits { relative: 1e-10, steps: 2 });
     assert_eq!(short.steps, 2);
     assert!(short.residual > 1e-6 && short.residual < 1.0);
     let whole = body.goal(&shape);

@@ -7,11 +7,11 @@
 //! for their stiffness; particles without mass get [`LIGHTEST`]; a tetrahedron whose corners turn the other way at rest
 //! is taken as its mirror image, a flat one has no volume to keep. Metres, seconds, kilograms.
 
-use super::edges::{EDGES, edges, neighbours_of_missing};
-use super::hanging::Hanging;
-use super::order::Order;
-use super::parts::Parts;
+use super::adjacency::Adjacency;
+use super::particle_order::Order;
+use super::partition::Partition;
 use super::regions::Regions;
+use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use numerics::masked::Masked;
 use numerics::vector::DVec3;
 
@@ -56,7 +56,7 @@ pub struct Material<'a> {
 
 /// A spring given as such, between particles of one body or two.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spring {
+pub struct BodySpring {
     /// The particles it joins.
     pub ends: [u32; 2],
     /// k, N/m.
@@ -102,7 +102,7 @@ pub enum BodyError {
 
 /// Particles, springs and tetrahedra, and the order in which the solver keeps them.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct SoftBody {
     pub(super) order: Order,
     /// Particles at rest, the solver's order.
     pub(super) rest: Vec<DVec3>,
@@ -113,7 +113,7 @@ pub struct Body {
     pub(super) damping: Vec<f64>,
     pub(super) lengths: Vec<f64>,
     /// The springs at each particle.
-    pub(super) hanging: Hanging,
+    pub(super) adjacency: Adjacency,
     /// Tetrahedra with a volume, corners by place, turning so that it is positive.
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) volumes: Vec<f64>,
@@ -121,15 +121,15 @@ pub struct Body {
     pub(super) moduli: Vec<f64>,
     pub(super) regions: Regions,
     /// Springs in fixed parts.
-    pub(super) spring_parts: Parts,
+    pub(super) spring_partition: Partition,
     /// Tetrahedra in fixed parts.
-    pub(super) tet_parts: Parts,
+    pub(super) tet_partition: Partition,
     /// All tetrahedra of the mesh by the caller's index, their six springs and volumes without sign.
-    given: Vec<Given>,
+    given: Vec<MeshTet>,
     /// Which tetrahedron of the mesh each of `tets` is.
     kept: Vec<u32>,
     /// Springs that the mesh has; the rest were given as such.
-    meshed: usize,
+    mesh_spring_count: usize,
     /// Springs whose k is a mean: missing edges, and the surface edges it is the mean of.
     means: Vec<Vec<u32>>,
     /// Longest side of the box of the points at rest, metres.
@@ -139,18 +139,18 @@ pub struct Body {
 }
 
 #[derive(Clone, Debug)]
-struct Given {
+struct MeshTet {
     corners: [u32; 4],
     springs: [u32; 6],
     volume: f64,
 }
 
-impl Body {
+impl SoftBody {
     /// A body of `material` with the shape of `mesh`, and `joints`: springs of their own, between its parts.
     ///
     /// # Errors
     /// Where a number is not finite, a particle does not exist, or nothing has a mass.
-    pub fn new(mesh: &Mesh<'_>, material: &Material<'_>, joints: &[Spring]) -> Result<Self, BodyError> {
+    pub fn new(mesh: &Mesh<'_>, material: &Material<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::shaped(mesh, joints)?;
         body.set_material(material)?;
         Ok(body)
@@ -160,7 +160,7 @@ impl Body {
     ///
     /// # Errors
     /// As [`Body::new`].
-    pub fn of_springs(points: &[[f64; 3]], masses: &[f64], springs: &[Spring]) -> Result<Self, BodyError> {
+    pub fn of_springs(points: &[[f64; 3]], masses: &[f64], springs: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::shaped(&Mesh { points, ..Mesh::default() }, springs)?;
         let masses: Vec<f64> = masses.iter().copied().chain(std::iter::repeat(0.0)).take(points.len()).collect();
         body.set_masses(&masses)?;
@@ -179,7 +179,7 @@ impl Body {
 
     /// The particles that each spring joins, by the caller's index.
     pub fn springs(&self) -> Vec<[u32; 2]> {
-        self.ends.iter().map(|ends| ends.map(|end| self.order.callers[end as usize])).collect()
+        self.ends.iter().map(|ends| ends.map(|end| self.order.caller_of[end as usize])).collect()
     }
 
     /// Stiffness k of each spring, N/m.
@@ -194,23 +194,23 @@ impl Body {
 
     /// Where a particle is at rest, by the caller's index, metres.
     pub fn rest_point(&self, particle: usize) -> [f64; 3] {
-        self.rest[self.order.places[particle] as usize].into()
+        self.rest[self.order.index_of[particle] as usize].into()
     }
 
     /// How many springs the mesh has; those given as such come after them.
-    pub fn meshed(&self) -> usize {
-        self.meshed
+    pub fn mesh_spring_count(&self) -> usize {
+        self.mesh_spring_count
     }
 
     /// Mass of each particle, by the caller's index, kilograms.
     pub fn masses(&self) -> Vec<f64> {
-        self.order.places.iter().map(|place| self.mass[*place as usize]).collect()
+        self.order.index_of.iter().map(|particle| self.mass[*particle as usize]).collect()
     }
 
     /// The clusters of tetrahedra whose volume is kept as one: the triangles around each, facing outwards, by the caller's
     /// index.
     pub fn regions(&self) -> Vec<Vec<[u32; 3]>> {
-        let caller = |place: u32| self.order.callers[place as usize];
+        let caller = |particle: u32| self.order.caller_of[particle as usize];
         (0..self.regions.len())
             .map(|region| self.regions.around(region).map(|face| face.map(caller)).collect())
             .collect()
@@ -222,14 +222,14 @@ impl Body {
     }
 
     /// Where the particles of a piece are.
-    pub(super) fn places(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+    pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let clusters = &self.order.clusters;
         clusters.range(piece.start).start..clusters.range(piece.end - 1).end
     }
 
     /// Brings values a particle, by the caller's index, into the solver's order.
-    pub(super) fn inwards<T: Copy>(&self, values: &[T]) -> Vec<T> {
-        self.order.callers.iter().map(|caller| values[*caller as usize]).collect()
+    pub(super) fn to_solver_order<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        self.order.caller_of.iter().map(|caller| values[*caller as usize]).collect()
     }
 
     /// Changes masses and stiffnesses; shape and state stay.
@@ -238,23 +238,23 @@ impl Body {
     /// Where nothing has a mass, or a number is not finite.
     pub fn set_material(&mut self, material: &Material<'_>) -> Result<(), BodyError> {
         let mut masses = vec![0.0; self.len()];
-        let meshed = self.meshed;
-        let mut stored = vec![0.0; meshed];
+        let mesh_spring_count = self.mesh_spring_count;
+        let mut stored = vec![0.0; mesh_spring_count];
         for tet in &self.given {
             let quarter = 0.25 * tet.volume * mean_over(&material.density, tet.corners);
             let energy = tet.volume * mean_over(&material.stiffness, tet.corners);
             tet.corners.iter().for_each(|corner| masses[*corner as usize] += quarter);
             tet.springs.iter().for_each(|spring| stored[*spring as usize] += energy);
         }
-        let first = meshed - self.means.len();
+        let first = mesh_spring_count - self.means.len();
         for (spring, near) in (first..).zip(&self.means) {
             stored[spring] = near.iter().map(|edge| stored[*edge as usize]).sum::<f64>() / near.len().max(1) as f64;
         }
-        let shortest = SHORTEST * mean(&self.lengths[..meshed]);
-        for spring in 0..meshed {
+        let shortest = SHORTEST * mean(&self.lengths[..mesh_spring_count]);
+        for spring in 0..mesh_spring_count {
             let length = self.lengths[spring].max(shortest);
             let k = if length > 0.0 { stored[spring] / (length * length) } else { 0.0 };
-            let ends = self.ends[spring].map(|end| self.order.callers[end as usize]);
+            let ends = self.ends[spring].map(|end| self.order.caller_of[end as usize]);
             self.stiffness[spring] = stiffness(spring, k)?;
             self.damping[spring] = number("damping", spring, mean_over(&material.damping, ends) * k)?;
         }
@@ -274,13 +274,13 @@ impl Body {
             return Err(BodyError::NoMass);
         }
         let least = LIGHTEST * sum / masses.len() as f64;
-        self.mass = self.order.callers.iter().map(|caller| masses[*caller as usize]).collect();
+        self.mass = self.order.caller_of.iter().map(|caller| masses[*caller as usize]).collect();
         self.mass.iter_mut().filter(|mass| **mass <= 0.0).for_each(|mass| *mass = least);
         Ok(())
     }
 
     /// All but masses and the stiffnesses of the mesh's springs.
-    fn shaped(mesh: &Mesh<'_>, joints: &[Spring]) -> Result<Self, BodyError> {
+    fn shaped(mesh: &Mesh<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let count = mesh.points.len();
         let points: Vec<DVec3> = mesh.points.iter().map(|p| DVec3::from(*p)).collect();
         if let Some(index) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
@@ -298,41 +298,41 @@ impl Body {
         let (mut ends, tet_springs) = edges(mesh.tets);
         let means = neighbours_of_missing(mesh, &ends, &tet_springs);
         ends.extend(mesh.missing);
-        let meshed = ends.len();
+        let mesh_spring_count = ends.len();
         ends.extend(joints.iter().map(|spring| spring.ends));
         let order = Order::new(&points, ends.iter().copied());
 
         let length = |ends: &[u32; 2]| (points[ends[0] as usize] - points[ends[1] as usize]).norm();
         let lengths: Vec<f64> =
-            ends[..meshed].iter().map(length).chain(joints.iter().map(|spring| spring.length)).collect();
+            ends[..mesh_spring_count].iter().map(length).chain(joints.iter().map(|spring| spring.length)).collect();
         let spacing = mean(&lengths);
-        let given: Vec<Given> = mesh
+        let given: Vec<MeshTet> = mesh
             .tets
             .iter()
             .zip(tet_springs)
-            .map(|(corners, springs)| Given {
+            .map(|(corners, springs)| MeshTet {
                 corners: *corners,
                 springs,
                 volume: volume(corners.map(|corner| points[corner as usize])).abs(),
             })
             .collect();
-        let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.places[end as usize])).collect();
-        let rest: Vec<DVec3> = order.callers.iter().map(|caller| points[*caller as usize]).collect();
+        let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.index_of[end as usize])).collect();
+        let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
         let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
         let regions = Regions::new(&rest, &tets);
-        let zeros = std::iter::repeat_n(0.0, meshed);
+        let zeros = std::iter::repeat_n(0.0, mesh_spring_count);
         Ok(Self {
             stiffness: zeros.clone().chain(joints.iter().map(|spring| f64::from(spring.stiffness as f32))).collect(),
             damping: zeros.chain(joints.iter().map(|spring| spring.damping)).collect(),
-            spring_parts: Parts::even(ends.len(), 2048, 1),
-            tet_parts: Parts::even(tets.len(), 2048, 1),
+            spring_partition: Partition::even(ends.len(), 2048, 1),
+            tet_partition: Partition::even(tets.len(), 2048, 1),
             size: if count > 0 { (high - low).max() } else { 0.0 },
             mass: vec![1.0; count],
             moduli: vec![0.0; tets.len()],
-            hanging: Hanging::new(&order.clusters, &ends),
+            adjacency: Adjacency::new(&order.clusters, &ends),
             order,
             rest,
             ends,
@@ -343,7 +343,7 @@ impl Body {
             given,
             kept,
             means,
-            meshed,
+            mesh_spring_count,
             spacing,
         })
     }
@@ -382,7 +382,7 @@ fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &Order) -> (Vec<u32>, V
         let signed = volume(corners);
         let longest = EDGES.iter().map(|[a, b]| (corners[*a] - corners[*b]).norm()).fold(0.0, f64::max);
         let sliver = mesh.slivers.get(index).copied().unwrap_or(false);
-        let [a, b, c, d] = tet.map(|corner| order.places[corner as usize]);
+        let [a, b, c, d] = tet.map(|corner| order.index_of[corner as usize]);
         let turned = if signed < 0.0 { [a, c, b, d] } else { [a, b, c, d] };
         (!sliver && signed.abs() > FLAT * longest * longest * longest).then_some((index as u32, turned))
     };

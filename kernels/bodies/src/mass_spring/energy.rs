@@ -1,8 +1,8 @@
 //! The energies of a body, and its worst spring: what a frame reports and what its steps are watched by.
 
 use super::springs;
-use super::stage::{Setting, Work};
-use super::step::Moving;
+use super::stage::{FrameContext, StageSolver};
+use super::step::Kinematics;
 use numerics::vector::DVec3;
 
 /// Joules.
@@ -30,25 +30,31 @@ impl Energies {
 }
 
 /// At `time`, a share of the frame; `looked` where volumes were last measured there.
-pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Moving, looked: bool) -> Energies {
-    let (body, x, v) = (on.body, &moving.x, &moving.v);
+pub(super) fn measure(
+    solver: &mut StageSolver,
+    context: &FrameContext<'_>,
+    time: f64,
+    moving: &Kinematics,
+    looked: bool,
+) -> Energies {
+    let (body, x, v) = (context.body, &moving.x, &moving.v);
     if !looked {
-        work.volumes.measure(body, x);
+        solver.volumes.measure(body, x);
     }
-    let watched = &work.inventory.watched;
-    let thin: f64 = work.volumes.thin(body, x, on.volumes, watched).iter().map(|thin| thin.energy).sum();
-    let stored = work.volumes.stored;
-    let springs = body
-        .spring_parts
-        .sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &on.rest, x, at)).sum());
+    let watched = &solver.inventory.watched;
+    let thin: f64 = solver.volumes.thin_tets(body, x, context.volumes, watched).iter().map(|thin| thin.energy).sum();
+    let stored = solver.volumes.stored;
+    let springs = body.spring_partition.sum((), |part, ()| {
+        body.spring_partition.range(part).map(|at| springs::energy(body, &context.rest, x, at)).sum()
+    });
     let clusters = &body.order.clusters;
     let own = clusters.map((), |cluster, ()| {
-        clusters.range(cluster).fold([0.0; 3], |[kinetic, goals, height], place| {
-            let mass = body.mass[place];
+        clusters.range(cluster).fold([0.0; 3], |[kinetic, goals, height], particle| {
+            let mass = body.mass[particle];
             [
-                kinetic + 0.5 * mass * v[place].norm_squared(),
-                goals + mass * on.drive.goal_energy(place, time, x[place]),
-                height - mass * on.drive.gravity.dot(&x[place]),
+                kinetic + 0.5 * mass * v[particle].norm_squared(),
+                goals + mass * context.external.goal_energy(particle, time, x[particle]),
+                height - mass * context.external.gravity.dot(&x[particle]),
             ]
         })
     });
@@ -58,12 +64,14 @@ pub(super) fn measure(work: &mut Work, on: &Setting<'_>, time: f64, moving: &Mov
 }
 
 /// The largest length ÷ length at rest of a spring, or its reciprocal; of springs that have a length at rest.
-pub(super) fn worst_stretch(on: &Setting<'_>, x: &[DVec3]) -> f64 {
-    let body = on.body;
-    let worst = body.spring_parts.map((), |part, ()| {
-        let springs =
-            body.spring_parts.range(part).filter(|at| on.rest.holds(*at as u32) && on.rest.lengths[*at] > 0.0);
-        let stretch = springs.map(|at| springs::spring_length(body, x, at) / on.rest.lengths[at]);
+pub(super) fn worst_stretch(context: &FrameContext<'_>, x: &[DVec3]) -> f64 {
+    let body = context.body;
+    let worst = body.spring_partition.map((), |part, ()| {
+        let springs = body
+            .spring_partition
+            .range(part)
+            .filter(|at| context.rest.is_intact(*at as u32) && context.rest.lengths[*at] > 0.0);
+        let stretch = springs.map(|at| springs::spring_length(body, x, at) / context.rest.lengths[at]);
         stretch.map(|stretch| stretch.max(1.0 / stretch)).fold(1.0, f64::max)
     });
     worst.into_iter().fold(1.0, f64::max)

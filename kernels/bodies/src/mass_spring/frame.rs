@@ -1,13 +1,13 @@
 //! One frame of a body: what is asked for, what is reported, and how the steps of a frame are chosen.
 
-use super::body::Body;
-use super::contact::Contacts;
-use super::drive::{Drive, Goal, Pin};
+use super::body::SoftBody;
+use super::contact::ContactFinder;
 use super::energy::{Energies, measure};
-use super::springs::{self, Rest};
-use super::stage::{Setting, Work};
+use super::external::{ExternalForces, GoalSpring, Pin};
+use super::springs::{self, RestLengths};
+use super::stage::{FrameContext, StageSolver};
 use super::state::State;
-use super::step::{Moving, Stepped, Stepper};
+use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
 use numerics::vector::DVec3;
 
@@ -30,7 +30,7 @@ pub enum Integrator {
 
 /// What happens in a frame.
 #[derive(Clone, Copy)]
-pub struct Frame<'a> {
+pub struct SolverFrame<'a> {
     /// Its length, seconds; 0 does nothing.
     pub seconds: f64,
     /// m/s².
@@ -40,20 +40,20 @@ pub struct Frame<'a> {
     /// Share of lost volume that is fought, 0…1.
     pub volume: f64,
     /// Soft targets.
-    pub goals: &'a [Goal],
+    pub goals: &'a [GoalSpring],
     /// Hard ones.
     pub pins: &'a [Pin],
     /// Who finds contacts.
-    pub contacts: Option<&'a dyn Contacts>,
+    pub contacts: Option<&'a dyn ContactFinder>,
     /// How time is stepped through.
     pub integrator: Integrator,
     /// Steps in the frame; 0: one, or two halves and so on where it leaves contacts too deep or errors too large.
     pub substeps: u32,
     /// Whether it begins off balance: rest lengths jumped, say. Then it is stepped through with implicit Euler.
-    pub rough: bool,
+    pub force_implicit_euler: bool,
 }
 
-impl Default for Frame<'_> {
+impl Default for SolverFrame<'_> {
     fn default() -> Self {
         Self {
             seconds: 1.0 / 24.0,
@@ -65,7 +65,7 @@ impl Default for Frame<'_> {
             contacts: None,
             integrator: Integrator::Default,
             substeps: 0,
-            rough: false,
+            force_implicit_euler: false,
         }
     }
 }
@@ -73,7 +73,7 @@ impl Default for Frame<'_> {
 /// What a frame took, and where it left the body.
 #[must_use]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
+pub struct FrameReport {
     /// Newton iterations.
     pub newton: u32,
     /// Iterations of linear solves.
@@ -93,7 +93,7 @@ pub struct Report {
     /// In goals, joules.
     pub goal_energy: f64,
     /// Taken because a step would have made energy, joules.
-    pub energy_shed: f64,
+    pub energy_removed: f64,
     /// Volume ÷ volume at rest.
     pub volume_ratio: f64,
     /// The largest length ÷ length at rest of a spring, or its reciprocal.
@@ -114,23 +114,23 @@ pub struct Report {
 
 /// Steps a body through frames; what it remembers between them is memory to use again, and changes no bit.
 #[derive(Clone, Debug)]
-pub struct Solver {
-    work: Work,
+pub struct BodySolver {
+    solver: StageSolver,
 }
 
-impl Solver {
+impl BodySolver {
     /// For `body`, whose shape stays; its material may change.
-    pub fn new(body: &Body) -> Self {
-        Self { work: Work::new(body) }
+    pub fn new(body: &SoftBody) -> Self {
+        Self { solver: StageSolver::new(body) }
     }
 
     /// Moves `state` through a frame.
     ///
     /// # Panics
     /// Where `state` does not fit `body`, a goal or pin names no particle, or `body` has not the shape it was made for.
-    pub fn step(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
+    pub fn step(&mut self, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>) -> FrameReport {
         assert!(state.fits(body), "a state of another body");
-        if body.order.clusters.is_wide() {
+        if body.order.clusters.is_parallel() {
             // From within, a loop over parts costs no call from thread to thread to begin.
             rayon::scope(|_| self.step_here(body, state, frame))
         } else {
@@ -138,58 +138,59 @@ impl Solver {
         }
     }
 
-    fn step_here(&mut self, body: &Body, state: &mut State, frame: &Frame<'_>) -> Report {
+    fn step_here(&mut self, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>) -> FrameReport {
         let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
         let gravity = DVec3::from(frame.gravity);
-        let drive = Drive::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
+        let external = ExternalForces::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
         let lengths = state.rest_lengths();
-        let rest = Rest { lengths: &lengths, torn: &state.torn };
-        self.work.volumes = Volumes::new(body, frame.volume, &state.volumes);
-        self.work.system.regions.idle = self.work.volumes.is_off();
-        springs::firmness(body, &rest, &mut self.work.firmness);
-        self.work.system.set_alone(&self.work.firmness);
-        let setting = Setting { body, drive: &drive, rest, volumes: &state.volumes };
-        let vectors = |values: &[[f64; 3]]| body.inwards(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
+        let rest = RestLengths { lengths: &lengths, torn: &state.torn };
+        self.solver.volumes = Volumes::new(body, frame.volume, &state.volumes);
+        self.solver.system.regions.idle = self.solver.volumes.is_off();
+        springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
+        self.solver.system.set_isolated(&self.solver.particle_stiffness);
+        let context = FrameContext { body, external: &external, rest, volumes: &state.volumes };
+        let vectors =
+            |values: &[[f64; 3]]| body.to_solver_order(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
         let trend =
             if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![DVec3::zeros(); body.len()] };
         let mut loads = vec![0.0; body.len()];
-        for (place, load) in body.order.places.iter().zip(&state.loads) {
-            loads[*place as usize] = *load;
+        for (particle, load) in body.order.index_of.iter().zip(&state.loads) {
+            loads[*particle as usize] = *load;
         }
-        let mut moving = Moving { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
-        let mut report = Report::default();
-        self.work.inventory = Inventory::new(body, &moving.x, &state.volumes);
-        let mut energies = measure(&mut self.work, &setting, 0.0, &moving, false);
+        let mut moving = Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
+        let mut report = FrameReport::default();
+        self.solver.inventory = Inventory::new(body, &moving.x, &state.volumes);
+        let mut energies = measure(&mut self.solver, &context, 0.0, &moving, false);
         if seconds > 0.0 && !body.is_empty() {
             let mut stepper = Stepper {
-                work: &mut self.work,
-                setting,
+                solver: &mut self.solver,
+                context,
                 frame,
                 seconds,
                 warm: &mut state.warm,
-                unsettled: &mut state.unsettled,
-                reserve: &mut state.reserve,
+                euler_steps_left: &mut state.euler_steps_left,
+                energy_budget: &mut state.energy_budget,
             };
             run(&mut stepper, &mut moving, &mut energies, &mut report);
         }
-        (report.inverted_tets, report.volume_ratio) = (self.work.inventory.turned, self.work.inventory.ratio);
-        describe(&mut report, &setting, &energies, &moving);
+        (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
+        describe(&mut report, &context, &energies, &moving);
         state.trend.resize(body.len(), [0.0; 3]);
         state.loads.resize(body.len(), 0.0);
-        for (caller, place) in body.order.places.iter().enumerate() {
-            state.positions[caller] = moving.x[*place as usize].into();
-            state.velocities[caller] = moving.v[*place as usize].into();
-            state.trend[caller] = moving.trend[*place as usize].into();
-            state.loads[caller] = moving.loads[*place as usize];
+        for (caller, particle) in body.order.index_of.iter().enumerate() {
+            state.positions[caller] = moving.x[*particle as usize].into();
+            state.velocities[caller] = moving.v[*particle as usize].into();
+            state.trend[caller] = moving.trend[*particle as usize].into();
+            state.loads[caller] = moving.loads[*particle as usize];
         }
         report
     }
 }
 
 /// The steps of a frame.
-fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report) {
+fn run(stepper: &mut Stepper<'_>, moving: &mut Kinematics, energies: &mut Energies, report: &mut FrameReport) {
     let accurate = match stepper.frame.integrator {
-        Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.setting.body.size),
+        Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.context.body.size),
         Integrator::Default | Integrator::Euler => None,
     };
     if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
@@ -211,9 +212,9 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, 
 /// that makes them shallower than `deepest`, metres.
 fn halve(
     stepper: &mut Stepper<'_>,
-    moving: &mut Moving,
+    moving: &mut Kinematics,
     energies: &mut Energies,
-    report: &mut Report,
+    report: &mut FrameReport,
     times: [f64; 2],
     deepest: f64,
 ) {
@@ -223,7 +224,7 @@ fn halve(
     const SHORT: f64 = 1.0 / 16.0;
     /// Newton iterations of a frame after which what is unmet is left so: a frame ends.
     const MOST_NEWTON: u32 = 400;
-    let (start, reserve, unsettled) = (moving.clone(), *stepper.reserve, *stepper.unsettled);
+    let (start, energy_budget, euler_steps_left) = (moving.clone(), *stepper.energy_budget, *stepper.euler_steps_left);
     let stepped = stepper.step(moving, times, energies, None, false);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
@@ -236,8 +237,8 @@ fn halve(
     }
     add_work(report, &stepped);
     *moving = start;
-    (*stepper.reserve, *stepper.unsettled) = (reserve, unsettled);
-    stepper.look(moving);
+    (*stepper.energy_budget, *stepper.euler_steps_left) = (energy_budget, euler_steps_left);
+    stepper.refresh_inventory(moving);
     let middle = 0.5 * (times[0] + times[1]);
     for half in [[times[0], middle], [middle, times[1]]] {
         halve(stepper, moving, energies, report, half, stepped.solved.unmet);
@@ -245,7 +246,13 @@ fn halve(
 }
 
 /// Steps whose estimated error a second stays within `tolerance` metres a frame.
-fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies, report: &mut Report, tolerance: f64) {
+fn adapt(
+    stepper: &mut Stepper<'_>,
+    moving: &mut Kinematics,
+    energies: &mut Energies,
+    report: &mut FrameReport,
+    tolerance: f64,
+) {
     /// Most and least that a step is changed by, and what is kept in reserve.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
@@ -257,12 +264,12 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let (before, reserve) = (moving.clone(), *stepper.reserve);
+        let (before, energy_budget) = (moving.clone(), *stepper.energy_budget);
         let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
         // What begins off balance is calmed, not followed: its estimate says how far it jumped. At a contact it counts.
-        let close = stepped.estimate <= allowed || stepped.calmed || (stepped.euler && smallest);
+        let close = stepped.estimate <= allowed || stepped.damped || (stepped.euler && smallest);
         let fits = close && (stepped.solved.unmet <= 0.0 || smallest);
         // An estimate a second falls with the step where the method is of order 1, with its square where it is of order 2.
         let ratio = allowed / stepped.estimate;
@@ -277,38 +284,38 @@ fn adapt(stepper: &mut Stepper<'_>, moving: &mut Moving, energies: &mut Energies
         calm = !fits && smallest;
         if fits {
             add(report, &stepped);
-            report.caps_hit += u32::from(stepped.euler && !stepped.calmed && stepped.estimate > allowed);
+            report.caps_hit += u32::from(stepped.euler && !stepped.damped && stepped.estimate > allowed);
             *energies = stepped.after;
             time = end;
         } else {
             add_work(report, &stepped);
             *moving = before;
-            *stepper.reserve = reserve;
-            stepper.look(moving);
+            *stepper.energy_budget = energy_budget;
+            stepper.refresh_inventory(moving);
         }
     }
 }
 
 /// The work of a step whose result does not count.
-fn add_work(report: &mut Report, stepped: &Stepped) {
+fn add_work(report: &mut FrameReport, stepped: &Stepped) {
     report.newton += stepped.solved.newton;
     report.cg += stepped.solved.cg;
 }
 
-fn add(report: &mut Report, stepped: &Stepped) {
+fn add(report: &mut FrameReport, stepped: &Stepped) {
     add_work(report, stepped);
     report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
     report.residual = report.residual.max(stepped.solved.residual);
     report.error_estimate += stepped.estimate;
-    report.energy_shed += stepped.shed;
+    report.energy_removed += stepped.energy_removed;
     report.substeps += 1;
     report.euler_steps += u32::from(stepped.euler);
     report.stopped = report.stopped.max(stepped.stopped);
     (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
 }
 
-fn describe(report: &mut Report, on: &Setting<'_>, energies: &Energies, moving: &Moving) {
+fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, moving: &Kinematics) {
     (report.kinetic, report.elastic) = (energies.kinetic, energies.springs);
     (report.volume_energy, report.goal_energy) = (energies.volumes, energies.goals);
-    report.worst_stretch = super::energy::worst_stretch(on, &moving.x);
+    report.worst_stretch = super::energy::worst_stretch(context, &moving.x);
 }

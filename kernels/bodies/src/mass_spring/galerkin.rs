@@ -1,10 +1,10 @@
 //! The coarse matrix: what clusters' motions meet, Pᵀ·A·P, P the shift and turn of each cluster at its particles.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::cholesky::Lower;
 use super::coarse::{Anchors, Layout, MODES};
-use super::parts::Parts;
-use super::rows::{Rows, add_square};
+use super::partition::Partition;
+use super::rank_one::{RankOneTerms, add_square};
 use super::springs::Record;
 use super::system::System;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
@@ -13,9 +13,9 @@ use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 #[derive(Clone, Copy)]
 pub(super) struct Galerkin<'a> {
     pub(super) layout: &'a Layout,
-    pub(super) body: &'a Body,
+    pub(super) body: &'a SoftBody,
     pub(super) system: &'a System,
-    pub(super) arms: &'a [Vec3],
+    pub(super) offset_from_centroid: &'a [Vec3],
     /// What of their clusters' motions particles in contact follow.
     pub(super) anchors: &'a Anchors,
 }
@@ -25,52 +25,52 @@ impl Galerkin<'_> {
     pub(super) fn factor(&self) -> Lower {
         let (layout, system) = (self.layout, self.system);
         let mut first = layout.first.clone();
-        if !system.loose.is_empty() {
-            for row in 0..system.loose.len() {
-                layout.join(&mut first, system.loose.places(row));
+        if !system.transient.is_empty() {
+            for row in 0..system.transient.len() {
+                layout.join(&mut first, system.transient.particles(row));
             }
         }
         let begin = |row: usize| MODES * first[row / MODES] as usize;
         let mut matrix = Lower::zeros((0..layout.rows()).map(begin));
-        let bands = Parts::new(matrix.bands(MODES));
-        bands.each(matrix.values_mut(), |cluster, out: &mut [f64]| {
+        let bands = Partition::new(matrix.bands(MODES));
+        bands.for_each(matrix.values_mut(), |cluster, out: &mut [f64]| {
             write(&self.band(first[cluster] as usize, cluster), out);
         });
         self.add_rows(&system.regions, &mut matrix);
-        self.add_rows(&system.loose, &mut matrix);
+        self.add_rows(&system.transient, &mut matrix);
         matrix.factor();
         matrix
     }
 
     /// A cluster against those from `first` to itself: springs and what each particle resists alone.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
-        let Self { layout, body, system, arms, anchors } = self;
+        let Self { layout, body, system, offset_from_centroid, anchors } = self;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
-        for place in body.order.clusters.range(cluster) {
-            let [inside, across] = body.hanging.of(place, &system.records);
-            inside.iter().for_each(|record| self.add_inside(place, record, &mut blocks[last]));
-            if system.held[place] {
+        for particle in body.order.clusters.range(cluster) {
+            let [inside, across] = body.adjacency.of(particle, &system.records);
+            inside.iter().for_each(|record| self.add_inside(particle, record, &mut blocks[last]));
+            if system.held[particle] {
                 continue;
             }
-            let mine = to_f64(arms[place]);
-            let anchor = anchors.at(place);
+            let mine = to_f64(offset_from_centroid[particle]);
+            let anchor = anchors.at(particle);
             // What resists the particle itself.
-            let mut own = system.blocks.get(place).copied().unwrap_or_default();
-            let mut alike = system.inertia[place];
+            let mut own = system.blocks.get(particle).copied().unwrap_or_default();
+            let mut alike = system.inertia[particle];
             for record in across {
                 let (other, alpha, w) = (record.other as usize, f64::from(record.alpha), record.along());
                 alike += alpha;
                 add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
-                    let (block, far) = (&mut blocks[home - first], to_f64(arms[other]));
+                    let (block, far) = (&mut blocks[home - first], to_f64(offset_from_centroid[other]));
                     if anchor.is_none() && anchors.at(other).is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
                     } else {
                         for (scale, way) in ways(record) {
-                            block.add(-scale, &self.along(place, way), &self.along(other, way));
+                            block.add(-scale, &self.along(particle, way), &self.along(other, way));
                         }
                     }
                 }
@@ -89,12 +89,12 @@ impl Galerkin<'_> {
 
     /// A spring inside of a cluster that hangs at `place`.
     #[inline(always)]
-    fn add_inside(&self, place: usize, record: &Record, block: &mut Block) {
-        let ends = [place, record.other as usize];
+    fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
+        let ends = [particle, record.other as usize];
         let anchors = ends.map(|end| self.anchors.at(end));
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && anchors == [None; 2] {
-            let [here, there] = ends.map(|end| to_f64(self.arms[end]));
+            let [here, there] = ends.map(|end| to_f64(self.offset_from_centroid[end]));
             block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
@@ -107,22 +107,23 @@ impl Galerkin<'_> {
 
     /// How far the motions of a particle's cluster move it along `way`.
     #[inline(always)]
-    fn along(&self, place: usize, way: DVec3) -> [f64; MODES] {
-        let way = self.anchors.at(place).map_or(way, |follows| follows.tr_mul(&way));
-        let turned = to_f64(self.arms[place]).cross(&way);
+    fn along(&self, particle: usize, way: DVec3) -> [f64; MODES] {
+        let way = self.anchors.at(particle).map_or(way, |follows| follows.tr_mul(&way));
+        let turned = to_f64(self.offset_from_centroid[particle]).cross(&way);
         [way.x, way.y, way.z, turned.x, turned.y, turned.z]
     }
 
     /// What rows resist; between pieces that do not hang together it is left out.
-    fn add_rows(&self, rows: &Rows, matrix: &mut Lower) {
-        let Some(parts) = rows.parts() else { return };
-        let of_part = |part, ()| -> Vec<Vec<Push>> { parts.range(part).map(|row| self.pushes(rows, row)).collect() };
-        let each = parts.map((), of_part);
+    fn add_rows(&self, rows: &RankOneTerms, matrix: &mut Lower) {
+        let Some(partition) = rows.partition() else { return };
+        let of_part =
+            |part, ()| -> Vec<Vec<Push>> { partition.range(part).map(|row| self.predicted_loads(rows, row)).collect() };
+        let each = partition.map((), of_part);
         let piece = |push: &Push| self.layout.piece[push.cluster];
-        for pushes in each.iter().flatten() {
-            for near in pushes {
+        for predicted_loads in each.iter().flatten() {
+            for near in predicted_loads {
                 let to = |far: &&Push| far.cluster <= near.cluster && piece(far) == piece(near);
-                for far in pushes.iter().filter(to) {
+                for far in predicted_loads.iter().filter(to) {
                     for (i, push) in near.along.iter().enumerate() {
                         let count = if far.cluster == near.cluster { i + 1 } else { MODES };
                         for (j, other) in far.along[..count].iter().enumerate() {
@@ -136,24 +137,27 @@ impl Galerkin<'_> {
 
     /// How the motions of clusters change a row; none where it lies within one that moves as a whole, as rigid motions
     /// change no volume and no gap.
-    fn pushes(&self, rows: &Rows, row: usize) -> Vec<Push> {
+    fn predicted_loads(&self, rows: &RankOneTerms, row: usize) -> Vec<Push> {
         let Self { layout, system, anchors, .. } = self;
-        let mut pushes: Vec<Push> = Vec::new();
-        let home = |place: usize| layout.cluster[place] as usize;
-        let places = rows.places(row);
-        let free = |place: usize| !system.held[place] && anchors.at(place).is_none();
-        if places.iter().all(|place| home(*place as usize) == home(places[0] as usize) && free(*place as usize)) {
-            return pushes;
+        let mut predicted_loads: Vec<Push> = Vec::new();
+        let home = |particle: usize| layout.cluster[particle] as usize;
+        let particles = rows.particles(row);
+        let free = |particle: usize| !system.held[particle] && anchors.at(particle).is_none();
+        if particles
+            .iter()
+            .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
+        {
+            return predicted_loads;
         }
-        for (place, g) in rows.entries(row).filter(|(place, _)| !system.held[*place]) {
-            let cluster = home(place);
-            let at = pushes.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
-                pushes.push(Push { cluster, along: [0.0; MODES] });
-                pushes.len() - 1
+        for (particle, g) in rows.entries(row).filter(|(particle, _)| !system.held[*particle]) {
+            let cluster = home(particle);
+            let at = predicted_loads.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
+                predicted_loads.push(Push { cluster, along: [0.0; MODES] });
+                predicted_loads.len() - 1
             });
-            pushes[at].along.iter_mut().zip(self.along(place, g)).for_each(|(sum, along)| *sum += along);
+            predicted_loads[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
         }
-        pushes
+        predicted_loads
     }
 }
 
@@ -189,9 +193,9 @@ fn turn(r: DVec3) -> DMat3 {
 
 /// What a cluster's shifts and turns do to a particle at `arm`, as far as it follows them.
 #[inline(always)]
-fn motion(anchor: Option<DMat3>, arm: DVec3) -> [DMat3; 2] {
+fn motion(anchor: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
     let shift = anchor.unwrap_or_else(DMat3::identity);
-    [shift, shift * turn(arm)]
+    [shift, shift * turn(offset)]
 }
 
 /// The motions of one cluster, rows, against those of another.

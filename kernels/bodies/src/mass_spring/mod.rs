@@ -10,38 +10,38 @@
 //! resolve is damped; angular momentum is kept to the order of the method; f32 records hold forces to 1e-7 of the stiffest
 //! spring at a particle. Everything is f64; metres, seconds, kilograms.
 
+mod adjacency;
 mod assemble;
 mod body;
-mod cg;
 mod cholesky;
 mod coarse;
+mod conjugate_gradients;
 mod contact;
-mod drive;
-mod edges;
 mod energy;
 mod euler;
+mod external;
 mod frame;
 mod galerkin;
-mod guess;
-mod hanging;
 mod momentum;
-mod order;
-mod parts;
+mod particle_order;
+mod partition;
 mod plastic;
+mod predictor;
+mod rank_one;
 mod regions;
-mod rows;
 mod search;
 mod springs;
 mod stage;
 mod state;
 mod step;
 mod system;
+mod tet_springs;
 mod volume;
 
-pub use body::{Body, BodyError, LIGHTEST, Material, Mesh, SHORTEST, Spring};
-pub use contact::{Contact, Contacts, Query};
-pub use drive::{Goal, Pin};
-pub use frame::{Frame, Integrator, Report, Solver};
+pub use body::{BodyError, BodySpring, LIGHTEST, Material, Mesh, SHORTEST, SoftBody};
+pub use contact::{Contact, ContactFinder, ContactQuery};
+pub use external::{GoalSpring, Pin};
+pub use frame::{BodySolver, FrameReport, Integrator, SolverFrame};
 pub use plastic::{Plasticity, flow, reset, tear};
 pub use state::State;
 

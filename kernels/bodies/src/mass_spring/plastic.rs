@@ -3,8 +3,8 @@
 //! A spring's length at rest is that of the shape times what dents scale it by, kept apart so that a body takes the shape of
 //! a goal and keeps its dents. Each change says what energy it released or stored.
 
-use super::body::{Body, volume};
-use super::springs::{self, Rest};
+use super::body::{SoftBody, volume};
+use super::springs::{self, RestLengths};
 use super::state::State;
 use numerics::vector::DVec3;
 
@@ -24,19 +24,25 @@ pub struct Plasticity {
 ///
 /// `drawn` is the shape that goals draw the body to, particles by the caller's index, NaN where they draw none. A length
 /// between that at rest and the drawn one is on its way and no dent; strain counts from the nearer of the two.
-pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64, drawn: Option<&[[f64; 3]]>) -> f64 {
+pub fn flow(
+    body: &SoftBody,
+    state: &mut State,
+    plasticity: Plasticity,
+    seconds: f64,
+    drawn: Option<&[[f64; 3]]>,
+) -> f64 {
     let flows = plasticity.yield_strain > 0.0 && plasticity.creep > 0.0 && seconds > 0.0;
     if !flows {
         return 0.0;
     }
     let share = -libm::expm1(-plasticity.creep * seconds);
     let before = elastic(body, state);
-    let x = places(body, &state.positions);
-    let drawn = drawn.map(|drawn| places(body, drawn));
+    let x = solver_positions(body, &state.positions);
+    let drawn = drawn.map(|drawn| solver_positions(body, drawn));
     for spring in 0..body.ends.len() {
         let (length, dent) = (state.lengths[spring], state.dents[spring]);
         let meant = match &drawn {
-            Some(drawn) if spring < body.meshed() => springs::spring_length(body, drawn, spring),
+            Some(drawn) if spring < body.mesh_spring_count() => springs::spring_length(body, drawn, spring),
             _ => f64::NAN,
         };
         // The least and the most of a number and NaN are the number.
@@ -57,12 +63,12 @@ pub fn flow(body: &Body, state: &mut State, plasticity: Plasticity, seconds: f64
 /// Brings the shape at rest `share` of the way to `shape`, particles by the caller's index; `keep` is the share of dents
 /// that stays (of their logarithm). Lengths of springs given as such, and torn ones, stay, and all that hangs on a
 /// particle whose place is not finite. Returns the energy that brings, joules, below 0 where it frees some.
-pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
+pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
     let before = elastic(body, state);
     let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
-    let goal = places(body, shape);
+    let goal = solver_positions(body, shape);
     let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
-    for spring in 0..body.meshed() {
+    for spring in 0..body.mesh_spring_count() {
         let length = springs::spring_length(body, &goal, spring);
         if !length.is_finite() {
             continue;
@@ -84,10 +90,10 @@ pub fn reset(body: &Body, state: &mut State, shape: &[[f64; 3]], share: f64, kee
 
 /// Tears springs given as such that are longer than `stretch` times their length at rest (or than `reach` metres, where
 /// that is more); returns how many.
-pub fn tear(body: &Body, state: &mut State, stretch: f64, reach: f64) -> u32 {
-    let x = places(body, &state.positions);
+pub fn tear(body: &SoftBody, state: &mut State, stretch: f64, reach: f64) -> u32 {
+    let x = solver_positions(body, &state.positions);
     let mut torn = 0;
-    for spring in body.meshed()..body.ends.len() {
+    for spring in body.mesh_spring_count()..body.ends.len() {
         let most = (stretch * state.lengths[spring] * state.dents[spring]).max(reach);
         if !state.torn[spring] && springs::spring_length(body, &x, spring) > most {
             state.torn[spring] = true;
@@ -97,15 +103,15 @@ pub fn tear(body: &Body, state: &mut State, stretch: f64, reach: f64) -> u32 {
     torn
 }
 
-fn places(body: &Body, points: &[[f64; 3]]) -> Vec<DVec3> {
-    body.inwards(points).into_iter().map(DVec3::from).collect()
+fn solver_positions(body: &SoftBody, points: &[[f64; 3]]) -> Vec<DVec3> {
+    body.to_solver_order(points).into_iter().map(DVec3::from).collect()
 }
 
 /// What springs store, joules.
-fn elastic(body: &Body, state: &State) -> f64 {
+fn elastic(body: &SoftBody, state: &State) -> f64 {
     let lengths = state.rest_lengths();
-    let rest = Rest { lengths: &lengths, torn: &state.torn };
-    let x = places(body, &state.positions);
-    body.spring_parts
-        .sum((), |part, ()| body.spring_parts.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
+    let rest = RestLengths { lengths: &lengths, torn: &state.torn };
+    let x = solver_positions(body, &state.positions);
+    body.spring_partition
+        .sum((), |part, ()| body.spring_partition.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
 }

@@ -6,8 +6,8 @@
 //! its volume, so it costs a fraction of what single tetrahedra would. Limit: within a region volume may move about; there
 //! springs resist, and what keeps single tetrahedra from turning over.
 
-use super::order::{pieces, split};
-use super::parts::Parts;
+use super::particle_order::{pieces, split};
+use super::partition::Partition;
 use numerics::vector::DVec3;
 
 /// Tetrahedra in a region: some eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges less
@@ -72,8 +72,8 @@ impl Regions {
     }
 
     /// Regions in fixed parts.
-    pub(super) fn parts(&self) -> Parts {
-        Parts::even(self.len(), 32, TETS)
+    pub(super) fn partition(&self) -> Partition {
+        Partition::even(self.len(), 32, TETS)
     }
 
     /// The sum of `values`, one a tetrahedron, over each region.

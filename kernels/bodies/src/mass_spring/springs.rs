@@ -7,9 +7,9 @@
 //! Source: H = αI + (a²K − α)nnᵀ, α = a²K·max(0, 1 − R/l), Baraff & Witkin 1998 with what makes H indefinite left out:
 //! positive semi-definite for every length. K and R are those of spring and dashpot together, see [`Link`].
 
-use super::body::Body;
-use super::hanging::Hung;
-use super::parts::Several;
+use super::adjacency::Incident;
+use super::body::SoftBody;
+use super::partition::RaggedSlice;
 use numerics::random::Key;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
@@ -27,14 +27,14 @@ pub(super) struct Record {
 
 /// Lengths at rest, a spring, and which springs are torn; none where empty.
 #[derive(Clone, Copy)]
-pub(super) struct Rest<'a> {
+pub(super) struct RestLengths<'a> {
     pub(super) lengths: &'a [f64],
     pub(super) torn: &'a [bool],
 }
 
-impl Rest<'_> {
+impl RestLengths<'_> {
     #[inline(always)]
-    pub(super) fn holds(&self, spring: u32) -> bool {
+    pub(super) fn is_intact(&self, spring: u32) -> bool {
         !self.torn.get(spring as usize).copied().unwrap_or(false)
     }
 }
@@ -72,47 +72,49 @@ pub(super) struct Link {
 /// The springs as they hang, one for each of `body.hanging`, in a stage of `a` whose lengths come from what `before` gives of
 /// two ends; torn ones neither pull nor resist.
 pub(super) fn links(
-    body: &Body,
-    rest: &Rest<'_>,
+    body: &SoftBody,
+    rest: &RestLengths<'_>,
     a: f64,
     before: impl Fn(usize, usize) -> f64 + Sync,
     out: &mut Vec<Link>,
 ) {
-    let hanging = &body.hanging;
-    out.resize(hanging.hung.len(), Link::default());
-    let links = Several::new(&hanging.starts, out);
-    body.order.clusters.each(links, |cluster, mut links| {
-        for (place, links) in body.order.clusters.range(cluster).zip(links.iter_mut()) {
-            let hung = hanging.of(place, &hanging.hung);
-            for (link, hung) in links.iter_mut().zip(hung.into_iter().flatten()) {
-                let at = hung.spring as usize;
+    let adjacency = &body.adjacency;
+    out.resize(adjacency.incident.len(), Link::default());
+    let links = RaggedSlice::new(&adjacency.starts, out);
+    body.order.clusters.for_each(links, |cluster, mut links| {
+        for (particle, links) in body.order.clusters.range(cluster).zip(links.iter_mut()) {
+            let incident = adjacency.of(particle, &adjacency.incident);
+            for (link, incident) in links.iter_mut().zip(incident.into_iter().flatten()) {
+                let at = incident.spring as usize;
                 let (k, dashed) = (body.stiffness[at], body.damping[at] / a);
                 let both = (k + dashed).min(f64::from(f32::MAX)) as f32;
                 let mut length = rest.lengths[at];
                 if dashed > 0.0 {
                     // Where nothing moves the force is the spring's, whatever both were rounded to.
-                    let before = before(place, hung.other as usize);
+                    let before = before(particle, incident.other as usize);
                     length = (before - (before - length) * (k / f64::from(both))).max(0.0);
                 }
-                let k = if rest.holds(hung.spring) { both } else { 0.0 };
-                *link = Link { other: hung.other, spring: hung.spring, k, rest: length };
+                let k = if rest.is_intact(incident.spring) { both } else { 0.0 };
+                *link = Link { other: incident.other, spring: incident.spring, k, rest: length };
             }
         }
     });
 }
 
 /// Σk of the springs that hold each particle, N/m.
-pub(super) fn firmness(body: &Body, rest: &Rest<'_>, out: &mut Vec<f64>) {
+pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &mut Vec<f64>) {
     out.clear();
     out.resize(body.len(), 0.0);
     let clusters = &body.order.clusters;
-    clusters.each(&mut out[..], |cluster, out: &mut [f64]| {
-        let places = clusters.range(cluster);
-        for place in places.clone() {
-            let [inside, across] = body.hanging.of(place, &body.hanging.hung);
-            let k = |hung: &Hung| if rest.holds(hung.spring) { body.stiffness[hung.spring as usize] } else { 0.0 };
-            out[place - places.start] += inside.iter().chain(across).map(k).sum::<f64>();
-            inside.iter().for_each(|hung| out[hung.other as usize - places.start] += k(hung));
+    clusters.for_each(&mut out[..], |cluster, out: &mut [f64]| {
+        let particles = clusters.range(cluster);
+        for particle in particles.clone() {
+            let [inside, across] = body.adjacency.of(particle, &body.adjacency.incident);
+            let k = |incident: &Incident| {
+                if rest.is_intact(incident.spring) { body.stiffness[incident.spring as usize] } else { 0.0 }
+            };
+            out[particle - particles.start] += inside.iter().chain(across).map(k).sum::<f64>();
+            inside.iter().for_each(|incident| out[incident.other as usize - particles.start] += k(incident));
         }
     });
 }
@@ -127,8 +129,8 @@ struct Seen {
 
 impl Seen {
     #[inline(always)]
-    fn from(link: &Link, place: usize, x: &[DVec3]) -> Self {
-        let d = x[place] - x[link.other as usize];
+    fn from(link: &Link, particle: usize, x: &[DVec3]) -> Self {
+        let d = x[particle] - x[link.other as usize];
         let squared = d.norm_squared();
         // Outside of these a square has lost its digits, or the length is none.
         if squared > 1e-280 && squared < 1e280 {
@@ -136,7 +138,7 @@ impl Seen {
             let inverse = 1.0 / length;
             Self { way: d * inverse, length, inverse }
         } else {
-            let (way, length) = unusual(d, link.spring, place < link.other as usize);
+            let (way, length) = unusual(d, link.spring, particle < link.other as usize);
             Self { way, length, inverse: 1.0 / length }
         }
     }
@@ -166,8 +168,8 @@ fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
 impl Link {
     /// What pulls the particle at `place` to the other end, newtons, and H for steps of `a`, in full and as a record.
     #[inline(always)]
-    fn linearise(&self, x: &[DVec3], a: f64, place: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
-        let seen = Seen::from(self, place, x);
+    fn linearise(&self, x: &[DVec3], a: f64, particle: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
+        let seen = Seen::from(self, particle, x);
         let force = seen.way * seen.tension(self);
         let k = (a * a * f64::from(self.k)).min(STIFFEST);
         let alpha = if seen.length > 0.0 {
@@ -187,19 +189,19 @@ impl Link {
 /// Adds to a cluster's forces, newtons, what the springs that hang at `place` pull with; `first` is the cluster's first place.
 /// After the particles before it, and this one, its own sum is whole.
 #[inline(always)]
-pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], place: usize, first: usize, forces: &mut [DVec3]) {
+pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
     let force = |link: &Link| {
-        let seen = Seen::from(link, place, x);
+        let seen = Seen::from(link, particle, x);
         seen.way * seen.tension(link)
     };
-    let mut sum = forces[place - first];
+    let mut sum = forces[particle - first];
     for link in inside {
         let force = force(link);
         sum -= force;
         forces[link.other as usize - first] += force;
     }
     across.iter().for_each(|link| sum -= force(link));
-    forces[place - first] = sum;
+    forces[particle - first] = sum;
 }
 
 /// What [`linearise`] adds to, a slot for each particle of a cluster: forces, and sums of H.
@@ -215,15 +217,15 @@ pub(super) fn linearise(
     records: &mut [Record],
     x: &[DVec3],
     a: f64,
-    place: usize,
+    particle: usize,
     first: usize,
     sums: &mut Sums<'_>,
 ) {
     let add = |sum: &mut [f64; 6], h: [f64; 6]| sum.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
-    let (mut force, mut block) = (sums.forces[place - first], sums.blocks[place - first]);
+    let (mut force, mut block) = (sums.forces[particle - first], sums.blocks[particle - first]);
     let (inside_records, across_records) = records.split_at_mut(inside.len());
     for (link, record) in inside.iter().zip(inside_records) {
-        let (pull, h) = link.linearise(x, a, place, record);
+        let (pull, h) = link.linearise(x, a, particle, record);
         let other = link.other as usize - first;
         force -= pull;
         add(&mut block, h);
@@ -231,17 +233,17 @@ pub(super) fn linearise(
         add(&mut sums.blocks[other], h);
     }
     for (link, record) in across.iter().zip(across_records) {
-        let (pull, h) = link.linearise(x, a, place, record);
+        let (pull, h) = link.linearise(x, a, particle, record);
         force -= pull;
         add(&mut block, h);
     }
-    (sums.forces[place - first], sums.blocks[place - first]) = (force, block);
+    (sums.forces[particle - first], sums.blocks[particle - first]) = (force, block);
 }
 
 /// The energy that spring `at` holds, joules.
 #[inline(always)]
-pub(super) fn energy(body: &Body, rest: &Rest<'_>, x: &[DVec3], at: usize) -> f64 {
-    if !rest.holds(at as u32) {
+pub(super) fn energy(body: &SoftBody, rest: &RestLengths<'_>, x: &[DVec3], at: usize) -> f64 {
+    if !rest.is_intact(at as u32) {
         return 0.0;
     }
     let strain = spring_length(body, x, at) - rest.lengths[at];
@@ -250,7 +252,7 @@ pub(super) fn energy(body: &Body, rest: &Rest<'_>, x: &[DVec3], at: usize) -> f6
 
 /// How long spring `at` is, metres.
 #[inline(always)]
-pub(super) fn spring_length(body: &Body, x: &[DVec3], at: usize) -> f64 {
+pub(super) fn spring_length(body: &SoftBody, x: &[DVec3], at: usize) -> f64 {
     let [a, b] = body.ends[at];
     distance(x, a as usize, b as usize)
 }
@@ -273,11 +275,11 @@ pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
 
 /// The energy within a stage of the springs that hang at `place`, each once, and their dashpots, joules.
 #[inline(always)]
-pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[DVec3], place: usize) -> f64 {
+pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize) -> f64 {
     let energy = |link: &Link| {
-        let strain = distance(x, place, link.other as usize) - link.rest;
+        let strain = distance(x, particle, link.other as usize) - link.rest;
         f64::from(link.k) * strain * strain
     };
-    let across = across.iter().filter(|link| place < link.other as usize);
+    let across = across.iter().filter(|link| particle < link.other as usize);
     0.5 * (inside.iter().map(energy).sum::<f64>() + across.map(energy).sum::<f64>())
 }

@@ -4,16 +4,16 @@
 //! iteration goes downhill; with a line search the objective never rises. One iteration is what a step has by default;
 //! it goes on where the force turned out otherwise than its derivative said, and with contacts until they are met.
 
-use super::body::Body;
-use super::cg::{self, Coarse, Limits};
+use super::body::SoftBody;
 use super::coarse::{self, Anchors, Layout};
-use super::contact::{Touch, Touching};
-use super::drive::Drive;
+use super::conjugate_gradients::{self, Coarse, Limits};
+use super::contact::{ContactConstraint, ContactState};
+use super::external::ExternalForces;
 use super::galerkin::Galerkin;
-use super::springs::{Link, Record, Rest};
-use super::state::Warm;
+use super::springs::{Link, Record, RestLengths};
+use super::state::CachedFactor;
 use super::system::System;
-use super::volume::{Inventory, Thin, Volumes};
+use super::volume::{Inventory, ThinTet, Volumes};
 use numerics::vector::{DVec3, Vec3};
 
 /// Share of the first residual that linear equations may leave.
@@ -46,7 +46,7 @@ pub(super) struct Stage<'a> {
     pub(super) a: f64,
     /// Share of the frame passed at its end.
     pub(super) time: f64,
-    pub(super) contacts: &'a [Touching],
+    pub(super) contacts: &'a [ContactConstraint],
     /// Seconds from there to the time that contacts were found for.
     pub(super) early: f64,
     /// Energy that turns each piece, joules; none where it does not matter.
@@ -57,10 +57,10 @@ pub(super) struct Stage<'a> {
 
 /// What holds for a whole frame.
 #[derive(Clone, Copy)]
-pub(super) struct Setting<'a> {
-    pub(super) body: &'a Body,
-    pub(super) drive: &'a Drive,
-    pub(super) rest: Rest<'a>,
+pub(super) struct FrameContext<'a> {
+    pub(super) body: &'a SoftBody,
+    pub(super) external: &'a ExternalForces,
+    pub(super) rest: RestLengths<'a>,
     /// Volumes of tetrahedra at rest.
     pub(super) volumes: &'a [f64],
 }
@@ -96,7 +96,7 @@ pub(super) struct Solved {
 
 /// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Work {
+pub(super) struct StageSolver {
     pub(super) system: System,
     pub(super) layout: Layout,
     pub(super) volumes: Volumes,
@@ -104,108 +104,108 @@ pub(super) struct Work {
     pub(super) measured: bool,
     /// Tetrahedra as the step began, and where they were looked over since.
     pub(super) inventory: Inventory,
-    pub(super) seen: Option<Inventory>,
-    pub(super) arms: Vec<Vec3>,
+    pub(super) latest_inventory: Option<Inventory>,
+    pub(super) offset_from_centroid: Vec<Vec3>,
     /// The springs as the frame has them.
     pub(super) links: Vec<Link>,
     /// Σk of those at each particle, N/m.
-    pub(super) firmness: Vec<f64>,
-    pub(super) scratch: cg::Scratch,
+    pub(super) particle_stiffness: Vec<f64>,
+    pub(super) scratch: conjugate_gradients::Scratch,
     /// Velocities at the positions looked at.
     pub(super) v: Vec<DVec3>,
     /// −(M(x − y) − a²f).
     pub(super) r: Vec<DVec3>,
     /// What of it is not of contacts.
-    pub(super) pull: Vec<DVec3>,
+    pub(super) noncontact_residual: Vec<DVec3>,
     pub(super) dx: Vec<DVec3>,
     pub(super) trial: Vec<DVec3>,
-    pub(super) thin: Vec<Thin>,
-    pub(super) touches: Vec<Touch>,
+    pub(super) thin_tets: Vec<ThinTet>,
+    pub(super) contact_states: Vec<ContactState>,
     /// What friction each contact is taken to have, as a share of all that it can.
-    pub(super) drags: Vec<DVec3>,
+    pub(super) friction_duals: Vec<DVec3>,
     /// What push each contact is expected to have, newtons.
-    pub(super) pushes: Vec<f64>,
+    pub(super) predicted_loads: Vec<f64>,
     /// Contacts whose push is linear from another than it has, and how much more that is.
-    pub(super) unlike: Vec<(usize, f64)>,
+    pub(super) linearisation_offsets: Vec<(usize, f64)>,
     /// Contacts' and thin tetrahedra's forces; empty where there are none.
-    pub(super) extra: Vec<DVec3>,
+    pub(super) transient_forces: Vec<DVec3>,
     /// The group of pieces that hang together by contacts, of each piece in one that is nowhere held; and pieces that nothing
     /// holds or touches.
     pub(super) groups: Vec<Option<u32>>,
-    pub(super) turns: Vec<bool>,
+    pub(super) free_pieces: Vec<bool>,
 }
 
-impl Work {
-    pub(super) fn new(body: &Body) -> Self {
+impl StageSolver {
+    pub(super) fn new(body: &SoftBody) -> Self {
         let count = body.len();
         let mut system = System {
-            records: vec![Record::default(); body.hanging.hung.len()],
+            records: vec![Record::default(); body.adjacency.incident.len()],
             inertia: vec![0.0; count],
             held: vec![false; count],
             smoother: vec![[0.0; 6]; count],
             ..System::default()
         };
         let regions = &body.regions;
-        system.regions.set_topology(count, &regions.starts, &regions.particles, regions.parts());
+        system.regions.set_topology(count, &regions.starts, &regions.particles, regions.partition());
         Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
     /// Makes ready for a stage's first look at `contacts`.
-    pub(super) fn begin(&mut self, on: &Setting<'_>, contacts: &[Touching]) {
-        self.find_free(on, contacts);
-        self.drags.clear();
-        self.drags.resize(contacts.len(), DVec3::zeros());
-        self.pushes.clear();
-        self.pushes.extend(contacts.iter().map(|contact| contact.load));
+    pub(super) fn begin(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
+        self.find_free_groups(context, contacts);
+        self.friction_duals.clear();
+        self.friction_duals.resize(contacts.len(), DVec3::zeros());
+        self.predicted_loads.clear();
+        self.predicted_loads.extend(contacts.iter().map(|contact| contact.load));
     }
 
     /// Solves the stage from the guess `x`, whose held particles are where they have to be, without looking back: Newton's
     /// method goes on where the force turned out otherwise than foreseen, or until steps are short.
     pub(super) fn solve(
         &mut self,
-        on: &Setting<'_>,
+        context: &FrameContext<'_>,
         stage: &Stage<'_>,
         newton: Newton,
-        warm: &mut Warm,
+        warm: &mut CachedFactor,
         x: &mut [DVec3],
     ) -> Solved {
-        self.begin(on, stage.contacts);
-        let solved = self.iterate(on, stage, newton, warm, x);
-        self.turn(on.body, stage, x);
+        self.begin(context, stage.contacts);
+        let solved = self.iterate(context, stage, newton, warm, x);
+        self.correct_angular_momentum(context.body, stage, x);
         solved
     }
 
     fn iterate(
         &mut self,
-        on: &Setting<'_>,
+        context: &FrameContext<'_>,
         stage: &Stage<'_>,
         newton: Newton,
-        warm: &mut Warm,
+        warm: &mut CachedFactor,
         x: &mut [DVec3],
     ) -> Solved {
-        let clusters = &on.body.order.clusters;
+        let clusters = &context.body.order.clusters;
         let mut solved = Solved::default();
         let mut first = 0.0;
         loop {
-            self.assemble(on, stage, x, true);
+            self.assemble(context, stage, x, true);
             let before = self.square(clusters);
             if solved.newton == 0 {
                 first = before;
             }
-            if !self.direction(on, stage, warm, x, &mut solved) {
+            if !self.direction(context, stage, warm, x, &mut solved) {
                 return solved;
             }
-            let foreseen = std::mem::take(&mut self.r);
+            let predicted = std::mem::take(&mut self.r);
             self.follow(stage, 1.0, x);
             self.r = vec![DVec3::zeros(); x.len()];
-            self.assemble(on, stage, x, false);
+            self.assemble(context, stage, x, false);
             let after = self.square(clusters);
             solved.failed = after > RISE * before || !after.is_finite();
             solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
             let wanted = if newton.tolerance > 0.0 {
                 self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max) > newton.tolerance
             } else {
-                self.distance(clusters, &foreseen) > UNFORESEEN * UNFORESEEN * before
+                self.distance(clusters, &predicted) > UNFORESEEN * UNFORESEEN * before
             };
             if solved.failed || !wanted || solved.newton >= newton.most {
                 return solved;
@@ -215,51 +215,64 @@ impl Work {
 
     /// Goes a `share` of `dx`, with what contacts are expected to do there.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
-        let known = stage.contacts.iter().zip(&self.touches).zip(&mut self.drags).zip(&mut self.pushes);
-        for (((contact, touch), drag), push) in known {
-            *drag = contact.drag(touch, drag, &self.dx, share, stage.a);
-            *push = contact.expected(touch, &self.dx, share);
+        let known = stage
+            .contacts
+            .iter()
+            .zip(&self.contact_states)
+            .zip(&mut self.friction_duals)
+            .zip(&mut self.predicted_loads);
+        for (((contact, state), drag), push) in known {
+            *drag = contact.drag(state, drag, &self.dx, share, stage.a);
+            *push = contact.expected(state, &self.dx, share);
         }
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
     }
 
     /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
-    pub(super) fn smooth(&self, body: &Body, warm: &Warm, r: &mut [DVec3]) {
-        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
-        cg::precondition(&self.system, body, coarse, r);
+    pub(super) fn smooth(&self, body: &SoftBody, warm: &CachedFactor, r: &mut [DVec3]) {
+        let coarse =
+            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
+        conjugate_gradients::precondition(&self.system, body, coarse, r);
     }
 
     /// A⁻¹r, by conjugate gradients.
-    pub(super) fn filter(&mut self, body: &Body, warm: &Warm, r: &mut Vec<DVec3>) -> cg::Reached {
-        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
+    pub(super) fn filter(
+        &mut self,
+        body: &SoftBody,
+        warm: &CachedFactor,
+        r: &mut Vec<DVec3>,
+    ) -> conjugate_gradients::Reached {
+        let coarse =
+            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![DVec3::zeros(); r.len()];
-        let reached = cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
+        let reached =
+            conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
         *r = out;
         reached
     }
 
     /// Contacts that push, and the deepest of them, metres below its gap.
-    pub(super) fn touching(&self) -> (u32, f64) {
-        let pushing = self.touches.iter().filter(|touch| touch.push > 0.0);
-        pushing.fold((0, 0.0), |(count, deepest), touch| (count + 1, touch.depth.max(deepest)))
+    pub(super) fn constraint(&self) -> (u32, f64) {
+        let pushing = self.contact_states.iter().filter(|state| state.normal_force > 0.0);
+        pushing.fold((0, 0.0), |(count, deepest), state| (count + 1, state.depth.max(deepest)))
     }
 
     /// The Newton direction `dx` at `x`; `r` becomes what of the residual it leaves. False where it is none.
     pub(super) fn direction(
         &mut self,
-        on: &Setting<'_>,
+        context: &FrameContext<'_>,
         stage: &Stage<'_>,
-        warm: &mut Warm,
+        warm: &mut CachedFactor,
         x: &[DVec3],
         solved: &mut Solved,
     ) -> bool {
-        let body = on.body;
+        let body = context.body;
         self.dx.clear();
         self.dx.resize(x.len(), DVec3::zeros());
-        let whole = self.whole(body, stage);
-        self.shift(body, stage, &whole);
-        coarse::arms(&body.order.clusters, x, &mut self.arms);
+        let whole = self.momentum_target(body, stage);
+        self.correct_linear_momentum(body, stage, &whole);
+        coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
         let anchors = Anchors::new(&self.system);
         let old = warm.factor.len() != self.layout.rows() || warm.spent > OLD;
         if old || anchors.change(&warm.anchors) > MOVED {
@@ -267,15 +280,15 @@ impl Work {
         }
         let fresh = &mut warm.fresh[stage.index];
         let bound = if *fresh == 0 { CG_CAP } else { (3 * *fresh).max(*fresh + 10) };
-        let free = stage.spinning.iter().zip(&self.turns).filter(|piece| *piece.1);
+        let free = stage.spinning.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
         let spinning: f64 = free.map(|piece| piece.0).sum();
         let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
-        let touching = !stage.contacts.is_empty();
+        let constraint = !stage.contacts.is_empty();
         // Implicit Euler alone asks for no bound on turning.
-        let searching = touching && stage.spinning.is_empty();
+        let searching = constraint && stage.spinning.is_empty();
         let asked = if searching {
             CG_SHARE_SEARCHING
-        } else if touching {
+        } else if constraint {
             CG_SHARE_TOUCHING
         } else {
             CG_SHARE
@@ -295,24 +308,25 @@ impl Work {
         if *fresh == 0 {
             *fresh = reached.iterations.max(1);
         } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*fresh) + 1.0 {
-            *warm = Warm::default();
+            *warm = CachedFactor::default();
         }
         solved.caps += u32::from(!reached.met);
         // Linear solves leave a share of the residual; momentum they may not touch.
-        self.shift(body, stage, &whole);
+        self.correct_linear_momentum(body, stage, &whole);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
         !solved.failed
     }
 
-    fn gradients(&mut self, body: &Body, warm: &Warm, limits: Limits) -> cg::Reached {
-        let coarse = Coarse { factor: &warm.factor, arms: &self.arms, anchors: &warm.anchors };
-        cg::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
+    fn gradients(&mut self, body: &SoftBody, warm: &CachedFactor, limits: Limits) -> conjugate_gradients::Reached {
+        let coarse =
+            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
+        conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 
-    fn renew(&mut self, body: &Body, warm: &mut Warm, anchors: Anchors) {
-        let (layout, system, arms) = (&self.layout, &self.system, &self.arms);
-        warm.factor = Galerkin { layout, body, system, arms, anchors: &anchors }.factor();
+    fn renew(&mut self, body: &SoftBody, warm: &mut CachedFactor, anchors: Anchors) {
+        let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
+        warm.factor = Galerkin { layout, body, system, offset_from_centroid, anchors: &anchors }.factor();
         (warm.anchors, warm.fresh, warm.spent) = (anchors, [0; 2], 0);
     }
 }

@@ -1,6 +1,6 @@
 //! What a body carries from one frame to the next.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::cholesky::Lower;
 use super::coarse::Anchors;
 use serde::{Deserialize, Serialize};
@@ -27,15 +27,15 @@ pub struct State {
     /// The push of an obstacle that each particle was under at last, newtons; none at the start.
     pub(super) loads: Vec<f64>,
     /// Steps for which contacts are taken to change.
-    pub(super) unsettled: u32,
+    pub(super) euler_steps_left: u32,
     /// Energy that steps without drive have lost so far, joules.
-    pub(super) reserve: f64,
-    pub(super) warm: Warm,
+    pub(super) energy_budget: f64,
+    pub(super) warm: CachedFactor,
 }
 
 /// The coarse half of the preconditioner, kept while it is good enough: it is what the iterations hang on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Warm {
+pub(super) struct CachedFactor {
     pub(super) factor: Lower,
     pub(super) anchors: Anchors,
     /// Iterations to the tolerance when it was new, for each stage of a step; 0 before the first.
@@ -46,8 +46,8 @@ pub(super) struct Warm {
 
 impl State {
     /// At rest in the shape of the body.
-    pub fn at_rest(body: &Body) -> Self {
-        let positions = body.order.places.iter().map(|place| body.rest[*place as usize].into()).collect();
+    pub fn at_rest(body: &SoftBody) -> Self {
+        let positions = body.order.index_of.iter().map(|particle| body.rest[*particle as usize].into()).collect();
         Self {
             positions,
             velocities: vec![[0.0; 3]; body.len()],
@@ -57,14 +57,14 @@ impl State {
             torn: vec![false; body.lengths.len()],
             trend: Vec::new(),
             loads: Vec::new(),
-            unsettled: 0,
-            reserve: 0.0,
-            warm: Warm::default(),
+            euler_steps_left: 0,
+            energy_budget: 0.0,
+            warm: CachedFactor::default(),
         }
     }
 
     /// Whether it has one entry for each of the body's particles, springs and tetrahedra.
-    pub fn fits(&self, body: &Body) -> bool {
+    pub fn fits(&self, body: &SoftBody) -> bool {
         let springs = body.ends.len();
         self.positions.len() == body.len()
             && self.velocities.len() == body.len()

@@ -3,9 +3,9 @@
 //! Springs are records by particle, in f32 and as differences: a rigid motion meets no resistance in any bit, however stiff
 //! the springs are against the masses (an assembled matrix would lose the masses at a²k ÷ m of 1e7). Vectors are f64.
 
-use super::body::Body;
-use super::parts::Parts;
-use super::rows::Rows;
+use super::body::SoftBody;
+use super::partition::Partition;
+use super::rank_one::RankOneTerms;
 use super::springs::Record;
 use numerics::vector::DVec3;
 
@@ -23,29 +23,29 @@ pub(super) struct System {
     /// Those that no spring holds; empty where there are none.
     pub(super) alone: Vec<bool>,
     /// Volumes of regions.
-    pub(super) regions: Rows,
+    pub(super) regions: RankOneTerms,
     /// Tetrahedra about to turn over, contacts of two bodies.
-    pub(super) loose: Rows,
+    pub(super) transient: RankOneTerms,
     /// Per particle the inverse of the lower factor of its own 3×3 block, rows one after the other.
     pub(super) smoother: Vec<[f32; 6]>,
 }
 
 impl System {
     /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at held particles.
-    pub(super) fn apply(&mut self, body: &Body, clusters: &Parts, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+    pub(super) fn apply(&mut self, body: &SoftBody, clusters: &Partition, p: &[DVec3], out: &mut [DVec3]) -> f64 {
         self.regions.measure(p);
-        self.loose.measure(p);
+        self.transient.measure(p);
         let system = &*self;
-        let (regions, loose) = (!system.regions.is_empty(), !system.loose.is_empty());
+        let (regions, transient) = (!system.regions.is_empty(), !system.transient.is_empty());
         clusters.sum(out, |cluster, out: &mut [DVec3]| {
-            let places = clusters.range(cluster);
-            let first = places.start;
+            let particles = clusters.range(cluster);
+            let first = particles.start;
             out.fill(DVec3::zeros());
             let mut sum = 0.0;
-            for place in places {
-                let mine = p[place];
-                let mut total = out[place - first] + mine * system.inertia[place];
-                let [inside, across] = body.hanging.of(place, &system.records);
+            for particle in particles {
+                let mine = p[particle];
+                let mut total = out[particle - first] + mine * system.inertia[particle];
+                let [inside, across] = body.adjacency.of(particle, &system.records);
                 for record in inside {
                     let other = record.other as usize;
                     let force = record.times(mine - p[other]);
@@ -55,20 +55,20 @@ impl System {
                 for record in across {
                     total += record.times(mine - p[record.other as usize]);
                 }
-                if system.held[place] {
-                    out[place - first] = DVec3::zeros();
+                if system.held[particle] {
+                    out[particle - first] = DVec3::zeros();
                     continue;
                 }
                 if !system.blocks.is_empty() {
-                    total += times(&system.blocks[place], mine);
+                    total += times(&system.blocks[particle], mine);
                 }
                 if regions {
-                    total += system.regions.push(place);
+                    total += system.regions.push(particle);
                 }
-                if loose {
-                    total += system.loose.push(place);
+                if transient {
+                    total += system.transient.push(particle);
                 }
-                out[place - first] = total;
+                out[particle - first] = total;
                 sum += mine.dot(&total);
             }
             sum
@@ -76,10 +76,10 @@ impl System {
     }
 
     /// Takes those to be alone that springs of no `firmness` hold.
-    pub(super) fn set_alone(&mut self, firmness: &[f64]) {
+    pub(super) fn set_isolated(&mut self, particle_stiffness: &[f64]) {
         self.alone.clear();
-        if firmness.contains(&0.0) {
-            self.alone.extend(firmness.iter().map(|k| *k == 0.0));
+        if particle_stiffness.contains(&0.0) {
+            self.alone.extend(particle_stiffness.iter().map(|k| *k == 0.0));
         }
     }
 }
@@ -112,14 +112,14 @@ pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
 
 /// W·r, whose square is rᵀ·(block)⁻¹·r.
 #[inline(always)]
-pub(super) fn halfway(w: &[f32; 6], r: DVec3) -> DVec3 {
+pub(super) fn solve_lower(w: &[f32; 6], r: DVec3) -> DVec3 {
     let [a, low, b, corner, left, c] = w.map(f64::from);
     DVec3::new(a * r.x, low * r.x + b * r.y, corner * r.x + left * r.y + c * r.z)
 }
 
 /// Wᵀ·h.
 #[inline(always)]
-pub(super) fn rest_of_the_way(w: &[f32; 6], h: DVec3) -> DVec3 {
+pub(super) fn solve_lower_transpose(w: &[f32; 6], h: DVec3) -> DVec3 {
     let [a, low, b, corner, left, c] = w.map(f64::from);
     DVec3::new(a * h.x + low * h.y + corner * h.z, b * h.y + left * h.z, c * h.z)
 }

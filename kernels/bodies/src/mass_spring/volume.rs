@@ -5,8 +5,8 @@
 //! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
 //! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
 
-use super::body::{Body, volume};
-use super::parts::{Parts, Several};
+use super::body::{SoftBody, volume};
+use super::partition::{Partition, RaggedSlice};
 use numerics::vector::DVec3;
 
 /// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
@@ -34,7 +34,7 @@ pub(super) struct Volumes {
     /// Share fought.
     share: f64,
     /// Regions in parts.
-    parts: Option<Parts>,
+    partition: Option<Partition>,
     /// How each region's volume changes with its particles.
     pub(super) gradients: Vec<DVec3>,
     /// Pressure each region has, Pa.
@@ -51,7 +51,7 @@ pub(super) struct Volumes {
 
 /// A tetrahedron that is thin or turned over.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Thin {
+pub(super) struct ThinTet {
     pub(super) corners: [u32; 4],
     /// How its volume changes with its corners.
     pub(super) gradient: [DVec3; 4],
@@ -63,13 +63,13 @@ pub(super) struct Thin {
 
 impl Volumes {
     /// Fights `share` of what tetrahedra lose of `rest`, their volumes.
-    pub(super) fn new(body: &Body, share: f64, rest: &[f64]) -> Self {
+    pub(super) fn new(body: &SoftBody, share: f64, rest: &[f64]) -> Self {
         let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
         let regions = &body.regions;
         if share == 0.0 || regions.len() == 0 {
             return Self::default();
         }
-        let parts = regions.parts();
+        let partition = regions.partition();
         let rest_sums = regions.sums(|tet| rest[tet]);
         let factor = SPRINGS * share / (1.0 - share + LEFT * share);
         let stiffness = regions.energy.iter().zip(&rest_sums).map(|(energy, volume)| {
@@ -80,7 +80,7 @@ impl Volumes {
             stiffness: stiffness.collect(),
             rest: rest_sums,
             share,
-            parts: Some(parts),
+            partition: Some(partition),
             gradients: vec![DVec3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
             slopes: vec![0.0; regions.len()],
@@ -93,26 +93,26 @@ impl Volumes {
 
     /// Whether nothing is fought.
     pub(super) fn is_off(&self) -> bool {
-        self.parts.is_none()
+        self.partition.is_none()
     }
 
     /// The volume of each region with particles at `x`.
-    pub(super) fn at(&self, body: &Body, x: &[DVec3]) -> Vec<f64> {
+    pub(super) fn at(&self, body: &SoftBody, x: &[DVec3]) -> Vec<f64> {
         self.drift(body, x, &[]).into_iter().map(|[volume, _]| volume).collect()
     }
 
     /// That, and how fast it changes, m³/s; all still where there is no `v`.
-    pub(super) fn drift(&self, body: &Body, x: &[DVec3], v: &[DVec3]) -> Vec<[f64; 2]> {
+    pub(super) fn drift(&self, body: &SoftBody, x: &[DVec3], v: &[DVec3]) -> Vec<[f64; 2]> {
         let regions = &body.regions;
         let mut out = vec![[0.0; 2]; self.before.len()];
-        if let Some(parts) = &self.parts {
-            parts.each(&mut out[..], |part, out: &mut [[f64; 2]]| {
+        if let Some(partition) = &self.partition {
+            partition.for_each(&mut out[..], |part, out: &mut [[f64; 2]]| {
                 let mut gradient = Vec::new();
-                for (region, out) in parts.range(part).zip(out) {
+                for (region, out) in partition.range(part).zip(out) {
                     let particles = regions.of(region);
                     gradient.resize(particles.len(), DVec3::zeros());
                     let volume = regions.measure(region, x, &mut gradient);
-                    let pace = |(g, place): (&DVec3, &u32)| v.get(*place as usize).map_or(0.0, |v| g.dot(v));
+                    let pace = |(g, particle): (&DVec3, &u32)| v.get(*particle as usize).map_or(0.0, |v| g.dot(v));
                     *out = [volume, gradient.iter().zip(particles).map(pace).sum()];
                 }
             });
@@ -126,14 +126,14 @@ impl Volumes {
     }
 
     /// Measures pressures, gradients and energies.
-    pub(super) fn measure(&mut self, body: &Body, x: &[DVec3]) {
-        let Some(parts) = &self.parts else { return };
+    pub(super) fn measure(&mut self, body: &SoftBody, x: &[DVec3]) {
+        let Some(partition) = &self.partition else { return };
         let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
-        let gradients = Several::new(&regions.starts, &mut self.gradients);
+        let gradients = RaggedSlice::new(&regions.starts, &mut self.gradients);
         let out = (&mut self.pressures[..], &mut self.slopes[..], gradients);
-        let sums = parts.map(out, |part, (pressures, slopes, mut gradients)| {
+        let sums = partition.map(out, |part, (pressures, slopes, mut gradients)| {
             let (mut stored, mut damped) = (0.0, 0.0);
-            let regions_here = parts.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
+            let regions_here = partition.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
             for (((region, pressure), slope), mine) in regions_here {
                 let volume = regions.measure(region, x, mine);
                 let k = stiffness[region];
@@ -155,7 +155,7 @@ impl Volumes {
     }
 
     /// Those of the `watched` tetrahedra that are thin.
-    pub(super) fn thin(&self, body: &Body, x: &[DVec3], rest: &[f64], watched: &[u32]) -> Vec<Thin> {
+    pub(super) fn thin_tets(&self, body: &SoftBody, x: &[DVec3], rest: &[f64], watched: &[u32]) -> Vec<ThinTet> {
         if self.is_off() {
             return Vec::new();
         }
@@ -166,7 +166,7 @@ impl Volumes {
             let left = THIN * rest[tet] - volume(at);
             let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
             let pressure = stiffness * left;
-            let thin = Thin { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left };
+            let thin = ThinTet { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left };
             (left > 0.0 && thin.energy.is_finite()).then_some(thin)
         };
         watched.iter().filter_map(of).collect()
@@ -204,7 +204,7 @@ pub(super) fn opening([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Inventory {
     /// How many are inside out.
-    pub(super) turned: u32,
+    pub(super) inverted: u32,
     /// All volume ÷ all at rest.
     pub(super) ratio: f64,
     /// Those that may be thin before the next look.
@@ -213,23 +213,23 @@ pub(super) struct Inventory {
 
 impl Inventory {
     /// With particles at `x`.
-    pub(super) fn new(body: &Body, x: &[DVec3], rest: &[f64]) -> Self {
-        let parts = body.tet_parts.map((), |part, ()| {
-            let (mut turned, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
-            for tet in body.tet_parts.range(part) {
+    pub(super) fn new(body: &SoftBody, x: &[DVec3], rest: &[f64]) -> Self {
+        let partition = body.tet_partition.map((), |part, ()| {
+            let (mut inverted, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
+            for tet in body.tet_partition.range(part) {
                 let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
-                turned += u32::from(volume < 0.0);
+                inverted += u32::from(volume < 0.0);
                 if volume <= WATCHED * rest[tet] {
                     watched.push(tet as u32);
                 }
                 now += volume;
                 before += rest[tet];
             }
-            (turned, now, before, watched)
+            (inverted, now, before, watched)
         });
         let (mut all, mut now, mut before) = (Self::default(), 0.0, 0.0);
-        for (turned, volume, rest, watched) in parts {
-            all.turned += turned;
+        for (inverted, volume, rest, watched) in partition {
+            all.inverted += inverted;
             all.watched.extend(watched);
             now += volume;
             before += rest;
@@ -239,7 +239,7 @@ impl Inventory {
     }
 
     /// Watches those too that turn out thin in `later`, of `rest` and with particles at `x`, and says whether there are such.
-    pub(super) fn watch(&mut self, later: &Self, body: &Body, x: &[DVec3], rest: &[f64]) -> bool {
+    pub(super) fn watch(&mut self, later: &Self, body: &SoftBody, x: &[DVec3], rest: &[f64]) -> bool {
         let thin = |tet: &&u32| {
             let at = **tet as usize;
             let left = volume(body.tets[at].map(|corner| x[corner as usize]));

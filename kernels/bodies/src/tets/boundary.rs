@@ -4,7 +4,7 @@ use numerics::vector::{Vec3, cross, dot, sub};
 
 /// A face of one tet alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
+pub struct BoundaryFace {
     /// Its points, counter-clockwise from outside.
     pub corners: [u32; 3],
     /// The tet it is of.
@@ -13,8 +13,8 @@ pub struct Face {
 
 /// Faces that belong to an odd number of tets, in the order of their tets and turned away from them where `points` (metres)
 /// are; a flat tet's are turned as if its corners ran counter-clockwise.
-pub fn boundary(tets: &[[u32; 4]], points: &[Vec3]) -> Vec<Face> {
-    let mut faces: Vec<([u32; 3], Face)> = Vec::with_capacity(4 * tets.len());
+pub fn boundary(tets: &[[u32; 4]], points: &[Vec3]) -> Vec<BoundaryFace> {
+    let mut faces: Vec<([u32; 3], BoundaryFace)> = Vec::with_capacity(4 * tets.len());
     for (tet, corners) in (0..).zip(tets) {
         let at = corners.map(|corner| points[corner as usize]);
         let turned = dot(sub(at[1], at[0]), cross(sub(at[2], at[0]), sub(at[3], at[0]))) < 0.0;
@@ -23,12 +23,12 @@ pub fn boundary(tets: &[[u32; 4]], points: &[Vec3]) -> Vec<Face> {
             let corners = if turned { [corners[0], corners[2], corners[1]] } else { corners };
             let mut sorted = corners;
             sorted.sort_unstable();
-            faces.push((sorted, Face { corners, tet }));
+            faces.push((sorted, BoundaryFace { corners, tet }));
         }
     }
     faces.sort_unstable_by_key(|(sorted, face)| (*sorted, face.tet));
     let alone = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() % 2 == 1);
-    let mut alone: Vec<Face> = alone.map(|same| same[0].1).collect();
+    let mut alone: Vec<BoundaryFace> = alone.map(|same| same[0].1).collect();
     alone.sort_by_key(|face| face.tet);
     alone
 }

@@ -3,17 +3,17 @@
 use numerics::vector::to_f64;
 use rayon::prelude::*;
 
-use super::cross::crossing;
 use super::edges::edges;
-use super::fault::Fault;
-use super::lattice::{Lattice, Place};
-use super::repair::{Changes, Polygons, Surface, in_order};
+use super::grid::{GridPoint, SnapGrid};
+use super::repair::{PolygonSurface, Polygons, RepairCounts, repaired_polygons};
+use super::self_crossing::crossing;
 use super::shells::{Shells, pieces, turned};
+use super::surface_fault::SurfaceFault;
 use numerics::tree::TriangleTree;
 
 /// A closed surface around one or several bodies, repaired where that was asked for.
 #[derive(Clone, Debug)]
-pub struct Closed {
+pub struct ClosedSurface {
     /// The point that came in as each, rising.
     pub source_points: Vec<u32>,
     /// The face that came in as each, rising.
@@ -25,18 +25,18 @@ pub struct Closed {
     /// Positions, metres.
     pub points: Vec<[f32; 3]>,
     /// What was changed.
-    pub changes: Changes,
+    pub changes: RepairCounts,
     /// Bodies it bounds.
     pub bodies: usize,
-    pub(super) lattice: Lattice,
-    pub(super) places: Vec<Place>,
+    pub(super) grid: SnapGrid,
+    pub(super) grid_points: Vec<GridPoint>,
     pub(super) shells: Shells,
     /// Shell of each point.
     pub(super) shell_of: Vec<u32>,
     pub(super) tree: TriangleTree,
 }
 
-impl Closed {
+impl ClosedSurface {
     /// The surface, if it is closed, in order and nowhere crosses itself; else, where `repair` says so and it is safe,
     /// put in order: points at one place joined where the surface hangs together there, points without a face and faces
     /// without three points or on another's points dropped, faces turned to look away from the bodies. Closed shells
@@ -48,29 +48,34 @@ impl Closed {
     ///
     /// # Panics
     /// Where a corner is out of range, or there are 2³² corners.
-    pub fn of(surface: &Surface, repair: bool) -> Result<Self, Fault> {
+    pub fn of(surface: &PolygonSurface, repair: bool) -> Result<Self, SurfaceFault> {
         if let Some(point) = surface.points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
-            return Err(Fault::NotFinite { point: point as u32 });
+            return Err(SurfaceFault::NotFinite { point: point as u32 });
         }
-        let lattice = Lattice::around(surface.points).unwrap_or_else(Lattice::unit);
-        let places: Vec<Place> = surface.points.par_iter().map(|point| lattice.place(point.map(f64::from))).collect();
-        let (polygons, mut changes) = in_order(surface, &places, repair)?;
+        let grid = SnapGrid::around(surface.points).unwrap_or_else(SnapGrid::unit);
+        let grid_points: Vec<GridPoint> =
+            surface.points.par_iter().map(|point| grid.grid_point(point.map(f64::from))).collect();
+        let (polygons, mut changes) = repaired_polygons(surface, &grid_points, repair)?;
         let mut pieces = pieces(&polygons, repair)?;
-        let mut shells = Shells::outward(&polygons, &mut pieces, surface.points, &places)?;
-        let wide: Vec<[f32; 3]> = places.iter().map(|place| place.map(|x| x as f32)).collect();
+        let mut shells = Shells::outward(&polygons, &mut pieces, surface.points, &grid_points)?;
+        let wide: Vec<[f32; 3]> = grid_points.iter().map(|grid_point| grid_point.map(|x| x as f32)).collect();
         let tree = TriangleTree::build(&wide, &shells.triangles);
-        if let Some((pair, count)) = crossing(&places, &shells.triangles, &tree) {
+        if let Some((pair, count)) = crossing(&grid_points, &shells.triangles, &tree) {
             let [first, _] = pair.map(|triangle| shells.triangles[triangle as usize]);
             let face = |triangle: u32| polygons.faces[shells.polygons[triangle as usize] as usize];
-            return Err(Fault::Crossing { faces: pair.map(face), at: surface.points[first[0] as usize], count });
+            return Err(SurfaceFault::SelfIntersection {
+                faces: pair.map(face),
+                at: surface.points[first[0] as usize],
+                count,
+            });
         }
-        shells.nest(&mut pieces, &places);
+        shells.nest(&mut pieces, &grid_points);
         turned(&polygons, &pieces, &shells, repair, &mut changes)?;
-        let (source_points, name) = kept(&polygons, places.len());
+        let (source_points, name) = kept(&polygons, grid_points.len());
         shells.triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner = name[*corner as usize]);
         Ok(Self {
             points: source_points.iter().map(|point| surface.points[*point as usize]).collect(),
-            places: source_points.iter().map(|point| places[*point as usize]).collect(),
+            grid_points: source_points.iter().map(|point| grid_points[*point as usize]).collect(),
             shell_of: shells.of_points(source_points.len()),
             source_points,
             corners: corners(&polygons, &pieces, &name),
@@ -78,7 +83,7 @@ impl Closed {
             starts: polygons.starts,
             changes,
             bodies: shells.bodies,
-            lattice,
+            grid,
             shells,
             tree,
         })
@@ -103,7 +108,7 @@ impl Closed {
 
     /// Longest side of a triangle, steps of the lattice.
     pub(super) fn longest_side(&self, triangle: u32) -> f64 {
-        let corners = self.shells.triangles[triangle as usize].map(|corner| self.places[corner as usize]);
+        let corners = self.shells.triangles[triangle as usize].map(|corner| self.grid_points[corner as usize]);
         let square = |k: usize| {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
             [0, 1, 2].map(|axis| f64::from(a[axis] - b[axis])).iter().map(|d| d * d).sum::<f64>()

@@ -9,16 +9,16 @@
 pub fn cubes(cells: [usize; 3], low: [f64; 3], size: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = cells.map(|n| n + 1);
     assert!(nx.saturating_mul(ny).saturating_mul(nz) < 1 << 32, "{cells:?} are too many cubes");
-    let place = |axis: usize, k: usize| low[axis] + size[axis] * k as f64 / cells[axis].max(1) as f64;
+    let coordinate = |axis: usize, k: usize| low[axis] + size[axis] * k as f64 / cells[axis].max(1) as f64;
     let in_order =
         |[x, y, z]: [usize; 3]| (0..z).flat_map(move |z| (0..y).flat_map(move |y| (0..x).map(move |x| [x, y, z])));
-    let points = in_order([nx, ny, nz]).map(|at| [0, 1, 2].map(|axis| place(axis, at[axis]))).collect();
+    let points = in_order([nx, ny, nz]).map(|at| [0, 1, 2].map(|axis| coordinate(axis, at[axis]))).collect();
     // Bits of a corner say along which axes it is the farther one; the six ways from 0 to 7 along edges.
-    let ways = [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]];
+    let paths = [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]];
     let tets = in_order(cells).flat_map(|[x, y, z]| {
         let corner =
             move |bits: usize| ((x + (bits & 1)) + nx * ((y + (bits >> 1 & 1)) + ny * (z + (bits >> 2)))) as u32;
-        ways.map(|[a, b]| [0, a, b, 7].map(corner))
+        paths.map(|[a, b]| [0, a, b, 7].map(corner))
     });
     (points, tets.collect())
 }

@@ -10,8 +10,8 @@
 //! they are one piece, and its boundary sees the place and, spheres being open, lies with no face on a plane with it, so
 //! joined to it makes positive tets.
 
-use super::lattice::Place;
-use super::order::insertion_order;
+use super::grid::GridPoint;
+use super::insertion_order::insertion_order;
 use super::predicates::{At, in_sphere, orient};
 
 /// What [`delaunay`] returns.
@@ -29,15 +29,15 @@ pub struct Delaunay {
 pub const NONE: u32 = u32::MAX;
 
 /// The Delaunay tets of `places`, whose coordinates lie from 0 to [`super::lattice::SIDE`].
-pub fn delaunay(places: &[Place]) -> Delaunay {
-    let mut order = insertion_order(places);
-    let Some(first) = first_tet(places, &order) else { return Delaunay::default() };
+pub fn delaunay(points: &[GridPoint]) -> Delaunay {
+    let mut order = insertion_order(points);
+    let Some(first) = first_tet(points, &order) else { return Delaunay::default() };
     // The first tet's corners are inserted before all else.
-    for (k, place) in first.into_iter().enumerate() {
-        let found = order.iter().position(|index| *index == place).expect("the corners are places");
+    for (k, point) in first.into_iter().enumerate() {
+        let found = order.iter().position(|index| *index == point).expect("the corners are places");
         order[k..=found].rotate_right(1);
     }
-    let mut complex = Complex::of(places, &order);
+    let mut complex = Complex::of(points, &order);
     let mut doubled = Vec::new();
     for vertex in 5..=order.len() as u32 {
         if let Some(earlier) = complex.insert(vertex) {
@@ -48,8 +48,8 @@ pub fn delaunay(places: &[Place]) -> Delaunay {
 }
 
 /// Four places that are the corners of a positive tet, the earliest that are in `order`.
-fn first_tet(places: &[Place], order: &[u32]) -> Option<[u32; 4]> {
-    let at = |index: &u32| At::from(places[*index as usize].map(f64::from));
+fn first_tet(points: &[GridPoint], order: &[u32]) -> Option<[u32; 4]> {
+    let at = |index: &u32| At::from(points[*index as usize].map(f64::from));
     let mut rest = order.iter();
     let a = rest.next()?;
     let b = rest.find(|b| at(b) != at(a))?;
@@ -108,9 +108,9 @@ struct Complex {
 
 impl Complex {
     /// The tet of the first four places, and its four ghosts.
-    fn of(places: &[Place], order: &[u32]) -> Self {
+    fn of(points: &[GridPoint], order: &[u32]) -> Self {
         let mut at = vec![At::zeros()];
-        at.extend(order.iter().map(|index| At::from(places[*index as usize].map(f64::from))));
+        at.extend(order.iter().map(|index| At::from(points[*index as usize].map(f64::from))));
         let vertices = at.len();
         let mut complex = Self {
             at,
@@ -195,8 +195,8 @@ impl Complex {
         let mut entered = 4;
         loop {
             let corners = self.corners[tet as usize];
-            let places = self.of_vertices(corners);
-            let through = (0..4).find(|corner| *corner != entered && side(places, *corner, p) < 0.0);
+            let points = self.of_vertices(corners);
+            let through = (0..4).find(|corner| *corner != entered && side(points, *corner, p) < 0.0);
             let Some(corner) = through else { return tet };
             let face = self.across[tet as usize][corner];
             (tet, entered) = (face / 4, face as usize % 4);

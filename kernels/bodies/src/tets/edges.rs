@@ -24,19 +24,19 @@ pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
 /// Those of `edges` that are no edge of a tet, in their order.
 pub fn missing_edges(edges: &[[u32; 2]], tets: &[[u32; 4]]) -> Vec<[u32; 2]> {
     let points = edges.as_flattened().iter().max().map_or(0, |highest| *highest as usize + 1);
-    let around = Around::new(points, tets);
+    let around = TetsAround::new(points, tets);
     edges.par_iter().filter(|edge| !around.has(*edge)).copied().collect()
 }
 
 /// The tets around each of the first points.
-pub(super) struct Around<'a> {
+pub(super) struct TetsAround<'a> {
     tets: &'a [[u32; 4]],
     /// First entry in `members` of each point, and their number at the end.
     starts: Vec<u32>,
     members: Vec<u32>,
 }
 
-impl<'a> Around<'a> {
+impl<'a> TetsAround<'a> {
     pub(super) fn new(points: usize, tets: &'a [[u32; 4]]) -> Self {
         let mut starts = vec![0_u32; points + 1];
         for corner in tets.as_flattened().iter().filter(|corner| (**corner as usize) < points) {

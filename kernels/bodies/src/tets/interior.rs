@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-use super::closed::Closed;
-use super::lattice::{Place, SIDE};
+use super::closed::ClosedSurface;
+use super::grid::{GridPoint, SIDE};
 use super::winding::Winding;
 use numerics::random::Key;
 
@@ -32,22 +32,23 @@ const SEED: u64 = 0xbcc;
 
 /// A point inside of a body.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inner {
-    pub(super) place: Place,
+pub(super) struct InteriorPoint {
+    pub(super) grid_point: GridPoint,
     /// No surface is nearer than this, in steps of the lattice.
     pub(super) clear: f32,
     pub(super) body: u32,
 }
 
 /// All points of the lattice with edges `spacing` (steps) long on average that are inside of a body.
-pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<Inner> {
-    if closed.places.is_empty() {
+pub(super) fn interior(closed: &ClosedSurface, winding: &Winding, spacing: f64) -> Vec<InteriorPoint> {
+    if closed.grid_points.is_empty() {
         return Vec::new();
     }
     let side = SIDE_BY_EDGE * spacing;
-    let (low, high) = closed.places.iter().fold(([SIDE; 3], [0; 3]), |(low, high): (Place, Place), place| {
-        ([0, 1, 2].map(|k| low[k].min(place[k])), [0, 1, 2].map(|k| high[k].max(place[k])))
-    });
+    let (low, high) =
+        closed.grid_points.iter().fold(([SIDE; 3], [0; 3]), |(low, high): (GridPoint, GridPoint), grid_point| {
+            ([0, 1, 2].map(|k| low[k].min(grid_point[k])), [0, 1, 2].map(|k| high[k].max(grid_point[k])))
+        });
     // Cubes to either side of the bounds' middle, so that what is symmetric is cut so.
     let reach = [0, 1, 2].map(|k| (0.5 * f64::from(high[k] - low[k]) / side).ceil() as i64);
     let middle = [0, 1, 2].map(|k| 0.5 * f64::from(high[k] + low[k]));
@@ -64,12 +65,12 @@ pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<
                 if !(0..3).all(|k| at[k] >= f64::from(low[k]) && at[k] <= f64::from(high[k])) {
                     continue;
                 }
-                let place = at.map(|x| x.round_ties_even() as i32);
-                winding.around(place.map(i64::from), 1, &mut tally);
+                let grid_point = at.map(|x| x.round_ties_even() as i32);
+                winding.around(grid_point.map(i64::from), 1, &mut tally);
                 let Some(body) = closed.body(&tally) else { continue };
-                let (clear, needed) = clearance(closed, place, spacing);
+                let (clear, needed) = clearance(closed, grid_point, spacing);
                 if clear >= needed {
-                    found.push(Inner { place, clear: clear as f32, body });
+                    found.push(InteriorPoint { grid_point, clear: clear as f32, body });
                 }
             }
         }
@@ -79,9 +80,9 @@ pub(super) fn interior(closed: &Closed, winding: &Winding, spacing: f64) -> Vec<
 }
 
 /// Distance of a place from the surface, as far as it matters, and how much it should be. Steps.
-fn clearance(closed: &Closed, place: Place, spacing: f64) -> (f64, f64) {
+fn clearance(closed: &ClosedSurface, grid_point: GridPoint, spacing: f64) -> (f64, f64) {
     let reach = SIDE_BY_EDGE.max(CLEAR * LONGEST) * spacing;
-    match closed.tree.closest(place.map(|x| x as f32), reach as f32) {
+    match closed.tree.closest(grid_point.map(|x| x as f32), reach as f32) {
         None => (reach, CLEAR * spacing),
         Some(found) => {
             let side = closed.longest_side(found.triangle);

@@ -15,29 +15,29 @@
 
 mod boundary;
 mod closed;
-mod cross;
 mod cubes;
 mod delaunay;
 mod edges;
-mod fault;
+pub mod grid;
+mod insertion_order;
 mod interior;
-pub mod lattice;
-mod order;
 mod predicates;
 mod quality;
 mod repair;
+mod self_crossing;
 mod shells;
 mod solid;
+mod surface_fault;
 mod winding;
 
-pub use boundary::{Face, boundary};
-pub use closed::Closed;
+pub use boundary::{BoundaryFace, boundary};
+pub use closed::ClosedSurface;
 pub use cubes::cubes;
 pub use delaunay::{Delaunay, NONE, delaunay};
 pub use edges::{edges, missing_edges};
-pub use fault::Fault;
-pub use repair::{Changes, Surface};
-pub use solid::{Fill, Measured, SLIVER, Side, Solid};
+pub use repair::{PolygonSurface, RepairCounts};
+pub use solid::{FillQuality, FillSettings, SLIVER, ShellSide, TetMesh};
+pub use surface_fault::SurfaceFault;
 
 #[cfg(test)]
 mod tests;

@@ -6,12 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use super::fault::Fault;
-use super::lattice::Place;
+use super::grid::GridPoint;
+use super::surface_fault::SurfaceFault;
 
 /// A mesh's polygons.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface<'a> {
+pub struct PolygonSurface<'a> {
     /// First corner of each face, and the number of corners at the end.
     pub starts: &'a [u32],
     /// Point of each corner, counter-clockwise from outside.
@@ -22,7 +22,7 @@ pub struct Surface<'a> {
 
 /// What was changed to bring a surface into order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Changes {
+pub struct RepairCounts {
     /// Points joined with another at their place.
     pub joined_points: usize,
     /// Points that had no face, or lost it.
@@ -35,7 +35,7 @@ pub struct Changes {
     pub turned_faces: usize,
 }
 
-impl Changes {
+impl RepairCounts {
     /// Whether nothing was changed.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
@@ -76,13 +76,17 @@ impl Polygons {
     }
 
     /// Every side of every polygon: its ends, the lower first; the polygon; whether it runs from the lower. Sorted.
-    pub(super) fn sides(&self) -> Vec<Side> {
+    pub(super) fn sides(&self) -> Vec<PolygonSide> {
         let mut sides = Vec::with_capacity(self.corners.len());
         for polygon in 0..self.len() {
             let corners = self.get(polygon);
             for (k, &from) in corners.iter().enumerate() {
                 let to = corners[(k + 1) % corners.len()];
-                sides.push(Side { ends: [from.min(to), from.max(to)], polygon: polygon as u32, rises: from < to });
+                sides.push(PolygonSide {
+                    ends: [from.min(to), from.max(to)],
+                    polygon: polygon as u32,
+                    rises: from < to,
+                });
             }
         }
         sides.sort_unstable();
@@ -92,70 +96,75 @@ impl Polygons {
 
 /// A side of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Side {
+pub(super) struct PolygonSide {
     pub(super) ends: [u32; 2],
     pub(super) polygon: u32,
     pub(super) rises: bool,
 }
 
 /// The surface in order, or the first thing that is not where `safe` repairs are not asked for.
-pub(super) fn in_order(surface: &Surface, places: &[Place], safe: bool) -> Result<(Polygons, Changes), Fault> {
+pub(super) fn repaired_polygons(
+    surface: &PolygonSurface,
+    grid_points: &[GridPoint],
+    safe: bool,
+) -> Result<(Polygons, RepairCounts), SurfaceFault> {
     let mut polygons = Polygons::empty();
     for (face, run) in surface.starts.windows(2).enumerate() {
         polygons.push(&surface.corners[run[0] as usize..run[1] as usize], face as u32);
     }
-    let mut changes = Changes::default();
+    let mut changes = RepairCounts::default();
     polygons = tidied(polygons, safe, &mut changes)?;
-    if let Some(onto) = joins(&polygons, places) {
-        let moved: Vec<u32> = (0..places.len() as u32).filter(|point| onto[*point as usize] != *point).collect();
+    if let Some(onto) = joins(&polygons, grid_points) {
+        let moved: Vec<u32> = (0..grid_points.len() as u32).filter(|point| onto[*point as usize] != *point).collect();
         if let Some(&point) = moved.first().filter(|_| !safe) {
-            return Err(Fault::Doubled { points: [onto[point as usize], point], count: moved.len() });
+            return Err(SurfaceFault::DuplicatePoint { points: [onto[point as usize], point], count: moved.len() });
         }
         changes.joined_points = moved.len();
         polygons.corners.iter_mut().for_each(|corner| *corner = onto[*corner as usize]);
         polygons = tidied(polygons, safe, &mut changes)?;
     }
-    let mut used = vec![false; places.len()];
+    let mut used = vec![false; grid_points.len()];
     polygons.corners.iter().for_each(|corner| used[*corner as usize] = true);
     let loose = used.iter().filter(|used| !**used).count() - changes.joined_points;
     if let Some(point) = used.iter().position(|used| !used).filter(|_| !safe) {
-        return Err(Fault::Loose { point: point as u32, count: loose });
+        return Err(SurfaceFault::UnusedPoint { point: point as u32, count: loose });
     }
     changes.loose_points = loose;
     Ok((polygons, changes))
 }
 
 /// Polygons of three points or more, none on another's points.
-fn tidied(polygons: Polygons, safe: bool, changes: &mut Changes) -> Result<Polygons, Fault> {
+fn tidied(polygons: Polygons, safe: bool, changes: &mut RepairCounts) -> Result<Polygons, SurfaceFault> {
     let before = polygons.len();
     let (polygons, trimmed) = trimmed(polygons);
     if let Some(&face) = trimmed.first().filter(|_| !safe) {
-        return Err(Fault::Degenerate { face, count: trimmed.len() });
+        return Err(SurfaceFault::Degenerate { face, count: trimmed.len() });
     }
     changes.trimmed_faces += trimmed.len() - (before - polygons.len());
     let (polygons, pairs) = once_each(polygons);
     if let Some(&faces) = pairs.first().filter(|_| !safe) {
-        return Err(Fault::Twice { faces, count: pairs.len() });
+        return Err(SurfaceFault::DuplicateFace { faces, count: pairs.len() });
     }
     changes.dropped_faces += before - polygons.len();
     Ok(polygons)
 }
 
 /// Which point each is joined to; `None` where no two are at one place.
-fn joins(polygons: &Polygons, places: &[Place]) -> Option<Vec<u32>> {
-    let mut order: Vec<u32> = (0..places.len() as u32).collect();
-    order.sort_unstable_by_key(|point| (places[*point as usize], *point));
-    let heaps = order.chunk_by(|a, b| places[*a as usize] == places[*b as usize]).filter(|heap| heap.len() > 1);
+fn joins(polygons: &Polygons, grid_points: &[GridPoint]) -> Option<Vec<u32>> {
+    let mut order: Vec<u32> = (0..grid_points.len() as u32).collect();
+    order.sort_unstable_by_key(|point| (grid_points[*point as usize], *point));
+    let heaps =
+        order.chunk_by(|a, b| grid_points[*a as usize] == grid_points[*b as usize]).filter(|heap| heap.len() > 1);
     let heaps: Vec<&[u32]> = heaps.collect();
     if heaps.is_empty() {
         return None;
     }
-    let mut open = vec![false; places.len()];
+    let mut open = vec![false; grid_points.len()];
     for sides in polygons.sides().chunk_by(|a, b| a.ends == b.ends).filter(|sides| sides.len() != 2) {
         sides[0].ends.iter().for_each(|end| open[*end as usize] = true);
     }
     // Which points hang together once the open ones are joined.
-    let mut pieces = Pieces::new(places.len());
+    let mut pieces = SignedUnionFind::new(grid_points.len());
     for heap in &heaps {
         heap.iter().filter(|point| open[**point as usize]).fold(None, |first: Option<u32>, point| {
             first.inspect(|first| pieces.join(*first, *point, false).unwrap_or(())).or(Some(*point))
@@ -165,7 +174,7 @@ fn joins(polygons: &Polygons, places: &[Place]) -> Option<Vec<u32>> {
         let corners = polygons.get(polygon);
         corners.iter().for_each(|corner| pieces.join(corners[0], *corner, false).unwrap_or(()));
     }
-    let mut onto: Vec<u32> = (0..places.len() as u32).collect();
+    let mut onto: Vec<u32> = (0..grid_points.len() as u32).collect();
     for heap in heaps {
         let mut first_of = BTreeMap::new();
         for point in heap {
@@ -252,12 +261,12 @@ fn once_each(polygons: Polygons) -> (Polygons, Vec<[u32; 2]>) {
 }
 
 /// Things that hang together, and which of them are turned against the others.
-pub(super) struct Pieces {
+pub(super) struct SignedUnionFind {
     /// Another of the same piece, lower or itself; whether this one is turned against it.
     towards: Vec<(u32, bool)>,
 }
 
-impl Pieces {
+impl SignedUnionFind {
     pub(super) fn new(count: usize) -> Self {
         Self { towards: (0..count as u32).map(|k| (k, false)).collect() }
     }

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::fault::Fault;
-use super::lattice::Place;
-use super::repair::{Changes, Pieces, Polygons, Side};
+use super::grid::GridPoint;
+use super::repair::{PolygonSide, Polygons, RepairCounts, SignedUnionFind};
+use super::surface_fault::SurfaceFault;
 use super::winding::Winding;
 use numerics::triangulate::triangulate;
 
@@ -33,28 +33,28 @@ pub(super) struct Shells {
 ///
 /// # Errors
 /// Where an edge has not two faces, or a shell has one side only.
-pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>, Fault> {
+pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>, SurfaceFault> {
     let sides = polygons.sides();
     let edges = || sides.chunk_by(|a, b| a.ends == b.ends);
-    let face = |side: &Side| polygons.faces[side.polygon as usize];
+    let face = |side: &PolygonSide| polygons.faces[side.polygon as usize];
     if let Some(crowded) = edges().find(|sides| sides.len() > 2) {
         let count = edges().filter(|sides| sides.len() > 2).count();
-        return Err(Fault::Crowded { points: crowded[0].ends, faces: crowded.len(), count });
+        return Err(SurfaceFault::NonManifoldEdge { points: crowded[0].ends, faces: crowded.len(), count });
     }
     if let Some(open) = edges().find(|sides| sides.len() < 2) {
         let count = edges().filter(|sides| sides.len() < 2).count();
-        return Err(Fault::Open { points: open[0].ends, face: face(&open[0]), count });
+        return Err(SurfaceFault::OpenEdge { points: open[0].ends, face: face(&open[0]), count });
     }
-    let mut pieces = Pieces::new(polygons.len());
-    let turned = |sides: &[Side]| sides[0].rises == sides[1].rises;
+    let mut pieces = SignedUnionFind::new(polygons.len());
+    let turned = |sides: &[PolygonSide]| sides[0].rises == sides[1].rises;
     for sides in edges() {
         if pieces.join(sides[0].polygon, sides[1].polygon, turned(sides)).is_err() {
-            return Err(Fault::OneSided { face: polygons.faces[pieces.root(sides[0].polygon).0 as usize] });
+            return Err(SurfaceFault::NonOrientable { face: polygons.faces[pieces.root(sides[0].polygon).0 as usize] });
         }
     }
     if let Some(pair) = edges().find(|sides| !safe && turned(sides)) {
         let count = edges().filter(|sides| turned(sides)).count();
-        return Err(Fault::Turned { faces: [face(&pair[0]), face(&pair[1])], count });
+        return Err(SurfaceFault::InconsistentOrientation { faces: [face(&pair[0]), face(&pair[1])], count });
     }
     let mut number = vec![u32::MAX; polygons.len()];
     let mut count = 0;
@@ -79,8 +79,8 @@ impl Shells {
         polygons: &Polygons,
         pieces: &mut [(u32, bool)],
         points: &[[f32; 3]],
-        places: &[Place],
-    ) -> Result<Self, Fault> {
+        grid_points: &[GridPoint],
+    ) -> Result<Self, SurfaceFault> {
         let cut = |polygon: usize| {
             let corners = polygons.get(polygon);
             let at: Vec<[f32; 3]> = corners.iter().map(|corner| points[*corner as usize]).collect();
@@ -98,10 +98,10 @@ impl Shells {
         shells.turn(pieces);
         let mut volumes = vec![0_i128; count];
         for (triangle, shell) in shells.triangles.iter().zip(&shells.shell_of) {
-            volumes[*shell as usize] += wedge(triangle.map(|corner| places[corner as usize]));
+            volumes[*shell as usize] += wedge(triangle.map(|corner| grid_points[corner as usize]));
         }
         if let Some(flat) = volumes.iter().position(|volume| *volume == 0) {
-            return Err(Fault::Flat { face: shells.first_face(flat, polygons) });
+            return Err(SurfaceFault::NoVolume { face: shells.first_face(flat, polygons) });
         }
         shells.turn_whole(pieces, |shell| volumes[shell as usize] < 0);
         Ok(shells)
@@ -132,20 +132,20 @@ impl Shells {
     }
 
     /// Finds which shells lie in which and turns the walls of cavities, so that each looks away from the body it bounds.
-    pub(super) fn nest(&mut self, pieces: &mut [(u32, bool)], places: &[Place]) {
-        let within = self.within(places);
+    pub(super) fn nest(&mut self, pieces: &mut [(u32, bool)], grid_points: &[GridPoint]) {
+        let within = self.within(grid_points);
         for (shell, others) in self.all.iter_mut().zip(&within) {
             shell.depth = others.len() as u32;
         }
         // The wall of a cavity bounds the body of the deepest shell around it; shells of one depth that share a point,
         // theirs together.
-        let mut bodies = Pieces::new(self.all.len());
+        let mut bodies = SignedUnionFind::new(self.all.len());
         let depth = |shell: u32| within[shell as usize].len();
         for (shell, others) in within.iter().enumerate().filter(|(_, others)| others.len() % 2 == 1) {
             let around = others.iter().find(|other| depth(**other) + 1 == others.len());
             around.inspect(|around| bodies.join(shell as u32, **around, false).unwrap_or(()));
         }
-        let mut shell_at = vec![u32::MAX; places.len()];
+        let mut shell_at = vec![u32::MAX; grid_points.len()];
         for (triangle, shell) in self.triangles.iter().zip(&self.shell_of) {
             for corner in triangle {
                 let other = std::mem::replace(&mut shell_at[*corner as usize], *shell);
@@ -167,7 +167,7 @@ impl Shells {
     }
 
     /// The shells that each shell lies in: where most of some of its triangles' middles are.
-    fn within(&self, places: &[Place]) -> Vec<Vec<u32>> {
+    fn within(&self, grid_points: &[GridPoint]) -> Vec<Vec<u32>> {
         const SAMPLES: usize = 31;
         if self.all.len() < 2 {
             return vec![Vec::new(); self.all.len()];
@@ -176,14 +176,15 @@ impl Shells {
         for (triangle, shell) in self.shell_of.iter().enumerate() {
             of_shell[*shell as usize].push(triangle as u32);
         }
-        let winding = Winding::new(places, &self.triangles, &self.shell_of);
+        let winding = Winding::new(grid_points, &self.triangles, &self.shell_of);
         let within = |(shell, members): (usize, &Vec<u32>)| {
             let (mut found, mut tally) = (Vec::new(), Vec::new());
             let stride = members.len().div_ceil(SAMPLES);
             let samples = members.iter().step_by(stride);
             let taken = samples.len();
             for member in samples {
-                let corners = self.triangles[*member as usize].map(|corner| places[corner as usize].map(i64::from));
+                let corners =
+                    self.triangles[*member as usize].map(|corner| grid_points[corner as usize].map(i64::from));
                 let sum = [0, 1, 2].map(|k| corners[0][k] + corners[1][k] + corners[2][k]);
                 winding.around(sum, 3, &mut tally);
                 found.extend(tally.iter().map(|(other, _)| *other).filter(|other| *other as usize != shell));
@@ -206,7 +207,7 @@ impl Shells {
 }
 
 /// Six times the volume between a triangle and the lattice's lowest place.
-fn wedge(corners: [Place; 3]) -> i128 {
+fn wedge(corners: [GridPoint; 3]) -> i128 {
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let term = |i: usize, j: usize, k: usize| i128::from(a[i]) * i128::from(b[j] * c[k] - b[k] * c[j]);
     term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)
@@ -218,8 +219,8 @@ pub(super) fn turned(
     pieces: &[(u32, bool)],
     shells: &Shells,
     safe: bool,
-    changes: &mut Changes,
-) -> Result<(), Fault> {
+    changes: &mut RepairCounts,
+) -> Result<(), SurfaceFault> {
     changes.turned_faces = pieces.iter().filter(|(_, turned)| *turned).count();
     let Some(first) = pieces.iter().position(|(_, turned)| *turned).filter(|_| !safe) else { return Ok(()) };
     let mut wrong: Vec<u32> = pieces.iter().filter(|(_, turned)| *turned).map(|(shell, _)| *shell).collect();
@@ -227,5 +228,5 @@ pub(super) fn turned(
     wrong.sort_unstable();
     wrong.dedup();
     let cavity = shells.all[pieces[first].0 as usize].depth % 2 == 1;
-    Err(Fault::InsideOut { face: polygons.faces[first], cavity, count: wrong.len() })
+    Err(SurfaceFault::InsideOut { face: polygons.faces[first], cavity, count: wrong.len() })
 }

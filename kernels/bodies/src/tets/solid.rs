@@ -5,18 +5,18 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::closed::Closed;
+use super::closed::ClosedSurface;
 use super::delaunay;
-use super::edges::Around;
-use super::fault::Fault;
-use super::interior::{Inner, POINTS_A_CUBE, SIDE_BY_EDGE, interior};
-use super::lattice::Place;
+use super::edges::TetsAround;
+use super::grid::GridPoint;
+use super::interior::{InteriorPoint, POINTS_A_CUBE, SIDE_BY_EDGE, interior};
 use super::quality::{Measure, measure};
-use super::winding::{Tally, Winding};
+use super::surface_fault::SurfaceFault;
+use super::winding::{Winding, WindingCounts};
 
 /// How to fill a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fill {
+pub struct FillSettings {
     /// Mean length of edges between interior points, metres; 0 for the surface's own.
     pub spacing: f64,
     /// Whether there are interior points.
@@ -25,7 +25,7 @@ pub struct Fill {
 
 /// On which kind of shell a point is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum ShellSide {
     /// None: inside a body.
     Interior,
     /// The outside of a body.
@@ -36,11 +36,11 @@ pub enum Side {
 
 /// Bodies of tets.
 #[derive(Clone, Debug)]
-pub struct Solid {
+pub struct TetMesh {
     /// The surface's points, in their order, then the interior ones. Metres.
     pub points: Vec<[f32; 3]>,
     /// Where each point is.
-    pub sides: Vec<Side>,
+    pub sides: Vec<ShellSide>,
     /// Points of each tet, so that its face across from a corner, seen from outside, runs the way its neighbour's does
     /// not: (b−a)×(c−a)·(d−a) > 0, but for slivers, which rounding to f32 may have turned over.
     pub tets: Vec<[u32; 4]>,
@@ -49,12 +49,12 @@ pub struct Solid {
     /// Whether each tet is too flat to say anything of volume: quality below [`SLIVER`].
     pub slivers: Vec<bool>,
     /// What was measured.
-    pub measured: Measured,
+    pub measured: FillQuality,
 }
 
 /// What was measured of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
+pub struct FillQuality {
     /// Smallest angle between two faces of a tet that is no sliver, radians; 0 without tets.
     pub min_dihedral: f64,
     /// Median quality of all tets: 3 × inner radius ÷ outer radius, 1 for regular ones; 0 without tets.
@@ -80,15 +80,15 @@ const MOST_POINTS: f64 = (1 << 22) as f64;
 /// Lattice points that may be looked at for it.
 const MOST_TRIED: f64 = (1 << 27) as f64;
 
-impl Closed {
+impl ClosedSurface {
     /// The surface's inside as tets, Delaunay in its points and, where asked for, points inside.
     ///
     /// # Errors
     /// Where the spacing would make more points than memory is for, or two shells overlap.
-    pub fn fill(&self, fill: &Fill) -> Result<Solid, Fault> {
-        let winding = Winding::new(&self.places, &self.shells.triangles, &self.shells.shell_of);
+    pub fn fill(&self, fill: &FillSettings) -> Result<TetMesh, SurfaceFault> {
+        let winding = Winding::new(&self.grid_points, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
-        let carved = Carved { closed: self, winding: &winding, inner: &inner };
+        let carved = Carving { closed: self, winding: &winding, inner: &inner };
         let bodies: Vec<Vec<[u32; 4]>> = carved
             .members()
             .into_par_iter()
@@ -100,39 +100,40 @@ impl Closed {
     }
 
     /// The spacing in steps of the lattice.
-    fn spacing(&self, asked: f64) -> Result<f64, Fault> {
+    fn spacing(&self, asked: f64) -> Result<f64, SurfaceFault> {
         let spacing = if asked > 0.0 { asked } else { self.mean_edge() };
         let side = SIDE_BY_EDGE * spacing;
         let cubes = |volume: f64| POINTS_A_CUBE * volume / (side * side * side);
         let extent = |k: usize| {
-            let (low, high) = self.places.iter().fold((i32::MAX, 0), |(low, high), p| (low.min(p[k]), high.max(p[k])));
-            f64::from(high - low.min(high)) * self.lattice.step()
+            let (low, high) =
+                self.grid_points.iter().fold((i32::MAX, 0), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+            f64::from(high - low.min(high)) * self.grid.step()
         };
         let (points, tried) = (cubes(self.volume()), cubes(extent(0) * extent(1) * extent(2)));
         match points > MOST_POINTS || tried > MOST_TRIED {
-            true => Err(Fault::TooMany { spacing, points, most: MOST_POINTS }),
-            false => Ok(spacing / self.lattice.step()),
+            true => Err(SurfaceFault::TooManyPoints { spacing, points, most: MOST_POINTS }),
+            false => Ok(spacing / self.grid.step()),
         }
     }
 
     /// The body around a point, given how shells wind around it. `None` outside and in cavities.
-    pub(super) fn body(&self, tally: &Tally) -> Option<u32> {
+    pub(super) fn body(&self, tally: &WindingCounts) -> Option<u32> {
         let depth = |shell: &u32| self.shells.all[*shell as usize].depth;
         let deepest = tally.iter().map(|(shell, _)| *shell).max_by_key(depth)?;
         (depth(&deepest) % 2 == 0).then(|| self.shells.all[deepest as usize].body)
     }
 
-    fn solid(&self, inner: &[Inner], tets: Vec<[u32; 4]>, bodies: Vec<u32>) -> Solid {
+    fn solid(&self, inner: &[InteriorPoint], tets: Vec<[u32; 4]>, bodies: Vec<u32>) -> TetMesh {
         let mut points = self.points.clone();
         let outward = |shell: &u32| match self.shells.all[*shell as usize].depth % 2 {
-            0 => Side::Outer,
-            _ => Side::Inner,
+            0 => ShellSide::Outer,
+            _ => ShellSide::Inner,
         };
-        let mut sides: Vec<Side> = self.shell_of.iter().map(outward).collect();
-        points.extend(inner.iter().map(|inner| self.lattice.point(inner.place.map(f64::from)).map(|x| x as f32)));
-        sides.resize(points.len(), Side::Interior);
+        let mut sides: Vec<ShellSide> = self.shell_of.iter().map(outward).collect();
+        points.extend(inner.iter().map(|inner| self.grid.point(inner.grid_point.map(f64::from)).map(|x| x as f32)));
+        sides.resize(points.len(), ShellSide::Interior);
         // In steps, so that no square of a length is too large or too small.
-        let step = self.lattice.step();
+        let step = self.grid.step();
         let steps = |corner: &u32| to_f64(points[*corner as usize]) / step;
         let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
         let slivers: Vec<bool> = measures.iter().map(|tet| !(tet.volume > 0.0 && tet.quality >= SLIVER)).collect();
@@ -140,20 +141,20 @@ impl Closed {
         let sharpest = measures.iter().zip(&slivers).filter(|(_, sliver)| !**sliver);
         let sharpest = sharpest.map(|(tet, _)| tet.sharpest).fold(-1.0, f64::max);
         let all = self.volume();
-        let mut measured = Measured {
+        let mut measured = FillQuality {
             min_dihedral: if sharpest > -1.0 { libm::acos(sharpest) } else { 0.0 },
             quality_median: median(measures.iter().map(|tet| tet.quality).collect()),
             volume_error: if all > 0.0 { (volume - all).abs() / all } else { 0.0 },
             slivers: slivers.iter().filter(|sliver| **sliver).count(),
-            ..Measured::default()
+            ..FillQuality::default()
         };
         self.compare(&tets, &mut measured);
-        Solid { points, sides, tets, bodies, slivers, measured }
+        TetMesh { points, sides, tets, bodies, slivers, measured }
     }
 
     /// Counts what tets lack of the surface.
-    fn compare(&self, tets: &[[u32; 4]], measured: &mut Measured) {
-        let around = Around::new(self.points.len(), tets);
+    fn compare(&self, tets: &[[u32; 4]], measured: &mut FillQuality) {
+        let around = TetsAround::new(self.points.len(), tets);
         measured.missing_edges = self.edges().par_iter().filter(|edge| !around.has(*edge)).count();
         measured.bare_points = (0..self.points.len() as u32).filter(|point| around.of(*point).is_empty()).count();
         let mut first = 0;
@@ -176,13 +177,13 @@ impl Closed {
 }
 
 /// What carving bodies out of their convex hulls needs to know.
-struct Carved<'a> {
-    closed: &'a Closed,
+struct Carving<'a> {
+    closed: &'a ClosedSurface,
     winding: &'a Winding<'a>,
-    inner: &'a [Inner],
+    inner: &'a [InteriorPoint],
 }
 
-impl Carved<'_> {
+impl Carving<'_> {
     /// The points of each body, rising.
     fn members(&self) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.closed.bodies];
@@ -195,14 +196,15 @@ impl Carved<'_> {
 
     /// Tets of a body: those of its points alone, so what comes near it has no part in it. Cut out of their hull by
     /// where the middle of each tet is.
-    fn body(&self, body: u32, points: &[u32]) -> Result<Vec<[u32; 4]>, Fault> {
+    fn body(&self, body: u32, points: &[u32]) -> Result<Vec<[u32; 4]>, SurfaceFault> {
         let inner = |point: u32| (point as usize).checked_sub(self.closed.points.len()).map(|k| &self.inner[k]);
-        let place =
-            |point: &u32| inner(*point).map_or_else(|| self.closed.places[*point as usize], |inner| inner.place);
-        let places: Vec<Place> = points.iter().map(place).collect();
-        let mut tets = delaunay(&places).tets;
-        let is_inside = |tally: &mut Tally, tet: &[u32; 4]| {
-            let corners = tet.map(|corner| places[corner as usize].map(i64::from));
+        let grid_point = |point: &u32| {
+            inner(*point).map_or_else(|| self.closed.grid_points[*point as usize], |inner| inner.grid_point)
+        };
+        let grid_points: Vec<GridPoint> = points.iter().map(grid_point).collect();
+        let mut tets = delaunay(&grid_points).tets;
+        let is_inside = |tally: &mut WindingCounts, tet: &[u32; 4]| {
+            let corners = tet.map(|corner| grid_points[corner as usize].map(i64::from));
             let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<i64>());
             // No surface is between an interior point and what is nearer to it than the surface.
             let near = |(corner, at): (&u32, &[i64; 3])| {
@@ -220,12 +222,12 @@ impl Carved<'_> {
                 0 => Ok(false),
                 1 => Ok(self.closed.body(tally) == Some(body)),
                 _ => {
-                    let at = self.closed.lattice.point(middle.map(|x| 0.25 * x as f64));
-                    Err(Fault::Overlap { at: at.map(|x| x as f32) })
+                    let at = self.closed.grid.point(middle.map(|x| 0.25 * x as f64));
+                    Err(SurfaceFault::SelfOverlap { at: at.map(|x| x as f32) })
                 }
             }
         };
-        let inside: Vec<Result<bool, Fault>> = tets.par_iter().map_init(Vec::new, is_inside).collect();
+        let inside: Vec<Result<bool, SurfaceFault>> = tets.par_iter().map_init(Vec::new, is_inside).collect();
         let inside: Vec<bool> = inside.into_iter().collect::<Result<_, _>>()?;
         let mut next = inside.iter();
         tets.retain(|_| *next.next().expect("one answer a tet"));

@@ -5,11 +5,11 @@
 //! sums are of whole numbers; a ray through an edge passes one of its two triangles, as if it stood a little to the +x
 //! and still less to the +y.
 
-use super::lattice::{Place, SIDE};
+use super::grid::{GridPoint, SIDE};
 
 /// Triangles by the squares in x and y that they cover.
 pub(super) struct Winding<'a> {
-    places: &'a [Place],
+    grid_points: &'a [GridPoint],
     triangles: &'a [[u32; 3]],
     /// Shell of each triangle.
     shells: &'a [u32],
@@ -21,16 +21,16 @@ pub(super) struct Winding<'a> {
 }
 
 /// The shells that wind around a point, and how often.
-pub(super) type Tally = Vec<(u32, i32)>;
+pub(super) type WindingCounts = Vec<(u32, i32)>;
 
 /// Squares may hold this many entries a triangle in all.
 const MOST_ENTRIES: usize = 8;
 
 impl<'a> Winding<'a> {
-    pub(super) fn new(places: &'a [Place], triangles: &'a [[u32; 3]], shells: &'a [u32]) -> Self {
+    pub(super) fn new(grid_points: &'a [GridPoint], triangles: &'a [[u32; 3]], shells: &'a [u32]) -> Self {
         // About a square a triangle, wider where triangles are many squares wide.
         let mut bits = (usize::BITS - triangles.len().leading_zeros()) / 2;
-        let mut new = Self { places, triangles, shells, shift: 0, starts: Vec::new(), members: Vec::new() };
+        let mut new = Self { grid_points, triangles, shells, shift: 0, starts: Vec::new(), members: Vec::new() };
         loop {
             new.shift = SIDE.trailing_zeros() - bits;
             let entries: usize = triangles.iter().map(|triangle| new.squares(*triangle).count()).sum();
@@ -63,7 +63,7 @@ impl<'a> Winding<'a> {
 
     /// The squares of a triangle's bounds; none of one that is upright, which no ray towards z passes.
     fn squares(&self, triangle: [u32; 3]) -> impl Iterator<Item = usize> + use<> {
-        let [a, b, c] = triangle.map(|corner| self.places[corner as usize].map(i64::from));
+        let [a, b, c] = triangle.map(|corner| self.grid_points[corner as usize].map(i64::from));
         let upright = (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
         let low = |axis: usize| (a[axis].min(b[axis]).min(c[axis]) >> self.shift) as usize;
         let high = |axis: usize| (a[axis].max(b[axis]).max(c[axis]) >> self.shift) as usize;
@@ -73,12 +73,12 @@ impl<'a> Winding<'a> {
     }
 
     /// How often each shell winds around the point `sum` ÷ `parts`, a sum of up to 4 places.
-    pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut Tally) {
+    pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut WindingCounts) {
         tally.clear();
         let square = |axis: usize| ((sum[axis] / parts) >> self.shift) as usize;
         let square = square(1) * self.across() + square(0);
         for member in &self.members[self.starts[square] as usize..self.starts[square + 1] as usize] {
-            let corners = self.triangles[*member as usize].map(|corner| self.places[corner as usize]);
+            let corners = self.triangles[*member as usize].map(|corner| self.grid_points[corner as usize]);
             let passed = passed(corners, sum, parts);
             if passed != 0 {
                 let shell = self.shells[*member as usize];
@@ -93,7 +93,7 @@ impl<'a> Winding<'a> {
 }
 
 /// 1 where the ray from `sum` ÷ `parts` towards +z passes the triangle from behind, −1 from before, 0 past it.
-fn passed(corners: [Place; 3], sum: [i64; 3], parts: i64) -> i32 {
+fn passed(corners: [GridPoint; 3], sum: [i64; 3], parts: i64) -> i32 {
     // From each corner to the point, times `parts`.
     let to = corners.map(|corner| [0, 1, 2].map(|axis| sum[axis] - parts * i64::from(corner[axis])));
     let mut turn = 0;

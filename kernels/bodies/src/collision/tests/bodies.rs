@@ -1,7 +1,7 @@
 //! Bodies under the solver: what rests, and what is rolled over.
 
 use super::*;
-use crate::mass_spring::{Body, Frame, Material, Mesh, Solver, State};
+use crate::mass_spring::{BodySolver, Material, Mesh, SoftBody, SolverFrame, State};
 use crate::tets::{boundary, cubes};
 use numerics::masked::Masked;
 
@@ -17,10 +17,10 @@ fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
     (points, tets, outer)
 }
 
-fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> Body {
+fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> SoftBody {
     let plain = |value| Masked::uniform(value);
     let material = Material { density: plain(1000.0), stiffness: plain(stiffness), damping: plain(0.02) };
-    Body::new(&Mesh { points, tets, ..Mesh::default() }, &material, &[]).unwrap()
+    SoftBody::new(&Mesh { points, tets, ..Mesh::default() }, &material, &[]).unwrap()
 }
 
 #[test]
@@ -37,12 +37,12 @@ fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
     for (stiffness, side) in [(5e4, 0.1), (5e3, 0.02)] {
         let (points, tets, faces) = block([3, 3, 3], side, [0.03, 0.9 * thickness, 0.05]);
         let body = body(&points, &tets, stiffness);
-        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
-        let own = Some(Rub { thickness, friction: 0.5 });
-        let scene = Scene { skins: &skins, obstacles: &plate, own, ..Scene::default() };
-        let frame = Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() };
+        let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
+        let self_contact = Some(ContactParams { thickness, friction: 0.5 });
+        let scene = CollisionScene { skins: &skins, obstacles: &plate, self_contact, ..CollisionScene::default() };
+        let frame = SolverFrame { contacts: Some(&scene), seconds: FRAME, ..SolverFrame::default() };
         let mut state = State::at_rest(&body);
-        let mut solver = Solver::new(&body);
+        let mut solver = BodySolver::new(&body);
         for number in 0..240 {
             let report = solver.step(&body, &mut state, &frame);
             let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
@@ -81,13 +81,13 @@ fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
 }
 
 /// Frames of a block under the pin, moved on by `step` through each; gives the deepest in any.
-fn rolled_over(frames: u32, mut step: impl FnMut(&Scene<'_>) -> Vec<[f64; 3]>, skins: &[Skin]) -> f64 {
+fn rolled_over(frames: u32, mut step: impl FnMut(&CollisionScene<'_>) -> Vec<[f64; 3]>, skins: &[BodySkin]) -> f64 {
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: -THICKNESS, thickness: THICKNESS, friction: 0.8 });
     let mut worst = 0.0_f64;
     for frame in 0..frames {
         let [(from, faces), (to, _)] = [frame, frame + 1].map(|frame| rolling(f64::from(frame)));
         let pin = [Obstacle::new(&faces, &[pose(0.0, &from), pose(1.0, &to)], FRAME, THICKNESS, 0.3).unwrap()];
-        let points = step(&Scene { skins, obstacles: &pin, ground, ..Scene::default() });
+        let points = step(&CollisionScene { skins, obstacles: &pin, ground, ..CollisionScene::default() });
         worst = worst.max(deepest(&points, &to, &faces));
     }
     worst
@@ -96,10 +96,10 @@ fn rolled_over(frames: u32, mut step: impl FnMut(&Scene<'_>) -> Vec<[f64; 3]>, s
 #[test]
 fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
     let (points, _, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
-    let skins = [Skin::new(&points, &faces, &[]).unwrap()];
+    let skins = [BodySkin::new(&points, &faces, &[]).unwrap()];
     let mut now = points.clone();
     // Vertices that go where their contacts put them and nothing else moves.
-    let put = |scene: &Scene<'_>| {
+    let put = |scene: &CollisionScene<'_>| {
         let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
         contacts.retain(|contact| contact.weights[1] == 0.0);
         for _ in 0..50 {
@@ -122,11 +122,11 @@ fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
     // Steps in which the pin moves ten times its thickness, and such in which it moves less than that.
     for (stiffness, substeps) in [(2e4, 0), (5e3, 0), (2e4, 16)] {
         let body = body(&points, &tets, stiffness);
-        let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+        let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
         let mut state = State::at_rest(&body);
-        let mut solver = Solver::new(&body);
-        let step = |scene: &Scene<'_>| {
-            let frame = Frame { contacts: Some(scene), seconds: FRAME, substeps, ..Frame::default() };
+        let mut solver = BodySolver::new(&body);
+        let step = |scene: &CollisionScene<'_>| {
+            let frame = SolverFrame { contacts: Some(scene), seconds: FRAME, substeps, ..SolverFrame::default() };
             let report = solver.step(&body, &mut state, &frame);
             assert_eq!((report.stopped, report.inverted_tets), (0, 0));
             assert!(state.positions.iter().all(|p| p[1] > -THICKNESS));
@@ -142,11 +142,11 @@ fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
 fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &State)) {
     let (points, tets, faces) = block([6, 4, 6], 0.02, [0.0, THICKNESS, 0.0]);
     let body = body(&points, &tets, 5e3);
-    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
     let (plate, triangles) = cuboid([0.4, 0.02, 0.4]);
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
     let mut state = State::at_rest(&body);
-    let mut solver = Solver::new(&body);
+    let mut solver = BodySolver::new(&body);
     for frame in 0..frames {
         let poses = [0.0, 1.0].map(|share| {
             let height = height(f64::from(frame) + share) + 0.01;
@@ -154,9 +154,12 @@ fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &
             pose(share, &at)
         });
         let plate = [Obstacle::new(&triangles, &poses, FRAME, THICKNESS, 0.5).unwrap()];
-        let scene = Scene { skins: &skins, obstacles: &plate, ground, ..Scene::default() };
-        let report =
-            solver.step(&body, &mut state, &Frame { contacts: Some(&scene), seconds: FRAME, ..Frame::default() });
+        let scene = CollisionScene { skins: &skins, obstacles: &plate, ground, ..CollisionScene::default() };
+        let report = solver.step(
+            &body,
+            &mut state,
+            &SolverFrame { contacts: Some(&scene), seconds: FRAME, ..SolverFrame::default() },
+        );
         let highest = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max);
         let lowest = state.positions.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
         assert!(lowest > 0.0 && highest < height(f64::from(frame + 1)), "frame {frame}: {lowest} {highest} {report:?}");
@@ -186,18 +189,19 @@ fn dough_hit_by_fifteen_thicknesses_in_a_frame_stays_outside() {
 fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume() {
     let (points, tets, faces) = block([6, 3, 4], 0.02, [0.0; 3]);
     let body = body(&points, &tets, 5e3);
-    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
     let whole = |threads: usize, resumed: bool| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut state = State::at_rest(&body);
-            let mut solver = Solver::new(&body);
-            let step = |scene: &Scene<'_>| {
+            let mut solver = BodySolver::new(&body);
+            let step = |scene: &CollisionScene<'_>| {
                 if resumed {
-                    solver = Solver::new(&body);
+                    solver = BodySolver::new(&body);
                     state = state.clone();
                 }
-                let _ = solver.step(&body, &mut state, &Frame { contacts: Some(scene), ..Frame::default() });
+                let _ =
+                    solver.step(&body, &mut state, &SolverFrame { contacts: Some(scene), ..SolverFrame::default() });
                 state.positions.clone()
             };
             rolled_over(14, step, &skins);
@@ -215,23 +219,29 @@ fn a_corner_beyond_a_plate_hangs_on_it_unless_that_draws_it_out_too_far() {
     let (side, thick) = (0.1, 0.02);
     let (points, tets, faces) = block([3, 3, 3], side, [0.0; 3]);
     let body = body(&points, &tets, 1e4);
-    let skins = [Skin::new(&points, &faces, &body.springs()).unwrap()];
+    let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
     let corner = points.iter().position(|p| p.iter().all(|x| *x > 2.9 * side)).unwrap();
     for (high, hangs) in [(0.5, true), (1.5, false)] {
         let (mut plate, triangles) = cuboid([2.0, thick, 2.0]);
         plate.iter_mut().for_each(|p| p[1] += high - 0.5 * thick);
         let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &plate)], FRAME, THICKNESS, 0.5).unwrap()];
-        let scene = Scene { skins: &skins, obstacles: &obstacles, ..Scene::default() };
-        let frame = Frame { contacts: Some(&scene), seconds: FRAME, gravity: [0.0; 3], drag: 4.0, ..Frame::default() };
+        let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ..CollisionScene::default() };
+        let frame = SolverFrame {
+            contacts: Some(&scene),
+            seconds: FRAME,
+            gravity: [0.0; 3],
+            drag: 4.0,
+            ..SolverFrame::default()
+        };
         let mut state = State::at_rest(&body);
         state.positions[corner][1] = high + 0.1;
-        assert_eq!(skins[0].count_let_go(&state.positions) == 0, hangs);
-        let mut solver = Solver::new(&body);
+        assert_eq!(skins[0].released_edges(&state.positions) == 0, hangs);
+        let mut solver = BodySolver::new(&body);
         for _ in 0..48 {
             let _ = solver.step(&body, &mut state, &frame);
         }
         let at = state.positions[corner][1];
         assert_eq!(at > high, hangs, "beyond {high} m, then at {at} m");
-        assert_eq!(skins[0].count_let_go(&state.positions), 0);
+        assert_eq!(skins[0].released_edges(&state.positions), 0);
     }
 }

@@ -15,11 +15,12 @@ fn speck(at: [f64; 3]) -> [[f64; 3]; 3] {
 fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
     let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE)], 1.0, 0.01, 0.5).unwrap();
     let (from, to) = (speck([0.0, 0.5, 0.0]), speck([0.0, -0.5, 0.0]));
-    let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
+    let skin = BodySkin::new(&from, &[[0, 1, 2]], &[]).unwrap();
     let mask = [0.5f32, 1.0, 1.0];
-    let scene = Scene { skins: &[skin], obstacles: &[plate], friction: Some(&mask), ..Scene::default() };
+    let scene =
+        CollisionScene { skins: &[skin], obstacles: &[plate], friction: Some(&mask), ..CollisionScene::default() };
     let (contacts, found) = find(&scene, &from, &to, [0.0, 1.0]);
-    assert_eq!(found, Found { contacts: 1, deepest_overlap: 0.0 });
+    assert_eq!(found, ContactSummary { contacts: 1, deepest_overlap: 0.0 });
     let contact = contacts[0];
     assert_eq!((contact.particles, contact.weights), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
     assert_eq!((contact.normal, contact.offset, contact.gap), ([0.0, 1.0, 0.0], 0.0, 0.01));
@@ -37,8 +38,8 @@ fn a_plate_that_comes_up_brings_its_height_and_velocity() {
     let up = SQUARE.map(|[x, _, z]| [x, 0.4, z]);
     let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE), pose(1.0, &up)], 0.5, 0.01, 0.5).unwrap();
     let still = speck([0.3, 0.1, 0.2]);
-    let skin = Skin::new(&still, &[[0, 1, 2]], &[]).unwrap();
-    let scene = Scene { skins: &[skin], obstacles: &[plate], ..Scene::default() };
+    let skin = BodySkin::new(&still, &[[0, 1, 2]], &[]).unwrap();
+    let scene = CollisionScene { skins: &[skin], obstacles: &[plate], ..CollisionScene::default() };
     let (contacts, _) = find(&scene, &still, &still, [0.0, 0.5]);
     assert_eq!(contacts.len(), 1);
     assert!((contacts[0].offset - 0.2).abs() < 1e-15 && (contacts[0].velocity[1] - 0.8).abs() < 1e-15);
@@ -52,9 +53,13 @@ fn edges_that_cross_push_where_they_cross() {
     let ridge = Obstacle::new(&[[0, 2, 1], [0, 1, 3]], &[pose(0.0, &tent)], 1.0, 0.01, 0.5).unwrap();
     let from = [[0.5, 0.2, -0.1], [0.5, 0.2, 0.3], [0.5, 1.0, 0.0]];
     let to = from.map(|[x, y, z]| [x, y - 0.3, z]);
-    let skin = Skin::new(&from, &[[0, 1, 2]], &[]).unwrap();
-    let (contacts, _) =
-        find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
+    let skin = BodySkin::new(&from, &[[0, 1, 2]], &[]).unwrap();
+    let (contacts, _) = find(
+        &CollisionScene { skins: &[skin], obstacles: &[ridge], ..CollisionScene::default() },
+        &from,
+        &to,
+        [0.0, 1.0],
+    );
     assert_eq!(contacts.len(), 1, "{contacts:?}");
     let Contact { particles, weights, normal, offset, .. } = contacts[0];
     assert_eq!(particles, [0, 1, 0, 0]);
@@ -70,9 +75,13 @@ fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
     let spike = Obstacle::new(&faces, &[pose(0.0, &spike), pose(1.0, &risen)], 1.0, 0.01, 0.5).unwrap();
     assert!(spike.is_closed());
     let sheet = [[-1.0, 0.2, -1.0], [-1.0, 0.2, 2.0], [2.0, 0.2, -1.0]];
-    let skin = Skin::new(&sheet, &[[0, 2, 1]], &[]).unwrap();
-    let (contacts, _) =
-        find(&Scene { skins: &[skin], obstacles: &[spike], ..Scene::default() }, &sheet, &sheet, [0.0, 1.0]);
+    let skin = BodySkin::new(&sheet, &[[0, 2, 1]], &[]).unwrap();
+    let (contacts, _) = find(
+        &CollisionScene { skins: &[skin], obstacles: &[spike], ..CollisionScene::default() },
+        &sheet,
+        &sheet,
+        [0.0, 1.0],
+    );
     assert_eq!(contacts.len(), 1, "{contacts:?}");
     let Contact { weights, normal, offset, velocity, .. } = contacts[0];
     assert!(weights[..3].iter().all(|weight| (weight - 1.0 / 3.0).abs() < 1e-12) && weights[3] == 0.0);
@@ -116,8 +125,8 @@ fn what_starts_inside_is_pushed_out_by_the_nearest_side_not_at_once() {
     let (points, faces) = cuboid([1.0; 3]);
     let cube = Obstacle::new(&faces, &[pose(0.0, &points)], 1.0, 0.01, 0.5).unwrap();
     let within = |depth: f64| [[0.1, 0.5 - depth, 0.2], [0.1, 9.0, 0.2], [0.1, 9.0, 0.3]];
-    let skin = Skin::new(&within(0.0), &[[0, 1, 2]], &[]).unwrap();
-    let scene = Scene { skins: &[skin], obstacles: &[cube], ..Scene::default() };
+    let skin = BodySkin::new(&within(0.0), &[[0, 1, 2]], &[]).unwrap();
+    let scene = CollisionScene { skins: &[skin], obstacles: &[cube], ..CollisionScene::default() };
     for (depth, offset) in [(0.005, 0.5), (0.05, 0.5), (0.25, 0.35)] {
         let (contacts, found) = find(&scene, &within(depth), &within(depth), [0.0, 1.0]);
         let mine: Vec<_> = contacts.iter().filter(|contact| contact.weights[0] == 1.0).collect();
@@ -138,9 +147,10 @@ fn ground_comes_first_and_nothing_pushes_below_it() {
     };
     let cube = Obstacle::new(&faces, &[pose(0.0, &tilted(0.9)), pose(1.0, &tilted(0.45))], 1.0, 0.01, 0.5).unwrap();
     let still = [[0.2, 0.01, 0.0], [5.0, 0.01, 0.0], [5.0, 0.01, 0.1]];
-    let skin = Skin::new(&still, &[[0, 1, 2]], &[]).unwrap();
+    let skin = BodySkin::new(&still, &[[0, 1, 2]], &[]).unwrap();
     let ground = Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: 0.01, friction: 0.3 };
-    let scene = Scene { skins: &[skin], obstacles: &[cube], ground: Some(ground), ..Scene::default() };
+    let scene =
+        CollisionScene { skins: &[skin], obstacles: &[cube], ground: Some(ground), ..CollisionScene::default() };
     let (contacts, _) = find(&scene, &still, &still, [0.0, 1.0]);
     assert!(contacts.len() > 3, "{contacts:?}");
     for (particle, contact) in (0..3).zip(&contacts) {
@@ -162,11 +172,11 @@ fn two_sheets_touch_and_neighbours_do_not() {
             triangles.extend([[a, a + 2, a + 3], [a, a + 3, a + 1]]);
         }
     }
-    let skin = Skin::new(&points, &triangles, &[]).unwrap();
-    let own = Some(Rub { thickness: 0.01, friction: 0.5 });
+    let skin = BodySkin::new(&points, &triangles, &[]).unwrap();
+    let self_contact = Some(ContactParams { thickness: 0.01, friction: 0.5 });
     let skins = [skin];
-    let scene = Scene { skins: &skins, own, ..Scene::default() };
-    assert_eq!(find(&scene, &points, &points, [0.0, 1.0]).1, Found::default());
+    let scene = CollisionScene { skins: &skins, self_contact, ..CollisionScene::default() };
+    assert_eq!(find(&scene, &points, &points, [0.0, 1.0]).1, ContactSummary::default());
     // Its first end is carried through the last.
     let mut to = points.clone();
     to[..2].iter_mut().for_each(|p| p[0] -= 2.2);
@@ -190,7 +200,7 @@ fn two_sheets_touch_and_neighbours_do_not() {
 #[test]
 fn skin_that_is_drawn_out_is_let_go() {
     let rest = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
-    let skin = [Skin::new(&rest, &[[0, 2, 1], [1, 2, 3]], &[]).unwrap()];
+    let skin = [BodySkin::new(&rest, &[[0, 2, 1], [1, 2, 3]], &[]).unwrap()];
     let (points, triangles) = cuboid([0.2, 0.2, 0.2]);
     let under = |at: [f64; 3]| {
         let moved: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + at[0], p[1] + at[1] - 0.101, p[2] + at[2]]).collect();
@@ -202,11 +212,12 @@ fn skin_that_is_drawn_out_is_let_go() {
         let middle = 0.25 + corner / 3.0;
         let obstacles = [under([0.3, 0.0, 0.3]), under([middle, 0.0, middle]), under([corner, 0.0, corner])];
         let touched = obstacles.each_ref().map(|obstacle| {
-            let scene = Scene { skins: &skin, obstacles: std::slice::from_ref(obstacle), ..Scene::default() };
+            let scene =
+                CollisionScene { skins: &skin, obstacles: std::slice::from_ref(obstacle), ..CollisionScene::default() };
             !find(&scene, &x, &x, [0.0, 1.0]).0.is_empty()
         });
         assert_eq!(touched, [true, held, held], "drawn out to {corner}");
         // Both edges that end at the corner.
-        assert_eq!(skin[0].count_let_go(&x), if held { 0 } else { 2 });
+        assert_eq!(skin[0].released_edges(&x), if held { 0 } else { 2 });
     }
 }

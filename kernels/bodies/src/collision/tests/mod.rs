@@ -6,15 +6,20 @@ use numerics::shapes;
 
 mod bodies;
 mod hand;
-mod missed;
+mod tunnelling;
 
-fn pose(share: f64, positions: &[[f64; 3]]) -> Pose {
-    Pose { share, positions: positions.to_vec() }
+fn pose(share: f64, positions: &[[f64; 3]]) -> ObstaclePose {
+    ObstaclePose { share, positions: positions.to_vec() }
 }
 
-fn find(scene: &Scene<'_>, from: &[[f64; 3]], to: &[[f64; 3]], times: [f64; 2]) -> (Vec<Contact>, Found) {
+fn find(
+    scene: &CollisionScene<'_>,
+    from: &[[f64; 3]],
+    to: &[[f64; 3]],
+    times: [f64; 2],
+) -> (Vec<Contact>, ContactSummary) {
     let mut out = Vec::new();
-    let found = scene.search(&Query { from, to, times }, &mut out);
+    let found = scene.search(&ContactQuery { from, to, times }, &mut out);
     (out, found)
 }
 

@@ -8,8 +8,8 @@ const THICKNESS: f64 = 1e-3;
 /// Half spaces that move: (normal, height of the surface along it at the frame's start and end, friction).
 struct Planes(Vec<([f64; 3], [f64; 2], f64)>, f64);
 
-impl Contacts for Planes {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for Planes {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         for (normal, heights, friction) in &self.0 {
             let n = DVec3::from(*normal);
             let at = |time: f64| heights[0] + (heights[1] - heights[0]) * time;
@@ -46,8 +46,8 @@ struct RollingPin {
     seconds: f64,
 }
 
-impl Contacts for RollingPin {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for RollingPin {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let time = query.times[1];
         let axis: [f64; 2] = std::array::from_fn(|k| self.axis[0][k] + (self.axis[1][k] - self.axis[0][k]) * time);
         for (particle, to) in query.to.iter().enumerate() {
@@ -77,10 +77,10 @@ impl Contacts for RollingPin {
     }
 }
 
-struct Both<'a>(&'a dyn Contacts, &'a dyn Contacts);
+struct Both<'a>(&'a dyn ContactFinder, &'a dyn ContactFinder);
 
-impl Contacts for Both<'_> {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for Both<'_> {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         self.0.find(query, out);
         self.1.find(query, out);
     }
@@ -94,7 +94,7 @@ fn fastest(state: &State) -> f64 {
     state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max)
 }
 
-fn centre(body: &Body, state: &State) -> DVec3 {
+fn centre(body: &SoftBody, state: &State) -> DVec3 {
     let masses = body.masses();
     let sum = state.positions.iter().zip(&masses).fold(DVec3::zeros(), |sum, (x, m)| sum + DVec3::from(*x) * *m);
     sum / masses.iter().sum::<f64>()
@@ -107,8 +107,8 @@ fn a_block_dropped_on_the_ground_comes_to_rest_there() {
         let body = block_body([4, 4, 4], 0.1, &material(1000.0, stiffness, 2e3 / stiffness));
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|x| x[1] += 0.2);
-        let frame = Frame { contacts: Some(&ground), volume, ..Frame::default() };
-        let mut solver = Solver::new(&body);
+        let frame = SolverFrame { contacts: Some(&ground), volume, ..SolverFrame::default() };
+        let mut solver = BodySolver::new(&body);
         let mut newton = 0;
         for number in 0..240 {
             let report = solver.step(&body, &mut state, &frame);
@@ -136,8 +136,8 @@ fn on_a_slope_it_sticks_below_the_friction_angle_and_slides_above() {
         let body = block_body([4, 2, 4], 0.1, &material(1000.0, 1e6, 0.005));
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|x| x[1] += 0.9 * THICKNESS);
-        let frame = Frame { gravity, contacts: Some(&ground), ..Frame::default() };
-        let mut solver = Solver::new(&body);
+        let frame = SolverFrame { gravity, contacts: Some(&ground), ..SolverFrame::default() };
+        let mut solver = BodySolver::new(&body);
         let mut run = |state: &mut State, frames: usize| {
             for _ in 0..frames {
                 let _ = solver.step(&body, state, &frame);
@@ -165,7 +165,7 @@ fn contact_holds_under_pins_that_press_ten_thicknesses_a_frame() {
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
         let top: Vec<usize> = (0..body.len()).filter(|i| body.rest_point(*i)[1] > 0.399).collect();
-        let mut solver = Solver::new(&body);
+        let mut solver = BodySolver::new(&body);
         for number in 0..20 {
             let pins: Vec<Pin> = top
                 .iter()
@@ -174,7 +174,7 @@ fn contact_holds_under_pins_that_press_ten_thicknesses_a_frame() {
                     Pin { particle: *i as u32, between: [from, [from[0], from[1] - 10.0 * THICKNESS, from[2]]] }
                 })
                 .collect();
-            let frame = Frame { contacts: Some(&ground), pins: &pins, integrator, ..Frame::default() };
+            let frame = SolverFrame { contacts: Some(&ground), pins: &pins, integrator, ..SolverFrame::default() };
             let report = solver.step(&body, &mut state, &frame);
             assert!(lowest(&state) > 0.0, "{integrator:?}, frame {number}: {} {report:?}", lowest(&state));
             assert_eq!(report.inverted_tets, 0);
@@ -187,26 +187,26 @@ fn pressed_to_half_its_height_a_block_keeps_its_volume_and_bulges_evenly() {
     let body = block_body([6, 6, 6], 0.1, &material(1000.0, 1e5, 0.02));
     let mut state = State::at_rest(&body);
     state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
-    let mut solver = Solver::new(&body);
-    let mut report = Report::default();
+    let mut solver = BodySolver::new(&body);
+    let mut report = FrameReport::default();
     let top = |frame: usize| 0.6 + 2.0 * THICKNESS - 0.3 * (frame.min(48) as f64 / 48.0);
     for number in 0..96 {
         let plates = Planes(
             vec![([0.0, 1.0, 0.0], [0.0, 0.0], 0.5), ([0.0, -1.0, 0.0], [-top(number), -top(number + 1)], 0.5)],
             1.0 / 24.0,
         );
-        let frame = Frame { gravity: [0.0; 3], contacts: Some(&plates), ..Frame::default() };
+        let frame = SolverFrame { gravity: [0.0; 3], contacts: Some(&plates), ..SolverFrame::default() };
         report = solver.step(&body, &mut state, &frame);
         let highest = state.positions.iter().map(|x| x[1]).fold(0.0, f64::max);
         assert!(lowest(&state) > 0.0 && highest < top(number + 1), "frame {number}: {highest} {report:?}");
     }
     assert_eq!(report.inverted_tets, 0);
     assert!((report.volume_ratio - 1.0).abs() < 0.025, "{report:?}");
-    let wide = |axis: usize| {
+    let parallel = |axis: usize| {
         let along = || state.positions.iter().map(|x| x[axis]);
         along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
     };
-    assert!((wide(0) / wide(2) - 1.0).abs() < 0.05 && wide(0) > 0.75, "{} {}", wide(0), wide(2));
+    assert!((parallel(0) / parallel(2) - 1.0).abs() < 0.05 && parallel(0) > 0.75, "{} {}", parallel(0), parallel(2));
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
     let mut state = State::at_rest(&body);
     state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
     let ground = ground(1.0);
-    let mut solver = Solver::new(&body);
+    let mut solver = BodySolver::new(&body);
     for number in 0..48 {
         let along =
             |frame: usize| [0.05 + 0.4 * frame as f64 / 48.0, 0.16 + 0.05 * (1.0 - (frame as f64 / 12.0).min(1.0))];
@@ -227,7 +227,7 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
             seconds: 1.0 / 24.0,
         };
         let both = Both(&ground, &pin);
-        let report = solver.step(&body, &mut state, &Frame { contacts: Some(&both), ..Frame::default() });
+        let report = solver.step(&body, &mut state, &SolverFrame { contacts: Some(&both), ..SolverFrame::default() });
         let axis = along(number + 1);
         let deepest = state
             .positions
@@ -250,8 +250,8 @@ struct Stack {
     cells: u32,
 }
 
-impl Contacts for Stack {
-    fn find(&self, query: &Query<'_>, out: &mut Vec<Contact>) {
+impl ContactFinder for Stack {
+    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let n = self.cells + 1;
         let place = |x: u32, z: u32| x + n * (self.cells + n * z);
         for particle in self.lower as usize..query.to.len() {
@@ -291,14 +291,14 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
     points.extend(above.iter().map(|x| [x[0] + 0.013, x[1] + 0.32, x[2] + 0.021]));
     tets.extend(more.iter().map(|tet| tet.map(|corner| corner + lower)));
     let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
-    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.03), &[]).unwrap();
+    let body = SoftBody::new(&mesh, &material(1000.0, 1e5, 0.03), &[]).unwrap();
     let stack = Stack { lower, side: 0.1, cells: 3 };
 
     let mut state = State::at_rest(&body);
     state.velocities[lower as usize..].iter_mut().for_each(|v| *v = [0.0, -1.0, 0.0]);
     let (before, turning) = (momentum(&body, &state), angular_momentum(&body, &state));
-    let mut solver = Solver::new(&body);
-    let frame = Frame { gravity: [0.0; 3], contacts: Some(&stack), ..Frame::default() };
+    let mut solver = BodySolver::new(&body);
+    let frame = SolverFrame { gravity: [0.0; 3], contacts: Some(&stack), ..SolverFrame::default() };
     let mut touched = 0;
     let kinetic = 0.5 * before.y * before.y / 27.0;
     for number in 0..24 {
@@ -315,7 +315,7 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
     let ground = ground(0.5);
     let both = Both(&ground, &stack);
     let mut state = State::at_rest(&body);
-    let frame = Frame { contacts: Some(&both), ..Frame::default() };
+    let frame = SolverFrame { contacts: Some(&both), ..SolverFrame::default() };
     let report = steps(&body, &mut state, &frame, 240);
     assert!(lowest(&state) > 0.0 && report.deepest_overlap < THICKNESS, "{report:?}");
     assert!(fastest(&state) < 1e-3 * 9.81 / 24.0, "{}", fastest(&state));
@@ -330,11 +330,12 @@ fn frictions_and_obstacles_beyond_reason() {
         for (heights, bound) in [([0.0, 5.0], 200.0), ([0.0, -5.0], 20.0), ([1.0, 1.0], 20.0)] {
             let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e5, 0.01));
             let mut state = State::at_rest(&body);
-            let mut solver = Solver::new(&body);
+            let mut solver = BodySolver::new(&body);
             for number in 0..10 {
                 let now = if number == 3 { heights } else { [heights[usize::from(number > 3)]; 2] };
                 let ground = Planes(vec![([0.0, 1.0, 0.0], now, friction)], 1.0 / 24.0);
-                let report = solver.step(&body, &mut state, &Frame { contacts: Some(&ground), ..Frame::default() });
+                let report =
+                    solver.step(&body, &mut state, &SolverFrame { contacts: Some(&ground), ..SolverFrame::default() });
                 assert!(is_finite(&state) && report.stopped == 0);
                 let far = state.positions.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
                 assert!(far < bound, "μ {friction}, {heights:?}, frame {number}: {far}");
@@ -356,14 +357,16 @@ fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
             let mask: Vec<f32> = (0..points.len()).map(|i| if i % 2 == 0 { 1.0 } else { 1.0 / ratio as f32 }).collect();
             let density = Masked { value: 1000.0, mask: Some(&mask) };
             let material = Material { density, ..material(1000.0, stiffness, 0.01) };
-            let body = Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
+            let body =
+                SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
             let mut state = State::at_rest(&body);
             for (index, x) in state.positions.iter_mut().enumerate() {
                 *x = (DVec3::from(*x) + DVec3::y() * 0.12 + from(index, turned)).into();
             }
-            let mut solver = Solver::new(&body);
+            let mut solver = BodySolver::new(&body);
             for number in 0..48 {
-                let report = solver.step(&body, &mut state, &Frame { contacts: Some(&ground), ..Frame::default() });
+                let report =
+                    solver.step(&body, &mut state, &SolverFrame { contacts: Some(&ground), ..SolverFrame::default() });
                 let what = || format!("E {stiffness}, ratio {ratio}, turned {turned}, frame {number}: {report:?}");
                 assert!(is_finite(&state) && report.stopped == 0, "{}", what());
                 assert!(lowest(&state) > -THICKNESS, "{} {}", lowest(&state), what());
@@ -381,16 +384,16 @@ fn dough_that_is_smashed_within_a_step_gains_no_energy() {
     for speed in [2.0, 3.0, 5.0, 8.0, 15.0, 30.0, 50.0, 100.0] {
         let (points, tets) = block([6, 6, 6], 0.02);
         let body =
-            Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1000.0, 5e3, 0.01), &[])
+            SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1000.0, 5e3, 0.01), &[])
                 .unwrap();
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|p| p[1] += 1.5 * THICKNESS);
         state.velocities.iter_mut().for_each(|v| v[1] = -speed);
         let ground = ground(0.5);
-        let mut solver = Solver::new(&body);
+        let mut solver = BodySolver::new(&body);
         let mut before = 0.5 * body.masses().iter().sum::<f64>() * speed * speed;
         for frame in 0..24 {
-            let report = solver.step(&body, &mut state, &Frame { contacts: Some(&ground), volume: 1.0, ..BARE });
+            let report = solver.step(&body, &mut state, &SolverFrame { contacts: Some(&ground), volume: 1.0, ..BARE });
             let after = report.kinetic + report.elastic + report.volume_energy;
             assert!(after <= before * 1.005, "{speed} m/s, frame {frame}: {before} J become {after}");
             before = after;
@@ -408,8 +411,8 @@ fn what_is_through_a_surface_comes_out_at_a_pace() {
         let mut state = State::at_rest(&body);
         state.positions.iter_mut().for_each(|p| p[1] -= 1.0);
         let ground = ground(0.5);
-        let mut solver = Solver::new(&body);
-        let frame = Frame { contacts: Some(&ground), volume: 1.0, substeps, ..Frame::default() };
+        let mut solver = BodySolver::new(&body);
+        let frame = SolverFrame { contacts: Some(&ground), volume: 1.0, substeps, ..SolverFrame::default() };
         let mut most = 0.0_f64;
         for number in 0..96 {
             let _ = solver.step(&body, &mut state, &frame);

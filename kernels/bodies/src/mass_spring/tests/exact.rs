@@ -6,12 +6,12 @@ use super::*;
 fn a_hanging_chain_stretches_by_the_weight_below() {
     let count = 6;
     let points: Vec<[f64; 3]> = (0..count).map(|i| [0.0, -f64::from(i), 0.0]).collect();
-    let springs: Vec<Spring> =
-        (1..count).map(|i| Spring { ends: [i - 1, i], stiffness: 500.0, damping: 50.0, length: 1.0 }).collect();
-    let body = Body::of_springs(&points, &[2.0; 6], &springs).unwrap();
+    let springs: Vec<BodySpring> =
+        (1..count).map(|i| BodySpring { ends: [i - 1, i], stiffness: 500.0, damping: 50.0, length: 1.0 }).collect();
+    let body = SoftBody::of_springs(&points, &[2.0; 6], &springs).unwrap();
     let mut state = State::at_rest(&body);
     let pins = [Pin { particle: 0, between: [[0.0; 3]; 2] }];
-    let _ = steps(&body, &mut state, &Frame { pins: &pins, volume: 0.0, ..Frame::default() }, 1000);
+    let _ = steps(&body, &mut state, &SolverFrame { pins: &pins, volume: 0.0, ..SolverFrame::default() }, 1000);
     for i in 1..count as usize {
         let length = state.positions[i - 1][1] - state.positions[i][1];
         let weight = 2.0 * 9.81 * f64::from(count - i as u32);
@@ -27,13 +27,13 @@ fn a_dashpot_leaves_a_spring_alone_that_turns() {
     let points = [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]];
     for integrator in [Integrator::Default, Integrator::Euler] {
         for damping in [0.0, 1e2, 1e4, 1e6] {
-            let spring = Spring { ends: [0, 1], stiffness: 1e4, damping, length: 1.0 };
-            let body = Body::of_springs(&points, &[1.0; 2], &[spring]).unwrap();
+            let spring = BodySpring { ends: [0, 1], stiffness: 1e4, damping, length: 1.0 };
+            let body = SoftBody::of_springs(&points, &[1.0; 2], &[spring]).unwrap();
             let mut state = State::at_rest(&body);
             state.velocities = vec![[0.0, -2.0, 0.0], [0.0, 2.0, 0.0]];
-            let mut solver = Solver::new(&body);
+            let mut solver = BodySolver::new(&body);
             for frame in 0..24 {
-                let _ = solver.step(&body, &mut state, &Frame { integrator, ..BARE });
+                let _ = solver.step(&body, &mut state, &SolverFrame { integrator, ..BARE });
                 let length = (DVec3::from(state.positions[1]) - DVec3::from(state.positions[0])).norm();
                 assert!((length - 1.0).abs() < 2.5e-3, "{integrator:?}, {damping}: {length} long in frame {frame}");
             }

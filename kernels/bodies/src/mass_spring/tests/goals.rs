@@ -15,20 +15,20 @@ fn flat(x: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_goal_draws_its_particle_as_a_damped_spring_does() {
-    let body = Body::of_springs(&[[0.0; 3]], &[3.0], &[]).unwrap();
+    let body = SoftBody::of_springs(&[[0.0; 3]], &[3.0], &[]).unwrap();
     let mut state = State::at_rest(&body);
-    let goal = Goal { particle: 0, between: [[1.0, 0.0, 0.0]; 2], strength: 4.0, damping: 4.0 };
+    let goal = GoalSpring { particle: 0, between: [[1.0, 0.0, 0.0]; 2], strength: 4.0, damping: 4.0 };
     let goals = [goal];
-    let frame = Frame { seconds: 0.01, goals: &goals, ..BARE };
+    let frame = SolverFrame { seconds: 0.01, goals: &goals, ..BARE };
     let report = steps(&body, &mut state, &frame, 100);
     // Critically damped with ω = 2: 1 − (1 + 2t)e^(−2t).
     let exact = 1.0 - 3.0 * libm::exp(-2.0);
     assert!((state.positions[0][0] - exact).abs() < 1e-5);
     assert!((report.goal_energy - 0.5 * 3.0 * 4.0 * (1.0 - exact) * (1.0 - exact)).abs() < 1e-4);
     // Two goals of one particle add up to one of both strengths.
-    let half = Goal { strength: 2.0, damping: 2.0, ..goal };
+    let half = GoalSpring { strength: 2.0, damping: 2.0, ..goal };
     let mut again = State::at_rest(&body);
-    let _ = steps(&body, &mut again, &Frame { seconds: 0.01, goals: &[half, half], ..BARE }, 100);
+    let _ = steps(&body, &mut again, &SolverFrame { seconds: 0.01, goals: &[half, half], ..BARE }, 100);
     assert!((again.positions[0][0] - state.positions[0][0]).abs() < 1e-12);
 }
 
@@ -37,22 +37,22 @@ fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
     let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.2));
     let mut state = State::at_rest(&body);
     let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| flat(*x)).collect();
-    let goals: Vec<Goal> = (0..body.len())
+    let goals: Vec<GoalSpring> = (0..body.len())
         .filter(|i| is_inside(&state.positions[*i]))
-        .map(|i| Goal { particle: i as u32, between: [shape[i]; 2], strength: 1e4, damping: 100.0 })
+        .map(|i| GoalSpring { particle: i as u32, between: [shape[i]; 2], strength: 1e4, damping: 100.0 })
         .collect();
     assert_eq!(goals.len(), 8);
-    let drawn = Frame { goals: &goals, ..Frame { volume: 1.0, ..BARE } };
-    let mut solver = Solver::new(&body);
+    let drawn = SolverFrame { goals: &goals, ..SolverFrame { volume: 1.0, ..BARE } };
+    let mut solver = BodySolver::new(&body);
     for number in 0..240 {
         if (24..28).contains(&number) {
             // A quarter, a third, a half, all of what is left.
             let _ = reset(&body, &mut state, &shape, 1.0 / f64::from(28 - number), 1.0);
         }
-        let rough = (24..28).contains(&number);
-        let _ = solver.step(&body, &mut state, &Frame { rough, ..drawn });
+        let force_implicit_euler = (24..28).contains(&number);
+        let _ = solver.step(&body, &mut state, &SolverFrame { force_implicit_euler, ..drawn });
     }
-    let report = steps(&body, &mut state, &Frame { goals: &[], ..drawn }, 96);
+    let report = steps(&body, &mut state, &SolverFrame { goals: &[], ..drawn }, 96);
     for (x, goal) in state.positions.iter().zip(&shape) {
         assert!((DVec3::from(*x) - DVec3::from(*goal)).norm() < 1e-4, "{x:?} for {goal:?}");
     }
@@ -94,8 +94,8 @@ fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
 
 #[test]
 fn springs_flow_above_the_yield_strain_alone() {
-    let spring = Spring { ends: [0, 1], stiffness: 100.0, damping: 0.0, length: 1.0 };
-    let body = Body::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[1.0; 2], &[spring]).unwrap();
+    let spring = BodySpring { ends: [0, 1], stiffness: 100.0, damping: 0.0, length: 1.0 };
+    let body = SoftBody::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[1.0; 2], &[spring]).unwrap();
     let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
     let at = |stretch: f64| {
         let mut state = State::at_rest(&body);
@@ -142,9 +142,9 @@ fn on_the_way_to_a_goal_nothing_is_dented() {
 
 #[test]
 fn a_joint_tears_and_then_neither_pulls_nor_counts() {
-    let spring = |a: u32| Spring { ends: [a, a + 1], stiffness: 100.0, damping: 1.0, length: 1.0 };
+    let spring = |a: u32| BodySpring { ends: [a, a + 1], stiffness: 100.0, damping: 1.0, length: 1.0 };
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
-    let body = Body::of_springs(&points, &[1.0; 3], &[spring(0), spring(1)]).unwrap();
+    let body = SoftBody::of_springs(&points, &[1.0; 3], &[spring(0), spring(1)]).unwrap();
     let mut state = State::at_rest(&body);
     state.positions[2][0] = 3.5;
     assert_eq!(tear(&body, &mut state, 3.0, 0.0), 0);
@@ -161,17 +161,18 @@ fn a_goal_far_away_and_goals_in_every_frame() {
         let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.02));
         let mut state = State::at_rest(&body);
         let rest = state.positions.clone();
-        let mut solver = Solver::new(&body);
+        let mut solver = BodySolver::new(&body);
         for number in 0..24 {
             let away = if number % 2 == 0 { 1e3 } else { -1e3 };
-            let goals: Vec<Goal> = (0..body.len())
+            let goals: Vec<GoalSpring> = (0..body.len())
                 .filter(|i| is_inside(&rest[*i]))
                 .map(|i| {
                     let to = [rest[i][0] + away, rest[i][1], rest[i][2]];
-                    Goal { particle: i as u32, between: [to; 2], strength: 1e4, damping: 0.0 }
+                    GoalSpring { particle: i as u32, between: [to; 2], strength: 1e4, damping: 0.0 }
                 })
                 .collect();
-            let _ = solver.step(&body, &mut state, &Frame { goals: &goals, integrator, ..Frame::default() });
+            let _ =
+                solver.step(&body, &mut state, &SolverFrame { goals: &goals, integrator, ..SolverFrame::default() });
             let far = state.positions.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
             assert!(is_finite(&state) && far < 1e5, "{integrator:?}, frame {number}: {far}");
         }

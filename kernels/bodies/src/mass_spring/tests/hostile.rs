@@ -6,15 +6,15 @@ use super::*;
 const HOW: [Integrator; 3] = [Integrator::Default, Integrator::Euler, Integrator::Accurate { tolerance: 1e-2 }];
 
 /// A block with its springs scaled one by one, and masses too.
-fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> Body {
+fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> SoftBody {
     let (points, tets) = block([5, 3, 3], 0.1);
-    let shape =
-        Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1.0, 1.0, 0.0), &[]).unwrap();
-    let springs: Vec<Spring> = shape
+    let shape = SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1.0, 1.0, 0.0), &[])
+        .unwrap();
+    let springs: Vec<BodySpring> = shape
         .springs()
         .into_iter()
         .enumerate()
-        .map(|(i, ends)| Spring {
+        .map(|(i, ends)| BodySpring {
             ends,
             stiffness: stiffness(i),
             damping: 1e-4 * stiffness(i),
@@ -22,7 +22,7 @@ fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> Body 
         })
         .collect();
     let masses: Vec<f64> = (0..points.len()).map(mass).collect();
-    Body::of_springs(&points, &masses, &springs).unwrap()
+    SoftBody::of_springs(&points, &masses, &springs).unwrap()
 }
 
 /// Moves particles by up to `cells` cells.
@@ -32,9 +32,9 @@ fn scramble(state: &mut State, cells: f64) {
     }
 }
 
-fn survives(body: &Body, state: &mut State, frame: &Frame<'_>, bound: f64) -> Report {
-    let mut solver = Solver::new(body);
-    let mut report = Report::default();
+fn survives(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, bound: f64) -> FrameReport {
+    let mut solver = BodySolver::new(body);
+    let mut report = FrameReport::default();
     for number in 0..24 {
         report = solver.step(body, state, frame);
         let worst = state.positions.iter().flatten().fold(0.0_f64, |worst, x| worst.max(x.abs()));
@@ -52,7 +52,7 @@ fn stiffness_from_nothing_to_everything_in_one_body() {
             let body = mixed(power, |_| 0.01);
             let mut state = State::at_rest(&body);
             scramble(&mut state, cells);
-            let frame = Frame { integrator, volume: 0.0, ..Frame::default() };
+            let frame = SolverFrame { integrator, volume: 0.0, ..SolverFrame::default() };
             let _ = survives(&body, &mut state, &frame, 20.0);
         }
     }
@@ -66,7 +66,7 @@ fn every_stiffness_and_scrambled_start() {
                 let body = mixed(|_| k, |_| 0.01);
                 let mut state = State::at_rest(&body);
                 scramble(&mut state, cells);
-                let _ = survives(&body, &mut state, &Frame { integrator, ..BARE }, 20.0);
+                let _ = survives(&body, &mut state, &SolverFrame { integrator, ..BARE }, 20.0);
             }
         }
     }
@@ -79,7 +79,7 @@ fn masses_a_million_apart() {
             let body = mixed(|_| 1e9, |i| if i % 7 == 0 { 1e4 } else { 1e-2 });
             let mut state = State::at_rest(&body);
             scramble(&mut state, cells);
-            let frame = Frame { integrator, volume: 0.0, ..Frame::default() };
+            let frame = SolverFrame { integrator, volume: 0.0, ..SolverFrame::default() };
             let _ = survives(&body, &mut state, &frame, 20.0);
         }
     }
@@ -91,8 +91,8 @@ fn turned_and_flat_tetrahedra_open_again() {
         let body = block_body([5, 3, 3], 0.1, &material(1000.0, 1e5, 0.01));
         let mut state = State::at_rest(&body);
         scramble(&mut state, 1.5);
-        let mut solver = Solver::new(&body);
-        let frame = Frame { integrator, volume: 1.0, ..BARE };
+        let mut solver = BodySolver::new(&body);
+        let frame = SolverFrame { integrator, volume: 1.0, ..BARE };
         let first = solver.step(&body, &mut state, &frame);
         assert!(first.volume_energy > 1.0, "{first:?}");
         let mut report = first;
@@ -114,12 +114,12 @@ fn turned_and_flat_tetrahedra_open_again() {
 fn one_tetrahedron_from_its_mirror_image() {
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mesh = Mesh { points: &points, tets: &[[0, 1, 2, 3]], ..Mesh::default() };
-    let body = Body::new(&mesh, &material(1000.0, 1e5, 0.01), &[]).unwrap();
+    let body = SoftBody::new(&mesh, &material(1000.0, 1e5, 0.01), &[]).unwrap();
     let mut state = State::at_rest(&body);
     state.positions[3][2] = -1.0;
     let report = steps(&body, &mut state, &BARE, 100);
     assert_eq!(report.inverted_tets, 1, "springs alone are content with a mirror image");
-    let report = steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 100);
+    let report = steps(&body, &mut state, &SolverFrame { volume: 1.0, ..BARE }, 100);
     assert_eq!(report.inverted_tets, 0);
     assert!((report.volume_ratio - 1.0).abs() < 1e-3);
 }
@@ -128,11 +128,11 @@ fn one_tetrahedron_from_its_mirror_image() {
 fn springs_of_no_length_and_particles_in_one_place() {
     for integrator in HOW {
         let points = [[0.0; 3]; 4];
-        let spring = |a: u32, b: u32, length: f64| Spring { ends: [a, b], stiffness: 1e4, damping: 1.0, length };
+        let spring = |a: u32, b: u32, length: f64| BodySpring { ends: [a, b], stiffness: 1e4, damping: 1.0, length };
         let springs = [spring(0, 1, 0.0), spring(1, 2, 0.5), spring(2, 3, 0.5), spring(1, 3, 0.5)];
-        let body = Body::of_springs(&points, &[1.0; 4], &springs).unwrap();
+        let body = SoftBody::of_springs(&points, &[1.0; 4], &springs).unwrap();
         let mut state = State::at_rest(&body);
-        let report = survives(&body, &mut state, &Frame { integrator, ..BARE }, 5.0);
+        let report = survives(&body, &mut state, &SolverFrame { integrator, ..BARE }, 5.0);
         let length = (DVec3::from(state.positions[1]) - DVec3::from(state.positions[2])).norm();
         assert!(report.kinetic.is_finite() && length > 0.3, "doubled particles part: {length}");
         let tight = (DVec3::from(state.positions[0]) - DVec3::from(state.positions[1])).norm();
@@ -152,7 +152,8 @@ fn everything_pinned_is_where_the_pins_are() {
                     Pin { particle: i as u32, between: [from, [from[0] + far, from[1], 0.3]] }
                 })
                 .collect();
-            let report = steps(&body, &mut state, &Frame { pins: &pins, integrator, ..Frame::default() }, 1);
+            let report =
+                steps(&body, &mut state, &SolverFrame { pins: &pins, integrator, ..SolverFrame::default() }, 1);
             assert!(pins.iter().all(|pin| state.positions[pin.particle as usize] == pin.between[1]));
             assert_eq!(report.caps_hit, 0);
         }
@@ -167,13 +168,14 @@ fn pins_pulled_a_hundred_lengths_in_a_frame_and_back() {
             let start = State::at_rest(&body);
             let mut state = start.clone();
             let held: Vec<usize> = (0..body.len()).filter(|i| start.positions[*i][0] == 0.0).collect();
-            let mut solver = Solver::new(&body);
+            let mut solver = BodySolver::new(&body);
             let mut x = 0.0;
             for (frame, to) in [40.0, 0.0].into_iter().chain([0.0; 60]).enumerate() {
                 let place = |i: &usize, x: f64| [x, start.positions[*i][1], start.positions[*i][2]];
                 let pins: Vec<Pin> =
                     held.iter().map(|i| Pin { particle: *i as u32, between: [place(i, x), place(i, to)] }).collect();
-                let report = solver.step(&body, &mut state, &Frame { pins: &pins, integrator, ..Frame::default() });
+                let report =
+                    solver.step(&body, &mut state, &SolverFrame { pins: &pins, integrator, ..SolverFrame::default() });
                 assert!(is_finite(&state) && report.stopped == 0, "frame {frame}");
                 assert!(pins.iter().all(|pin| state.positions[pin.particle as usize] == pin.between[1]));
                 x = to;
@@ -193,9 +195,10 @@ fn speeds_and_steps_beyond_reason() {
             for (index, v) in state.velocities.iter_mut().enumerate() {
                 *v = (random(3, index) * speed).into();
             }
-            let mut solver = Solver::new(&body);
+            let mut solver = BodySolver::new(&body);
             for _ in 0..10 {
-                let report = solver.step(&body, &mut state, &Frame { seconds, integrator, ..Frame::default() });
+                let report =
+                    solver.step(&body, &mut state, &SolverFrame { seconds, integrator, ..SolverFrame::default() });
                 assert!(is_finite(&state) && report.kinetic.is_finite(), "{integrator:?} {speed} {seconds}");
             }
         }
@@ -211,7 +214,7 @@ fn gravity_of_ten_thousand() {
             .filter(|i| state.positions[*i][0] == 0.0)
             .map(|i| Pin { particle: i as u32, between: [state.positions[i]; 2] })
             .collect();
-        let frame = Frame { gravity: [0.0, -1e4, 0.0], pins: &pins, integrator, ..Frame::default() };
+        let frame = SolverFrame { gravity: [0.0, -1e4, 0.0], pins: &pins, integrator, ..SolverFrame::default() };
         let _ = survives(&body, &mut state, &frame, 1e4);
     }
 }
@@ -220,7 +223,8 @@ fn gravity_of_ten_thousand() {
 fn what_is_no_body_is_refused() {
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let body = |points: &[[f64; 3]], tets: &[[u32; 4]], density: f64| {
-        Body::new(&Mesh { points, tets, ..Mesh::default() }, &material(density, 1.0, 0.0), &[]).map(|body| body.len())
+        SoftBody::new(&Mesh { points, tets, ..Mesh::default() }, &material(density, 1.0, 0.0), &[])
+            .map(|body| body.len())
     };
     assert_eq!(body(&points, &[[0, 1, 2, 3]], 1.0), Ok(4));
     assert_eq!(body(&points, &[[0, 1, 2, 3]], 0.0), Err(BodyError::NoMass));
@@ -232,6 +236,6 @@ fn what_is_no_body_is_refused() {
     // A point in no tetrahedron is light, not nothing.
     let loose = [points[0], points[1], points[2], points[3], [9.0; 3]];
     let mesh = Mesh { points: &loose, tets: &[[0, 1, 2, 3]], ..Mesh::default() };
-    let masses = Body::new(&mesh, &material(1.0, 1.0, 0.0), &[]).unwrap().masses();
+    let masses = SoftBody::new(&mesh, &material(1.0, 1.0, 0.0), &[]).unwrap().masses();
     assert!((masses[4] - LIGHTEST / 6.0 / 5.0).abs() < 1e-12, "{masses:?}");
 }

@@ -10,7 +10,7 @@ fn a_rigid_turn_and_shift_meets_no_force() {
     let turned: Vec<[f64; 3]> =
         state.positions.iter().map(|x| (turn * DVec3::from(*x) + DVec3::new(5.0, -3.0, 2.0)).into()).collect();
     state.positions.clone_from(&turned);
-    let report = steps(&body, &mut state, &Frame { volume: 1.0, ..BARE }, 5);
+    let report = steps(&body, &mut state, &SolverFrame { volume: 1.0, ..BARE }, 5);
     for (a, b) in state.positions.iter().zip(&turned) {
         assert!((DVec3::from(*a) - DVec3::from(*b)).norm() < 1e-12);
     }
@@ -28,8 +28,8 @@ fn bits_are_the_same_for_any_number_of_threads_and_after_a_resume() {
                 .filter(|i| state.positions[*i][0] == 0.0)
                 .map(|i| Pin { particle: i as u32, between: [state.positions[i]; 2] })
                 .collect();
-            let frame = Frame { pins: &pins, ..Frame::default() };
-            let mut solver = Solver::new(&body);
+            let frame = SolverFrame { pins: &pins, ..SolverFrame::default() };
+            let mut solver = BodySolver::new(&body);
             let mut reports = Vec::new();
             for _ in 0..8 {
                 reports.push(solver.step(&body, &mut state, &frame));
@@ -37,7 +37,7 @@ fn bits_are_the_same_for_any_number_of_threads_and_after_a_resume() {
                     let text = format!("{state:?}");
                     state = state.clone();
                     assert_eq!(text, format!("{state:?}"));
-                    solver = Solver::new(&body);
+                    solver = BodySolver::new(&body);
                 }
             }
             (reports, state)
@@ -54,9 +54,9 @@ fn nothing_to_do_costs_nothing_and_changes_no_bit() {
     let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e5, 0.01));
     let mut state = State::at_rest(&body);
     let before = state.clone();
-    let report = steps(&body, &mut state, &Frame { seconds: 0.0, ..Frame::default() }, 1);
+    let report = steps(&body, &mut state, &SolverFrame { seconds: 0.0, ..SolverFrame::default() }, 1);
     assert_eq!((state.positions, state.velocities), (before.positions, before.velocities));
     assert_eq!((report.newton, report.cg), (0, 0));
-    let empty = Body::of_springs(&[], &[], &[]).unwrap();
-    let _ = steps(&empty, &mut State::at_rest(&empty), &Frame::default(), 2);
+    let empty = SoftBody::of_springs(&[], &[], &[]).unwrap();
+    let _ = steps(&empty, &mut State::at_rest(&empty), &SolverFrame::default(), 2);
 }

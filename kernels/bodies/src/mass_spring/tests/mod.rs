@@ -13,7 +13,7 @@ mod hostile;
 mod kept;
 
 /// No gravity, no volume: springs alone.
-const BARE: Frame<'static> = Frame {
+const BARE: SolverFrame<'static> = SolverFrame {
     seconds: 1.0 / 24.0,
     gravity: [0.0; 3],
     drag: 0.0,
@@ -23,7 +23,7 @@ const BARE: Frame<'static> = Frame {
     contacts: None,
     integrator: Integrator::Default,
     substeps: 0,
-    rough: false,
+    force_implicit_euler: false,
 };
 
 fn plain(value: f64) -> Masked<'static, f64> {
@@ -39,15 +39,15 @@ fn block(cells: [u32; 3], side: f64) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     cubes(cells.map(|n| n as usize), [0.0; 3], cells.map(|n| f64::from(n) * side))
 }
 
-fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> Body {
+fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> SoftBody {
     let (points, tets) = block(cells, side);
-    Body::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, material, &[]).unwrap()
+    SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, material, &[]).unwrap()
 }
 
 /// Steps `frames` frames and gives the last report.
-fn steps(body: &Body, state: &mut State, frame: &Frame<'_>, frames: usize) -> Report {
-    let mut solver = Solver::new(body);
-    let mut report = Report::default();
+fn steps(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, frames: usize) -> FrameReport {
+    let mut solver = BodySolver::new(body);
+    let mut report = FrameReport::default();
     for _ in 0..frames {
         report = solver.step(body, state, frame);
     }
@@ -58,13 +58,13 @@ fn is_finite(state: &State) -> bool {
     state.positions.iter().chain(&state.velocities).flatten().all(|x| x.is_finite())
 }
 
-fn momentum(body: &Body, state: &State) -> DVec3 {
+fn momentum(body: &SoftBody, state: &State) -> DVec3 {
     let each = state.velocities.iter().zip(body.masses());
     each.fold(DVec3::zeros(), |sum, (v, mass)| sum + DVec3::from(*v) * mass)
 }
 
 /// About the origin.
-fn angular_momentum(body: &Body, state: &State) -> DVec3 {
+fn angular_momentum(body: &SoftBody, state: &State) -> DVec3 {
     let moving = state.positions.iter().zip(&state.velocities).zip(body.masses());
     moving.map(|((x, v), mass)| DVec3::from(*x).cross(&DVec3::from(*v)) * mass).sum()
 }

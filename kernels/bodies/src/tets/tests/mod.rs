@@ -5,26 +5,26 @@ mod predicates;
 mod solids;
 mod surfaces;
 
-use super::lattice::Place;
+use super::grid::GridPoint;
 use super::predicates::{in_sphere, orient};
 use super::{Delaunay, NONE};
 use numerics::random::Key;
 use numerics::shapes;
 use numerics::vector::DVec3;
 
-fn at(place: Place) -> DVec3 {
-    DVec3::from(place.map(f64::from))
+fn at(grid_point: GridPoint) -> DVec3 {
+    DVec3::from(grid_point.map(f64::from))
 }
 
 /// Random places, each coordinate below `side`.
-fn random(count: u64, side: i32, seed: u64) -> Vec<Place> {
+fn random(count: u64, side: i32, seed: u64) -> Vec<GridPoint> {
     let key = Key::new(seed);
     (0..count).map(|k| [0, 1, 2].map(|axis| (key.of(k).of(axis).u64() % side as u64) as i32)).collect()
 }
 
 /// Six times the volume of all tets.
-fn volume(places: &[Place], tets: &[[u32; 4]]) -> i128 {
-    let whole = |corner: u32| places[corner as usize].map(i128::from);
+fn volume(grid_points: &[GridPoint], tets: &[[u32; 4]]) -> i128 {
+    let whole = |corner: u32| grid_points[corner as usize].map(i128::from);
     let six = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(whole);
         let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
@@ -35,8 +35,8 @@ fn volume(places: &[Place], tets: &[[u32; 4]]) -> i128 {
 
 /// Fails unless every tet is positive, knows its neighbours, and has no neighbour's far corner in its sphere: what a
 /// Delaunay complex is, by Delaunay's lemma.
-fn check(places: &[Place], Delaunay { tets, across, doubled }: &Delaunay) {
-    let of = |tet: &[u32; 4]| tet.map(|corner| at(places[corner as usize]));
+fn check(grid_points: &[GridPoint], Delaunay { tets, across, doubled }: &Delaunay) {
+    let of = |tet: &[u32; 4]| tet.map(|corner| at(grid_points[corner as usize]));
     for (index, (tet, others)) in tets.iter().zip(across).enumerate() {
         let [a, b, c, d] = of(tet);
         assert!(orient(&a, &b, &c, &d) > 0.0, "tet {index} is flat or inverted");
@@ -54,13 +54,13 @@ fn check(places: &[Place], Delaunay { tets, across, doubled }: &Delaunay) {
                 face
             };
             assert_eq!(shared(tet, corner), shared(&tets[*other as usize], back));
-            assert!(in_sphere(&a, &b, &c, &d, &at(places[far as usize])) <= 0.0, "face {corner} of tet {index}");
+            assert!(in_sphere(&a, &b, &c, &d, &at(grid_points[far as usize])) <= 0.0, "face {corner} of tet {index}");
         }
     }
-    let mut used = vec![false; places.len()];
+    let mut used = vec![false; grid_points.len()];
     tets.as_flattened().iter().for_each(|corner| used[*corner as usize] = true);
     for [double, of] in doubled {
-        assert_eq!(places[*double as usize], places[*of as usize]);
+        assert_eq!(grid_points[*double as usize], grid_points[*of as usize]);
         assert!(!used[*double as usize], "a double has no tet");
         used[*double as usize] = true;
     }

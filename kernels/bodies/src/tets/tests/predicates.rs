@@ -1,6 +1,6 @@
 //! Predicates against whole numbers of any size.
 
-use super::super::lattice::{Place, SIDE};
+use super::super::grid::{GridPoint, SIDE};
 use super::super::predicates::{in_sphere, orient};
 use super::{at, random};
 use numerics::random::Key;
@@ -75,29 +75,29 @@ impl Big {
 }
 
 /// Sign of the determinant with a row (x, y, z, 1) a place, turned to be positive for positive tets.
-fn true_side(places: &[Place; 4]) -> i32 {
-    let row = |p: &Place| [p[0], p[1], p[2], 1].map(|x| Big::of(i64::from(x))).to_vec();
-    -Big::determinant(&places.iter().map(row).collect::<Vec<_>>()).sign()
+fn true_side(grid_points: &[GridPoint; 4]) -> i32 {
+    let row = |p: &GridPoint| [p[0], p[1], p[2], 1].map(|x| Big::of(i64::from(x))).to_vec();
+    -Big::determinant(&grid_points.iter().map(row).collect::<Vec<_>>()).sign()
 }
 
 /// Sign of the determinant with a row (x, y, z, x² + y² + z², 1) a place.
-fn true_sphere(places: &[Place; 5]) -> i32 {
-    let row = |p: &Place| {
+fn true_sphere(grid_points: &[GridPoint; 5]) -> i32 {
+    let row = |p: &GridPoint| {
         let [x, y, z] = p.map(i64::from);
         [x, y, z, x * x + y * y + z * z, 1].map(Big::of).to_vec()
     };
-    -Big::determinant(&places.iter().map(row).collect::<Vec<_>>()).sign()
+    -Big::determinant(&grid_points.iter().map(row).collect::<Vec<_>>()).sign()
 }
 
 fn sign(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
-fn agree(places: [Place; 5]) {
-    let [a, b, c, d, e] = places.map(at);
-    let [p, q, r, s, _] = places;
-    assert_eq!(sign(orient(&a, &b, &c, &d)), true_side(&[p, q, r, s]), "{places:?}");
-    assert_eq!(sign(in_sphere(&a, &b, &c, &d, &e)), true_sphere(&places), "{places:?}");
+fn agree(grid_points: [GridPoint; 5]) {
+    let [a, b, c, d, e] = grid_points.map(at);
+    let [p, q, r, s, _] = grid_points;
+    assert_eq!(sign(orient(&a, &b, &c, &d)), true_side(&[p, q, r, s]), "{grid_points:?}");
+    assert_eq!(sign(in_sphere(&a, &b, &c, &d, &e)), true_sphere(&grid_points), "{grid_points:?}");
 }
 
 #[test]
@@ -124,8 +124,8 @@ fn a_corner_tet_is_positive_and_its_sphere_passes_through_the_cube() {
 #[test]
 fn random_places_of_all_sizes_agree() {
     for bits in [2, 4, 8, 13, 18, 22, 24] {
-        for places in random(5 * 400, 1 << bits, bits).chunks_exact(5) {
-            agree(places.try_into().unwrap());
+        for grid_points in random(5 * 400, 1 << bits, bits).chunks_exact(5) {
+            agree(grid_points.try_into().unwrap());
         }
     }
 }
@@ -153,7 +153,7 @@ fn nearly_flat_and_nearly_cospherical_places_agree() {
 
 #[test]
 fn the_largest_places_do_not_overflow() {
-    let corners: Vec<Place> = (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit * SIDE)).collect();
+    let corners: Vec<GridPoint> = (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit * SIDE)).collect();
     for k in 0..8_usize.pow(5) {
         agree(std::array::from_fn(|n| corners[k / 8_usize.pow(n as u32) % 8]));
     }

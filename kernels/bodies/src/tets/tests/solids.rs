@@ -1,33 +1,33 @@
 //! Filled surfaces: by hand, then what holds for all.
 
-use super::super::{Closed, Fault, Fill, Side, Solid, Surface};
+use super::super::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use super::{Mesh, ball, block, joined, turned_block};
 use numerics::random::Key;
 
-fn closed(mesh: &Mesh) -> Closed {
+fn closed(mesh: &Mesh) -> ClosedSurface {
     let starts = mesh.starts();
-    Closed::of(&Surface { starts: &starts, corners: &mesh.corners, points: &mesh.points }, true).unwrap()
+    ClosedSurface::of(&PolygonSurface { starts: &starts, corners: &mesh.corners, points: &mesh.points }, true).unwrap()
 }
 
-fn fill(mesh: &Mesh, spacing: f64, interior: bool) -> (Closed, Solid) {
+fn fill(mesh: &Mesh, spacing: f64, interior: bool) -> (ClosedSurface, TetMesh) {
     let closed = closed(mesh);
-    let solid = closed.fill(&Fill { spacing, interior }).unwrap();
+    let solid = closed.fill(&FillSettings { spacing, interior }).unwrap();
     sound(&closed, &solid);
     (closed, solid)
 }
 
-fn volume(solid: &Solid, tet: &[u32; 4]) -> f64 {
+fn volume(solid: &TetMesh, tet: &[u32; 4]) -> f64 {
     let [a, b, c, d] = tet.map(|corner| solid.points[corner as usize].map(f64::from));
     let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
     (b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0])) / 6.0
 }
 
 /// What holds for every solid.
-fn sound(closed: &Closed, solid: &Solid) {
+fn sound(closed: &ClosedSurface, solid: &TetMesh) {
     let n = closed.points.len();
     assert_eq!(solid.points[..n], closed.points, "the surface's points come first, as they are");
-    assert!(solid.sides[..n].iter().all(|side| *side != Side::Interior));
-    assert!(solid.sides[n..].iter().all(|side| *side == Side::Interior));
+    assert!(solid.sides[..n].iter().all(|side| *side != ShellSide::Interior));
+    assert!(solid.sides[n..].iter().all(|side| *side == ShellSide::Interior));
     assert!(solid.points.as_flattened().iter().all(|x| x.is_finite()));
     for (tet, sliver) in solid.tets.iter().zip(&solid.slivers) {
         assert!(*sliver || volume(solid, tet) > 0.0, "no tet but a sliver is inverted");
@@ -144,8 +144,8 @@ fn a_ball_in_a_ball_is_a_cavity_exact_to_its_facets() {
     let whole = |mesh: &Mesh| closed_volume(mesh);
     assert!((closed.volume() - (whole(&outer) - whole(&inner))).abs() < 1e-12);
     let n = outer.points.len();
-    assert!(solid.sides[..n].iter().all(|side| *side == Side::Outer));
-    assert!(solid.sides[n..closed.points.len()].iter().all(|side| *side == Side::Inner));
+    assert!(solid.sides[..n].iter().all(|side| *side == ShellSide::Outer));
+    assert!(solid.sides[n..closed.points.len()].iter().all(|side| *side == ShellSide::Inner));
     // No tet reaches through the cavity.
     assert!(solid.tets.iter().all(|tet| {
         let middle = [0, 1, 2].map(|k| tet.iter().map(|c| f64::from(solid.points[*c as usize][k])).sum::<f64>() / 4.0);
@@ -229,18 +229,21 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn too_fine_a_spacing_is_refused_with_what_it_would_make() {
     let closed = closed(&block([1.0; 3], [0.0; 3]));
-    let fault = closed.fill(&Fill { spacing: 1e-4, interior: true }).unwrap_err();
-    assert!(matches!(fault, Fault::TooMany { points, .. } if (1.4e12..1.8e12).contains(&points)), "{fault}");
+    let fault = closed.fill(&FillSettings { spacing: 1e-4, interior: true }).unwrap_err();
+    assert!(
+        matches!(fault, SurfaceFault::TooManyPoints { points, .. } if (1.4e12..1.8e12).contains(&points)),
+        "{fault}"
+    );
     // A spacing wider than the body leaves no room, which is no fault.
-    let solid = closed.fill(&Fill { spacing: 5.0, interior: true }).unwrap();
+    let solid = closed.fill(&FillSettings { spacing: 5.0, interior: true }).unwrap();
     assert_eq!(solid.points.len(), 8);
 }
 
 #[test]
 fn nothing_is_filled_with_nothing() {
-    let solid = closed(&Mesh::default()).fill(&Fill { spacing: 0.0, interior: true }).unwrap();
+    let solid = closed(&Mesh::default()).fill(&FillSettings { spacing: 0.0, interior: true }).unwrap();
     assert!(solid.tets.is_empty() && solid.points.is_empty());
-    assert_eq!(solid.measured, super::super::Measured::default());
+    assert_eq!(solid.measured, super::super::FillQuality::default());
 }
 
 /// A mesh of the example graphs.
@@ -297,9 +300,9 @@ fn nothing_done_to_a_ball_makes_it_panic() {
             }
         }
         let starts: Vec<u32> = (0..=mesh.corners.len() as u32).step_by(3).collect();
-        let surface = Surface { starts: &starts, corners: &mesh.corners, points: &mesh.points };
-        let solid = Closed::of(&surface, true).and_then(|closed| {
-            let solid = closed.fill(&Fill { spacing: 0.3, interior: true })?;
+        let surface = PolygonSurface { starts: &starts, corners: &mesh.corners, points: &mesh.points };
+        let solid = ClosedSurface::of(&surface, true).and_then(|closed| {
+            let solid = closed.fill(&FillSettings { spacing: 0.3, interior: true })?;
             sound(&closed, &solid);
             Ok(solid)
         });

@@ -1,11 +1,11 @@
 //! What is repaired and what is refused.
 
-use super::super::{Changes, Closed, Fault, Surface};
+use super::super::{ClosedSurface, PolygonSurface, RepairCounts, SurfaceFault};
 use super::{Mesh, ball, block, joined};
 
-fn close(mesh: &Mesh, repair: bool) -> Result<Closed, Fault> {
+fn close(mesh: &Mesh, repair: bool) -> Result<ClosedSurface, SurfaceFault> {
     let starts: Vec<u32> = mesh.starts();
-    Closed::of(&Surface { starts: &starts, corners: &mesh.corners, points: &mesh.points }, repair)
+    ClosedSurface::of(&PolygonSurface { starts: &starts, corners: &mesh.corners, points: &mesh.points }, repair)
 }
 
 /// Refused either way, as the text says.
@@ -16,7 +16,7 @@ fn refused(mesh: &Mesh, text: &str) {
 }
 
 /// Refused as the text says, unless repairs are asked for.
-fn repaired(mesh: &Mesh, text: &str) -> Closed {
+fn repaired(mesh: &Mesh, text: &str) -> ClosedSurface {
     assert_eq!(close(mesh, false).unwrap_err().to_string(), text);
     let closed = close(mesh, true).unwrap();
     assert!(!closed.changes.is_none());
@@ -32,7 +32,7 @@ fn repaired(mesh: &Mesh, text: &str) -> Closed {
 fn a_cube_is_in_order_and_stays_as_it_is() {
     let cube = block([1.0; 3], [0.0; 3]);
     let closed = close(&cube, false).unwrap();
-    assert_eq!((closed.changes, closed.bodies), (Changes::default(), 1));
+    assert_eq!((closed.changes, closed.bodies), (RepairCounts::default(), 1));
     assert_eq!((closed.corners.clone(), closed.points.clone()), (cube.corners, cube.points));
     assert_eq!((closed.volume(), closed.mean_edge(), closed.edges().len()), (1.0, 1.0, 12));
 }
@@ -157,22 +157,25 @@ fn what_has_no_inside_is_refused() {
     for i in 0..n {
         (0..n).for_each(|j| bottle.face(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     }
-    assert!(matches!(close(&bottle, true), Err(Fault::OneSided { .. })));
+    assert!(matches!(close(&bottle, true), Err(SurfaceFault::NonOrientable { .. })));
     // Unless they may be turned, faces that look opposite ways come first.
-    assert!(matches!(close(&bottle, false), Err(Fault::Turned { .. } | Fault::OneSided { .. })));
+    assert!(matches!(
+        close(&bottle, false),
+        Err(SurfaceFault::InconsistentOrientation { .. } | SurfaceFault::NonOrientable { .. })
+    ));
 }
 
 #[test]
 fn surfaces_that_cross_are_refused() {
     let crossed = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [0.5, 0.3, 0.2])]);
     let fault = close(&crossed, true).unwrap_err();
-    let Fault::Crossing { faces, count, .. } = fault else { panic!("{fault}") };
+    let SurfaceFault::SelfIntersection { faces, count, .. } = fault else { panic!("{fault}") };
     assert!(faces[0] < 6 && (6..12).contains(&faces[1]) && count > 1, "{faces:?} {count}");
     // A spike of a ball pulled through its other side.
     let mut ball = ball(4, 1.0);
     let top = (0..ball.points.len()).max_by(|a, b| ball.points[*a][1].total_cmp(&ball.points[*b][1])).unwrap();
     ball.points[top] = [0.1, -1.7, 0.05];
-    assert!(matches!(close(&ball, true), Err(Fault::Crossing { .. })));
+    assert!(matches!(close(&ball, true), Err(SurfaceFault::SelfIntersection { .. })));
 }
 
 #[test]
@@ -180,8 +183,8 @@ fn shells_that_overlap_with_no_face_through_another_are_refused_when_filled() {
     // Two boxes of one height and depth: every crossing runs through edges.
     let overlapping = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [0.5, 0.0, 0.0])]);
     let closed = close(&overlapping, true).unwrap();
-    let fault = closed.fill(&super::super::Fill { spacing: 0.2, interior: true }).unwrap_err();
-    assert!(matches!(fault, Fault::Overlap { .. }), "{fault}");
+    let fault = closed.fill(&super::super::FillSettings { spacing: 0.2, interior: true }).unwrap_err();
+    assert!(matches!(fault, SurfaceFault::SelfOverlap { .. }), "{fault}");
 }
 
 #[test]

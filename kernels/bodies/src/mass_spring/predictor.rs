@@ -4,7 +4,7 @@
 //! of the deformation. So a stiff body that spins starts from a shape without strain, and linear solves have little left
 //! to do. A guess changes where Newton's method begins, not the equation.
 
-use super::body::Body;
+use super::body::SoftBody;
 use numerics::vector::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -13,8 +13,8 @@ const NOTHING: f64 = 1e-9;
 
 /// How a piece moves as a whole.
 #[derive(Clone, Debug)]
-pub(super) struct Rigid {
-    pub(super) places: Range<usize>,
+pub(super) struct RigidMotion {
+    pub(super) particles: Range<usize>,
     middle: DVec3,
     pace: DVec3,
     /// Radians a second.
@@ -25,47 +25,47 @@ pub(super) struct Rigid {
     energy: f64,
 }
 
-impl Rigid {
+impl RigidMotion {
     /// The rigid motion with the momenta of a piece; rest where it has `held` particles.
     pub(super) fn new(
-        body: &Body,
+        body: &SoftBody,
         held: &[bool],
         piece: &Range<usize>,
         x: &[DVec3],
         v: &[DVec3],
         trend: &[DVec3],
     ) -> Self {
-        let places = body.places(piece);
+        let particles = body.particles(piece);
         let [middle, pace, spin] = [DVec3::zeros(); 3];
-        let still = Self { places: places.clone(), middle, pace, spin, trend: DVec3::zeros(), energy: 0.0 };
-        if held[places.clone()].contains(&true) {
+        let still = Self { particles: particles.clone(), middle, pace, spin, trend: DVec3::zeros(), energy: 0.0 };
+        if held[particles.clone()].contains(&true) {
             return still;
         }
-        let mass: f64 = body.mass[places.clone()].iter().sum();
+        let mass: f64 = body.mass[particles.clone()].iter().sum();
         let mean = |values: &[DVec3]| {
-            let each = places.clone().zip(&values[places.clone()]);
-            each.map(|(place, value)| value * body.mass[place]).sum::<DVec3>() / mass
+            let each = particles.clone().zip(&values[particles.clone()]);
+            each.map(|(particle, value)| value * body.mass[particle]).sum::<DVec3>() / mass
         };
         let [middle, pace, trend] = [mean(x), mean(v), mean(trend)];
         let (mut turning, mut tensor) = (DVec3::zeros(), DMat3::zeros());
-        for place in places.clone() {
-            let (arm, m) = (x[place] - middle, body.mass[place]);
-            turning += arm.cross(&(v[place] - pace)) * m;
-            tensor += (DMat3::identity() * arm.norm_squared() - arm * arm.transpose()) * m;
+        for particle in particles.clone() {
+            let (offset, m) = (x[particle] - middle, body.mass[particle]);
+            turning += offset.cross(&(v[particle] - pace)) * m;
+            tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * m;
         }
         tensor += DMat3::identity() * (NOTHING * tensor.trace());
         match tensor.try_inverse().map(|inverse| inverse * turning) {
             Some(spin) if spin.iter().chain(&middle).chain(&pace).all(|x| x.is_finite()) => {
-                Self { places, middle, pace, spin, trend, energy: 0.5 * spin.dot(&turning) }
+                Self { particles, middle, pace, spin, trend, energy: 0.5 * spin.dot(&turning) }
             }
             _ => still,
         }
     }
 
     /// The mean of its particles' places by mass.
-    fn centre(&self, body: &Body, x: &[DVec3]) -> DVec3 {
-        let mass: f64 = body.mass[self.places.clone()].iter().sum();
-        self.places.clone().map(|place| x[place] * body.mass[place]).sum::<DVec3>() / mass
+    fn centre(&self, body: &SoftBody, x: &[DVec3]) -> DVec3 {
+        let mass: f64 = body.mass[self.particles.clone()].iter().sum();
+        self.particles.clone().map(|particle| x[particle] * body.mass[particle]).sum::<DVec3>() / mass
     }
 
     /// Without its turning.
@@ -81,9 +81,9 @@ impl Rigid {
 
 /// The motion of all pieces from some positions on.
 #[derive(Clone, Debug)]
-pub(super) struct Guess<'a> {
-    body: &'a Body,
-    pieces: Vec<Rigid>,
+pub(super) struct Predictor<'a> {
+    body: &'a SoftBody,
+    pieces: Vec<RigidMotion>,
     x: &'a [DVec3],
     v: &'a [DVec3],
     trend: &'a [DVec3],
@@ -91,18 +91,18 @@ pub(super) struct Guess<'a> {
     before: f64,
 }
 
-impl<'a> Guess<'a> {
+impl<'a> Predictor<'a> {
     /// From `x`, `v` and the change of velocity in the step of `before` seconds that led there. Pieces with `loose` particles
     /// are not rigid.
     pub(super) fn new(
-        body: &'a Body,
+        body: &'a SoftBody,
         loose: &[bool],
         x: &'a [DVec3],
         v: &'a [DVec3],
         trend: &'a [DVec3],
         before: f64,
     ) -> Self {
-        let rigid = |piece: &Range<usize>| Rigid::new(body, loose, piece, x, v, trend);
+        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, x, v, trend);
         Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
     }
 
@@ -113,15 +113,18 @@ impl<'a> Guess<'a> {
 
     /// Positions after `seconds`.
     pub(super) fn at(&self, seconds: f64) -> Vec<DVec3> {
-        let each: Vec<[Turn; 2]> =
-            self.pieces.iter().map(|p| [Turn::by(p.spin * (-0.5 * self.before)), Turn::by(p.spin * seconds)]).collect();
-        self.map(|index, place| {
+        let each: Vec<[CayleyRotation; 2]> = self
+            .pieces
+            .iter()
+            .map(|p| [CayleyRotation::by(p.spin * (-0.5 * self.before)), CayleyRotation::by(p.spin * seconds)])
+            .collect();
+        self.map(|index, particle| {
             let (piece, [back, turn]) = (&self.pieces[index], &each[index]);
-            let arm = self.x[place] - piece.middle;
-            let drift = self.v[place] - piece.velocity(self.x[place]);
+            let offset = self.x[particle] - piece.middle;
+            let drift = self.v[particle] - piece.velocity(self.x[particle]);
             // The trend as it was half a step before, without what turning makes of it.
-            let bent = self.trend[place] - piece.trend - piece.spin.cross(&piece.spin.cross(&back.apply(arm)));
-            let own = arm + (drift + back.undo(bent) * (0.5 * seconds)) * seconds;
+            let bent = self.trend[particle] - piece.trend - piece.spin.cross(&piece.spin.cross(&back.apply(offset)));
+            let own = offset + (drift + back.undo(bent) * (0.5 * seconds)) * seconds;
             piece.middle + (piece.pace + piece.trend * (0.5 * seconds)) * seconds + turn.apply(own)
         })
     }
@@ -133,17 +136,17 @@ impl<'a> Guess<'a> {
         let on = |start: DVec3, pace: DVec3, at: DVec3| {
             start + pace * seconds + (at - start - pace * early) / (share * share)
         };
-        let whole = |piece: &Rigid| {
+        let whole = |piece: &RigidMotion| {
             let centre = if piece.spin == DVec3::zeros() { piece.middle } else { piece.centre(self.body, middle) };
-            let turns = [Turn::by(piece.spin * early), Turn::by(piece.spin * seconds)];
+            let turns = [CayleyRotation::by(piece.spin * early), CayleyRotation::by(piece.spin * seconds)];
             (centre, on(piece.middle, piece.pace, centre), turns)
         };
-        let each: Vec<(DVec3, DVec3, [Turn; 2])> = self.pieces.iter().map(whole).collect();
-        self.map(|index, place| {
-            let (piece, (centre, whole, [halfway, turn])) = (&self.pieces[index], &each[index]);
-            let arm = self.x[place] - piece.middle;
-            let drift = self.v[place] - piece.velocity(self.x[place]);
-            whole + turn.apply(on(arm, drift, halfway.undo(middle[place] - centre)))
+        let each: Vec<(DVec3, DVec3, [CayleyRotation; 2])> = self.pieces.iter().map(whole).collect();
+        self.map(|index, particle| {
+            let (piece, (centre, whole, [solve_lower, turn])) = (&self.pieces[index], &each[index]);
+            let offset = self.x[particle] - piece.middle;
+            let drift = self.v[particle] - piece.velocity(self.x[particle]);
+            whole + turn.apply(on(offset, drift, solve_lower.undo(middle[particle] - centre)))
         })
     }
 
@@ -151,9 +154,9 @@ impl<'a> Guess<'a> {
     fn map(&self, of: impl Fn(usize, usize) -> DVec3 + Sync) -> Vec<DVec3> {
         let order = &self.body.order;
         let mut out = vec![DVec3::zeros(); self.x.len()];
-        order.clusters.each(&mut out[..], |cluster, out: &mut [DVec3]| {
+        order.clusters.for_each(&mut out[..], |cluster, out: &mut [DVec3]| {
             let piece = order.pieces.partition_point(|piece| piece.end <= cluster);
-            order.clusters.range(cluster).zip(out).for_each(|(place, out)| *out = of(piece, place));
+            order.clusters.range(cluster).zip(out).for_each(|(particle, out)| *out = of(piece, particle));
         });
         out
     }
@@ -161,12 +164,12 @@ impl<'a> Guess<'a> {
 
 /// A rotation by Cayley's transform: exact, without sines. By 2·atan(|w|/2), w to third order.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Turn {
+pub(super) struct CayleyRotation {
     half: DVec3,
     scale: f64,
 }
 
-impl Turn {
+impl CayleyRotation {
     pub(super) fn by(w: DVec3) -> Self {
         let half = w * 0.5;
         Self { half, scale: 2.0 / (1.0 + half.norm_squared()) }
@@ -187,11 +190,11 @@ mod tests {
 
     #[test]
     fn a_turn_keeps_lengths_and_is_undone() {
-        let turn = Turn::by(DVec3::new(0.3, -2.0, 1.0));
+        let turn = CayleyRotation::by(DVec3::new(0.3, -2.0, 1.0));
         let v = DVec3::new(1.0, 2.0, -3.0);
         assert!((turn.apply(v).norm() - v.norm()).abs() < 1e-14);
         assert!((turn.undo(turn.apply(v)) - v).norm() < 1e-14);
         // A quarter turn: 2·atan(1) about z.
-        assert!((Turn::by(DVec3::z() * 2.0).apply(DVec3::x()) - DVec3::y()).norm() < 1e-15);
+        assert!((CayleyRotation::by(DVec3::z() * 2.0).apply(DVec3::x()) - DVec3::y()).norm() < 1e-15);
     }
 }

@@ -4,10 +4,10 @@
 //! Promise: at most the given iterations; what was reached is returned, measured in the preconditioner's norm; the same
 //! bits for any number of threads. Sums run by cluster, in order.
 
-use super::body::Body;
+use super::body::SoftBody;
 use super::cholesky::Lower;
 use super::coarse::{Anchors, moved};
-use super::system::{System, halfway, rest_of_the_way};
+use super::system::{System, solve_lower, solve_lower_transpose};
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
 
@@ -47,7 +47,7 @@ pub(super) struct Scratch {
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
     pub(super) factor: &'a Lower,
-    pub(super) arms: &'a [Vec3],
+    pub(super) offset_from_centroid: &'a [Vec3],
     pub(super) anchors: &'a Anchors,
 }
 
@@ -65,20 +65,20 @@ impl Coarse<'_> {
 
     /// What the clusters' motions do to a particle.
     #[inline(always)]
-    fn moved(&self, modes: &[f64], cluster: usize, place: usize) -> DVec3 {
+    fn moved(&self, modes: &[f64], cluster: usize, particle: usize) -> DVec3 {
         if modes.is_empty() {
             DVec3::zeros()
         } else {
-            let free = moved(&modes[6 * cluster..6 * cluster + 6], to_f64(self.arms[place]));
-            self.anchors.at(place).map_or(free, |way| way * free)
+            let free = moved(&modes[6 * cluster..6 * cluster + 6], to_f64(self.offset_from_centroid[particle]));
+            self.anchors.at(particle).map_or(free, |way| way * free)
         }
     }
 
     /// A particle's share of the force on its cluster, added to `sums`.
     #[inline(always)]
-    fn restrict(&self, place: usize, r: DVec3, sums: &mut [f64; 6]) {
-        let r = self.anchors.at(place).map_or(r, |way| way.tr_mul(&r));
-        let torque = to_f64(self.arms[place]).cross(&r);
+    fn restrict(&self, particle: usize, r: DVec3, sums: &mut [f64; 6]) {
+        let r = self.anchors.at(particle).map_or(r, |way| way.tr_mul(&r));
+        let torque = to_f64(self.offset_from_centroid[particle]).cross(&r);
         for axis in 0..3 {
             sums[axis] += r[axis];
             sums[3 + axis] += torque[axis];
@@ -89,7 +89,7 @@ impl Coarse<'_> {
 /// Moves `x` towards A⁻¹ of the residual `r`, which it keeps; `r` is 0 at held particles and stays so.
 pub(super) fn solve(
     system: &mut System,
-    body: &Body,
+    body: &SoftBody,
     coarse: Coarse<'_>,
     limits: Limits,
     scratch: &mut Scratch,
@@ -106,9 +106,9 @@ pub(super) fn solve(
     let smoother = &system.smoother;
     let first = clusters.map((), |cluster, ()| {
         let (mut square, mut sums) = (0.0, [0.0; 6]);
-        for place in clusters.range(cluster) {
-            square += halfway(&smoother[place], r[place]).norm_squared();
-            coarse.restrict(place, r[place], &mut sums);
+        for particle in clusters.range(cluster) {
+            square += solve_lower(&smoother[particle], r[particle]).norm_squared();
+            coarse.restrict(particle, r[particle], &mut sums);
         }
         (square, sums)
     });
@@ -124,11 +124,12 @@ pub(super) fn solve(
     let enough = asked.min(limits.square).max(asked.min(FINEST * FINEST * start));
     loop {
         let smoother = &system.smoother;
-        clusters.each(&mut p[..], |cluster, mine: &mut [DVec3]| {
-            for (place, p) in clusters.range(cluster).zip(mine) {
-                if !system.held[place] {
-                    let fine = rest_of_the_way(&smoother[place], halfway(&smoother[place], r[place]));
-                    *p = fine + coarse.moved(modes, cluster, place) + *p * beta;
+        clusters.for_each(&mut p[..], |cluster, mine: &mut [DVec3]| {
+            for (particle, p) in clusters.range(cluster).zip(mine) {
+                if !system.held[particle] {
+                    let fine =
+                        solve_lower_transpose(&smoother[particle], solve_lower(&smoother[particle], r[particle]));
+                    *p = fine + coarse.moved(modes, cluster, particle) + *p * beta;
                 }
             }
         });
@@ -142,11 +143,11 @@ pub(super) fn solve(
         let smoother = &system.smoother;
         let next = clusters.map((&mut x[..], &mut r[..]), |cluster, (x, r): (&mut [DVec3], &mut [DVec3])| {
             let (mut square, mut sums) = (0.0, [0.0; 6]);
-            for ((place, x), r) in clusters.range(cluster).zip(x).zip(r) {
-                *x += p[place] * alpha;
-                *r -= ap[place] * alpha;
-                square += halfway(&smoother[place], *r).norm_squared();
-                coarse.restrict(place, *r, &mut sums);
+            for ((particle, x), r) in clusters.range(cluster).zip(x).zip(r) {
+                *x += p[particle] * alpha;
+                *r -= ap[particle] * alpha;
+                square += solve_lower(&smoother[particle], *r).norm_squared();
+                coarse.restrict(particle, *r, &mut sums);
             }
             (square, sums)
         });
@@ -171,23 +172,23 @@ pub(super) fn solve(
 }
 
 /// Replaces `r` by the preconditioner's answer to it: near A⁻¹r, in one go.
-pub(super) fn precondition(system: &System, body: &Body, coarse: Coarse<'_>, r: &mut [DVec3]) {
+pub(super) fn precondition(system: &System, body: &SoftBody, coarse: Coarse<'_>, r: &mut [DVec3]) {
     let clusters = &body.order.clusters;
     let forces = {
         let r = &*r;
         clusters.map((), |cluster, ()| {
             let mut sums = [0.0; 6];
-            clusters.range(cluster).for_each(|place| coarse.restrict(place, r[place], &mut sums));
+            clusters.range(cluster).for_each(|particle| coarse.restrict(particle, r[particle], &mut sums));
             sums
         })
     };
     let mut modes = Vec::new();
     coarse.solve(&forces, &mut modes);
-    clusters.each(r, |cluster, r: &mut [DVec3]| {
-        for (place, r) in clusters.range(cluster).zip(r) {
-            let w = &system.smoother[place];
-            let fine = rest_of_the_way(w, halfway(w, *r));
-            *r = if system.held[place] { DVec3::zeros() } else { fine + coarse.moved(&modes, cluster, place) };
+    clusters.for_each(r, |cluster, r: &mut [DVec3]| {
+        for (particle, r) in clusters.range(cluster).zip(r) {
+            let w = &system.smoother[particle];
+            let fine = solve_lower_transpose(w, solve_lower(w, *r));
+            *r = if system.held[particle] { DVec3::zeros() } else { fine + coarse.moved(&modes, cluster, particle) };
         }
     });
 }

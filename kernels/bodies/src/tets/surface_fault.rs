@@ -3,7 +3,7 @@
 /// What is wrong with a surface. Where one thing is wrong in several places, it names the first.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum SurfaceFault {
     /// A coordinate is no number, or infinite.
     #[error("point {point} is not finite")]
     NotFinite {
@@ -12,7 +12,7 @@ pub enum Fault {
     },
     /// Points at one place, in a surface that is to stay as it is.
     #[error("points {} and {} are at one place{}", points[0], points[1], of(*count, "such point"))]
-    Doubled {
+    DuplicatePoint {
         /// The first two.
         points: [u32; 2],
         /// Points that are where an earlier one is.
@@ -28,7 +28,7 @@ pub enum Fault {
     },
     /// Two faces on the same points, in a surface that is to stay as it is.
     #[error("faces {} and {} have the same points{}", faces[0], faces[1], of(*count, "such pair"))]
-    Twice {
+    DuplicateFace {
         /// The first two.
         faces: [u32; 2],
         /// Faces that are on an earlier one.
@@ -36,7 +36,7 @@ pub enum Fault {
     },
     /// A point without a face, in a surface that is to stay as it is.
     #[error("point {point} has no face{}", of(*count, "such point"))]
-    Loose {
+    UnusedPoint {
         /// The first.
         point: u32,
         /// How many.
@@ -47,7 +47,7 @@ pub enum Fault {
         "the surface is open: the edge of face {face} between points {} and {} has no other face{}", points[0],
         points[1], of(*count, "such edge")
     )]
-    Open {
+    OpenEdge {
         /// The first edge's ends.
         points: [u32; 2],
         /// Its face.
@@ -60,7 +60,7 @@ pub enum Fault {
         "the edge between points {} and {} has {faces} faces, expected 2{}", points[0], points[1],
         of(*count, "such edge")
     )]
-    Crowded {
+    NonManifoldEdge {
         /// The first edge's ends.
         points: [u32; 2],
         /// Its faces.
@@ -70,7 +70,7 @@ pub enum Fault {
     },
     /// Neighbours that look opposite ways, in a surface that is to stay as it is.
     #[error("faces {} and {} look opposite ways{}", faces[0], faces[1], of(*count, "such pair"))]
-    Turned {
+    InconsistentOrientation {
         /// The first two.
         faces: [u32; 2],
         /// Edges between such faces.
@@ -78,13 +78,13 @@ pub enum Fault {
     },
     /// A surface like Klein's bottle.
     #[error("the shell with face {face} has one side only, so it has no inside")]
-    OneSided {
+    NonOrientable {
         /// A face of it.
         face: u32,
     },
     /// A shell without an inside.
     #[error("the shell with face {face} encloses no volume")]
-    Flat {
+    NoVolume {
         /// Its first face.
         face: u32,
     },
@@ -103,7 +103,7 @@ pub enum Fault {
     },
     /// Faces that pass through each other.
     #[error("faces {} and {} cross near {at:?}{}", faces[0], faces[1], of(*count, "such pair"))]
-    Crossing {
+    SelfIntersection {
         /// The first two.
         faces: [u32; 2],
         /// A point of one of them near the crossing, metres.
@@ -113,13 +113,13 @@ pub enum Fault {
     },
     /// A part of space that the surface is around more than once, where its faces cross in edges alone.
     #[error("the surface overlaps itself near {at:?}")]
-    Overlap {
+    SelfOverlap {
         /// A point of that part, metres.
         at: [f32; 3],
     },
     /// More interior points than memory is for.
     #[error("a spacing of {spacing} m would make about {points:.2e} points, expected at most {most:.2e}")]
-    TooMany {
+    TooManyPoints {
         /// Metres.
         spacing: f64,
         /// How many it would make.
@@ -134,20 +134,25 @@ fn of(count: usize, what: &str) -> String {
     if count > 1 { format!(" ({count} {what}s in all)") } else { String::new() }
 }
 
-impl Fault {
+impl SurfaceFault {
     /// What to do about it.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => "look at what made it",
-            Self::Doubled { .. } | Self::Degenerate { .. } | Self::Twice { .. } | Self::Loose { .. } => {
-                "`repair` \"safe\" takes them out"
+            Self::DuplicatePoint { .. }
+            | Self::Degenerate { .. }
+            | Self::DuplicateFace { .. }
+            | Self::UnusedPoint { .. } => "`repair` \"safe\" takes them out",
+            Self::InconsistentOrientation { .. } | Self::InsideOut { .. } => "`repair` \"safe\" turns them",
+            Self::OpenEdge { .. } => {
+                "only closed surfaces can be filled: close the hole, or give a thin wall a thickness"
             }
-            Self::Turned { .. } | Self::InsideOut { .. } => "`repair` \"safe\" turns them",
-            Self::Open { .. } => "only closed surfaces can be filled: close the hole, or give a thin wall a thickness",
-            Self::Crowded { .. } => "take the faces inside the body out, or part the bodies that share the edge",
-            Self::OneSided { .. } | Self::Flat { .. } => "only a surface around a volume can be filled",
-            Self::Crossing { .. } | Self::Overlap { .. } => "part them, or make them one surface first",
-            Self::TooMany { .. } => "make `spacing` larger",
+            Self::NonManifoldEdge { .. } => {
+                "take the faces inside the body out, or part the bodies that share the edge"
+            }
+            Self::NonOrientable { .. } | Self::NoVolume { .. } => "only a surface around a volume can be filled",
+            Self::SelfIntersection { .. } | Self::SelfOverlap { .. } => "part them, or make them one surface first",
+            Self::TooManyPoints { .. } => "make `spacing` larger",
         }
     }
 }

@@ -1,58 +1,58 @@
 //! Which springs hang at which particle: those inside of a cluster once, at the first of their ends, those between clusters
 //! at both. So each cluster is computed for itself, and most of a body's springs are looked at once only.
 
-use super::parts::Parts;
+use super::partition::Partition;
 
 /// A spring as one end has it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Hung {
+pub(super) struct Incident {
     pub(super) other: u32,
     pub(super) spring: u32,
 }
 
 /// The springs of each particle, by place: those inside of its cluster to particles that come later, then all to others.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Hanging {
+pub(super) struct Adjacency {
     /// Where each particle's begin, and where the last one's end.
     pub(super) starts: Vec<u32>,
     /// Where those to other clusters begin.
     middles: Vec<u32>,
-    pub(super) hung: Vec<Hung>,
+    pub(super) incident: Vec<Incident>,
 }
 
-impl Hanging {
+impl Adjacency {
     /// Of springs whose ends are these places.
-    pub(super) fn new(clusters: &Parts, ends: &[[u32; 2]]) -> Self {
+    pub(super) fn new(clusters: &Partition, ends: &[[u32; 2]]) -> Self {
         let mut cluster = Vec::new();
         for index in 0..clusters.len() {
             cluster.extend(clusters.range(index).map(|_| index));
         }
         let across = |[a, b]: [u32; 2]| cluster[a as usize] != cluster[b as usize];
-        let mut all: Vec<(u32, bool, Hung)> = Vec::with_capacity(ends.len() * 5 / 4);
+        let mut all: Vec<(u32, bool, Incident)> = Vec::with_capacity(ends.len() * 5 / 4);
         for (spring, [a, b]) in ends.iter().enumerate() {
             let (first, second) = (*a.min(b), *a.max(b));
             let spring = spring as u32;
-            all.push((first, across([first, second]), Hung { other: second, spring }));
+            all.push((first, across([first, second]), Incident { other: second, spring }));
             if across([first, second]) {
-                all.push((second, true, Hung { other: first, spring }));
+                all.push((second, true, Incident { other: first, spring }));
             }
         }
-        all.sort_unstable_by_key(|(place, across, hung)| (*place, *across, hung.other, hung.spring));
-        let begin = |place: usize, across: bool| {
-            all.partition_point(|known| (known.0 as usize, known.1) < (place, across)) as u32
+        all.sort_unstable_by_key(|(particle, across, incident)| (*particle, *across, incident.other, incident.spring));
+        let begin = |particle: usize, across: bool| {
+            all.partition_point(|known| (known.0 as usize, known.1) < (particle, across)) as u32
         };
         Self {
-            starts: (0..=cluster.len()).map(|place| begin(place, false)).collect(),
-            middles: (0..cluster.len()).map(|place| begin(place, true)).collect(),
-            hung: all.into_iter().map(|known| known.2).collect(),
+            starts: (0..=cluster.len()).map(|particle| begin(particle, false)).collect(),
+            middles: (0..cluster.len()).map(|particle| begin(particle, true)).collect(),
+            incident: all.into_iter().map(|known| known.2).collect(),
         }
     }
 
     /// Of something there is for each of them: what the particle at `place` has inside its cluster, and to others.
     #[inline(always)]
-    pub(super) fn of<'a, T>(&self, place: usize, all: &'a [T]) -> [&'a [T]; 2] {
+    pub(super) fn of<'a, T>(&self, particle: usize, all: &'a [T]) -> [&'a [T]; 2] {
         let [start, middle, end] =
-            [self.starts[place], self.middles[place], self.starts[place + 1]].map(|at| at as usize);
+            [self.starts[particle], self.middles[particle], self.starts[particle + 1]].map(|at| at as usize);
         [&all[start..middle], &all[middle..end]]
     }
 }
@@ -63,15 +63,18 @@ mod tests {
 
     #[test]
     fn a_spring_hangs_once_inside_a_cluster_and_twice_between_two() {
-        let clusters = Parts::new(vec![0, 3, 5]);
-        let hanging = Hanging::new(&clusters, &[[1, 0], [3, 1], [1, 2], [4, 3], [0, 4]]);
-        let others =
-            |place| hanging.of(place, &hanging.hung).map(|some| some.iter().map(|hung| hung.other).collect::<Vec<_>>());
+        let clusters = Partition::new(vec![0, 3, 5]);
+        let adjacency = Adjacency::new(&clusters, &[[1, 0], [3, 1], [1, 2], [4, 3], [0, 4]]);
+        let others = |particle| {
+            adjacency
+                .of(particle, &adjacency.incident)
+                .map(|some| some.iter().map(|incident| incident.other).collect::<Vec<_>>())
+        };
         assert_eq!(others(0), [vec![1], vec![4]]);
         assert_eq!(others(1), [vec![2], vec![3]]);
         assert_eq!(others(2), [vec![], vec![]]);
         assert_eq!(others(3), [vec![4], vec![1]]);
         assert_eq!(others(4), [vec![], vec![0]]);
-        assert_eq!(hanging.hung[0].spring, 0);
+        assert_eq!(adjacency.incident[0].spring, 0);
     }
 }

@@ -10,26 +10,26 @@ use rayon::prelude::*;
 
 /// What a point hangs on: particles and their shares, which sum to 1. Unused ones have weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Carrier {
+pub struct EmbeddedPoint {
     /// Indices.
     pub particles: [u32; 4],
     /// Shares.
     pub weights: [f64; 4],
 }
 
-impl Carrier {
+impl EmbeddedPoint {
     /// A point that is that particle.
-    pub fn on(particle: u32) -> Self {
+    pub fn at_particle(particle: u32) -> Self {
         Self { particles: [particle, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] }
     }
 
     /// Where the point is when particles are at `places`; exactly there for one that is a particle.
     #[inline]
-    pub fn at(&self, places: &[[f64; 3]]) -> [f64; 3] {
+    pub fn position(&self, positions: &[[f64; 3]]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (particle, weight) in self.particles.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0) {
-            let place = places[*particle as usize];
-            (0..3).for_each(|k| sum[k] += place[k] * weight);
+            let position = positions[*particle as usize];
+            (0..3).for_each(|k| sum[k] += position[k] * weight);
         }
         sum
     }
@@ -39,9 +39,9 @@ impl Carrier {
 ///
 /// # Panics
 /// Where a tet names no point.
-pub fn carry(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec<Carrier>> {
+pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec<EmbeddedPoint>> {
     let solid: Vec<u32> =
-        (0..tets.len() as u32).filter(|tet| Inverse::of(points, tets[*tet as usize]).is_some()).collect();
+        (0..tets.len() as u32).filter(|tet| BarycentricMap::of(points, tets[*tet as usize]).is_some()).collect();
     if solid.is_empty() {
         return None;
     }
@@ -55,10 +55,13 @@ pub fn carry(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
         let nearest = tree.closest(*p, f32::INFINITY).map_or([0; 3], |found| sorted(faces[found.triangle as usize]));
         let from = owners.partition_point(|owner| owner.0 < nearest);
         let around = owners[from..].iter().take_while(|owner| owner.0 == nearest).map(|owner| owner.1);
-        let shares = |tet: u32| Some((tet, Inverse::of(points, tets[tet as usize])?.shares(p)));
+        let shares = |tet: u32| Some((tet, BarycentricMap::of(points, tets[tet as usize])?.shares(p)));
         let least = |shares: &[f64; 4]| shares.iter().copied().fold(f64::INFINITY, f64::min);
         let best = around.filter_map(shares).reduce(|a, b| if least(&b.1) > least(&a.1) { b } else { a });
-        best.map_or(Carrier::on(0), |(tet, weights)| Carrier { particles: tets[tet as usize], weights })
+        best.map_or(EmbeddedPoint::at_particle(0), |(tet, weights)| EmbeddedPoint {
+            particles: tets[tet as usize],
+            weights,
+        })
     };
     Some(carried.par_iter().map(bind).collect())
 }
@@ -73,12 +76,12 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
 }
 
 /// What makes barycentric coordinates of places.
-struct Inverse {
+struct BarycentricMap {
     first: DVec3,
     rows: DMat3,
 }
 
-impl Inverse {
+impl BarycentricMap {
     /// Of a tet with a volume.
     fn of(points: &[Vec3], tet: [u32; 4]) -> Option<Self> {
         /// Least volume ÷ the product of its edges that counts: rounding of f32 positions.
@@ -113,33 +116,33 @@ mod tests {
 
     #[test]
     fn a_point_hangs_on_the_tet_it_is_in() {
-        let found = carry(&POINTS, &TETS, &[[0.1, 0.2, 0.3], [0.75, 0.75, 0.75], [0.0, 1.0, 0.0]]).unwrap();
+        let found = embed(&POINTS, &TETS, &[[0.1, 0.2, 0.3], [0.75, 0.75, 0.75], [0.0, 1.0, 0.0]]).unwrap();
         assert_eq!(found[0].particles, TETS[0]);
         for (share, expected) in found[0].weights.iter().zip([0.4, 0.1, 0.2, 0.3]) {
             assert!((share - expected).abs() < 1e-7);
         }
         assert_eq!(found[1].particles, TETS[1]);
-        assert_eq!(found[2].at(&POINTS.map(|p| p.map(f64::from))), [0.0, 1.0, 0.0]);
+        assert_eq!(found[2].position(&POINTS.map(|p| p.map(f64::from))), [0.0, 1.0, 0.0]);
     }
 
     #[test]
     fn affine_motion_carries_points_within_and_without_alike() {
         let carried = [[0.2, 0.3, 0.1], [0.6, 0.6, 0.7], [-0.5, 0.2, 0.1], [3.0, 3.0, 3.0]];
-        let found = carry(&POINTS, &TETS, &carried).unwrap();
+        let found = embed(&POINTS, &TETS, &carried).unwrap();
         let affine = |p: Vec3| {
             let [x, y, z] = p.map(f64::from);
             [2.0 * x + 0.5 * y + 3.0, y - 0.25 * z - 1.0, 0.5 * z + x]
         };
-        let places = POINTS.map(affine);
+        let positions = POINTS.map(affine);
         for (carrier, p) in found.iter().zip(carried) {
-            let (at, expected) = (carrier.at(&places), affine(p));
+            let (at, expected) = (carrier.position(&positions), affine(p));
             assert!((0..3).all(|k| (at[k] - expected[k]).abs() < 1e-6), "{at:?}, expected {expected:?}");
         }
     }
 
     #[test]
     fn flat_tets_carry_nothing() {
-        assert_eq!(carry(&[[0.0; 3]; 4], &[[0, 1, 2, 3]], &[[0.0; 3]]), None);
-        assert_eq!(carry(&[], &[], &[]), None);
+        assert_eq!(embed(&[[0.0; 3]; 4], &[[0, 1, 2, 3]], &[[0.0; 3]]), None);
+        assert_eq!(embed(&[], &[], &[]), None);
     }
 }

@@ -5,21 +5,21 @@
 //! by up to half a step, between 2⁻²⁵ and 2⁻²⁴ of the longest side of all bounds.
 
 /// A place on the lattice: three numbers from 0 to [`SIDE`].
-pub type Place = [i32; 3];
+pub type GridPoint = [i32; 3];
 
 /// The largest coordinate of a place.
 pub const SIDE: i32 = 1 << 24;
 
 /// Where places lie in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lattice {
+pub struct SnapGrid {
     /// Lowest place, in steps from the world's origin.
     low: [f64; 3],
     /// Metres.
     step: f64,
 }
 
-impl Lattice {
+impl SnapGrid {
     /// The finest lattice that holds all points. `None` where one is not finite, or none is there.
     pub fn around(points: &[[f32; 3]]) -> Option<Self> {
         let (first, rest) = points.split_first()?;
@@ -39,7 +39,7 @@ impl Lattice {
             return Some(Self { low, step: 1.0 }.settled(low));
         }
         let exponent = (longest.to_bits() >> 52) as i64 - 1023;
-        let fits = |lattice: &Self| lattice.steps(high).iter().all(|steps| *steps <= f64::from(SIDE));
+        let fits = |grid: &Self| grid.steps(high).iter().all(|steps| *steps <= f64::from(SIDE));
         let at = |exponent: i64| Self { low, step: power_of_two(exponent) }.settled(low);
         let fine = at(exponent - 24);
         Some(if fits(&fine) { fine } else { at(exponent - 23) })
@@ -61,13 +61,13 @@ impl Lattice {
     }
 
     /// The place nearest to a point; one of the sides where the point is beyond.
-    pub fn place(&self, point: [f64; 3]) -> Place {
+    pub fn grid_point(&self, point: [f64; 3]) -> GridPoint {
         self.steps(point).map(|steps| steps.clamp(0.0, f64::from(SIDE)) as i32)
     }
 
     /// Where a place is, metres.
-    pub fn point(&self, place: [f64; 3]) -> [f64; 3] {
-        [0, 1, 2].map(|axis| (self.low[axis] + place[axis]) * self.step)
+    pub fn point(&self, grid_point: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| (self.low[axis] + grid_point[axis]) * self.step)
     }
 
     /// Metres from a place to the next.
@@ -87,33 +87,33 @@ mod tests {
 
     #[test]
     fn a_box_of_a_power_of_two_has_all_24_bits_and_exact_places() {
-        let lattice = Lattice::around(&[[0.0; 3], [1.0; 3]]).unwrap();
-        assert_eq!(lattice.step(), 1.0 / f64::from(SIDE));
-        assert_eq!(lattice.place([1.0, 0.5, 0.0]), [SIDE, SIDE / 2, 0]);
-        assert_eq!(lattice.point([f64::from(SIDE), 1.0, 0.0]), [1.0, lattice.step(), 0.0]);
+        let grid = SnapGrid::around(&[[0.0; 3], [1.0; 3]]).unwrap();
+        assert_eq!(grid.step(), 1.0 / f64::from(SIDE));
+        assert_eq!(grid.grid_point([1.0, 0.5, 0.0]), [SIDE, SIDE / 2, 0]);
+        assert_eq!(grid.point([f64::from(SIDE), 1.0, 0.0]), [1.0, grid.step(), 0.0]);
     }
 
     #[test]
     fn places_fit_and_are_within_half_a_step_whatever_the_scale() {
         for scale in [1e-44_f32, 1e-38, 1e-6, 1.0, 1e6, 3e38] {
             let points = [[-0.3 * scale, 0.1 * scale, 0.7 * scale], [0.9 * scale, 0.11 * scale, 0.0]];
-            let lattice = Lattice::around(&points).unwrap();
+            let grid = SnapGrid::around(&points).unwrap();
             for point in points {
                 let point = point.map(f64::from);
-                let place = lattice.place(point);
-                assert!(place.iter().all(|x| (0..=SIDE).contains(x)), "{scale}: {place:?}");
-                let back = lattice.point(place.map(f64::from));
-                assert!((0..3).all(|k| (back[k] - point[k]).abs() <= 0.5 * lattice.step()), "{scale}");
+                let grid_point = grid.grid_point(point);
+                assert!(grid_point.iter().all(|x| (0..=SIDE).contains(x)), "{scale}: {grid_point:?}");
+                let back = grid.point(grid_point.map(f64::from));
+                assert!((0..3).all(|k| (back[k] - point[k]).abs() <= 0.5 * grid.step()), "{scale}");
             }
-            assert!(lattice.step() * f64::from(SIDE) <= 4.0 * f64::from(1.2 * scale), "{scale}: it is fine enough");
+            assert!(grid.step() * f64::from(SIDE) <= 4.0 * f64::from(1.2 * scale), "{scale}: it is fine enough");
         }
     }
 
     #[test]
     fn one_point_or_a_heap_has_a_lattice_and_no_point_or_a_nan_has_none() {
-        assert_eq!(Lattice::around(&[[5.0, 0.0, -1.0]; 3]).unwrap().place([5.0, 0.0, -1.0]), [0; 3]);
-        assert_eq!(Lattice::around(&[]), None);
-        assert_eq!(Lattice::around(&[[0.0; 3], [0.0, f32::NAN, 0.0]]), None);
-        assert_eq!(Lattice::around(&[[0.0; 3], [0.0, f32::INFINITY, 0.0]]), None);
+        assert_eq!(SnapGrid::around(&[[5.0, 0.0, -1.0]; 3]).unwrap().grid_point([5.0, 0.0, -1.0]), [0; 3]);
+        assert_eq!(SnapGrid::around(&[]), None);
+        assert_eq!(SnapGrid::around(&[[0.0; 3], [0.0, f32::NAN, 0.0]]), None);
+        assert_eq!(SnapGrid::around(&[[0.0; 3], [0.0, f32::INFINITY, 0.0]]), None);
     }
 }

@@ -1,9 +1,9 @@
 //! The surface of a body: its triangles by particle, and what of it is too near by nature to count as touching.
 
-use super::TouchError;
-use super::near::{Nearest, along};
+use super::CollisionError;
+use super::closest_point::{ClosestPoint, along};
 use super::obstacle::{check_points, check_triangles};
-use super::surface::{Edge, Moment, NONE, Surface};
+use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::swept::Elements;
 
 /// Times as long as at rest, and as the skin's edges are on average, from which on an edge is let go.
@@ -11,8 +11,8 @@ const LONG: f64 = 8.0;
 
 /// A surface of particles, facing outwards.
 #[derive(Clone, Debug)]
-pub struct Skin {
-    pub(super) surface: Surface,
+pub struct BodySkin {
+    pub(super) surface: TriangleSurface,
     pub(super) faces: Elements<3>,
     pub(super) edges: Elements<2>,
     rest: Vec<[f64; 3]>,
@@ -23,19 +23,19 @@ pub struct Skin {
     rings: Vec<u32>,
 }
 
-impl Skin {
+impl BodySkin {
     /// Of `triangles` of particles, which are at `rest` where nothing acts; `links` are the springs of the body, which
     /// say who is whose neighbour beside the triangles' own sides.
     ///
     /// # Errors
     /// Where a triangle or link names no particle, or a coordinate is not finite.
-    pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, TouchError> {
+    pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, CollisionError> {
         check_triangles(rest.len(), triangles)?;
         check_points(rest)?;
         if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= rest.len())) {
-            return Err(TouchError::Link { index, ends: links[index], count: rest.len() });
+            return Err(CollisionError::Link { index, ends: links[index], count: rest.len() });
         }
-        let surface = Surface::new(rest.len(), triangles);
+        let surface = TriangleSurface::new(rest.len(), triangles);
         let (starts, rings) = rings(&surface, rest.len(), links);
         Ok(Self {
             faces: Elements::new(surface.triangles.clone(), rest),
@@ -62,34 +62,34 @@ impl Skin {
     /// How far a particle is from a triangle at rest, metres.
     pub(super) fn rest_to_face(&self, particle: u32, face: u32) -> f64 {
         let at = Moment::of(&self.rest);
-        Nearest::on(face, at.place(particle), self.surface.corners(&at, face)).distance
+        ClosestPoint::on(face, at.position(particle), self.surface.corners(&at, face)).distance
     }
 
     /// What obstacles let go with particles at `x`.
-    pub(super) fn let_go(&self, x: &[[f64; 3]]) -> LetGo {
+    pub(super) fn released(&self, x: &[[f64; 3]]) -> ReleasedElements {
         let surface = &self.surface;
-        let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_drawn_out(edge, x)).collect();
+        let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_overstretched(edge, x)).collect();
         if !edges.contains(&true) {
-            return LetGo::default();
+            return ReleasedElements::default();
         }
         let (mut faces, mut particles) = (vec![false; surface.triangles.len()], vec![true; self.rest.len()]);
-        for (edge, let_go) in surface.edges.iter().zip(&edges) {
-            if *let_go {
+        for (edge, released) in surface.edges.iter().zip(&edges) {
+            if *released {
                 edge.faces.iter().filter(|face| **face != NONE).for_each(|face| faces[*face as usize] = true);
             } else {
                 edge.ends.iter().for_each(|end| particles[*end as usize] = false);
             }
         }
-        LetGo { edges, faces, particles }
+        ReleasedElements { edges, faces, particles }
     }
 
     /// How many edges obstacles let go with particles at `x`: those more than eight times as long as at rest, and as edges are
     /// on average.
-    pub fn count_let_go(&self, x: &[[f64; 3]]) -> usize {
-        self.surface.edges.iter().filter(|edge| self.is_drawn_out(edge, x)).count()
+    pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
+        self.surface.edges.iter().filter(|edge| self.is_overstretched(edge, x)).count()
     }
 
-    fn is_drawn_out(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
+    fn is_overstretched(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
         edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean)
     }
 
@@ -97,7 +97,7 @@ impl Skin {
     pub(super) fn rest_between(&self, edge: u32, other: u32) -> f64 {
         let at = Moment::of(&self.rest);
         let [[p, q], [a, b]] =
-            [edge, other].map(|edge| self.surface.edges[edge as usize].ends.map(|end| at.place(end)));
+            [edge, other].map(|edge| self.surface.edges[edge as usize].ends.map(|end| at.position(end)));
         let [s, t] = along([p, q], [a, b]);
         (p.lerp(&q, s) - a.lerp(&b, t)).norm()
     }
@@ -106,7 +106,7 @@ impl Skin {
 /// What of a skin obstacles let go: edges that are drawn out too far to be skin. What a tool has hooked would be drawn out for
 /// ever, as it stays on the side it came from; let go, it is drawn out no further.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LetGo {
+pub(super) struct ReleasedElements {
     /// By edge; empty where none is.
     edges: Vec<bool>,
     /// By triangle: whether one of its edges is.
@@ -115,7 +115,7 @@ pub(super) struct LetGo {
     particles: Vec<bool>,
 }
 
-impl LetGo {
+impl ReleasedElements {
     pub(super) fn has_edge(&self, edge: u32) -> bool {
         self.edges.get(edge as usize) == Some(&true)
     }
@@ -131,11 +131,11 @@ impl LetGo {
 
 fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     let at = Moment::of(places);
-    (at.place(edge.ends[0]) - at.place(edge.ends[1])).norm()
+    (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
 }
 
 /// Lists of the surface's particles within two links of each of them.
-fn rings(surface: &Surface, count: usize, links: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
+fn rings(surface: &TriangleSurface, count: usize, links: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
     let mut pairs: Vec<[u32; 2]> = links.iter().copied().chain(surface.edges.iter().map(|edge| edge.ends)).collect();
     pairs.extend(pairs.clone().into_iter().map(|[a, b]| [b, a]));
     pairs.sort_unstable();

@@ -3,12 +3,12 @@
 //! All are evaluated within each stage, at the stage's own time; goals and pins go straight from where they are at the
 //! step's start to where they are at its end.
 
-use super::body::Body;
+use super::body::SoftBody;
 use numerics::vector::DVec3;
 
 /// Draws a particle towards a place: a spring of `strength`·mass N/m, and a dashpot beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goal {
+pub struct GoalSpring {
     /// Whom.
     pub particle: u32,
     /// Where, at the start and at the end of the frame, metres.
@@ -32,7 +32,7 @@ const NONE: u32 = u32::MAX;
 
 /// The drive of one frame, in the solver's order.
 #[derive(Clone, Debug)]
-pub(super) struct Drive {
+pub(super) struct ExternalForces {
     pub(super) gravity: DVec3,
     pub(super) drag: f64,
     /// Seconds the frame has.
@@ -52,9 +52,16 @@ struct Track {
     damping: f64,
 }
 
-impl Drive {
-    pub(super) fn new(body: &Body, gravity: DVec3, drag: f64, seconds: f64, goals: &[Goal], pins: &[Pin]) -> Self {
-        let mut drive = Self {
+impl ExternalForces {
+    pub(super) fn new(
+        body: &SoftBody,
+        gravity: DVec3,
+        drag: f64,
+        seconds: f64,
+        goals: &[GoalSpring],
+        pins: &[Pin],
+    ) -> Self {
+        let mut external = Self {
             gravity,
             drag,
             seconds,
@@ -64,26 +71,26 @@ impl Drive {
             pins: Vec::with_capacity(pins.len()),
         };
         for goal in goals.iter().filter(|goal| goal.strength > 0.0) {
-            let place = body.order.places[goal.particle as usize] as usize;
+            let particle = body.order.index_of[goal.particle as usize] as usize;
             let track = Track {
                 between: goal.between.map(DVec3::from),
                 strength: goal.strength,
                 damping: goal.damping.max(0.0),
             };
-            if drive.goal_of[place] == NONE {
-                drive.goal_of[place] = drive.goals.len() as u32;
-                drive.goals.push(track);
+            if external.goal_of[particle] == NONE {
+                external.goal_of[particle] = external.goals.len() as u32;
+                external.goals.push(track);
             } else {
-                drive.goals[drive.goal_of[place] as usize].join(&track);
+                external.goals[external.goal_of[particle] as usize].join(&track);
             }
         }
         for pin in pins {
-            let place = body.order.places[pin.particle as usize];
-            if !std::mem::replace(&mut drive.held[place as usize], true) {
-                drive.pins.push((place, pin.between.map(DVec3::from)));
+            let particle = body.order.index_of[pin.particle as usize];
+            if !std::mem::replace(&mut external.held[particle as usize], true) {
+                external.pins.push((particle, pin.between.map(DVec3::from)));
             }
         }
-        drive
+        external
     }
 
     /// Whether something moves by itself, so that energy may rise.
@@ -94,18 +101,18 @@ impl Drive {
 
     /// Puts pinned particles where they are at `time`, a share of the frame, and `z` where (x − z)/a is their pins' velocity.
     pub(super) fn hold(&self, time: f64, x: &mut [DVec3], z: &mut [DVec3], a: f64) {
-        for (place, between) in &self.pins {
-            let place = *place as usize;
-            x[place] = lerp(between, time);
-            z[place] = x[place] - self.velocity(between) * a;
+        for (particle, between) in &self.pins {
+            let particle = *particle as usize;
+            x[particle] = lerp(between, time);
+            z[particle] = x[particle] - self.velocity(between) * a;
         }
     }
 
     /// What acts on a particle apart from springs, volumes and contacts, newtons.
     #[inline(always)]
-    pub(super) fn force(&self, place: usize, mass: f64, time: f64, x: DVec3, v: DVec3) -> DVec3 {
+    pub(super) fn force(&self, particle: usize, mass: f64, time: f64, x: DVec3, v: DVec3) -> DVec3 {
         let mut sum = self.gravity - v * self.drag;
-        if let Some(goal) = self.goal(place) {
+        if let Some(goal) = self.goal(particle) {
             sum += (lerp(&goal.between, time) - x) * goal.strength;
             sum += (self.velocity(&goal.between) - v) * goal.damping;
         }
@@ -114,32 +121,32 @@ impl Drive {
 
     /// What that resists for steps of `a`, kilograms.
     #[inline(always)]
-    pub(super) fn inertia(&self, place: usize, mass: f64, a: f64) -> f64 {
+    pub(super) fn inertia(&self, particle: usize, mass: f64, a: f64) -> f64 {
         let mut sum = a * self.drag;
-        if let Some(goal) = self.goal(place) {
+        if let Some(goal) = self.goal(particle) {
             sum += a * a * goal.strength + a * goal.damping;
         }
         sum * mass
     }
 
     /// The energy whose slope is [`Drive::force`] where `v` changes by 1/a of what `x` does; with `a` 0 what is stored.
-    pub(super) fn energy(&self, place: usize, mass: f64, time: f64, a: f64, x: DVec3, v: DVec3) -> f64 {
+    pub(super) fn energy(&self, particle: usize, mass: f64, time: f64, a: f64, x: DVec3, v: DVec3) -> f64 {
         let mut sum = -self.gravity.dot(&x) + 0.5 * a * self.drag * v.norm_squared();
-        sum += self.goal_energy(place, time, x);
-        if let Some(goal) = self.goal(place) {
+        sum += self.goal_energy(particle, time, x);
+        if let Some(goal) = self.goal(particle) {
             sum += 0.5 * a * goal.damping * (self.velocity(&goal.between) - v).norm_squared();
         }
         sum * mass
     }
 
     /// What a particle's goal stores, joules a kilogram.
-    pub(super) fn goal_energy(&self, place: usize, time: f64, x: DVec3) -> f64 {
-        self.goal(place).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
+    pub(super) fn goal_energy(&self, particle: usize, time: f64, x: DVec3) -> f64 {
+        self.goal(particle).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
     }
 
     #[inline(always)]
-    fn goal(&self, place: usize) -> Option<&Track> {
-        self.goals.get(*self.goal_of.get(place)? as usize)
+    fn goal(&self, particle: usize) -> Option<&Track> {
+        self.goals.get(*self.goal_of.get(particle)? as usize)
     }
 
     fn velocity(&self, between: &[DVec3; 2]) -> DVec3 {

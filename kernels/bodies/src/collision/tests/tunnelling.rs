@@ -36,8 +36,8 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
             DVec3::new(p.x, p.y + p.y.signum() * (0.5 * size[1] + 2e-5), p.z)
         };
         let [from, to] = specks(COUNT, 1e-5, above, |k| random(2, k).component_mul(&DVec3::new(0.3, 0.6, 0.3)));
-        let skin = Skin::new(&from, &triples(COUNT), &[]).unwrap();
-        let scene = Scene { skins: &[skin], obstacles: &[plate], ..Scene::default() };
+        let skin = BodySkin::new(&from, &triples(COUNT), &[]).unwrap();
+        let scene = CollisionScene { skins: &[skin], obstacles: &[plate], ..CollisionScene::default() };
         let (contacts, _) = find(&scene, &from, &to, [0.0, 1.0]);
         let mut of = vec![Vec::new(); from.len()];
         for contact in contacts.iter().filter(|contact| contact.weights == [1.0, 0.0, 0.0, 0.0]) {
@@ -62,7 +62,7 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
             } else if vertex % 50 == 0 {
                 let distance = |t: f64| {
                     let at = |face: &[u32; 3]| face.map(|corner| DVec3::from(points[corner as usize]));
-                    let each = faces.iter().map(|face| Nearest::on(0, p + relative * t, at(face)).distance);
+                    let each = faces.iter().map(|face| ClosestPoint::on(0, p + relative * t, at(face)).distance);
                     each.fold(f64::INFINITY, f64::min)
                 };
                 let least = (0..=1000).map(|k| distance(f64::from(k) / 1000.0)).fold(f64::INFINITY, f64::min);
@@ -94,9 +94,13 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
             to.push((p + way).into());
         }
     }
-    let skin = Skin::new(&from, &triples(COUNT), &[]).unwrap();
-    let (contacts, _) =
-        find(&Scene { skins: &[skin], obstacles: &[ridge], ..Scene::default() }, &from, &to, [0.0, 1.0]);
+    let skin = BodySkin::new(&from, &triples(COUNT), &[]).unwrap();
+    let (contacts, _) = find(
+        &CollisionScene { skins: &[skin], obstacles: &[ridge], ..CollisionScene::default() },
+        &from,
+        &to,
+        [0.0, 1.0],
+    );
     let mut through = 0;
     for k in 0..COUNT as usize {
         let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(DVec3::from);
@@ -132,10 +136,16 @@ fn spin(scale: f64) -> Vec<Contact> {
     let poses = [pose(0.0, &points), pose(1.0, &turned)];
     let pin = Obstacle::new(&faces, &poses, 1.0, 2e-3 * scale, 0.5).unwrap();
     let [from, to] = specks(COUNT, 0.05 * scale, |k| random(8, k) * (0.5 * scale), |k| random(9, k) * (0.1 * scale));
-    let skins = [Skin::new(&from, &triples(COUNT), &[]).unwrap()];
-    let own = Some(Rub { thickness: 1e-3 * scale, friction: 0.2 });
+    let skins = [BodySkin::new(&from, &triples(COUNT), &[]).unwrap()];
+    let self_contact = Some(ContactParams { thickness: 1e-3 * scale, friction: 0.2 });
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: -0.1 * scale, thickness: 1e-3 * scale, friction: 0.1 });
-    find(&Scene { skins: &skins, obstacles: &[pin], own, ground, ..Scene::default() }, &from, &to, [0.1, 0.9]).0
+    find(
+        &CollisionScene { skins: &skins, obstacles: &[pin], self_contact, ground, ..CollisionScene::default() },
+        &from,
+        &to,
+        [0.1, 0.9],
+    )
+    .0
 }
 
 #[test]
@@ -173,20 +183,26 @@ fn what_is_no_number_or_has_no_area_is_passed_over() {
     let cube = Obstacle::new(&faces, &[pose(0.0, &points)], 0.0, 0.0, 0.5).unwrap();
     let mut from: Vec<[f64; 3]> = (0..300).map(|k| (random(6, k) * 3.0).into()).collect();
     let to: Vec<[f64; 3]> = (0..300).map(|k| (random(7, k) * 3.0).into()).collect();
-    let skin = Skin::new(&from, &triples(100), &[]).unwrap();
+    let skin = BodySkin::new(&from, &triples(100), &[]).unwrap();
     from[17] = [f64::NAN, 0.0, 0.0];
     from[40] = [0.0, f64::INFINITY, 0.0];
-    let rub = Some(Rub { thickness: 0.0, friction: 1e6 });
+    let params = Some(ContactParams { thickness: 0.0, friction: 1e6 });
     let skins = [skin.clone(), skin];
-    let scene = Scene { skins: &skins, obstacles: &[cube], own: rub, between: rub, ..Scene::default() };
+    let scene = CollisionScene {
+        skins: &skins,
+        obstacles: &[cube],
+        self_contact: params,
+        body_contact: params,
+        ..CollisionScene::default()
+    };
     let (contacts, _) = find(&scene, &from, &to, [0.5, 0.5]);
     assert!(!contacts.is_empty());
     for contact in &contacts {
         assert!(contact.normal.iter().chain(&contact.velocity).all(|x| x.is_finite()) && contact.offset.is_finite());
     }
-    assert_eq!(Obstacle::new(&faces, &[], 1.0, 0.0, 0.0).unwrap_err(), TouchError::NoPose);
+    assert_eq!(Obstacle::new(&faces, &[], 1.0, 0.0, 0.0).unwrap_err(), CollisionError::NoPose);
     let twice = [pose(0.0, &points), pose(0.0, &points)];
     assert!(Obstacle::new(&faces, &twice, 1.0, 0.0, 0.0).unwrap_err().to_string().contains("`share`"));
-    let none = Scene::default();
-    assert_eq!(find(&none, &[], &[], [0.0, 1.0]).1, Found::default());
+    let none = CollisionScene::default();
+    assert_eq!(find(&none, &[], &[], [0.0, 1.0]).1, ContactSummary::default());
 }

@@ -4,12 +4,12 @@
 //! first by row (how fast does it change), then by particle (what does that push), so nothing is scattered and the order of
 //! every sum is fixed. In f32: a row that moves with a body rigidly feels it to 1e-7.
 
-use super::parts::{Parts, Several};
+use super::partition::{Partition, RaggedSlice};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Rows by row and by particle.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rows {
+pub(super) struct RankOneTerms {
     /// Whether they count for nothing.
     pub(super) idle: bool,
     /// Where each row's entries begin.
@@ -21,7 +21,7 @@ pub(super) struct Rows {
     /// Where each particle's entries begin in `at`; empty where there is no row.
     at_starts: Vec<u32>,
     at: Vec<At>,
-    parts: Option<Parts>,
+    partition: Option<Partition>,
     /// Each row's change in the last product.
     change: Vec<f64>,
 }
@@ -34,9 +34,9 @@ struct At {
     along: Vec3,
 }
 
-impl Rows {
+impl RankOneTerms {
     /// Rows of `particles` that begin at `starts`, among `count` particles.
-    pub(super) fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], parts: Parts) {
+    pub(super) fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], partition: Partition) {
         self.starts.clear();
         self.particles.clear();
         self.at_starts.clear();
@@ -49,9 +49,9 @@ impl Rows {
         self.starts.extend_from_slice(starts);
         self.particles.extend_from_slice(particles);
         self.at_starts.resize(count + 1, 0);
-        particles.iter().for_each(|place| self.at_starts[*place as usize + 1] += 1);
-        for place in 0..count {
-            self.at_starts[place + 1] += self.at_starts[place];
+        particles.iter().for_each(|particle| self.at_starts[*particle as usize + 1] += 1);
+        for particle in 0..count {
+            self.at_starts[particle + 1] += self.at_starts[particle];
         }
         let mut next = self.at_starts.clone();
         self.at.clear();
@@ -67,7 +67,7 @@ impl Rows {
         self.along.resize(particles.len(), [0.0; 3]);
         self.change.clear();
         self.change.resize(starts.len() - 1, 0.0);
-        self.parts = Some(parts);
+        self.partition = Some(partition);
     }
 
     /// Whether there is no row that counts.
@@ -86,7 +86,7 @@ impl Rows {
     }
 
     /// The particles of a row.
-    pub(super) fn places(&self, row: usize) -> &[u32] {
+    pub(super) fn particles(&self, row: usize) -> &[u32] {
         &self.particles[self.row(row)]
     }
 
@@ -96,19 +96,19 @@ impl Rows {
     }
 
     /// The rows in parts; none where there is no row that counts.
-    pub(super) fn parts(&self) -> Option<&Parts> {
-        self.parts.as_ref().filter(|_| !self.is_empty())
+    pub(super) fn partition(&self) -> Option<&Partition> {
+        self.partition.as_ref().filter(|_| !self.is_empty())
     }
 
     /// Sets what each entry resists: `weight` of the row, times the entry's gradient.
-    pub(super) fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Parts) {
+    pub(super) fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Partition) {
         if self.is_empty() {
             return;
         }
-        if let Some(parts) = &self.parts {
+        if let Some(partition) = &self.partition {
             let starts = &self.starts;
-            parts.each(Several::new(starts, &mut self.along), |part, mut along| {
-                for (row, along) in parts.range(part).zip(along.iter_mut()) {
+            partition.for_each(RaggedSlice::new(starts, &mut self.along), |part, mut along| {
+                for (row, along) in partition.range(part).zip(along.iter_mut()) {
                     let root = weights[row].max(0.0).sqrt();
                     for (entry, along) in (starts[row] as usize..).zip(along) {
                         *along = to_f32(gradients[entry] * root);
@@ -117,7 +117,7 @@ impl Rows {
             });
         }
         let along = &self.along;
-        clusters.each(Several::new(&self.at_starts, &mut self.at), |_, mut mine| {
+        clusters.for_each(RaggedSlice::new(&self.at_starts, &mut self.at), |_, mut mine| {
             mine.iter_mut().flatten().for_each(|at| at.along = along[at.entry as usize]);
         });
     }
@@ -127,36 +127,36 @@ impl Rows {
         if self.is_empty() {
             return;
         }
-        let Some(parts) = &self.parts else { return };
+        let Some(partition) = &self.partition else { return };
         let (starts, particles, along) = (&self.starts, &self.particles, &self.along);
-        parts.each(&mut self.change[..], |part, mine: &mut [f64]| {
-            for (row, change) in parts.range(part).zip(mine) {
+        partition.for_each(&mut self.change[..], |part, mine: &mut [f64]| {
+            for (row, change) in partition.range(part).zip(mine) {
                 let entries = starts[row] as usize..starts[row + 1] as usize;
                 let each = particles[entries.clone()].iter().zip(&along[entries]);
-                *change = each.fold(0.0, |sum, (place, g)| sum + to_f64(*g).dot(&p[*place as usize]));
+                *change = each.fold(0.0, |sum, (particle, g)| sum + to_f64(*g).dot(&p[*particle as usize]));
             }
         });
     }
 
     /// Σ g·(its row's change), of the particle at `place`.
     #[inline(always)]
-    pub(super) fn push(&self, place: usize) -> DVec3 {
-        let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
+    pub(super) fn push(&self, particle: usize) -> DVec3 {
+        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
     /// `weight` of Σ g gᵀ of the particle at `place`, added to `block`.
     #[inline(always)]
-    pub(super) fn add_block(&self, place: usize, weight: f64, block: &mut [f64; 6]) {
-        for at in &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize] {
+    pub(super) fn add_block(&self, particle: usize, weight: f64, block: &mut [f64; 6]) {
+        for at in &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize] {
             add_square(block, to_f64(at.along), weight);
         }
     }
 
     /// Σ of `values`, one a row, times `gradients`, one an entry: a force on the particle at `place`.
     #[inline(always)]
-    pub(super) fn gather(&self, place: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
-        let mine = &self.at[self.at_starts[place] as usize..self.at_starts[place + 1] as usize];
+    pub(super) fn gather(&self, particle: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
+        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
     }
 }

@@ -5,7 +5,7 @@ use numerics::vector::DVec3;
 
 /// The nearest point of a triangle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Nearest {
+pub(super) struct ClosestPoint {
     pub(super) face: u32,
     /// Of the corners, ≥ 0, together 1; exactly 0 off a side or corner.
     pub(super) weights: [f64; 3],
@@ -13,7 +13,7 @@ pub(super) struct Nearest {
     pub(super) distance: f64,
 }
 
-impl Nearest {
+impl ClosestPoint {
     /// Of `face` with these corners, to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
     #[inline]
     pub(super) fn on(face: u32, p: DVec3, corners: [DVec3; 3]) -> Self {
@@ -122,7 +122,7 @@ mod tests {
         for case in 0..300 {
             let corners = [0, 1, 2].map(|k| random(1, 4 * case + k));
             let p = random(1, 4 * case + 3) * 3.0 - DVec3::repeat(1.0);
-            let best = Nearest::on(0, p, corners);
+            let best = ClosestPoint::on(0, p, corners);
             assert!((best.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             for k in 0..400 {
                 let [u, v] = [random(2, k).x, random(2, k).y];
@@ -147,7 +147,7 @@ mod tests {
             [DVec3::zeros(), DVec3::x(), DVec3::x()],
             [DVec3::zeros(), DVec3::x(), DVec3::x() * 2.0],
         ] {
-            assert!(Nearest::on(0, p, corners).distance.is_finite());
+            assert!(ClosestPoint::on(0, p, corners).distance.is_finite());
         }
         assert_eq!(along([p, p], [p, p]), [0.0, 0.0]);
         assert!(along([p, p * 2.0], [p, p * 2.0]).iter().all(|x| x.is_finite()));

@@ -5,7 +5,7 @@
 //! follow each other so that those joined by springs are few steps apart, for the coarse matrix's sake.
 //! The order hangs on sets alone, never on how a sort orders equals.
 
-use super::parts::Parts;
+use super::partition::Partition;
 use numerics::vector::DVec3;
 use std::ops::Range;
 
@@ -22,11 +22,11 @@ const LEAF: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Order {
     /// The caller's index of each.
-    pub(super) callers: Vec<u32>,
+    pub(super) caller_of: Vec<u32>,
     /// Where each of the caller's is.
-    pub(super) places: Vec<u32>,
+    pub(super) index_of: Vec<u32>,
     /// Clusters.
-    pub(super) clusters: Parts,
+    pub(super) clusters: Partition,
     /// Pieces that hang together, as ranges of clusters.
     pub(super) pieces: Vec<Range<usize>>,
 }
@@ -36,40 +36,40 @@ impl Order {
     pub(super) fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let roots = pieces(points.len(), springs.clone());
         // Pieces by their first particle, particles within by index.
-        let mut callers: Vec<u32> = (0..points.len() as u32).collect();
-        callers.sort_by_key(|particle| (roots[*particle as usize], *particle));
+        let mut caller_of: Vec<u32> = (0..points.len() as u32).collect();
+        caller_of.sort_by_key(|particle| (roots[*particle as usize], *particle));
         let wanted = CLUSTERS * libm::pow(points.len() as f64, GROWTH);
         let (mut starts, mut ranges, mut first) = (vec![0], Vec::new(), 0);
-        while first < callers.len() {
-            let root = roots[callers[first] as usize];
-            let count = callers[first..].iter().take_while(|particle| roots[**particle as usize] == root).count();
+        while first < caller_of.len() {
+            let root = roots[caller_of[first] as usize];
+            let count = caller_of[first..].iter().take_while(|particle| roots[**particle as usize] == root).count();
             let share = (wanted * count as f64 / points.len() as f64) as usize;
             let clusters = share.clamp(1, (count / SMALLEST).max(1));
             let before = starts.len() - 1;
-            halve(points, &mut callers[first..first + count], clusters, first, &mut starts);
+            halve(points, &mut caller_of[first..first + count], clusters, first, &mut starts);
             ranges.push(before..starts.len() - 1);
             first += count;
         }
-        let (callers, starts) = lined_up(&callers, &starts, &ranges, springs);
-        let mut places = vec![0; points.len()];
-        for (place, caller) in callers.iter().enumerate() {
-            places[*caller as usize] = place as u32;
+        let (caller_of, starts) = lined_up(&caller_of, &starts, &ranges, springs);
+        let mut index_of = vec![0; points.len()];
+        for (index, caller) in caller_of.iter().enumerate() {
+            index_of[*caller as usize] = index as u32;
         }
-        Self { callers, places, clusters: Parts::new(starts), pieces: ranges }
+        Self { caller_of, index_of, clusters: Partition::new(starts), pieces: ranges }
     }
 }
 
 /// `callers`, whose clusters begin at `starts`, with the clusters of each piece in an order in which joined ones are near each
 /// other: outwards from one at the piece's end, reversed (Cuthill & McKee 1969).
 fn lined_up(
-    callers: &[u32],
+    caller_of: &[u32],
     starts: &[usize],
     pieces: &[Range<usize>],
     springs: impl Iterator<Item = [u32; 2]>,
 ) -> (Vec<u32>, Vec<usize>) {
-    let mut cluster = vec![0; callers.len()];
+    let mut cluster = vec![0; caller_of.len()];
     for (index, ends) in starts.windows(2).enumerate() {
-        callers[ends[0]..ends[1]].iter().for_each(|caller| cluster[*caller as usize] = index);
+        caller_of[ends[0]..ends[1]].iter().for_each(|caller| cluster[*caller as usize] = index);
     }
     let mut joined = vec![Vec::new(); starts.len() - 1];
     for ends in springs {
@@ -83,14 +83,14 @@ fn lined_up(
         others.sort_unstable();
         others.dedup();
     }
-    let (mut ordered, mut ends) = (Vec::with_capacity(callers.len()), vec![0]);
+    let (mut ordered, mut ends) = (Vec::with_capacity(caller_of.len()), vec![0]);
     let mut met = vec![false; joined.len()];
     for piece in pieces {
         let line = outwards(&joined, piece.start, &mut met);
         // The last of them is at an end, or nearly so.
         let line = outwards(&joined, line[line.len() - 1], &mut met);
         for cluster in line.into_iter().rev() {
-            ordered.extend_from_slice(&callers[starts[cluster]..starts[cluster + 1]]);
+            ordered.extend_from_slice(&caller_of[starts[cluster]..starts[cluster + 1]]);
             ends.push(ordered.len());
         }
     }
@@ -192,7 +192,7 @@ mod tests {
         for cluster in 0..clusters.len() {
             let range = clusters.range(cluster);
             assert!((90..150).contains(&range.len()), "{} particles", range.len());
-            let members = || order.callers[range.clone()].iter().map(|particle| points[*particle as usize]);
+            let members = || order.caller_of[range.clone()].iter().map(|particle| points[*particle as usize]);
             let high = members().fold(DVec3::repeat(-1e9), |high, p| high.sup(&p));
             let low = members().fold(DVec3::repeat(1e9), |low, p| low.inf(&p));
             assert!((high - low).max() <= 8.0, "a cluster as long as {}", (high - low).max());
@@ -207,8 +207,8 @@ mod tests {
         let pairs = (1..216).step_by(4).map(|i| [i, i + 2]);
         let order = Order::new(&points, even.chain(pairs));
         assert_eq!(order.pieces.len(), 1 + 54);
-        for (place, caller) in order.callers.iter().enumerate() {
-            assert_eq!(order.places[*caller as usize] as usize, place);
+        for (index, caller) in order.caller_of.iter().enumerate() {
+            assert_eq!(order.index_of[*caller as usize] as usize, index);
         }
         let last = order.pieces.last().unwrap().clone();
         assert_eq!(order.clusters.range(last.start).len(), 2);
@@ -222,8 +222,8 @@ mod tests {
         let inside = springs.filter(|ends| (ends[1] as usize) < points.len());
         let order = Order::new(&points, inside.clone());
         let cluster = |particle: u32| {
-            let place = order.places[particle as usize] as usize;
-            (0..order.clusters.len()).find(|cluster| order.clusters.range(*cluster).contains(&place)).unwrap()
+            let index = order.index_of[particle as usize] as usize;
+            (0..order.clusters.len()).find(|cluster| order.clusters.range(*cluster).contains(&index)).unwrap()
         };
         assert!(order.clusters.len() > 30);
         assert!(inside.step_by(7).all(|ends| cluster(ends[0]).abs_diff(cluster(ends[1])) <= 1));

@@ -5,15 +5,19 @@
 
 use rayon::prelude::*;
 
-use super::lattice::Place;
+use super::grid::GridPoint;
 use super::predicates::{At, orient};
 use numerics::tree::TriangleTree;
 
 /// The first pair of triangles that cross, by index, and how many pairs do.
-pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &TriangleTree) -> Option<([u32; 2], usize)> {
+pub(super) fn crossing(
+    grid_points: &[GridPoint],
+    triangles: &[[u32; 3]],
+    tree: &TriangleTree,
+) -> Option<([u32; 2], usize)> {
     let found = |first: usize| {
         let own = triangles[first];
-        let corners = own.map(|corner| places[corner as usize]);
+        let corners = own.map(|corner| grid_points[corner as usize]);
         let bound = |pick: fn(i32, i32) -> i32| {
             [0, 1, 2].map(|k| pick(pick(corners[0][k], corners[1][k]), corners[2][k]) as f32)
         };
@@ -26,7 +30,7 @@ pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &Triangle
                 }
                 let theirs = triangles[*other as usize];
                 if own.iter().filter(|corner| theirs.contains(corner)).count() < 2
-                    && triangles_cross(places, own, theirs)
+                    && triangles_cross(grid_points, own, theirs)
                 {
                     least = least.min(*other);
                     count += 1;
@@ -39,8 +43,8 @@ pub(super) fn crossing(places: &[Place], triangles: &[[u32; 3]], tree: &Triangle
     all.first().map(|(pair, _)| (*pair, all.iter().map(|(_, count)| count).sum()))
 }
 
-fn triangles_cross(places: &[Place], a: [u32; 3], b: [u32; 3]) -> bool {
-    let at = |triangle: [u32; 3]| triangle.map(|corner| At::from(places[corner as usize].map(f64::from)));
+fn triangles_cross(grid_points: &[GridPoint], a: [u32; 3], b: [u32; 3]) -> bool {
+    let at = |triangle: [u32; 3]| triangle.map(|corner| At::from(grid_points[corner as usize].map(f64::from)));
     let (at_a, at_b) = (at(a), at(b));
     let (Some(a_sides), Some(b_sides)) = (sides(&at_b, &at_a), sides(&at_a, &at_b)) else { return false };
     pierces(&at_a, a_sides, &at_b) || pierces(&at_b, b_sides, &at_a)

@@ -2,28 +2,28 @@
 //! (Amenta, Choi & Rote 2003), within a round along Morton's curve. So a walk to the next point is short, and no input is
 //! slow.
 
-use super::lattice::{Place, SIDE};
+use super::grid::{GridPoint, SIDE};
 use numerics::random::Key;
 
 /// Any fixed number.
 const SEED: u64 = 0x7e75;
 
 /// The indices of all places, in the order of insertion: the same for the same places, whatever the machine.
-pub(super) fn insertion_order(places: &[Place]) -> Vec<u32> {
-    let rounds = u64::from(usize::BITS - places.len().leading_zeros());
-    let key = |(index, place): (usize, &Place)| {
+pub(super) fn insertion_order(points: &[GridPoint]) -> Vec<u32> {
+    let rounds = u64::from(usize::BITS - points.len().leading_zeros());
+    let key = |(index, point): (usize, &GridPoint)| {
         // Half of all points go last, a quarter before them, and so on.
         let later = u64::from(Key::new(SEED).of(index as u64).u64().trailing_zeros()).min(rounds);
-        u128::from(rounds - later) << 96 | u128::from(morton(*place)) << 32 | index as u128
+        u128::from(rounds - later) << 96 | u128::from(morton(*point)) << 32 | index as u128
     };
-    let mut keys: Vec<u128> = places.iter().enumerate().map(key).collect();
+    let mut keys: Vec<u128> = points.iter().enumerate().map(key).collect();
     keys.sort_unstable();
     keys.into_iter().map(|key| key as u32).collect()
 }
 
 /// The 21 highest bits of three coordinates in turns.
-fn morton(place: Place) -> u64 {
-    let [x, y, z] = place.map(|x| spread(x.min(SIDE - 1) as u64 >> 3));
+fn morton(point: GridPoint) -> u64 {
+    let [x, y, z] = point.map(|x| spread(x.min(SIDE - 1) as u64 >> 3));
     x | y << 1 | z << 2
 }
 
@@ -49,8 +49,8 @@ mod tests {
 
     #[test]
     fn every_place_comes_once_and_most_come_late() {
-        let places: Vec<Place> = (0..1000).map(|k| [k, 0, 0]).collect();
-        let order = insertion_order(&places);
+        let points: Vec<GridPoint> = (0..1000).map(|k| [k, 0, 0]).collect();
+        let order = insertion_order(&points);
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.into_iter().eq(0..1000));

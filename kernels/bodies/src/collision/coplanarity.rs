@@ -21,7 +21,7 @@ impl Roots {
 
 /// What one direction says about two things that go straight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Apart {
+pub(super) enum Separation {
     /// Never as near as asked.
     Far,
     /// Near perhaps, never through each other.
@@ -33,31 +33,31 @@ pub(super) enum Apart {
 /// What the normal of a triangle where it starts says, then the ways across its sides within its plane and across how the
 /// point passes them: its two sides and the way to the point from where they meet.
 #[inline]
-pub(super) fn face_apart(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+pub(super) fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let normal = start[0].cross(&start[1]);
-    let said = face_along(&normal, start, end, reach);
-    if said == Apart::Unknown {
+    let separation = face_separation_along(&normal, start, end, reach);
+    if separation == Separation::Unknown {
         let pass = end[2] - start[2];
         for side in [start[0], start[1], start[1] - start[0]] {
             for axis in [normal.cross(&side), pass.cross(&side)] {
-                if face_along(&axis, start, end, reach) == Apart::Far {
-                    return Apart::Far;
+                if face_separation_along(&axis, start, end, reach) == Separation::Far {
+                    return Separation::Far;
                 }
             }
         }
     }
-    said
+    separation
 }
 
 /// What `axis` says of a point and a triangle.
 #[inline]
-fn face_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let range = |[b, c, p]: &[DVec3; 3]| {
-        let (one, two, way) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
-        (way + one.min(two).min(0.0), way + one.max(two).max(0.0))
+        let (one, two, offset) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
+        (offset + one.min(two).min(0.0), offset + one.max(two).max(0.0))
     };
     let (first, last) = (range(start), range(end));
-    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+    classify(first.0.min(last.0), first.1.max(last.1), reach, axis)
 }
 
 /// What the normal of two edges where they start says, then the ways across each within the plane of both and across how
@@ -65,46 +65,46 @@ fn face_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) ->
 ///
 /// Edges that stay parallel go through each other nowhere that their ends do not.
 #[inline]
-pub(super) fn edges_apart(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+pub(super) fn edge_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     /// Sine within which edges are parallel.
     const PARALLEL: f64 = 1e-9;
     let normal = start[0].cross(&start[1]);
-    let said = edges_along(&normal, start, end, reach);
-    if said != Apart::Unknown {
-        return said;
+    let separation = edge_separation_along(&normal, start, end, reach);
+    if separation != Separation::Unknown {
+        return separation;
     }
     let pass = end[2] - start[2];
     let axes = [normal.cross(&start[0]), normal.cross(&start[1]), pass.cross(&start[0]), pass.cross(&start[1])];
-    if axes.iter().any(|axis| edges_along(axis, start, end, reach) == Apart::Far) {
-        return Apart::Far;
+    if axes.iter().any(|axis| edge_separation_along(axis, start, end, reach) == Separation::Far) {
+        return Separation::Far;
     }
     let parallel =
         |[d, e, _]: &[DVec3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
-    if parallel(start) && parallel(end) { Apart::Near } else { Apart::Unknown }
+    if parallel(start) && parallel(end) { Separation::Near } else { Separation::Unknown }
 }
 
 /// What `axis` says of two edges.
 #[inline]
-fn edges_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Apart {
+fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let range = |[d, e, r]: &[DVec3; 3]| {
-        let (one, two, way) = (-axis.dot(d), axis.dot(e), axis.dot(r));
-        (way + one.min(0.0) + two.min(0.0), way + one.max(0.0) + two.max(0.0))
+        let (one, two, offset) = (-axis.dot(d), axis.dot(e), axis.dot(r));
+        (offset + one.min(0.0) + two.min(0.0), offset + one.max(0.0) + two.max(0.0))
     };
     let (first, last) = (range(start), range(end));
-    verdict(first.0.min(last.0), first.1.max(last.1), reach, axis)
+    classify(first.0.min(last.0), first.1.max(last.1), reach, axis)
 }
 
 /// Of heights within `low` and `high` times the normal's length.
 #[inline]
-fn verdict(low: f64, high: f64, reach: f64, normal: &DVec3) -> Apart {
+fn classify(low: f64, high: f64, reach: f64, normal: &DVec3) -> Separation {
     let nearest = low.max(-high);
     let far = reach * (1.0 + 1e-9);
     if nearest > 0.0 && nearest * nearest > far * far * normal.norm_squared() {
-        Apart::Far
+        Separation::Far
     } else if nearest > 0.0 {
-        Apart::Near
+        Separation::Near
     } else {
-        Apart::Unknown
+        Separation::Unknown
     }
 }
 
