@@ -154,6 +154,8 @@ metrics! {
     ELASTIC = "elastic", Unit::Joules, "Energy in springs.";
     GOAL_ENERGY = "goal_energy", Unit::Joules, "Energy in goals.";
     RESET_ENERGY = "reset_energy", Unit::Joules, "Energy that a goal brought as it became the shape at rest; below 0 freed.";
+    PLASTIC_WORK = "plastic_work", Unit::Joules,
+        "Elastic energy that plastic flow dissipated after the frame's steps: it is missing from the next frame's `elastic`.";
     ENERGY_SHED = "energy_shed", Unit::Joules, "Energy taken away because a step would have made it of nothing.";
     VOLUME_RATIO = "volume_ratio", Unit::None, "Volume as a share of that at rest.";
     WORST_STRETCH = "worst_stretch", Unit::None, "The largest length of a spring by its length at rest, or the reverse.";
@@ -170,7 +172,7 @@ metrics! {
 /// See the module.
 pub static NODE: Node = Node::new(
     "Softbody",
-    1,
+    2,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, rub and press against colliders, the ground, each \
      other and themselves, keep their volume and, where they are plastic, their dents; goals direct them and pins hold \
      them. Stiffness does not hang on how finely they are cut, and none blows up, stiff or soft, \
@@ -285,7 +287,7 @@ impl Chain for Run {
         let plasticity =
             Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
         let drawn = goals.shape(times[1]);
-        let _ = flow(&solving.body, &mut self.state, plasticity, seconds, drawn.as_deref());
+        let plastic_work = flow(&solving.body, &mut self.state, plasticity, seconds, drawn.as_deref());
         let mut brought = 0.0;
         let keep = f64::from(cx.get(KEEP_DENTS));
         goals.resets(times[1], whole, frames, |shape, share| {
@@ -297,7 +299,7 @@ impl Chain for Run {
         }
         let far = goals.distance(times[1], on, &self.state.positions);
         let let_go = if obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
-        self.said = said(&report, brought, let_go, far.unwrap_or(0.0), pinned, &self.state);
+        self.said = said(&report, [brought, plastic_work], let_go, far.unwrap_or(0.0), pinned, &self.state);
         self.solving = Some(solving);
         Ok(())
     }
@@ -348,7 +350,7 @@ impl Solving {
 /// Values in the order of [`METRICS`].
 fn said(
     report: &FrameReport,
-    reset_energy: f64,
+    [reset_energy, plastic_work]: [f64; 2],
     let_go: usize,
     goal_distance: f64,
     pinned: usize,
@@ -365,6 +367,7 @@ fn said(
         report.elastic,
         report.goal_energy,
         reset_energy,
+        plastic_work,
         report.energy_removed,
         report.volume_ratio,
         report.worst_stretch,

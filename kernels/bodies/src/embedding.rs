@@ -4,6 +4,7 @@
 //! tets go it goes, exactly so for affine motion. Limit: a point far outside of all tets is carried as if its tet went on to
 //! there, which magnifies how that one deforms.
 
+use crate::tets::{faces_of, sorted};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 use rayon::prelude::*;
@@ -46,7 +47,7 @@ pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
         return None;
     }
     // A straight way from a point to the nearest of all faces crosses none: that face is of the tet the point is in.
-    let faces: Vec<[u32; 3]> = solid.iter().flat_map(|tet| sides(tets[*tet as usize])).collect();
+    let faces: Vec<[u32; 3]> = solid.iter().flat_map(|tet| faces_of(&tets[*tet as usize])).collect();
     let tree = TriangleTree::build(points, &faces);
     let mut owners: Vec<([u32; 3], u32)> =
         faces.iter().enumerate().map(|(k, face)| (sorted(*face), solid[k / 4])).collect();
@@ -64,15 +65,6 @@ pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
         })
     };
     Some(carried.par_iter().map(bind).collect())
-}
-
-fn sides([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 4] {
-    [[b, c, d], [a, d, c], [a, b, d], [a, c, b]]
-}
-
-fn sorted(mut face: [u32; 3]) -> [u32; 3] {
-    face.sort_unstable();
-    face
 }
 
 /// What makes barycentric coordinates of places.

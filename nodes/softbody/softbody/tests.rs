@@ -226,3 +226,15 @@ fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
     let torn = coupled(1.0);
     assert!(torn[1].metrics["torn"] == 9.0 && drop(&torn) > 0.5, "{} {:?}", drop(&torn), torn[1].metrics);
 }
+
+#[test]
+fn plastic_work_is_published_where_springs_flow() {
+    let work = |creep: f32| {
+        let block = block([2; 3], [0.0; 3], [0.1; 3]);
+        let soft = simulating(block).set(GROUND, true).set(STIFFNESS, all(2e3));
+        let frames = soft.set(PLASTIC_YIELD, 0.01).set(PLASTIC_CREEP, creep).frames([1, 12]);
+        frames[1].metrics["plastic_work"]
+    };
+    assert_eq!(work(0.0), 0.0);
+    assert!(work(20.0) > 0.0, "{}", work(20.0));
+}

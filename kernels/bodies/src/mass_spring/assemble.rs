@@ -13,19 +13,6 @@ use numerics::vector::DVec3;
 const OVERLAP: f64 = 3.0;
 
 impl StageSolver {
-    /// Begins a stage of `a` whose springs' lengths and regions' volumes come from those `before`.
-    pub(super) fn set_step_start(
-        &mut self,
-        context: &FrameContext<'_>,
-        a: f64,
-        before: impl Fn(usize, usize) -> f64 + Sync,
-        volumes: Vec<f64>,
-    ) {
-        springs::links(context.body, &context.rest, a, before, &mut self.links);
-        self.volumes.begin(a, volumes);
-        self.measured = false;
-    }
-
     /// The force on each particle at `x` and `v`.
     pub(super) fn forces(
         &mut self,

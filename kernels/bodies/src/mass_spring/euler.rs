@@ -89,7 +89,17 @@ impl Stepper<'_> {
         let scale = self.scale(&moving.x, &y, contacts, h);
         let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
-        let stage = Stage { y: &y, z: &z, a: h, time: times[1], contacts: &[], early: 0.0, spinning: &[], index: 0 };
+        let stage = Stage {
+            y: &y,
+            z: &z,
+            a: h,
+            time: times[1],
+            contacts: &[],
+            early: 0.0,
+            spinning: &[],
+            line_search: true,
+            index: 0,
+        };
         let before = OnceCell::new();
         for round in 1..=ROUNDS {
             let again = self.solver.descend(&self.context, &stage, contacts, enough, self.warm, &mut x);

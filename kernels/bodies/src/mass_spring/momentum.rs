@@ -146,7 +146,7 @@ impl StageSolver {
 
     /// Turns each group as a whole so that it has the angular momentum of the stage's equation, whatever linear solves left:
     /// springs and volumes do not feel it, and contacts with obstacles are counted for what they resist.
-    pub(super) fn correct_angular_momentum(&self, body: &SoftBody, stage: &Stage<'_>, x: &mut [DVec3]) {
+    pub(super) fn correct_angular_momentum(&self, body: &SoftBody, stage: &Stage<'_>, x: &mut [DVec3]) -> bool {
         /// Share of a group's inertia below which it has none about an axis.
         const NOTHING: f64 = 1e-9;
         let inertia = &self.system.inertia;
@@ -189,5 +189,6 @@ impl StageSolver {
                 x[particle] = middles[group] + turn.apply(x[particle] - middles[group]);
             }
         }
+        turns.iter().any(Option::is_some)
     }
 }

@@ -85,12 +85,11 @@ impl StageSolver {
                 base = ObjectiveParts { contacts, others: self.other_objective(context, stage, x) };
                 solved.enough = enough.square.max(enough.share * enough.share * now.min(enough.scale));
             }
-            solved.residual = if solved.first > 0.0 { (now / solved.first).sqrt() } else { 0.0 };
+            solved.set_residual(now);
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
             let wanted = (now > solved.enough && !slow) || deep;
             if !wanted || stuck || solved.newton >= most {
                 solved.caps += u32::from(wanted && !stuck && most == MOST_TOUCHING);
-                solved.failed = !now.is_finite();
                 break;
             }
             self.store_noncontact_residual(stage);
@@ -111,7 +110,9 @@ impl StageSolver {
             }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
-        self.correct_angular_momentum_downhill(context, stage, base, x);
+        if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {
+            self.measure_residual(context, stage, x, &mut solved);
+        }
         solved
     }
 
@@ -122,11 +123,11 @@ impl StageSolver {
         stage: &Stage<'_>,
         base: ObjectiveParts,
         x: &mut [DVec3],
-    ) {
+    ) -> bool {
         let mut turned = x.to_vec();
         self.correct_angular_momentum(context.body, stage, &mut turned);
         if turned == x {
-            return;
+            return false;
         }
         let contacts = self.contact_objective(context, stage, &turned);
         let level = ObjectiveParts { contacts, others: self.other_objective(context, stage, &turned) };
@@ -136,6 +137,7 @@ impl StageSolver {
         } else {
             velocities(&context.body.order.clusters, x, stage, &mut self.v);
         }
+        self.measured
     }
 
     /// What all but contacts count in what the stage makes least, ½(x − y)ᵀM(x − y) + a²·(energies), at positions that

@@ -10,7 +10,7 @@ use super::conjugate_gradients::{self, Coarse, Limits};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::ExternalForces;
 use super::galerkin::Galerkin;
-use super::springs::{Link, Record, RestLengths};
+use super::springs::{self, Link, Record, RestLengths};
 use super::state::CachedFactor;
 use super::system::System;
 use super::volume::{Inventory, ThinTet, Volumes};
@@ -51,6 +51,8 @@ pub(super) struct Stage<'a> {
     pub(super) early: f64,
     /// Energy that turns each piece, joules; none where it does not matter.
     pub(super) spinning: &'a [f64],
+    /// Whether Newton's method runs with a line search, and may change which contacts act: implicit Euler.
+    pub(super) line_search: bool,
     /// Which of a step's stages, for the count of iterations.
     pub(super) index: usize,
 }
@@ -92,6 +94,14 @@ pub(super) struct Solved {
     pub(super) unmet: f64,
     /// How deep the worst contact is of all there are at the end, those that nothing was done about too, metres below its gap.
     pub(super) deepest: f64,
+}
+
+impl Solved {
+    /// Takes note of the square of the residual that is left.
+    pub(super) fn set_residual(&mut self, square: f64) {
+        self.residual = if self.first > 0.0 { (square / self.first).sqrt() } else { 0.0 };
+        self.failed = !square.is_finite();
+    }
 }
 
 /// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.
@@ -150,6 +160,20 @@ impl StageSolver {
         Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
+    /// Starts a stage with step coefficient `a`: dashpots measure changes of length and volume from those at the start of the
+    /// step, `before` (by the two ends of a spring) and `volumes` (by region).
+    pub(super) fn set_step_start(
+        &mut self,
+        context: &FrameContext<'_>,
+        a: f64,
+        before: impl Fn(usize, usize) -> f64 + Sync,
+        volumes: Vec<f64>,
+    ) {
+        springs::links(context.body, &context.rest, a, before, &mut self.links);
+        self.volumes.begin(a, volumes);
+        self.measured = false;
+    }
+
     /// Makes ready for a stage's first look at `contacts`.
     pub(super) fn begin(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
         self.find_free_groups(context, contacts);
@@ -170,9 +194,23 @@ impl StageSolver {
         x: &mut [DVec3],
     ) -> Solved {
         self.begin(context, stage.contacts);
-        let solved = self.iterate(context, stage, newton, warm, x);
-        self.correct_angular_momentum(context.body, stage, x);
+        let mut solved = self.iterate(context, stage, newton, warm, x);
+        if self.correct_angular_momentum(context.body, stage, x) && !solved.failed {
+            self.measure_residual(context, stage, x, &mut solved);
+        }
         solved
+    }
+
+    /// Measures the residual at `x`, which is what the stage returns, for `solved`.
+    pub(super) fn measure_residual(
+        &mut self,
+        context: &FrameContext<'_>,
+        stage: &Stage<'_>,
+        x: &[DVec3],
+        solved: &mut Solved,
+    ) {
+        self.assemble(context, stage, x, false);
+        solved.set_residual(self.square(&context.body.order.clusters));
     }
 
     fn iterate(
@@ -185,12 +223,11 @@ impl StageSolver {
     ) -> Solved {
         let clusters = &context.body.order.clusters;
         let mut solved = Solved::default();
-        let mut first = 0.0;
         loop {
             self.assemble(context, stage, x, true);
             let before = self.square(clusters);
             if solved.newton == 0 {
-                first = before;
+                solved.first = before;
             }
             if !self.direction(context, stage, warm, x, &mut solved) {
                 return solved;
@@ -200,8 +237,8 @@ impl StageSolver {
             self.r = vec![DVec3::zeros(); x.len()];
             self.assemble(context, stage, x, false);
             let after = self.square(clusters);
-            solved.failed = after > RISE * before || !after.is_finite();
-            solved.residual = if first > 0.0 { (after / first).sqrt() } else { 0.0 };
+            solved.set_residual(after);
+            solved.failed |= after > RISE * before;
             let wanted = if newton.tolerance > 0.0 {
                 self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max) > newton.tolerance
             } else {
@@ -253,7 +290,7 @@ impl StageSolver {
     }
 
     /// Contacts that push, and the deepest of them, metres below its gap.
-    pub(super) fn constraint(&self) -> (u32, f64) {
+    pub(super) fn active_contacts(&self) -> (u32, f64) {
         let pushing = self.contact_states.iter().filter(|state| state.normal_force > 0.0);
         pushing.fold((0, 0.0), |(count, deepest), state| (count + 1, state.depth.max(deepest)))
     }
@@ -283,16 +320,9 @@ impl StageSolver {
         let free = stage.spinning.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
         let spinning: f64 = free.map(|piece| piece.0).sum();
         let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
-        let constraint = !stage.contacts.is_empty();
-        // Implicit Euler alone asks for no bound on turning.
-        let searching = constraint && stage.spinning.is_empty();
-        let asked = if searching {
-            CG_SHARE_SEARCHING
-        } else if constraint {
-            CG_SHARE_TOUCHING
-        } else {
-            CG_SHARE
-        };
+        let in_contact = !stage.contacts.is_empty();
+        let asked = linear_tolerance(in_contact, stage.line_search);
+        let searching = in_contact && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
         let mut reached = self.gradients(body, warm, limits);
         solved.cg += reached.iterations;
@@ -328,5 +358,68 @@ impl StageSolver {
         let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
         warm.factor = Galerkin { layout, body, system, offset_from_centroid, anchors: &anchors }.factor();
         (warm.anchors, warm.fresh, warm.spent) = (anchors, [0; 2], 0);
+    }
+}
+
+/// Share of the residual that a linear solve may leave in a stage with or without contacts, with or without a line search.
+fn linear_tolerance(in_contact: bool, line_search: bool) -> f64 {
+    match (in_contact, line_search) {
+        (false, _) => CG_SHARE,
+        (true, true) => CG_SHARE_SEARCHING,
+        (true, false) => CG_SHARE_TOUCHING,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Material, Mesh};
+    use super::super::search::StopCriteria;
+    use super::*;
+    use crate::tets::cubes;
+
+    #[test]
+    fn only_stages_with_a_line_search_solve_contacts_loosely() {
+        assert_eq!(linear_tolerance(true, true), CG_SHARE_SEARCHING);
+        assert_eq!(linear_tolerance(true, false), CG_SHARE_TOUCHING);
+        assert!(CG_SHARE_TOUCHING < CG_SHARE && CG_SHARE < CG_SHARE_SEARCHING);
+        for line_search in [false, true] {
+            assert_eq!(linear_tolerance(false, line_search), CG_SHARE);
+        }
+    }
+
+    /// A spinning, deformed block without a pin: its angular momentum is corrected after Newton's method.
+    #[test]
+    fn the_residual_is_that_of_the_positions_returned() {
+        let h = 1.0 / 24.0;
+        let (points, tets) = cubes([3, 2, 2], [0.0; 3], [0.3, 0.2, 0.2]);
+        let material = Material { density: 1000.0.into(), stiffness: 1e4.into(), damping: 0.01.into() };
+        let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
+        let body = SoftBody::new(&mesh, &material, &[]).unwrap();
+        let external = ExternalForces::new(&body, DVec3::zeros(), 0.0, h, &[], &[]);
+        let rest = RestLengths { lengths: &body.lengths, torn: &[] };
+        let context = FrameContext { body: &body, external: &external, rest, volumes: &body.volumes };
+        let start: Vec<DVec3> = body.rest.iter().map(|x| x + DVec3::new(x.y * x.y, 0.3 * x.z, x.x * x.y)).collect();
+        let inertial: Vec<DVec3> = start.iter().map(|x| x + DVec3::z().cross(x) * (5.0 * h)).collect();
+        for line_search in [false, true] {
+            let mut solver = StageSolver::new(&body);
+            solver.volumes = Volumes::new(&body, 1.0, &body.volumes);
+            springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
+            let volumes = solver.volumes.at(&body, &start);
+            solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
+            let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
+            let stage = Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, spinning: &[], line_search, index: 0 };
+            let (mut cached, mut x) = (CachedFactor::default(), inertial.clone());
+            let solved = if line_search {
+                let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };
+                solver.descend(&context, &stage, &mut [], enough, &mut cached, &mut x)
+            } else {
+                solver.solve(&context, &stage, Newton { most: 1, tolerance: 0.0 }, &mut cached, &mut x)
+            };
+            assert!(solver.correct_angular_momentum(&body, &stage, &mut x.clone()), "nothing holds the block");
+            solver.assemble(&context, &stage, &x, false);
+            let residual = (solver.square(&body.order.clusters) / solved.first).sqrt();
+            assert!(residual > 0.0 && !solved.failed, "{solved:?}");
+            assert_eq!(solved.residual, residual, "line search: {line_search}");
+        }
     }
 }

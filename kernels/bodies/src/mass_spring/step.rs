@@ -137,7 +137,7 @@ impl Stepper<'_> {
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&moving.x, 0.0) < 0.0)) {
             *self.euler_steps_left = (*self.euler_steps_left).max(1);
         }
-        (stepped.contacts, stepped.overlap) = self.solver.constraint();
+        (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
         let contact_states = stepped.euler || stepped.contacts > 0;
         let trend = |(v, before): (&DVec3, &DVec3)| if contact_states { DVec3::zeros() } else { (v - before) / h };
@@ -206,7 +206,17 @@ impl Stepper<'_> {
         let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.trend, h);
         let mut x = predictor.at(2.0 * a);
         let spinning = predictor.spinning();
-        let mut stage = Stage { y: &[], z: &[], a, time: times[0], contacts, early: h, spinning: &spinning, index: 0 };
+        let mut stage = Stage {
+            y: &[],
+            z: &[],
+            a,
+            time: times[0],
+            contacts,
+            early: h,
+            spinning: &spinning,
+            line_search: false,
+            index: 0,
+        };
         let volumes = self.solver.volumes.drift(body, &moving.x, &moving.v);
         // Lengths and volumes go by the same rules as positions do.
         let on_from_start = |solver: &mut StageSolver, seconds: f64| {
@@ -246,7 +256,17 @@ impl Stepper<'_> {
         let y: Vec<DVec3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
         let mut x = predictor.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
-        let stage = Stage { y: &y, z: &z, a, time: times[1], contacts, early: 0.0, spinning: &spinning, index: 1 };
+        let stage = Stage {
+            y: &y,
+            z: &z,
+            a,
+            time: times[1],
+            contacts,
+            early: 0.0,
+            spinning: &spinning,
+            line_search: false,
+            index: 1,
+        };
         let second = self.solver.solve(&self.context, &stage, newton, self.warm, &mut x);
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
 

@@ -1,11 +1,10 @@
 //! The springs of a body: edges of tetrahedra, each once.
 
 use super::body::Mesh;
+use crate::tets::FACES;
 
 /// Corners that each of the six edges of a tetrahedron joins.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-/// Corners of its four faces.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// The edges of tetrahedra, each once, by their ends; and the six of each.
 pub(super) fn edges(tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, Vec<[u32; 6]>) {

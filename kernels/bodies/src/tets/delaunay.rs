@@ -10,6 +10,7 @@
 //! they are one piece, and its boundary sees the place and, spheres being open, lies with no face on a plane with it, so
 //! joined to it makes positive tets.
 
+use super::boundary::FACES;
 use super::grid::GridPoint;
 use super::insertion_order::insertion_order;
 use super::predicates::{At, in_sphere, orient};
@@ -70,9 +71,6 @@ const GHOST: u32 = 0;
 /// The corner of a dead tet.
 const DEAD: u32 = u32::MAX;
 
-/// The other corners of a tet in such an order that, after the first, they make an even permutation.
-const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
 /// A face of a tet: four times the tet, plus the corner it is across from.
 type Face = u32;
 
@@ -132,7 +130,7 @@ impl Complex {
         for k in 0..4 {
             let mut ghost = first;
             ghost[k] = GHOST;
-            ghost.swap(OTHERS[k][0], OTHERS[k][1]);
+            ghost.swap(FACES[k][0], FACES[k][1]);
             complex.push(ghost);
         }
         for tet in 0..5 {
@@ -157,7 +155,7 @@ impl Complex {
 
     /// The vertices of a face, sorted.
     fn face(&self, tet: usize, corner: usize) -> [u32; 3] {
-        let mut face = OTHERS[corner].map(|other| self.corners[tet][other]);
+        let mut face = FACES[corner].map(|other| self.corners[tet][other]);
         face.sort_unstable();
         face
     }
@@ -300,7 +298,7 @@ impl Complex {
     fn number(&mut self, rim: &[Rim]) -> bool {
         let mut count = 0;
         for Rim { corners, corner, .. } in rim {
-            for other in OTHERS[*corner as usize] {
+            for other in FACES[*corner as usize] {
                 let local = &mut self.local[corners[other] as usize];
                 if local[0] != self.stamp {
                     *local = [self.stamp, count];
@@ -341,6 +339,6 @@ fn side<'a>(mut tet: [&'a At; 4], corner: usize, p: &'a At) -> f64 {
 /// across from.
 #[inline(always)]
 fn edges(corner: usize) -> [[usize; 3]; 3] {
-    let [a, b, c] = OTHERS[corner];
+    let [a, b, c] = FACES[corner];
     [[a, b, c], [b, c, a], [c, a, b]]
 }

@@ -31,6 +31,7 @@ mod surface_fault;
 mod winding;
 
 pub use boundary::{BoundaryFace, boundary};
+pub(crate) use boundary::{FACES, faces_of, oriented_boundary, sorted};
 pub use closed::ClosedSurface;
 pub use cubes::cubes;
 pub use delaunay::{Delaunay, NONE, delaunay};

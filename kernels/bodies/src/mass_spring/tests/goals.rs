@@ -118,6 +118,19 @@ fn springs_flow_above_the_yield_strain_alone() {
 }
 
 #[test]
+fn what_flow_returns_is_what_the_next_report_lacks() {
+    let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e4, 0.02));
+    let mut state = State::at_rest(&body);
+    state.positions.iter_mut().for_each(|x| x[1] *= 0.7);
+    let still = SolverFrame { seconds: 0.0, ..BARE };
+    let before = steps(&body, &mut state, &still, 1).elastic;
+    let work = flow(&body, &mut state, Plasticity { yield_strain: 0.05, creep: 10.0 }, 1.0 / 24.0, None);
+    let after = steps(&body, &mut state, &still, 1).elastic;
+    assert!(work > 0.1 * before, "{work} of {before}");
+    assert!((before - work - after).abs() < 1e-12 * before, "{before} − {work} is not {after}");
+}
+
+#[test]
 fn on_the_way_to_a_goal_nothing_is_dented() {
     let body = block_body([1, 1, 1], 1.0, &material(1000.0, 1e4, 0.02));
     let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
