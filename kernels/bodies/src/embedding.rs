@@ -1,30 +1,31 @@
-//! Points that tets carry: a fine surface on a coarse body.
+//! Embedded points: a fine surface carried by a coarse tet mesh.
 //!
-//! Each point is bound to the tet it lies in, or to that of the nearest face, by its barycentric coordinates there; where the
-//! tets go it goes, exactly so for affine motion. Limit: a point far outside of all tets is carried as if its tet went on to
-//! there, which magnifies how that one deforms.
+//! Each point is bound by barycentric coordinates to the tet that contains it, or to the tet of the nearest face. It
+//! follows affine motion of the tets exactly. Limit: a point far outside all tets extrapolates from its tet, which
+//! magnifies that tet's deformation.
 
 use crate::tets::{faces_of, sorted};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 use rayon::prelude::*;
 
-/// What a point hangs on: particles and their shares, which sum to 1. Unused ones have weight 0.
+/// Barycentric coordinates of a point: particles and weights, which sum to 1. Unused entries have weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmbeddedPoint {
-    /// Indices.
+    /// Indices of the particles.
     pub particles: [u32; 4],
-    /// Shares.
+    /// Weight of each particle.
     pub weights: [f64; 4],
 }
 
 impl EmbeddedPoint {
-    /// A point that is that particle.
+    /// A point that coincides with one particle.
     pub fn at_particle(particle: u32) -> Self {
         Self { particles: [particle, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] }
     }
 
-    /// Where the point is when particles are at `places`; exactly there for one that is a particle.
+    /// The point's position for the given particle positions, metres; exact for a point that coincides with a
+    /// particle.
     #[inline]
     pub fn position(&self, positions: &[[f64; 3]]) -> [f64; 3] {
         let mut sum = [0.0; 3];
@@ -36,17 +37,17 @@ impl EmbeddedPoint {
     }
 }
 
-/// Binds `carried` to `tets` of `points`; all in metres. None where no tet has a volume.
+/// Binds the points `carried` to `tets` over `points`; all in metres. `None` if no tet has a volume.
 ///
-/// # Panics
-/// Where a tet names no point.
+/// # Panics If a tet has a corner index out of range.
 pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec<EmbeddedPoint>> {
     let solid: Vec<u32> =
         (0..tets.len() as u32).filter(|tet| BarycentricMap::of(points, tets[*tet as usize]).is_some()).collect();
     if solid.is_empty() {
         return None;
     }
-    // A straight way from a point to the nearest of all faces crosses none: that face is of the tet the point is in.
+    // The segment from a point to the nearest of all faces crosses no face, so that face belongs to the tet that
+    // contains the point.
     let faces: Vec<[u32; 3]> = solid.iter().flat_map(|tet| faces_of(&tets[*tet as usize])).collect();
     let tree = TriangleTree::build(points, &faces);
     let mut owners: Vec<([u32; 3], u32)> =
@@ -67,16 +68,17 @@ pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
     Some(carried.par_iter().map(bind).collect())
 }
 
-/// What makes barycentric coordinates of places.
+/// Maps positions to barycentric coordinates of one tet.
 struct BarycentricMap {
     first: DVec3,
     rows: DMat3,
 }
 
 impl BarycentricMap {
-    /// Of a tet with a volume.
+    /// Of a tet; `None` if it has no volume.
     fn of(points: &[Vec3], tet: [u32; 4]) -> Option<Self> {
-        /// Least volume ÷ the product of its edges that counts: rounding of f32 positions.
+        /// Smallest determinant ÷ product of edge lengths of a tet with a volume: above the rounding of f32
+        /// positions.
         const FLAT: f64 = 1e-6;
         let [a, b, c, d] = tet.map(|corner| to_f64(points[corner as usize]));
         let (p, q, r) = (b - a, c - a, d - a);

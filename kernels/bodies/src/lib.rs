@@ -1,7 +1,8 @@
-//! Soft bodies: tets that fill them ([`tets`]), shapes they are led to ([`goals`]), how they move ([`mass_spring`]) and
-//! what they meet ([`collision`]); plain slices in, plain slices out; knows no node and no geometry.
+//! Soft bodies: filling a closed surface with tets ([`tets`]), goal shapes ([`goals`]), the mass-spring solver
+//! ([`mass_spring`]), contact detection ([`collision`]) and surfaces carried by tets ([`embedding`]). Functions take
+//! and return plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
-//! All that [`numerics`] promises holds: the same bits on any CPU and for any number of threads.
+//! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
 #![deny(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]

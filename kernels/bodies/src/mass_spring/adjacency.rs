@@ -1,27 +1,28 @@
-//! Which springs hang at which particle: those inside of a cluster once, at the first of their ends, those between clusters
-//! at both. So each cluster is computed for itself, and most of a body's springs are looked at once only.
+//! Incident springs of each particle. A spring within a cluster is listed once, at its first end; one between two
+//! clusters at both ends. Each cluster can then be computed on its own, and most springs are visited only once.
 
 use super::partition::Partition;
 
-/// A spring as one end has it.
+/// A spring as seen from one of its ends.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Incident {
     pub(super) other: u32,
     pub(super) spring: u32,
 }
 
-/// The springs of each particle, by place: those inside of its cluster to particles that come later, then all to others.
+/// The springs of each particle: first those within its cluster to later particles, then all that lead to other
+/// clusters.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Adjacency {
-    /// Where each particle's begin, and where the last one's end.
+    /// Index of the first entry of each particle, and the number of entries at the end.
     pub(super) starts: Vec<u32>,
-    /// Where those to other clusters begin.
+    /// Index of the first entry that leads to another cluster.
     middles: Vec<u32>,
     pub(super) incident: Vec<Incident>,
 }
 
 impl Adjacency {
-    /// Of springs whose ends are these places.
+    /// Of springs with these ends.
     pub(super) fn new(clusters: &Partition, ends: &[[u32; 2]]) -> Self {
         let mut cluster = Vec::new();
         for index in 0..clusters.len() {
@@ -48,7 +49,8 @@ impl Adjacency {
         }
     }
 
-    /// Of something there is for each of them: what the particle at `place` has inside its cluster, and to others.
+    /// Splits `all`, which has one element for each entry, into those of `particle` within its cluster and those to
+    /// other clusters.
     #[inline(always)]
     pub(super) fn of<'a, T>(&self, particle: usize, all: &'a [T]) -> [&'a [T]; 2] {
         let [start, middle, end] =

@@ -1,4 +1,4 @@
-//! Forces, residual and linear system of a stage at some positions.
+//! Forces, residual and linear system of a stage at given positions.
 
 use super::contact::ContactMode;
 use super::partition::{Partition, RaggedSlice};
@@ -8,8 +8,8 @@ use super::stage::{FrameContext, Stage, StageSolver};
 use super::system::{smoother, solve_lower};
 use numerics::vector::DVec3;
 
-/// Times as much as they resist one particle that regions count in its own block: what is moved by its own block alone moves
-/// with some of the region's others, and a tenth fewer iterations are needed.
+/// Factor on the regions' contribution to a particle's own diagonal block. The block smoother then accounts for part
+/// of the coupling within a region, which saves a tenth of the iterations.
 const OVERLAP: f64 = 3.0;
 
 impl StageSolver {
@@ -34,7 +34,7 @@ impl StageSolver {
         out
     }
 
-    /// Volumes, thin tetrahedra, contacts at `x` and `v`, and the forces of the last two.
+    /// Evaluates volumes, thin tetrahedra and contacts at `x` and `v`, and the forces of the latter two.
     fn update_transient_forces(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], v: &[DVec3]) {
         let body = context.body;
         if !std::mem::take(&mut self.measured) {
@@ -61,7 +61,7 @@ impl StageSolver {
         }
     }
 
-    /// All but springs.
+    /// All forces on a particle but those of its springs.
     #[inline(always)]
     fn own_force(&self, context: &FrameContext<'_>, time: f64, particle: usize, x: &[DVec3], v: &[DVec3]) -> DVec3 {
         let mut sum = context.external.force(particle, context.body.mass[particle], time, x[particle], v[particle]);
@@ -74,7 +74,7 @@ impl StageSolver {
         sum
     }
 
-    /// The residual at `x`, and where `linear` the system there.
+    /// Evaluates the residual at `x`, and if `linear` the linear system too.
     pub(super) fn assemble(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], linear: bool) {
         let (body, a) = (context.body, stage.a);
         let clusters = &body.order.clusters;
@@ -93,7 +93,7 @@ impl StageSolver {
                 &mut system.smoother[..],
                 RaggedSlice::new(&body.adjacency.starts, &mut system.records),
             );
-            // `own_force` reads the regions' entries, which have moved out of `self` with the system.
+            // `own_force` would read the regions from `self.system`, which has been moved out.
             let solver = &*self;
             clusters.for_each(partition, |cluster, (r, inertia, smooth, mut records)| {
                 let particles = clusters.range(cluster);
@@ -154,7 +154,7 @@ impl StageSolver {
         self.v = v;
     }
 
-    /// Makes pushes linear where they are expected.
+    /// Linearises contact forces around the predicted load instead of the current one, where that is lower.
     fn expect(&mut self, stage: &Stage<'_>) {
         self.linearisation_offsets.clear();
         for (index, ((contact, state), push)) in
@@ -168,7 +168,8 @@ impl StageSolver {
         }
     }
 
-    /// Takes what pushes are linear from instead of what they are: the residual that a direction is to answer.
+    /// Replaces contact forces in the residual by those that the linearisation uses: the right-hand side of the
+    /// linear system.
     pub(super) fn use_linearised_forces(&mut self, stage: &Stage<'_>) {
         for (index, more) in &self.linearisation_offsets {
             let contact = &stage.contacts[*index];
@@ -178,7 +179,7 @@ impl StageSolver {
         }
     }
 
-    /// What volumes, thin tetrahedra and contacts resist.
+    /// Sets up the rank-one terms of volumes, thin tetrahedra and contacts.
     fn set_rows(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>) {
         let (body, a) = (context.body, stage.a);
         let clusters = &body.order.clusters;
@@ -219,7 +220,7 @@ impl StageSolver {
         transient.set(&vec![1.0; starts.len() - 1], &along, clusters);
     }
 
-    /// The residual's square in the norm of the particles' own blocks.
+    /// The squared residual in the norm of the block-diagonal preconditioner.
     pub(super) fn square(&self, clusters: &Partition) -> f64 {
         clusters.sum((), |cluster, ()| {
             let particles = clusters.range(cluster);
@@ -229,7 +230,7 @@ impl StageSolver {
         })
     }
 
-    /// That of its difference to another.
+    /// The squared distance of the residual from `other`, in the same norm.
     pub(super) fn distance(&self, clusters: &Partition, other: &[DVec3]) -> f64 {
         let own = |particle: usize| {
             solve_lower(&self.system.smoother[particle], self.r[particle] - other[particle]).norm_squared()
@@ -238,7 +239,7 @@ impl StageSolver {
     }
 }
 
-/// (x − z)/a.
+/// Velocities of the stage, (x − z)/a.
 pub(super) fn velocities(clusters: &Partition, x: &[DVec3], stage: &Stage<'_>, v: &mut Vec<DVec3>) {
     v.resize(x.len(), DVec3::zeros());
     clusters.for_each(&mut v[..], |cluster, v: &mut [DVec3]| {

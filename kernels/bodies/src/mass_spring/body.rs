@@ -1,11 +1,13 @@
-//! A body: particles with mass, springs between them, tetrahedra with a rest volume.
+//! A soft body: particles with mass, springs between them, tetrahedra with a rest volume.
 //!
-//! Springs stand on all edges of the tetrahedra with k = E·ΣV/L² (van Gelder 1998), so that stiffness does not depend on
-//! how finely a body is cut; dashpots c = β·k lie beside them; a tetrahedron's mass goes to its corners in equal parts.
+//! There is a spring on every edge of the tetrahedra with k = E·ΣV/L² (van Gelder 1998), which makes stiffness
+//! independent of mesh resolution, and a dashpot c = β·k parallel to it. The mass of a tetrahedron is distributed
+//! equally to its corners.
 //!
-//! Promise: same springs in the same order for the same mesh. Limits: springs shorter than [`SHORTEST`] count as that long
-//! for their stiffness; particles without mass get [`LIGHTEST`]; a tetrahedron whose corners turn the other way at rest
-//! is taken as its mirror image, a flat one has no volume to keep. Metres, seconds, kilograms.
+//! The same mesh always gives the same springs in the same order. Limits: the stiffness of a spring shorter than
+//! [`SHORTEST`] is computed as if it had that length; particles without mass get [`LIGHTEST`]; a tetrahedron that is
+//! inverted at rest is treated as its mirror image, and a flat one has no volume to preserve. Metres, seconds,
+//! kilograms.
 
 use super::adjacency::Adjacency;
 use super::particle_order::Order;
@@ -15,14 +17,16 @@ use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use numerics::masked::Masked;
 use numerics::vector::DVec3;
 
-/// Shortest spring that k = E·ΣV/L² is taken of, as a share of the mean: k of a doubled point stays within 1e6 of others'.
+/// Shortest length used in k = E·ΣV/L², as a fraction of the mean length: bounds k at duplicate points to 1e6 times
+/// that of other springs.
 pub const SHORTEST: f64 = 1e-3;
-/// Least mass of a particle, as a share of the mean: of points in no tetrahedron.
+/// Smallest mass of a particle, as a fraction of the mean: for points in no tetrahedron.
 pub const LIGHTEST: f64 = 1e-3;
-/// Share of L³ below which a tetrahedron is flat, L its longest edge: rounding of positions given in f32 reaches 1e-7.
+/// A tetrahedron whose volume is below this fraction of the cube of its longest edge is flat: rounding of f32
+/// positions reaches 1e-7.
 const FLAT: f64 = 1e-6;
 
-/// The mean of a masked number over some particles, 0 or more.
+/// The mean of a masked number over some particles, clamped to be non-negative.
 fn mean_over<const N: usize>(number: &Masked<'_, f64>, particles: [u32; N]) -> f64 {
     let scale = number.mask.map_or(1.0, |mask| {
         particles.iter().map(|particle| f64::from(mask[*particle as usize])).sum::<f64>() / N as f64
@@ -30,20 +34,21 @@ fn mean_over<const N: usize>(number: &Masked<'_, f64>, particles: [u32; N]) -> f
     (number.value * scale).max(0.0)
 }
 
-/// The shape of a body at rest.
+/// A tetrahedral mesh at rest.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mesh<'a> {
-    /// Particles, metres.
+    /// Positions of the particles, metres.
     pub points: &'a [[f64; 3]],
-    /// Tetrahedra.
+    /// Corners of each tetrahedron.
     pub tets: &'a [[u32; 4]],
-    /// Which tetrahedra have no volume worth keeping; none of them where empty. Their edges and masses count.
+    /// Which tetrahedra are too flat for volume preservation; their edges and masses still count. May be empty: none.
     pub slivers: &'a [bool],
-    /// Edges of the surface that no tetrahedron has: springs with the mean E·ΣV of the surface edges at their ends.
+    /// Surface edges that no tetrahedron has. They become springs with the mean E·ΣV of the surface edges at their
+    /// ends.
     pub missing: &'a [[u32; 2]],
 }
 
-/// What a body is made of.
+/// Material parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Material<'a> {
     /// Density, kg/m³.
@@ -54,87 +59,87 @@ pub struct Material<'a> {
     pub damping: Masked<'a, f64>,
 }
 
-/// A spring given as such, between particles of one body or two.
+/// A spring given explicitly, between particles of the same or of different bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySpring {
-    /// The particles it joins.
+    /// The two particles.
     pub ends: [u32; 2],
-    /// k, N/m.
+    /// Stiffness k, N/m.
     pub stiffness: f64,
-    /// c, N·s/m.
+    /// Damping c, N·s/m.
     pub damping: f64,
-    /// Length at rest, metres; 0 is a spring that pulls its ends together.
+    /// Rest length, metres; with 0 the spring pulls its ends together.
     pub length: f64,
 }
 
-/// Why there is no body.
+/// Why a body could not be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BodyError {
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A tetrahedron or spring names a particle that there is none of, or one twice.
+    /// A tetrahedron or spring has a particle index out of range, or the same one twice.
     #[error("{what} {index} joins particles {particles:?}; expected different ones of {count}")]
     Particles {
         /// `tetrahedron` or `spring`.
         what: &'static str,
-        /// Which.
+        /// Index of that element.
         index: usize,
         /// Its particles.
         particles: Vec<u32>,
-        /// Particles there are.
+        /// Number of particles.
         count: usize,
     },
-    /// A number of a spring or particle is negative or not finite.
+    /// A parameter of a spring or particle is negative or not finite.
     #[error("`{what}` of {index} is {value}; expected a finite number, 0 or more")]
     Number {
-        /// Which number.
+        /// Name of the parameter.
         what: &'static str,
-        /// Of which spring or particle.
+        /// Index of the spring or particle.
         index: usize,
-        /// The number.
+        /// Its value.
         value: f64,
     },
-    /// Nothing has a mass.
+    /// The total mass is zero.
     #[error("the body has no mass; expected a tetrahedron with a volume and a density above 0")]
     NoMass,
 }
 
-/// Particles, springs and tetrahedra, and the order in which the solver keeps them.
+/// Particles, springs and tetrahedra in the solver's order.
 #[derive(Clone, Debug)]
 pub struct SoftBody {
     pub(super) order: Order,
-    /// Particles at rest, the solver's order.
+    /// Rest positions, in the solver's order.
     pub(super) rest: Vec<DVec3>,
     pub(super) mass: Vec<f64>,
-    /// Ends by place; those of tetrahedra first, then missing edges, then springs given as such.
+    /// Ends of each spring: tetrahedron edges first, then missing edges, then explicit springs.
     pub(super) ends: Vec<[u32; 2]>,
     pub(super) stiffness: Vec<f64>,
     pub(super) damping: Vec<f64>,
     pub(super) lengths: Vec<f64>,
-    /// The springs at each particle.
+    /// Incident springs of each particle.
     pub(super) adjacency: Adjacency,
-    /// Tetrahedra with a volume, corners by place, turning so that it is positive.
+    /// Tetrahedra with a volume, oriented so that it is positive.
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) volumes: Vec<f64>,
-    /// E of each.
+    /// Young's modulus of each of `tets`.
     pub(super) moduli: Vec<f64>,
     pub(super) regions: Regions,
-    /// Springs in fixed parts.
+    /// Springs in fixed parts, for parallel loops.
     pub(super) spring_partition: Partition,
     /// Tetrahedra in fixed parts.
     pub(super) tet_partition: Partition,
-    /// All tetrahedra of the mesh by the caller's index, their six springs and volumes without sign.
+    /// All tetrahedra of the mesh by the caller's indices, with their six springs and unsigned volumes.
     given: Vec<MeshTet>,
-    /// Which tetrahedron of the mesh each of `tets` is.
+    /// Index in the mesh of each of `tets`.
     kept: Vec<u32>,
-    /// Springs that the mesh has; the rest were given as such.
+    /// Number of springs that come from the mesh; explicit ones follow.
     mesh_spring_count: usize,
-    /// Springs whose k is a mean: missing edges, and the surface edges it is the mean of.
+    /// For each missing edge, the surface edges whose mean stiffness it takes.
     means: Vec<Vec<u32>>,
-    /// Longest side of the box of the points at rest, metres.
+    /// Longest side of the bounding box at rest, metres.
     pub(super) size: f64,
-    /// Mean length of its springs at rest, metres.
+    /// Mean rest length of the springs, metres.
     pub(super) spacing: f64,
 }
 
@@ -146,20 +151,18 @@ struct MeshTet {
 }
 
 impl SoftBody {
-    /// A body of `material` with the shape of `mesh`, and `joints`: springs of their own, between its parts.
+    /// A body with the shape of `mesh`, made of `material`, and explicit springs `joints`.
     ///
-    /// # Errors
-    /// Where a number is not finite, a particle does not exist, or nothing has a mass.
+    /// # Errors If a number is not finite, an index is out of range, or the total mass is zero.
     pub fn new(mesh: &Mesh<'_>, material: &Material<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::shaped(mesh, joints)?;
         body.set_material(material)?;
         Ok(body)
     }
 
-    /// Particles of `masses` kilograms, which `springs` join.
+    /// A pure mass-spring network: `masses` in kilograms, joined by `springs`.
     ///
-    /// # Errors
-    /// As [`Body::new`].
+    /// # Errors As [`SoftBody::new`].
     pub fn of_springs(points: &[[f64; 3]], masses: &[f64], springs: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::shaped(&Mesh { points, ..Mesh::default() }, springs)?;
         let masses: Vec<f64> = masses.iter().copied().chain(std::iter::repeat(0.0)).take(points.len()).collect();
@@ -167,17 +170,17 @@ impl SoftBody {
         Ok(body)
     }
 
-    /// Particles.
+    /// Number of particles.
     pub fn len(&self) -> usize {
         self.rest.len()
     }
 
-    /// Whether there is no particle.
+    /// Whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.rest.is_empty()
     }
 
-    /// The particles that each spring joins, by the caller's index.
+    /// The two particles of each spring, by the caller's indices.
     pub fn springs(&self) -> Vec<[u32; 2]> {
         self.ends.iter().map(|ends| ends.map(|end| self.order.caller_of[end as usize])).collect()
     }
@@ -187,17 +190,17 @@ impl SoftBody {
         &self.stiffness
     }
 
-    /// Length of each spring at rest, before anything changed it, metres.
+    /// Rest length of each spring before any plastic flow or reset, metres.
     pub fn lengths(&self) -> &[f64] {
         &self.lengths
     }
 
-    /// Where a particle is at rest, by the caller's index, metres.
+    /// Rest position of a particle, by the caller's index, metres.
     pub fn rest_point(&self, particle: usize) -> [f64; 3] {
         self.rest[self.order.index_of[particle] as usize].into()
     }
 
-    /// How many springs the mesh has; those given as such come after them.
+    /// Number of springs that come from the mesh; explicit ones follow.
     pub fn mesh_spring_count(&self) -> usize {
         self.mesh_spring_count
     }
@@ -207,8 +210,8 @@ impl SoftBody {
         self.order.index_of.iter().map(|particle| self.mass[*particle as usize]).collect()
     }
 
-    /// The clusters of tetrahedra whose volume is kept as one: the triangles around each, facing outwards, by the caller's
-    /// index.
+    /// The regions whose volume is preserved: the boundary triangles of each, facing outwards, by the caller's
+    /// indices.
     pub fn regions(&self) -> Vec<Vec<[u32; 3]>> {
         let caller = |particle: u32| self.order.caller_of[particle as usize];
         (0..self.regions.len())
@@ -216,26 +219,25 @@ impl SoftBody {
             .collect()
     }
 
-    /// Longest side of the box around the points at rest, metres: what tolerances are relative to.
+    /// Longest side of the bounding box at rest, metres: the length that tolerances are relative to.
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// Where the particles of a piece are.
+    /// The particles of a piece.
     pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let clusters = &self.order.clusters;
         clusters.range(piece.start).start..clusters.range(piece.end - 1).end
     }
 
-    /// Brings values a particle, by the caller's index, into the solver's order.
+    /// Permutes per-particle values from the caller's to the solver's order.
     pub(super) fn to_solver_order<T: Copy>(&self, values: &[T]) -> Vec<T> {
         self.order.caller_of.iter().map(|caller| values[*caller as usize]).collect()
     }
 
-    /// Changes masses and stiffnesses; shape and state stay.
+    /// Changes masses and stiffnesses; shape and state are kept.
     ///
-    /// # Errors
-    /// Where nothing has a mass, or a number is not finite.
+    /// # Errors If the total mass is zero, or a number is not finite.
     pub fn set_material(&mut self, material: &Material<'_>) -> Result<(), BodyError> {
         let mut masses = vec![0.0; self.len()];
         let mesh_spring_count = self.mesh_spring_count;
@@ -279,7 +281,7 @@ impl SoftBody {
         Ok(())
     }
 
-    /// All but masses and the stiffnesses of the mesh's springs.
+    /// Everything but masses and the stiffnesses of mesh springs.
     fn shaped(mesh: &Mesh<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let count = mesh.points.len();
         let points: Vec<DVec3> = mesh.points.iter().map(|p| DVec3::from(*p)).collect();
@@ -349,7 +351,7 @@ impl SoftBody {
     }
 }
 
-/// Six times the volume is a determinant; positive where the corners turn counter-clockwise seen from the first.
+/// Signed volume; positive if b, c, d run counter-clockwise seen from a.
 pub(super) fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
 }
@@ -362,7 +364,7 @@ fn number(what: &'static str, index: usize, value: f64) -> Result<f64, BodyError
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number { what, index, value }) }
 }
 
-/// A stiffness as forces have it, in f32, so that energies are of the same springs.
+/// A stiffness rounded to f32, as forces store it, so that energies match forces exactly.
 fn stiffness(index: usize, k: f64) -> Result<f64, BodyError> {
     number("stiffness", index, f64::from(k as f32))
 }
@@ -375,7 +377,7 @@ fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -
     Ok(())
 }
 
-/// Tetrahedra with a volume to keep: their indices, and their corners by place.
+/// Tetrahedra with a volume to preserve: their indices in the mesh, and their corners in the solver's order.
 fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &Order) -> (Vec<u32>, Vec<[u32; 4]>) {
     let keep = |(index, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|corner| points[corner as usize]);

@@ -1,9 +1,9 @@
-//! Cholesky factors of positive semi-definite matrices that are zero far from the diagonal: each row is kept from its first
-//! entry on (Jennings 1966), as a factor fills no others.
+//! Cholesky factorisation of positive semi-definite matrices in envelope (skyline) storage: each row is stored from
+//! its first non-zero entry to the diagonal, and the factor has no fill outside that (Jennings 1966).
 //!
-//! Promise: the same bits on every SIMD path and number of threads (sums run in eight fixed lanes); a direction in which the
-//! matrix is zero to rounding gets no solution component instead of a huge one. Cost Σ b²/2 over rows of b entries, and
-//! Σ 2b a solve.
+//! The same bits on every SIMD path and for any number of threads (sums run in eight fixed lanes). Where the matrix
+//! is singular to rounding the solution has no component, instead of a huge one. Cost: Σ b²/2 for rows of b entries,
+//! and Σ 2b a solve.
 
 use numerics::simd::{Path, kernel};
 use rayon::prelude::*;
@@ -11,24 +11,24 @@ use serde::{Deserialize, Serialize};
 
 /// Lanes of a sum.
 const LANES: usize = 8;
-/// Columns finished at once: their rows stay in the cache while all rows below use them.
+/// Columns factored at a time: their rows stay in the cache while all rows below use them.
 const BLOCK: usize = 48;
-/// Rows a thread takes at least.
+/// Smallest number of rows for a thread.
 const ROWS: usize = 32;
-/// A pivot that is this share of its diagonal is rounding.
+/// A pivot below this fraction of its diagonal entry is rounding noise.
 const NOTHING: f64 = 1e-11;
 
-/// The lower half of a symmetric matrix, or its factor: rows one after the other, each from its first entry to the diagonal.
+/// The lower triangle of a symmetric matrix, or its factor, row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Lower {
-    /// Where each row begins in `values`, and where the last ends.
+    /// Start of each row in `values`, and the total at the end.
     starts: Vec<usize>,
-    /// On a factor's diagonal reciprocals, 0 where a pivot is nothing.
+    /// In a factor the diagonal holds reciprocals, 0 for a negligible pivot.
     values: Vec<f64>,
 }
 
 impl Lower {
-    /// Zeros, with rows whose first columns are `firsts`.
+    /// A zero matrix whose rows start at the columns `firsts`.
     pub(super) fn zeros(firsts: impl Iterator<Item = usize>) -> Self {
         let mut starts = vec![0];
         let mut size = 0;
@@ -39,22 +39,22 @@ impl Lower {
         Self { starts, values: vec![0.0; size] }
     }
 
-    /// How many rows.
+    /// Number of rows.
     pub(super) fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// All entries.
+    /// All stored entries.
     pub(super) fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
-    /// Where each `count` rows begin among the entries, and where the last end.
+    /// Start of every `count`-th row in the entries, and the total at the end.
     pub(super) fn bands(&self, count: usize) -> Vec<usize> {
         self.starts.iter().step_by(count).copied().collect()
     }
 
-    /// Adds to the entry in row `i` and column `j`, which is neither above the diagonal nor before the row's first.
+    /// Adds to an entry of the envelope, with j ≤ i.
     #[inline(always)]
     pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
         self.values[self.starts[i + 1] - 1 - (i - j)] += value;
@@ -64,7 +64,7 @@ impl Lower {
     pub(super) fn factor(&mut self) {
         let (path, n) = (Path::chosen(), self.len());
         let Self { starts, values } = self;
-        // For each column the end of the rows that reach it.
+        // For each column, one past the last row that has an entry in it.
         let mut reach: Vec<usize> = (1..=n).collect();
         for i in 0..n {
             let first = first(starts, i);
@@ -101,15 +101,15 @@ impl Lower {
     }
 }
 
-/// The first column of row `i`.
+/// Column of the first entry of row `i`.
 #[inline(always)]
 fn first(starts: &[usize], i: usize) -> usize {
     i + 1 + starts[i] - starts[i + 1]
 }
 
 kernel! {
-    /// Brings columns from `begin` on of a row, of which `mine` are those from the first one, `from`, to the factor's, given
-    /// the rows above: where they begin, and their values.
+    /// Factors the columns from `begin` on of one row, whose stored entries `mine` start at column `from`, given the
+    /// rows above as their starts and values.
     fn finish(above: (&[usize], &[f64]), mine: &mut [f64], from: usize, begin: usize) -> () = finish_body;
 }
 
@@ -134,7 +134,7 @@ fn finish_body((starts, above): (&[usize], &[f64]), mine: &mut [f64], from: usiz
 }
 
 kernel! {
-    /// The scalar product.
+    /// Inner product of two long vectors.
     fn inner_product(a: &[f64], b: &[f64]) -> f64 = inner_product_body;
 }
 
@@ -153,7 +153,7 @@ fn inner_product_body(a: &[f64], b: &[f64]) -> f64 {
 }
 
 kernel! {
-    /// Forwards and back through a factor.
+    /// Forward and back substitution.
     fn solve(starts: &[usize], values: &[f64], x: &mut [f64]) -> () = solve_body;
 }
 
@@ -180,8 +180,7 @@ mod tests {
     use super::*;
     use numerics::random::Key;
 
-    /// L·Lᵀ + s·I of random L whose rows begin at `first`: the full matrix, which is zero where a row of its lower half has
-    /// not begun.
+    /// L·Lᵀ + s·I for a random L whose rows start at `first`, in envelope storage and as a full matrix.
     fn matrix(n: usize, s: f64, first: impl Fn(usize) -> usize) -> (Lower, Vec<Vec<f64>>) {
         let l = |i: usize, j: usize| {
             if j < first(i) || j > i { 0.0 } else { Key::new(3).of((i * n + j) as u64).f64() - 0.5 }
@@ -196,7 +195,7 @@ mod tests {
         (lower, full)
     }
 
-    /// Rows of 1 to 60 entries, and now and then a whole one.
+    /// Rows of 1 to 60 entries, and every fiftieth full.
     fn ragged(i: usize) -> usize {
         if i % 50 == 49 { 0 } else { i.saturating_sub(i * 7 % 60) }
     }
@@ -231,7 +230,7 @@ mod tests {
 
     #[test]
     fn what_the_matrix_does_not_resist_stays_where_it_is() {
-        // diag(4, 0, 9) with the middle row and column zero.
+        // diag(4, 0, 9): the middle row and column are zero.
         let mut lower = Lower::zeros([0, 0, 0].into_iter());
         lower.add(0, 0, 4.0);
         lower.add(2, 2, 9.0);

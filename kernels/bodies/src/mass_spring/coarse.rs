@@ -1,9 +1,8 @@
-//! The coarse half of the preconditioner: each cluster of particles may shift and turn as one, and these six motions a
-//! cluster are solved for exactly.
+//! The coarse level of the preconditioner: exact solution for the six rigid motions of each cluster of particles.
 //!
-//! They are what conjugate gradients find last, as news of them travels one spring an iteration; springs inside a cluster
-//! do not resist them. Clusters stand in an order in which neighbours are near each other, so that the factor is a narrow
-//! band; a thousand small bodies cost what they are.
+//! Conjugate gradients find these motions last, because information travels one spring an iteration, and springs
+//! within a cluster do not resist them. Clusters are ordered so that neighbours have near indices, which keeps the
+//! factor's envelope narrow; for a thousand separate small bodies it is block-diagonal.
 
 use super::body::SoftBody;
 use super::partition::Partition;
@@ -11,26 +10,26 @@ use super::system::{System, solve_lower, solve_lower_transpose, times};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f32};
 use serde::{Deserialize, Serialize};
 
-/// Motions of a cluster: three shifts, three turns.
+/// Rigid motions of a cluster: three translations, three rotations.
 pub(super) const MODES: usize = 6;
 
-/// How far particles that contacts hold follow their clusters' motions.
+/// Filter of the rigid motions for particles in contact.
 ///
-/// A surface that many particles press on would hold their whole cluster, and what lies above them could not be told to
-/// move. One step of the smoother on what contacts resist, F = 1 − D⁻¹C, leaves it free: F is near 0 along a contact and 1
-/// where there is none.
+/// The stiffness of a contact on many particles of a cluster would lock the whole cluster in the coarse system,
+/// including particles that are free to move. One smoothing step with the contact stiffness, F = 1 − D⁻¹C, avoids
+/// that: F is near 0 in the directions a contact resists and 1 elsewhere.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Anchors {
-    /// Of each particle the entry in `ways`; empty where nothing is held.
+    /// Index in `ways` for each particle; empty if no particle is filtered.
     of: Vec<u32>,
     /// F, column by column.
     ways: Vec<[[f64; 3]; 3]>,
 }
 
 impl Anchors {
-    /// Of a system; particles that hang on nothing follow nobody.
+    /// Of a linear system; isolated particles (without springs) take no part in cluster motions.
     pub(super) fn new(system: &System) -> Self {
-        /// Share of a particle's resistance below which contacts do not count.
+        /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const LITTLE: f64 = 0.1;
         let mut anchors = Self::default();
         if system.blocks.is_empty() && system.transient.is_empty() && system.alone.is_empty() {
@@ -70,7 +69,7 @@ impl Anchors {
         self.ways.push(way);
     }
 
-    /// How much others differ from these: 1 where all of them let go, say.
+    /// Mean difference from `others`: 1 if, for example, all contacts have opened.
     pub(super) fn change(&self, others: &Self) -> f64 {
         let most = self.ways.len().max(others.ways.len());
         let way = |anchors: &Self, particle: usize| anchors.at(particle).unwrap_or_else(DMat3::identity);
@@ -80,7 +79,7 @@ impl Anchors {
         if most > 0 { sum / most as f64 } else { 0.0 }
     }
 
-    /// F of a particle that is held.
+    /// F of a filtered particle.
     #[inline(always)]
     pub(super) fn at(&self, particle: usize) -> Option<DMat3> {
         let way = self.ways.get(*self.of.get(particle)? as usize)?;
@@ -88,17 +87,17 @@ impl Anchors {
     }
 }
 
-/// No entry.
+/// A particle without filter.
 const FREE: u32 = u32::MAX;
 
-/// Which clusters have to do with which.
+/// Coupling structure of the clusters.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
-    /// The cluster of each particle.
+    /// Cluster of each particle.
     pub(super) cluster: Vec<u32>,
-    /// The piece of each cluster.
+    /// Piece of each cluster.
     pub(super) piece: Vec<u32>,
-    /// The first cluster that each is joined with, by springs and regions.
+    /// For each cluster, the first one it is coupled to by springs or regions.
     pub(super) first: Vec<u32>,
 }
 
@@ -125,7 +124,7 @@ impl Layout {
         layout
     }
 
-    /// Has `first` reach the first cluster of the same piece that one of `places` is in, for the clusters of all of them.
+    /// Extends the envelope `first` by the coupling between the clusters of `particles`, within the same piece.
     pub(super) fn join(&self, first: &mut [u32], particles: &[u32]) {
         let clusters = || particles.iter().map(|particle| self.cluster[*particle as usize]);
         let Some(least) = clusters().min() else { return };
@@ -136,13 +135,14 @@ impl Layout {
         }
     }
 
-    /// How many rows a factor has.
+    /// Number of rows of the coarse matrix.
     pub(super) fn rows(&self) -> usize {
         MODES * self.first.len()
     }
 }
 
-/// Where each particle is seen from its cluster's middle, in units of the cluster's radius; the turns' lever.
+/// Offset of each particle from the centroid of its cluster, in units of the cluster's radius: the lever arm of
+/// rotations.
 pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_from_centroid: &mut Vec<Vec3>) {
     offset_from_centroid.resize(x.len(), [0.0; 3]);
     clusters.for_each(&mut offset_from_centroid[..], |cluster, mine: &mut [Vec3]| {
@@ -156,7 +156,7 @@ pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_fro
     });
 }
 
-/// What a cluster's motion does to a particle.
+/// Displacement at `offset` by a rigid motion.
 #[inline(always)]
 pub(super) fn moved(modes: &[f64], offset: DVec3) -> DVec3 {
     DVec3::new(modes[0], modes[1], modes[2]) + DVec3::new(modes[3], modes[4], modes[5]).cross(&offset)

@@ -1,8 +1,8 @@
-//! Conjugate gradients on the linear system, preconditioned on two levels: each particle's own 3×3 block, plus the motions
-//! of clusters (see [`super::coarse`]).
+//! Conjugate gradients with a two-level preconditioner: the 3×3 diagonal block of each particle, plus a coarse solve
+//! for rigid motions of clusters (see [`super::coarse`]).
 //!
-//! Promise: at most the given iterations; what was reached is returned, measured in the preconditioner's norm; the same
-//! bits for any number of threads. Sums run by cluster, in order.
+//! Runs at most the given number of iterations and reports the residual reached, in the norm of the preconditioner.
+//! Sums run by cluster in a fixed order, so bits do not depend on the number of threads.
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
@@ -11,31 +11,31 @@ use super::system::{System, solve_lower, solve_lower_transpose};
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
 
-/// Least share of a residual that is worth asking for where its square has a bound of its own.
+/// An absolute bound on the residual is not pursued below this fraction of the initial residual.
 const FINEST: f64 = 1e-4;
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Residual at the end ÷ at the start.
+    /// Final ÷ initial residual.
     pub(super) share: f64,
-    /// The residual's square is to be this small too, as far as [`FINEST`] of the start allows.
+    /// The squared residual has to fall below this too, as far as [`FINEST`] allows.
     pub(super) square: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub(super) cap: u32,
 }
 
-/// What a solve reached.
+/// Outcome of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Reached {
     pub(super) iterations: u32,
-    /// Residual at the end ÷ at the start.
+    /// Final ÷ initial residual.
     pub(super) share: f64,
-    /// Whether `share` is what was asked.
+    /// Whether the criteria were met.
     pub(super) met: bool,
 }
 
-/// Vectors that solves use again.
+/// Vectors kept between solves to avoid allocations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     p: Vec<DVec3>,
@@ -43,7 +43,7 @@ pub(super) struct Scratch {
     modes: Vec<f64>,
 }
 
-/// Both levels of the preconditioner: `system.smoother` is the other half of it.
+/// The coarse level of the preconditioner; the fine one is `system.smoother`.
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
     pub(super) factor: &'a Lower,
@@ -52,7 +52,7 @@ pub(super) struct Coarse<'a> {
 }
 
 impl Coarse<'_> {
-    /// The clusters' motions for the forces on them, and what they gain: cᵀ·(PᵀAP)⁻¹·c.
+    /// Solves for the rigid motions `modes` of the clusters under `forces`; returns forcesᵀ·(PᵀAP)⁻¹·forces.
     fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
         modes.clear();
         if self.factor.len() == 0 {
@@ -63,7 +63,7 @@ impl Coarse<'_> {
         forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
     }
 
-    /// What the clusters' motions do to a particle.
+    /// Displacement of a particle by the rigid motion of its cluster.
     #[inline(always)]
     fn moved(&self, modes: &[f64], cluster: usize, particle: usize) -> DVec3 {
         if modes.is_empty() {
@@ -74,7 +74,7 @@ impl Coarse<'_> {
         }
     }
 
-    /// A particle's share of the force on its cluster, added to `sums`.
+    /// Adds a particle's contribution to the force and torque on its cluster to `sums`.
     #[inline(always)]
     fn restrict(&self, particle: usize, r: DVec3, sums: &mut [f64; 6]) {
         let r = self.anchors.at(particle).map_or(r, |way| way.tr_mul(&r));
@@ -86,7 +86,8 @@ impl Coarse<'_> {
     }
 }
 
-/// Moves `x` towards A⁻¹ of the residual `r`, which it keeps; `r` is 0 at held particles and stays so.
+/// Adds an approximate solution of A·dx = r to `x` and updates the residual `r`, which is 0 at pinned particles and
+/// stays so.
 pub(super) fn solve(
     system: &mut System,
     body: &SoftBody,
@@ -102,7 +103,7 @@ pub(super) fn solve(
     p.resize(r.len(), DVec3::zeros());
     ap.resize(r.len(), DVec3::zeros());
 
-    // A residual's square in the preconditioner's norm, and the forces on clusters.
+    // Squared residual in the preconditioner's norm, and forces on clusters.
     let smoother = &system.smoother;
     let first = clusters.map((), |cluster, ()| {
         let (mut square, mut sums) = (0.0, [0.0; 6]);
@@ -171,7 +172,7 @@ pub(super) fn solve(
     reached
 }
 
-/// Replaces `r` by the preconditioner's answer to it: near A⁻¹r, in one go.
+/// Replaces `r` by the preconditioner applied to it, an approximation of A⁻¹r.
 pub(super) fn precondition(system: &System, body: &SoftBody, coarse: Coarse<'_>, r: &mut [DVec3]) {
     let clusters = &body.order.clusters;
     let forces = {

@@ -1,74 +1,79 @@
-//! Contact and friction: who finds contacts, what they push with, how it is made linear.
+//! Contact and Coulomb friction: the interface to contact detection, the contact forces, and their linearisation.
 //!
-//! The solver asks a [`Contacts`] once a stage for all that may touch, and treats each as a spring that only pushes and only
-//! below the distance kept, without limit where the surfaces meet: N = κδ ÷ (1 − δ/gap), implicit like every other force.
-//! Friction is Coulomb's, sticking to a creep of [`CREEP`] body lengths a second, implicit too, with N
-//! as it was at last until the step has its own.
+//! Once a stage the solver asks a [`ContactFinder`] for all potential contacts. Each becomes a one-sided penalty
+//! spring that acts below the gap and grows without bound as the surfaces meet: N = κδ ÷ (1 − δ/gap), treated
+//! implicitly like every other force. Friction is Coulomb's law, regularised by a creep velocity of [`CREEP`] body
+//! lengths a second and implicit too; the normal load it uses is that of the previous step until the current step has
+//! its own.
 //!
-//! Limit: the surfaces a contact was found for are planes within the stage.
+//! Limit: within a stage the surfaces of a contact are planes.
 
 use super::body::SoftBody;
 use super::rank_one::add_square;
 use numerics::vector::DVec3;
 
-/// κ ÷ what the particles put up against being moved: springs and inertia together. More holds the gap better in one
-/// iteration, less converges faster.
+/// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
+/// gap better in one iteration, smaller ones converge faster.
 const FIRM: f64 = 30.0;
-/// Most that sticking resists a slip of a frame ÷ κ: beyond, frictions like 1e6 would only be noise.
+/// Upper bound on the friction coefficient of a slip rate: slip of one frame is resisted by at most this times κ.
+/// Limits friction coefficients like 1e6, which would only add noise.
 const HOLD: f64 = 1e4;
-/// Share of the gap from where on the push grows straight on: its slope is 1/(1 − that)² of the first.
+/// Fraction of the gap beyond which the contact force continues linearly; its slope there is 1/(1 − this)² of the
+/// initial one.
 const STRAIGHT: f64 = 0.95;
-/// Share of its gap below which a contact is too deep to leave it there.
+/// Fraction of the gap beyond which a contact is too deep to accept.
 const DEEP: f64 = 0.96;
-/// Shares of its gap that a step may close a contact by before it is stopped, and where: one that was apart, and one that
-/// pushed already.
+/// Largest increase of depth in a trial step, as a fraction of the gap, and the depth to stop at instead: for a
+/// contact that was open, and for one that was closed.
 const CLOSED: [f64; 2] = [0.05, 0.02];
 const PRESSED: [f64; 2] = [0.3, 0.1];
-/// Share of a drag that is believed to go on: the rest keeps a slip from being turned round too far.
+/// Factor on the friction dual of a predicted slip, which keeps it away from the boundary, where the slip direction
+/// could flip.
 const SURE: f64 = 0.98;
-/// Length of a sum of two units below which they are opposite.
+/// Two unit vectors with a sum shorter than this are opposite.
 const OPPOSITE: f64 = 1e-9;
-/// Body lengths a second at which friction is all of μN; below it creeps in proportion.
+/// Slip, in body lengths a second, above which friction is μN; proportional below.
 const CREEP: f64 = 2e-5;
 
-/// Two surfaces that may touch: u = Σ wᵢxᵢ is how far the first is from the second, along `normal` once `offset` is taken.
+/// Two surfaces that may touch. With u = Σ wᵢxᵢ, n·u − offset is the distance of the first from the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// The particles; those of weight 0 are none.
+    /// The particles involved; entries of weight 0 are unused.
     pub particles: [u32; 4],
-    /// Vertex against an obstacle: 1. Vertex against a face: 1 and −barycentric. Edge against edge: both, the second negative.
+    /// Vertex against obstacle: 1. Vertex against face: 1 and minus the barycentric weights. Edge against edge:
+    /// weights along both, negative on the second.
     pub weights: [f64; 4],
-    /// Unit, from the second surface (or the obstacle) towards the first.
+    /// Unit normal, from the second surface (or the obstacle) towards the first.
     pub normal: [f64; 3],
-    /// n·u where the surfaces touch, at the time asked for; 0 between two bodies. Metres.
+    /// n·u at which the surfaces touch, at the end of the query; 0 between two bodies. Metres.
     pub offset: f64,
-    /// Distance kept between them, metres.
+    /// Distance to keep between the surfaces, metres.
     pub gap: f64,
-    /// The obstacle's velocity there, m/s; 0 between two bodies.
+    /// Velocity of the obstacle at the contact, m/s; 0 between two bodies.
     pub velocity: [f64; 3],
-    /// Coulomb's μ.
+    /// Coulomb's friction coefficient μ.
     pub friction: f64,
 }
 
-/// What may touch what while particles go straight `from` here `to` there.
+/// A motion for which potential contacts are wanted: particles move linearly from `from` to `to`.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactQuery<'a> {
-    /// Where particles are at the first of `times`, by the caller's index.
+    /// Positions at the first of `times`, by the caller's indices, metres.
     pub from: &'a [[f64; 3]],
-    /// Where they are expected at the second: contacts hold for then.
+    /// Expected positions at the second; contact planes hold for that time.
     pub to: &'a [[f64; 3]],
-    /// Shares of the frame that have passed.
+    /// Start and end, as fractions of the frame.
     pub times: [f64; 2],
 }
 
-/// Finds contacts.
+/// Contact detection as the solver needs it.
 pub trait ContactFinder: Sync {
-    /// Adds all contacts that may act to `out`: those that touch, and those that come closer than twice the gap on the way.
-    /// In a fixed order.
+    /// Adds all potential contacts to `out`, in a fixed order: pairs that touch, and pairs that come closer than
+    /// twice the gap during the motion.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>);
 }
 
-/// A contact in the solver's order.
+/// A contact as the solver treats it, with particles in the solver's order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactConstraint {
     pub(super) particles: [u32; 4],
@@ -78,51 +83,54 @@ pub(super) struct ContactConstraint {
     gap: f64,
     pub(super) velocity: DVec3,
     friction: f64,
-    /// κ, N/m.
+    /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
-    /// Most that sticking resists slip with, N·s/m.
+    /// Largest resistance of friction to a slip rate, N·s/m.
     hold: f64,
-    /// N that friction counts, newtons.
+    /// Normal load that friction is computed from, newtons.
     pub(super) load: f64,
-    /// How much deeper it may be, metres: surfaces that are through each other come apart at a pace.
+    /// Depth at which the penalty force starts, metres: above 0 while surfaces that penetrated each other are
+    /// separated gradually.
     slack: f64,
-    /// What it is taken to do throughout a step.
+    /// State that the contact keeps throughout a step, if it is frozen.
     frozen: Option<ContactState>,
 }
 
-/// What a contact does.
+/// State of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ContactMode {
-    /// Nothing.
+    /// Open: no force.
     #[default]
     Open,
-    /// Pushes, without friction.
+    /// Closed, without friction.
     Frictionless,
-    /// Its surfaces stick.
+    /// Closed and sticking.
     Sticking,
-    /// Its surfaces slide.
+    /// Closed and sliding.
     Sliding,
 }
 
-/// A contact at some positions.
+/// Forces of a contact at some positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactState {
     pub(super) mode: ContactMode,
-    /// On the first surface, newtons.
+    /// Force on the first surface, newtons.
     pub(super) force: DVec3,
-    /// How far below the gap, metres.
+    /// Depth below the gap, metres.
     pub(super) depth: f64,
-    /// N, and its slope with the depth.
+    /// Normal force N, newtons, and its derivative with respect to depth.
     pub(super) normal_force: f64,
     slope: f64,
-    /// Resistance to slip, N·s/m, and the share of all friction that the slip rouses: of length 1 where it slides.
+    /// Resistance to slip, N·s/m, and the slip relative to the creep velocity, which has length 1 where the contact
+    /// slides.
     grip: f64,
     slip: DVec3,
     pub(super) energy: f64,
 }
 
 impl ContactConstraint {
-    /// A contact as found, for frames of `seconds`; `firmness` is each particle's Σk.
+    /// A detected contact, for frames of `seconds`. `particle_stiffness` is the sum of spring stiffnesses at each
+    /// particle. `None` if it is degenerate.
     pub(super) fn new(body: &SoftBody, contact: &Contact, seconds: f64, particle_stiffness: &[f64]) -> Option<Self> {
         let finite = contact.weights.iter().chain(&contact.normal).chain(&contact.velocity).all(|x| x.is_finite());
         let normal = DVec3::from(contact.normal).try_normalize(1e-12)?;
@@ -158,30 +166,31 @@ impl ContactConstraint {
         (yielding > 0.0 && constraint.penalty_stiffness.is_finite()).then_some(constraint)
     }
 
-    /// The particles, with their weights.
+    /// The particles with their weights.
     pub(super) fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
         let sides: [(usize, f64); 4] = std::array::from_fn(|k| (self.particles[k] as usize, self.weights[k]));
         sides.into_iter().filter(|(_, weight)| *weight != 0.0)
     }
 
-    /// Share of the gap that a depth takes up.
+    /// Depth as a fraction of the gap.
     fn gap_fraction(&self, depth: f64) -> f64 {
         if self.gap > 0.0 { depth / self.gap } else { 0.0 }
     }
 
-    /// Whether it is deeper than it may stay.
+    /// Whether the contact is too deep to be accepted at `x`.
     pub(super) fn is_too_deep(&self, x: &[DVec3]) -> bool {
         let depth = self.depth(x, 0.0);
         depth > 0.0 && self.gap_fraction(depth) > DEEP
     }
 
-    /// Whether it begins a step of `seconds` at `x` so deep that its push is a way out, not a spring's.
+    /// Whether the surfaces penetrate each other at the start `x` of a step of `seconds`: the force then separates
+    /// them instead of acting as a spring.
     pub(super) fn is_penetrating(&self, x: &[DVec3], seconds: f64) -> bool {
         self.gap_fraction(self.depth(x, seconds)) >= STRAIGHT
     }
 
-    /// How far what goes from `x` `to` there has to stay back where it would get deep into the contact: a step further is seen
-    /// how it pushes.
+    /// How much deeper than allowed a contact would get by a motion from `x` to `to`, metres; `None` if it stays
+    /// within the limits. Limiting the motion lets the next iteration see the contact force.
     pub(super) fn overshoot(&self, x: &[DVec3], to: &[DVec3]) -> Option<f64> {
         let (before, after) = (self.depth(x, 0.0), self.depth(to, 0.0));
         let [most, stop] = if before > 0.0 { PRESSED } else { CLOSED };
@@ -189,42 +198,42 @@ impl ContactConstraint {
         (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
     }
 
-    /// Whether one particle alone is in it.
+    /// The particle and its weight, if the contact involves only one.
     pub(super) fn single_particle(&self) -> Option<(usize, f64)> {
         let mut sides = self.sides();
         sides.next().filter(|_| sides.next().is_none())
     }
 
-    /// Σ w·values.
+    /// Σ wᵢ·valuesᵢ.
     pub(super) fn weighted_sum(&self, values: &[DVec3]) -> DVec3 {
         self.sides().fold(DVec3::zeros(), |sum, (particle, weight)| sum + values[particle] * weight)
     }
 
-    /// Distance above the gap, `seconds` before the time it was found for.
+    /// Distance above the gap at `x`, `seconds` before the time the contact was detected for.
     pub(super) fn clearance(&self, x: &[DVec3], seconds: f64) -> f64 {
         let offset = self.offset - self.normal.dot(&self.velocity) * seconds;
         self.normal.dot(&self.weighted_sum(x)) - offset - self.gap
     }
 
-    /// How far below the gap it pushes, likewise.
+    /// Depth at which the penalty acts, likewise.
     fn depth(&self, x: &[DVec3], seconds: f64) -> f64 {
         -self.clearance(x, seconds) - self.slack
     }
 
-    /// Takes it to be on its way out where surfaces are through each other as a step of `seconds` begins at `x`: by `way` in
-    /// that step. All at once, within a short step, they would leave each other like a shot.
+    /// For surfaces that penetrate each other at the start `x` of a step of `seconds`, limits the separation in that
+    /// step to `way` metres. Resolved at once within a short step, they would fly apart.
     pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, way: f64) -> Self {
         let through = -self.clearance(x, seconds) - self.gap;
         Self { slack: (through - way).max(0.0), ..self }
     }
 
-    /// Takes it to go on as at `x` and `v`, `seconds` before the time it was found for: to push or not, stick or slide, with
-    /// the push a straight line of the depth. A step that only pushes one way is no step of order 2; one that goes on is.
+    /// Freezes the state at `x` and `v`, `seconds` before the detection time: open or closed, sticking or sliding,
+    /// with the normal force linear in depth. A one-sided force would reduce the order of the step to 1.
     pub(super) fn frozen(&self, x: &[DVec3], v: &[DVec3], seconds: f64, size: f64) -> Self {
         Self { frozen: Some(self.at(x, v, seconds, size)), ..*self }
     }
 
-    /// Whether what a frozen contact was taken to do is what it does at `x` and `v`.
+    /// Whether a frozen contact would have the same state at `x` and `v`.
     pub(super) fn active_set_unchanged(&self, x: &[DVec3], v: &[DVec3]) -> bool {
         let Some(then) = self.frozen else { return true };
         let depth = self.depth(x, 0.0);
@@ -239,13 +248,13 @@ impl ContactConstraint {
         }
     }
 
-    /// How fast the surfaces slip.
+    /// Slip velocity of the surfaces.
     fn slip(&self, v: &[DVec3]) -> DVec3 {
         let pace = self.weighted_sum(v) - self.velocity;
         pace - self.normal * self.normal.dot(&pace)
     }
 
-    /// What it does at `x` and `v`, `seconds` before the time it was found for; `size` is the body's.
+    /// The forces at `x` and `v`, `seconds` before the detection time, for a body of the given `size`.
     pub(super) fn at(&self, x: &[DVec3], v: &[DVec3], seconds: f64, size: f64) -> ContactState {
         let depth = self.depth(x, seconds);
         if let Some(then) = self.frozen {
@@ -256,7 +265,7 @@ impl ContactConstraint {
                 ContactMode::Sliding => then.slip * (self.friction * self.load),
             };
             let force = if then.mode == ContactMode::Open { DVec3::zeros() } else { self.normal * push - drag };
-            // Sliding goes on whatever its speed: nothing resists across it either.
+            // Sliding friction does not depend on the slip, so it has no stiffness across it either.
             let grip = if then.mode == ContactMode::Sliding { 0.0 } else { then.grip };
             return ContactState { depth, normal_force: push, force, grip, ..then };
         }
@@ -275,7 +284,7 @@ impl ContactConstraint {
             (state.normal_force, state.slope, state.energy) = self.spring(depth);
             state.force = self.normal * state.normal_force;
         }
-        // A load goes on through the step, as otherwise friction would begin and end with a jump.
+        // The load is constant within a step; otherwise friction would start and stop with a jump.
         let most = self.friction * self.load;
         if most > 0.0 {
             let slip = self.slip(v);
@@ -288,9 +297,10 @@ impl ContactConstraint {
         state
     }
 
-    /// Takes the push at `x`, `seconds` before the time it was found for, as what friction counts: so friction has an energy
-    /// of its own, and what is solved stays convex. A contact that begins has none yet. Where the surface moves so far that
-    /// its plane then is not known it is what the particle was under at last, of `loads`.
+    /// Fixes the normal load of friction: the force at `x`, `seconds` before the detection time, but no more than the
+    /// last step's `loads`. With a given load friction has a potential and the stage stays a convex minimisation. A
+    /// new contact has no load yet. Where an obstacle moves so far that its plane at that time is unknown, a contact
+    /// of a single particle takes the last load.
     pub(super) fn with_load(&self, x: &[DVec3], loads: &[f64], seconds: f64) -> Self {
         let near = self.velocity.norm() * seconds <= self.gap;
         let last = self.sides().map(|(particle, _)| loads[particle]).fold(0.0, f64::max);
@@ -304,13 +314,13 @@ impl ContactConstraint {
         Self { load: now.min(last), ..*self }
     }
 
-    /// The push at `x`, as a load.
+    /// The normal force at `x`, as a load for friction.
     pub(super) fn load_at(&self, x: &[DVec3]) -> f64 {
         self.load_at_depth(self.depth(x, 0.0))
     }
 
     fn load_at_depth(&self, depth: f64) -> f64 {
-        // Where surfaces are through each other the push is no load but a way out.
+        // Where the surfaces penetrate each other, the force only separates them and causes no friction.
         if depth <= 0.0 || self.gap_fraction(depth) > 1.0 {
             return 0.0;
         }
@@ -318,7 +328,7 @@ impl ContactConstraint {
         self.spring(depth.min(deepest)).0
     }
 
-    /// The push at a depth > 0, its slope, and the energy it stores.
+    /// Normal force at a depth > 0, its derivative, and the stored energy.
     fn spring(&self, depth: f64) -> (f64, f64, f64) {
         let (k, gap) = (self.penalty_stiffness, self.gap);
         let edge = STRAIGHT * gap;
@@ -337,8 +347,8 @@ impl ContactConstraint {
         (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
     }
 
-    /// Makes the push linear where it is `expected`, if that is less than it is: from too deep, where it grows without limit,
-    /// Newton's method would come back by half of what is left at a time.
+    /// Linearises the normal force at a predicted value instead of the current one, if that is smaller. Far into the
+    /// steep part of the penalty, Newton's method would only halve the excess in each iteration.
     pub(super) fn expect(&self, state: &mut ContactState, expected: f64) {
         if self.frozen.is_some() || state.depth <= 0.0 || self.gap <= 0.0 || expected >= state.normal_force {
             return;
@@ -349,7 +359,7 @@ impl ContactConstraint {
         (state.normal_force, state.slope) = (push, slope);
     }
 
-    /// The push where particles are a `share` of `dx` on.
+    /// Normal force predicted by the linearisation after a fraction `share` of the step `dx`.
     pub(super) fn expected(&self, state: &ContactState, dx: &[DVec3], share: f64) -> f64 {
         if state.depth <= 0.0 {
             return 0.0;
@@ -357,7 +367,7 @@ impl ContactConstraint {
         (state.normal_force - state.slope * share * self.normal.dot(&self.weighted_sum(dx))).max(0.0)
     }
 
-    /// The energy that friction counts as in a line search, where `v` changes by 1/a of what `x` does.
+    /// Friction potential of the stage in which `v` = (x − z)/a.
     pub(super) fn friction_energy(&self, v: &[DVec3], a: f64, size: f64) -> f64 {
         let most = self.friction * self.load;
         let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.hold));
@@ -365,11 +375,12 @@ impl ContactConstraint {
         a * most * held
     }
 
-    /// What it resists for steps of `a`: up to three directions, each scaled by the root of its stiffness.
+    /// Up to three directions in which the contact has stiffness in a stage of `a`, each scaled by the square root of
+    /// that stiffness, and their number.
     ///
-    /// Friction grows no further once surfaces slide, so that Newton's method alone would turn slips round and back. It is
-    /// made linear together with what it is (Chan, Golub & Mulet 1999): with no `drag` it resists as slower surfaces would,
-    /// which never overshoots, and with the drag that belongs to the slip exactly.
+    /// The derivative of sliding friction vanishes along the slip, so plain Newton iterations would oscillate. The
+    /// linearisation is the primal-dual one of Chan, Golub & Mulet (1999): with a dual of 0 it is that of slower
+    /// surfaces, which never overshoots; with the dual that matches the slip it is exact.
     pub(super) fn stiffness_directions(&self, state: &ContactState, a: f64, drag: &DVec3) -> ([DVec3; 3], usize) {
         let n = self.normal;
         let mut out = [n * (a * a * state.slope).max(0.0).sqrt(), DVec3::zeros(), DVec3::zeros()];
@@ -390,9 +401,8 @@ impl ContactConstraint {
         (out, 3)
     }
 
-    /// The drag that belongs to where particles are a `share` of `dx` on in a stage of `a`, of length 1 at most, as the
-    /// system that [`Self::resisted`] with `drag` stands for has it. None where all of a step that was too long would have
-    /// turned the slip round.
+    /// The friction dual, of length 1 at most, after a fraction `share` of the step `dx` in a stage of `a`, as
+    /// linearised with the current `dual`. Zero where the step was cut because it would have reversed the slip.
     pub(super) fn drag(&self, state: &ContactState, drag: &DVec3, dx: &[DVec3], share: f64, a: f64) -> DVec3 {
         let most = self.friction * self.load;
         if most <= 0.0 || state.mode == ContactMode::Open {
@@ -409,13 +419,13 @@ impl ContactConstraint {
         next * (SURE / next.norm().max(1.0))
     }
 
-    /// That, as the block of a particle alone in it.
+    /// Adds the stiffness of a single-particle contact to that particle's block.
     pub(super) fn add_block(&self, resisted: &([DVec3; 3], usize), weight: f64, block: &mut [f64; 6]) {
         resisted.0[..resisted.1].iter().for_each(|way| add_square(block, *way, weight * weight));
     }
 }
 
-/// Slip at which friction is all of μN, m/s.
+/// Slip velocity above which friction is μN, m/s.
 fn creep(size: f64) -> f64 {
     (CREEP * size).max(f64::MIN_POSITIVE)
 }

@@ -1,35 +1,36 @@
-//! The energies of a body, and its worst spring: what a frame reports and what its steps are watched by.
+//! Energies of a body and its worst spring, for reports and step control.
 
 use super::springs;
 use super::stage::{FrameContext, StageSolver};
 use super::step::Kinematics;
 use numerics::vector::DVec3;
 
-/// Joules.
+/// Energies, joules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Energies {
     pub(super) kinetic: f64,
     pub(super) springs: f64,
-    /// Regions and tetrahedra about to turn over.
+    /// In regions and inverted or thin tetrahedra.
     pub(super) volumes: f64,
     pub(super) goals: f64,
-    /// Against gravity, from the origin.
+    /// Potential energy of gravity relative to the origin.
     pub(super) height: f64,
 }
 
 impl Energies {
-    /// All that a body without drive may not gain.
+    /// The total, which must not grow without external driving.
     pub(super) fn sum(&self) -> f64 {
         self.kinetic + self.springs + self.volumes + self.goals + self.height
     }
 
-    /// What it is small against: without the part whose zero is arbitrary.
+    /// The scale of energy changes: the total without gravity, whose zero is arbitrary.
     pub(super) fn scale(&self) -> f64 {
         self.kinetic + self.springs + self.volumes + self.goals
     }
 }
 
-/// At `time`, a share of the frame; `looked` where volumes were last measured there.
+/// Measures the energies at `time`, a fraction of the frame; `looked` if volumes were last measured at these
+/// positions.
 pub(super) fn measure(
     solver: &mut StageSolver,
     context: &FrameContext<'_>,
@@ -63,7 +64,7 @@ pub(super) fn measure(
     Energies { kinetic, springs, volumes: stored + thin, goals, height }
 }
 
-/// The largest length ÷ length at rest of a spring, or its reciprocal; of springs that have a length at rest.
+/// The largest of stretch and compression, length ÷ rest length or its reciprocal, over springs with a rest length.
 pub(super) fn worst_stretch(context: &FrameContext<'_>, x: &[DVec3]) -> f64 {
     let body = context.body;
     let worst = body.spring_partition.map((), |part, ()| {

@@ -1,8 +1,9 @@
-//! Implicit Euler with contacts: finds them, solves, looks whether others came, what got thin and what friction there is, and
-//! goes on.
+//! Implicit Euler with contacts: detect, solve, and repeat while contacts were missed, tetrahedra became thin or
+//! friction loads changed.
 //!
-//! Friction is solved with pushes that are given: those the particles were under at last, then those found on the way down,
-//! until they are about the same. So each step has an objective, and what comes out has Coulomb's friction of its own pushes.
+//! Friction is solved with given normal loads: first those of the last step, then those found by the descent, until
+//! they agree. Each solve therefore minimises an objective, and the result satisfies Coulomb's law for its own normal
+//! forces.
 
 use super::contact::{Contact, ContactConstraint, ContactQuery};
 use super::search::{StopCriteria, reload};
@@ -12,15 +13,15 @@ use super::step::{Kinematics, Stepper, deepest, sum};
 use numerics::vector::DVec3;
 use std::cell::OnceCell;
 
-/// Times that implicit Euler looks for contacts it has missed.
+/// Rounds of contact detection in a step.
 const ROUNDS: u32 = 4;
-/// Share of the mean spring that a first guess may move a particle to a surface.
+/// Largest initial displacement of a particle onto a surface, as a fraction of the mean spring length.
 const NUDGE: f64 = 0.3;
-/// Share of the first residual at which implicit Euler stops.
+/// Residual ÷ initial residual at which implicit Euler stops.
 const EULER_SHARE: f64 = 0.05;
 
 impl Stepper<'_> {
-    /// Contacts on the way from `start` `to` there, with the load they have at its start.
+    /// Potential contacts of a motion from `start` to `to`, with their loads at the start.
     pub(super) fn contacts(&self, start: &Kinematics, to: &[DVec3], times: [f64; 2]) -> Vec<ContactConstraint> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
@@ -37,7 +38,7 @@ impl Stepper<'_> {
         known.map(|c| c.depenetrating(&start.x, h, way).with_load(&start.x, &start.loads, h)).collect()
     }
 
-    /// The largest push of an obstacle on each particle at `x`.
+    /// The largest normal force of a contact on each particle at `x`.
     pub(super) fn loads(&self, contacts: &[ContactConstraint], x: &[DVec3]) -> Vec<f64> {
         let mut loads = vec![0.0; x.len()];
         for contact in contacts {
@@ -48,8 +49,8 @@ impl Stepper<'_> {
         loads
     }
 
-    /// The contacts that `x` has, and whether `known` lacks deep ones of them: what was far may be pushed near, and surfaces
-    /// bend.
+    /// Detects contacts at `x`, and whether `known` lacks deep ones of them: contacts may push particles to surfaces
+    /// that were far away, and surfaces bend.
     pub(super) fn find_missed(
         &self,
         known: &[ContactConstraint],
@@ -66,12 +67,12 @@ impl Stepper<'_> {
         (found, missed)
     }
 
-    /// How deep the worst contact is where particles are at `time`, metres below its gap.
+    /// Depth of the deepest contact at `time`, metres below its gap.
     fn depth(&self, moving: &Kinematics, time: f64) -> f64 {
         deepest(&self.contacts(moving, &moving.x, [time; 2]), &moving.x)
     }
 
-    /// Implicit Euler; `off` where it begins off balance by more than its contacts.
+    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts.
     pub(super) fn euler(
         &mut self,
         moving: &mut Kinematics,
@@ -108,7 +109,8 @@ impl Stepper<'_> {
             let changed = reload(contacts, &x, &self.solver.v, h, self.context.body.size).is_some();
             let (mut found, missed) = self.find_missed(contacts, moving, &x, times);
             let thinned = self.watch_thin(&x);
-            // What was deep before is on its way out. A plane of the end may call deep what was none: surfaces turn.
+            // Contacts that were deep before are being separated. A contact plane at the end of a step may report
+            // depth that was none before, as surfaces turn.
             let sank = |c: &&ContactConstraint| {
                 let now = -c.clearance(&x, 0.0);
                 c.is_too_deep(&x)
@@ -125,13 +127,13 @@ impl Stepper<'_> {
             }
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
-        // What velocities changed by is a whole step late.
+        // First-order estimate: the change of velocity acts a whole step late.
         let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
         (moving.x, moving.v) = (x, v);
         (solved, estimate)
     }
 
-    /// About the square of the residual of motion on from `x` to `y`, gravity and obstacles within `h`, if nothing gave way.
+    /// Estimate of the squared residual of free motion from `x` to `y` plus gravity and obstacle motion in `h`.
     fn scale(&self, x: &[DVec3], y: &[DVec3], contacts: &[ContactConstraint], h: f64) -> f64 {
         let mass = &self.context.body.mass;
         let falls = (DVec3::from(self.frame.gravity) * (h * h)).norm_squared();
@@ -145,7 +147,8 @@ impl Stepper<'_> {
         if scale > 0.0 { scale } else { f64::INFINITY }
     }
 
-    /// `y`, with contacts as deep as they were at `x`, or just touching: a slip that goes on is what friction is sure of.
+    /// The predicted positions `y`, moved so that contacts stay as deep as at `x` or just touch: friction acts on
+    /// slip, so the initial guess should not contain normal motion.
     fn slid(&self, x: &[DVec3], y: &[DVec3], contacts: &[ContactConstraint], h: f64) -> Vec<DVec3> {
         let mut out = y.to_vec();
         for contact in contacts {
@@ -160,9 +163,9 @@ impl Stepper<'_> {
     }
 }
 
-/// Has contacts found anew count the loads of those that `known` has of the same particles in about the same direction.
+/// Transfers the loads of `known` contacts to newly detected ones of the same particles with a similar normal.
 fn take_loads(known: &[ContactConstraint], found: &mut [ContactConstraint]) {
-    /// Cosine of the angle within which directions are the same.
+    /// Cosine of the largest angle between similar normals.
     const SAME: f64 = 0.9;
     let mut order: Vec<u32> = (0..known.len() as u32).collect();
     order.sort_by_key(|index| (known[*index as usize].particles, *index));

@@ -1,50 +1,49 @@
-//! What moves a body from outside: gravity, drag, goals, pins.
+//! External forces and constraints: gravity, drag, goals, pins.
 //!
-//! All are evaluated within each stage, at the stage's own time; goals and pins go straight from where they are at the
-//! step's start to where they are at its end.
+//! All are evaluated at the time of each stage; goals and pins move linearly through the frame.
 
 use super::body::SoftBody;
 use numerics::vector::DVec3;
 
-/// Draws a particle towards a place: a spring of `strength`·mass N/m, and a dashpot beside it.
+/// Pulls a particle to a target: a spring of `strength`·mass N/m with a parallel dashpot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalSpring {
-    /// Whom.
+    /// The particle, by the caller's index.
     pub particle: u32,
-    /// Where, at the start and at the end of the frame, metres.
+    /// Target at the start and at the end of the frame, metres.
     pub between: [[f64; 3]; 2],
-    /// 1/s².
+    /// Spring stiffness ÷ mass, 1/s².
     pub strength: f64,
-    /// Against motion other than the goal's own, 1/s.
+    /// Damping of motion relative to the target, ÷ mass, 1/s.
     pub damping: f64,
 }
 
-/// Puts a particle exactly where it says; nothing else moves it.
+/// Prescribes the position of a particle exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pin {
-    /// Whom.
+    /// The particle, by the caller's index.
     pub particle: u32,
-    /// Where, at the start and at the end of the frame, metres.
+    /// Position at the start and at the end of the frame, metres.
     pub between: [[f64; 3]; 2],
 }
 
 const NONE: u32 = u32::MAX;
 
-/// The drive of one frame, in the solver's order.
+/// External forces of one frame, in the solver's order.
 #[derive(Clone, Debug)]
 pub(super) struct ExternalForces {
     pub(super) gravity: DVec3,
     pub(super) drag: f64,
-    /// Seconds the frame has.
+    /// Length of the frame, seconds.
     seconds: f64,
-    /// Which goal each particle has; empty where there is none.
+    /// Index of each particle's goal; empty without goals.
     goal_of: Vec<u32>,
     goals: Vec<Track>,
     pub(super) held: Vec<bool>,
     pins: Vec<(u32, [DVec3; 2])>,
 }
 
-/// A goal, or several of one particle joined: their forces add up to its.
+/// A goal, or the sum of several goals of one particle.
 #[derive(Clone, Copy, Debug)]
 struct Track {
     between: [DVec3; 2],
@@ -93,13 +92,14 @@ impl ExternalForces {
         external
     }
 
-    /// Whether something moves by itself, so that energy may rise.
+    /// Whether a goal or pin moves, so that it can do work.
     pub(super) fn moves(&self) -> bool {
         let moves = |between: &[DVec3; 2]| between[0] != between[1];
         self.pins.iter().any(|pin| moves(&pin.1)) || self.goals.iter().any(|goal| moves(&goal.between))
     }
 
-    /// Puts pinned particles where they are at `time`, a share of the frame, and `z` where (x − z)/a is their pins' velocity.
+    /// Moves pinned particles to their positions at `time`, a fraction of the frame, and sets `z` so that (x − z)/a
+    /// is their velocity.
     pub(super) fn hold(&self, time: f64, x: &mut [DVec3], z: &mut [DVec3], a: f64) {
         for (particle, between) in &self.pins {
             let particle = *particle as usize;
@@ -108,7 +108,7 @@ impl ExternalForces {
         }
     }
 
-    /// What acts on a particle apart from springs, volumes and contacts, newtons.
+    /// External force on a particle, newtons.
     #[inline(always)]
     pub(super) fn force(&self, particle: usize, mass: f64, time: f64, x: DVec3, v: DVec3) -> DVec3 {
         let mut sum = self.gravity - v * self.drag;
@@ -119,7 +119,7 @@ impl ExternalForces {
         sum * mass
     }
 
-    /// What that resists for steps of `a`, kilograms.
+    /// Its contribution to the diagonal of the system in a stage of `a`, kilograms.
     #[inline(always)]
     pub(super) fn inertia(&self, particle: usize, mass: f64, a: f64) -> f64 {
         let mut sum = a * self.drag;
@@ -129,7 +129,8 @@ impl ExternalForces {
         sum * mass
     }
 
-    /// The energy whose slope is [`Drive::force`] where `v` changes by 1/a of what `x` does; with `a` 0 what is stored.
+    /// Potential of [`ExternalForces::force`] in a stage in which `v` = (x − z)/a; with `a` = 0 the stored energy,
+    /// joules.
     pub(super) fn energy(&self, particle: usize, mass: f64, time: f64, a: f64, x: DVec3, v: DVec3) -> f64 {
         let mut sum = -self.gravity.dot(&x) + 0.5 * a * self.drag * v.norm_squared();
         sum += self.goal_energy(particle, time, x);
@@ -139,7 +140,7 @@ impl ExternalForces {
         sum * mass
     }
 
-    /// What a particle's goal stores, joules a kilogram.
+    /// Energy in a particle's goal, joules a kilogram.
     pub(super) fn goal_energy(&self, particle: usize, time: f64, x: DVec3) -> f64 {
         self.goal(particle).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
     }
@@ -164,7 +165,7 @@ impl Track {
     }
 }
 
-/// Exact at both ends.
+/// Linear interpolation, exact at both ends.
 #[inline(always)]
 fn lerp(between: &[DVec3; 2], time: f64) -> DVec3 {
     if time >= 1.0 { between[1] } else { between[0] + (between[1] - between[0]) * time }

@@ -1,4 +1,4 @@
-//! One frame of a body: what is asked for, what is reported, and how the steps of a frame are chosen.
+//! One frame of a body: input, report, and step size control.
 
 use super::body::SoftBody;
 use super::contact::ContactFinder;
@@ -11,45 +11,46 @@ use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
 use numerics::vector::DVec3;
 
-/// Steps that a frame is cut into, at most, where halving is what helps.
+/// Largest number of steps in a frame.
 const MOST_STEPS: u32 = 256;
 
-/// How time is stepped through.
+/// Time integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Integrator {
-    /// TR-BDF2, order 2, one Newton iteration a stage; implicit Euler where a step begins off balance.
+    /// TR-BDF2, second order, one Newton iteration a stage; implicit Euler for steps that start out of balance.
     Default,
-    /// TR-BDF2 with steps chosen so that the estimated error of a frame stays within `tolerance` of the body's size.
+    /// TR-BDF2 with steps chosen so that the estimated error of a frame stays below `tolerance` of the body's size.
     Accurate {
-        /// Share of the body's size.
+        /// Fraction of the body's size.
         tolerance: f64,
     },
-    /// Implicit Euler with line search: order 1, calms everything.
+    /// Implicit Euler with line search: first order, damps all motion.
     Euler,
 }
 
-/// What happens in a frame.
+/// Input for one frame.
 #[derive(Clone, Copy)]
 pub struct SolverFrame<'a> {
-    /// Its length, seconds; 0 does nothing.
+    /// Length of the frame, seconds; 0 does nothing.
     pub seconds: f64,
-    /// m/s².
+    /// Acceleration by gravity, m/s².
     pub gravity: [f64; 3],
-    /// Against all motion, 1/s.
+    /// Damping of all motion, 1/s.
     pub drag: f64,
-    /// Share of lost volume that is fought, 0…1.
+    /// Strength of volume preservation, 0…1.
     pub volume: f64,
-    /// Soft targets.
+    /// Soft targets for particles.
     pub goals: &'a [GoalSpring],
-    /// Hard ones.
+    /// Prescribed positions of particles.
     pub pins: &'a [Pin],
-    /// Who finds contacts.
+    /// Contact detection; `None` without contacts.
     pub contacts: Option<&'a dyn ContactFinder>,
-    /// How time is stepped through.
+    /// Time integration.
     pub integrator: Integrator,
-    /// Steps in the frame; 0: one, or two halves and so on where it leaves contacts too deep or errors too large.
+    /// Number of steps; 0: one, halved repeatedly where contacts stay too deep or errors too large.
     pub substeps: u32,
-    /// Whether it begins off balance: rest lengths jumped, say. Then it is stepped through with implicit Euler.
+    /// Whether to step with implicit Euler throughout: for frames that start out of balance, for example after rest
+    /// lengths changed.
     pub force_implicit_euler: bool,
 }
 
@@ -70,7 +71,7 @@ impl Default for SolverFrame<'_> {
     }
 }
 
-/// What a frame took, and where it left the body.
+/// Outcome of one frame.
 #[must_use]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameReport {
@@ -78,60 +79,61 @@ pub struct FrameReport {
     pub newton: u32,
     /// Iterations of linear solves.
     pub cg: u32,
-    /// The largest share of a stage's first residual that was left of it.
+    /// The largest final ÷ initial residual of a stage.
     pub residual: f64,
-    /// Solves that stopped short of what was asked, and steps that left contacts too deep.
+    /// Solves that did not reach their tolerance, and steps that left contacts too deep.
     pub caps_hit: u32,
-    /// Estimated error of the positions that the frame added, metres: the sum over its steps of the largest of a particle.
+    /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
+    /// particle.
     pub error_estimate: f64,
-    /// Joules.
+    /// Kinetic energy, joules.
     pub kinetic: f64,
-    /// In the springs, joules.
+    /// Elastic energy of springs, joules.
     pub elastic: f64,
-    /// In pressures and against turning over, joules.
+    /// Energy in pressures and thin tetrahedra, joules.
     pub volume_energy: f64,
-    /// In goals, joules.
+    /// Energy in goals, joules.
     pub goal_energy: f64,
-    /// Taken because a step would have made energy, joules.
+    /// Energy removed to prevent a spurious gain, joules.
     pub energy_removed: f64,
-    /// Volume ÷ volume at rest.
+    /// Volume ÷ rest volume.
     pub volume_ratio: f64,
-    /// The largest length ÷ length at rest of a spring, or its reciprocal.
+    /// The largest length ÷ rest length of a spring, or its reciprocal.
     pub worst_stretch: f64,
-    /// Tetrahedra inside out.
+    /// Inverted tetrahedra.
     pub inverted_tets: u32,
     /// Steps taken.
     pub substeps: u32,
     /// How many of them were implicit Euler.
     pub euler_steps: u32,
-    /// Contacts that push.
+    /// Closed contacts.
     pub contacts: u32,
-    /// How far the worst of them is below its gap, metres.
+    /// Depth of the deepest contact below its gap, metres.
     pub deepest_overlap: f64,
-    /// Particles that were stopped where they stood, as nothing finite came out.
+    /// Particles whose result was not finite: they were stopped where they were.
     pub stopped: u32,
 }
 
-/// Steps a body through frames; what it remembers between them is memory to use again, and changes no bit.
+/// Steps a body through frames. What it keeps between calls only saves allocations; it does not affect results.
 #[derive(Clone, Debug)]
 pub struct BodySolver {
     solver: StageSolver,
 }
 
 impl BodySolver {
-    /// For `body`, whose shape stays; its material may change.
+    /// For `body`, whose topology must stay the same; its material may change.
     pub fn new(body: &SoftBody) -> Self {
         Self { solver: StageSolver::new(body) }
     }
 
-    /// Moves `state` through a frame.
+    /// Advances `state` by one frame.
     ///
-    /// # Panics
-    /// Where `state` does not fit `body`, a goal or pin names no particle, or `body` has not the shape it was made for.
+    /// # Panics If `state` does not fit `body`, a goal or pin has an index out of range, or `body` has another
+    /// topology than in [`BodySolver::new`].
     pub fn step(&mut self, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>) -> FrameReport {
         assert!(state.fits(body), "a state of another body");
         if body.order.clusters.is_parallel() {
-            // From within, a loop over parts costs no call from thread to thread to begin.
+            // Inside of a scope, starting a parallel loop needs no hand-over between threads.
             rayon::scope(|_| self.step_here(body, state, frame))
         } else {
             self.step_here(body, state, frame)
@@ -187,7 +189,7 @@ impl BodySolver {
     }
 }
 
-/// The steps of a frame.
+/// Takes the steps of a frame.
 fn run(stepper: &mut Stepper<'_>, moving: &mut Kinematics, energies: &mut Energies, report: &mut FrameReport) {
     let accurate = match stepper.frame.integrator {
         Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.context.body.size),
@@ -208,8 +210,8 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Kinematics, energies: &mut Energi
     }
 }
 
-/// A step from one of `times` to the other, or two halves of it where it leaves contacts unmet: short steps only as long as
-/// that makes them shallower than `deepest`, metres.
+/// Takes one step between `times`, or two halves of it if contacts stay too deep. Short steps are only halved further
+/// if that reduces the depth below `deepest`, metres.
 fn halve(
     stepper: &mut Stepper<'_>,
     moving: &mut Kinematics,
@@ -218,11 +220,11 @@ fn halve(
     times: [f64; 2],
     deepest: f64,
 ) {
-    /// Share of the depth that halves have to leave, at most, to be halved too.
+    /// Largest depth after halving ÷ before for which another halving is worth while.
     const HELPS: f64 = 0.9;
-    /// Share of the frame above which a step is not short.
+    /// Steps longer than this fraction of the frame are always halved.
     const SHORT: f64 = 1.0 / 16.0;
-    /// Newton iterations of a frame after which what is unmet is left so: a frame ends.
+    /// Newton iterations of a frame after which remaining depths are accepted, so that the frame ends.
     const MOST_NEWTON: u32 = 400;
     let (start, energy_budget, euler_steps_left) = (moving.clone(), *stepper.energy_budget, *stepper.euler_steps_left);
     let stepped = stepper.step(moving, times, energies, None, false);
@@ -245,7 +247,7 @@ fn halve(
     }
 }
 
-/// Steps whose estimated error a second stays within `tolerance` metres a frame.
+/// Takes steps whose estimated error stays below `tolerance` metres a frame.
 fn adapt(
     stepper: &mut Stepper<'_>,
     moving: &mut Kinematics,
@@ -253,14 +255,15 @@ fn adapt(
     report: &mut FrameReport,
     tolerance: f64,
 ) {
-    /// Most and least that a step is changed by, and what is kept in reserve.
+    /// Bounds on the change of step size, and its safety factor.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
-    /// Newton iterations of a frame after which steps are taken as they are, calmed, and counted: a frame ends.
+    /// Newton iterations of a frame after which steps are accepted, damped and counted as caps, so that the frame
+    /// ends.
     const MOST_NEWTON: u32 = 4000;
     let (mut time, mut share, mut calm) = (0.0, 1.0_f64, false);
     while time < 1.0 {
-        // Equal steps to the end, so that no sliver is left there.
+        // Equal steps to the end, which avoids a tiny last one.
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
@@ -268,19 +271,21 @@ fn adapt(
         let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
-        // What begins off balance is calmed, not followed: its estimate says how far it jumped. At a contact it counts.
+        // Steps that start out of balance are damped, so their error estimate only tells the size of the jump; at
+        // contacts it counts.
         let close = stepped.estimate <= allowed || stepped.damped || (stepped.euler && smallest);
         let fits = close && (stepped.solved.unmet <= 0.0 || smallest);
-        // An estimate a second falls with the step where the method is of order 1, with its square where it is of order 2.
+        // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a
+        // second-order one.
         let ratio = allowed / stepped.estimate;
         let ratio = if stepped.euler { ratio } else { ratio.sqrt() };
         let change = if stepped.estimate > 0.0 { RESERVE * ratio } else { CHANGE[1] };
         share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
         if stepped.solved.unmet > 0.0 {
-            // The estimate knows nothing of contacts: what sank asks for shorter steps.
+            // The estimate does not cover contacts: those that got deeper ask for shorter steps.
             share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
         }
-        // No step is small enough: what is left of it is calmed.
+        // The smallest step is still inaccurate: take it damped.
         calm = !fits && smallest;
         if fits {
             add(report, &stepped);
@@ -296,7 +301,7 @@ fn adapt(
     }
 }
 
-/// The work of a step whose result does not count.
+/// Adds the cost of a step, whose result may be rejected.
 fn add_work(report: &mut FrameReport, stepped: &Stepped) {
     report.newton += stepped.solved.newton;
     report.cg += stepped.solved.cg;

@@ -1,4 +1,4 @@
-//! The coarse matrix: what clusters' motions meet, Pᵀ·A·P, P the shift and turn of each cluster at its particles.
+//! The coarse (Galerkin) matrix PᵀAP, where P maps rigid motions of clusters to particles.
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
@@ -9,19 +9,19 @@ use super::springs::Record;
 use super::system::System;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
-/// What the matrix is made of.
+/// What the matrix is assembled from.
 #[derive(Clone, Copy)]
 pub(super) struct Galerkin<'a> {
     pub(super) layout: &'a Layout,
     pub(super) body: &'a SoftBody,
     pub(super) system: &'a System,
     pub(super) offset_from_centroid: &'a [Vec3],
-    /// What of their clusters' motions particles in contact follow.
+    /// Filters of the rigid motions at particles in contact.
     pub(super) anchors: &'a Anchors,
 }
 
 impl Galerkin<'_> {
-    /// The matrix's factor.
+    /// Assembles the matrix and factors it.
     pub(super) fn factor(&self) -> Lower {
         let (layout, system) = (self.layout, self.system);
         let mut first = layout.first.clone();
@@ -42,7 +42,7 @@ impl Galerkin<'_> {
         matrix
     }
 
-    /// A cluster against those from `first` to itself: springs and what each particle resists alone.
+    /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
         let Self { layout, body, system, offset_from_centroid, anchors } = self;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
@@ -55,7 +55,7 @@ impl Galerkin<'_> {
             }
             let mine = to_f64(offset_from_centroid[particle]);
             let anchor = anchors.at(particle);
-            // What resists the particle itself.
+            // Stiffness and inertia of the particle itself.
             let mut own = system.blocks.get(particle).copied().unwrap_or_default();
             let mut alike = system.inertia[particle];
             for record in across {
@@ -87,7 +87,7 @@ impl Galerkin<'_> {
         blocks
     }
 
-    /// A spring inside of a cluster that hangs at `place`.
+    /// Adds a spring within a cluster, listed at `particle`.
     #[inline(always)]
     fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
         let ends = [particle, record.other as usize];
@@ -105,7 +105,7 @@ impl Galerkin<'_> {
         }
     }
 
-    /// How far the motions of a particle's cluster move it along `way`.
+    /// Displacement of a particle along `way` by each rigid motion of its cluster.
     #[inline(always)]
     fn along(&self, particle: usize, way: DVec3) -> [f64; MODES] {
         let way = self.anchors.at(particle).map_or(way, |follows| follows.tr_mul(&way));
@@ -113,7 +113,7 @@ impl Galerkin<'_> {
         [way.x, way.y, way.z, turned.x, turned.y, turned.z]
     }
 
-    /// What rows resist; between pieces that do not hang together it is left out.
+    /// Adds rank-one terms; coupling between different pieces is left out.
     fn add_rows(&self, rows: &RankOneTerms, matrix: &mut Lower) {
         let Some(partition) = rows.partition() else { return };
         let of_part =
@@ -135,8 +135,8 @@ impl Galerkin<'_> {
         }
     }
 
-    /// How the motions of clusters change a row; none where it lies within one that moves as a whole, as rigid motions
-    /// change no volume and no gap.
+    /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
+    /// and unfiltered, since rigid motions change neither volumes nor gaps.
     fn predicted_loads(&self, rows: &RankOneTerms, row: usize) -> Vec<Push> {
         let Self { layout, system, anchors, .. } = self;
         let mut predicted_loads: Vec<Push> = Vec::new();
@@ -161,13 +161,13 @@ impl Galerkin<'_> {
     }
 }
 
-/// How the motions of a cluster change a row.
+/// Change of a rank-one term by the rigid motions of one cluster.
 struct Push {
     cluster: usize,
     along: [f64; MODES],
 }
 
-/// What a spring resists in, each with how much.
+/// The directions in which a spring has stiffness, each with that stiffness.
 #[inline(always)]
 fn ways(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
     let alpha = f64::from(record.alpha);
@@ -175,7 +175,7 @@ fn ways(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
     std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
 }
 
-/// Writes a cluster's rows as far as the diagonal.
+/// Writes the block row of a cluster in envelope order, up to the diagonal.
 fn write(blocks: &[Block], out: &mut [f64]) {
     let before = MODES * (blocks.len() - 1);
     let mut left = out.iter_mut();
@@ -185,26 +185,26 @@ fn write(blocks: &[Block], out: &mut [f64]) {
     }
 }
 
-/// −[r]×: what a turn does at `r`.
+/// The matrix −[r]×, which maps a rotation vector to the displacement at `r`.
 #[inline(always)]
 fn turn(r: DVec3) -> DMat3 {
     DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
 }
 
-/// What a cluster's shifts and turns do to a particle at `arm`, as far as it follows them.
+/// Displacement at `offset` for translations and rotations, filtered.
 #[inline(always)]
 fn motion(anchor: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
     let shift = anchor.unwrap_or_else(DMat3::identity);
     [shift, shift * turn(offset)]
 }
 
-/// The motions of one cluster, rows, against those of another.
+/// Coupling of the rigid motions of two clusters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Block([[f64; MODES]; MODES]);
 
 impl Block {
-    /// Springs inside of a cluster, `d` from one end to the other: they resist a turn as far as they are stretched, and no
-    /// shift.
+    /// A spring within a cluster, with `d` the offset between its ends: it resists rotation as far as it is
+    /// stretched, and no translation.
     #[inline(always)]
     fn add_turn(&mut self, alpha: f64, w: DVec3, d: DVec3) {
         let (u, square) = (d.cross(&w), d.norm_squared());
@@ -216,7 +216,7 @@ impl Block {
         }
     }
 
-    /// Pᵀ·αI·Q of particles at `p` and `q` that are free.
+    /// Pᵀ·αI·Q for unfiltered particles at `p` and `q`.
     #[inline(always)]
     fn add_alike(&mut self, alpha: f64, p: DVec3, q: DVec3) {
         let (p, dot) = (p * alpha, p.dot(&q) * alpha);
@@ -234,7 +234,7 @@ impl Block {
         }
     }
 
-    /// Pᵀ·s·wwᵀ·Q of particles at `p` and `q` that are free.
+    /// Pᵀ·s·wwᵀ·Q for unfiltered particles at `p` and `q`.
     #[inline(always)]
     fn add_along(&mut self, s: f64, w: DVec3, p: DVec3, q: DVec3) {
         let (p, q) = (p.cross(&w), q.cross(&w));
@@ -250,7 +250,7 @@ impl Block {
         }
     }
 
-    /// Pᵀ·h·Q of two particles' motions, shifts and turns.
+    /// Pᵀ·h·Q for translations and rotations of two particles.
     fn add_product(&mut self, p: [DMat3; 2], h: &DMat3, q: [DMat3; 2]) {
         for (row, p) in p.iter().enumerate() {
             let left = p.transpose() * h;
@@ -276,7 +276,7 @@ mod tests {
         short.add_along(-0.6, w, p, q);
         let h = DMat3::from_diagonal_element(1.7) - w * w.transpose() * 0.6;
         long.add_product(motion(None, p), &h, motion(None, q));
-        // Both ends of a spring in one cluster, against each other and themselves.
+        // All four blocks of a spring within one cluster.
         short.add_turn(0.9, w, p - q);
         let h = DMat3::from_diagonal_element(0.9) + w * w.transpose();
         for (a, b, sign) in [(p, p, 1.0), (q, q, 1.0), (p, q, -1.0), (q, p, -1.0)] {

@@ -1,14 +1,19 @@
-//! Soft bodies: springs on the edges of tetrahedra, stepped implicitly (R1).
+//! Mass-spring bodies on tetrahedral meshes, integrated implicitly (paper R1).
 //!
-//! Particles hang on springs and dashpots ([`Body`]); pressures keep their volume; gravity, goals, pins and contacts move
-//! them. A frame is one step of TR-BDF2, its two stages one Newton iteration each, whose linear system conjugate gradients
-//! solve on two levels without ever writing it out.
+//! Particles are joined by springs with dashpots ([`SoftBody`]); pressures preserve volume; gravity, goals, pins and
+//! contacts act on particles. By default a frame is one step of TR-BDF2 with one Newton iteration for each of its two
+//! stages. The linear systems are solved matrix-free by conjugate gradients with a two-level preconditioner.
 //!
-//! Promise: bounded for any stiffness, mass and step, also from turned and crumpled shapes; order 2 in time where motion is
-//! smooth; linear momentum kept to rounding, hard pins exact; without drive no energy gained; the same bits for any number
-//! of threads and SIMD path, and after a state was written and read back. Limits: fast oscillation that a step cannot
-//! resolve is damped; angular momentum is kept to the order of the method; f32 records hold forces to 1e-7 of the stiffest
-//! spring at a particle. Everything is f64; metres, seconds, kilograms.
+//! Inside the solver a *particle* is an index in the solver's own order ([`particle_order`]); indices as the caller
+//! gave them are called the caller's. A *piece* is a connected component of the spring graph, a *cluster* a compact
+//! part of a piece.
+//!
+//! Guarantees: bounded for any stiffness, mass and step size, also from inverted or crumpled states; second order in
+//! time where the motion is smooth; linear momentum conserved to rounding; hard pins exact; no energy gain without
+//! external driving; the same bits for any number of threads and SIMD path, and after a state was saved and restored.
+//! Limits: oscillations faster than a step can resolve are damped; angular momentum is conserved to the order of the
+//! method; spring stiffnesses are stored in f32, so forces are accurate to 1e-7 of the stiffest spring at a particle.
+//! Everything else is f64, in metres, seconds, kilograms.
 
 mod adjacency;
 mod assemble;

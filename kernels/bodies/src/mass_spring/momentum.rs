@@ -1,4 +1,5 @@
-//! What is kept of the momenta of whole pieces, whatever linear solves leave of a residual.
+//! Exact conservation of linear and angular momentum of unconstrained groups of pieces, independent of the accuracy
+//! of linear solves.
 
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
@@ -7,39 +8,39 @@ use super::predictor::CayleyRotation;
 use super::stage::{FrameContext, Stage, StageSolver};
 use numerics::vector::{DMat3, DVec3};
 
-/// Sum of weights above which a contact is with an obstacle: it is 1 there, and 0 between two bodies, which hold each other
-/// only.
+/// A contact is with an obstacle if the sum of its weights exceeds this: it is 1 there and 0 between bodies.
 const HELD: f64 = 0.5;
 
-/// What groups of pieces are to be given, and what they put up against being shifted as a whole.
+/// Total residual and translational stiffness of each group.
 pub(super) struct MomentumTarget {
-    /// Σ of residuals, of each group.
+    /// Sum of residuals over each group.
     wanted: Vec<DVec3>,
-    /// Resistance to a shift: inertia, and contacts with obstacles.
+    /// Stiffness of each group against translation: inertia and contacts with obstacles.
     resisted: Vec<DMat3>,
     obstacle_contacts: Vec<ObstacleContact>,
 }
 
-/// A contact by which an obstacle holds a group.
+/// A contact of a group with an obstacle.
 struct ObstacleContact {
     group: usize,
-    /// Which of the stage's.
+    /// Index in the stage's contacts.
     contact: usize,
-    /// Σ of its weights.
+    /// Sum of its weights.
     weight: f64,
-    /// As in [`Touching::resisted`].
+    /// As in [`ContactConstraint::stiffness_directions`].
     ways: ([DVec3; 3], usize),
 }
 
 impl ObstacleContact {
-    /// Directions it resists in, each scaled by the root of the stiffness.
+    /// Directions in which it has stiffness, scaled by the square root of that.
     fn ways(&self) -> impl Iterator<Item = &DVec3> {
         self.ways.0[..self.ways.1].iter()
     }
 }
 
 impl StageSolver {
-    /// Which pieces, joined by contacts with each other, are nowhere held; and which of them are in no contact.
+    /// Finds the groups of pieces, joined by contacts with each other, that are not pinned; and which pieces have no
+    /// contact.
     pub(super) fn find_free_groups(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
         let pieces_in_all = context.body.order.pieces.len();
         let piece_of = |particle: usize| self.layout.piece[self.layout.cluster[particle] as usize];
@@ -68,7 +69,7 @@ impl StageSolver {
         self.groups = groups.iter().map(|group| free[*group as usize].then_some(*group)).collect();
     }
 
-    /// What the residual asks of each group as a whole.
+    /// Total residual of each group.
     pub(super) fn momentum_target(&self, body: &SoftBody, stage: &Stage<'_>) -> MomentumTarget {
         let inertia = &self.system.inertia;
         let sums = self.sums(body, |particle| (self.r[particle], inertia[particle]));
@@ -82,7 +83,7 @@ impl StageSolver {
         MomentumTarget { wanted, resisted, obstacle_contacts }
     }
 
-    /// What obstacles hold groups by.
+    /// Contacts between groups and obstacles.
     fn obstacle_contacts(&self, stage: &Stage<'_>) -> Vec<ObstacleContact> {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
@@ -115,8 +116,8 @@ impl StageSolver {
         groups
     }
 
-    /// Shifts each group as a whole so that `dx` gives it all that is wanted, and takes that from `r`: springs and volumes do
-    /// not feel it.
+    /// Translates each group as a whole so that `dx` accounts for its entire residual, and updates `r`. Springs and
+    /// volumes are not affected.
     pub(super) fn correct_linear_momentum(&mut self, body: &SoftBody, stage: &Stage<'_>, whole: &MomentumTarget) {
         let given = self.sums(body, |particle| (self.dx[particle] * self.system.inertia[particle], 0.0));
         let mut left: Vec<DVec3> = whole.wanted.iter().zip(&given).map(|(wanted, (given, _))| wanted - given).collect();
@@ -144,10 +145,11 @@ impl StageSolver {
         }
     }
 
-    /// Turns each group as a whole so that it has the angular momentum of the stage's equation, whatever linear solves left:
-    /// springs and volumes do not feel it, and contacts with obstacles are counted for what they resist.
+    /// Rotates each group as a whole so that it has the angular momentum that the stage's equation demands, whatever
+    /// linear solves left over. Springs and volumes are not affected; the stiffness of contacts with obstacles is
+    /// accounted for. Returns whether anything was rotated.
     pub(super) fn correct_angular_momentum(&self, body: &SoftBody, stage: &Stage<'_>, x: &mut [DVec3]) -> bool {
-        /// Share of a group's inertia below which it has none about an axis.
+        /// Moments of inertia below this fraction of the trace are treated as zero.
         const NOTHING: f64 = 1e-9;
         let inertia = &self.system.inertia;
         let members = || {

@@ -1,41 +1,41 @@
-//! The order in which the solver keeps a body's particles: bodies that hang together one after the other, within each
-//! compact clusters one after the other, so that neighbours lie near each other in memory and a cluster is a range.
+//! The solver's order of particles: piece by piece and, within a piece, cluster by cluster, so that neighbours are
+//! near each other in memory and a cluster is a range of indices.
 //!
-//! Clusters come from halving at medians along the longest side, so they are compact and of equal size on any mesh; they
-//! follow each other so that those joined by springs are few steps apart, for the coarse matrix's sake.
-//! The order hangs on sets alone, never on how a sort orders equals.
+//! Clusters come from recursive median splits along the longest side, which makes them compact and of equal size on
+//! any mesh. They are ordered so that coupled clusters have near indices, for the envelope of the coarse matrix. The
+//! result does not depend on how a sort orders equal keys.
 
 use super::partition::Partition;
 use numerics::vector::DVec3;
 use std::ops::Range;
 
-/// Clusters of a body of n particles: CLUSTERS·n^GROWTH, which keeps the iterations nearly level from 2,000 particles (80 a
-/// cluster) to 60,000 (630). Two and three times as many save no iterations under contact.
+/// A body of n particles has CLUSTERS·n^GROWTH clusters. That keeps the number of iterations nearly constant from
+/// 2,000 particles (80 a cluster) to 60,000 (630). Two or three times as many save no iterations under contact.
 const CLUSTERS: f64 = 2.0;
 const GROWTH: f64 = 0.35;
-/// Fewer particles are no cluster: six modes each would be no coarser than the particles.
+/// Smallest cluster: with six modes each, smaller ones would be no coarser than the particles.
 const SMALLEST: usize = 24;
-/// Particles below which halving no longer brings neighbours together.
+/// Sets of particles smaller than this are not split any further for locality.
 const LEAF: usize = 8;
 
-/// The particles in the solver's order.
+/// The solver's order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Order {
-    /// The caller's index of each.
+    /// The caller's index of each particle.
     pub(super) caller_of: Vec<u32>,
-    /// Where each of the caller's is.
+    /// The solver's index for each of the caller's.
     pub(super) index_of: Vec<u32>,
-    /// Clusters.
+    /// Clusters, as ranges of particles.
     pub(super) clusters: Partition,
-    /// Pieces that hang together, as ranges of clusters.
+    /// Connected components, as ranges of clusters.
     pub(super) pieces: Vec<Range<usize>>,
 }
 
 impl Order {
-    /// Of particles at `points`, joined by `springs`.
+    /// The order for particles at `points`, joined by `springs`.
     pub(super) fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let roots = pieces(points.len(), springs.clone());
-        // Pieces by their first particle, particles within by index.
+        // Pieces by their lowest particle, particles within a piece by index.
         let mut caller_of: Vec<u32> = (0..points.len() as u32).collect();
         caller_of.sort_by_key(|particle| (roots[*particle as usize], *particle));
         let wanted = CLUSTERS * libm::pow(points.len() as f64, GROWTH);
@@ -59,8 +59,8 @@ impl Order {
     }
 }
 
-/// `callers`, whose clusters begin at `starts`, with the clusters of each piece in an order in which joined ones are near each
-/// other: outwards from one at the piece's end, reversed (Cuthill & McKee 1969).
+/// Reorders the clusters of each piece by reverse Cuthill–McKee (1969), so that coupled ones have near indices.
+/// `caller_of` lists the particles cluster by cluster, and clusters begin at `starts`.
 fn lined_up(
     caller_of: &[u32],
     starts: &[usize],
@@ -87,7 +87,7 @@ fn lined_up(
     let mut met = vec![false; joined.len()];
     for piece in pieces {
         let line = outwards(&joined, piece.start, &mut met);
-        // The last of them is at an end, or nearly so.
+        // The last cluster reached is a peripheral one, or nearly so.
         let line = outwards(&joined, line[line.len() - 1], &mut met);
         for cluster in line.into_iter().rev() {
             ordered.extend_from_slice(&caller_of[starts[cluster]..starts[cluster + 1]]);
@@ -97,8 +97,8 @@ fn lined_up(
     (ordered, ends)
 }
 
-/// All that hang together with `first`, nearest first, and those with few neighbours before others; `met` is false for all,
-/// and is again.
+/// All clusters connected with `first` in breadth-first order, those with few neighbours first; `met` must be all
+/// false, and is again on return.
 fn outwards(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<usize> {
     let (mut line, mut next) = (vec![first], 0);
     met[first] = true;
@@ -116,7 +116,8 @@ fn outwards(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<usize>
     line
 }
 
-/// Orders `particles` and adds where their `clusters` end; `base` is where they begin themselves.
+/// Orders `particles` and appends the ends of their `clusters` to `starts`; `base` is the index of the first
+/// particle.
 fn halve(points: &[DVec3], particles: &mut [u32], clusters: usize, base: usize, starts: &mut Vec<usize>) {
     let count = particles.len();
     if clusters <= 1 && count <= LEAF {
@@ -138,7 +139,7 @@ fn halve(points: &[DVec3], particles: &mut [u32], clusters: usize, base: usize, 
     }
 }
 
-/// Brings the `middle` items that come first along the longest side of their box to the front.
+/// Partitions `items` so that the `middle` lowest along the longest side of their bounding box come first.
 pub(super) fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
     let mut low = DVec3::repeat(f64::INFINITY);
     let mut high = -low;
@@ -154,7 +155,7 @@ pub(super) fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
     }
 }
 
-/// The first particle of the piece that each hangs together with.
+/// For each particle, the lowest one of its connected component.
 pub(super) fn pieces(count: usize, springs: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
     fn root(parents: &mut [u32], mut particle: u32) -> u32 {
         while parents[particle as usize] != particle {
@@ -202,7 +203,7 @@ mod tests {
     #[test]
     fn pieces_share_no_cluster_and_places_undo_the_order() {
         let points = grid(6);
-        // Even particles hang together, odd ones by pairs.
+        // Even particles are all connected, odd ones in pairs.
         let even = (2..216).step_by(2).map(|i| [i - 2, i]);
         let pairs = (1..216).step_by(4).map(|i| [i, i + 2]);
         let order = Order::new(&points, even.chain(pairs));

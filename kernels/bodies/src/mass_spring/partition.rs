@@ -1,23 +1,23 @@
-//! Fixed parts of the particles, for threads and for sums: which part a particle is in never depends on the threads, so
-//! neither does any bit.
+//! Fixed partitions of particles for parallel loops and sums. They do not depend on the number of threads, so neither
+//! do results.
 
 use std::ops::Range;
 
-/// Particles below which threads cost more than they bring.
+/// Number of particles below which threads cost more than they gain.
 const WORTH_THREADS: usize = 1500;
 
-/// Ranges that follow each other from 0.
+/// Consecutive ranges that start at 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Partition {
-    /// Where each begins, and where the last ends.
+    /// Start of each range, and the end of the last.
     starts: Vec<usize>,
-    /// Whether there is work enough to share.
+    /// Whether loops run in parallel.
     parallel: bool,
 }
 
-/// Data that can be cut in two at a particle.
+/// Per-particle data that can be split between two particles.
 pub(super) trait SplitAt: Send + Sized {
-    /// What lies before `at`, and the rest.
+    /// The parts before and from particle `at` on.
     fn halves(self, at: usize) -> (Self, Self);
 }
 
@@ -33,19 +33,19 @@ impl SplitAt for () {
     }
 }
 
-/// Several entries a particle: those of the first begin at `starts[0]`.
+/// A slice with a variable number of entries for each particle.
 pub(super) struct RaggedSlice<'a, T> {
     starts: &'a [u32],
     data: &'a mut [T],
 }
 
 impl<'a, T> RaggedSlice<'a, T> {
-    /// All of `data`, each particle's from its start to the next one's.
+    /// `data` with the entries of each particle from its start to the next one's.
     pub(super) fn new(starts: &'a [u32], data: &'a mut [T]) -> Self {
         Self { starts, data }
     }
 
-    /// Each particle's, in order.
+    /// The entries of each particle, in order.
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut [T]> {
         let mut left = &mut *self.data;
         self.starts.windows(2).map(move |ends| {
@@ -85,35 +85,36 @@ impl<A: SplitAt, B: SplitAt, C: SplitAt, D: SplitAt> SplitAt for (A, B, C, D) {
 }
 
 impl Partition {
-    /// Parts that begin at `starts`, the last of which is the end.
+    /// Ranges that begin at `starts`, whose last element is the end.
     pub(super) fn new(starts: Vec<usize>) -> Self {
         let parallel = starts.last().is_some_and(|end| *end >= WORTH_THREADS);
         Self { starts, parallel }
     }
 
-    /// Parts of `size` items each of `len`, the last shorter; `weight` is how many particles' work an item is.
+    /// Ranges of `size` out of `len` items, the last one shorter; `weight` is the cost of an item relative to that of
+    /// a particle.
     pub(super) fn even(len: usize, size: usize, weight: usize) -> Self {
         let mut starts: Vec<usize> = (0..len).step_by(size).collect();
         starts.push(len);
         Self { starts, parallel: len.saturating_mul(weight) >= WORTH_THREADS }
     }
 
-    /// Whether threads share the work.
+    /// Whether loops run in parallel.
     pub(super) fn is_parallel(&self) -> bool {
         self.parallel
     }
 
-    /// How many there are.
+    /// Number of ranges.
     pub(super) fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// The particles of one.
+    /// One range.
     pub(super) fn range(&self, part: usize) -> Range<usize> {
         self.starts[part]..self.starts[part + 1]
     }
 
-    /// What `work` gives for each part and its share of `data`.
+    /// Evaluates `work` for each range with its part of `data`.
     pub(super) fn map<D: SplitAt, R: Send + Default>(&self, data: D, work: impl Fn(usize, D) -> R + Sync) -> Vec<R> {
         let mut out = Vec::with_capacity(self.len());
         out.resize_with(self.len(), R::default);
@@ -121,12 +122,12 @@ impl Partition {
         out
     }
 
-    /// The sum over all parts, in their order.
+    /// The sum of `work` over all ranges, in order.
     pub(super) fn sum<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) -> f64 + Sync) -> f64 {
         self.map(data, work).into_iter().fold(0.0, |sum, part| sum + part)
     }
 
-    /// `work` on each part and its share of `data`.
+    /// Runs `work` for each range with its part of `data`.
     pub(super) fn for_each<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) + Sync) {
         self.map(data, work);
     }

@@ -1,29 +1,31 @@
-//! What changes lengths at rest: dents, goals that become the shape at rest, and tears.
+//! Changes of rest lengths: plastic flow, goals that become the rest shape, and tearing.
 //!
-//! A spring's length at rest is that of the shape times what dents scale it by, kept apart so that a body takes the shape of
-//! a goal and keeps its dents. Each change says what energy it released or stored.
+//! The rest length of a spring is the length in the rest shape times a plastic factor, its dent. They are kept apart
+//! so that a body can take on a goal as its rest shape and keep its dents. Each function returns the energy it
+//! dissipated or added.
 
 use super::body::{SoftBody, volume};
 use super::springs::{self, RestLengths};
 use super::state::State;
 use numerics::vector::DVec3;
 
-/// Least and most that dents scale a length by: a spring flows no further.
+/// Bounds on the plastic factor of a spring.
 const DENTS: [f64; 2] = [0.1, 10.0];
 
-/// How springs give way for good.
+/// Parameters of plastic flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plasticity {
     /// Strain above which a spring flows; 0: never.
     pub yield_strain: f64,
-    /// Share of the strain above it that flows away a second, 1/s.
+    /// Rate at which the strain above that decays, 1/s.
     pub creep: f64,
 }
 
-/// Lets springs flow for `seconds`; returns the energy that takes, joules.
+/// Applies plastic flow for `seconds`; returns the elastic energy it dissipates, joules.
 ///
-/// `drawn` is the shape that goals draw the body to, particles by the caller's index, NaN where they draw none. A length
-/// between that at rest and the drawn one is on its way and no dent; strain counts from the nearer of the two.
+/// `drawn` is the shape that goals pull towards, by the caller's indices, NaN for particles without goal. Lengths
+/// between the rest length and the drawn one are transitional and cause no flow; strain is measured from the nearer
+/// of the two.
 pub fn flow(
     body: &SoftBody,
     state: &mut State,
@@ -45,7 +47,7 @@ pub fn flow(
             Some(drawn) if spring < body.mesh_spring_count() => springs::spring_length(body, drawn, spring),
             _ => f64::NAN,
         };
-        // The least and the most of a number and NaN are the number.
+        // The minimum or maximum of a number and NaN is the number.
         let (least, most) = (length.min(meant) * dent, length.max(meant) * dent);
         if least > 0.0 && !state.torn[spring] {
             let now = springs::spring_length(body, &x, spring);
@@ -60,9 +62,9 @@ pub fn flow(
     before - elastic(body, state)
 }
 
-/// Brings the shape at rest `share` of the way to `shape`, particles by the caller's index; `keep` is the share of dents
-/// that stays (of their logarithm). Lengths of springs given as such, and torn ones, stay, and all that hangs on a
-/// particle whose place is not finite. Returns the energy that brings, joules, below 0 where it frees some.
+/// Blends the rest shape towards `shape` (by the caller's indices) by the fraction `share`; `keep` is the fraction of
+/// the dents, in the logarithm, that remains. Explicit springs keep their rest lengths, and so do springs at
+/// particles whose target is not finite. Returns the energy added, joules, negative if it decreases.
 pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
     let before = elastic(body, state);
     let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
@@ -80,7 +82,7 @@ pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64,
     }
     for (tet, corners) in body.tets.iter().enumerate() {
         let volume = volume(corners.map(|corner| goal[corner as usize]));
-        // A goal that turns a tetrahedron over has no volume to ask of it.
+        // A tetrahedron that is inverted in the goal keeps its rest volume.
         if volume.is_finite() && volume > 0.0 {
             state.volumes[tet] = blend(state.volumes[tet], volume);
         }
@@ -88,8 +90,8 @@ pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64,
     elastic(body, state) - before
 }
 
-/// Tears springs given as such that are longer than `stretch` times their length at rest (or than `reach` metres, where
-/// that is more); returns how many.
+/// Tears explicit springs that are longer than `stretch` times their rest length and longer than `reach` metres;
+/// returns how many.
 pub fn tear(body: &SoftBody, state: &mut State, stretch: f64, reach: f64) -> u32 {
     let x = solver_positions(body, &state.positions);
     let mut torn = 0;
@@ -107,7 +109,7 @@ fn solver_positions(body: &SoftBody, points: &[[f64; 3]]) -> Vec<DVec3> {
     body.to_solver_order(points).into_iter().map(DVec3::from).collect()
 }
 
-/// What springs store, joules.
+/// Elastic energy of the springs, joules.
 fn elastic(body: &SoftBody, state: &State) -> f64 {
     let lengths = state.rest_lengths();
     let rest = RestLengths { lengths: &lengths, torn: &state.torn };

@@ -1,32 +1,32 @@
-//! Where particles will be: what the first Newton iteration of a stage starts from.
+//! Predicted positions, the initial guess of a stage's first Newton iteration.
 //!
-//! A piece is taken to go on as a rigid body, and within that, turned along, each particle as it went: velocity and trend
-//! of the deformation. So a stiff body that spins starts from a shape without strain, and linear solves have little left
-//! to do. A guess changes where Newton's method begins, not the equation.
+//! Each piece is extrapolated as a rigid body, and the deformation within it, in the rotating frame, by its velocity
+//! and acceleration. A stiff spinning body then starts without strain, which leaves little for the linear solve. The
+//! prediction affects only the initial guess, not the equations.
 
 use super::body::SoftBody;
 use numerics::vector::{DMat3, DVec3};
 use std::ops::Range;
 
-/// Share of a piece's inertia below which it has none about an axis.
+/// Moments of inertia below this fraction of the trace are treated as zero.
 const NOTHING: f64 = 1e-9;
 
-/// How a piece moves as a whole.
+/// Rigid motion of a piece.
 #[derive(Clone, Debug)]
 pub(super) struct RigidMotion {
     pub(super) particles: Range<usize>,
     middle: DVec3,
     pace: DVec3,
-    /// Radians a second.
+    /// Angular velocity, radians a second.
     spin: DVec3,
-    /// m/s².
+    /// Acceleration, m/s².
     trend: DVec3,
-    /// Of its turning, joules.
+    /// Kinetic energy of rotation, joules.
     energy: f64,
 }
 
 impl RigidMotion {
-    /// The rigid motion with the momenta of a piece; rest where it has `held` particles.
+    /// The rigid motion with the momenta of a piece; at rest if it has particles that are `held`.
     pub(super) fn new(
         body: &SoftBody,
         held: &[bool],
@@ -62,24 +62,24 @@ impl RigidMotion {
         }
     }
 
-    /// The mean of its particles' places by mass.
+    /// Centre of mass at positions `x`.
     fn centre(&self, body: &SoftBody, x: &[DVec3]) -> DVec3 {
         let mass: f64 = body.mass[self.particles.clone()].iter().sum();
         self.particles.clone().map(|particle| x[particle] * body.mass[particle]).sum::<DVec3>() / mass
     }
 
-    /// Without its turning.
+    /// The same without rotation.
     pub(super) fn shift(self) -> Self {
         Self { spin: DVec3::zeros(), ..self }
     }
 
-    /// The velocity it has at `x`.
+    /// Velocity at position `x`.
     pub(super) fn velocity(&self, x: DVec3) -> DVec3 {
         self.pace + self.spin.cross(&(x - self.middle))
     }
 }
 
-/// The motion of all pieces from some positions on.
+/// Extrapolation of all pieces from given positions.
 #[derive(Clone, Debug)]
 pub(super) struct Predictor<'a> {
     body: &'a SoftBody,
@@ -87,13 +87,13 @@ pub(super) struct Predictor<'a> {
     x: &'a [DVec3],
     v: &'a [DVec3],
     trend: &'a [DVec3],
-    /// The step that `trend` was measured over.
+    /// Length of the step over which `trend` was measured, seconds.
     before: f64,
 }
 
 impl<'a> Predictor<'a> {
-    /// From `x`, `v` and the change of velocity in the step of `before` seconds that led there. Pieces with `loose` particles
-    /// are not rigid.
+    /// From `x`, `v` and the acceleration `trend` measured over the last step of `before` seconds. Pieces with
+    /// `loose` particles are not treated as rigid.
     pub(super) fn new(
         body: &'a SoftBody,
         loose: &[bool],
@@ -106,7 +106,7 @@ impl<'a> Predictor<'a> {
         Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
     }
 
-    /// The energy that turns each piece, joules.
+    /// Kinetic energy of rotation of each piece, joules.
     pub(super) fn spinning(&self) -> Vec<f64> {
         self.pieces.iter().map(|piece| piece.energy).collect()
     }
@@ -122,17 +122,17 @@ impl<'a> Predictor<'a> {
             let (piece, [back, turn]) = (&self.pieces[index], &each[index]);
             let offset = self.x[particle] - piece.middle;
             let drift = self.v[particle] - piece.velocity(self.x[particle]);
-            // The trend as it was half a step before, without what turning makes of it.
+            // Acceleration of the deformation half a step earlier: without the centripetal part.
             let bent = self.trend[particle] - piece.trend - piece.spin.cross(&piece.spin.cross(&back.apply(offset)));
             let own = offset + (drift + back.undo(bent) * (0.5 * seconds)) * seconds;
             piece.middle + (piece.pace + piece.trend * (0.5 * seconds)) * seconds + turn.apply(own)
         })
     }
 
-    /// Positions after `seconds`, given where particles were at `share` of that time.
+    /// Positions after `seconds`, given those at the fraction `share` of that time.
     pub(super) fn past(&self, seconds: f64, share: f64, middle: &[DVec3]) -> Vec<DVec3> {
         let early = share * seconds;
-        // A parabola through both places and the first velocity; for the whole as for the deformation.
+        // Parabola through both positions with the initial velocity, used for the centre and for the deformation.
         let on = |start: DVec3, pace: DVec3, at: DVec3| {
             start + pace * seconds + (at - start - pace * early) / (share * share)
         };
@@ -150,7 +150,7 @@ impl<'a> Predictor<'a> {
         })
     }
 
-    /// What `of` gives for each particle and its piece.
+    /// Evaluates `of` for each particle and its piece.
     fn map(&self, of: impl Fn(usize, usize) -> DVec3 + Sync) -> Vec<DVec3> {
         let order = &self.body.order;
         let mut out = vec![DVec3::zeros(); self.x.len()];
@@ -162,7 +162,8 @@ impl<'a> Predictor<'a> {
     }
 }
 
-/// A rotation by Cayley's transform: exact, without sines. By 2·atan(|w|/2), w to third order.
+/// A rotation by the Cayley transform: exactly orthogonal and without trigonometric functions. Its angle is
+/// 2·atan(|w|/2), equal to |w| up to third order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CayleyRotation {
     half: DVec3,
@@ -194,7 +195,7 @@ mod tests {
         let v = DVec3::new(1.0, 2.0, -3.0);
         assert!((turn.apply(v).norm() - v.norm()).abs() < 1e-14);
         assert!((turn.undo(turn.apply(v)) - v).norm() < 1e-14);
-        // A quarter turn: 2·atan(1) about z.
+        // A quarter turn, 2·atan(1), about z.
         assert!((CayleyRotation::by(DVec3::z() * 2.0).apply(DVec3::x()) - DVec3::y()).norm() < 1e-15);
     }
 }

@@ -1,32 +1,32 @@
-//! Rows: what resists one direction of motion of several particles at once, H = Σ g gᵀ with a vector g a particle.
+//! Sums of rank-one terms, H = Σ g gᵀ, where each g involves several particles.
 //!
-//! Volumes of regions, tetrahedra about to turn over and contacts of two bodies are rows. Each is read twice a product:
-//! first by row (how fast does it change), then by particle (what does that push), so nothing is scattered and the order of
-//! every sum is fixed. In f32: a row that moves with a body rigidly feels it to 1e-7.
+//! Region volumes, thin tetrahedra and contacts between bodies are such terms. A product reads each term twice: by
+//! term, for g·p, and by particle, for Σ g (g·p). Nothing is scattered, so the order of every sum is fixed. Stored in
+//! f32: rigid motions are resisted only to 1e-7.
 
 use super::partition::{Partition, RaggedSlice};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// Rows by row and by particle.
+/// Rank-one terms, stored by term and by particle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RankOneTerms {
-    /// Whether they count for nothing.
+    /// Whether they are ignored.
     pub(super) idle: bool,
-    /// Where each row's entries begin.
+    /// Start of each term's entries.
     starts: Vec<u32>,
-    /// Particle of each entry, by place.
+    /// Particle of each entry.
     particles: Vec<u32>,
     /// √weight·gradient of each entry.
     along: Vec<Vec3>,
-    /// Where each particle's entries begin in `at`; empty where there is no row.
+    /// Start of each particle's entries in `at`; empty without terms.
     at_starts: Vec<u32>,
     at: Vec<At>,
     partition: Option<Partition>,
-    /// Each row's change in the last product.
+    /// g·p of each term in the current product.
     change: Vec<f64>,
 }
 
-/// An entry as its particle sees it.
+/// An entry as stored for its particle.
 #[derive(Clone, Copy, Debug, Default)]
 struct At {
     row: u32,
@@ -35,7 +35,7 @@ struct At {
 }
 
 impl RankOneTerms {
-    /// Rows of `particles` that begin at `starts`, among `count` particles.
+    /// Sets the particles of each term, whose entries begin at `starts`, for a body of `count` particles.
     pub(super) fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], partition: Partition) {
         self.starts.clear();
         self.particles.clear();
@@ -70,37 +70,37 @@ impl RankOneTerms {
         self.partition = Some(partition);
     }
 
-    /// Whether there is no row that counts.
+    /// Whether there are no terms to apply.
     pub(super) fn is_empty(&self) -> bool {
         self.idle || self.at_starts.is_empty()
     }
 
-    /// How many rows.
+    /// Number of terms.
     pub(super) fn len(&self) -> usize {
         self.change.len()
     }
 
-    /// The entries of a row.
+    /// Range of a term's entries.
     pub(super) fn row(&self, row: usize) -> std::ops::Range<usize> {
         self.starts[row] as usize..self.starts[row + 1] as usize
     }
 
-    /// The particles of a row.
+    /// The particles of a term.
     pub(super) fn particles(&self, row: usize) -> &[u32] {
         &self.particles[self.row(row)]
     }
 
-    /// The entries' particles and vectors.
+    /// The particles and vectors of a term.
     pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (usize, DVec3)> {
         self.row(row).map(|entry| (self.particles[entry] as usize, to_f64(self.along[entry])))
     }
 
-    /// The rows in parts; none where there is no row that counts.
+    /// The terms in fixed parts; `None` without terms to apply.
     pub(super) fn partition(&self) -> Option<&Partition> {
         self.partition.as_ref().filter(|_| !self.is_empty())
     }
 
-    /// Sets what each entry resists: `weight` of the row, times the entry's gradient.
+    /// Sets the vectors: √`weights` of the term times the entry's gradient.
     pub(super) fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Partition) {
         if self.is_empty() {
             return;
@@ -122,7 +122,7 @@ impl RankOneTerms {
         });
     }
 
-    /// Measures how `p` changes each row; [`Rows::push`] then gives what that does.
+    /// Computes g·p of each term, for [`RankOneTerms::push`].
     pub(super) fn measure(&mut self, p: &[DVec3]) {
         if self.is_empty() {
             return;
@@ -138,14 +138,14 @@ impl RankOneTerms {
         });
     }
 
-    /// Σ g·(its row's change), of the particle at `place`.
+    /// Σ g·(g·p) at `particle`.
     #[inline(always)]
     pub(super) fn push(&self, particle: usize) -> DVec3 {
         let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
-    /// `weight` of Σ g gᵀ of the particle at `place`, added to `block`.
+    /// Adds `weight` times the diagonal block of `particle` to `block`.
     #[inline(always)]
     pub(super) fn add_block(&self, particle: usize, weight: f64, block: &mut [f64; 6]) {
         for at in &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize] {
@@ -153,7 +153,7 @@ impl RankOneTerms {
         }
     }
 
-    /// Σ of `values`, one a row, times `gradients`, one an entry: a force on the particle at `place`.
+    /// Σ of `values` (by term) times `gradients` (by entry): a force on `particle`.
     #[inline(always)]
     pub(super) fn gather(&self, particle: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
         let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
@@ -161,7 +161,7 @@ impl RankOneTerms {
     }
 }
 
-/// Adds s·v vᵀ to a symmetric block: xx, xy, xz, yy, yz, zz.
+/// Adds s·v vᵀ to a symmetric block, stored as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
 pub(super) fn add_square(block: &mut [f64; 6], v: DVec3, s: f64) {
     block[0] += s * v.x * v.x;

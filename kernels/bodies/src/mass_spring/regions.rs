@@ -1,41 +1,42 @@
-//! Regions: clusters of tetrahedra whose volume is kept as one.
+//! Regions: groups of tetrahedra whose total volume is preserved.
 //!
-//! One pressure for each tetrahedron would leave particles no freedom (there are five to six times as many tetrahedra as
-//! particles: the body locks). One for many, with particles inside of every face between two regions, is a stable pair:
-//! piecewise linear displacement on a finer mesh than the constant pressure. Only particles on a region's boundary change
-//! its volume, so it costs a fraction of what single tetrahedra would. Limit: within a region volume may move about; there
-//! springs resist, and what keeps single tetrahedra from turning over.
+//! One pressure for each tetrahedron would leave particles no freedom (there are five to six times as many tetrahedra
+//! as particles), and the body would lock. One pressure for a group of tetrahedra, with particles in the interior of
+//! every face between two groups, is a stable mixed discretisation: piecewise linear displacements on a finer mesh
+//! than the piecewise constant pressures. Only particles on a region's boundary change its volume, which makes it
+//! much cheaper than single tetrahedra. Limit: volume can move within a region; there only the springs and the
+//! barrier against inversion resist.
 
 use super::particle_order::{pieces, split};
 use super::partition::Partition;
 use crate::tets::oriented_boundary;
 use numerics::vector::DVec3;
 
-/// Tetrahedra in a region: some eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges less
-/// evenly; with 20 it costs a tenth more.
+/// Tetrahedra in a region, about eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges
+/// less evenly; with 20 it costs a tenth more.
 const TETS: usize = 48;
 
-/// Closed surfaces around clusters of tetrahedra.
+/// Regions and their closed boundary surfaces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Regions {
-    /// Tetrahedra by region: where each region's begin.
+    /// Tetrahedra by region: start of each region's.
     tet_starts: Vec<u32>,
     tets: Vec<u32>,
-    /// Where each region's particles begin among `particles`.
+    /// Start of each region's entries in `particles`.
     pub(super) starts: Vec<u32>,
-    /// Particles on the regions' boundaries, by place.
+    /// Particles on the boundary of each region.
     pub(super) particles: Vec<u32>,
-    /// Where each region's faces begin.
+    /// Start of each region's faces.
     face_starts: Vec<u32>,
-    /// Corners among the region's own particles, outwards.
+    /// Boundary faces, outwards, as indices into the region's own particles.
     faces: Vec<[u16; 3]>,
-    /// E·V of each region at rest, summed over its tetrahedra, joules; its β, seconds.
+    /// For each region the sum of E·V at rest over its tetrahedra, joules, and its β, seconds.
     pub(super) energy: Vec<f64>,
     pub(super) damping: Vec<f64>,
 }
 
 impl Regions {
-    /// Of `tets`, corners by place among the particles `rest`.
+    /// Groups `tets` over the particles at `rest`.
     pub(super) fn new(rest: &[DVec3], tets: &[[u32; 4]]) -> Self {
         let centres: Vec<DVec3> =
             tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<DVec3>() * 0.25).collect();
@@ -67,42 +68,42 @@ impl Regions {
         regions
     }
 
-    /// How many there are.
+    /// Number of regions.
     pub(super) fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Regions in fixed parts.
+    /// The regions in fixed parts, for parallel loops.
     pub(super) fn partition(&self) -> Partition {
         Partition::even(self.len(), 32, TETS)
     }
 
-    /// The sum of `values`, one a tetrahedron, over each region.
+    /// Sums of `values`, one for each tetrahedron, over each region.
     pub(super) fn sums(&self, values: impl Fn(usize) -> f64) -> Vec<f64> {
         let members = |ends: &[u32]| &self.tets[ends[0] as usize..ends[1] as usize];
         self.tet_starts.windows(2).map(|ends| members(ends).iter().map(|tet| values(*tet as usize)).sum()).collect()
     }
 
-    /// What the tetrahedra are made of: volume, E and β of each.
+    /// Sets volume, E and β of the tetrahedra.
     pub(super) fn set_material(&mut self, volumes: &[f64], moduli: &[f64], damping: &[f64]) {
         self.energy = self.sums(|tet| volumes[tet] * moduli[tet]);
         let (weighed, all) = (self.sums(|tet| volumes[tet] * damping[tet]), self.sums(|tet| volumes[tet]));
         self.damping = weighed.iter().zip(&all).map(|(sum, all)| if *all > 0.0 { sum / all } else { 0.0 }).collect();
     }
 
-    /// The triangles around a region, outwards, corners by place.
+    /// The boundary triangles of a region, outwards.
     pub(super) fn around(&self, region: usize) -> impl Iterator<Item = [u32; 3]> {
         let corners = self.of(region);
         let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
         faces.iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
     }
 
-    /// The particles of a region.
+    /// The particles on the boundary of a region.
     pub(super) fn of(&self, region: usize) -> &[u32] {
         &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize]
     }
 
-    /// The volume of a region with particles at `x`, and how it changes with each of its own: m² outwards.
+    /// Volume of a region with particles at `x`, and its gradient with respect to each boundary particle, m².
     pub(super) fn measure(&self, region: usize, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let corners = self.of(region);
         gradient.fill(DVec3::zeros());
@@ -115,8 +116,9 @@ impl Regions {
             gradient[b] += twice_area;
             gradient[c] += twice_area;
         }
-        // Around a corner of a closed surface areas sum up to what the volume changes by; and the volume, of degree 3, is a
-        // third of Σ x·that, from a point nearby so that nothing is lost far from the origin.
+        // The area vectors around a corner of a closed surface sum to six times the gradient. As the volume is
+        // homogeneous of degree 3, it is a third of Σ x·gradient, taken relative to a nearby origin to avoid
+        // cancellation.
         let origin = x[*first as usize];
         let mut volume = 0.0;
         for (part, corner) in gradient.iter_mut().zip(corners) {
@@ -127,7 +129,7 @@ impl Regions {
     }
 }
 
-/// As for particles: at medians along the longest side.
+/// Recursive median splits along the longest side, as for clusters of particles.
 fn halve(centres: &[DVec3], tets: &mut [u32], regions: usize, base: usize, starts: &mut Vec<u32>) {
     if regions <= 1 {
         tets.sort_unstable();
@@ -145,7 +147,7 @@ fn halve(centres: &[DVec3], tets: &mut [u32], regions: usize, base: usize, start
 mod tests {
     use super::*;
 
-    /// A unit cube cut into six tetrahedra around its diagonal.
+    /// A unit cube of six tetrahedra around its diagonal.
     fn cube() -> (Vec<DVec3>, Vec<[u32; 4]>) {
         let points = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect();
         let tets = vec![[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
@@ -160,7 +162,8 @@ mod tests {
         let far: Vec<DVec3> = points.iter().map(|p| p * 2.0 + DVec3::new(1e4, -1e4, 1e4)).collect();
         let mut gradient = vec![DVec3::zeros(); 8];
         assert!((regions.measure(0, &far, &mut gradient) - 8.0).abs() < 1e-9);
-        // Six of the twelve triangles, each of area 2, lie on the three faces of the corner where all diagonals start.
+        // Six of the twelve triangles, each of area 2, lie on the three faces at the corner where all diagonals
+        // start.
         assert!((gradient[0] - DVec3::repeat(-4.0 / 3.0)).norm() < 1e-9, "{}", gradient[0]);
         assert!(gradient.iter().sum::<DVec3>().norm() < 1e-9);
         regions.set_material(&[1.0 / 6.0; 6], &[30.0; 6], &[0.5; 6]);
@@ -180,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_regions_volume_is_the_sum_of_its_tetrahedra_where_they_overlap_too() {
-        // Both stand on the same side of the face 0 1 2: 1 × ½ ÷ 3 and 2 × ½ ÷ 3.
+        // Both are on the same side of the face 0 1 2: 1 × ½ ÷ 3 and 2 × ½ ÷ 3.
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, 2.0]];
         let mut points = corners.map(DVec3::from);
         let regions = Regions::new(&points, &[[0, 1, 2, 3], [0, 1, 2, 4]]);
@@ -192,7 +195,7 @@ mod tests {
             points[point][axis] -= by;
             volume
         };
-        // The volume is a straight line of each coordinate alone.
+        // The volume is linear in each single coordinate.
         for (point, axis) in (0..15).map(|k| (k / 3, k % 3)) {
             let slope = 0.5 * (moved(point, axis, 1.0) - moved(point, axis, -1.0));
             assert!((slope - gradient[point][axis]).abs() < 1e-14, "{point} {axis}: {slope} {}", gradient[point]);

@@ -1,4 +1,5 @@
-//! The objective that a stage makes least, and the line search on it: with it a stage never ends higher than it began.
+//! The incremental potential that a stage minimises, and the line search on it, which never ends higher than it
+//! started.
 
 use super::assemble::velocities;
 use super::contact::ContactConstraint;
@@ -7,39 +8,39 @@ use super::stage::{FrameContext, Solved, Stage, StageSolver};
 use super::state::CachedFactor;
 use numerics::vector::DVec3;
 
-/// Halvings of a step that a line search tries.
+/// Largest number of step halvings in a line search.
 const HALVINGS: usize = 16;
-/// Share of a step from which on what it gained tells what is left to gain.
+/// A line search that took more than this fraction of its step indicates how much decrease is left.
 const LONG: f64 = 0.2;
-/// Iterations a stage may have without contacts, and with them.
+/// Newton iterations of a stage without contacts, and with contacts.
 const MOST: u32 = 4;
 const MOST_TOUCHING: u32 = 20;
-/// Iterations after which friction counts what it counted at last, so that a descent ends.
+/// Iterations after which friction loads stay fixed, so that the descent terminates.
 const RELOADS: u32 = 8;
-/// Share of all loads that friction may have counted otherwise than they turn out.
+/// Relative change of friction loads that requires an update.
 const CHANGED: f64 = 0.3;
-/// Share of the objective that is rounding: a smaller decrease is not searched for.
+/// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
-/// When a descent ends.
+/// Stopping criteria of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StopCriteria {
-    /// Share of the first residual.
+    /// Final ÷ initial residual.
     pub(super) share: f64,
-    /// That residual's square counts as this at most: what a guess that is far off leaves is no measure.
+    /// Upper bound on the squared initial residual, so that a poor initial guess does not loosen the tolerance.
     pub(super) scale: f64,
-    /// A residual's square that is enough whatever the first was.
+    /// A squared residual that suffices in any case.
     pub(super) square: f64,
-    /// The square of the residual that the step began with; 0 where it begins here.
+    /// Squared residual at the start of the step; 0 if this descent starts it.
     pub(super) first: f64,
 }
 
-/// The objective at some positions.
+/// The objective, in two parts.
 #[derive(Clone, Copy, Debug, Default)]
 struct ObjectiveParts {
-    /// What contacts count in it.
+    /// Contribution of contacts.
     contacts: f64,
-    /// What all else does.
+    /// All other contributions.
     others: f64,
 }
 
@@ -49,19 +50,19 @@ impl ObjectiveParts {
     }
 }
 
-/// Where a line search ends.
+/// Outcome of a line search.
 struct LineSearch {
-    /// Of the direction; 0 where none lowers the objective.
+    /// Fraction of the direction taken; 0 if none lowers the objective.
     share: f64,
-    /// The objective there.
+    /// Objective at the end.
     lower: ObjectiveParts,
-    /// Whether contacts stopped particles.
+    /// Whether particles were stopped at contacts.
     stopped: bool,
 }
 
 impl StageSolver {
-    /// Solves the stage from the guess `x` by Newton's method downhill, until the residual is small enough and no contact too
-    /// deep. Friction counts the pushes that `contacts` are found to have on the way, which replace their loads.
+    /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small
+    /// and no contact is too deep. Updates the friction loads of `contacts` on the way.
     pub(super) fn descend(
         &mut self,
         context: &FrameContext<'_>,
@@ -116,7 +117,8 @@ impl StageSolver {
         solved
     }
 
-    /// Turns groups as wholes, if that does not lead higher than `base`: contacts that were open may close.
+    /// Corrects the angular momentum of free groups, unless that raises the objective above `base`, as closing
+    /// contacts may. Returns whether `x` was changed.
     fn correct_angular_momentum_downhill(
         &mut self,
         context: &FrameContext<'_>,
@@ -140,8 +142,8 @@ impl StageSolver {
         self.measured
     }
 
-    /// What all but contacts count in what the stage makes least, ½(x − y)ᵀM(x − y) + a²·(energies), at positions that
-    /// [`Self::of_contacts`] was asked about.
+    /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
+    /// [`Self::contact_objective`] was just evaluated.
     fn other_objective(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
         let (body, a) = (context.body, stage.a);
         self.volumes.measure(body, x);
@@ -168,7 +170,7 @@ impl StageSolver {
         inertial + a * a * (stored + thin + own)
     }
 
-    /// What contacts count in it at `x`; makes velocities those there.
+    /// Contribution of contacts to the objective at `x`; sets the velocities to those at `x`.
     fn contact_objective(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
         let (body, a) = (context.body, stage.a);
         velocities(&body.order.clusters, x, stage, &mut self.v);
@@ -179,7 +181,7 @@ impl StageSolver {
         a * a * stage.contacts.iter().map(of).sum::<f64>()
     }
 
-    /// Keeps what of the residual is not of contacts.
+    /// Stores the residual without contact forces.
     fn store_noncontact_residual(&mut self, stage: &Stage<'_>) {
         self.noncontact_residual.clone_from(&self.r);
         for (contact, state) in stage.contacts.iter().zip(&self.contact_states) {
@@ -189,11 +191,12 @@ impl StageSolver {
         }
     }
 
-    /// Goes 1, ½, ¼ … of `dx` until that lowers the objective from `base`, each share as it is and then with [`stop`]. `dx`
-    /// becomes what led there.
+    /// Tries 1, ½, ¼ … of `dx` until the objective falls below `base`, each both unchanged and limited by [`stop`].
+    /// `dx` becomes the direction actually taken.
     ///
-    /// Where contacts gain more on the way than all else loses on its slope, nothing else is asked: a step too far into a
-    /// contact is the most usual of those that lower nothing.
+    /// The contact part is evaluated first: a trial is rejected without evaluating the rest if contacts gain more
+    /// than the rest can lose along its initial slope. Moving too far into a contact is the usual reason for a
+    /// rejection.
     fn search(
         &mut self,
         context: &FrameContext<'_>,
@@ -233,9 +236,9 @@ impl StageSolver {
     }
 }
 
-/// Stops particles that go from `x` to `trial` on their own where they would get too deep into a contact, and says whether
-/// there were any. A direction knows nothing of contacts that it closes, and takes their pushes for straight lines: one
-/// particle that has to stop would hold up all others.
+/// Stops single particles on their way from `x` to `trial` where they would get too deep into a contact; returns
+/// whether there were any. The direction does not know of contacts that it closes and linearises their forces; a
+/// single such particle would otherwise shorten the step of all others.
 fn stop(context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
     let mut stopped = false;
     for contact in stage.contacts {
@@ -250,8 +253,8 @@ fn stop(context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut 
     stopped
 }
 
-/// Has friction count the pushes that contacts have at `x`, where velocities are `v`, if what it counted before is another by
-/// more than [`CHANGED`]: then gives how much more it counts in the objective of a stage of `a`.
+/// Updates friction loads to the normal forces at `x` if they changed by more than [`CHANGED`]; returns the resulting
+/// increase of the objective of a stage of `a`, with velocities `v`.
 pub(super) fn reload(contacts: &mut [ContactConstraint], x: &[DVec3], v: &[DVec3], a: f64, size: f64) -> Option<f64> {
     let sums = contacts.iter().map(|contact| (contact.load_at(x), contact.load));
     let (sum, changed) = sums.fold((0.0, 0.0), |sums, (now, then)| (sums.0 + now, sums.1 + (now - then).abs()));

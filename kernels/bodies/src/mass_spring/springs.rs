@@ -1,11 +1,11 @@
-//! The force of the springs on each particle, and its derivative: what a spring's ends do to each other.
+//! Spring forces and their derivatives.
 //!
-//! Springs inside of a cluster are computed once and act on both ends. Each end of one between clusters computes it for
-//! itself, from the same numbers with the sign turned. So both forces add up to zero in every bit, and a cluster needs only
-//! its own slots.
+//! A spring within a cluster is computed once and applied to both ends. Of one between clusters, each end computes
+//! the force itself, from the same numbers with opposite sign. Forces therefore cancel exactly, and a cluster writes
+//! only to its own particles.
 //!
-//! Source: H = αI + (a²K − α)nnᵀ, α = a²K·max(0, 1 − R/l), Baraff & Witkin 1998 with what makes H indefinite left out:
-//! positive semi-definite for every length. K and R are those of spring and dashpot together, see [`Link`].
+//! H = αI + (a²K − α)nnᵀ with α = a²K·max(0, 1 − R/l): Baraff & Witkin 1998 without the indefinite part, so it is
+//! positive semi-definite at any length. K and R combine spring and dashpot, see [`Link`].
 
 use super::adjacency::Incident;
 use super::body::SoftBody;
@@ -13,10 +13,10 @@ use super::partition::RaggedSlice;
 use numerics::random::Key;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// Largest a²k a record holds: α, β and products with displacements stay far inside of f32.
+/// Largest a²k of a record: products with displacements stay well within the range of f32.
 const STIFFEST: f64 = 1e24;
 
-/// What a spring resists with: Hd = αd + w(w·d), d the displacement of the end it hangs at against the other's.
+/// Stiffness of a spring, H·d = αd + w(w·d), with d the displacement of this end relative to the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub(super) struct Record {
@@ -25,7 +25,7 @@ pub(super) struct Record {
     pub(super) w: Vec3,
 }
 
-/// Lengths at rest, a spring, and which springs are torn; none where empty.
+/// Current rest lengths, and which springs are torn (may be empty: none).
 #[derive(Clone, Copy)]
 pub(super) struct RestLengths<'a> {
     pub(super) lengths: &'a [f64],
@@ -40,13 +40,13 @@ impl RestLengths<'_> {
 }
 
 impl Record {
-    /// w.
+    /// The vector w.
     #[inline(always)]
     pub(super) fn along(&self) -> DVec3 {
         to_f64(self.w)
     }
 
-    /// Hd.
+    /// H·d.
     #[inline(always)]
     pub(super) fn times(&self, d: DVec3) -> DVec3 {
         let w = self.along();
@@ -54,11 +54,12 @@ impl Record {
     }
 }
 
-/// A spring and its dashpot as the end they hang at sees them within a stage: read in order, once a look.
+/// A spring with its dashpot, as seen from one end during a stage.
 ///
-/// There the dashpot is a spring too: it counts how fast the length changes, (l − lz)/a with lz what it came from, so that
-/// k(l − L₀) + c(l − lz)/a = K(l − R). So its force is the slope of an energy, which a line search has to know, and a body that
-/// turns by any angle within a step is not damped. The pace of its ends along the spring has neither.
+/// Within a stage the dashpot acts on the rate of change of length, (l − lz)/a with lz the length at the start, so
+/// that both combine to one spring: k(l − L₀) + c(l − lz)/a = K(l − R). This force has a potential, which a line
+/// search needs, and a body that rotates by any angle in a step is not damped. Neither would hold for a dashpot on
+/// the relative velocity along the spring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     other: u32,
@@ -69,8 +70,8 @@ pub(super) struct Link {
     rest: f64,
 }
 
-/// The springs as they hang, one for each of `body.hanging`, in a stage of `a` whose lengths come from what `before` gives of
-/// two ends; torn ones neither pull nor resist.
+/// Links for all entries of `body.adjacency`, in a stage of `a` in which the dashpot of a spring starts from the
+/// length `before` of its two ends. Torn springs get no stiffness.
 pub(super) fn links(
     body: &SoftBody,
     rest: &RestLengths<'_>,
@@ -90,7 +91,7 @@ pub(super) fn links(
                 let both = (k + dashed).min(f64::from(f32::MAX)) as f32;
                 let mut length = rest.lengths[at];
                 if dashed > 0.0 {
-                    // Where nothing moves the force is the spring's, whatever both were rounded to.
+                    // Compensates the rounding of K to f32, so that without motion the force is exactly the spring's.
                     let before = before(particle, incident.other as usize);
                     length = (before - (before - length) * (k / f64::from(both))).max(0.0);
                 }
@@ -101,7 +102,7 @@ pub(super) fn links(
     });
 }
 
-/// Σk of the springs that hold each particle, N/m.
+/// Sum of spring stiffnesses at each particle, N/m.
 pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &mut Vec<f64>) {
     out.clear();
     out.resize(body.len(), 0.0);
@@ -119,7 +120,7 @@ pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &
     });
 }
 
-/// A spring seen from one end: the way there from the other, its length, and 1 ÷ that.
+/// A spring seen from one end: unit vector from the other end, length, and 1 ÷ length.
 #[derive(Clone, Copy)]
 struct Seen {
     way: DVec3,
@@ -132,7 +133,7 @@ impl Seen {
     fn from(link: &Link, particle: usize, x: &[DVec3]) -> Self {
         let d = x[particle] - x[link.other as usize];
         let squared = d.norm_squared();
-        // Outside of these a square has lost its digits, or the length is none.
+        // Outside this range the square has lost precision, or the length is zero.
         if squared > 1e-280 && squared < 1e280 {
             let length = squared.sqrt();
             let inverse = 1.0 / length;
@@ -143,15 +144,15 @@ impl Seen {
         }
     }
 
-    /// What pulls the ends together, newtons.
+    /// Tension, newtons.
     #[inline(always)]
     fn tension(&self, link: &Link) -> f64 {
         f64::from(link.k) * (self.length - link.rest)
     }
 }
 
-/// A direction for ends that are in the same place (any: each spring's own, so that doubled particles part), or whose
-/// distance squared is beyond numbers.
+/// Direction and length where the squared distance under- or overflows. For coinciding ends the direction is
+/// pseudo-random for each spring, so that duplicate particles separate.
 #[cold]
 fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
     if d != DVec3::zeros() {
@@ -166,7 +167,7 @@ fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
 }
 
 impl Link {
-    /// What pulls the particle at `place` to the other end, newtons, and H for steps of `a`, in full and as a record.
+    /// Force on `particle` along the spring, newtons, and H for a stage of `a`, in full and as a record.
     #[inline(always)]
     fn linearise(&self, x: &[DVec3], a: f64, particle: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
         let seen = Seen::from(self, particle, x);
@@ -186,8 +187,8 @@ impl Link {
     }
 }
 
-/// Adds to a cluster's forces, newtons, what the springs that hang at `place` pull with; `first` is the cluster's first place.
-/// After the particles before it, and this one, its own sum is whole.
+/// Adds the spring forces listed at `particle` to the forces of its cluster, which starts at the particle `first`.
+/// The sum of a particle is complete once it and all earlier ones of the cluster have been processed.
 #[inline(always)]
 pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
     let force = |link: &Link| {
@@ -204,13 +205,13 @@ pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize,
     forces[particle - first] = sum;
 }
 
-/// What [`linearise`] adds to, a slot for each particle of a cluster: forces, and sums of H.
+/// Accumulators of [`linearise`], one for each particle of a cluster: forces, and sums of H.
 pub(super) struct Sums<'a> {
     pub(super) forces: &'a mut [DVec3],
     pub(super) blocks: &'a mut [[f64; 6]],
 }
 
-/// As [`pull`], with the `records` of the springs for steps of `a`, and the sums of their H.
+/// As [`pull`], and sets the `records` of the springs for a stage of `a` and adds their H.
 #[inline(always)]
 pub(super) fn linearise(
     [inside, across]: [&[Link]; 2],
@@ -240,7 +241,7 @@ pub(super) fn linearise(
     (sums.forces[particle - first], sums.blocks[particle - first]) = (force, block);
 }
 
-/// The energy that spring `at` holds, joules.
+/// Elastic energy of spring `at`, joules.
 #[inline(always)]
 pub(super) fn energy(body: &SoftBody, rest: &RestLengths<'_>, x: &[DVec3], at: usize) -> f64 {
     if !rest.is_intact(at as u32) {
@@ -250,14 +251,14 @@ pub(super) fn energy(body: &SoftBody, rest: &RestLengths<'_>, x: &[DVec3], at: u
     0.5 * body.stiffness[at] * strain * strain
 }
 
-/// How long spring `at` is, metres.
+/// Length of spring `at`, metres.
 #[inline(always)]
 pub(super) fn spring_length(body: &SoftBody, x: &[DVec3], at: usize) -> f64 {
     let [a, b] = body.ends[at];
     distance(x, a as usize, b as usize)
 }
 
-/// How far two particles are from each other, metres.
+/// Distance between two particles, metres.
 #[inline(always)]
 pub(super) fn distance(x: &[DVec3], a: usize, b: usize) -> f64 {
     let d = x[a] - x[b];
@@ -265,7 +266,7 @@ pub(super) fn distance(x: &[DVec3], a: usize, b: usize) -> f64 {
     if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 }
 }
 
-/// That, and how fast it changes, m/s.
+/// Distance between two particles, metres, and its rate of change, m/s.
 #[inline(always)]
 pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
     let length = distance(x, a, b);
@@ -273,7 +274,7 @@ pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
     [length, pace]
 }
 
-/// The energy within a stage of the springs that hang at `place`, each once, and their dashpots, joules.
+/// Potential within a stage of the springs listed at `particle`, each counted once, and of their dashpots, joules.
 #[inline(always)]
 pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize) -> f64 {
     let energy = |link: &Link| {

@@ -1,8 +1,9 @@
-//! One implicit stage: M(x − y) = a²·f(x, (x − z)/a), by Newton's method.
+//! One implicit stage, M(x − y) = a²·f(x, (x − z)/a), solved by Newton's method.
 //!
-//! Implicit Euler is one such stage, TR-BDF2 two with the same a. The derivative is made positive semi-definite, so that each
-//! iteration goes downhill; with a line search the objective never rises. One iteration is what a step has by default;
-//! it goes on where the force turned out otherwise than its derivative said, and with contacts until they are met.
+//! Implicit Euler is one such stage, TR-BDF2 two with the same a. The Jacobian is made positive semi-definite, so
+//! every Newton direction is a descent direction; with a line search the objective never rises. By default a stage
+//! takes one iteration; more follow where the force deviated from its linearisation and, with contacts, until these
+//! converge.
 
 use super::body::SoftBody;
 use super::coarse::{self, Anchors, Layout};
@@ -16,131 +17,135 @@ use super::system::System;
 use super::volume::{Inventory, ThinTet, Volumes};
 use numerics::vector::{DVec3, Vec3};
 
-/// Share of the first residual that linear equations may leave.
+/// Tolerance of linear solves, relative to the residual.
 const CG_SHARE: f64 = 0.1;
-/// That share where contacts may change and Newton's method goes on anyway.
+/// That with contacts and a line search, where more Newton iterations follow anyway.
 const CG_SHARE_SEARCHING: f64 = 0.2;
-/// That share where contacts are taken to go on and nothing is solved again: a slip drifts by what is left, and piles jump.
+/// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
 const CG_SHARE_TOUCHING: f64 = 0.02;
-/// Share of the energy that turns free pieces which a linear solve may leave as noise: it would slow them.
+/// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
+/// would slow them down.
 const NOISE: f64 = 1e-8;
-/// Iterations a linear solve has at most.
+/// Largest number of iterations of a linear solve.
 const CG_CAP: u32 = 300;
-/// Times as many iterations as when it was new, at which the coarse factor is made again.
+/// The coarse factor is renewed once solves take this many times the iterations that they took with it new.
 const STALE: f64 = 1.5;
-/// Iterations after which it is made again whatever it brings: what was good where it was made may do worse than a new one.
+/// It is also renewed after this many iterations, since it may have been poor from the start.
 const OLD: u32 = 500;
-/// Change of what contacts hold at which it is made again too: worth some ten iterations.
+/// It is also renewed after this change of the contact filter, which is worth about ten iterations.
 const MOVED: f64 = 0.3;
-/// Share of the first residual above which what the derivative did not foresee asks for another iteration.
+/// Deviation of the force from its linearisation, relative to the initial residual, that requires another iteration.
 const UNFORESEEN: f64 = 0.35;
-/// Times as large as before that a residual's square may be after an iteration without line search.
+/// Largest growth of the squared residual in an iteration without line search.
 const RISE: f64 = 100.0;
 
-/// What a stage is to solve.
+/// The equation of a stage.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub(super) y: &'a [DVec3],
     pub(super) z: &'a [DVec3],
-    /// Seconds.
+    /// Step coefficient, seconds.
     pub(super) a: f64,
-    /// Share of the frame passed at its end.
+    /// Time at its end, as a fraction of the frame.
     pub(super) time: f64,
     pub(super) contacts: &'a [ContactConstraint],
-    /// Seconds from there to the time that contacts were found for.
+    /// Seconds from that time to the one that contacts were detected for.
     pub(super) early: f64,
-    /// Energy that turns each piece, joules; none where it does not matter.
+    /// Kinetic energy of rotation of each piece, joules; may be empty: no bound on the noise.
     pub(super) spinning: &'a [f64],
-    /// Whether Newton's method runs with a line search, and may change which contacts act: implicit Euler.
+    /// Whether Newton's method runs with a line search and the set of active contacts may change: implicit Euler.
     pub(super) line_search: bool,
-    /// Which of a step's stages, for the count of iterations.
+    /// Index of the stage in its step, for the iteration counts.
     pub(super) index: usize,
 }
 
-/// What holds for a whole frame.
+/// What is constant during a frame.
 #[derive(Clone, Copy)]
 pub(super) struct FrameContext<'a> {
     pub(super) body: &'a SoftBody,
     pub(super) external: &'a ExternalForces,
     pub(super) rest: RestLengths<'a>,
-    /// Volumes of tetrahedra at rest.
+    /// Current rest volumes of tetrahedra.
     pub(super) volumes: &'a [f64],
 }
 
-/// When Newton's method stops.
+/// Stopping criteria of Newton's method without line search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newton {
-    /// Iterations at most.
+    /// Maximum number of iterations.
     pub(super) most: u32,
-    /// A step this short ends it, metres; 0 where it goes on as long as the force turns out otherwise than foreseen.
+    /// Size of the last step at which to stop, metres; with 0, iterations continue while the force deviates from its
+    /// linearisation.
     pub(super) tolerance: f64,
 }
 
-/// What a stage took and reached.
+/// Outcome of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Solved {
     pub(super) newton: u32,
     pub(super) cg: u32,
     pub(super) caps: u32,
-    /// Residual at the end ÷ at the start.
+    /// Final ÷ initial residual.
     pub(super) residual: f64,
-    /// The square of that at the start.
+    /// Squared initial residual.
     pub(super) first: f64,
-    /// Whether the residual rose, or a number is not finite.
+    /// Whether the residual rose too far or is not finite.
     pub(super) failed: bool,
-    /// The residual's square that was asked for.
+    /// Target for the squared residual.
     pub(super) enough: f64,
-    /// How deep the worst contact is that got too deep, metres below its gap; 0 where none did.
+    /// Depth of the deepest contact that sank beyond the accepted depth, metres below its gap; 0 without any.
     pub(super) unmet: f64,
-    /// How deep the worst contact is of all there are at the end, those that nothing was done about too, metres below its gap.
+    /// Depth of the deepest contact detected at the end, including ones that were not solved for, metres below its
+    /// gap.
     pub(super) deepest: f64,
 }
 
 impl Solved {
-    /// Takes note of the square of the residual that is left.
+    /// Sets the residual from its square.
     pub(super) fn set_residual(&mut self, square: f64) {
         self.residual = if self.first > 0.0 { (square / self.first).sqrt() } else { 0.0 };
         self.failed = !square.is_finite();
     }
 }
 
-/// Memory and the linear system, kept from stage to stage; nothing in it changes a bit.
+/// The linear system and buffers, kept between stages to avoid allocations; they do not affect results.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StageSolver {
     pub(super) system: System,
     pub(super) layout: Layout,
     pub(super) volumes: Volumes,
-    /// Whether they are of where the next look is: a search ends with measuring what it takes.
+    /// Whether `volumes` holds values for the positions evaluated next: a line search ends with evaluating the point
+    /// it accepts.
     pub(super) measured: bool,
-    /// Tetrahedra as the step began, and where they were looked over since.
+    /// Tetrahedra watched since the start of the step, and the latest full check.
     pub(super) inventory: Inventory,
     pub(super) latest_inventory: Option<Inventory>,
     pub(super) offset_from_centroid: Vec<Vec3>,
-    /// The springs as the frame has them.
+    /// Springs of the current stage.
     pub(super) links: Vec<Link>,
-    /// Σk of those at each particle, N/m.
+    /// Sum of spring stiffnesses at each particle, N/m.
     pub(super) particle_stiffness: Vec<f64>,
     pub(super) scratch: conjugate_gradients::Scratch,
-    /// Velocities at the positions looked at.
+    /// Velocities at the current positions.
     pub(super) v: Vec<DVec3>,
-    /// −(M(x − y) − a²f).
+    /// Residual, a²f − M(x − y).
     pub(super) r: Vec<DVec3>,
-    /// What of it is not of contacts.
+    /// The residual without contact forces.
     pub(super) noncontact_residual: Vec<DVec3>,
     pub(super) dx: Vec<DVec3>,
     pub(super) trial: Vec<DVec3>,
     pub(super) thin_tets: Vec<ThinTet>,
     pub(super) contact_states: Vec<ContactState>,
-    /// What friction each contact is taken to have, as a share of all that it can.
+    /// Friction dual of each contact: predicted friction relative to its bound.
     pub(super) friction_duals: Vec<DVec3>,
-    /// What push each contact is expected to have, newtons.
+    /// Predicted normal force of each contact, newtons.
     pub(super) predicted_loads: Vec<f64>,
-    /// Contacts whose push is linear from another than it has, and how much more that is.
+    /// Contacts that were linearised around another force than the current one, and the difference.
     pub(super) linearisation_offsets: Vec<(usize, f64)>,
-    /// Contacts' and thin tetrahedra's forces; empty where there are none.
+    /// Forces of contacts and thin tetrahedra; may be empty: none.
     pub(super) transient_forces: Vec<DVec3>,
-    /// The group of pieces that hang together by contacts, of each piece in one that is nowhere held; and pieces that nothing
-    /// holds or touches.
+    /// For each piece the free group it belongs to: pieces joined by contacts of which none is pinned. And which
+    /// pieces are neither pinned nor in contact.
     pub(super) groups: Vec<Option<u32>>,
     pub(super) free_pieces: Vec<bool>,
 }
@@ -160,8 +165,8 @@ impl StageSolver {
         Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
-    /// Starts a stage with step coefficient `a`: dashpots measure changes of length and volume from those at the start of the
-    /// step, `before` (by the two ends of a spring) and `volumes` (by region).
+    /// Starts a stage with step coefficient `a`. Dashpots measure changes of length and volume from the start of the
+    /// step: `before` gives the length of a spring by its two ends, `volumes` those of the regions.
     pub(super) fn set_step_start(
         &mut self,
         context: &FrameContext<'_>,
@@ -174,7 +179,7 @@ impl StageSolver {
         self.measured = false;
     }
 
-    /// Makes ready for a stage's first look at `contacts`.
+    /// Prepares a solve with `contacts`.
     pub(super) fn begin(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
         self.find_free_groups(context, contacts);
         self.friction_duals.clear();
@@ -183,8 +188,8 @@ impl StageSolver {
         self.predicted_loads.extend(contacts.iter().map(|contact| contact.load));
     }
 
-    /// Solves the stage from the guess `x`, whose held particles are where they have to be, without looking back: Newton's
-    /// method goes on where the force turned out otherwise than foreseen, or until steps are short.
+    /// Solves the stage from the initial guess `x`, whose pinned particles are already in place, by Newton's method
+    /// without line search; then corrects the angular momentum of free groups.
     pub(super) fn solve(
         &mut self,
         context: &FrameContext<'_>,
@@ -201,7 +206,7 @@ impl StageSolver {
         solved
     }
 
-    /// Measures the residual at `x`, which is what the stage returns, for `solved`.
+    /// Measures the residual at `x`, the positions that the stage returns.
     pub(super) fn measure_residual(
         &mut self,
         context: &FrameContext<'_>,
@@ -250,7 +255,7 @@ impl StageSolver {
         }
     }
 
-    /// Goes a `share` of `dx`, with what contacts are expected to do there.
+    /// Applies a fraction `share` of `dx` and updates the predictions of contact forces.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
         let known = stage
             .contacts
@@ -265,14 +270,14 @@ impl StageSolver {
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
     }
 
-    /// The preconditioner's answer to a residual `r`: near A⁻¹r, in one go.
+    /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
     pub(super) fn smooth(&self, body: &SoftBody, warm: &CachedFactor, r: &mut [DVec3]) {
         let coarse =
             Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
         conjugate_gradients::precondition(&self.system, body, coarse, r);
     }
 
-    /// A⁻¹r, by conjugate gradients.
+    /// Replaces `r` by A⁻¹r, computed with conjugate gradients.
     pub(super) fn filter(
         &mut self,
         body: &SoftBody,
@@ -289,13 +294,14 @@ impl StageSolver {
         reached
     }
 
-    /// Contacts that push, and the deepest of them, metres below its gap.
+    /// Number of closed contacts, and the depth of the deepest, metres below its gap.
     pub(super) fn active_contacts(&self) -> (u32, f64) {
         let pushing = self.contact_states.iter().filter(|state| state.normal_force > 0.0);
         pushing.fold((0, 0.0), |(count, deepest), state| (count + 1, state.depth.max(deepest)))
     }
 
-    /// The Newton direction `dx` at `x`; `r` becomes what of the residual it leaves. False where it is none.
+    /// Computes the Newton direction `dx` at `x`; `r` becomes the residual of the linear system. Returns false if the
+    /// direction is not finite.
     pub(super) fn direction(
         &mut self,
         context: &FrameContext<'_>,
@@ -327,7 +333,7 @@ impl StageSolver {
         let mut reached = self.gradients(body, warm, limits);
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
-            // Stale past use: go on with a new one.
+            // The factor is too old to be useful: continue with a new one.
             self.renew(body, warm, Anchors::new(&self.system));
             let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
             reached = self.gradients(body, warm, limits);
@@ -341,7 +347,7 @@ impl StageSolver {
             *warm = CachedFactor::default();
         }
         solved.caps += u32::from(!reached.met);
-        // Linear solves leave a share of the residual; momentum they may not touch.
+        // The linear solve left part of the residual; momentum has to be exact.
         self.correct_linear_momentum(body, stage, &whole);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
@@ -361,7 +367,7 @@ impl StageSolver {
     }
 }
 
-/// Share of the residual that a linear solve may leave in a stage with or without contacts, with or without a line search.
+/// Tolerance of linear solves, relative to the residual.
 fn linear_tolerance(in_contact: bool, line_search: bool) -> f64 {
     match (in_contact, line_search) {
         (false, _) => CG_SHARE,
@@ -387,7 +393,7 @@ mod tests {
         }
     }
 
-    /// A spinning, deformed block without a pin: its angular momentum is corrected after Newton's method.
+    /// A spinning and deforming block without pins, whose angular momentum is corrected after Newton's method.
     #[test]
     fn the_residual_is_that_of_the_positions_returned() {
         let h = 1.0 / 24.0;

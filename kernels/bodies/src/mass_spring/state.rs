@@ -1,51 +1,52 @@
-//! What a body carries from one frame to the next.
+//! The state of a body between frames.
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
 use super::coarse::Anchors;
 use serde::{Deserialize, Serialize};
 
-/// Everything the next frame hangs on: written and read back, the frames that follow have the same bits.
+/// Everything that later frames depend on: after saving and restoring it they have the same bits.
 ///
-/// Particles by the caller's index; springs as in [`Body::springs`]; tetrahedra are those with a volume, in order.
+/// Particles by the caller's indices; springs as in [`SoftBody::springs`]; tetrahedra are those with a volume, in
+/// order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Metres.
+    /// Positions of particles, metres.
     pub positions: Vec<[f64; 3]>,
-    /// Metres a second.
+    /// Velocities of particles, m/s.
     pub velocities: Vec<[f64; 3]>,
-    /// Length each spring has at rest, dents left aside, metres.
+    /// Rest length of each spring without plastic flow, metres.
     pub lengths: Vec<f64>,
-    /// What dents scale it by.
+    /// Plastic factor on that length.
     pub dents: Vec<f64>,
-    /// Volume each tetrahedron has at rest, m³.
+    /// Rest volume of each tetrahedron, m³.
     pub volumes: Vec<f64>,
-    /// Springs that are no more.
+    /// Torn springs.
     pub torn: Vec<bool>,
-    /// How velocities changed in the last step, m/s²: what the next first guess goes by; none at the start.
+    /// Acceleration in the last step, m/s², for the predictor; empty at the start.
     pub(super) trend: Vec<[f64; 3]>,
-    /// The push of an obstacle that each particle was under at last, newtons; none at the start.
+    /// The last normal force of contacts on each particle, newtons; empty at the start.
     pub(super) loads: Vec<f64>,
-    /// Steps for which contacts are taken to change.
+    /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: u32,
-    /// Energy that steps without drive have lost so far, joules.
+    /// Energy that steps without external driving have dissipated so far, joules.
     pub(super) energy_budget: f64,
     pub(super) warm: CachedFactor,
 }
 
-/// The coarse half of the preconditioner, kept while it is good enough: it is what the iterations hang on.
+/// The factored coarse matrix, kept while it is good enough; iteration counts depend on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct CachedFactor {
     pub(super) factor: Lower,
     pub(super) anchors: Anchors,
-    /// Iterations to the tolerance when it was new, for each stage of a step; 0 before the first.
+    /// Iterations of a solve when it was new, for each stage of a step; 0 before the first.
     pub(super) fresh: [u32; 2],
     /// Iterations since then.
     pub(super) spent: u32,
 }
 
 impl State {
-    /// At rest in the shape of the body.
+    /// At rest in the body's rest shape.
     pub fn at_rest(body: &SoftBody) -> Self {
         let positions = body.order.index_of.iter().map(|particle| body.rest[*particle as usize].into()).collect();
         Self {
@@ -63,7 +64,7 @@ impl State {
         }
     }
 
-    /// Whether it has one entry for each of the body's particles, springs and tetrahedra.
+    /// Whether it has an entry for each particle, spring and tetrahedron of `body`.
     pub fn fits(&self, body: &SoftBody) -> bool {
         let springs = body.ends.len();
         self.positions.len() == body.len()
@@ -72,7 +73,7 @@ impl State {
             && self.volumes.len() == body.tets.len()
     }
 
-    /// Length each spring has at rest now.
+    /// Current rest length of each spring.
     pub(super) fn rest_lengths(&self) -> Vec<f64> {
         self.lengths.iter().zip(&self.dents).map(|(length, dent)| length * dent).collect()
     }

@@ -1,13 +1,14 @@
-//! One step: TR-BDF2, or implicit Euler.
+//! One step of TR-BDF2 or implicit Euler.
 //!
-//! TR-BDF2 (Bank et al. 1985) goes by the trapezoidal rule to γ = 2 − √2 of the step and by the second backward
-//! difference from there: order 2, L-stable, and both stages are the same equation M(x − y) = a²f(x, (x − z)/a) with
-//! a = γh/2. Its error estimate is Hosea & Shampine's (1996). Implicit Euler is that equation once, with a = h.
+//! TR-BDF2 (Bank et al. 1985) applies the trapezoidal rule to γ = 2 − √2 of the step, then the second backward
+//! difference formula: second order and L-stable, and both stages are the same equation M(x − y) = a²f(x, (x − z)/a)
+//! with a = γh/2. The error estimate is that of Hosea & Shampine (1996). Implicit Euler solves that equation once,
+//! with a = h.
 //!
-//! A step that begins off balance (turned tetrahedra, contacts that changed in the step before, or the caller says so) is
-//! implicit Euler with line search, which calms what TR-BDF2 would carry on: an impact within its first stage would come
-//! back from it 1.4 times as fast, as any method of order 2 continues forces. So is one in which contacts change or that
-//! turned out bad, again from the start.
+//! Steps that start out of balance (inverted tetrahedra, contacts that changed in the previous step, or on request)
+//! use implicit Euler with line search, which damps what TR-BDF2 would carry on: an impact during its first stage
+//! would rebound 1.4 times as fast, since a second-order method extrapolates forces. The same holds for a step in
+//! which contacts change or that failed; it is repeated from its start.
 
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
@@ -21,38 +22,38 @@ use super::volume::Inventory;
 use numerics::vector::DVec3;
 
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
-/// Newton iterations a stage has by default where its force turned out otherwise than foreseen.
+/// Newton iterations of a stage by default.
 const MOST: u32 = 4;
-/// Newton iterations a stage has in accurate mode.
+/// Newton iterations of a stage in accurate mode.
 const MOST_ACCURATE: u32 = 12;
-/// Share of the tolerance at which Newton's method stops in accurate mode.
+/// Tolerance of Newton's method in accurate mode, as a fraction of that of the frame.
 const NEWTON_SHARE: f64 = 0.1;
-/// Share of the energy at hand that a step may gain before it is done again with implicit Euler.
+/// Energy gain of a step, relative to its energy, above which it is repeated with implicit Euler.
 const GAIN: f64 = 0.005;
-/// Steps of implicit Euler after one in which contacts changed otherwise than foreseen.
+/// Steps of implicit Euler after one in which the set of active contacts changed.
 const EULER_STEPS_AFTER_CHANGE: u32 = 4;
 
-/// Positions and velocities, the solver's order.
+/// Motion of all particles, in the solver's order.
 #[derive(Clone, Debug)]
 pub(super) struct Kinematics {
     pub(super) x: Vec<DVec3>,
     pub(super) v: Vec<DVec3>,
-    /// How velocities changed in the step before, m/s²: what the next one's first guess goes by, nothing else.
+    /// Acceleration in the last step, m/s²; used only by the predictor.
     pub(super) trend: Vec<DVec3>,
-    /// The push of an obstacle that each particle was under at last, newtons.
+    /// The last normal force of contacts on each particle, newtons.
     pub(super) loads: Vec<f64>,
 }
 
-/// What a step took and reached.
+/// Outcome of a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stepped {
     pub(super) solved: Solved,
     /// Largest estimated error of a particle, metres.
     pub(super) estimate: f64,
     pub(super) euler: bool,
-    /// Whether that was to calm it, not for its contacts.
+    /// Whether implicit Euler was used to damp the step, not because of contacts.
     pub(super) damped: bool,
-    /// Joules taken out.
+    /// Energy removed to prevent a spurious gain, joules.
     pub(super) energy_removed: f64,
     pub(super) after: Energies,
     pub(super) contacts: u32,
@@ -60,23 +61,23 @@ pub(super) struct Stepped {
     pub(super) stopped: u32,
 }
 
-/// What steps are made with.
+/// What steps work with.
 pub(super) struct Stepper<'a> {
     pub(super) solver: &'a mut StageSolver,
     pub(super) context: FrameContext<'a>,
     pub(super) frame: &'a SolverFrame<'a>,
-    /// Of the frame.
+    /// Length of the frame, seconds.
     pub(super) seconds: f64,
     pub(super) warm: &'a mut CachedFactor,
-    /// Steps for which contacts are taken to change.
+    /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: &'a mut u32,
-    /// Energy that steps have lost so far and that rounding of others may bring back, joules.
+    /// Energy that steps have dissipated so far, and that rounding in later ones may return, joules.
     pub(super) energy_budget: &'a mut f64,
 }
 
 impl Stepper<'_> {
-    /// From one of `times`, shares of the frame, to the other; `tolerance` in metres where Newton's method is to converge.
-    /// `before` are the energies there; `calm` asks for implicit Euler.
+    /// Steps between two `times`, as fractions of the frame. `tolerance`, metres, makes Newton's method converge.
+    /// `before` are the energies at the start; `calm` asks for a damped step.
     pub(super) fn step(
         &mut self,
         moving: &mut Kinematics,
@@ -98,7 +99,7 @@ impl Stepper<'_> {
             None => Vec::new(),
         };
         let turned = self.frame.volume > 0.0 && self.solver.inventory.inverted > 0;
-        // What pushes a way out grows no weaker in a straight line: it would throw.
+        // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
         let force_implicit_euler =
             calm || *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
@@ -157,14 +158,14 @@ impl Stepper<'_> {
         stepped
     }
 
-    /// Looks the tetrahedra over for what begins where particles are now.
+    /// Takes stock of the tetrahedra at the current positions, for the next step.
     pub(super) fn refresh_inventory(&mut self, moving: &Kinematics) {
         let seen = self.solver.latest_inventory.take();
         self.solver.inventory =
             seen.unwrap_or_else(|| Inventory::new(self.context.body, &moving.x, self.context.volumes));
     }
 
-    /// Looks them over within a step, and says whether any got thin at `x` that were not watched.
+    /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
     pub(super) fn watch_thin(&mut self, x: &[DVec3]) -> bool {
         if self.solver.volumes.is_off() {
             return false;
@@ -176,8 +177,8 @@ impl Stepper<'_> {
         thinned
     }
 
-    /// Whether nothing from outside did work in the step but gravity and goals that stand still: contacts may be near, not
-    /// push.
+    /// Whether nothing external but gravity and resting goals did work in the step: contacts may be near, but not
+    /// closed.
     fn undriven(&self) -> bool {
         !self.context.external.moves() && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
     }
@@ -218,7 +219,7 @@ impl Stepper<'_> {
             index: 0,
         };
         let volumes = self.solver.volumes.drift(body, &moving.x, &moving.v);
-        // Lengths and volumes go by the same rules as positions do.
+        // Lengths and volumes follow the same rules as positions.
         let on_from_start = |solver: &mut StageSolver, seconds: f64| {
             let length = |first, second| {
                 let [length, pace] = drift(&moving.x, &moving.v, first, second);
@@ -240,7 +241,7 @@ impl Stepper<'_> {
         let v_middle: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
         let x_middle = x;
 
-        // Of the second backward difference: what the middle and the start count.
+        // Weights of the middle and the start in the second backward difference formula.
         let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
         let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
         let mix = |middle: &[DVec3], start: &[DVec3]| -> Vec<DVec3> {
@@ -289,18 +290,18 @@ impl Stepper<'_> {
         (solved, estimate)
     }
 
-    /// Particles that do not go along with their piece: those held, and those that hang on nothing.
+    /// Particles that do not move with their piece: pinned and isolated ones.
     fn loose(&self) -> Vec<bool> {
         let (held, alone) = (&self.context.external.held, &self.solver.system.alone);
         (0..held.len()).map(|particle| held[particle] || alone.get(particle) == Some(&true)).collect()
     }
 
-    /// Puts held particles where they are at `time`, and where (x − z)/a is their velocity.
+    /// Moves pinned particles to their positions at `time`, with velocities (x − z)/a.
     pub(super) fn pin(&self, x: &mut [DVec3], z: &mut [DVec3], time: f64, a: f64) {
         self.context.external.hold(time, x, z, a);
     }
 
-    /// Particles that are nowhere stay where they were.
+    /// Stops particles whose result is not finite where they were.
     fn keep_finite(&mut self, start: &Kinematics, moving: &mut Kinematics, stepped: &mut Stepped) {
         for particle in 0..moving.x.len() {
             if !moving.x[particle].iter().chain(moving.v[particle].iter()).all(|x| x.is_finite()) {
@@ -312,11 +313,11 @@ impl Stepper<'_> {
         }
     }
 
-    /// Slows all particles against their mean where the step made energy.
+    /// Slows particles relative to their mean motion if the step gained energy.
     fn remove_energy_gain(&mut self, before: &Energies, moving: &mut Kinematics, stepped: &mut Stepped) {
-        /// Share of the energy that is rounding.
+        /// Fraction of the energy that is rounding.
         const ROUNDING: f64 = 1e-9;
-        /// Share of it that what was lost may bring back.
+        /// Largest budget of previously dissipated energy, as a fraction of the energy.
         const LENT: f64 = 2e-3;
         let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
@@ -326,7 +327,7 @@ impl Stepper<'_> {
         }
         let body = self.context.body;
         let held = &self.context.external.held;
-        // What bends a piece pays first, then all that is not a shift of it: momentum is not to pay.
+        // Takes energy from the deformation first, then from all motion but translation: momentum is conserved.
         for turning in [true, false] {
             let gained = -*self.energy_budget;
             let mut moved = moving.v.clone();
@@ -356,12 +357,12 @@ impl Stepper<'_> {
     }
 }
 
-/// Joules.
+/// Kinetic energy, joules.
 fn kinetic(body: &SoftBody, v: &[DVec3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
 }
 
-/// How far the worst contact is below its gap at `x`, metres; 0 where none is.
+/// Depth of the deepest contact at `x`, metres below its gap; 0 without any.
 pub(super) fn deepest(contacts: &[ContactConstraint], x: &[DVec3]) -> f64 {
     contacts.iter().map(|contact| -contact.clearance(x, 0.0)).fold(0.0, f64::max)
 }

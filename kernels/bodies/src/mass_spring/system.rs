@@ -1,7 +1,9 @@
-//! The linear system of one Newton iteration: M + a²K + aC of springs, volumes, goals and contacts, never written out.
+//! The linear system of a Newton iteration, M + a²K + aC of springs, volumes, goals and contacts, applied without
+//! assembling it.
 //!
-//! Springs are records by particle, in f32 and as differences: a rigid motion meets no resistance in any bit, however stiff
-//! the springs are against the masses (an assembled matrix would lose the masses at a²k ÷ m of 1e7). Vectors are f64.
+//! Spring stiffnesses are f32 and act on differences of displacements, so rigid motions are not resisted in any bit,
+//! however stiff the springs are relative to the masses. (An assembled matrix would lose the masses at a²k ÷ m of
+//! 1e7.) Vectors are f64.
 
 use super::body::SoftBody;
 use super::partition::Partition;
@@ -9,29 +11,29 @@ use super::rank_one::RankOneTerms;
 use super::springs::Record;
 use numerics::vector::DVec3;
 
-/// M + a²K + aC around some positions.
+/// M + a²K + aC at some positions.
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// The springs as they hang, one for each of `Body::hanging`.
+    /// Springs, one for each entry of `SoftBody::adjacency`.
     pub(super) records: Vec<Record>,
-    /// What resists each particle alone in all directions alike: mass, drag, goals. Kilograms.
+    /// Isotropic diagonal terms of each particle: mass, drag, goals. Kilograms.
     pub(super) inertia: Vec<f64>,
-    /// What resists it in some directions, xx xy xz yy yz zz; empty where nothing does.
+    /// Other diagonal blocks, xx xy xz yy yz zz; empty without any.
     pub(super) blocks: Vec<[f64; 6]>,
-    /// Particles whose motion is given.
+    /// Pinned particles.
     pub(super) held: Vec<bool>,
-    /// Those that no spring holds; empty where there are none.
+    /// Particles without intact springs; empty if there are none.
     pub(super) alone: Vec<bool>,
-    /// Volumes of regions.
+    /// Terms of regions.
     pub(super) regions: RankOneTerms,
-    /// Tetrahedra about to turn over, contacts of two bodies.
+    /// Terms of thin tetrahedra and of contacts between bodies.
     pub(super) transient: RankOneTerms,
-    /// Per particle the inverse of the lower factor of its own 3×3 block, rows one after the other.
+    /// For each particle the inverse Cholesky factor of its 3×3 diagonal block, lower triangle by rows.
     pub(super) smoother: Vec<[f32; 6]>,
 }
 
 impl System {
-    /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at held particles.
+    /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at pinned particles.
     pub(super) fn apply(&mut self, body: &SoftBody, clusters: &Partition, p: &[DVec3], out: &mut [DVec3]) -> f64 {
         self.regions.measure(p);
         self.transient.measure(p);
@@ -75,7 +77,7 @@ impl System {
         })
     }
 
-    /// Takes those to be alone that springs of no `firmness` hold.
+    /// Marks particles whose springs have no stiffness as isolated.
     pub(super) fn set_isolated(&mut self, particle_stiffness: &[f64]) {
         self.alone.clear();
         if particle_stiffness.contains(&0.0) {
@@ -90,11 +92,11 @@ pub(super) fn times([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: DVec3) -> DVec3 {
     DVec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
 }
 
-/// The inverse of the lower factor of a symmetric block that is positive definite: l⁻¹ by rows, so that its square is the
-/// block's inverse and stays positive in f32. A pivot that rounding ate counts as its diagonal entry.
+/// Inverse Cholesky factor of a positive definite symmetric block, by rows: WᵀW is the inverse of the block and stays
+/// positive definite in f32. A pivot lost to rounding is replaced by a small fraction of its diagonal entry.
 #[inline(always)]
 pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
-    /// Below this share a pivot is rounding.
+    /// A pivot below this fraction of its diagonal entry is rounding noise.
     const NOTHING: f64 = 1e-13;
     let [xx, xy, xz, yy, yz, zz] = *block;
     let pivot = |left: f64, whole: f64| 1.0 / left.max(NOTHING * whole).sqrt();
@@ -110,7 +112,7 @@ pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
     if all.iter().all(|value| value.is_finite()) { all.map(|value| value as f32) } else { [0.0; 6] }
 }
 
-/// W·r, whose square is rᵀ·(block)⁻¹·r.
+/// W·r, with |W·r|² = rᵀ·block⁻¹·r.
 #[inline(always)]
 pub(super) fn solve_lower(w: &[f32; 6], r: DVec3) -> DVec3 {
     let [a, low, b, corner, left, c] = w.map(f64::from);

@@ -1,12 +1,12 @@
-//! The springs of a body: edges of tetrahedra, each once.
+//! The edges of tetrahedra, which become springs.
 
 use super::body::Mesh;
 use crate::tets::FACES;
 
-/// Corners that each of the six edges of a tetrahedron joins.
+/// The corners of the six edges of a tetrahedron.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// The edges of tetrahedra, each once, by their ends; and the six of each.
+/// All edges of tetrahedra, each once, as pairs of points; and the six edges of each tetrahedron.
 pub(super) fn edges(tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, Vec<[u32; 6]>) {
     let ends = |tet: &[u32; 4], edge: [usize; 2]| {
         let [a, b] = edge.map(|corner| tet[corner]);
@@ -28,7 +28,7 @@ pub(super) fn edges(tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, Vec<[u32; 6]>) {
     (unique, springs)
 }
 
-/// For each missing edge the springs on surface edges at its two ends: on faces that one tetrahedron alone has.
+/// For each missing edge the springs on boundary edges at its two ends, that is, on faces of a single tetrahedron.
 pub(super) fn neighbours_of_missing(mesh: &Mesh<'_>, ends: &[[u32; 2]], tet_springs: &[[u32; 6]]) -> Vec<Vec<u32>> {
     if mesh.missing.is_empty() {
         return Vec::new();

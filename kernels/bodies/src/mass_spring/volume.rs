@@ -1,68 +1,71 @@
-//! What keeps a body's volume: a pressure in each region, and a push against tetrahedra that are about to turn over.
+//! Volume preservation: a pressure in each region, and a barrier against inversion of single tetrahedra.
 //!
-//! Region: ½κ(V − V₀)²/V₀ and a fourth power, so that lost volume is fought by κ against the springs' own bulk modulus, and
-//! much of it much harder: cheap where there is little to fight. Tetrahedron: below
-//! [`THIN`] of its volume ½μ(THIN·V₀ − V)²/V₀, which pushes on through flat and inside out, where springs pull either way.
-//! Both are made linear by their gradient alone (Gauss–Newton), so they never make the system indefinite.
+//! A region has the energy ½κ(V − V₀)²/V₀ plus a fourth-order term: κ acts against the bulk modulus of the springs,
+//! and large changes of volume are resisted much more, at little cost where there are none. A tetrahedron below
+//! [`THIN`] of its volume has ½μ(THIN·V₀ − V)²/V₀, which acts through the flat state and beyond, where springs pull
+//! either way. Both are linearised by their gradient alone (Gauss–Newton), which keeps the system positive
+//! semi-definite.
 
 use super::body::{SoftBody, volume};
 use super::partition::{Partition, RaggedSlice};
 use numerics::vector::DVec3;
 
-/// Bulk modulus of the springs themselves ÷ E: their Poisson ratio is a quarter.
+/// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
-/// Share of the springs' loss that is left where all of a small one is fought: what conjugate gradients do nearly level.
+/// Fraction of the volume change of bare springs that remains at full strength, for small changes: conjugate
+/// gradients then converge almost as fast as without.
 const LEFT: f64 = 0.1;
-/// Share of a region's volume that is fought twice as hard as a small one, and where hardness grows no more (114 times).
+/// Relative volume change at which resistance has doubled, and at which it stops growing (114 times).
 const SLIGHT: f64 = 0.0065;
 const MUCH: f64 = 0.04;
-/// Volume ÷ volume at rest below which a tetrahedron is pushed open.
+/// Volume ÷ rest volume below which the barrier acts on a tetrahedron.
 const THIN: f64 = 0.3;
-/// Volume ÷ volume at rest below which it is watched within a step. One that gets thin from above has to be seen and watched
-/// too, as it would begin the next step with energy from nowhere.
+/// Volume ÷ rest volume below which a tetrahedron is watched during a step. One that becomes thin within a step has
+/// to be watched too, or the next step would start with spurious energy.
 const WATCHED: f64 = 0.7;
-/// μ ÷ E where all lost volume is fought: springs alone pull a mirrored tetrahedron back into its mirror image with less.
+/// μ ÷ E at full strength: with less, springs alone would pull an inverted tetrahedron into its mirror image.
 const OPENING: f64 = 16.0;
 
-/// The terms of one frame.
+/// Volume terms of one frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Volumes {
     /// κ ÷ V₀ of each region.
     stiffness: Vec<f64>,
-    /// V₀.
+    /// Rest volume V₀ of each region.
     rest: Vec<f64>,
-    /// Share fought.
+    /// Strength of volume preservation, 0…1.
     share: f64,
-    /// Regions in parts.
+    /// Regions in fixed parts.
     partition: Option<Partition>,
-    /// How each region's volume changes with its particles.
+    /// Gradient of each region's volume with respect to its particles.
     pub(super) gradients: Vec<DVec3>,
-    /// Pressure each region has, Pa.
+    /// Pressure of each region, Pa.
     pub(super) pressures: Vec<f64>,
-    /// How each region's pressure grows with its volume within the stage, Pa/m³.
+    /// Derivative of the pressure with respect to volume within the stage, Pa/m³.
     slopes: Vec<f64>,
-    /// The stage's a, seconds, and the volumes it comes from: dashpots count (V − those)/a, as springs do.
+    /// Step coefficient of the stage, seconds, and volumes at its start: dashpots act on (V − those)/a, as for
+    /// springs.
     a: f64,
     before: Vec<f64>,
-    /// What they stored when last measured, and what their dashpots count in a line search, joules.
+    /// Stored energy when last measured, and the potential of the dashpots in a line search, joules.
     pub(super) stored: f64,
     pub(super) damped: f64,
 }
 
-/// A tetrahedron that is thin or turned over.
+/// A tetrahedron that is thin or inverted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ThinTet {
     pub(super) corners: [u32; 4],
-    /// How its volume changes with its corners.
+    /// Gradient of its volume with respect to its corners.
     pub(super) gradient: [DVec3; 4],
-    /// μ ÷ V₀, and what that opens it with, Pa.
+    /// μ ÷ V₀, and the pressure that opens it, Pa.
     pub(super) stiffness: f64,
     pub(super) pressure: f64,
     pub(super) energy: f64,
 }
 
 impl Volumes {
-    /// Fights `share` of what tetrahedra lose of `rest`, their volumes.
+    /// Volume preservation of strength `share`, for tetrahedra with the volumes `rest`.
     pub(super) fn new(body: &SoftBody, share: f64, rest: &[f64]) -> Self {
         let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
         let regions = &body.regions;
@@ -91,17 +94,17 @@ impl Volumes {
         }
     }
 
-    /// Whether nothing is fought.
+    /// Whether volume is not preserved.
     pub(super) fn is_off(&self) -> bool {
         self.partition.is_none()
     }
 
-    /// The volume of each region with particles at `x`.
+    /// Volume of each region with particles at `x`.
     pub(super) fn at(&self, body: &SoftBody, x: &[DVec3]) -> Vec<f64> {
         self.drift(body, x, &[]).into_iter().map(|[volume, _]| volume).collect()
     }
 
-    /// That, and how fast it changes, m³/s; all still where there is no `v`.
+    /// Volume of each region and its rate of change, m³/s, which is 0 if `v` is empty.
     pub(super) fn drift(&self, body: &SoftBody, x: &[DVec3], v: &[DVec3]) -> Vec<[f64; 2]> {
         let regions = &body.regions;
         let mut out = vec![[0.0; 2]; self.before.len()];
@@ -120,7 +123,7 @@ impl Volumes {
         out
     }
 
-    /// Begins a stage of `a` whose volumes come from those `before`.
+    /// Starts a stage of `a` with volumes `before`.
     pub(super) fn begin(&mut self, a: f64, before: Vec<f64>) {
         (self.a, self.before) = (a, before);
     }
@@ -149,12 +152,12 @@ impl Volumes {
         (self.stored, self.damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
     }
 
-    /// What each region resists for steps of `a`, where last measured.
+    /// Weight of each region's rank-one term in a stage of `a`, as last measured.
     pub(super) fn weights(&self, a: f64) -> Vec<f64> {
         self.slopes.iter().map(|slope| slope * a * a).collect()
     }
 
-    /// Those of the `watched` tetrahedra that are thin.
+    /// The thin ones among the `watched` tetrahedra.
     pub(super) fn thin_tets(&self, body: &SoftBody, x: &[DVec3], rest: &[f64], watched: &[u32]) -> Vec<ThinTet> {
         if self.is_off() {
             return Vec::new();
@@ -173,8 +176,8 @@ impl Volumes {
     }
 }
 
-/// What a lost (or won) volume is fought with, ÷ κ/V₀: the volume itself near rest, more and more from [`SLIGHT`] on, in a
-/// straight line again from [`MUCH`] on. Its slope, and its integral.
+/// Resistance to a change of volume, relative to κ/V₀: linear near rest, increasing from [`SLIGHT`] on, linear again
+/// from [`MUCH`] on. Returns the value, its derivative and its integral.
 fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
     let soft = 1.0 / (SLIGHT * rest * SLIGHT * rest);
     let curved = |lost: f64| {
@@ -193,26 +196,26 @@ fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
     ((push + slope * more).copysign(lost), slope, energy + push * more + 0.5 * slope * more * more)
 }
 
-/// How a tetrahedron's volume changes with each corner.
+/// Gradient of a tetrahedron's volume with respect to each corner.
 pub(super) fn opening([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     let (ab, ac, ad) = (b - a, c - a, d - a);
     let [b, c, d] = [ac.cross(&ad) / 6.0, ad.cross(&ab) / 6.0, ab.cross(&ac) / 6.0];
     [-(b + c + d), b, c, d]
 }
 
-/// The tetrahedra of a body, looked over once a step.
+/// State of all tetrahedra, evaluated once a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Inventory {
-    /// How many are inside out.
+    /// Number of inverted ones.
     pub(super) inverted: u32,
-    /// All volume ÷ all at rest.
+    /// Total volume ÷ total rest volume.
     pub(super) ratio: f64,
-    /// Those that may be thin before the next look.
+    /// Those that may become thin before the next evaluation.
     pub(super) watched: Vec<u32>,
 }
 
 impl Inventory {
-    /// With particles at `x`.
+    /// Evaluated at the positions `x`.
     pub(super) fn new(body: &SoftBody, x: &[DVec3], rest: &[f64]) -> Self {
         let partition = body.tet_partition.map((), |part, ()| {
             let (mut inverted, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
@@ -238,7 +241,8 @@ impl Inventory {
         all
     }
 
-    /// Watches those too that turn out thin in `later`, of `rest` and with particles at `x`, and says whether there are such.
+    /// Also watches the tetrahedra that are thin at `x` according to the `later` evaluation; returns whether there
+    /// are any new ones.
     pub(super) fn watch(&mut self, later: &Self, body: &SoftBody, x: &[DVec3], rest: &[f64]) -> bool {
         let thin = |tet: &&u32| {
             let at = **tet as usize;
