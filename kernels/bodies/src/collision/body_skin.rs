@@ -1,4 +1,4 @@
-//! The surface of a body: its triangles by particle, and what of it is too near by nature to count as touching.
+//! The skin of a body: its surface triangles, and which of its elements are too close at rest to count as in contact.
 
 use super::CollisionError;
 use super::closest_point::{ClosestPoint, along};
@@ -6,29 +6,28 @@ use super::obstacle::{check_points, check_triangles};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::swept::Elements;
 
-/// Times as long as at rest, and as the skin's edges are on average, from which on an edge is let go.
+/// An edge longer than this many times its rest length and the skin's mean edge is released.
 const LONG: f64 = 8.0;
 
-/// A surface of particles, facing outwards.
+/// A closed surface over particles, facing outwards.
 #[derive(Clone, Debug)]
 pub struct BodySkin {
     pub(super) surface: TriangleSurface,
     pub(super) faces: Elements<3>,
     pub(super) edges: Elements<2>,
     rest: Vec<[f64; 3]>,
-    /// Length of its edges at rest, metres.
+    /// Mean rest length of the edges, metres.
     mean: f64,
-    /// Particles of the surface within two links of each particle, rising.
+    /// For each surface particle, those within two links, ascending.
     starts: Vec<u32>,
     rings: Vec<u32>,
 }
 
 impl BodySkin {
-    /// Of `triangles` of particles, which are at `rest` where nothing acts; `links` are the springs of the body, which
-    /// say who is whose neighbour beside the triangles' own sides.
+    /// A skin of `triangles` over particles that are at `rest` without load; `links` are the springs of the body,
+    /// which define neighbours in addition to the triangles' edges.
     ///
-    /// # Errors
-    /// Where a triangle or link names no particle, or a coordinate is not finite.
+    /// # Errors If an index is out of range or a coordinate is not finite.
     pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, CollisionError> {
         check_triangles(rest.len(), triangles)?;
         check_points(rest)?;
@@ -49,23 +48,23 @@ impl BodySkin {
         })
     }
 
-    /// Particles, those within the body too.
+    /// Number of particles of the body, interior ones included.
     pub(super) fn particles(&self) -> usize {
         self.rest.len()
     }
 
-    /// The surface's particles within two links of one of them, itself too.
+    /// Surface particles within two links of a particle, itself included.
     pub(super) fn around(&self, particle: u32) -> &[u32] {
         &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
     }
 
-    /// How far a particle is from a triangle at rest, metres.
+    /// Distance of a particle from a triangle at rest, metres.
     pub(super) fn rest_to_face(&self, particle: u32, face: u32) -> f64 {
         let at = Moment::of(&self.rest);
         ClosestPoint::on(face, at.position(particle), self.surface.corners(&at, face)).distance
     }
 
-    /// What obstacles let go with particles at `x`.
+    /// The elements released by obstacles with particles at `x`.
     pub(super) fn released(&self, x: &[[f64; 3]]) -> ReleasedElements {
         let surface = &self.surface;
         let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_overstretched(edge, x)).collect();
@@ -83,8 +82,8 @@ impl BodySkin {
         ReleasedElements { edges, faces, particles }
     }
 
-    /// How many edges obstacles let go with particles at `x`: those more than eight times as long as at rest, and as edges are
-    /// on average.
+    /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
+    /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
         self.surface.edges.iter().filter(|edge| self.is_overstretched(edge, x)).count()
     }
@@ -93,7 +92,7 @@ impl BodySkin {
         edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean)
     }
 
-    /// How far two edges are apart at rest, metres.
+    /// Distance of two edges at rest, metres.
     pub(super) fn rest_between(&self, edge: u32, other: u32) -> f64 {
         let at = Moment::of(&self.rest);
         let [[p, q], [a, b]] =
@@ -103,15 +102,15 @@ impl BodySkin {
     }
 }
 
-/// What of a skin obstacles let go: edges that are drawn out too far to be skin. What a tool has hooked would be drawn out for
-/// ever, as it stays on the side it came from; let go, it is drawn out no further.
+/// Elements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
+/// would stretch it without limit, since contacts keep it on the side it came from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {
-    /// By edge; empty where none is.
+    /// Whether each edge is released; empty if none is.
     edges: Vec<bool>,
-    /// By triangle: whether one of its edges is.
+    /// Whether each triangle has a released edge.
     faces: Vec<bool>,
-    /// By particle: whether all its edges are.
+    /// Whether all edges of a particle are released.
     particles: Vec<bool>,
 }
 
@@ -134,7 +133,7 @@ fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
 }
 
-/// Lists of the surface's particles within two links of each of them.
+/// For each surface particle, the surface particles within two links of it.
 fn rings(surface: &TriangleSurface, count: usize, links: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
     let mut pairs: Vec<[u32; 2]> = links.iter().copied().chain(surface.edges.iter().map(|edge| edge.ends)).collect();
     pairs.extend(pairs.clone().into_iter().map(|[a, b]| [b, a]));

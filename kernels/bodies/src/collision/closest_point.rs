@@ -1,20 +1,20 @@
-//! Nearest points of triangles and segments, f64.
+//! Closest points of triangles and segments, in f64.
 
 use super::surface::Feature;
 use numerics::vector::DVec3;
 
-/// The nearest point of a triangle.
+/// The closest point of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestPoint {
     pub(super) face: u32,
-    /// Of the corners, ≥ 0, together 1; exactly 0 off a side or corner.
+    /// Barycentric weights, non-negative, with sum 1; exactly 0 away from a corner or its sides.
     pub(super) weights: [f64; 3],
     pub(super) point: DVec3,
     pub(super) distance: f64,
 }
 
 impl ClosestPoint {
-    /// Of `face` with these corners, to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+    /// The point of `face` with these corners that is closest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
     #[inline]
     pub(super) fn on(face: u32, p: DVec3, corners: [DVec3; 3]) -> Self {
         let weights = weights(p, corners);
@@ -77,7 +77,7 @@ fn weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [(1.0 - v - w).max(0.0), v, w]
 }
 
-/// Weights of the corners where `p` falls on a triangle's plane; negative beyond a side.
+/// Barycentric weights of the projection of `p` to the plane of a triangle; negative beyond a side.
 pub(super) fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64; 3] {
     let area = (b - a).cross(&(c - a)).dot(&normal);
     let v = (p - a).cross(&(c - a)).dot(&normal) / area;
@@ -85,7 +85,7 @@ pub(super) fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64;
     [1.0 - v - w, v, w]
 }
 
-/// How far along two segments their nearest points are, 0…1 (Ericson, 5.1.9).
+/// Parameters of the closest points of two segments, 0…1 (Ericson, 5.1.9).
 pub(super) fn along([p, q]: [DVec3; 2], [a, b]: [DVec3; 2]) -> [f64; 2] {
     let (d, e, r) = (q - p, b - a, p - a);
     let (dd, ee, er) = (d.norm_squared(), e.norm_squared(), e.dot(&r));

@@ -1,11 +1,12 @@
-//! When four points that go straight are in one plane: roots of a cubic, each in its own monotone piece. 0 counts as above.
+//! Times at which four linearly moving points are coplanar: the roots of a cubic, each isolated in a monotone
+//! interval. 0 counts as positive.
 //!
-//! Promise: every change of sign within the way is found, to rounding of the time. Limit: a plane touched and left again
-//! within rounding may be two or none.
+//! Every sign change during the motion is found, up to rounding of its time. Limit: a plane that is touched and left
+//! again within rounding may count as two crossings or none.
 
 use numerics::vector::DVec3;
 
-/// Up to three times in 0…1, rising, and whether the value was above 0 before.
+/// Up to three times in 0…1, ascending, and whether the value was positive before each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Roots {
     times: [f64; 3],
@@ -19,19 +20,20 @@ impl Roots {
     }
 }
 
-/// What one direction says about two things that go straight.
+/// Result of a separating-axis test of two linearly moving elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separation {
-    /// Never as near as asked.
+    /// Always farther apart than the given distance.
     Far,
-    /// Near perhaps, never through each other.
+    /// Possibly close, but they never cross.
     Near,
-    /// Nothing.
+    /// Undecided.
     Unknown,
 }
 
-/// What the normal of a triangle where it starts says, then the ways across its sides within its plane and across how the
-/// point passes them: its two sides and the way to the point from where they meet.
+/// Separating-axis test of a point and a triangle, given the triangle's sides and the offset of the point: along the
+/// initial normal, and then, only for distance, along the in-plane normals of its sides and the directions normal to
+/// a side and the relative displacement.
 #[inline]
 pub(super) fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let normal = start[0].cross(&start[1]);
@@ -49,7 +51,7 @@ pub(super) fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) 
     separation
 }
 
-/// What `axis` says of a point and a triangle.
+/// The same along one axis.
 #[inline]
 fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let range = |[b, c, p]: &[DVec3; 3]| {
@@ -60,13 +62,14 @@ fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], rea
     classify(first.0.min(last.0), first.1.max(last.1), reach, axis)
 }
 
-/// What the normal of two edges where they start says, then the ways across each within the plane of both and across how
-/// they pass each other: both edges and the way from the first one's start to the second's.
+/// Separating-axis test of two edges, given both edge vectors and the offset between their first ends: along their
+/// initial common normal, and then, only for distance, along in-plane normals and directions normal to an edge and
+/// the relative displacement.
 ///
-/// Edges that stay parallel go through each other nowhere that their ends do not.
+/// Edges that stay parallel cannot cross unless their ends cross too.
 #[inline]
 pub(super) fn edge_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
-    /// Sine within which edges are parallel.
+    /// Largest sine of the angle between parallel edges.
     const PARALLEL: f64 = 1e-9;
     let normal = start[0].cross(&start[1]);
     let separation = edge_separation_along(&normal, start, end, reach);
@@ -83,7 +86,7 @@ pub(super) fn edge_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) 
     if parallel(start) && parallel(end) { Separation::Near } else { Separation::Unknown }
 }
 
-/// What `axis` says of two edges.
+/// The same along one axis.
 #[inline]
 fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
     let range = |[d, e, r]: &[DVec3; 3]| {
@@ -94,7 +97,7 @@ fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], rea
     classify(first.0.min(last.0), first.1.max(last.1), reach, axis)
 }
 
-/// Of heights within `low` and `high` times the normal's length.
+/// Classifies by the range of signed distances, each multiplied by the length of the axis.
 #[inline]
 fn classify(low: f64, high: f64, reach: f64, normal: &DVec3) -> Separation {
     let nearest = low.max(-high);
@@ -112,7 +115,7 @@ fn det(a: &DVec3, b: &DVec3, c: &DVec3) -> f64 {
     a.cross(b).dot(c)
 }
 
-/// When the determinant of three vectors that go straight from `start` to `end` changes its sign.
+/// Times at which the determinant of three linearly moving vectors changes sign.
 #[inline]
 pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     let [a, b, c] = start;
@@ -123,7 +126,7 @@ pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     let c2 = (aq + pb).dot(&r) + pq.dot(c);
     let c3 = pq.dot(&r);
     let last = det(&end[0], &end[1], &end[2]);
-    // Of the Bernstein form, within whose values the cubic stays.
+    // The cubic stays within the range of its Bernstein coefficients.
     let held = [c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, last];
     let mut roots = Roots::default();
     if held.iter().all(|x| *x > 0.0) || held.iter().all(|x| *x < 0.0) {
@@ -144,12 +147,12 @@ pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     roots
 }
 
-/// Where c₁ + 2c₂t + 3c₃t² is 0 within 0…1, rising.
+/// Roots of c₁ + 2c₂t + 3c₃t² in 0…1, ascending.
 fn turning_points(c1: f64, c2: f64, c3: f64) -> ([f64; 2], usize) {
     let (mut out, mut count) = ([0.0; 2], 0);
     let under = c2 * c2 - 3.0 * c1 * c3;
     if under > 0.0 {
-        // The larger sum first, so that nothing cancels.
+        // Compute the root without cancellation first.
         let sum = -(c2 + under.sqrt().copysign(c2));
         for t in [sum / (3.0 * c3), c1 / sum] {
             if t > 0.0 && t < 1.0 {
@@ -164,8 +167,7 @@ fn turning_points(c1: f64, c2: f64, c3: f64) -> ([f64; 2], usize) {
     (out, count)
 }
 
-/// Where a monotone function changes its sign between two arguments: the false position, halved where one end stays
-/// (Illinois), then halving.
+/// Root of a monotone function between two arguments: regula falsi with the Illinois modification, then bisection.
 fn root(value: &impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     let above = low.1 >= 0.0;
     let mut kept = 0;
@@ -194,7 +196,7 @@ fn root(value: &impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) 
 mod tests {
     use super::*;
 
-    /// When (t − a)(t − b)(t − c), as the determinant of a diagonal, changes its sign.
+    /// Sign changes of (t − a)(t − b)(t − c), as the determinant of a diagonal matrix.
     fn product(roots: [f64; 3]) -> Vec<(f64, bool)> {
         let at = |t: f64| {
             let [a, b, c] = roots.map(|root| t - root);

@@ -1,7 +1,7 @@
-//! An edge on its way against an edge of another surface: whether they went through each other, how near they are.
+//! A moving edge against a moving edge of another surface: whether they crossed, and how close they are.
 //!
-//! Two edges touch where each is what its own surface has nearest to the other. So a pair counts where the way from one
-//! to the other points out of both surfaces and away from the triangles beside the edges.
+//! Two edges are in contact if each is its own surface's closest feature to the other. A pair therefore counts only
+//! if the direction between them points out of both surfaces, away from the triangles adjacent to the edges.
 
 use super::closest_point::along;
 use super::coplanarity::{Separation, edge_separation, sign_changes};
@@ -9,22 +9,22 @@ use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::vertex::{ContactRules, MovingSurface, ON};
 use numerics::vector::DVec3;
 
-/// Two edges that may touch.
+/// Two edges that may be in contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
-    /// How far along the first and the second edge, from their first ends.
+    /// Parameters along the first and the second edge.
     pub(super) shares: [f64; 2],
-    /// Unit, from the second to the first, at the end of the way.
+    /// Unit normal from the second to the first edge, at the end of the motion.
     pub(super) normal: DVec3,
 }
 
-/// Sine of the angle by which triangles beside edges that went through each other may lean over: more than a dent that
-/// an edge made in a flat surface.
+/// Sine of the angle by which adjacent triangles may lie on the wrong side, for edges that crossed: more than the
+/// dent that an edge makes in a flat surface.
 const LEAN_THROUGH: f64 = 0.5;
-/// As much for edges that are near.
+/// The same for edges that are close.
 const LEAN_NEAR: f64 = 0.1;
 
-/// How `edge` and `other`, each of its surface, meet.
+/// Tests two edges of different surfaces.
 pub(super) fn hit(
     first: &MovingSurface<'_>,
     edge: &Edge,
@@ -66,7 +66,7 @@ impl Pair<'_> {
         ]
     }
 
-    /// Both edges and the way from the start of the first to that of the second.
+    /// Both edge vectors and the offset between their first ends.
     #[inline]
     fn configuration(&self, pose: usize) -> [DVec3; 3] {
         let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
@@ -75,7 +75,7 @@ impl Pair<'_> {
         [q - p, b - a, a - p]
     }
 
-    /// Where they went through each other within a piece of the way.
+    /// A crossing during one interval of the motion.
     fn through(&self, piece: usize, [start, end]: &[[DVec3; 3]; 2]) -> Option<Hit> {
         for (t, above) in sign_changes(start, end).iter() {
             let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
@@ -87,7 +87,7 @@ impl Pair<'_> {
             if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
                 let [d, e, _] = self.configuration(self.first.poses.len() - 1);
                 let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
-                // Turned that far they may have passed each other's direction: the way they met holds.
+                // The edges may have rotated past each other; then the normal at the crossing is kept.
                 let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
                 return Some(Hit { shares: [s, u], normal });
             }
@@ -95,7 +95,7 @@ impl Pair<'_> {
         None
     }
 
-    /// How near they are at a pose, told for the last.
+    /// Closeness at one pose, reported for the last.
     fn near(&self, pose: usize, reach: f64) -> Option<Hit> {
         let inner = |share: f64| share > ON && share < 1.0 - ON;
         let segments = self.segments(pose);
@@ -114,7 +114,7 @@ impl Pair<'_> {
         Some(Hit { shares, normal: turned.unwrap_or(normal) })
     }
 
-    /// Whether the second edge points out of its surface along `normal`, and the first against it.
+    /// Whether the normal points out of the second surface at its edge, and into the first.
     fn faces(&self, time: f64, [s, u]: [f64; 2], normal: DVec3, lean: f64) -> bool {
         is_ridge(self.second.surface, &self.second.moment(time), self.other, u, normal, lean)
             && is_ridge(self.first.surface, &self.first.moment(time), self.edge, s, -normal, lean)
@@ -125,7 +125,7 @@ fn between([[p, q], [a, b]]: [[DVec3; 2]; 2], [s, u]: [f64; 2]) -> DVec3 {
     p.lerp(&q, s) - a.lerp(&b, u)
 }
 
-/// Whether the triangles at an edge fall away from it, seen along `out`, and have that outside.
+/// Whether the adjacent triangles fall away from an edge as seen along `out`, which has to point outwards.
 fn is_ridge(surface: &TriangleSurface, at: &Moment<'_>, edge: &Edge, share: f64, out: DVec3, lean: f64) -> bool {
     let point = at.position(edge.ends[0]).lerp(&at.position(edge.ends[1]), share);
     let falls = |third: u32| {

@@ -1,16 +1,17 @@
-//! Finds what soft bodies touch: animated meshes, the ground, each other, themselves. [`Scene`] is a [`mass_spring::Contacts`].
+//! Continuous collision detection for soft bodies against animated meshes, the ground, other bodies and themselves.
+//! [`CollisionScene`] is a [`ContactFinder`].
 //!
-//! Both sides move in every test, and time is continuous: a vertex that goes through a triangle, or an edge through an
-//! edge, within a step is kept on the side it came from, however thin the sheet. Candidates come from boxes around the
-//! whole way, sixteen at a time in f32 and rounded outwards; what is decided is decided in f64 (Bridson et al. 2002:
-//! roots of the cubic of coplanarity).
+//! All tests are continuous in time, with both sides in motion: a vertex that crosses a triangle, or an edge that
+//! crosses an edge, is kept on the side it came from, however thin the sheet. Candidates come from bounding boxes of
+//! the whole motion, sixteen at a time in f32 and rounded outwards; decisions are made in f64 from the roots of the
+//! coplanarity cubic (Bridson et al. 2002).
 //!
-//! Promise: no vertex and no edge goes through unseen while points go straight between the poses looked at, of which a
-//! turning obstacle has as many as keep it within a quarter of its thickness; only what is nearest around counts, so flat
-//! parts give one contact a vertex whatever their triangles are; the same bits for any number of threads. Limits: a
-//! contact is a plane; a side is known from where the step began, so what sits beyond an open sheet then belongs there;
-//! edges that were near within the way but neither at its ends nor through each other are not told; positions beyond f32
-//! are not found.
+//! Guarantees: no crossing of a vertex or an edge is missed while points move linearly between poses, and a rotating
+//! obstacle is sampled so densely that it deviates by at most a quarter of its thickness; only locally closest
+//! features count, so flat areas give one contact a vertex whatever their triangulation; the same bits for any number
+//! of threads. Limits: a contact is a plane; sides are known only from the start of a step, so whatever is beyond an
+//! open sheet then is taken to belong there; edges that come close during the motion, but neither at its ends nor by
+//! crossing, are not reported; positions beyond the range of f32 are not found.
 
 mod body_skin;
 mod closest_point;
@@ -38,94 +39,94 @@ use surface::{Moment, Positions};
 use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
-/// Vertices or edges that a task looks after: some 20 µs of work.
+/// Vertices or edges in a parallel task: about 20 µs of work.
 const TASK: usize = 64;
-/// Gaps within which things count.
+/// Distance, in gaps, within which potential contacts are reported.
 const REACH: f64 = 2.0;
-/// Share of the gap by which a turning obstacle may leave the straight lines between the poses looked at.
+/// Largest deviation of a rotating obstacle from linear motion between sampled poses, as a fraction of the gap.
 const SAG: f64 = 0.25;
 
-/// Why there is nothing to touch.
+/// Why contact detection could not be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CollisionError {
-    /// An obstacle is nowhere.
+    /// An obstacle without a pose.
     #[error("an obstacle has no pose; expected one at least")]
     NoPose,
-    /// A pose has other points than the first.
+    /// A pose with another number of points than the first.
     #[error("pose {index} has {count} points; expected {expected}, as the first")]
     Points {
-        /// Which pose.
+        /// Index of the pose.
         index: usize,
-        /// Points it has.
+        /// Its number of points.
         count: usize,
-        /// Points the first has.
+        /// Number of points of the first pose.
         expected: usize,
     },
-    /// Shares of the frame do not rise.
+    /// Times of poses do not increase.
     #[error("`share` of pose {index} is {share}; expected a finite number above the one before")]
     Share {
-        /// Which pose.
+        /// Index of the pose.
         index: usize,
-        /// Its share.
+        /// Its time, as a fraction of the frame.
         share: f64,
     },
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A triangle has a corner that there is none of.
+    /// A triangle has an index out of range.
     #[error("triangle {index} has corners {corners:?}; expected points of {count}")]
     Triangle {
-        /// Which.
+        /// Index of the triangle.
         index: usize,
         /// Its corners.
         corners: [u32; 3],
-        /// Points there are.
+        /// Number of points.
         count: usize,
     },
-    /// A link joins a particle that there is none of.
+    /// A link has an index out of range.
     #[error("link {index} joins {ends:?}; expected particles of {count}")]
     Link {
-        /// Which.
+        /// Index of the link.
         index: usize,
         /// Its ends.
         ends: [u32; 2],
-        /// Particles there are.
+        /// Number of particles.
         count: usize,
     },
-    /// A number is negative or not finite.
+    /// A parameter is negative or not finite.
     #[error("`{what}` is {value}; expected a finite number, 0 or more")]
     Number {
-        /// Which number.
+        /// Name of the parameter.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
 }
 
-/// All that may touch.
+/// Everything that may be in contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CollisionScene<'a> {
-    /// Surfaces of bodies.
+    /// Skins of the bodies.
     pub skins: &'a [BodySkin],
-    /// What each particle's friction is scaled by; 1 where there is none.
+    /// Factor on the friction of each particle; 1 without.
     pub friction: Option<&'a [f32]>,
-    /// First of all.
+    /// The ground; it takes precedence over obstacles.
     pub ground: Option<Ground>,
     /// Animated meshes.
     pub obstacles: &'a [Obstacle],
-    /// How skins touch each other; none: they do not.
+    /// Contact between different skins; `None`: ignored.
     pub body_contact: Option<ContactParams>,
-    /// How skins touch themselves; none: they do not.
+    /// Contact of skins with themselves; `None`: ignored.
     pub self_contact: Option<ContactParams>,
 }
 
-/// What a search found.
+/// Summary of a search.
 #[must_use]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSummary {
-    /// Contacts.
+    /// Number of contacts.
     pub contacts: u32,
-    /// How far below its gap the worst of them was where the way began, along its normal at the end, metres.
+    /// Largest depth below the gap at the start of the motion, along the normal at its end, metres.
     pub deepest_overlap: f64,
 }
 
@@ -135,17 +136,17 @@ impl ContactFinder for CollisionScene<'_> {
     }
 }
 
-/// A contact and where its second side was when the way began: n·u is that less what was kept.
+/// A contact, and its offset at the start of the motion.
 #[derive(Clone, Copy, Debug)]
 struct FoundContact {
     contact: Contact,
-    /// n·u at which surfaces touched at the start.
+    /// n·u at which the surfaces touch at the start.
     start: f64,
 }
 
 impl CollisionScene<'_> {
-    /// [`Contacts::find`], with what it found: the ground's contacts by particle; each obstacle's by particle, then
-    /// by its own points, then by edges; then pairs of bodies; then each body's own.
+    /// As [`ContactFinder::find`], with a summary. The order is: ground contacts by particle; those of each obstacle
+    /// by particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
     pub fn search(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> ContactSummary {
         let mut seen = Vec::new();
         self.on_ground(query, &mut seen);
@@ -192,7 +193,7 @@ impl CollisionScene<'_> {
         }
     }
 
-    /// What friction is scaled by where particles have `weights`.
+    /// Factor on friction at the point with these weights.
     fn friction_scale(&self, particles: &[u32], weights: &[f64]) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
         let of = |particle: &u32| mask.get(*particle as usize).map_or(1.0, |scale| f64::from(*scale));
@@ -204,7 +205,8 @@ impl CollisionScene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// What a skin, but for what is let go of it, meets of an obstacle; `boxes` and `faces` are those of particles and of its triangles on their way.
+    /// Contacts of a skin, without its released elements, with an obstacle. `boxes` and `faces` are the swept boxes
+    /// of particles and of triangles.
     fn against_obstacle(
         &self,
         query: &ContactQuery<'_>,
@@ -244,7 +246,7 @@ impl CollisionScene<'_> {
     }
 }
 
-/// Where particles are between the first and the last of `times`.
+/// Positions of particles between the first and the last of `times`.
 fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> {
     let whole = query.times[1] - query.times[0];
     let at = |time: &f64| {
@@ -255,21 +257,21 @@ fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> 
     times[1..times.len() - 1].iter().map(at).collect()
 }
 
-/// A skin and an obstacle, both on their way.
+/// A moving skin and a moving obstacle.
 struct SkinObstaclePair<'a> {
     scene: &'a CollisionScene<'a>,
     query: &'a ContactQuery<'a>,
     skin: &'a BodySkin,
     released: &'a ReleasedElements,
     obstacle: &'a Obstacle,
-    /// Of particles and of the obstacle's points, on their way.
+    /// Swept boxes of the particles and of the obstacle's points.
     boxes: [&'a [Cuboid]; 2],
     body: MovingSurface<'a>,
     still: MovingSurface<'a>,
     rules: ContactRules,
 }
 
-/// Tells what each of `things` meets, in their order, whatever the number of threads; `scratch` is memory to use again.
+/// Collects the contacts of `things` in their order, for any number of threads; `scratch` creates buffers for a task.
 fn collect_in_order<T: Sync, S>(
     things: &[T],
     scratch: impl Fn() -> S + Sync + Send,
@@ -285,16 +287,16 @@ fn collect_in_order<T: Sync, S>(
     out.extend(parts.into_iter().flatten());
 }
 
-/// The places of a point in all poses.
+/// Positions of a point in all poses.
 fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
     path.clear();
     path.extend(poses.iter().map(|pose| DVec3::from(pose[point as usize])));
 }
 
 impl SkinObstaclePair<'_> {
-    /// The skin's vertices against the obstacle's triangles.
+    /// Vertices of the skin against triangles of the obstacle.
     fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
-        // Of where it is at all, as nothing less is at hand; what is not closed has no inside.
+        // A vertex may be inside anywhere within the bounds; only closed obstacles have an inside.
         let (solid, bounds) = (OnceLock::new(), tree.bounds);
         let has_inside = self.obstacle.surface.closed;
         let find_in = |(): &mut (), vertices: &[u32], out: &mut Vec<FoundContact>| {
@@ -320,8 +322,8 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&self.skin.surface.vertices, || (), find_in, out);
     }
 
-    /// The nearest triangle where the way begins, of a vertex within the obstacle's `bounds`; `solid` are its triangles
-    /// then, put where they are once they are asked.
+    /// The closest triangle at the start of the motion, for a vertex within the `bounds` of the obstacle; `solid`
+    /// holds its triangles at that time, built on first use.
     fn starts_inside(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);
         if !swept::overlap(&Cuboid { low: p, high: p }, bounds) {
@@ -336,7 +338,7 @@ impl SkinObstaclePair<'_> {
         Some(ClosestPoint::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
     }
 
-    /// The obstacle's sharp points against the skin's triangles.
+    /// Sharp points of the obstacle against triangles of the skin.
     fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
         let find_in = |(): &mut (), points: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
@@ -361,7 +363,7 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&self.obstacle.sharp_points, || (), find_in, out);
     }
 
-    /// The skin's edges against the obstacle's sharp ones.
+    /// Edges of the skin against sharp edges of the obstacle.
     fn edges(&self, out: &mut Vec<FoundContact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
@@ -383,7 +385,7 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&indices, || (), find_in, out);
     }
 
-    /// A contact of particles with points of the obstacle; none where it would only push into the ground.
+    /// A contact of particles with points of the obstacle; `None` if it would only push into the ground.
     fn contact(
         &self,
         (particles, weights): ([u32; 4], [f64; 4]),
@@ -410,9 +412,9 @@ impl SkinObstaclePair<'_> {
 }
 
 impl CollisionScene<'_> {
-    /// A normal that pushes nothing at `point` below the ground: along it where it would, none where nothing is left.
+    /// The normal, without its downward part if it would push `point` below the ground; `None` if nothing remains.
     fn above_ground(&self, normal: DVec3, point: DVec3, gap: f64) -> Option<DVec3> {
-        /// Share of a normal that is left above the rounding of one straight down.
+        /// Smallest remaining length, above the rounding of a normal straight down.
         const LEFT: f64 = 1e-3;
         let Some(ground) = self.ground else { return Some(normal) };
         let up = DVec3::from(ground.up);

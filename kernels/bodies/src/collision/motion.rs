@@ -1,23 +1,23 @@
-//! How an obstacle moves between the poses it is given: as the rigid body that fits best, and what is left of the way
-//! straight on, in its turning frame.
+//! Motion of an obstacle between given poses: the best-fitting rigid motion, plus linear interpolation of the
+//! remainder in the rotating frame.
 //!
-//! Its middle goes straight, and it turns about it at an even pace by the rotation of least squares (Horn 1987). Promise:
-//! poses are met to the bit, and what turns as a whole keeps its size. Limit: between two poses it turns less than half
-//! a turn; a middle that swings goes by the chord.
+//! The centroid moves linearly, and the mesh rotates about it at a constant rate by the least-squares rotation (Horn
+//! 1987). Poses are met exactly, and a mesh that moves rigidly keeps its shape. Limits: the rotation between two
+//! poses is less than half a turn; a centroid on an arc takes the chord.
 
 use nalgebra::Matrix4;
 use numerics::vector::{DMat3, DVec3};
 
-/// Positions at a share of the frame.
+/// Positions at one time in the frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObstaclePose {
-    /// 0 the frame's start, 1 its end.
+    /// Time, from 0 at the start of the frame to 1 at its end.
     pub share: f64,
-    /// Metres.
+    /// Positions of all points, metres.
     pub positions: Vec<[f64; 3]>,
 }
 
-/// Poses in time and how one becomes the next.
+/// Poses and the motions between them.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
     poses: Vec<ObstaclePose>,
@@ -28,21 +28,21 @@ pub(super) struct Motion {
 struct PoseInterval {
     middles: [DVec3; 2],
     axis: DVec3,
-    /// Radians.
+    /// Rotation angle, radians.
     angle: f64,
-    /// Of the point farthest from the axis, metres.
+    /// Distance of the farthest point from the axis, metres.
     radius: f64,
 }
 
 impl Motion {
-    /// Of poses with rising shares and equally many finite points.
+    /// Of poses at increasing times, all with the same number of finite points.
     pub(super) fn new(poses: &[ObstaclePose]) -> Self {
         let intervals =
             poses.windows(2).map(|pair| PoseInterval::between(&pair[0].positions, &pair[1].positions)).collect();
         Self { poses: poses.to_vec(), intervals }
     }
 
-    /// The span that a share is in, the earlier of two, and how far along it is.
+    /// The interval that contains the time `share` (the earlier of two), and the fraction of it that has passed.
     fn interval(&self, share: f64) -> Option<(usize, f64)> {
         let last = self.intervals.len().checked_sub(1)?;
         let index = self.poses[1..].iter().position(|pose| share <= pose.share).unwrap_or(last);
@@ -50,7 +50,7 @@ impl Motion {
         Some((index, ((share - from) / (to - from)).clamp(0.0, 1.0)))
     }
 
-    /// Where all points are.
+    /// Positions of all points.
     pub(super) fn at(&self, share: f64) -> Vec<[f64; 3]> {
         match self.interval(share) {
             None => self.poses[0].positions.clone(),
@@ -71,7 +71,7 @@ impl Motion {
         }
     }
 
-    /// How fast a point is, metres a frame; before the first pose and after the last it stands still.
+    /// Velocity of a point, metres a frame; 0 before the first pose and after the last.
     pub(super) fn velocity_per_frame(&self, share: f64, point: u32) -> DVec3 {
         let (first, last) = (self.poses[0].share, self.poses[self.poses.len() - 1].share);
         let Some((index, along)) = self.interval(share).filter(|_| first <= share && share <= last) else {
@@ -87,9 +87,10 @@ impl Motion {
         displacement / (self.poses[index + 1].share - self.poses[index].share)
     }
 
-    /// Shares from one of `times` to the other, between which no point leaves the straight line by more than `allowed`.
+    /// Times from the first to the second of `times`, close enough that between them no point deviates from a
+    /// straight line by more than `allowed`.
     pub(super) fn times(&self, times: [f64; 2], allowed: f64) -> Vec<f64> {
-        /// Pieces a span is cut into, at most.
+        /// Largest number of pieces of an interval.
         const MOST: f64 = 16.0;
         let mut out = vec![times[0]];
         for (interval, pair) in self.intervals.iter().zip(self.poses.windows(2)) {
@@ -135,25 +136,25 @@ impl PoseInterval {
         self.angle == 0.0
     }
 
-    /// The turn after a share of the span (Rodrigues).
+    /// Rotation after the fraction `along` of the interval (Rodrigues).
     fn rotation(&self, along: f64) -> DMat3 {
         let (sine, cosine) = libm::sincos(self.angle * along);
         let cross = self.axis.cross_matrix();
         DMat3::identity() + cross * sine + cross * cross * (1.0 - cosine)
     }
 
-    /// A point about the middle, not turned yet.
+    /// Offset of a point from the centroid, before rotation.
     fn offset(&self, back: &DMat3, from: &[f64; 3], to: &[f64; 3], along: f64) -> DVec3 {
         (DVec3::from(*from) - self.middles[0]).lerp(&(back * (DVec3::from(*to) - self.middles[1])), along)
     }
 }
 
-/// The quaternion (cosine first) of the rotation that brings the first points of a spread Σ a bᵀ nearest to the second:
-/// the first eigenvector of Horn's matrix, by Jacobi's rotations; no turn where every one does as well.
+/// Quaternion (cosine first) of the rotation that best maps the first points of a covariance Σ a bᵀ to the second:
+/// the dominant eigenvector of Horn's matrix, by Jacobi rotations. The identity if it fits as well as any other.
 fn best_rotation(spread: &DMat3) -> [f64; 4] {
-    /// Share of the spread by which no turn is preferred: above rounding of what has no width.
+    /// Preference for the identity, as a fraction of the covariance: above the rounding of degenerate point sets.
     const CALM: f64 = 1e-13;
-    /// Sweeps; each squares what is off the diagonal.
+    /// Number of Jacobi sweeps, which converge quadratically.
     const SWEEPS: usize = 12;
     let s = spread;
     let (xx, yy, zz) = (s[(0, 0)], s[(1, 1)], s[(2, 2)]);

@@ -1,4 +1,4 @@
-//! What bodies touch that they do not move: animated meshes, and the ground.
+//! Obstacles: animated meshes, and the ground.
 
 use super::CollisionError;
 use super::motion::{Motion, ObstaclePose};
@@ -7,33 +7,32 @@ use super::swept::Elements;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
 
-/// A mesh that moves through the frame as its poses say, as rigidly as they allow.
+/// A mesh that moves through the frame as its poses prescribe, as rigidly as possible.
 #[derive(Clone, Debug)]
 pub struct Obstacle {
     pub(super) surface: TriangleSurface,
     pub(super) motion: Motion,
-    /// Boxes of triangles, of sharp edges, and which edges those are.
+    /// Swept boxes of triangles and of sharp edges, and the indices of those edges.
     pub(super) faces: Elements<3>,
     pub(super) edges: Elements<2>,
     pub(super) sharp_edges: Vec<u32>,
-    /// Points that a surface does not pass flat through.
+    /// Points where the surface is not flat.
     pub(super) sharp_points: Vec<u32>,
-    /// Its triangles themselves, to look for the nearest.
+    /// Its triangles, for closest-point queries.
     pub(super) solid: TriangleTree,
-    /// Of the frame, seconds.
+    /// Length of the frame, seconds.
     seconds: f64,
-    /// Distance kept from it, metres.
+    /// Distance to keep from it, metres.
     pub(super) thickness: f64,
-    /// Coulomb's μ.
+    /// Coulomb's friction coefficient μ.
     pub(super) friction: f64,
 }
 
 impl Obstacle {
-    /// Of `triangles` of the points that each of `poses` has, in a frame of `seconds`. One pose stands still; shares of
-    /// the frame rise. It keeps bodies `thickness` metres away and rubs with `friction`.
+    /// An obstacle of `triangles` over the points of each of `poses`, in a frame of `seconds`. With one pose it is at
+    /// rest; times of poses must increase. `thickness` is the distance to keep, metres, `friction` Coulomb's μ.
     ///
-    /// # Errors
-    /// Where there is no pose, a triangle names no point, or a number is not finite or below 0.
+    /// # Errors Without a pose, or if a triangle's index is out of range or a number is not finite or negative.
     pub fn new(
         triangles: &[[u32; 3]],
         poses: &[ObstaclePose],
@@ -78,21 +77,20 @@ impl Obstacle {
         })
     }
 
-    /// Whether it has an inside: every edge has two triangles that agree on what is out.
+    /// Whether it has an inside: every edge has two consistently oriented triangles.
     pub fn is_closed(&self) -> bool {
         self.surface.closed
     }
 
-    /// Where its points are at a share of the frame, metres: poses to the bit, between them as the rigid body that fits
-    /// best and what is left straight on.
+    /// Positions of its points at a time in the frame, metres: exact at poses, between them by the best-fitting rigid
+    /// motion and a linear remainder.
     pub fn at(&self, share: f64) -> Vec<[f64; 3]> {
         self.motion.at(share)
     }
 
-    /// How fast it is where a triangle's corners have `weights`, m/s.
+    /// Its velocity at the point of a triangle with barycentric `weights`, m/s.
     ///
-    /// # Panics
-    /// Where there is no such triangle.
+    /// # Panics If there is no such triangle.
     pub fn velocity(&self, share: f64, triangle: u32, weights: [f64; 3]) -> [f64; 3] {
         self.velocity_of(share, &self.surface.triangles[triangle as usize], &weights).into()
     }
@@ -107,16 +105,16 @@ impl Obstacle {
     }
 }
 
-/// A plane that wins over all obstacles.
+/// The ground, a plane that takes precedence over obstacles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// Unit, to its free side.
+    /// Unit normal towards the free side.
     pub up: [f64; 3],
-    /// Of the plane along `up`, metres.
+    /// Distance of the plane from the origin along `up`, metres.
     pub height: f64,
-    /// Distance kept, metres.
+    /// Distance to keep, metres.
     pub thickness: f64,
-    /// Coulomb's μ.
+    /// Coulomb's friction coefficient μ.
     pub friction: f64,
 }
 
@@ -142,9 +140,10 @@ pub(super) fn check_number(what: &'static str, value: f64) -> Result<(), Collisi
     if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(CollisionError::Number { what, value }) }
 }
 
-/// Whether the two triangles of an edge are one plane.
+/// Whether the two triangles at an edge are coplanar.
 fn is_flat(surface: &TriangleSurface, at: &Moment<'_>, edge: u32) -> bool {
-    /// 1 − cosine of the bend: 5e-5 of a radian, above the rounding of f32 meshes, below any bend that is meant.
+    /// 1 − cosine of the angle between them: 5e-5 radians, above the rounding of f32 meshes and below any intended
+    /// angle.
     const BEND: f64 = 1e-9;
     let faces = surface.edges[edge as usize].faces;
     if faces.contains(&NONE) {

@@ -1,4 +1,4 @@
-//! Skins against each other and against themselves.
+//! Contact between bodies, and of a body with itself.
 
 use super::body_skin::BodySkin;
 use super::edge;
@@ -9,32 +9,32 @@ use crate::mass_spring::{Contact, ContactQuery};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
 
-/// How surfaces of bodies touch.
+/// Contact parameters of body surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactParams {
-    /// Distance kept, metres.
+    /// Distance to keep, metres.
     pub thickness: f64,
-    /// Coulomb's μ.
+    /// Coulomb's friction coefficient μ.
     pub friction: f64,
 }
 
-/// Share of the gap below which what is that near at rest belongs together.
+/// Elements nearer than this fraction of the gap at rest are considered joined.
 const JOINED: f64 = 1e-6;
 
-/// Two skins, or one twice, on their way.
+/// Two moving skins, or one with itself.
 struct Pair<'a> {
     scene: &'a CollisionScene<'a>,
     query: &'a ContactQuery<'a>,
-    /// Boxes of particles on their way.
+    /// Swept boxes of the particles.
     points: &'a [Cuboid],
     skins: [&'a BodySkin; 2],
-    /// Whether both are one.
+    /// Whether both skins are the same.
     self_contact: bool,
     params: ContactParams,
     rules: ContactRules,
 }
 
-/// Which particles are around some: those with the number of the last that asked.
+/// Marks the neighbourhood of some particles, by the number of the query that marked them last.
 #[derive(Default)]
 struct Marks {
     of: Vec<u32>,
@@ -58,14 +58,14 @@ impl Marks {
     }
 }
 
-/// Boxes of a skin on its way.
+/// Swept boxes of a skin.
 struct Boxes<'a> {
     faces: BoxTree<'a>,
     edges: BoxTree<'a>,
 }
 
 impl CollisionScene<'_> {
-    /// All pairs of skins, then each with itself.
+    /// All pairs of skins, then each skin with itself.
     pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<FoundContact>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let faces = self.skins.iter().map(|skin| skin.faces.sweep(points, reach));
@@ -103,7 +103,7 @@ impl CollisionScene<'_> {
 }
 
 impl Pair<'_> {
-    /// The first skin's vertices against the second's triangles.
+    /// Vertices of the first skin against triangles of the second.
     fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
@@ -133,7 +133,7 @@ impl Pair<'_> {
         collect_in_order(&first.surface.vertices, Marks::default, find_in, out);
     }
 
-    /// The first skin's edges against the second's.
+    /// Edges of the first skin against those of the second.
     fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
@@ -162,7 +162,7 @@ impl Pair<'_> {
         collect_in_order(&indices, Marks::default, find_in, out);
     }
 
-    /// The gap of a pair: no more than how far it is apart `at_rest`, where both are of one body.
+    /// The gap of a pair; for elements of the same skin at most their distance at rest.
     fn gap(&self, at_rest: impl FnOnce() -> f64) -> f64 {
         if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
     }

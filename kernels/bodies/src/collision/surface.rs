@@ -1,7 +1,7 @@
-//! What hangs together in a surface of triangles: edges, neighbours, and which way is out.
+//! Connectivity of a triangle surface: edges, neighbours, orientation.
 //!
-//! Positions are given at each call, so that one surface serves every pose. An edge with more than two triangles keeps
-//! the first two.
+//! Positions are passed to each call, so that one surface serves all poses. An edge with more than two triangles
+//! keeps the first two.
 
 use super::closest_point::ClosestPoint;
 use numerics::vector::DVec3;
@@ -9,51 +9,51 @@ use numerics::vector::DVec3;
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Triangles and what joins them; a triangle that names a point twice has no part in it.
+/// Triangles and their connectivity; degenerate triangles, which use a point twice, have no edges.
 #[derive(Clone, Debug)]
 pub(super) struct TriangleSurface {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) edges: Vec<Edge>,
-    /// The edges of each triangle, from its corner k to k + 1.
+    /// Edges of each triangle, from corner k to k + 1.
     sides: Vec<[u32; 3]>,
     /// Edges at each point.
     starts: Vec<u32>,
     around: Vec<u32>,
-    /// The points that triangles have, rising.
+    /// Points used by triangles, ascending.
     pub(super) vertices: Vec<u32>,
-    /// Whether every edge has two triangles, which agree on what is out.
+    /// Whether every edge has two consistently oriented triangles.
     pub(super) closed: bool,
 }
 
-/// Where two triangles meet, or one ends.
+/// An edge of one or two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Edge {
     pub(super) ends: [u32; 2],
-    /// [`NONE`] for the second where there is one.
+    /// Its triangles; the second is [`NONE`] on a boundary.
     pub(super) faces: [u32; 2],
-    /// Their third corners.
+    /// The corners of these triangles that are not on the edge.
     pub(super) opposite: [u32; 2],
 }
 
 /// Positions of points, metres.
 pub(super) type Positions<'a> = &'a [[f64; 3]];
 
-/// Positions somewhere on the straight way from one pose to another.
+/// Positions at a time between two poses, with linear motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moment<'a> {
     pub(super) from: Positions<'a>,
     pub(super) to: Positions<'a>,
-    /// Of the way.
+    /// Fraction of the time from the first to the second.
     pub(super) share: f64,
 }
 
 impl<'a> Moment<'a> {
-    /// A pose itself.
+    /// Exactly one pose.
     pub(super) fn of(pose: Positions<'a>) -> Self {
         Self { from: pose, to: pose, share: 1.0 }
     }
 
-    /// Where a point is.
+    /// Position of a point.
     #[inline(always)]
     pub(super) fn position(&self, point: u32) -> DVec3 {
         let to = DVec3::from(self.to[point as usize]);
@@ -62,7 +62,7 @@ impl<'a> Moment<'a> {
 }
 
 impl TriangleSurface {
-    /// Of `triangles` of `points` points, all of which exist.
+    /// Connectivity of `triangles` over `points` points; indices must be in range.
     pub(super) fn new(points: usize, triangles: &[[u32; 3]]) -> Self {
         let mut halves: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(3 * triangles.len());
         for (face, corners) in (0u32..).zip(triangles).filter(|(_, [a, b, c])| a != b && b != c && c != a) {
@@ -117,7 +117,7 @@ impl TriangleSurface {
         self.around = around;
     }
 
-    /// The edges at a point.
+    /// Edges at a point.
     pub(super) fn edges_at(&self, point: u32) -> impl Iterator<Item = &Edge> {
         let range = self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize;
         self.around[range].iter().map(|edge| &self.edges[*edge as usize])
@@ -129,7 +129,7 @@ impl TriangleSurface {
         [at.position(a), at.position(b), at.position(c)]
     }
 
-    /// Unit; none where there is no area.
+    /// Unit normal; `None` for a triangle without area.
     pub(super) fn normal(&self, at: &Moment<'_>, face: u32) -> Option<DVec3> {
         let [a, b, c] = self.corners(at, face);
         let (ab, ac) = (b - a, c - a);
@@ -138,14 +138,14 @@ impl TriangleSurface {
         (length > 1e-12 * ab.norm() * ac.norm()).then(|| normal / length)
     }
 
-    /// The triangle across the side that faces corner `k`.
+    /// The triangle across the side opposite to corner `k`.
     pub(super) fn across(&self, face: u32, k: usize) -> Option<u32> {
         let edge = *self.edges.get(self.sides[face as usize][(k + 1) % 3] as usize)?;
         edge.faces.into_iter().find(|other| *other != face && *other != NONE)
     }
 
-    /// Which way is out at a point of a triangle: the angle-weighted mean of the triangles there (Bærentzen & Aanæs
-    /// 2005), so that its side is that of any point to which this one is the nearest.
+    /// Outward direction at a point of a triangle: the angle-weighted mean of the adjacent normals (Bærentzen & Aanæs
+    /// 2005), which gives the correct side for any point that has this one as its closest.
     pub(super) fn outward(&self, at: &Moment<'_>, nearest: &ClosestPoint) -> DVec3 {
         let corners = self.triangles[nearest.face as usize];
         let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
@@ -171,9 +171,9 @@ impl TriangleSurface {
         }
     }
 
-    /// Whether no triangle around is nearer than `nearest` to a point that is `away` from it.
+    /// Whether no adjacent triangle is nearer than `nearest` to a point at the offset `away` from it.
     pub(super) fn is_nearest_around(&self, at: &Moment<'_>, nearest: &ClosestPoint, away: &DVec3) -> bool {
-        /// Sine of the angle by which it may lie on a neighbour's side: above rounding, below any real one.
+        /// Sine of the angle that is tolerated on a neighbour's side: above rounding, below any intended angle.
         const SLACK: f64 = 1e-9;
         let corners = self.triangles[nearest.face as usize];
         let length = away.norm();
@@ -193,12 +193,12 @@ impl TriangleSurface {
         }
     }
 
-    /// Goes from triangle to triangle, over edges that bend little, to one that has `point` above or below it: the plane
-    /// that is the surface for a point that slid on from where it came through.
+    /// Walks across nearly flat edges to the triangle whose projection contains `point`: the contact plane of a point
+    /// that slid on from where it crossed the surface.
     pub(super) fn walk_to(&self, at: &Moment<'_>, face: u32, point: DVec3) -> Settled {
-        /// Triangles passed, at most.
+        /// Largest number of triangles passed.
         const MOST: usize = 64;
-        /// Cosine of the angle at an edge beyond which the other triangle is another side.
+        /// Cosine of the angle at an edge beyond which the next triangle belongs to another side.
         const BEND: f64 = 0.5;
         let (mut face, mut before) = (face, NONE);
         let mut normal = self.normal(at, face);
@@ -219,20 +219,20 @@ impl TriangleSurface {
     }
 }
 
-/// Where [`Surface::settle`] came to.
+/// Result of [`TriangleSurface::walk_to`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Settled {
     pub(super) nearest: ClosestPoint,
     pub(super) normal: Option<DVec3>,
 }
 
-/// Which part of a triangle a point of it is on.
+/// Part of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Feature {
-    /// Within.
+    /// Its interior.
     Inside,
-    /// On the side that faces this corner.
+    /// The side opposite to this corner.
     Side(usize),
-    /// On this corner.
+    /// This corner.
     Corner(usize),
 }

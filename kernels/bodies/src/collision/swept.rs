@@ -1,4 +1,4 @@
-//! Boxes around what moves, in a tree sixteen wide, f32, rounded outwards: nothing that may meet is left out.
+//! Bounding boxes of moving elements in a tree sixteen wide, in f32, rounded outwards so that no overlap is missed.
 
 use super::surface::Positions;
 use numerics::lanes::{F32x16, LANES, set};
@@ -7,33 +7,34 @@ use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
 use numerics::vector::Vec3;
 use rayon::prelude::*;
 
-/// Levels that 2³² elements need, at most.
+/// Largest number of levels, enough for 2³² elements.
 const MOST_LEVELS: usize = 8;
 
-/// Elements of N points each, sixteen that are near each other side by side.
+/// Elements of N points each, in groups of sixteen neighbours.
 #[derive(Clone, Debug)]
 pub(super) struct Elements<const N: usize> {
     points: Vec<[u32; N]>,
-    /// Which element each lane is; [`NONE`] for none.
+    /// Index of the element in each lane; [`NONE`] in unused ones.
     order: Vec<[u32; LANES]>,
 }
 
-/// Their boxes on some way; of the box on lane l of row r the children are the row 16r + l one level down.
+/// Swept boxes of elements. The children of the box in lane l of row r are row 16r + l of the level below.
 #[derive(Clone, Debug)]
 pub(super) struct BoxTree<'a> {
     order: &'a [[u32; LANES]],
     levels: Vec<Vec<Boxes>>,
-    /// Around all.
+    /// Bounds of everything.
     pub(super) bounds: Cuboid,
 }
 
-/// Meets nothing.
+/// A box that overlaps nothing.
 const NOWHERE: Cuboid = Cuboid { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
 impl<const N: usize> Elements<N> {
-    /// Of elements that are about where they are in `pose`.
+    /// Groups elements by their positions in `pose`.
     pub(super) fn new(points: Vec<[u32; N]>, pose: Positions<'_>) -> Self {
-        // A triangle without area from the lowest to the highest corner of each, sorted by the tree of triangles.
+        // Each element becomes a degenerate triangle from its lowest to its highest corner, which the triangle tree
+        // can sort.
         let boxes: Vec<Cuboid> = pose.iter().map(box_of).collect();
         let corners: Vec<Vec3> =
             points.iter().map(|element| bounds_of(element, &boxes)).flat_map(|own| [own.low, own.high]).collect();
@@ -42,7 +43,7 @@ impl<const N: usize> Elements<N> {
         Self { order: tree.blocks().iter().map(|block| block.triangle).collect(), points }
     }
 
-    /// Their boxes around the boxes of their points, wider by `reach`.
+    /// The boxes of all elements, given those of their points, inflated by `reach`.
     pub(super) fn sweep(&self, boxes: &[Cuboid], reach: f64) -> BoxTree<'_> {
         let own = |element: u32| inflated(&bounds_of(&self.points[element as usize], boxes), reach);
         let leaf =
@@ -58,7 +59,7 @@ impl<const N: usize> Elements<N> {
     }
 }
 
-/// Up to sixteen boxes side by side; those of NaN are nowhere.
+/// Up to sixteen boxes as lanes; boxes of NaN overlap nothing.
 fn row(boxes: impl Iterator<Item = Cuboid>) -> Boxes {
     let mut out = Boxes { low: NOWHERE.low.map(F32x16::splat), high: NOWHERE.high.map(F32x16::splat) };
     for (lane, own) in boxes.enumerate().filter(|own| !own.1.low[0].is_nan()) {
@@ -68,7 +69,7 @@ fn row(boxes: impl Iterator<Item = Cuboid>) -> Boxes {
     out
 }
 
-/// The box around sixteen.
+/// Bounds of sixteen boxes.
 fn bounds(boxes: &Boxes) -> Cuboid {
     let mut out = NOWHERE;
     for axis in 0..3 {
@@ -80,14 +81,14 @@ fn bounds(boxes: &Boxes) -> Cuboid {
     out
 }
 
-/// The box of each point in all poses.
+/// The box of each point over all poses.
 pub(super) fn swept_boxes(poses: &[Positions<'_>]) -> Vec<Cuboid> {
     let (first, others) = poses.split_first().map_or((&[][..], &[][..]), |(first, others)| (*first, others));
     let of = |point: usize| others.iter().fold(box_of(&first[point]), |own, pose| join(&own, &box_of(&pose[point])));
     (0..first.len()).into_par_iter().with_min_len(1024).map(of).collect()
 }
 
-/// The box of NaN, which meets nothing, where a point is not finite.
+/// The box of a point; of NaN, which overlaps nothing, if the point is not finite.
 fn box_of(p: &[f64; 3]) -> Cuboid {
     if !(p[0] + p[1] + p[2]).is_finite() {
         return Cuboid { low: [f32::NAN; 3], high: [f32::NAN; 3] };
@@ -95,7 +96,7 @@ fn box_of(p: &[f64; 3]) -> Cuboid {
     Cuboid { low: [below(p[0]), below(p[1]), below(p[2])], high: [-below(-p[0]), -below(-p[1]), -below(-p[2])] }
 }
 
-/// The box around two; of NaN where one is.
+/// Bounds of two boxes; of NaN if one is.
 #[inline(always)]
 fn join(a: &Cuboid, b: &Cuboid) -> Cuboid {
     if b.low[0].is_nan() {
@@ -109,14 +110,14 @@ fn join(a: &Cuboid, b: &Cuboid) -> Cuboid {
     out
 }
 
-/// The box around the boxes of some points.
+/// Bounds of the boxes of some points.
 #[inline]
 pub(super) fn bounds_of(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
     let first = boxes[points[0] as usize];
     points[1..].iter().fold(first, |all, point| join(&all, &boxes[*point as usize]))
 }
 
-/// A box wider by `reach` on every side.
+/// A box inflated by `reach` on every side.
 #[inline]
 pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
     let mut out = *a;
@@ -127,19 +128,19 @@ pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
     out
 }
 
-/// The largest f32 that is not above.
+/// The largest f32 that is not greater.
 fn below(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) > x { near.next_down() } else { near }
 }
 
-/// Whether two boxes have a point in common.
+/// Whether two boxes overlap.
 pub(super) fn overlap(a: &Cuboid, b: &Cuboid) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
 impl BoxTree<'_> {
-    /// Elements whose boxes meet `region`, rising.
+    /// Elements whose boxes overlap `region`, ascending.
     pub(super) fn overlapping(&self, region: &Cuboid, out: &mut Vec<u32>) {
         out.clear();
         if overlap(region, &self.bounds) {

@@ -1,19 +1,19 @@
-//! A point on its way against the triangles of a surface on its own: where it went through, what it is near to.
+//! A moving point against the triangles of a moving surface: crossings and proximity.
 //!
-//! What counts is the side it came from. A closed surface is only ever entered from outside; an open one has two sides.
-//! After the first triangle it goes through, only that is what it meets: what else it was near to is judged there.
+//! What decides is the side the point came from. A closed surface can only be entered from outside; an open one has
+//! two sides. After the first crossing only that triangle counts; other triangles are judged at that time.
 
 use super::closest_point::ClosestPoint;
 use super::coplanarity::{Separation, face_separation, sign_changes};
 use super::surface::{Moment, Positions, Settled, TriangleSurface};
 use numerics::vector::DVec3;
 
-/// Share of the lengths involved within which a point is on a triangle's plane: above rounding.
+/// Distance from a triangle's plane at which a point lies on it, relative to the lengths involved: above rounding.
 pub(super) const ON: f64 = 1e-9;
-/// Gaps that a point which starts inside is pushed out by, at most.
+/// Largest distance by which a point that starts inside is pushed out, in gaps.
 const PUSH: f64 = 10.0;
 
-/// A surface on its way: its poses at a few times, straight between.
+/// A moving surface: poses at some times, with linear motion between them.
 #[derive(Clone, Copy)]
 pub(super) struct MovingSurface<'a> {
     pub(super) surface: &'a TriangleSurface,
@@ -29,40 +29,40 @@ impl<'a> MovingSurface<'a> {
         Moment::of(self.poses[self.poses.len() - 1])
     }
 
-    /// `time` counts poses.
+    /// Positions at a time that counts poses.
     pub(super) fn moment(&self, time: f64) -> Moment<'a> {
         let piece = (time as usize).min(self.poses.len() - 2);
         Moment { from: self.poses[piece], to: self.poses[piece + 1], share: time - piece as f64 }
     }
 }
 
-/// How far things count, and which sides there are.
+/// Which distances and sides count.
 #[derive(Clone, Copy)]
 pub(super) struct ContactRules {
-    /// Distance kept.
+    /// Distance to keep.
     pub(super) gap: f64,
-    /// What comes nearer counts.
+    /// Distance at which elements count as close.
     pub(super) reach: f64,
-    /// Whether what starts inside is pushed out by the nearest triangle.
+    /// Whether points that start inside are pushed out through the closest triangle.
     pub(super) push: bool,
 }
 
-/// A point that may touch a triangle.
+/// A point and a triangle that may be in contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
     pub(super) face: u32,
-    /// Of the triangle's corners.
+    /// Barycentric weights in the triangle.
     pub(super) weights: [f64; 3],
-    /// Unit, from the triangle to the point, at the end of the way.
+    /// Unit normal from the triangle to the point, at the end of the motion.
     pub(super) normal: DVec3,
-    /// How much deeper than the triangle's plane it may stay.
+    /// Depth below the triangle's plane that is allowed for now.
     pub(super) shift: f64,
     /// Distance at the end.
     clearance: f64,
 }
 
-/// Adds what the point on `path` (as many places as there are poses) meets among `faces`, which rise; `sunk` is the
-/// nearest triangle at the start where none of them is near then and the point may be inside.
+/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending. `sunk` finds
+/// the closest triangle at the start, for a point that may start inside and has no triangle close to it.
 pub(super) fn hits(
     path: &[DVec3],
     on: &MovingSurface<'_>,
@@ -108,7 +108,7 @@ pub(super) fn hits(
     let here = point_at(path, met);
     for face in &near {
         let nearest = ClosestPoint::on(*face, here, surface.corners(&at, *face));
-        // What it goes through then is its contact already.
+        // The triangle it crosses at that time already is a contact.
         let least = if !through.is_empty() { 1e-6 * rules.reach } else { 0.0 };
         if nearest.distance <= rules.reach && nearest.distance >= least {
             out.extend(close(surface, &at, &on.end(), nearest, here, end));
@@ -138,18 +138,18 @@ fn point_at(path: &[DVec3], time: f64) -> DVec3 {
     path[piece].lerp(&path[piece + 1], time - piece as f64)
 }
 
-/// Whether a point is inside, seen from its nearest of a closed surface.
+/// Whether a point is inside a closed surface, given its closest point there.
 fn is_behind(surface: &TriangleSurface, at: &Moment<'_>, nearest: &ClosestPoint, point: DVec3) -> bool {
     surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
 }
 
-/// What a point may do with a triangle on its way.
+/// What a point does with a triangle during the motion.
 enum Approach {
-    /// Does not come near.
+    /// Stays away.
     Far,
-    /// May come near.
+    /// May come close.
     Near,
-    /// Goes through it then, first, from above or not; where closed, into it.
+    /// Crosses it, first at this time, and whether from above; for closed surfaces only inwards.
     Crosses(f64, bool),
 }
 
@@ -180,7 +180,8 @@ fn crossing(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> Ap
     if far { Approach::Far } else { Approach::Near }
 }
 
-/// The hit on a triangle that a point `here` is near to, where it is the nearest around; told for the end of the way.
+/// The contact of a point at `here` with a triangle close to it, if no adjacent triangle is closer; given for the end
+/// of the motion.
 fn close(
     surface: &TriangleSurface,
     at: &Moment<'_>,
@@ -213,10 +214,10 @@ fn close(
     Some(Hit { face, weights: nearest.weights, normal, shift: 0.0, clearance: normal.dot(&(end - point)) })
 }
 
-/// Whether the point comes nearer than `reach` to a triangle: on by what is left of the way at their top speed, which
-/// leaps over nothing.
+/// Whether the point comes closer than `reach` to a triangle, by conservative advancement: steps as long as the
+/// remaining distance at the top speed allows.
 fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> bool {
-    /// Steps a piece; what is not decided by then counts.
+    /// Largest number of steps in an interval; undecided cases count as close.
     const MOST: usize = 64;
     for piece in 0..path.len() - 1 {
         let corners = |pose: usize| on.surface.corners(&Moment::of(on.poses[pose]), face);
@@ -231,7 +232,7 @@ fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> 
                 return true;
             }
             time += (distance - reach) / speed;
-            // Without speed it is infinitely late.
+            // Without relative motion the time is infinite.
             if time > 1.0 || time.is_nan() {
                 decided = true;
                 break;
@@ -244,11 +245,11 @@ fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> 
     false
 }
 
-/// Of hits from `first` on whose normals are about the same the deepest; a few; by triangle.
+/// Of contacts from `first` on with similar normals keeps the deepest, and only a few in all, ordered by triangle.
 fn merge(hits: &mut Vec<Hit>, first: usize) {
-    /// Cosine of the angle within which normals are of one smooth region.
+    /// Cosine of the angle within which normals are similar.
     const SAME: f64 = 0.99;
-    /// Contacts a point has with one surface, at most.
+    /// Largest number of contacts of a point with one surface.
     const MOST: usize = 4;
     let mut mine: Vec<Hit> = hits.drain(first..).collect();
     mine.sort_by(|a, b| a.clearance.total_cmp(&b.clearance).then(a.face.cmp(&b.face)));

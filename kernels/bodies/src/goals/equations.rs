@@ -1,31 +1,32 @@
-//! The forces between points of a body: linear finite elements on its tets, one row a free point.
+//! Linear finite elements on the tets of a body: one equation for each free point.
 //!
-//! Corner k of a tet of volume V lies across from a face whose outward normal nₖ is twice its area long, and its hat has
-//! the gradient −nₖ ÷ 6V. So corners k and l are joined by the weight −nₖ·nₗ ÷ 36 V, and the weights on a tet are the
-//! products of one vector a corner: their matrix has no negative eigenvalue, whatever the volume is taken to be.
+//! The hat function of corner k of a tet of volume V has the gradient −nₖ ÷ 6V, where nₖ is the outward normal of the
+//! opposite face, twice its area long. Corners k and l are therefore coupled with the weight −nₖ·nₗ ÷ 36 V. As the
+//! weights of a tet are products of one vector for each corner, their matrix is positive semi-definite whatever
+//! volume is used.
 
 use super::FLAT;
 use numerics::vector::{DVec3, Vec3, to_f64};
 use rayon::prelude::*;
 
-/// Rows that a thread takes at a time.
+/// Rows of a parallel task.
 pub(super) const CHUNK: usize = 1024;
 
-/// Symmetric, none of its eigenvalues negative.
+/// A positive semi-definite sparse system.
 pub(super) struct Equations {
-    /// The row of each point that is free.
+    /// Row of each free point.
     pub(super) free: Vec<Option<u32>>,
-    /// First entry of each row, and the number of entries.
+    /// Start of each row's entries, and their number at the end.
     starts: Vec<u32>,
-    /// Row at the other end, and its weight.
+    /// Column and weight of each entry.
     entries: Vec<(u32, f64)>,
     pub(super) diagonal: Vec<f64>,
-    /// What held points exert on each row.
+    /// Contribution of fixed points to each row.
     pub(super) forces: Vec<DVec3>,
 }
 
 impl Equations {
-    /// Of points that are moved by `held_by` or free.
+    /// For points that have prescribed displacements `held_by` or are free.
     pub(super) fn of(points: &[Vec3], tets: &[[u32; 4]], held_by: &[Option<DVec3>]) -> Self {
         let mut rows = 0_u32;
         let number = |held: &Option<DVec3>| {
@@ -80,7 +81,7 @@ impl Equations {
     }
 }
 
-/// Weights of the edges with a free end, each edge once, sorted; those of its tets are added up in their order.
+/// Weights of the edges with a free end, sorted; those of an edge's tets are summed in order.
 fn edges(points: &[Vec3], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
     const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     let of_tet = |tet: &[u32; 4]| {
@@ -100,13 +101,13 @@ fn edges(points: &[Vec3], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32;
     edges
 }
 
-/// What joins the corners of a tet, two by two; 0 where all lie on one spot.
+/// Weights between the corners of a tet; 0 if they all coincide.
 fn weights(corners: &[Vec3; 4]) -> [[f64; 4]; 4] {
     let edge = longest_edge(corners);
     if edge == 0.0 {
         return [[0.0; 4]; 4];
     }
-    // A unit of an edge, so that no power of a length is too small or too large.
+    // In units of the longest edge, so that no power of a length over- or underflows.
     let [a, b, c, d] = corners.map(|p| (to_f64(p) - to_f64(corners[0])) / edge);
     let normals = [(d - b).cross(&(c - b)), (c - a).cross(&(d - a)), (d - a).cross(&(b - a)), (b - a).cross(&(c - a))];
     let six_volumes = (b - a).dot(&normals[1]).abs().max(FLAT);
@@ -114,7 +115,7 @@ fn weights(corners: &[Vec3; 4]) -> [[f64; 4]; 4] {
     std::array::from_fn(|k| std::array::from_fn(|l| weight(k, l)))
 }
 
-/// The length of a tet's longest edge.
+/// Length of the longest edge of a tet.
 pub(super) fn longest_edge(corners: &[Vec3; 4]) -> f64 {
     let wide = corners.map(to_f64);
     let mut longest = 0.0_f64;
@@ -132,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_corner_of_a_cube_is_joined_by_a_sixth_to_each_side_and_those_not_to_each_other() {
-        // Gradients of the hats: (−1, −1, −1), x, y, z; volume 1/6. Size 2 doubles it.
+        // Gradients of the hat functions: (−1, −1, −1), x, y, z; volume 1/6. Size 2 doubles it.
         let corners = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
         let weights = weights(&corners);
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");

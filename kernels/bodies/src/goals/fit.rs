@@ -1,36 +1,37 @@
-//! The affine map that brings the held points of a piece nearest to where they belong.
+//! The affine map that best fits the motion of the fixed points of a piece.
 
 use super::{ConnectedPieces, HeldBody, target};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
-/// Of the trace of the held points' scatter: in directions thinner than this share's root, a fit follows the rest shape.
-/// Squared coordinates keep 16 digits, so what is above is known to 4; what is taken off too little, the solve does.
+/// Regularisation relative to the trace of the covariance: in directions that are thinner than its square root the
+/// fit follows the rest shape. Squares have 16 digits, so anything thicker is known to 4; whatever the fit misses is
+/// solved for.
 const THIN: f64 = 1e-12;
 
 /// An affine map.
 pub(super) struct Affine {
     from: DVec3,
     to: DVec3,
-    /// The linear part less the identity.
+    /// The linear part minus the identity.
     stretch: DMat3,
     rests: bool,
 }
 
-/// Sums over the held points of a piece.
+/// Sums over the fixed points of a piece.
 #[derive(Clone, Default)]
 struct Sums {
     count: f64,
     rest: DVec3,
     goal: DVec3,
     moved: bool,
-    /// Rest · restᵀ, from the middles.
+    /// Σ rest · restᵀ about the centroids.
     scatter: DMat3,
-    /// (Goal − rest) · restᵀ, from the middles.
+    /// Σ (goal − rest) · restᵀ about the centroids.
     change: DMat3,
 }
 
 impl Affine {
-    /// One a piece; none where nothing of it is held.
+    /// One for each piece; `None` if the piece has no fixed point.
     pub(super) fn of_pieces(held: &HeldBody<'_>, pieces: &ConnectedPieces) -> Vec<Option<Self>> {
         let mut sums = vec![Sums::default(); pieces.count];
         let held_points = || {
@@ -70,12 +71,12 @@ impl Affine {
         Self { from: sums.rest, to: sums.goal, stretch, rests: !sums.moved }
     }
 
-    /// Whether all held points are where they were at rest.
+    /// Whether all fixed points are at their rest positions.
     pub(super) fn rests(&self) -> bool {
         self.rests
     }
 
-    /// Where it brings a point.
+    /// Image of a point.
     pub(super) fn map(&self, rest: Vec3) -> DVec3 {
         let rest = to_f64(rest);
         if self.rests {

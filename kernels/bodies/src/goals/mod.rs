@@ -1,16 +1,16 @@
-//! Where the inside of a body belongs when its surface is brought into another shape.
+//! Goal shapes: the interior of a body for a given shape of its surface.
 //!
-//! The surface is held at the shape and the inside takes its static equilibrium: each coordinate the least Dirichlet energy
-//! of linear finite elements on the tets at rest (cotangent weights). Those have linear precision: the inside of a body
-//! whose surface is moved by an affine map moves by that map, however its tets lie. Springs of weight E·ΣV ÷ L² have not,
-//! and leave on any unstructured mesh a grain of its own in the goal; so they are for the motion, not for the goal. What is
-//! affine in the motion of each body is taken off first, so that turns and stretches cost no step and lose no digit.
+//! The surface is fixed to the shape and the interior takes its static equilibrium: each coordinate minimises the
+//! Dirichlet energy of linear finite elements on the rest tets (cotangent weights). These reproduce linear functions,
+//! so if the surface moves by an affine map, the interior moves by the same map on any mesh. Springs of weight E·ΣV ÷
+//! L² do not, and would imprint the mesh on the goal; they are used for the motion, not for goals. The affine part of
+//! each piece's motion is removed first, so that it costs no iterations and no precision.
 //!
-//! Promise: affine maps to the rounding of f32; a body whose surface is not moved keeps its bits; pieces of a body that
-//! hang together are solved as if they were alone; finite for any finite points; the same bits on any number of threads.
-//! Limits: harmonic maps can fold where a shape is far from convex, and [`Goal::inverted`] tells; a tet flatter than
-//! [`FLAT`] at rest counts as if it were so thick, which costs linear precision about as much as that share; tets inside
-//! out at rest cost it. Metres.
+//! Guarantees: affine maps are exact to f32 rounding; a body whose surface does not move keeps its bits; connected
+//! pieces are independent of each other; results are finite for any finite points, with the same bits for any number
+//! of threads. Limits: harmonic maps can fold where a shape is far from convex, which [`GoalShape::inverted`]
+//! reports; a tet flatter than [`FLAT`] at rest is treated as if it were that thick, which costs about that much
+//! linear precision; tets that are inverted at rest cost it too. Metres.
 
 mod equations;
 mod fit;
@@ -26,50 +26,50 @@ use solve::solve;
 
 pub use solve::GoalLimits;
 
-/// Of the cube of a tet's longest edge, a sixth of it: what is flatter has no say in volumes, and no more weight than
-/// this gives it. The rounding of f32 moves a point by 1e-7 of a body, so by 1e-5 of an edge of one in a hundred.
+/// Six times the volume of a tet ÷ the cube of its longest edge: flatter tets count neither in volumes nor with more
+/// than this thickness in weights. Rounding of f32 moves points by 1e-7 of the body, 1e-5 of an edge that is a
+/// hundredth of it.
 pub const FLAT: f64 = 1e-6;
 
-/// A body at rest, and which of its points are held where.
+/// A body at rest and the target of its surface.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldBody<'a> {
-    /// Positions at rest.
+    /// Rest positions.
     pub points: &'a [[f32; 3]],
-    /// Four points each.
+    /// Corners of each tet.
     pub tets: &'a [[u32; 4]],
-    /// Which row of `shape` each point is brought to; below 0 it is free. One a point.
+    /// For each point its row in `shape`; negative for free points.
     pub rows: &'a [i32],
-    /// Where the surface belongs.
+    /// Target positions of the surface.
     pub shape: &'a [[f32; 3]],
 }
 
-/// The body in its goal shape, and what was reached.
+/// A goal shape, with measures of its quality.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoalShape {
-    /// One point for every one at rest.
+    /// Positions of all points.
     pub points: Vec<[f32; 3]>,
-    /// Steps of conjugate gradients.
+    /// Iterations of conjugate gradients.
     pub steps: usize,
-    /// What is left of the forces on free points, as a share of what the surface exerts on them.
+    /// Remaining force on free points, relative to that of the surface on them.
     pub residual: f64,
-    /// Tets that are inside out or flat there and were neither at rest.
+    /// Tets that are inverted or flat in the goal, but not at rest.
     pub inverted: usize,
-    /// Free points of pieces that are held nowhere, or in no tet: they stay.
+    /// Free points of pieces without fixed points, or in no tet: they stay.
     pub loose: usize,
-    /// Volume of all tets there, as a share of that at rest; none where they have none at rest.
+    /// Volume ÷ rest volume; `None` without a rest volume.
     pub volume_ratio: Option<f64>,
 }
 
-/// Brings a body into a shape.
+/// Computes the goal shape.
 ///
-/// # Panics
-/// Where a tet has a corner that is no point, a point has no row, or a row is not of the shape.
+/// # Panics If an index is out of range or a point has no row.
 pub fn goal_shape(held: &HeldBody<'_>, limits: GoalLimits) -> GoalShape {
     let pieces = ConnectedPieces::of(held.points.len(), held.tets);
     let fits = Affine::of_pieces(held, &pieces);
     let mut loose = 0;
-    // The affine part of each point's place; what is held differs from it by `held_by`.
+    // Affine part of each position; fixed points differ from it by `held_by`.
     let mut positions: Vec<DVec3> = Vec::with_capacity(held.points.len());
     let mut held_by: Vec<Option<DVec3>> = Vec::with_capacity(held.points.len());
     for (point, rest) in held.points.iter().enumerate() {
@@ -79,7 +79,7 @@ pub fn goal_shape(held: &HeldBody<'_>, limits: GoalLimits) -> GoalShape {
         loose += usize::from(target.is_none() && fit.is_none());
         held_by.push(match target {
             Some(target) => Some(to_f64(target) - position),
-            // Nothing pulls where the surface rests, or nothing is held.
+            // Nothing moves if the surface is at rest, or if no point is fixed.
             None if fit.as_ref().is_none_or(Affine::rests) => Some(DVec3::zeros()),
             None => None,
         });
@@ -102,12 +102,12 @@ pub fn goal_shape(held: &HeldBody<'_>, limits: GoalLimits) -> GoalShape {
     GoalShape { points, steps: solved.steps, residual: solved.residual, inverted, loose, volume_ratio }
 }
 
-/// Where a point is held.
+/// Target of a fixed point.
 fn target(held: &HeldBody<'_>, point: usize) -> Option<[f32; 3]> {
     usize::try_from(held.rows[point]).ok().map(|row| held.shape[row])
 }
 
-/// Tets that were upright at rest and are not in `points`.
+/// Tets that are upright at rest and inverted or flat in `points`.
 fn inverted(held: &HeldBody<'_>, points: &[[f32; 3]]) -> usize {
     let corners = |points: &[[f32; 3]], tet: &[u32; 4]| tet.map(|corner| points[corner as usize]);
     let upright = |tet: &&[u32; 4]| {

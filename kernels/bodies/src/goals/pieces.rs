@@ -1,15 +1,15 @@
-//! Which points of a body hang together.
+//! Connected components of a body.
 
-/// Pieces of a body, numbered by their first points.
+/// Connected components, numbered by their lowest points.
 pub(super) struct ConnectedPieces {
     pub(super) count: usize,
-    /// The piece of each point; a point in no tet is one by itself.
+    /// Component of each point; a point in no tet is one of its own.
     pub(super) of_point: Vec<u32>,
 }
 
 impl ConnectedPieces {
     pub(super) fn of(points: usize, tets: &[[u32; 4]]) -> Self {
-        // A point's entry leads to a point before it in its piece, and that of the first to itself.
+        // Union-find: each entry leads to a lower point of the component, that of the lowest to itself.
         let mut towards: Vec<u32> = (0..points as u32).collect();
         for [a, rest @ ..] in tets {
             for b in rest {
@@ -28,7 +28,7 @@ impl ConnectedPieces {
     }
 }
 
-/// The first point of a piece; halves the way there.
+/// The lowest point of a component; halves the path.
 fn first(towards: &mut [u32], mut point: u32) -> u32 {
     while towards[point as usize] != point {
         let next = towards[towards[point as usize] as usize];

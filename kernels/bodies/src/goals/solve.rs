@@ -1,36 +1,35 @@
-//! Conjugate gradients, three coordinates at a time.
+//! Conjugate gradients for three right-hand sides, one for each coordinate.
 
 use super::equations::{CHUNK, Equations};
 use numerics::vector::DVec3;
 use rayon::prelude::*;
 
-/// When a solve may stop, and when it must.
+/// Stopping criteria.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalLimits {
-    /// Share of the forces that may be left.
+    /// Final ÷ initial residual.
     pub relative: f64,
-    /// Most steps.
+    /// Maximum number of iterations.
     pub steps: usize,
 }
 
 impl Default for GoalLimits {
-    /// Below the rounding of f32 for any body: what is left of a place is at most the condition (1e5 for a body a hundred
-    /// points across) times this.
+    /// Below f32 rounding for any body: the error of a position is at most this times the condition number, 1e5 for a
+    /// body a hundred points across.
     fn default() -> Self {
         Self { relative: 1e-10, steps: 10_000 }
     }
 }
 
-/// What a solve reached.
+/// Outcome of a solve.
 pub(super) struct Solved {
     pub(super) rows: Vec<DVec3>,
     pub(super) steps: usize,
-    /// Measured on `rows`, as a share of the forces; 0 where there were none.
+    /// True residual of `rows`, relative to the forces; 0 without forces.
     pub(super) residual: f64,
 }
 
-/// Finds the rows whose forces among each other hold those from outside. Each coordinate takes its own step, as if it were
-/// solved alone.
+/// Solves the system; each coordinate takes its own step sizes, as if it were solved alone.
 pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
     let count = equations.forces.len();
     let inverse: Vec<f64> = equations.diagonal.iter().map(|d| if *d > 0.0 { 1.0 / d } else { 0.0 }).collect();
@@ -42,7 +41,7 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
     let mut pushed = vec![DVec3::zeros(); count];
     let mut energy = dots(&left, &along);
     let mut steps = 0;
-    // A comparison that NaN fails: it stops, and its residual says so.
+    // The comparison is false for NaN, which stops the iteration; the residual then reports it.
     while steps < limits.steps && total(dots(&left, &left)) > enough {
         equations.times(&along, &mut pushed);
         let bend = dots(&along, &pushed);
@@ -50,7 +49,7 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
         rows.par_chunks_mut(CHUNK).zip(along.par_chunks(CHUNK)).for_each(|(rows, along)| add(rows, step, along));
         let back = -step;
         left.par_chunks_mut(CHUNK).zip(pushed.par_chunks(CHUNK)).for_each(|(left, pushed)| add(left, back, pushed));
-        // The preconditioned rest takes the place of what is not needed any more.
+        // `pushed` is no longer needed and takes the preconditioned residual.
         let rest = pushed.par_chunks_mut(CHUNK).zip(left.par_chunks(CHUNK)).zip(inverse.par_chunks(CHUNK));
         rest.for_each(|((rest, left), inverse)| {
             for ((rest, left), inverse) in rest.iter_mut().zip(left).zip(inverse) {
@@ -75,14 +74,14 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
     Solved { rows, steps, residual }
 }
 
-/// `to` + `share` · `of`.
+/// `to` += `share` · `of`, by coordinate.
 fn add(to: &mut [DVec3], share: DVec3, of: &[DVec3]) {
     for (to, of) in to.iter_mut().zip(of) {
         *to += share.component_mul(of);
     }
 }
 
-/// Coordinate by coordinate; 0 where there is nothing left to divide.
+/// By coordinate; 0 where the divisor is 0.
 fn quotient(a: DVec3, b: DVec3) -> DVec3 {
     a.zip_map(&b, |a, b| if b > 0.0 { a / b } else { 0.0 })
 }
@@ -91,7 +90,7 @@ fn total(v: DVec3) -> f64 {
     v.x + v.y + v.z
 }
 
-/// Scalar products coordinate by coordinate: of chunks, then those in their order.
+/// Inner products by coordinate, summed by chunks in order.
 fn dots(a: &[DVec3], b: &[DVec3]) -> DVec3 {
     let of_chunk =
         |(a, b): (&[DVec3], &[DVec3])| a.iter().zip(b).fold(DVec3::zeros(), |sum, (a, b)| sum + a.component_mul(b));

@@ -3,7 +3,7 @@ use crate::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use numerics::random::Key;
 use numerics::shapes::{self, Polygons};
 
-/// A filled surface: points, tets, and the row of the shape that each point is.
+/// A filled surface: points, tets, and the row of each point in the shape.
 struct Body {
     points: Vec<[f32; 3]>,
     tets: Vec<[u32; 4]>,
@@ -28,7 +28,7 @@ impl Body {
         Self::filled(&shapes::sphere([1.0; 3], n), 0.0)
     }
 
-    /// Six corners around a middle, 1 away from it along the axes.
+    /// Six corners around a centre, at distance 1 along the axes.
     fn octahedron() -> Self {
         let mut points = vec![[0.0; 3]; 7];
         for axis in 0..3 {
@@ -47,7 +47,7 @@ impl Body {
         self.rows.iter().filter(|row| **row >= 0).count()
     }
 
-    /// Where a map brings the surface.
+    /// Image of the surface by a map.
     fn shape(&self, map: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f32; 3]> {
         self.points[..self.skin()].iter().map(|p| map(p.map(f64::from)).map(|x| x as f32)).collect()
     }
@@ -60,7 +60,7 @@ impl Body {
         goal_shape(&HeldBody { points: &self.points, tets: &self.tets, rows: &self.rows, shape }, limits)
     }
 
-    /// Farthest that a point lies from where a map brings it.
+    /// Largest distance of a point from its image by a map.
     fn away(&self, goal: &GoalShape, map: impl Fn([f64; 3]) -> [f64; 3]) -> f64 {
         let mut most = 0.0_f64;
         for (rest, point) in self.points.iter().zip(&goal.points) {
@@ -82,7 +82,7 @@ fn the_middle_of_an_octahedron_is_the_mean_of_its_corners() {
     shape[0] = [7.0, 0.0, 0.0];
     let out = body.goal(&shape);
     assert!((0..3).all(|k| (out.points[6][k] - [1.0, 0.0, 0.0][k]).abs() < 1e-6), "{:?}", out.points[6]);
-    // Four of eight corners of 1/6 are longer by 6, all are shorter or longer by 1 as the middle moves: 4/6·(7 + 1)/2.
+    // Four of the eight corner tets of volume 1/6 grow by a factor of 7 + 1 over 2: 4/6·(7 + 1)/2.
     assert!((out.volume_ratio.unwrap() - 4.0).abs() < 1e-5);
     assert_eq!((out.inverted, out.loose), (0, 0));
     assert!(out.residual < 1e-10);
@@ -93,7 +93,7 @@ fn a_corner_pushed_through_the_middle_turns_its_tets_inside_out() {
     let body = Body::octahedron();
     let mut shape = body.shape(|p| p);
     shape[0] = [-3.0, 0.0, 0.0];
-    // The middle goes to −4/6, which is still in front of the far corner at −1.
+    // The centre moves to −4/6, which is still above the opposite corner at −1.
     assert_eq!(body.goal(&shape).inverted, 4);
 }
 
@@ -127,7 +127,7 @@ fn the_equations_alone_have_linear_precision() {
 
 #[test]
 fn harmonic_maps_come_out_the_better_the_finer_the_body() {
-    // Each coordinate solves Laplace's equation, so it is its own inside.
+    // Each coordinate solves Laplace's equation, so the map is its own interior.
     let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * (x * x - y * y), y + 0.7 * x * z, z + 0.4 * (y * z - x * y)];
     let error = |n: usize| {
         let body = Body::ball(n);
