@@ -19,7 +19,7 @@ fn main() {
     let triangles = mesh.triangles();
     println!("{} triangles", triangles.len());
     for (curves, cvs, cone) in [(10_000, 5, 0.0), (10_000, 32, 0.0), (100_000, 5, 0.0), (10_000, 5, 0.1)] {
-        // Hair a tenth of the radius long, on random places.
+        // Hairs a tenth of the radius long, at random positions.
         let cv = |curve: u32, cv: u32| {
             let [x, y, z] = [0, 1, 2].map(|axis| Key::new(1).of(u64::from(curve)).of(axis).f32() - 0.5);
             let height = (1.0 + 0.1 * cv as f32 / (cvs - 1) as f32) / (x * x + y * y + z * z).sqrt();

@@ -1,19 +1,18 @@
-//! Directions that lie in the skin, led out of it continuously.
+//! Directions into the skin are redirected out of it, continuously.
 //!
-//! First contact is not continuous in where the wind wants a segment: what lies flat on the skin either stays where it is
-//! or passes on over it, as its goal is a little below the skin or above, and wind that blows straight into the skin
-//! presses curves now to one side, now to the other. No map of all directions onto those above the skin that leaves
-//! these as they are is continuous and also keeps the side; so the deeper a goal lies in the skin, the more upright a
-//! segment is left.
+//! First contact is not a continuous function of a segment's goal: a segment flat on the skin stays where it is or passes
+//! over it, depending on whether its goal is slightly below the skin or above, and wind straight into the skin presses
+//! curves now to one side, now to the other. No continuous map of all directions onto those above the skin keeps both
+//! these and the side; so the deeper a goal lies in the skin, the more upright a segment is left.
 
 use numerics::vector::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
-/// How far upright rather than along the curve wind leaves those that it blows straight into the skin: found to halve
-/// the jumps that are left, on fur.
+/// How upright, rather than along the curve, wind straight into the skin leaves a segment: found to halve the remaining
+/// jumps on fur.
 const UPRIGHT: f64 = 1.0;
 
-/// How high over the skin the way leads from the one side to the other.
+/// How high above the skin the path from one side to the other leads.
 const ARCH: f64 = 2.0;
 
 /// The skin under a segment.
@@ -21,16 +20,16 @@ const ARCH: f64 = 2.0;
 pub(super) struct Ground {
     /// Outward, unit.
     pub(super) normal: DVec3,
-    /// Of the segment's pivot over it.
+    /// Height of the segment's pivot above it, metres.
     pub(super) height: f64,
 }
 
 impl Ground {
-    /// Where a segment of that length, whose curve leads along `along`, is to point instead of at `goal`: the same where
-    /// its end is above the ground, else above it. Continuous in all of them; unit vectors.
+    /// The direction that replaces `goal` for a segment of this length whose curve runs along `along`: the same where the
+    /// segment's end is above the ground, else one above it. Continuous in all arguments; unit vectors.
     pub(super) fn lead_out(&self, along: &DVec3, goal: &DVec3, length: f64) -> DVec3 {
         let n = &self.normal;
-        // The lowest that it may point, and how low it does.
+        // The largest angle below the horizon that is allowed, and that of the goal.
         let lowest = libm::asin((self.height / length).clamp(0.0, 1.0));
         let low = -libm::asin(goal.dot(n).clamp(-1.0, 1.0));
         if low <= lowest {
@@ -45,14 +44,14 @@ impl Ground {
         let standing = self.left_standing(along, room);
         let Some(pressed) = edge(goal) else { return standing };
         let mixed = pressed * (1.0 - share) + standing * share + n * (ARCH * share * (1.0 - share) * room);
-        // Where there is room below, the way between two directions that are above the ground may dip into it.
+        // Where there is room below, the path between two directions above the ground may dip into it.
         match mixed.try_normalize(1e-9) {
             Some(led) if led.dot(n) < -libm::sin(lowest) => edge(&led).unwrap_or(pressed),
             led => led.unwrap_or(pressed),
         }
     }
 
-    /// Where it points with the wind straight into the ground: down as far as there is room.
+    /// The direction with the wind straight into the ground: as far down as there is room.
     fn left_standing(&self, along: &DVec3, room: f64) -> DVec3 {
         let n = &self.normal;
         let above = along + n * ((-along.dot(n)).max(0.0) + UPRIGHT);
@@ -70,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn goals_above_the_ground_are_kept_and_others_led_above_it() {
+    fn goals_above_the_ground_are_kept_and_others_redirected_above_it() {
         for i in 0..20_000 {
             let key = Key::new(3).of(i);
             let ground = Ground { normal: random(key.of(0)), height: 1.5 * key.of(9).f64() };
@@ -92,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn goals_that_lie_close_are_led_to_directions_that_lie_close() {
+    fn close_goals_give_close_directions() {
         for height in [0.0, 0.1, 0.3] {
             let mut most = 0.0_f64;
             for i in 0..20_000 {
@@ -101,8 +100,8 @@ mod tests {
                 let along = DVec3::new(1.0, 0.0, 0.3 * key.of(5).f64()).normalize();
                 let goal = random(key.of(1));
                 let near = (goal + random(key.of(2)) * 1e-4).normalize();
-                let way = ground.lead_out(&along, &goal, 1.0) - ground.lead_out(&along, &near, 1.0);
-                most = most.max(way.norm() / (goal - near).norm());
+                let difference = ground.lead_out(&along, &goal, 1.0) - ground.lead_out(&along, &near, 1.0);
+                most = most.max(difference.norm() / (goal - near).norm());
             }
             assert!(most < 4.0, "{height}: {most}");
         }

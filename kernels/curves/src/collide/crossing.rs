@@ -1,4 +1,4 @@
-//! Whether a segment crosses a triangle: in f64, on the positions as they are written.
+//! Whether a segment crosses a triangle: in f64, on positions as written.
 
 use super::triangle_filter::may_cross;
 use numerics::lanes::get;
@@ -8,9 +8,9 @@ use numerics::vector::{DVec3, Vec3, to_f64};
 /// A segment through a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// Share of the way at which it passes.
+    /// Where along the segment it passes, 0..1.
     pub(super) share: f64,
-    /// How far the end that is less far through has come.
+    /// Distance from the plane of the nearer of the two ends.
     pub(super) depth: f64,
     /// Unit normal of the triangle, towards the segment's start.
     pub(super) normal: DVec3,
@@ -23,16 +23,16 @@ pub(super) fn corners(block: &Block, lane: usize) -> [DVec3; 3] {
     [to_f64(get(a, lane)), to_f64(get(b, lane)), to_f64(get(c, lane))]
 }
 
-/// Where the segment from `a` to `b` crosses the triangle; touching counts. None in the triangle's own plane.
+/// Where the segment from `a` to `b` crosses the triangle; touching counts. `None` in the triangle's own plane.
 pub(super) fn crossing(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> Option<Crossing> {
     let normal = (q - p).cross(&(r - p));
     let (start, end) = (normal.dot(&(a - p)), normal.dot(&(b - p)));
     if start * end > 0.0 || start == end {
         return None;
     }
-    let way = b - a;
+    let along = b - a;
     let [p, q, r] = [p - a, q - a, r - a];
-    let volumes = [way.dot(&p.cross(&q)), way.dot(&q.cross(&r)), way.dot(&r.cross(&p))];
+    let volumes = [along.dot(&p.cross(&q)), along.dot(&q.cross(&r)), along.dot(&r.cross(&p))];
     let around = volumes.iter().all(|volume| *volume >= 0.0) || volumes.iter().all(|volume| *volume <= 0.0);
     let towards_start = start > 0.0 || (start == 0.0 && end < 0.0);
     around.then(|| {

@@ -3,34 +3,44 @@
 use super::crossing::{first_crossing, first_crossing_in};
 use super::segment_turn::{Nearby, Segment};
 use super::{Collide, Reached, perpendicular};
-use nalgebra::{Quaternion, UnitQuaternion};
-use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+use nalgebra::Quaternion;
+use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
-/// Of the first segment, the part not tested where the root may lie on the skin: this many gaps.
+/// Length of the first segment, in gaps, that is not tested where the root may lie on the skin.
 const SKIPPED_GAPS: f64 = 5.0;
 
-/// A curve as it comes in, and where it is written.
+/// An incoming curve, and where it is written.
 pub(super) struct Hair<'a> {
-    /// Row of its root in the attributes.
+    /// Index of its root among all CVs.
     pub(super) first: usize,
-    /// How far it is moved for `offset_root`.
+    /// Its displacement for `offset_root`.
     pub(super) shift: DVec3,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
 }
 
-/// Memory used again from curve to curve.
+/// Memory that curves reuse.
 #[derive(Default)]
 pub(super) struct Scratch<'t> {
     nearby: Nearby<'t>,
     goal: Vec<DVec3>,
 }
 
+/// What one segment hands on to the next.
+struct Carried {
+    /// Composition of all rotations so far.
+    rotation: DQuat,
+    /// About which a segment turns whose goal is opposite to it.
+    axis: DVec3,
+    /// Direction of the previous segment; zero at the root.
+    before: DVec3,
+}
+
 impl Hair<'_> {
-    /// Writes the curve as it collides.
+    /// Writes the curve after its collisions.
     #[inline(always)]
-    pub(super) fn collide<'t>(&mut self, all: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
+    pub(super) fn collide<'t>(&mut self, how: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
         let mut reached = Reached::default();
         self.out.copy_from_slice(self.goal);
         let cvs = self.goal.len();
@@ -38,81 +48,109 @@ impl Hair<'_> {
             return reached;
         }
         let shift = self.shift;
-        self.set_goals(all, &shift, &mut scratch.goal);
-        let goal = &scratch.goal;
-        let moved = shift != DVec3::zeros();
-        if moved {
+        self.set_goals(how, &shift, &mut scratch.goal);
+        let Scratch { nearby, goal } = scratch;
+        if shift != DVec3::zeros() {
             self.out[0] = to_f32(goal[0]);
         }
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
-        let mut turned = UnitQuaternion::identity();
-        let (mut axis, mut before) = (DVec3::zeros(), DVec3::zeros());
+        let mut carried = Carried { rotation: DQuat::identity(), axis: DVec3::zeros(), before: DVec3::zeros() };
         for k in 0..cvs - 1 {
-            let way = goal[k + 1] - goal[k];
+            let along = goal[k + 1] - goal[k];
             let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
-            if length == 0.0 || way.norm() == 0.0 {
+            if length == 0.0 || along.norm() == 0.0 {
                 self.out[k + 1] = self.out[k];
                 continue;
             }
-            let wanted = way / way.norm();
-            let rest = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
-            let from = if rest.norm() > 0.0 { turned * (rest / rest.norm()) } else { wanted };
-            axis = perpendicular(&from, &axis);
-            let pivot = to_f64(self.out[k]);
-            let (from, to) = match all.ground(&pivot, length) {
-                None => (from, wanted),
-                Some(ground) => {
-                    let led = [&from, &wanted]
-                        .map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, all.coherence));
-                    (led[0], led[1])
-                }
-            };
-            let segment = Segment {
-                pivot,
-                from,
-                to,
-                axis,
-                before,
-                length,
-                half: 0.5 * f64::from(all.width.at(self.first + k)),
-                gap: all.gap,
-                inner: if k == 0 && all.offset_root < all.gap { SKIPPED_GAPS * all.gap } else { 0.0 },
-                rounding: 1.2e-7 * (f64::from(largest) + length),
-            };
-            let mut done = segment.turn(all.method, all.obstacles, &mut scratch.nearby);
-            let mut end = segment.end(&done.direction);
-            // Not where it was led elsewhere.
-            let reaches = !done.met && to == wanted;
-            if reaches && self.out[k] == self.goal[k] && goal[k + 1] == to_f64(self.goal[k + 1]) {
-                end = self.goal[k + 1];
-            }
-            if !done.clear && first_crossing(&scratch.nearby, segment.start(&done.direction), end).is_some() {
-                done = segment.turn_wary(all.method, all.obstacles, &mut scratch.nearby);
-                end = segment.end(&done.direction);
-                if let Some(crossing) = first_crossing(&scratch.nearby, segment.start(&done.direction), end) {
-                    reached.unfreed_segments += 1;
-                    reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
-                }
-            }
-            reached.contacts += u64::from(done.met);
-            turned = minimal_turn(&from, &done.direction, &axis) * turned;
-            before = done.direction;
-            self.out[k + 1] = end;
+            let wanted = along / along.norm();
+            let rounding = 1.2e-7 * (f64::from(largest) + length);
+            let segment = self.segment(how, k, &wanted, [length, rounding], &mut carried);
+            // Not where the skin redirects the segment, or its goal was raised.
+            let may_keep_goal = segment.to == wanted && goal[k + 1] == to_f64(self.goal[k + 1]);
+            let direction = self.turn(how, k, &segment, may_keep_goal, nearby, &mut reached);
+            carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
+            carried.before = direction;
         }
-        reached.crossings_left = match self.blend(all, &shift) {
+        reached.crossings_left = match self.blend(how, &shift) {
             false => reached.unfreed_segments,
-            true => self.crossings(all),
+            true => self.crossings(how),
         };
         reached.length_error = self.length_error();
         reached
     }
 
+    /// The segment from CV k, about to turn towards the unit vector `wanted`.
+    #[inline(always)]
+    fn segment(
+        &self,
+        how: &Collide<'_>,
+        k: usize,
+        wanted: &DVec3,
+        [length, rounding]: [f64; 2],
+        carried: &mut Carried,
+    ) -> Segment {
+        let rest = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
+        let from = if rest.norm() > 0.0 { carried.rotation * (rest / rest.norm()) } else { *wanted };
+        carried.axis = perpendicular(&from, &carried.axis);
+        let axis = carried.axis;
+        let pivot = to_f64(self.out[k]);
+        let (from, to) = match how.ground(&pivot, length) {
+            None => (from, *wanted),
+            Some(ground) => {
+                let led_out =
+                    [&from, wanted].map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, how.coherence));
+                (led_out[0], led_out[1])
+            }
+        };
+        Segment {
+            pivot,
+            from,
+            to,
+            axis,
+            before: carried.before,
+            length,
+            half: 0.5 * f64::from(how.width.at(self.first + k)),
+            gap: how.gap,
+            inner: if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 },
+            rounding,
+        }
+    }
+
+    /// Turns the segment from CV k and writes its end; returns its direction.
+    #[inline(always)]
+    fn turn<'t>(
+        &mut self,
+        how: &Collide<'t>,
+        k: usize,
+        segment: &Segment,
+        may_keep_goal: bool,
+        nearby: &mut Nearby<'t>,
+        reached: &mut Reached,
+    ) -> DVec3 {
+        let mut turned = segment.turn(how.method, how.obstacles, nearby);
+        let mut end = segment.end(&turned.direction);
+        if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
+            end = self.goal[k + 1];
+        }
+        if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
+            turned = segment.turn_wary(how.method, how.obstacles, nearby);
+            end = segment.end(&turned.direction);
+            if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
+                reached.unfreed_segments += 1;
+                reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
+            }
+        }
+        reached.contacts += u64::from(turned.met);
+        self.out[k + 1] = end;
+        turned.direction
+    }
+
     /// Segments that cross something as they are written.
     #[inline(always)]
-    fn crossings(&self, all: &Collide<'_>) -> u64 {
+    fn crossings(&self, how: &Collide<'_>) -> u64 {
         let mut count = 0;
         for k in 1..self.out.len() {
-            count += u64::from(first_crossing_in(all.obstacles, self.out[k - 1], self.out[k]).is_some());
+            count += u64::from(first_crossing_in(how.obstacles, self.out[k - 1], self.out[k]).is_some());
         }
         count
     }
@@ -133,11 +171,11 @@ impl Hair<'_> {
         cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
     }
 
-    /// Where the CVs are to go: as they come in, or kept off the skin by `offset_scale` of their rest distance.
+    /// The CVs' goals: as they come in, or kept off the skin by `offset_scale` of their rest distance.
     #[inline(always)]
-    fn set_goals(&self, all: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
+    fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
-        let (Some(scale), Some(skin)) = (all.offset_scale, &all.skin) else {
+        let (Some(scale), Some(skin)) = (how.offset_scale, &how.skin) else {
             goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift));
             return;
         };
@@ -146,17 +184,17 @@ impl Hair<'_> {
         for k in 1..self.goal.len() {
             let (from, to) = (to_f64(self.goal[k - 1]), to_f64(self.goal[k]));
             let raised = skin.raised(self.rest[k], &to, scale);
-            // Lengths are restored root to tip: the raised CV says a direction only.
-            let way = raised - before;
+            // Lengths are restored root to tip: only the direction to the raised CV counts.
+            let along = raised - before;
             let length = (to - from).norm();
-            before += if way.norm() > 0.0 { way * (length / way.norm()) } else { to - from };
+            before += if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
             goals.push(before + shift);
         }
     }
 
-    /// Turns each segment back towards its goal by 1 − `blend`; whether that is anything.
-    fn blend(&mut self, all: &Collide<'_>, shift: &DVec3) -> bool {
-        let share = |k: usize| f64::from(all.blend.at(self.first + k)).clamp(0.0, 1.0);
+    /// Turns each segment back towards its goal by 1 − `blend`; returns whether any turned.
+    fn blend(&mut self, how: &Collide<'_>, shift: &DVec3) -> bool {
+        let share = |k: usize| f64::from(how.blend.at(self.first + k)).clamp(0.0, 1.0);
         if (0..self.out.len()).all(|k| share(k) == 1.0) {
             return false;
         }
@@ -181,8 +219,7 @@ impl Hair<'_> {
     }
 }
 
-/// The unit vector a share of the way from one to another on their great circle; through `axis` × `from` where they are
-/// opposite.
+/// Spherical interpolation from one unit vector to another; through `axis` × `from` where they are opposite.
 fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     let turn = from.cross(to);
     let (sine, cosine) = (turn.norm(), from.dot(to));
@@ -191,9 +228,9 @@ fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     from * cosine + n.cross(from) * sine
 }
 
-/// The smallest turn from one unit vector to another; about `axis` where they are opposite.
-fn minimal_turn(from: &DVec3, to: &DVec3, axis: &DVec3) -> UnitQuaternion<f64> {
+/// The smallest rotation from one unit vector to another; about `axis` where they are opposite.
+fn smallest_rotation(from: &DVec3, to: &DVec3, axis: &DVec3) -> DQuat {
     let real = 1.0 + from.dot(to);
     let imaginary = if real > 1e-12 { from.cross(to) } else { *axis };
-    UnitQuaternion::new_normalize(Quaternion::from_parts(if real > 1e-12 { real } else { 0.0 }, imaginary))
+    DQuat::new_normalize(Quaternion::from_parts(if real > 1e-12 { real } else { 0.0 }, imaginary))
 }

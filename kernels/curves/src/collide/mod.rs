@@ -1,13 +1,14 @@
 //! Curves against meshes: the kernel of Curve_Wind_Collision (W3).
 //!
-//! Root to tip, each segment turns from where the ones before it have brought its rest direction towards its goal's
-//! direction, until it meets a triangle. One that an earlier turn pushed through a surface turns out of it first, on
-//! the great circle towards the surface's normal where it passes. First contact is a closed form (see [`sector`]).
+//! Root to tip, each segment starts at its rest direction, rotated along with the previous segments, and turns towards
+//! its goal's direction until it meets a triangle. A segment that earlier rotations have pushed through a surface first
+//! turns out of it, on the great circle towards the surface's normal there. First contact is a closed form (see
+//! [`sector`]).
 //!
-//! Promise: segments keep their goal's lengths to a rounding of the positions; no written segment of a curve that
-//! crosses nothing at rest crosses a triangle, but those counted in [`Collided::unfreed_segments`]; a curve that meets
-//! nothing keeps its goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
-//! obstacles, not volumes, so a curve wholly inside of one stays there.
+//! Promise: segments keep their goal's lengths up to the rounding of positions; written segments of a curve that crosses
+//! nothing at rest cross no triangle, except those counted in [`Collided::unfreed_segments`]; a curve that meets nothing
+//! keeps its goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are obstacles, not
+//! volumes, so a curve wholly inside a surface stays there.
 
 mod coherence;
 mod crossing;
@@ -35,7 +36,7 @@ use std::ops::Range;
 pub enum ContactMethod {
     /// At first contact, in closed form.
     Exact,
-    /// The paper's: at the last of so many equal steps that crosses nothing.
+    /// As in the paper: at the last of so many equal steps that crosses nothing.
     Steps(u32),
 }
 
@@ -48,15 +49,15 @@ pub struct Collide<'a> {
     pub skin: Option<SkinSurface<'a>>,
     /// How a turn is stopped.
     pub method: ContactMethod,
-    /// How far directions that lie in the skin are led out of it before a segment turns, 0..1; see [`coherence`].
+    /// How strongly directions into the skin are redirected outwards before a segment turns, 0..1; see [`coherence`].
     pub coherence: f64,
-    /// Arc kept from what is met, metres.
+    /// Arc length kept from contacts, metres.
     pub gap: f64,
-    /// How far outside of the skin the roots are brought, metres; 0 leaves them.
+    /// Height above the skin to which roots are lifted, metres; 0 leaves them.
     pub offset_root: f64,
-    /// Keeps goals this many times as high over the skin as the curves are at rest, where they would be lower.
+    /// Raises goals to at least this multiple of the curves' height above the skin at rest.
     pub offset_scale: Option<f64>,
-    /// What [`at_rest`] said of the same curves, if it was asked.
+    /// The result of [`at_rest`] for the same curves, if known.
     pub at_rest: Option<&'a AtRest>,
     /// Share of each segment's collision that is kept, 0..1.
     pub blend: Masked<'a, f32>,
@@ -65,7 +66,7 @@ pub struct Collide<'a> {
 }
 
 impl Collide<'_> {
-    /// The skin that a segment is to be led out of, if any is.
+    /// The skin that a segment is to be redirected out of, if any.
     #[inline(always)]
     fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
         self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
@@ -78,21 +79,21 @@ impl Collide<'_> {
 pub struct Collided {
     /// One point for every incoming one.
     pub points: Vec<Vec3>,
-    /// Segments that no turn frees from what they are in.
+    /// Segments that could not be freed from what they cross.
     pub unfreed_segments: u64,
-    /// Segments that cross something as they are written: with a whole blend the unfreed ones.
+    /// Segments that cross something as written: with full blend the unfreed ones.
     pub crossings_left: u64,
     /// Curves that cross something at rest.
     pub started_inside: u64,
-    /// Segments that something keeps from their goal.
+    /// Segments stopped short of their goal.
     pub contacts: u64,
-    /// The deepest that a segment reaches through a surface, metres.
+    /// How far a segment reaches through a surface at most, metres.
     pub deepest_overlap: f64,
     /// Largest |length − goal's| of a segment ÷ curve length, as written.
     pub length_error: f64,
 }
 
-/// What some curves reached.
+/// Counts and largest values over some curves.
 #[derive(Clone, Copy, Default)]
 struct Reached {
     unfreed_segments: u64,
@@ -117,7 +118,7 @@ impl Reached {
 /// CVs that a task has at least: some 100 µs of work.
 const TASK_CVS: usize = 256;
 
-/// Collides curves `goal[starts[i]..starts[i + 1]]`, which at rest are those of `rest`.
+/// Collides curves `goal[starts[i]..starts[i + 1]]`, whose rest shapes are the same ranges of `rest`.
 ///
 /// # Panics
 /// Where `starts` does not run up to the number of points of both.
@@ -130,12 +131,12 @@ pub fn collide(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) 
 /// # Panics
 /// As [`collide()`].
 pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
-    let looked;
+    let computed;
     let at_rest = match how.at_rest {
         Some(at_rest) => at_rest,
         None => {
-            looked = at_rest_on(path, starts, rest, how);
-            &looked
+            computed = at_rest_on(path, starts, rest, how);
+            &computed
         }
     };
     let mut points = vec![[0.0; 3]; goal.len()];
@@ -198,7 +199,7 @@ fn task(
     reached
 }
 
-/// A unit vector at a right angle to the unit vector `to`: the part of `near` that is, if it has any.
+/// A unit vector perpendicular to the unit vector `to`: along the perpendicular part of `near`, if there is one.
 fn perpendicular(to: &DVec3, near: &DVec3) -> DVec3 {
     let side = near - to * to.dot(near);
     let length = side.norm();

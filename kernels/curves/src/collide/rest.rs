@@ -1,4 +1,4 @@
-//! Curves as they grow: how far their roots are lifted, and which cross something already.
+//! Curves at rest: how far their roots are lifted, and which cross something already.
 
 use super::Collide;
 use super::crossing::first_crossing;
@@ -7,13 +7,13 @@ use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use rayon::prelude::*;
 
-/// Segments that ask the trees together.
+/// Successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
 
 /// Curves a task.
 const TASK_CURVES: usize = 64;
 
-/// What curves, obstacles and skin at rest have in common at any wind; see [`at_rest`].
+/// What depends on curves, obstacles and skin at rest only, not on the wind; see [`at_rest`].
 #[derive(Clone, Debug, Default)]
 pub struct AtRest {
     curves: Vec<Grown>,
@@ -22,14 +22,14 @@ pub struct AtRest {
 /// A curve at rest.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Grown {
-    /// How far it is moved, so that its root is `offset_root` outside of the skin.
+    /// Its displacement, which puts its root `offset_root` above the skin.
     pub(super) shift: DVec3,
-    /// So moved, it crosses something.
+    /// Whether it crosses something, displaced.
     pub(super) inside: bool,
 }
 
-/// Looks at curves at rest. It depends on `obstacles`, `skin` and `offset_root` of `how` alone: to be kept and handed on in
-/// [`Collide::at_rest`] while these and the curves stand still.
+/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass it
+/// in [`Collide::at_rest`] while these and the curves do not change.
 ///
 /// # Panics
 /// As [`super::collide()`].
@@ -65,7 +65,7 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
     }
 }
 
-/// Whether a curve crosses something.
+/// Whether a displaced curve crosses something.
 #[inline(always)]
 fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
     let at = |k: usize| to_f32(to_f64(cvs[k]) + shift);
@@ -89,12 +89,12 @@ fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut 
 }
 
 impl AtRest {
-    /// How many curves cross something.
+    /// Number of curves that cross something.
     pub(super) fn inside(&self) -> u64 {
         self.curves.iter().map(|curve| u64::from(curve.inside)).sum()
     }
 
-    /// How far a curve is moved.
+    /// The displacement of a curve.
     pub(super) fn shift(&self, curve: usize) -> DVec3 {
         self.curves[curve].shift
     }

@@ -1,35 +1,35 @@
 //! The sector that a segment sweeps when it turns about its pivot, and where a triangle blocks it.
 //!
-//! A triangle cuts the sector's plane in a straight piece; on the part of it inside the circle the angle seen from the
-//! pivot runs one way, so that part blocks one interval of angles and its ends give it in closed form. A thick segment
-//! is a slab: the triangle's part between two planes, whose outline is up to five such pieces.
+//! A triangle intersects the sector's plane in a straight piece. Along the part of it inside the circle the angle seen
+//! from the pivot is monotonic, so that part blocks one interval of angles, which its ends give in closed form. A thick
+//! segment is a slab: it is blocked by the triangle's part between two planes, whose outline is up to five such pieces.
 //!
-//! All in f64, relative to the pivot: exact but for f64 rounding. Angles in radians, lengths in metres.
+//! Computed in f64 relative to the pivot: exact up to f64 rounding. Angles in radians, lengths in metres.
 
 use numerics::vector::DVec3;
 
 /// A segment about to turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sector {
-    /// About which it turns.
+    /// The point about which it turns.
     pub(super) pivot: DVec3,
-    /// Unit: where it points.
+    /// Unit: its direction.
     pub(super) u: DVec3,
-    /// Unit, perpendicular to `u`: which way it turns.
+    /// Unit, perpendicular to `u`, in the direction it turns.
     pub(super) v: DVec3,
     /// u × v.
     pub(super) n: DVec3,
-    /// Length of the segment, and how much farther obstacles count.
+    /// Obstacles farther from the pivot are ignored: the length of the segment and a margin.
     pub(super) reach: f64,
-    /// Obstacles nearer to the pivot do not count.
+    /// Obstacles nearer to the pivot are ignored.
     pub(super) inner: f64,
-    /// Half the thickness across the plane; 0 is the plane itself.
+    /// Half the thickness across the plane; 0 tests the plane itself.
     pub(super) half: f64,
-    /// Arc kept from what is met.
+    /// Arc length kept from contacts.
     pub(super) back: f64,
 }
 
-/// Angles at which a triangle is in the way: lo ≤ hi, lo in −π…π; and how far from the pivot its ends are.
+/// An interval of angles that a triangle blocks: lo ≤ hi, lo in −π…π; and the distances of its ends from the pivot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Blocked {
     pub(super) lo: f64,
@@ -42,7 +42,7 @@ pub(super) struct Blocked {
 pub(super) type P2 = [f64; 2];
 
 impl Sector {
-    /// Where it points after a turn by `angle`.
+    /// The direction after a turn by `angle`.
     pub(super) fn direction(&self, angle: f64) -> DVec3 {
         if angle == 0.0 {
             return self.u;
@@ -51,32 +51,32 @@ impl Sector {
         self.u * cosine + self.v * sine
     }
 
-    /// Calls `found` with each interval of angles at which the triangle is in the way; may leave out those that lie
-    /// behind it, or stop no turn before the direction `until`.
+    /// Calls `found` with each interval of angles that the triangle blocks; may leave out intervals behind the segment and
+    /// those that stop no turn before the direction `until`.
     pub(super) fn blocked_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         // A point that lies over the ray at an angle α by `back`, a radius r out, is by asin(back/r) ≥ back/r past α.
         let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
         let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
             [true, true] => false,
             [false, false] => !(over(p) && over(q)),
-            // From behind to the front it passes the start or, left of it, the far side.
+            // A piece from behind to the front passes the start or, on its left, the far side.
             [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
             [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
         };
         self.blocked(corners, counts, &mut found);
     }
 
-    /// Calls `found` with each interval of angles at which the triangle is in the way.
+    /// Calls `found` with each interval of angles that the triangle blocks.
     pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         self.blocked(corners, |_, _| true, &mut found);
     }
 
-    /// As [`Sector::blocked_by`]; of a plane only by straight pieces that count.
+    /// As [`Sector::blocked_by`], restricted to pieces for which `counts` holds where the segment has no thickness.
     fn blocked(&self, corners: &[DVec3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
         let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
         let flat = |k: usize| {
-            let arm = corners[k] - self.pivot;
-            [self.u.dot(&arm), self.v.dot(&arm)]
+            let from_pivot = corners[k] - self.pivot;
+            [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
         };
         if self.half == 0.0 {
             if let Some(piece) = slice(&heights, 0.0, flat) {
@@ -96,8 +96,8 @@ impl Sector {
         self.blocked_in_slab(
             &heights,
             corners.each_ref().map(|corner| {
-                let arm = *corner - self.pivot;
-                [self.u.dot(&arm), self.v.dot(&arm)]
+                let from_pivot = *corner - self.pivot;
+                [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
             }),
             found,
         );
@@ -122,7 +122,7 @@ impl Sector {
                 self.within_reach(piece, |p, q| add(Blocked::between(p, q)));
             }
         }
-        // The outline is one curve: seen from a pivot outside of it, its pieces make one interval.
+        // The outline is one closed curve: seen from a pivot outside it, its pieces form one interval.
         let pieces = || intervals.iter().flatten();
         let Some(first) = pieces().next() else { return };
         let all = pieces().fold(*first, |all, piece| {
@@ -141,7 +141,7 @@ impl Sector {
         if all.hi - all.lo > std::f64::consts::PI {
             pieces().copied().for_each(found);
         } else if all.lo < 0.0 && all.hi >= 0.0 {
-            // It touches the thick segment as it stands: which way it lies is what its middle says.
+            // It touches the thick segment at its start: the side it is on is decided by its cut with the middle plane.
             if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
                 self.within_reach(piece, |p, q| found(Blocked::between(p, q)));
             }
@@ -182,14 +182,14 @@ impl Blocked {
         let angle = |p: P2| libm::atan2(p[1], p[0]);
         let radius = |p: P2| (p[0] * p[0] + p[1] * p[1]).sqrt();
         let (lo, hi) = (angle(first), angle(last));
-        // One that ends beyond the far side goes on past π.
+        // An interval across the far side continues past π.
         let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
         Self { lo, hi, lo_radius: radius(first), hi_radius: radius(last) }
     }
 }
 
-/// Where the plane at `level` cuts a triangle of corners at these heights. A corner at the level counts as above it, in
-/// every triangle it is part of, so that a closed surface is cut in a closed line.
+/// Where the plane at `level` cuts a triangle with corners at these heights. A corner at the level counts as above it in
+/// every triangle, so that a closed surface is cut along closed lines.
 fn slice(heights: &[f64; 3], level: f64, flat: impl Fn(usize) -> P2) -> Option<[P2; 2]> {
     let above = heights.map(|height| height >= level);
     let alone = match above {
@@ -218,11 +218,11 @@ fn between_levels([p, q]: [P2; 2], [a, b]: [f64; 2], half: f64) -> Option<[P2; 2
     Some([point(from), point(to)])
 }
 
-/// The share of the way from p to q at which it enters the circle about the origin, and at which it leaves.
+/// The parameters, 0..1, at which the piece from p to q enters and leaves the circle about the origin.
 fn inside_circle(p: P2, q: P2, radius: f64) -> Option<[f64; 2]> {
-    let way = [q[0] - p[0], q[1] - p[1]];
-    let square = way[0] * way[0] + way[1] * way[1];
-    let along = p[0] * way[0] + p[1] * way[1];
+    let side = [q[0] - p[0], q[1] - p[1]];
+    let square = side[0] * side[0] + side[1] * side[1];
+    let along = p[0] * side[0] + p[1] * side[1];
     let outside = p[0] * p[0] + p[1] * p[1] - radius * radius;
     if square == 0.0 {
         return (outside <= 0.0).then_some([0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! One segment's turn: from where it points towards its goal until something is met, out of what it stands in first.
+//! One segment's turn: towards its goal until something is met; first out of what it crosses already.
 
 use super::crossing::{Crossing, corners, first_crossing};
 use super::sector::{Blocked, Sector};
@@ -8,48 +8,48 @@ use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
 
-/// How straight into a surface a segment has to stick for the curve to say which way out is taken.
+/// How perpendicular to a surface a segment has to be for the curve to decide the direction out.
 const STRAIGHT_IN: f64 = 1e-3;
 
-/// A segment that is to turn.
+/// A segment about to turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
-    /// The end that stays.
+    /// The fixed end.
     pub(super) pivot: DVec3,
-    /// Where it points, and where it is to point: unit.
+    /// Its direction, and that of its goal: unit.
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// About which it turns where the two are opposite.
+    /// The axis about which it turns where the two are opposite.
     pub(super) axis: DVec3,
-    /// Where the segment before it points; zero at the root.
+    /// Direction of the previous segment; zero at the root.
     pub(super) before: DVec3,
     pub(super) length: f64,
     /// Half its thickness.
     pub(super) half: f64,
-    /// Arc kept from what is met.
+    /// Arc length kept from contacts.
     pub(super) gap: f64,
-    /// The part next to the pivot that meets nothing.
+    /// Length next to the pivot that is not tested.
     pub(super) inner: f64,
-    /// What rounding may move the written positions by.
+    /// Rounding error of the written positions.
     pub(super) rounding: f64,
 }
 
 /// How a turn ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turned {
-    /// Where it points now.
+    /// Its direction now.
     pub(super) direction: DVec3,
-    /// Something kept it from its goal.
+    /// Whether something stopped it short of its goal.
     pub(super) met: bool,
-    /// Nothing came near on its way: it crosses nothing, however positions are rounded.
+    /// Whether nothing was near the swept sector: it crosses nothing, however positions are rounded.
     pub(super) clear: bool,
 }
 
-/// Blocks of the tree that a segment may meet, with a bit for each triangle; memory that is used again.
+/// Blocks of the tree that a segment may meet, with a bit for each triangle.
 pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
 
 impl Segment {
-    /// Turns as `method` says. Afterwards `nearby` holds all that the segment may cross where it points now.
+    /// Turns by `method`. Afterwards `nearby` holds everything that the segment may cross in its new direction.
     #[inline(always)]
     pub(super) fn turn<'t>(
         &self,
@@ -59,7 +59,7 @@ impl Segment {
     ) -> Turned {
         match self.sweep(method, obstacles, nearby) {
             Sweep::Free(turned) => turned,
-            Sweep::Stuck => match self.way_out(method, obstacles, nearby) {
+            Sweep::Stuck => match self.turn_out(method, obstacles, nearby) {
                 None => Turned { direction: self.from, met: true, clear: false },
                 Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
                     Sweep::Free(turned) => Turned { met: true, ..turned },
@@ -69,7 +69,7 @@ impl Segment {
         }
     }
 
-    /// As [`Segment::turn`] where that ended in a crossing: obstacles as thick as what rounding may have hidden.
+    /// As [`Segment::turn`], after that ended in a crossing: obstacles are thickened by the rounding error.
     #[inline(always)]
     pub(super) fn turn_wary<'t>(
         &self,
@@ -117,12 +117,12 @@ impl Segment {
         }
     }
 
-    /// The end of the segment where it points to `direction`, as written.
+    /// The end of the segment in this direction, as written.
     pub(super) fn end(&self, direction: &DVec3) -> Vec3 {
         to_f32(self.pivot + direction * self.length)
     }
 
-    /// Where the part that meets things starts, where it points to `direction`.
+    /// The start of its tested part in this direction.
     pub(super) fn start(&self, direction: &DVec3) -> Vec3 {
         to_f32(self.pivot + direction * self.inner)
     }
@@ -131,7 +131,7 @@ impl Segment {
         first_crossing(nearby, self.start(direction), self.end(direction))
     }
 
-    /// The paper's way: small steps until one crosses.
+    /// The paper's method: small steps until one crosses.
     #[inline(always)]
     fn last_free_step(&self, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
         let angle = sector.angle_of(&self.to);
@@ -148,17 +148,17 @@ impl Segment {
         Stop::None
     }
 
-    /// The nearest free direction on the great circle away from what the segment stands in; `None` where there is none
-    /// up to half a turn.
+    /// The nearest free direction on the great circle away from what the segment crosses; `None` where there is none
+    /// within half a turn.
     #[inline(always)]
-    fn way_out<'t>(
+    fn turn_out<'t>(
         &self,
         method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Option<DVec3> {
         let crossed = self.crosses(&self.from, nearby);
-        // Stuck straight in, every way out is as near: the one that bends the curve least is taken.
+        // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is taken.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
         let sector = self.sector(self.from, outwards);
         let (low, high) = sector.bounds(&-sector.u);
@@ -174,14 +174,14 @@ impl Segment {
     }
 }
 
-/// How far a sweep came.
+/// The result of a sweep.
 enum Sweep {
     Free(Turned),
-    /// Something is in the way where it starts.
+    /// It is blocked at its start.
     Stuck,
 }
 
-/// All blocks of trees that a box meets.
+/// Gathers all blocks of the trees that a box meets.
 #[inline(always)]
 pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
     nearby.clear();
@@ -190,18 +190,18 @@ pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, 
     }
 }
 
-/// Where a sweep is stopped.
+/// Where a sweep stops.
 enum Stop {
-    /// Nowhere, as there is nothing near.
+    /// At the goal: nothing is near.
     Clear,
-    /// Nowhere.
+    /// At the goal.
     None,
     At(f64),
-    /// Something is in the way where it starts.
+    /// It is blocked at its start.
     Stuck,
 }
 
-/// How far the sector may turn towards the unit vector `to` of its plane.
+/// How far the sector may turn towards the unit vector `to` in its plane.
 #[inline(always)]
 fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
@@ -216,7 +216,7 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
             let mut stuck = false;
             let mut next = None;
             sector.blocked_before(until, &corners(block, lane), |blocked| {
-                stuck |= blocked.holds_start();
+                stuck |= blocked.blocks_start();
                 if blocked.lo > 0.0 {
                     let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
                     next = Some(next.map_or(angle, |least: f64| least.min(angle)));
@@ -240,7 +240,7 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     }
 }
 
-/// The first angle up to π at which nothing is within the sector's arc.
+/// The first angle up to π at which nothing is within the arc kept from contacts.
 #[inline(always)]
 fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
     let wedge = Wedge::new(sector, [-1.0, 0.0]);
@@ -272,19 +272,19 @@ fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
 }
 
 impl Blocked {
-    /// Whether the angle 0 is one of them.
-    fn holds_start(&self) -> bool {
+    /// Whether it contains the angle 0.
+    fn blocks_start(&self) -> bool {
         (self.lo <= 0.0 && self.hi >= 0.0) || self.hi >= std::f64::consts::TAU
     }
 }
 
 impl Sector {
-    /// How far it has to turn to the unit vector `to` of its plane: 0…π.
+    /// The angle of the unit vector `to` in its plane: 0…π.
     fn angle_of(&self, to: &DVec3) -> f64 {
         libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
     }
 
-    /// A box around all that it sweeps while it turns to the unit vector `end` of its plane.
+    /// A box around everything it sweeps while it turns to the unit vector `end` in its plane.
     fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);

@@ -1,13 +1,13 @@
-//! The surface that curves grow on: which way is out, and how far.
+//! The surface that curves grow on: its outward normal, and heights above it.
 
 use super::coherence::Ground;
 use numerics::tree::{Closest, TriangleTree};
-use numerics::vector::{DVec3, Vec3, to_f64};
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// How often a root is lifted again where the surface bends away below it.
+/// How many times a root is lifted where the surface curves below it.
 const LIFTS: usize = 4;
 
-/// A skin: its tree, triangles and the normals of its points.
+/// A skin: tree, triangles and normals of its points.
 #[derive(Clone, Copy)]
 pub struct SkinSurface<'a> {
     /// Over `triangles`.
@@ -18,8 +18,8 @@ pub struct SkinSurface<'a> {
     pub normals: &'a [Vec3],
 }
 
-/// Outward normals of the points of a mesh, each the mean of its triangles' by the angle they have there, so that it
-/// does not depend on how faces are cut into triangles; 0 where there is none.
+/// Outward normals of the points of a mesh, each the mean of its triangles' normals weighted by their angles there, so
+/// that it does not depend on how faces are triangulated; 0 where undefined.
 pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![DVec3::zeros(); points.len()];
     for corners in triangles {
@@ -33,11 +33,11 @@ pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
             sums[corners[k] as usize] += normal * libm::atan2(a.cross(&b).norm(), a.dot(&b));
         }
     }
-    sums.iter().map(|sum| sum.try_normalize(0.0).map_or([0.0; 3], |n| [n.x as f32, n.y as f32, n.z as f32])).collect()
+    sums.iter().map(|sum| sum.try_normalize(0.0).map_or([0.0; 3], to_f32)).collect()
 }
 
 impl SkinSurface<'_> {
-    /// The outward unit normal at a point of the surface; `None` where it has none.
+    /// The outward unit normal at a point of the surface; `None` where undefined.
     pub(super) fn normal(&self, at: &Closest) -> Option<DVec3> {
         let corners = self.triangles[at.triangle as usize];
         let mixed = (0..3)
@@ -45,31 +45,30 @@ impl SkinSurface<'_> {
         mixed.try_normalize(1e-12)
     }
 
-    /// Height of a point over the surface, below 0 inside, and the normal it stands on.
+    /// Height of a point above the surface, negative inside, and the normal there.
     #[inline(always)]
     fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
         let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
         let away = p - to_f64(closest.point);
-        // Beside an edge the normal leans: the distance is what counts, the normal says its side.
+        // Near an edge the interpolated normal is not along the distance: it only decides the sign.
         let height = away.norm().copysign(away.dot(&normal));
         Some((height, normal))
     }
 
-    /// The skin under a segment that stands on `pivot`, if it reaches that.
+    /// The skin below a segment at `pivot`, if within its reach.
     #[inline(always)]
     pub(super) fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
         let (height, normal) = self.height(pivot, length as f32)?;
         Some(Ground { normal, height: height.max(0.0) })
     }
 
-    /// A CV's goal, raised until it is `scale` times as high over the skin as the CV is at rest; as it is where it is
-    /// that high.
+    /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged where it is that high.
     #[inline(always)]
     pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
         let rest = to_f64(rest);
         let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
-        // It cannot have come nearer than by the way it went.
+        // It cannot have come nearer by more than its displacement.
         let moved = (goal - rest).norm();
         if height - moved >= scale * height {
             return *goal;
@@ -80,7 +79,7 @@ impl SkinSurface<'_> {
         }
     }
 
-    /// How far a root is to be moved until it is `offset` outside of the skin: zero where it is.
+    /// The displacement that lifts a root to `offset` above the skin: zero where it is that high.
     #[inline(always)]
     pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
         let mut shift = DVec3::zeros();

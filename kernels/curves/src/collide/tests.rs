@@ -8,10 +8,10 @@ use numerics::vector::{self, to_f64};
 mod hairs;
 mod sectors;
 
-/// Whether the segment crosses the triangle: by solving for the point of the plane, in f64. Touching does not count.
+/// Whether the segment crosses the triangle, by solving for its point in the plane. Touching does not count.
 fn crosses(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> bool {
-    let (e, f, way) = (q - p, r - p, b - a);
-    let h = way.cross(&f);
+    let (e, f, along) = (q - p, r - p, b - a);
+    let h = along.cross(&f);
     let det = e.dot(&h);
     if det == 0.0 {
         return false;
@@ -19,7 +19,7 @@ fn crosses(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> bool {
     let s = a - p;
     let u = s.dot(&h) / det;
     let g = s.cross(&e);
-    let v = way.dot(&g) / det;
+    let v = along.dot(&g) / det;
     let t = f.dot(&g) / det;
     u > 0.0 && v > 0.0 && u + v < 1.0 && t > 0.0 && t < 1.0
 }
@@ -29,11 +29,11 @@ fn coordinate(key: Key) -> f64 {
     2.0 * f64::from(key.f32()) - 1.0
 }
 
-fn vector(key: Key) -> DVec3 {
+fn random_vector(key: Key) -> DVec3 {
     DVec3::new(coordinate(key.of(0)), coordinate(key.of(1)), coordinate(key.of(2)))
 }
 
-fn unit(key: Key) -> DVec3 {
-    let v = vector(key);
-    if v.norm() > 0.1 { v.normalize() } else { unit(key.of(9)) }
+fn random_unit(key: Key) -> DVec3 {
+    let v = random_vector(key);
+    if v.norm() > 0.1 { v.normalize() } else { random_unit(key.of(9)) }
 }

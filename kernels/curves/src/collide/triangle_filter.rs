@@ -1,14 +1,14 @@
-//! Which triangles of a block may matter: sixteen at a time, in f32, letting pass what rounding leaves in doubt.
+//! Which triangles of a block may be met: sixteen at a time, in f32, conservative with regard to rounding.
 
 use super::sector::Sector;
 use numerics::lanes::LANES;
 use numerics::tree::Block;
 use numerics::vector::{self, Vec3, cross, dot, sub, to_f32};
 
-/// Rounding of a few products of differences, as a share of the largest difference.
+/// Rounding error of a few products of differences, as a share of the largest difference.
 const ROUNDING: f32 = 2e-6;
 
-/// The part of a sector that is still of interest: angles from 0 to that of `until`, at most π.
+/// The part of a sector that is still to be tested: angles from 0 to that of `until`, at most π.
 pub(super) struct Wedge {
     pivot: Vec3,
     axes: [Vec3; 3],
@@ -40,7 +40,11 @@ impl Wedge {
         let mut mask = 0;
         for lane in 0..LANES {
             let corners = block.around(lane, self.pivot);
-            let (x, y, s) = (along(corners, self.axes[0]), along(corners, self.axes[1]), along(corners, self.axes[2]));
+            let (x, y, s) = (
+                coordinates(corners, self.axes[0]),
+                coordinates(corners, self.axes[1]),
+                coordinates(corners, self.axes[2]),
+            );
             let size = most(most(vector::largest(x), vector::largest(y)), vector::largest(s));
             let slack = slack + ROUNDING * size;
             let across = (most3(s) >= -(self.half + slack)) & (least3(s) <= self.half + slack);
@@ -60,30 +64,30 @@ impl Wedge {
 /// A bit for each lane whose triangle the segment from `a` to `b` may cross.
 #[inline(always)]
 pub(super) fn may_cross(block: &Block, a: Vec3, b: Vec3) -> u16 {
-    let way = sub(b, a);
-    let slack = ROUNDING * (vector::largest(way) + 0.1 * vector::largest(a));
+    let along = sub(b, a);
+    let slack = ROUNDING * (vector::largest(along) + 0.1 * vector::largest(a));
     let mut mask = 0;
     for lane in 0..LANES {
         let [p, q, r] = block.around(lane, a);
         let (pq, pr) = (sub(q, p), sub(r, p));
         let normal = cross(pq, pr);
         let size = most3([vector::largest(p), vector::largest(q), vector::largest(r)]);
-        // Heights over the plane, times twice the area; volumes with each edge.
+        // Heights above the plane, times twice the area; volumes with each edge.
         let start = -dot(normal, p);
-        let end = dot(normal, sub(way, p));
+        let end = dot(normal, sub(along, p));
         let doubt = (ROUNDING * size + slack) * (most(vector::largest(pq), vector::largest(pr))) * 4.0 * size;
         let passes = !((start > doubt) & (end > doubt)) & !((start < -doubt) & (end < -doubt));
-        let volumes = [dot(way, cross(p, q)), dot(way, cross(q, r)), dot(way, cross(r, p))];
-        let doubt = (ROUNDING * size + slack) * vector::largest(way) * 8.0 * size;
+        let volumes = [dot(along, cross(p, q)), dot(along, cross(q, r)), dot(along, cross(r, p))];
+        let doubt = (ROUNDING * size + slack) * vector::largest(along) * 8.0 * size;
         let around = !((most3(volumes) > doubt) & (least3(volumes) < -doubt));
         mask |= u16::from(passes & around) << lane;
     }
     mask
 }
 
-/// Each corner's share of `axis`.
+/// The corners' coordinates along `axis`.
 #[inline(always)]
-fn along(corners: [Vec3; 3], axis: Vec3) -> Vec3 {
+fn coordinates(corners: [Vec3; 3], axis: Vec3) -> Vec3 {
     [dot(corners[0], axis), dot(corners[1], axis), dot(corners[2], axis)]
 }
 

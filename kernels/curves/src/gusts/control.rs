@@ -1,18 +1,18 @@
-//! Gusts placed by hand: a sphere, or a cube within a cube, moved, turned, stretched, sheared.
+//! Gusts placed by hand: a sphere, or a cube within a cube, under any affine map.
 //!
-//! A control's own space has its centre at 0 and its axes' ends at 1. There the share of a point at
-//! q is, from 0 at the centre to 1 at the boundary where the influence ends,
+//! In a control's own space its centre is at 0 and its axes end at 1. The share of a point q there runs from 0 at the
+//! centre to 1 at the boundary, where the influence ends:
 //! * sphere: |q|;
 //! * cubes: with m = max |qᵢ|, so that level sets are cubes, m/2 up to the inner boundary m = 1, and
 //!   ½ + ½·(m − 1)/(outer − 1) from there to the outer one, m = outer.
 //!
-//! A control without volume (a scale of 0 on an axis) touches nothing.
+//! A control without volume (a scale of 0 along an axis) reaches nothing.
 
 use numerics::lanes::{F32x16, LANES, Lanes};
 use numerics::ramp::Ramp;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// What a control looks like.
+/// The shape of a control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControlShape {
     /// A ball.
@@ -21,8 +21,8 @@ pub enum ControlShape {
     Cubes,
 }
 
-/// Of the product of its axes' lengths: a control of less volume is flat. Above what f32 positions
-/// make of three axes in a plane, below any stretch an artist makes.
+/// A control whose volume is less than this share of the product of its axes' lengths is flat: more than f32 rounding
+/// makes of three coplanar axes, less than any stretch in practice.
 const FLAT: f64 = 1e-6;
 
 /// A region with its own space and its own ramp.
@@ -34,13 +34,13 @@ pub struct Control {
     outer: f64,
     ramp: Ramp,
     strength: f32,
-    /// From the scene to the control's own space, row by row; `None` where it is flat.
+    /// The matrix from the scene to the control's own space, row by row; `None` where it is flat.
     inverse: Option<[DVec3; 3]>,
 }
 
 impl Control {
-    /// A control at `centre` whose own axes end at `centre + axes[k]`. `outer` is how many times the
-    /// inner cube the outer one is (less than 1 counts as 1); `strength` may be negative.
+    /// A control at `centre` whose own axes end at `centre + axes[k]`, metres. `outer` is the size of the outer cube
+    /// relative to the inner one (less than 1 counts as 1); `strength` may be negative.
     pub fn new(
         shape: ControlShape,
         centre: [f64; 3],
@@ -66,7 +66,7 @@ impl Control {
         self.strength
     }
 
-    /// How far it reaches along x, y and z; `None` where it touches nothing.
+    /// How far it reaches along x, y and z; `None` where it reaches nothing.
     pub(super) fn reach(&self) -> Option<DVec3> {
         self.inverse.filter(|_| self.strength != 0.0)?;
         let ends = |axis: usize| DVec3::from(self.axes.map(|end| end[axis]));
@@ -77,13 +77,13 @@ impl Control {
         Some(DVec3::new(extent(0), extent(1), extent(2)))
     }
 
-    /// Whether its influence is nowhere below 0.
+    /// Whether its influence is nowhere negative.
     pub fn only_adds(&self) -> bool {
         let [least, most] = [self.ramp.min(), self.ramp.max()].map(|value| value * self.strength);
         least >= 0.0 && most >= 0.0
     }
 
-    /// The control as seen from a point near by.
+    /// The control relative to a nearby point.
     pub(super) fn local(&self, origin: Vec3) -> Local {
         let inverse = self.inverse.unwrap_or_default();
         Local {
@@ -100,7 +100,7 @@ pub(super) struct Local {
     shape: ControlShape,
     centre: Vec3,
     rows: [Vec3; 3],
-    /// Of the share, a unit beyond the inner cube; infinite where the cubes are one.
+    /// Increase of the share per unit beyond the inner cube; infinite where both cubes are the same.
     beyond: f32,
 }
 
@@ -156,15 +156,15 @@ fn inverse(axes: [DVec3; 3]) -> Option<[DVec3; 3]> {
     Some(std::array::from_fn(|k| rows[k] / volume / lengths[k]))
 }
 
-/// The first rows of an outline: its centre and the ends of its own x, y and z axis.
+/// The first rows of an outline: its centre and the ends of its x, y and z axes.
 pub const AXIS_ROWS: usize = 4;
 
-/// Points of a great circle, or of a cube's edge, at least.
+/// Minimum number of points of a great circle, and of a cube's edge.
 const CIRCLE: usize = 32;
 const EDGE: usize = 6;
 
-/// Points that show a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or
-/// the edges of both cubes. At least `least` points.
+/// Points that draw a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or the edges of both
+/// cubes. At least `least` points.
 pub fn outline(shape: ControlShape, outer: f64, least: usize) -> Vec<[f32; 3]> {
     let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     match shape {
@@ -191,7 +191,7 @@ fn circles(count: usize, points: &mut Vec<[f32; 3]>) {
     }
 }
 
-/// The twelve edges of a cube of this half size, both corners of each.
+/// The twelve edges of a cube of this half size, with both corners of each.
 fn edges(half: f64, count: usize, points: &mut Vec<[f32; 3]>) {
     for axis in 0..3 {
         for corner in 0..4 {

@@ -1,15 +1,13 @@
-//! The share of a cone that a mesh covers, sixteen triangles at once.
+//! The share of a cone that a mesh covers, sixteen triangles at a time.
 //!
-//! The cone's section is a disc. How often a mesh covers a point of it, counting the triangles that show
-//! one face, is the same everywhere but across the edges that bound the mesh as seen from the cone's
-//! tip; so its mean over the disc is its value in the middle and, for each such edge, an integral
-//! along the part of it that lies in the disc (Green's theorem): half the area it spans with the middle
-//! less the disc's sector, over the disc's area. Both jump when an edge crosses the middle, by opposite
-//! amounts, and an edge adds nothing where it enters the disc: the mean is continuous in the wind.
+//! The cone's cross-section is a disc. How many times a mesh covers a point of it, counting triangles that show the same
+//! face, changes only across silhouette edges as seen from the cone's tip. So its mean over the disc is its value at the
+//! centre plus, for each such edge, an integral along the part of it inside the disc (Green's theorem): half the area it
+//! spans with the centre less the disc's sector, over the disc's area. When an edge crosses the centre, both jump by
+//! opposite amounts, and an edge adds nothing where it enters the disc: the mean is continuous in the wind.
 //!
-//! Faces that show the front and those that show the back are counted apart and the larger mean taken, at
-//! most 1: exact where what is seen lies in one layer, or covers all of the disc, at most too much where one
-//! layer overlaps another in part.
+//! Front and back faces are counted separately; the larger mean is taken, at most 1. That is exact where the visible
+//! surface is one layer or covers the whole disc, and an upper bound where layers overlap in part.
 
 use super::Obstacle;
 use super::rays::{Seen, beside};
@@ -21,22 +19,22 @@ use numerics::trig;
 use numerics::vector::{self, Vec3, cross, sub};
 use std::f32::consts::PI;
 
-/// Of the offset, the part at its far end over which shelter fades out: a collider that reaches
-/// past the end as the wind turns would otherwise come and go at once.
+/// Share of the offset, at its far end, over which shelter fades out: a collider that moves past the end would otherwise
+/// appear and vanish abruptly.
 const FADE: f32 = 0.1;
 
-/// A share this close to 0 or 1 is one: above the rounding of the sums.
+/// A share this close to 0 or 1 counts as that: above the rounding of the sums.
 const ROUNDING: f32 = 2e-5;
 
-/// By how much of its radius the disc's middle lies beside the ray, either way: meshes are often symmetric,
-/// and corners exactly in the middle would have no angle.
+/// Offset of the disc's centre from the ray, in radii along both axes: meshes are often symmetric, and a corner exactly
+/// at the centre would have no angle.
 const ASIDE: [f32; 2] = [3e-5, 2e-5];
 
-/// How far outside of the disc edges are cut off before they are divided by their distance, in radii.
+/// How far outside the disc edges are clipped before the perspective division, in radii.
 const MARGIN: f32 = 2.0;
 
 kernel! {
-    /// The share in `covered` that is sheltered of the cone of each CV, half of its angle `cone`.
+    /// Writes the covered share of the cone of each CV, with half angle `cone`, to `covered`.
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
@@ -77,7 +75,7 @@ struct Cone {
 }
 
 impl Cone {
-    /// Adds how often the mesh shows its front and its back, as a mean over the disc, on any lanes.
+    /// Adds how many times the mesh covers the disc with front and with back faces, on average; spread over the lanes.
     #[inline(always)]
     fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2]) {
         let Some(edges) = &obstacle.edges else { return };
@@ -88,7 +86,7 @@ impl Cone {
         }
     }
 
-    /// Points as the tip sees them, upright on the disc's middle.
+    /// Points relative to the tip, sheared so that the disc's centre is on the axis.
     #[inline(always)]
     fn seen(&self, points: &[Lanes<3>; 3]) -> [Lanes<3>; 3] {
         let mut seen = *points;
@@ -124,8 +122,8 @@ impl Cone {
                 let (from, to) = (at[side], at[(side + 1) % 3]);
                 let third = get(&thirds[side], lane);
                 let volume = vector::dot(cross(to, from), third);
-                let goes_on = self.counts(volume, [to, from, third]) & ((volume > 0.0) == (seen.volume > 0.0));
-                open[side][lane] = counts & !goes_on;
+                let continues = self.counts(volume, [to, from, third]) & ((volume > 0.0) == (seen.volume > 0.0));
+                open[side][lane] = counts & !continues;
             }
         }
         for side in 0..3 {
@@ -149,14 +147,14 @@ impl Cone {
         }
     }
 
-    /// Whether a triangle, from its volume with the tip, is one, and not one that the CV lies on.
+    /// Whether a triangle with this volume with the tip has an area and is not one that the CV lies on.
     #[inline(always)]
     fn counts(&self, volume: f32, [a, b, c]: [Vec3; 3]) -> bool {
         let area = vector::length(cross(sub(b, a), sub(c, a)));
         (area > 0.0) & (volume.abs() > self.gap * area)
     }
 
-    /// How much of the wind something stops at a distance: all but at the end of the offset.
+    /// The share of the wind that is stopped at a distance: 1 but near the end of the offset.
     #[inline(always)]
     fn weight(&self, distance: f32) -> f32 {
         let weight = (1.0 - distance / self.reach) * (1.0 / FADE);
@@ -164,13 +162,13 @@ impl Cone {
         if weight < 1.0 { weight } else { 1.0 }
     }
 
-    /// What an edge adds to the mean over the disc: the part of it in the disc, seen from its middle. It has
-    /// the surface on its left.
+    /// What an edge adds to the mean over the disc: an integral over the part of it inside the disc, as seen from the
+    /// centre. The surface is on the left of the edge.
     #[inline(always)]
     fn edge(&self, from: Vec3, to: Vec3) -> f32 {
         let (start, end) = self.near_the_cone(from, to);
         let along = sub(to, from);
-        // An end that is not cut keeps its bits: the next edge begins there.
+        // An end that is not clipped keeps its bits: the next edge begins there.
         let p = vector::add(from, vector::scale(along, start));
         let q = vector::sub(to, vector::scale(along, 1.0 - end));
         let in_front = (start < end) & (p[2] > 0.0) & (q[2] > 0.0);
@@ -191,7 +189,7 @@ impl Cone {
         let twice_area = (ax * by - ay * bx).abs();
         let angle = trig::atan2(twice_area, ax * bx + ay * by);
 
-        // Distances along a straight line seen in perspective go with their inverses.
+        // Along a line in perspective the inverse of the distance is linear.
         let nearest = -half / square;
         let nearest = if nearest > enters { nearest } else { enters };
         let nearest = if nearest < leaves { nearest } else { leaves };
@@ -203,7 +201,7 @@ impl Cone {
         if sound { share } else { 0.0 }
     }
 
-    /// From where to where, 0…1, an edge lies in the pyramid around the cone; start ≥ end where it does not.
+    /// The interval of an edge, 0…1, inside the pyramid around the cone; start ≥ end where it is outside.
     #[inline(always)]
     fn near_the_cone(&self, from: Vec3, to: Vec3) -> (f32, f32) {
         let (mut start, mut end) = (0.0, 1.0);
@@ -236,7 +234,7 @@ impl Region for &Cone {
             }
             let far = boxes.high[2].0[lane] - self.at[2];
             let near = boxes.low[2].0[lane] - self.at[2];
-            // A little wider than the cone, for the rounding of both and for `ASIDE`.
+            // A little wider than the cone, to allow for rounding and `ASIDE`.
             let radius = self.slope * 1.001 * far;
             let meets = (far > 0.0) & (near <= self.reach) & (square <= radius * radius);
             mask |= u16::from(meets) << lane;
@@ -245,8 +243,8 @@ impl Region for &Cone {
     }
 }
 
-/// Whether the axis lies left of an edge as it is seen along the axis. Where it lies on it, of the two
-/// ways of running along the edge one has it left, so of two triangles one contains it.
+/// Whether the axis is to the left of an edge, seen along the axis. Where it lies on the edge, that holds for exactly one
+/// of the edge's two directions, so exactly one of two neighbouring triangles contains it.
 #[inline(always)]
 fn is_left(from: Vec3, to: Vec3) -> bool {
     let side = beside(from, to);

@@ -1,34 +1,33 @@
-//! Across which side of a triangle another one goes on: beside the blocks of a tree, the third corner of
-//! each side's neighbour.
+//! Neighbouring triangles: for each block of a tree, the third corner of the neighbour across each side.
 
 use numerics::lanes::{Lanes, set};
 use numerics::tree::{NONE, TriangleTree};
 use numerics::vector::Vec3;
 use rayon::prelude::*;
 
-/// Neighbours' third corners, a block of the tree an entry. Side k runs from corner k to the next; one
-/// without a neighbour has its own first corner there, which spans no triangle with it.
+/// Third corners of neighbours, an entry a block of the tree. Side k runs from corner k to the next; a side without a
+/// neighbour has its own first corner instead, which makes a triangle without area.
 pub(super) struct Edges(Vec<[Lanes<3>; 3]>);
 
 /// One side of a triangle.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
-    /// Its two points, the lower index first.
+    /// Its points, the lower index first.
     points: [u32; 2],
-    /// Whether the triangle runs from the higher to the lower.
+    /// Whether the triangle runs along it from the higher index to the lower.
     falls: bool,
     triangle: u32,
     side: u8,
 }
 
-/// For each side of each triangle the point that its neighbour adds, or the side's own first.
+/// For each side of each triangle the third point of its neighbour, or the side's own first point without one.
 #[derive(Clone, Debug)]
 pub struct Neighbours(Vec<[u32; 3]>);
 
 impl Neighbours {
-    /// Two triangles are neighbours where they run along two points in opposite ways, as faces that are
-    /// wound alike do; where more than two meet, they are paired in order and the rest stay alone. Of the points it
-    /// matters which are finite alone.
+    /// Two triangles are neighbours where they run along the same two points in opposite directions, as consistently wound
+    /// faces do; where more than two meet, they are paired in order and the rest have none. Of the points it only
+    /// matters which are finite.
     ///
     /// # Panics
     /// Where an index is out of range.
@@ -86,8 +85,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_side_knows_the_corner_beyond_it() {
-        // Two triangles of a square, wound alike; then the second turned over, which makes both stand alone.
+    fn a_side_has_the_third_corner_of_its_neighbour() {
+        // Two triangles of a square, wound alike; then the second reversed, which leaves both without a neighbour.
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         assert_eq!(thirds(&points, &[[0, 1, 2], [0, 2, 3]]), [[0, 1, 3], [1, 2, 3]]);
         assert_eq!(thirds(&points, &[[0, 1, 2], [0, 3, 2]]), [[0, 1, 2], [0, 3, 2]]);
@@ -95,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn of_three_that_meet_two_are_neighbours() {
+    fn of_three_triangles_at_a_side_two_are_neighbours() {
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
         let thirds = thirds(&points, &[[0, 1, 2], [1, 0, 3], [1, 0, 4]]);
         assert_eq!([thirds[0][0], thirds[1][0], thirds[2][0]], [3, 2, 1]);

@@ -4,7 +4,7 @@
 use super::Collider;
 use numerics::vector::{self, DVec3, Vec3, direction, to_f32, to_f64};
 
-/// From a point of the scene to the frame.
+/// The map from the scene to the frame.
 pub(super) struct Frame {
     centre: DVec3,
     /// Two axes across the wind and the one upwind, each of length `unit`.
@@ -13,8 +13,8 @@ pub(super) struct Frame {
     unit: f64,
 }
 
-/// When a CV lies on a triangle, in the frame's unit: within `least` of its plane, or within
-/// `share` of the collider's size while that is not more than `most`.
+/// How close a CV on a triangle is to its plane at most, in the frame's unit: [`SKIN`] of the collider's size but at most
+/// `most`, and at least `least`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gap {
     least: f32,
@@ -29,13 +29,13 @@ impl Gap {
     }
 }
 
-/// Of a collider's size: above the rounding of a text file of six digits, below any gap one models.
+/// As a share of a collider's size: above the rounding of text files with six digits, below any modelled gap.
 const SKIN: f32 = 1e-5;
 
-/// Of a curve's size: where the collider is a landscape, its hundred-thousandth is longer than a hair.
+/// As a share of a curve's size: 1e-5 of a collider as large as a landscape is longer than a hair.
 const HAIR: f32 = 1e-2;
 
-/// Units in the last place by which a position, and the plane of a triangle there, may be off.
+/// Rounding error of a position and of the plane of a triangle there, in ulp.
 const ULPS: f32 = 4.0;
 
 impl Frame {
@@ -56,7 +56,7 @@ impl Frame {
         Some(Self { centre, axes, unit })
     }
 
-    /// A point of the scene, in the frame.
+    /// A point of the scene in the frame.
     #[inline(always)]
     pub(super) fn at(&self, point: Vec3) -> Vec3 {
         let from_centre = to_f64(point) - self.centre;
@@ -64,12 +64,12 @@ impl Frame {
         [a.dot(&from_centre) as f32, b.dot(&from_centre) as f32, c.dot(&from_centre) as f32]
     }
 
-    /// A length of the scene, in the frame.
+    /// A length of the scene in the frame.
     pub(super) fn length(&self, metres: f32) -> f32 {
         (f64::from(metres) * self.unit) as f32
     }
 
-    /// When a CV of this curve lies on a triangle.
+    /// The gap for the CVs of a curve.
     pub(super) fn gap(&self, cvs: &[Vec3], asked: f32) -> Gap {
         let Bounds { low, high } = Bounds::of(cvs);
         let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
@@ -81,14 +81,14 @@ impl Frame {
     }
 }
 
-/// Least and largest coordinates; of nothing, both 0.
+/// Least and largest coordinates; both 0 without points.
 struct Bounds {
     low: Vec3,
     high: Vec3,
 }
 
 impl Bounds {
-    /// Of the finite ones of some points.
+    /// Bounds of the points, coordinates that are not finite ignored.
     fn of(points: &[Vec3]) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for point in points {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn any_scene_is_brought_below_two() {
+    fn any_scene_is_scaled_below_two() {
         for scale in [1e-40_f32, 1e-6, 1.0, 1e6, 3e38] {
             let points = [[0.0, 0.0, 0.0], [scale, 0.0, 0.0]];
             let frame = Frame::of([1.0, 0.0, 0.0], &points, &[]).unwrap();

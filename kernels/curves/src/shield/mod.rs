@@ -1,18 +1,16 @@
-//! Which curves stand in the lee: the kernel of Curve_Wind_Shielding (W4).
+//! Which curves are in the lee of colliders: the kernel of Curve_Wind_Shielding (W4).
 //!
-//! From each CV a ray goes upwind. As all rays are parallel, everything is turned into a frame whose
-//! third axis points upwind; there a ray is a box without width, a hit a point in a triangle, and a
-//! far offset costs no precision. A CV may ask a cone instead of a ray: what share of it is covered.
+//! A ray is cast upwind from each CV. As all rays are parallel, everything is rotated into a frame whose third axis points
+//! upwind; there a ray is a box without width, a hit test is a point-in-triangle test, and a large offset costs no
+//! precision. Instead of a ray a CV may use a cone: the result is the share of the cone that is covered.
 //!
-//! Promise: rays are exact to the rounding of the positions and to [`Shield::skin_gap`], find no cracks
-//! between triangles that share their points, and are stopped by either side of a face. The share of a
-//! cone is continuous in the wind. The same bits on every SIMD path and for any number of threads; finite
-//! for any input.
+//! Promise: rays are exact up to the rounding of positions and [`Shield::skin_gap`], do not slip through between triangles
+//! that share points, and are stopped by either side of a face. The covered share of a cone is a continuous function of
+//! the wind. The same bits on every SIMD path and number of threads; finite for any input.
 //!
-//! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the
-//! gap. So a root on the windward side of a closed skin is free, and one on the lee side is sheltered by
-//! the skin's other side, at any angle of the wind. Limit: a root buried deeper than the gap is covered
-//! by the skin above it.
+//! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the gap. So a root on
+//! the windward side of a closed skin is exposed, and one on the lee side is sheltered by the opposite side of the skin,
+//! at any angle of the wind. Limit: a root buried deeper than the gap is covered by the skin above it.
 
 mod cone;
 mod edges;
@@ -35,43 +33,42 @@ use views::Views;
 pub struct Collider<'a> {
     /// Positions, metres.
     pub points: &'a [Vec3],
-    /// Three indices of `points` each; which way round does not matter for rays.
+    /// Three indices of `points` each; their winding does not matter for rays.
     pub triangles: &'a [[u32; 3]],
-    /// A tree over them, where there is one: saves building another.
+    /// A tree over them, where one exists: saves building another.
     pub tree: Option<&'a TriangleTree>,
-    /// What [`Neighbours::of`] gives for them, where it is known: saves cones looking for them.
+    /// Their [`Neighbours`], where known: saves finding them, for cones.
     pub neighbours: Option<&'a Neighbours>,
 }
 
 impl<'a> Collider<'a> {
-    /// One of which nothing else is known.
+    /// A collider without tree and neighbours.
     pub fn of(points: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Self {
         Self { points, triangles, tree: None, neighbours: None }
     }
 }
 
-/// How the wind is stopped.
+/// How shelter is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Shield {
     /// Where the wind blows to, of any length; nothing is sheltered from a wind of 0.
     pub wind: [f64; 3],
     /// How far upwind of a CV something shelters it, metres.
     pub offset: f32,
-    /// Half the angle of the cone that a CV looks upwind through, radians, 0…0.5; 0 is a ray.
+    /// Half the opening angle of the cone, radians, 0…0.5; 0 is a ray.
     pub cone: f32,
-    /// A CV this close to a triangle's plane lies on it, metres, if that is more than the least that
-    /// positions allow: a hundred-thousandth of the collider's size and a hundredth of the curve's,
-    /// whichever is less, but four units in the last place of the CV's largest coordinate.
+    /// A CV this close to a triangle's plane lies on it, metres. At least the smaller of 1e-5 of the collider's size and
+    /// 1e-2 of the curve's, and 4 ulp of the CV's largest coordinate.
     pub skin_gap: f32,
 }
 
-/// CVs that are sorted together: enough to lie close, and few enough to stay in a cache.
+/// CVs that are sorted together: enough to lie close together, and few enough to stay in a cache.
 const SORTED_CVS: usize = 1 << 18;
 
 /// Groups of sixteen CVs that a task has: some 30 µs of work.
 const TASK_GROUPS: usize = 32;
 
-/// Curves that a task sums up.
+/// Curves a task averages over.
 const TASK_CURVES: usize = 1024;
 
 /// A collider in the frame of the wind.
@@ -79,7 +76,7 @@ struct Obstacle {
     tree: TriangleTree,
     /// Twice the area of each triangle, a block an entry.
     areas: Vec<F32x16>,
-    /// What bounds the mesh as a cone sees it; none where there are rays alone.
+    /// Neighbours of each triangle, which cones need; `None` for rays.
     edges: Option<Edges>,
     /// The longest side of its bounds.
     size: f32,
@@ -89,7 +86,7 @@ struct Obstacle {
 /// `points[starts[i]..starts[i + 1]]`.
 ///
 /// # Panics
-/// Where `starts` falls or ends beyond `points`, or a triangle's index is out of range.
+/// Where `starts` decreases or ends beyond `points`, or a triangle's index is out of range.
 pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
     shield_on(Path::chosen(), starts, points, colliders, shield)
 }
@@ -139,7 +136,7 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
     }
 }
 
-/// Runs of curves of about `SORTED_CVS`, as ranges of `starts`, its end included.
+/// Runs of curves with about `SORTED_CVS` CVs, as ranges of `starts` that include the end.
 fn batches(starts: &[u32]) -> Vec<std::ops::Range<usize>> {
     let (mut batches, mut first) = (Vec::new(), 0);
     for curve in 1..starts.len() {
@@ -151,14 +148,14 @@ fn batches(starts: &[u32]) -> Vec<std::ops::Range<usize>> {
     batches
 }
 
-/// The mean over a curve's CVs, which are at these places of `covered`; 0 for one without.
+/// The mean over a curve's CVs, given their indices in `covered`; 0 without CVs.
 fn share(cvs: &[u32], covered: &[f32]) -> f32 {
-    let sum: f64 = cvs.iter().map(|place| f64::from(covered[*place as usize])).sum();
+    let sum: f64 = cvs.iter().map(|cv| f64::from(covered[*cv as usize])).sum();
     if cvs.is_empty() { 0.0 } else { (sum / cvs.len() as f64) as f32 }
 }
 
 impl Obstacle {
-    /// A collider turned into the frame.
+    /// A collider in the frame.
     fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
         let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
         let tree = match collider.tree {

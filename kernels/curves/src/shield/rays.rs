@@ -39,7 +39,7 @@ fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32])
     }
 }
 
-/// Where sixteen rays start, all upwind.
+/// Sixteen rays upwind, by their starts.
 struct Rays {
     at: Lanes<3>,
     gap: F32x16,
@@ -47,7 +47,7 @@ struct Rays {
 }
 
 impl Rays {
-    /// Sets `hit` to 1 for each ray that meets the tree; whether all are.
+    /// Sets `hit` to 1 for each ray that meets the tree; returns whether all do.
     #[inline(always)]
     fn meet(&self, obstacle: &Obstacle, hit: &mut [u32; LANES]) -> bool {
         let (Cuboid { low, high }, tree) = (self.bounds(), &obstacle.tree);
@@ -98,15 +98,15 @@ impl Rays {
     }
 }
 
-/// A triangle as the start of a ray sees it along the third axis.
+/// A triangle as seen from the start of a ray along the third axis.
 pub(super) struct Seen {
-    /// Whether the ray, or its other way, goes through it, its sides included. Two triangles
-    /// compute a side they share as the same number, so nothing goes between them.
+    /// Whether the line of the ray passes through it, sides included. Two triangles compute a shared side as the same
+    /// number, so no ray passes between them.
     pub(super) inside: bool,
     /// Twice its area across the ray, ≥ 0 where inside.
     pub(super) across: f32,
-    /// `across` times the way to it; also twice its area in space times the distance of its plane,
-    /// below 0 where that lies behind.
+    /// `across` times the distance along the ray; also twice its area times the distance of its plane; negative where the
+    /// triangle lies behind the start.
     pub(super) towards: f32,
     /// Six times the volume of the tetrahedron that it spans with the start.
     pub(super) volume: f32,
@@ -126,8 +126,8 @@ impl Seen {
     }
 }
 
-/// Twice the area that a side spans with the axis, as it is seen along the axis: below 0 where that lies right
-/// of the way from `p` to `q`.
+/// Twice the signed area that a side spans with the axis, seen along the axis: negative where the axis is to the right
+/// of the side from `p` to `q`.
 #[inline(always)]
 pub(super) fn beside(p: Vec3, q: Vec3) -> f32 {
     p[0] * q[1] - p[1] * q[0]

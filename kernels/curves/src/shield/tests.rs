@@ -1,8 +1,10 @@
+//! Shelter against closed forms and against counting rays.
+
 use super::*;
 use numerics::random::Key;
 use numerics::shapes;
 
-/// A sphere of radius 1, and another way to turn it, so that no facet is in line with an axis.
+/// A sphere of radius 1.
 fn sphere(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mesh = shapes::sphere([2.0; 3], n);
     (mesh.points.iter().map(|point| point.map(|x| x as f32)).collect(), mesh.triangles())
@@ -15,7 +17,7 @@ fn lone(points: &[Vec3]) -> Vec<u32> {
 
 const STILL: Shield = Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, cone: 0.0, skin_gap: 0.0 };
 
-/// The share of each point on its own.
+/// The share of each point as a curve of one CV.
 fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
     shield(&lone(points), points, &[Collider::of(&mesh.0, &mesh.1)], how)
 }
@@ -38,7 +40,7 @@ fn half_a_curve_behind_a_wall_is_half_sheltered() {
 }
 
 #[test]
-fn two_walls_shelter_what_either_shelters() {
+fn two_walls_shelter_all_that_either_shelters() {
     let (low, triangles) = wall(0.0);
     let high: Vec<Vec3> = low.iter().map(|[x, y, z]| [x - 1.0, y + 2.5, *z]).collect();
     let points = [[0.5, 0.0, 0.0], [0.5, 2.0, 0.0], [0.5, 1.2, 0.0]];
@@ -60,13 +62,15 @@ fn a_sphere_shelters_its_silhouette_at_any_offset() {
             let [x, y, z] = point.map(f64::from);
             let inside = 1.0 - y * y - z * z;
             let half = inside.max(0.0).sqrt();
-            let ways = [x + half, x - half];
-            let near =
-                |way: f64| way.abs() < 2e-3 / half.max(1e-2) || (way - f64::from(offset)).abs() < 2e-3 / half.max(1e-2);
-            if inside.abs() < 2e-3 || ways.iter().any(|way| near(*way)) {
+            let distances = [x + half, x - half];
+            let near = |distance: f64| {
+                distance.abs() < 2e-3 / half.max(1e-2) || (distance - f64::from(offset)).abs() < 2e-3 / half.max(1e-2)
+            };
+            if inside.abs() < 2e-3 || distances.iter().any(|distance| near(*distance)) {
                 continue;
             }
-            let expected = inside > 0.0 && ways.iter().any(|way| *way > 0.0 && *way <= f64::from(offset));
+            let expected = inside > 0.0
+                && distances.iter().any(|distance| (0.0..=f64::from(offset)).contains(distance) && *distance > 0.0);
             assert_eq!(found, f32::from(u8::from(expected)), "{point:?} at {offset}");
             sure += 1;
         }
@@ -75,7 +79,7 @@ fn a_sphere_shelters_its_silhouette_at_any_offset() {
 }
 
 #[test]
-fn roots_on_a_sphere_are_sheltered_on_its_lee_side_alone() {
+fn roots_on_a_sphere_are_sheltered_on_its_lee_side_only() {
     // On the vertices, on the middles of edges and in faces, at any turn of the wind; a face's width from the terminator.
     let (points, triangles) = sphere(24);
     let mut roots = points.clone();
@@ -112,7 +116,7 @@ fn a_flat_ground_shelters_nothing_that_grows_on_it() {
 }
 
 #[test]
-fn turning_the_wind_round_mirrors_the_shelter() {
+fn reversing_the_wind_mirrors_the_shelter() {
     let (points, triangles) = sphere(16);
     let curves: Vec<Vec3> =
         (0..600u64).map(|i| [0, 1, 2].map(|axis| Key::new(3).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
@@ -127,7 +131,7 @@ fn turning_the_wind_round_mirrors_the_shelter() {
 }
 
 #[test]
-fn nothing_goes_between_triangles_that_share_their_points() {
+fn no_ray_passes_between_triangles_that_share_points() {
     // A crumpled sheet; rays exactly at its vertices, at the middles of its edges and just beside both.
     let n = 12u32;
     let at = |i: u32, j: u32| {
@@ -238,7 +242,7 @@ mod cones {
     }
 
     #[test]
-    fn a_cone_s_share_is_that_of_many_rays() {
+    fn a_cone_s_share_matches_that_of_many_rays() {
         let mesh = sphere(8);
         for p in [
             [3.0, 0.9, 0.1],
@@ -260,7 +264,7 @@ mod cones {
     }
 
     #[test]
-    fn half_a_cone_behind_an_edge_is_half_covered_whichever_way_it_is_wound() {
+    fn a_cone_centred_on_an_edge_is_half_covered_for_either_winding() {
         let (points, triangles) = wall(0.0);
         let turned: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
         let loose: Vec<Vec3> = triangles.iter().flatten().map(|point| points[*point as usize]).collect();
@@ -283,7 +287,7 @@ mod cones {
     }
 
     #[test]
-    fn a_share_never_jumps_as_the_wind_turns() {
+    fn shares_are_continuous_as_the_wind_turns() {
         // A hundred thousandth of a turn at a time past a tumbled cube: a ray's share would jump by 1.
         let cube = shapes::block([1.0; 3], [1; 3]);
         let triangles = cube.triangles();

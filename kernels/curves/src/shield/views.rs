@@ -1,13 +1,13 @@
-//! The CVs in the frame, sorted so that sixteen that follow each other see the same triangles.
+//! The CVs in the frame, sorted so that sixteen successive ones see nearly the same triangles.
 //!
-//! Curves may lie in memory in any order and their CVs reach far, so it is CVs that are sorted, into the cells
-//! of a grid across the wind, along a Z-curve: two passes over them.
+//! Curves may lie in memory in any order and may be long, so CVs are sorted rather than curves: into the cells of a grid
+//! across the wind, along a Z-order curve, in two passes.
 
 use super::frame::{Frame, Gap};
 use numerics::vector::Vec3;
 use rayon::prelude::*;
 
-/// A CV that looks upwind.
+/// A CV, from which a ray or cone is cast upwind.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     pub(super) at: Vec3,
@@ -17,26 +17,26 @@ pub(super) struct View {
 /// The CVs of some curves.
 pub(super) struct Views {
     sorted: Vec<View>,
-    /// Where in `sorted` each CV is, one curve after the other.
-    places: Vec<u32>,
-    /// Where in `places` each curve starts, and where the last ends.
+    /// The index in `sorted` of each CV, curve by curve.
+    order: Vec<u32>,
+    /// The index in `order` where each curve starts, and where the last ends.
     starts: Vec<u32>,
 }
 
-/// Curves that a task turns into the frame.
+/// Curves that a task transforms into the frame.
 const TASK: usize = 256;
 
-/// CVs a cell of the grid holds on average.
+/// CVs a cell on average.
 const IN_CELL: usize = 4;
 
-/// Most halvings of the grid's side.
+/// Log₂ of the most cells along a side of the grid.
 const FINEST: u32 = 8;
 
 impl Views {
     /// The CVs `points[starts[i]..starts[i + 1]]`.
     pub(super) fn of(frame: &Frame, starts: &[u32], points: &[Vec3], skin_gap: f32) -> Self {
         let Some(base) = starts.first().copied() else {
-            return Self { sorted: Vec::new(), places: Vec::new(), starts: vec![0] };
+            return Self { sorted: Vec::new(), order: Vec::new(), starts: vec![0] };
         };
         let points = &points[base as usize..starts[starts.len() - 1] as usize];
         let starts: Vec<u32> = starts.iter().map(|start| start - base).collect();
@@ -54,18 +54,18 @@ impl Views {
                 views = rest;
             }
         });
-        let (sorted, places) = sorted(&views);
-        Self { sorted, places, starts }
+        let (sorted, order) = sorted(&views);
+        Self { sorted, order, starts }
     }
 
-    /// All CVs, near ones next to each other.
+    /// All CVs, sorted so that near ones are close to each other.
     pub(super) fn sorted(&self) -> &[View] {
         &self.sorted
     }
 
-    /// Where in [`Views::sorted`] the CVs of each curve are.
+    /// The indices in [`Views::sorted`] of the CVs of each curve.
     pub(super) fn curves(&self) -> impl IndexedParallelIterator<Item = &[u32]> {
-        self.starts.par_windows(2).map(|ends| &self.places[ends[0] as usize..ends[1] as usize])
+        self.starts.par_windows(2).map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
     }
 }
 
@@ -85,7 +85,7 @@ fn split<'a>(mut views: &'a mut [View], starts: &'a [u32]) -> Vec<Task<'a>> {
     tasks
 }
 
-/// The views cell by cell, in one cell as they came; and where each went.
+/// The views sorted by cell (stable), and the new index of each.
 fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
     let mut bits = 1;
     while bits < FINEST && IN_CELL << (2 * bits) < views.len() {
@@ -103,22 +103,22 @@ fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
         *count = sum;
     }
     let mut out = views.to_vec();
-    let mut places = cells;
-    for (place, view) in places.iter_mut().zip(views) {
-        let next = &mut next[*place as usize];
-        *place = *next;
+    let mut order = cells;
+    for (index, view) in order.iter_mut().zip(views) {
+        let next = &mut next[*index as usize];
+        *index = *next;
         out[*next as usize] = *view;
         *next += 1;
     }
-    (out, places)
+    (out, order)
 }
 
 /// Cells across the wind.
 struct Grid {
     low: [f32; 2],
-    /// Cells a unit.
+    /// Cells a unit of length.
     fine: [f32; 2],
-    /// Number of the last cell along an axis.
+    /// Index of the last cell along an axis.
     last: f32,
 }
 
@@ -139,7 +139,7 @@ impl Grid {
         Self { low, fine: [fine; 2], last }
     }
 
-    /// The number of a point's cell along a Z-curve; a point that is no number may be in any.
+    /// The index of a point's cell along a Z-order curve; any cell for NaN.
     fn cell(&self, at: Vec3) -> u32 {
         let mut cell = 0;
         for axis in 0..2 {
@@ -150,7 +150,7 @@ impl Grid {
     }
 }
 
-/// Sixteen bits, a zero between each two.
+/// Spreads sixteen bits: a zero between each two.
 fn spread(x: u32) -> u32 {
     let x = (x | x << 8) & 0x00ff_00ff;
     let x = (x | x << 4) & 0x0f0f_0f0f;
@@ -163,13 +163,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cvs_are_sorted_by_place_and_found_again() {
+    fn cvs_are_sorted_by_cell_and_found_again() {
         // Two curves of a row of CVs across the wind, their numbers shuffled.
         let along = [5, 2, 7, 0, 3, 6, 1, 4];
         let points: Vec<Vec3> = along.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         let views = Views::of(&frame, &[0, 3, 8], &points, 0.0);
-        let at = |place: &u32| views.sorted()[*place as usize].at;
+        let at = |index: &u32| views.sorted()[*index as usize].at;
         let found: Vec<Vec3> = views.curves().collect::<Vec<_>>().into_iter().flatten().map(at).collect();
         assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
         let cells: Vec<u32> = {
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_no_numbers_or_all_one_are_sorted_too() {
+    fn nan_and_coincident_points_are_sorted_too() {
         let points = [[f32::NAN; 3], [f32::INFINITY, 0.0, 0.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0]];
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         for n in 0..=4 {

@@ -1,4 +1,4 @@
-//! What has turned so far down a curve: one quaternion and one offset.
+//! The rotation accumulated down a curve: one quaternion and one displacement.
 
 use super::Bend;
 use super::curve_group::Unit;
@@ -7,22 +7,22 @@ use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::trig;
 use numerics::vector::{self, IDENTITY, Vec3};
 
-/// Sine of the angle short of π below which the vector product of two directions is rounding noise
-/// (its error is 2e-7), and the axis of their turn is taken from the curve instead.
+/// Sine of the remaining angle to π below which the cross product of two directions is rounding noise (its error is
+/// 2e-7), and the axis of rotation is taken from the curve instead.
 const OPPOSITE: f32 = 1e-6;
 
-/// A curve encloses more than this share of its size² with its chord where its own bend is not the
-/// rounding of a straight one.
+/// Area between curve and chord, as a share of the curve's size², above which the curve is bent and not straight up to
+/// rounding.
 const STRAIGHT: f32 = 1e-5;
 
 /// The state of sixteen curves at a pivot.
 pub(super) struct Chain {
-    /// All turns of this and earlier pivots.
+    /// The rotations of this and all earlier pivots, composed.
     turned: Lanes<4>,
-    /// From where the CV came in to where it is, in units, and what its sum has lost to rounding.
+    /// Displacement of the CV in units, and what its sum has lost to rounding (Kahan).
     offset: Lanes<3>,
     carry: Lanes<3>,
-    /// The axes that curves bend about by themselves, where one was asked for.
+    /// The axes that curves bend about at rest, where one was needed.
     bulges: [Option<Vec3>; LANES],
 }
 
@@ -32,8 +32,8 @@ impl Chain {
         Self { turned: IDENTITY.map(F32x16::splat), offset: still, carry: still, bulges: [None; LANES] }
     }
 
-    /// Turns what is beyond the pivot by `share` of the angle from its tip to `towards`; `chord` is
-    /// the tip less the pivot as they came in. `bulge` gives a lane's axis of bending, or 0.
+    /// Rotates the rest of the curve about the pivot by `share` of the angle from its tip to `towards`; `chord` is the
+    /// incoming tip less the incoming pivot. `bulge` gives the axis that a lane's curve bends about, or 0.
     #[inline(always)]
     pub(super) fn turn(&mut self, chord: &Lanes<3>, towards: &Lanes<3>, share: &F32x16, bulge: impl Fn(usize) -> Vec3) {
         let mut tip = [F32x16::splat(0.0); 3];
@@ -65,7 +65,7 @@ impl Chain {
         }
     }
 
-    /// Goes on to the next CV, at the end of `segment`; gives how far the segment's turn moves it.
+    /// Advances to the next CV, at the end of `segment`; returns the displacement that the rotation of the segment adds.
     #[inline(always)]
     pub(super) fn advance(&mut self, bend: &Bend<'_>, segment: &Lanes<3>, at: &[usize; LANES]) -> Lanes<3> {
         let whole = bend.blend.value >= 1.0 && bend.blend.mask.is_none();
@@ -86,7 +86,7 @@ impl Chain {
         moved
     }
 
-    /// The share `blend` of all turns so far: their axis, less of their angle.
+    /// The accumulated rotation with its angle scaled by `blend`.
     #[inline(always)]
     fn blended(&self, bend: &Bend<'_>, at: &[usize; LANES]) -> Lanes<4> {
         let mut share = gather(bend.blend.mask, at);
@@ -105,7 +105,7 @@ impl Chain {
         let mut out = self.turned;
         for lane in 0..LANES {
             let [x, y, z, w] = get(&self.turned, lane);
-            // The shorter way round: a turn past π is one of less than π the other way.
+            // The shorter rotation: one past π is one of less than π in the opposite sense.
             let part = if w < 0.0 { -part.0[lane] } else { part.0[lane] };
             let part = if sine.0[lane] > 0.0 { part / sine.0[lane] } else { 0.0 };
             let whole = share.0[lane] >= 1.0;
@@ -116,7 +116,7 @@ impl Chain {
         out
     }
 
-    /// Where the CVs that came in at `points` are now: the same bits where nothing has moved.
+    /// The incoming CVs `points`, displaced: the same bits where the displacement is 0.
     #[inline(always)]
     pub(super) fn displace(&self, points: &Lanes<3>, unit: &Unit) -> Lanes<3> {
         let mut out = *points;
@@ -131,22 +131,22 @@ impl Chain {
     }
 }
 
-/// The turn from one direction to another.
+/// The smallest rotation from one direction to another.
 struct Between {
-    /// Of length 1, or 0 where it has none.
+    /// Of length 1, or 0 where it is undefined.
     axis: Vec3,
     /// 0..π.
     angle: f32,
-    /// Whether the directions are so opposite that `axis` is noise.
+    /// Whether the directions are so nearly opposite that `axis` is rounding noise.
     opposite: bool,
 }
 
 impl Between {
-    /// From `from` to `to`, of any lengths; no turn where one is zero.
+    /// From `from` to `to`, of any lengths; no rotation where one is zero.
     #[inline(always)]
     fn of(from: Vec3, to: Vec3) -> Self {
         let normal = vector::cross(from, to);
-        // Between near-opposite directions its rounding leans towards them: bring it upright.
+        // For nearly opposite directions rounding tilts the normal towards them: make it perpendicular again.
         let square = vector::dot(from, from);
         let lean = if square > 0.0 { vector::dot(normal, from) / square } else { 0.0 };
         let normal = vector::sub(normal, vector::scale(from, lean));
@@ -160,8 +160,8 @@ impl Between {
     }
 }
 
-/// An axis to turn `tip` about: as the curve bends already, `bulge`, or perpendicular to `tip`
-/// where it is straight.
+/// An axis to rotate `tip` about: the one the curve is bent about, `bulge`, or any perpendicular to `tip` where it is
+/// straight.
 fn own_axis(bulge: Vec3, tip: Vec3) -> Vec3 {
     let along = vector::dot(bulge, tip) / vector::dot(tip, tip);
     let upright = vector::sub(bulge, vector::scale(tip, along));

@@ -1,7 +1,7 @@
-//! Sixteen curves, root to tip: one step a pivot, a loop over lanes for each part of it.
+//! Sixteen curves, root to tip: one step a pivot, in loops over lanes.
 //!
-//! A lane whose curve has ended, or that has none, repeats its last CV: its segments have no length,
-//! so nothing turns and nothing needs a mask.
+//! A lane whose curve has ended, or that has none, repeats its last CV: its segments have no length, so nothing rotates
+//! and no lane masks are needed.
 
 use super::chain::Chain;
 use super::share::Share;
@@ -14,24 +14,24 @@ use numerics::vector::{self, Vec3};
 
 /// Up to sixteen curves of `points`.
 pub(super) struct CurveGroup<'a> {
-    /// The first one's number.
+    /// Index of the first one.
     pub(super) first: usize,
     /// Where each starts, and where the last ends.
     pub(super) starts: &'a [u32],
     pub(super) points: &'a [Vec3],
 }
 
-/// Memory that groups reuse, a step an entry.
+/// Memory that groups reuse; an entry a step.
 #[derive(Default)]
 pub(super) struct Scratch {
-    /// CVs as they come in.
+    /// Incoming CVs.
     points: Vec<Lanes<3>>,
-    /// Arc length from the root to the CV, in the lane's own unit.
+    /// Arc length from the root to the CV, in the lane's unit.
     arc: Vec<F32x16>,
 }
 
 kernel! {
-    /// Writes the bent curves of `group` to `out`, which holds their points alone.
+    /// Writes the bent curves of `group` to `out`, which holds just their points.
     pub(super) fn bend_group(
         bend: &Bend<'_>,
         group: &CurveGroup<'_>,
@@ -75,18 +75,18 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
 
 /// Where each lane's curve lies in the points.
 pub(super) struct Curves {
-    /// Where the group's own points begin.
+    /// Where the group's points begin.
     base: usize,
     first: [usize; LANES],
     last: [usize; LANES],
-    /// CVs that are the lane's own: 0 where it has no curve.
+    /// CVs of the lane's curve: 0 where it has none.
     count: [usize; LANES],
-    /// Most CVs of a curve, at least 1.
+    /// CVs of the longest curve, at least 1.
     longest: usize,
 }
 
 impl Curves {
-    /// None where the group has no CV.
+    /// `None` where the group has no CV.
     fn of(group: &CurveGroup<'_>) -> Option<Self> {
         let base = group.starts[0] as usize;
         let mut curves = Self { base, first: [base; LANES], last: [base; LANES], count: [0; LANES], longest: 0 };
@@ -101,13 +101,13 @@ impl Curves {
         (curves.longest > 0).then_some(curves)
     }
 
-    /// Which point is each lane's CV at `step`: its last one where the curve has ended.
+    /// The index of each lane's CV at `step`: of the last one where the curve has ended.
     #[inline(always)]
     pub(super) fn at(&self, step: usize) -> [usize; LANES] {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step))
     }
 
-    /// Fills `scratch.points`; the unit of each lane follows from its size.
+    /// Fills `scratch.points`; returns the units of the lanes.
     #[inline(always)]
     fn load(&self, points: &[Vec3], scratch: &mut Scratch) -> Unit {
         let blank = F32x16::splat(0.0);
@@ -139,8 +139,8 @@ impl Curves {
         }
     }
 
-    /// Along the axis about which a lane's curve already bends, as seen from its root, and as long as
-    /// the area that it encloses with its chord ÷ its size²; 0 where it is straight.
+    /// A vector along the axis about which a lane's incoming curve bends, whose length is the area between the curve and
+    /// its chord ÷ its size²; 0 where it is straight.
     fn bulge(&self, lane: usize, points: &[Vec3]) -> Vec3 {
         let cvs = &points[self.first[lane]..=self.last[lane]];
         let size = cvs.iter().map(|cv| vector::largest(vector::sub(*cv, cvs[0]))).fold(0.0, f32::max);
@@ -150,8 +150,8 @@ impl Curves {
     }
 }
 
-/// The power of two that brings a lane's curve to a size of 1…2, so that no square overflows or
-/// vanishes; scaling by it changes no digit.
+/// Each lane's power of two that scales its curve to a size of 1…2, so that no square overflows or vanishes; scaling by
+/// it is exact.
 pub(super) struct Unit {
     to: F32x16,
     pub(super) from: F32x16,
@@ -180,8 +180,8 @@ impl Unit {
     }
 }
 
-/// Fills `scratch.arc`; gives the curves' lengths, in units. Summed with its rounding carried along:
-/// ten thousand equal segments would else round the same way each time.
+/// Fills `scratch.arc`; returns the curves' lengths, in units. A compensated sum: otherwise the rounding errors of ten
+/// thousand equal segments would add up.
 #[inline(always)]
 fn measure(longest: usize, unit: &Unit, scratch: &mut Scratch) -> F32x16 {
     let mut sum = F32x16::splat(0.0);

@@ -1,15 +1,15 @@
 //! Wind on curves: the kernel of Curve_Wind (W2), sixteen curves side by side.
 //!
-//! Root to tip, one pivot at a time, the rest of the curve turns about the pivot from the direction
-//! of its *current* tip towards the wind. All that has turned so far is one quaternion carried down
-//! the curve, so the cost is linear in CVs where moving all later points would be quadratic.
+//! Root to tip, one pivot at a time, the rest of the curve rotates about the pivot, from the direction of its *current*
+//! tip towards the wind. The accumulated rotation is one quaternion carried down the curve, so the cost is linear in CVs
+//! where moving all later points would be quadratic.
 //!
-//! Promise: the root keeps its bits; segments keep their lengths within 1e-5 of the curve's plus 4 ulp
-//! of the positions, at any number of CVs; what does not turn keeps its bits; the same bits on every
-//! SIMD path and number of threads; finite for any finite positions below 1e37. All arithmetic is on
-//! differences of CVs, brought to 1…2 by a power of two, so position and scale of the scene cost no
-//! digit but those its f32 positions have lost. Limits: near two directions exactly opposite the turn
-//! has no axis of its own; within 1e-6 rad it is taken from the curve. Positions in metres, radians.
+//! Promise: the root keeps its bits; segments keep their lengths within 1e-5 of the curve's plus 4 ulp of the positions,
+//! at any number of CVs; CVs that do not move keep their bits; the same bits on every SIMD path and number of threads;
+//! finite for any finite positions below 1e37. All arithmetic is on differences of CVs, scaled to 1…2 by a power of two,
+//! so precision does not depend on the scene's position and scale beyond that of f32 positions. Limit: between exactly
+//! opposite directions the axis of rotation is undefined; within 1e-6 rad of that it is taken from the curve. Metres,
+//! radians.
 
 mod chain;
 mod curve_group;
@@ -25,21 +25,21 @@ use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use rayon::prelude::*;
 
-/// Which share of the angle to the wind a pivot turns.
+/// By which share of the angle to the wind a pivot rotates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BendMode {
-    /// The paper's: g at every pivot. Segment k of a straight curve is left with θ₀(1−g)ᵏ⁺¹, k from
-    /// 0, so more CVs bend more.
+    /// As in the paper: g at every pivot. Segment k of a straight curve ends at an angle of θ₀(1−g)ᵏ⁺¹, k from 0, so
+    /// curves with more CVs bend more.
     Paper,
-    /// θ₀(1−g)^(u·n) at a segment whose middle is at u, n this number: the same curve for any CVs.
-    /// g ≥ 1 lies along the wind at once.
+    /// θ₀(1−g)^(u·n) at a segment whose middle is at u, n this number: the same shape for any number of CVs. With g ≥ 1
+    /// the whole curve lies along the wind.
     ResolutionFree {
-        /// CVs' worth of bending over the whole curve.
+        /// The number of segments for which it bends as the paper does.
         reference_segments: f32,
     },
 }
 
-/// What bends the curves. Slices are one value a CV unless said.
+/// How curves bend. Slices have one value a CV unless stated.
 #[derive(Clone, Debug)]
 pub struct Bend<'a> {
     /// Where wind blows to, of length 1.
@@ -50,11 +50,11 @@ pub struct Bend<'a> {
     pub envelope: Option<&'a [f32]>,
     /// Scales `rotate` along u, the rest arc length ÷ curve length.
     pub ramp: &'a Ramp,
-    /// How g is applied.
+    /// How g acts along the curve.
     pub mode: BendMode,
     /// Share of each segment's whole turn that is kept, 0..1; 0 gives the incoming bits.
     pub blend: Masked<'a, f32>,
-    /// What varies the wind's direction.
+    /// Noise that varies the wind's direction.
     pub noise: Option<BendNoise<'a>>,
 }
 
@@ -64,31 +64,31 @@ pub struct Bend<'a> {
 pub struct BendNoise<'a> {
     /// The field.
     pub field: &'a Field,
-    /// Of the noise, against a wind of 1; 0 costs nothing.
+    /// Of the noise, relative to a wind of length 1; 0 costs nothing.
     pub amplitude: f32,
     /// Cells of the field a metre.
     pub frequency: f64,
-    /// Share of the arc length by which a CV samples downwind of its root; 0 costs one sample a curve.
+    /// Share of its arc length by which a CV samples downwind of its root; at 0 one sample a curve is enough.
     pub waviness: f32,
     /// Added to the root, in metres: the scene's origin less the scroll's offset.
     pub origin: [f64; 3],
-    /// Where to sample a curve, one a curve; none: at its own root.
+    /// Where to sample a curve's noise, one a curve; `None` is at its own root.
     pub roots: Option<&'a [[f32; 3]]>,
 }
 
-/// Bent curves, and what was reached.
+/// Bent curves, and how far they bent.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bent {
     /// One point for every incoming one.
     pub points: Vec<[f32; 3]>,
-    /// Largest turn of a segment, in radians, 0..π.
+    /// Largest rotation of a segment, in radians, 0..π.
     pub max_angle: f32,
     /// Largest |length − incoming| ÷ curve length, of segments and of whole curves as written.
     pub length_error: f32,
 }
 
-/// What a group of curves, or all of them, reached.
+/// Largest values over some curves.
 #[derive(Clone, Copy, Default)]
 struct Reached {
     max_angle: f32,
@@ -104,10 +104,10 @@ impl Reached {
 /// CVs a task has at least: some 30 µs of work, against a few for handing it to a thread.
 const TASK_CVS: usize = 2048;
 
-/// Bends curves `points[starts[i]..starts[i + 1]]` as `bend` says; curves of one CV pass through.
+/// Bends curves `points[starts[i]..starts[i + 1]]`; curves of one CV pass through unchanged.
 ///
 /// # Panics
-/// Where `starts` falls or does not run from 0 to the number of points, or a slice of `bend` is
+/// Where `starts` decreases or does not run from 0 to the number of points, or a slice of `bend` is
 /// shorter than its points or curves.
 pub fn bend(starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
     bend_on(Path::chosen(), starts, points, bend)
@@ -140,7 +140,7 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
     Bent { points: out, max_angle: reached.max_angle, length_error: reached.length_error }
 }
 
-/// Whole groups of curves for one thread, and the points that it writes.
+/// Whole groups of curves for one task, and the points that it writes.
 struct Task<'a> {
     first: usize,
     end: usize,

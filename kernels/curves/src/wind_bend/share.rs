@@ -1,20 +1,20 @@
-//! Which share of its angle to the wind each pivot turns.
+//! The share of its angle to the wind by which each pivot rotates.
 
 use super::{Bend, BendMode};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
 use numerics::vector;
 
-/// Largest share: beyond 1 a segment swings past the wind, beyond thousands its angle is noise; up
-/// to here sine and cosine of half of it are still good.
+/// Largest share: beyond 1 a segment swings past the wind, beyond thousands its angle is meaningless; up to here sine and
+/// cosine of half the angle are still accurate.
 const LARGEST: f32 = 5e5;
 
-/// The share of one pivot after another.
+/// The shares of successive pivots.
 pub(super) struct Share<'a> {
     bend: &'a Bend<'a>,
     /// The curves' lengths.
     length: F32x16,
-    /// Where along u the middle of the segment before this one was.
+    /// u at the middle of the previous segment.
     middle: F32x16,
 }
 
@@ -23,8 +23,8 @@ impl<'a> Share<'a> {
         Self { bend, length, middle: F32x16::splat(0.0) }
     }
 
-    /// The shares at the pivot whose segment runs between two `arcs`; `at` are its CVs' indices.
-    /// 0 for a segment of no length.
+    /// The shares at the pivots whose segments run between two `arcs`; `at` are the pivots' indices. 0 for a segment of
+    /// no length.
     #[inline(always)]
     pub(super) fn at(&mut self, arcs: [&F32x16; 2], segment: &Lanes<3>, at: &[usize; LANES]) -> F32x16 {
         let mut u = F32x16::splat(0.0);
@@ -40,7 +40,7 @@ impl<'a> Share<'a> {
         for lane in 0..LANES {
             let envelope = if envelope.0[lane] > 0.0 { envelope.0[lane] } else { 0.0 };
             let product = self.bend.rotate.value * share.0[lane] * mask.0[lane] * envelope;
-            // An infinity times a 0 is no number: nothing was asked for.
+            // Infinity times 0 is NaN and counts as 0.
             share.0[lane] = if product.is_nan() { 0.0 } else { product };
         }
         if let BendMode::ResolutionFree { reference_segments } = self.bend.mode {
@@ -56,7 +56,7 @@ impl<'a> Share<'a> {
         share
     }
 
-    /// Replaces g by 1 − (1 − g)^(Δ·n), Δ the way along u from the middle of the segment before.
+    /// Replaces g by 1 − (1 − g)^(Δ·n), Δ the difference of u from the middle of the previous segment.
     #[inline(always)]
     fn free_of_resolution(
         &mut self,
@@ -69,7 +69,7 @@ impl<'a> Share<'a> {
         for lane in 0..LANES {
             let middle = 0.5 * arcs[0].0[lane] + 0.5 * arcs[1].0[lane];
             let middle = along(middle, self.length.0[lane]);
-            // A segment of no length does not turn, so its part of the way is left to the next.
+            // A segment of no length does not rotate; its part of Δ is left to the next.
             let still = vector::largest(get(segment, lane)) == 0.0;
             let middle = if still { self.middle.0[lane] } else { middle };
             exponent.0[lane] = (middle - self.middle.0[lane]) * reference_segments;

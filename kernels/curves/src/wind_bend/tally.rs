@@ -1,4 +1,4 @@
-//! What a bend did to its curves, measured on what it writes.
+//! How far curves were bent and their lengths changed, measured on the written positions.
 
 use super::Reached;
 use numerics::lanes::{F32x16, LANES, Lanes, get};
@@ -7,11 +7,11 @@ use numerics::vector;
 
 /// Running measures of sixteen curves, in units.
 pub(super) struct Tally {
-    /// Squares of the difference and the sum of a segment before and after, where their ratio, the
-    /// squared tangent of half the angle between them, is largest: exact from 0 to π.
+    /// Squares of the difference and of the sum of a segment before and after, where their ratio, the squared tangent of
+    /// half the angle between them, is largest: accurate from 0 to π.
     difference: F32x16,
     sum: F32x16,
-    /// Largest change of a segment's length, and all changes added up.
+    /// Largest change of a segment's length, and the sum of all changes.
     largest: F32x16,
     total: F32x16,
 }
@@ -22,7 +22,7 @@ impl Tally {
         Self { difference: zero, sum: one, largest: zero, total: zero }
     }
 
-    /// Adds a segment: as it came in, how its turn moved its end, and as written.
+    /// Adds a segment: as it came in, the displacement of its end by its rotation, and as written.
     #[inline(always)]
     pub(super) fn add(&mut self, segment: &Lanes<3>, moved: &Lanes<3>, written: &Lanes<3>) {
         for lane in 0..LANES {
@@ -42,7 +42,7 @@ impl Tally {
         }
     }
 
-    /// The largest of the lanes, whose curves are this long.
+    /// The largest over the lanes, whose curves have these lengths.
     pub(super) fn reached(&self, length: &F32x16) -> Reached {
         let (mut difference, mut sum, mut length_error) = (0.0, 1.0, 0.0f32);
         for lane in 0..LANES {

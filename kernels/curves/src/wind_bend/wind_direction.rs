@@ -1,20 +1,20 @@
-//! Where the wind blows at each pivot: its own direction, and noise.
+//! The direction of the wind at each pivot: its own direction plus noise.
 
 use super::curve_group::{CurveGroup, Curves, Unit};
 use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::vector;
 
-/// Largest amplitude: the wind's own part is long below rounding, squares still far from overflow.
+/// Largest amplitude: by then the wind's own part is below rounding, and squares are still far from overflow.
 const LARGEST: f32 = 1e12;
 
-/// The wind at the CVs of sixteen curves.
+/// The wind's direction at the CVs of sixteen curves.
 pub(super) struct WindDirection<'a> {
     wind: [f32; 3],
     noise: Option<&'a BendNoise<'a>>,
-    /// Where the roots sample, in metres, an axis an array.
+    /// Where the roots sample the noise, in metres, an array an axis.
     roots: [[f64; LANES]; 3],
-    /// Metres of the lanes' unit.
+    /// Length of each lane's unit in metres.
     unit: &'a F32x16,
 }
 
@@ -39,13 +39,13 @@ impl<'a> WindDirection<'a> {
         Self { wind: bend.wind, noise, roots, unit: &unit.from }
     }
 
-    /// Whether it differs from CV to CV of a curve.
+    /// Whether it varies along a curve.
     #[inline(always)]
     pub(super) fn varies(&self) -> bool {
         self.noise.is_some_and(|noise| noise.waviness != 0.0)
     }
 
-    /// The direction at CVs this arc length from their roots; of length 1…4, not 1.
+    /// The direction at CVs at these arc lengths from their roots; of length 1…4.
     #[inline(always)]
     pub(super) fn at(&self, arc: &F32x16) -> Lanes<3> {
         let mut towards = self.wind.map(F32x16::splat);
@@ -54,8 +54,8 @@ impl<'a> WindDirection<'a> {
         for axis in 0..3 {
             let along = f64::from(self.wind[axis]) * f64::from(noise.waviness);
             for lane in 0..LANES {
-                let way = f64::from(arc.0[lane]) * f64::from(self.unit.0[lane]) * along;
-                points[axis][lane] = (self.roots[axis][lane] + way) * noise.frequency;
+                let displacement = f64::from(arc.0[lane]) * f64::from(self.unit.0[lane]) * along;
+                points[axis][lane] = (self.roots[axis][lane] + displacement) * noise.frequency;
             }
         }
         let field = noise.field.at_lanes(&points);

@@ -63,9 +63,9 @@ fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 fn fur(curves: u64, cvs: usize, long: f64, wind: DVec3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
     let (mut rest, mut goal) = (Vec::new(), Vec::new());
     for k in 0..curves {
-        let up = unit(Key::new(5).of(k));
+        let up = random_unit(Key::new(5).of(k));
         let step = long / (cvs - 1) as f64;
-        let lean = (up + vector(Key::new(6).of(k)) * 0.3).normalize();
+        let lean = (up + random_vector(Key::new(6).of(k)) * 0.3).normalize();
         let mut direction = lean;
         let mut at = up * 1.001;
         for cv in 0..cvs {
@@ -103,7 +103,7 @@ fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
 }
 
 #[test]
-fn a_hair_laid_down_by_wind_stops_its_gap_above_the_floor() {
+fn a_hair_blown_down_stops_one_gap_above_the_floor() {
     // From its root 0.1 above the floor a segment of length 1 is to point down: it stops where sin φ = 0.1, less the
     // arc 1e-4 of a radius of 1.
     let (points, triangles) = floor();
@@ -120,7 +120,7 @@ fn a_hair_laid_down_by_wind_stops_its_gap_above_the_floor() {
 }
 
 #[test]
-fn a_hair_that_meets_nothing_keeps_its_goals_bits() {
+fn a_hair_without_contact_keeps_its_goal_s_bits() {
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
     let obstacles = [&tree];
@@ -132,7 +132,7 @@ fn a_hair_that_meets_nothing_keeps_its_goals_bits() {
 }
 
 #[test]
-fn a_segment_pushed_through_a_wall_by_the_one_before_turns_out_of_it() {
+fn a_segment_pushed_through_a_wall_by_the_previous_one_turns_out_of_it() {
     // The rest curve goes up, then hooks over to +x. Turning the first segment to +x hooks the second down through the
     // floor, from where it turns up again until it is free: level, its gap above the floor.
     let (points, triangles) = floor();
@@ -147,8 +147,8 @@ fn a_segment_pushed_through_a_wall_by_the_one_before_turns_out_of_it() {
 }
 
 #[test]
-fn nothing_passes_a_blade_that_steps_miss() {
-    // A blade of a degree, a third of the way of the turn: ten steps of 9 degrees jump it.
+fn exact_contact_stops_at_a_blade_that_steps_miss() {
+    // A blade one degree wide at a third of the turn: ten steps of 9 degrees jump over it.
     let blade = |angle: f64| -> Vec3 { [(0.5 * libm::cos(angle)) as f32, (0.5 * libm::sin(angle)) as f32, 0.0] };
     let middle = 0.55;
     let mut points = vec![blade(middle), blade(middle + 0.017)];
@@ -169,7 +169,7 @@ fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
-    for (k, wind) in [DVec3::x(), -DVec3::y(), unit(Key::new(8))].iter().enumerate() {
+    for (k, wind) in [DVec3::x(), -DVec3::y(), random_unit(Key::new(8))].iter().enumerate() {
         for (cvs, long) in [(2, 0.2), (5, 0.4), (12, 1.5)] {
             let (starts, rest, goal) = fur(400, cvs, long, *wind);
             assert_eq!(crossings(&starts, &rest, &mesh), 0);
@@ -185,13 +185,13 @@ fn fur_in_any_wind_crosses_nothing_and_keeps_its_lengths() {
 }
 
 #[test]
-fn coherent_fur_crosses_nothing_either() {
+fn fur_with_coherence_crosses_nothing_either() {
     let mesh = sphere(12);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let normals = normals(&mesh.0, &mesh.1);
     let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
-    for (k, wind) in [DVec3::x(), -DVec3::y(), unit(Key::new(8))].iter().enumerate() {
+    for (k, wind) in [DVec3::x(), -DVec3::y(), random_unit(Key::new(8))].iter().enumerate() {
         for coherence in [0.3, 1.0] {
             let (starts, rest, goal) = fur(1000, 6, 0.5, *wind);
             let out = collide(&starts, &rest, &goal, &Collide { skin: Some(skin), coherence, ..on(&obstacles) });
@@ -203,7 +203,7 @@ fn coherent_fur_crosses_nothing_either() {
 }
 
 #[test]
-fn finer_steps_come_nearer_to_exact_as_fast_as_they_get_finer() {
+fn steps_converge_to_exact_with_order_1() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
@@ -245,7 +245,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
 }
 
 #[test]
-fn at_no_offset_roots_keep_their_bits_though_they_lie_on_the_skin() {
+fn without_offset_roots_on_the_skin_keep_their_bits() {
     let mesh = sphere(24);
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
@@ -286,9 +286,9 @@ fn blend_turns_back_towards_the_goal() {
 }
 
 #[test]
-fn odd_curves_and_meshes_are_taken_as_they_are() {
+fn degenerate_curves_and_meshes_are_valid() {
     let nan = f32::NAN;
-    // No area, a point, and one that is no number.
+    // Triangles without area, a point, and NaN.
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [nan, 0.0, 0.0]];
     let tree = TriangleTree::build(&points, &[[0, 1, 2], [1, 1, 1], [0, 1, 3]]);
     let obstacles = [&tree];

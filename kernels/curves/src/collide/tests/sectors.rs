@@ -51,7 +51,7 @@ fn first_by_events(sector: &Sector, corners: &[DVec3; 3]) -> Option<f64> {
             }
         }
     }
-    // What it stands in from the start is met at once.
+    // What it crosses at the start is met at once.
     if crosses(&DVec3::zeros(), &(sector.u * sector.reach), corners) {
         angles.push(0.0);
     }
@@ -69,7 +69,7 @@ fn a_level_segment_meets_a_floor_at_the_arcsine_of_its_height() {
 }
 
 #[test]
-fn a_needle_is_met_where_it_stands() {
+fn a_needle_is_met_at_its_angle() {
     // An upright sliver at 30° from the start, half way out.
     let at = DVec3::new(0.5 * libm::cos(FRAC_PI_6), 0.5 * libm::sin(FRAC_PI_6), 0.0);
     let needle = [at + DVec3::new(0.0, 0.0, -1.0), at + DVec3::new(1e-7, 0.0, 1.0), at + DVec3::new(0.0, 1e-7, 1.0)];
@@ -78,17 +78,19 @@ fn a_needle_is_met_where_it_stands() {
 }
 
 #[test]
-fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
+fn a_million_random_turns_meet_triangles_at_the_angle_of_the_first_event() {
     let (mut met, mut missed) = (0, 0);
     for k in 0..1_000_000 {
         let key = Key::new(11).of(k);
-        let u = unit(key.of(0));
-        let Some(v) = (unit(key.of(1)) - u * u.dot(&unit(key.of(1)))).try_normalize(0.01) else { continue };
-        let mut corners = [2, 3, 4].map(|corner| vector(key.of(corner)));
+        let u = random_unit(key.of(0));
+        let Some(v) = (random_unit(key.of(1)) - u * u.dot(&random_unit(key.of(1)))).try_normalize(0.01) else {
+            continue;
+        };
+        let mut corners = [2, 3, 4].map(|corner| random_vector(key.of(corner)));
         match k % 4 {
             // A needle, and a blade, and one almost in the sector's plane.
-            1 => corners[1] = corners[0] + vector(key.of(5)) * 1e-3,
-            2 => corners[2] = corners[0] + (corners[1] - corners[0]) * 0.5 + vector(key.of(5)) * 1e-4,
+            1 => corners[1] = corners[0] + random_vector(key.of(5)) * 1e-3,
+            2 => corners[2] = corners[0] + (corners[1] - corners[0]) * 0.5 + random_vector(key.of(5)) * 1e-4,
             3 => {
                 let n = u.cross(&v);
                 corners = corners.map(|corner| corner - n * (n.dot(&corner) * 0.999));
@@ -96,7 +98,7 @@ fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
             _ => {}
         }
         let sector = sector(u, v, 0.9);
-        // Beyond half a turn the two disagree on what is asked, not on where it is.
+        // Beyond half a turn the two use different definitions.
         let found = first(&sector, &corners).filter(|angle| *angle < PI - 1e-9);
         let expected = first_by_events(&sector, &corners).filter(|angle| *angle < PI - 1e-9);
         match (found, expected) {
@@ -106,7 +108,7 @@ fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
             }
             (None, None) => missed += 1,
             _ => {
-                // One of them grazes: a hair's breadth more or less of reach decides.
+                // A grazing contact: a slightly larger or smaller reach decides.
                 let with = |reach: f64| first(&Sector { reach, ..sector }, &corners);
                 let (less, more) = (with(0.9 - 1e-6), with(0.9 + 1e-6));
                 assert!(
@@ -120,7 +122,7 @@ fn a_million_random_turns_meet_triangles_where_the_two_kinds_of_event_say() {
 }
 
 #[test]
-fn a_thick_segment_is_stopped_by_what_is_beside_its_plane() {
+fn a_thick_segment_is_stopped_beside_its_plane() {
     // The plane of the turn passes 0.01 beside a sheet that stands across it further out.
     let beside = [DVec3::new(0.5, 0.5, 0.01), DVec3::new(0.6, 0.4, 0.5), DVec3::new(0.4, 0.6, 0.5)];
     let thin = sector(DVec3::x(), DVec3::y(), 1.0);

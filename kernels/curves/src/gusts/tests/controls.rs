@@ -15,7 +15,7 @@ fn felt(control: Control, points: &[[f32; 3]]) -> Vec<f32> {
 }
 
 #[test]
-fn a_sphere_runs_from_its_centre_to_its_boundary() {
+fn the_share_in_a_sphere_is_0_at_its_centre_and_1_at_its_boundary() {
     let axes = UNIT.map(|axis| axis.map(|x| 2.0 * x));
     let control =
         Control::new(ControlShape::Sphere, [1.0, 0.0, 0.0], axes, 9.0, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
@@ -24,7 +24,7 @@ fn a_sphere_runs_from_its_centre_to_its_boundary() {
 }
 
 #[test]
-fn cubes_run_to_a_half_at_the_inner_and_to_1_at_the_outer_boundary() {
+fn the_share_in_cubes_is_a_half_at_the_inner_and_1_at_the_outer_boundary() {
     let control =
         |outer| Control::new(ControlShape::Cubes, [0.0; 3], UNIT, outer, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
     let points = [[0.0; 3], [0.5, 0.1, -0.2], [0.3, -1.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 3.1, 0.0]];
@@ -53,7 +53,7 @@ fn shares_are_measured_in_the_controls_own_space() {
 }
 
 #[test]
-fn strength_may_take_away_and_the_order_of_sums_is_that_of_the_list() {
+fn negative_strengths_subtract_and_sums_follow_the_list_order() {
     let falloff = one();
     let control = |strength| Control::new(ControlShape::Sphere, [0.0; 3], UNIT, 2.0, one(), strength);
     let with = |controls: &[Control]| {
@@ -68,7 +68,7 @@ fn strength_may_take_away_and_the_order_of_sums_is_that_of_the_list() {
 }
 
 #[test]
-fn a_control_without_volume_touches_nothing() {
+fn a_control_without_volume_reaches_nothing() {
     let flat = [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]], [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.3, 0.0]]];
     let broken = [[[f64::NAN, 0.0, 0.0], UNIT[1], UNIT[2]], [[f64::INFINITY, 0.0, 0.0], UNIT[1], UNIT[2]]];
     for axes in flat.into_iter().chain(broken).chain([[[0.0; 3]; 3]]) {

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn no_points_and_no_gusts_are_fine() {
+fn no_points_or_no_gusts_is_valid() {
     let falloff = smooth();
     assert_eq!(evaluate(&[], &only(&falloff, &[sphere([0.0; 3], 1.0)])), Influence { values: vec![], reached: 0 });
     let felt = evaluate(&hairs(3), &Gusts { base: 0.3, ..only(&falloff, &[]) });
@@ -11,7 +11,7 @@ fn no_points_and_no_gusts_are_fine() {
 }
 
 #[test]
-fn a_radius_of_0_and_what_is_hardly_more_touch_nothing() {
+fn radii_of_0_and_hardly_more_reach_nothing() {
     let falloff = one();
     for radius in [0.0, f32::MIN_POSITIVE, -1.0, f32::NAN] {
         assert_eq!(evaluate(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], radius)])).values, [0.0], "{radius}");
@@ -21,7 +21,7 @@ fn a_radius_of_0_and_what_is_hardly_more_touch_nothing() {
 }
 
 #[test]
-fn anything_finite_gives_a_number_from_0_to_1() {
+fn any_finite_input_gives_values_from_0_to_1() {
     let sizes = [0.0, 1e-41, 1e-30, 1.0, 1e20, 3e38];
     let points: Vec<[f32; 3]> = sizes.iter().flat_map(|x| [[*x, -*x, 0.0], [-*x, 0.0, *x]]).collect();
     for falloff in [smooth(), Ramp::new(vec![[0.0, 1e30], [1.0, -1e30]], Interpolation::Linear).unwrap()] {
@@ -40,7 +40,7 @@ fn anything_finite_gives_a_number_from_0_to_1() {
 }
 
 #[test]
-fn ten_thousand_gusts_over_each_other_end_at_1() {
+fn ten_thousand_overlapping_gusts_saturate_at_1() {
     let points = hairs(100);
     let falloff = smooth();
     let gusts: Vec<Sphere> = strewn(10_000, [1.0, 0.0, 1.0], 1.0)

@@ -29,7 +29,7 @@ fn a_gust_lives_from_its_start_through_its_life_and_fades_over_its_decay() {
 }
 
 #[test]
-fn what_is_drawn_lies_in_its_range_and_depends_on_seed_and_number_alone() {
+fn draws_lie_in_their_ranges_and_depend_on_seed_and_index_only() {
     let gusts = PLAIN.at(50.0).gusts;
     assert!(gusts.len() > 10 && gusts.len() < 40);
     for gust in &gusts {
@@ -47,7 +47,7 @@ fn what_is_drawn_lies_in_its_range_and_depends_on_seed_and_number_alone() {
 }
 
 #[test]
-fn a_gust_comes_again_every_so_many_frames_with_other_numbers() {
+fn a_gust_repeats_with_new_random_numbers() {
     let draw = Draw { gusts: 1, start: [10.0, 10.0], life: [20.0, 20.0], decay: [5.0, 5.0], repeat: 100.0, ..PLAIN };
     let at = |frame: f64| draw.at(frame).gusts;
     let starts = |frame: f64| at(frame).iter().map(|gust| gust.start).collect::<Vec<_>>();
@@ -62,7 +62,7 @@ fn a_gust_comes_again_every_so_many_frames_with_other_numbers() {
 }
 
 #[test]
-fn rounds_that_overlap_are_all_alive_and_found_without_counting_from_the_first() {
+fn overlapping_rounds_are_all_alive_and_found_directly() {
     let draw = Draw { gusts: 2, start: [0.0; 2], life: [95.0, 95.0], decay: [5.0, 5.0], repeat: 10.0, ..PLAIN };
     for frame in [0.0, 3.5, 1e6, -1e6, 1e9] {
         let living = draw.at(frame);
@@ -73,7 +73,7 @@ fn rounds_that_overlap_are_all_alive_and_found_without_counting_from_the_first()
 }
 
 #[test]
-fn a_flood_of_rounds_is_bounded_and_counted() {
+fn too_many_rounds_are_bounded_and_counted() {
     let draw = Draw { gusts: 1000, life: [1e9, 1e9], repeat: 1.0, ..PLAIN };
     let living = draw.at(100.0);
     assert!(living.gusts.len() as u64 <= MOST_LIVING && living.gusts.len() > 50_000);

@@ -13,7 +13,7 @@ fn influence_is_1_at_the_centre_0_at_the_boundary_and_a_smoothstep_between() {
 }
 
 #[test]
-fn influences_add_up_to_base_and_are_clamped() {
+fn influences_add_to_the_base_and_are_clamped() {
     let falloff = Ramp::new(vec![[0.0, 0.5], [1.0, 0.5]], Interpolation::Linear).unwrap();
     let spheres = [sphere([0.0; 3], 1.0), sphere([1.0, 0.0, 0.0], 1.0), sphere([0.5, 0.0, 0.0], 0.25)];
     let points = [[-0.5, 0.0, 0.0], [0.1, 0.0, 0.0], [0.5, 0.0, 0.0], [9.0, 0.0, 0.0]];
@@ -27,7 +27,7 @@ fn influences_add_up_to_base_and_are_clamped() {
 }
 
 #[test]
-fn sums_are_those_of_f64_and_of_every_sphere_whatever_is_culled() {
+fn sums_match_f64_sums_over_all_spheres_despite_culling() {
     let points = hairs(40);
     let spheres: Vec<Sphere> = strewn(30, [1.0, 0.0, 1.0], 1.2)
         .iter()
@@ -50,7 +50,7 @@ fn sums_are_those_of_f64_and_of_every_sphere_whatever_is_culled() {
 }
 
 #[test]
-fn noise_keeps_the_centre_and_stays_inside_of_the_sphere() {
+fn noise_keeps_the_centre_and_stays_within_the_sphere() {
     let points = strewn(20_000, [0.0; 3], 1.2);
     let falloff = smooth();
     let round = evaluate(&points, &only(&falloff, &[sphere([0.0; 3], 1.0)]));
@@ -71,7 +71,7 @@ fn noise_keeps_the_centre_and_stays_inside_of_the_sphere() {
 }
 
 #[test]
-fn noise_is_the_spheres_own_and_moves_along_with_it() {
+fn each_sphere_has_its_own_noise_which_moves_with_it() {
     let points = strewn(2000, [0.0; 3], 1.0);
     let moved: Vec<[f32; 3]> = points.iter().map(|p| [p[0] + 4.0, p[1], p[2]]).collect();
     let falloff = smooth();
@@ -85,7 +85,7 @@ fn noise_is_the_spheres_own_and_moves_along_with_it() {
 }
 
 #[test]
-fn incoming_scales_what_is_felt_and_less_than_0_or_nan_is_0() {
+fn incoming_values_scale_the_result_and_negative_or_nan_counts_as_0() {
     let incoming = [0.5, 2.0, -1.0, f32::NAN];
     let falloff = one();
     let spheres = [sphere([0.0; 3], 1.0)];
@@ -95,7 +95,7 @@ fn incoming_scales_what_is_felt_and_less_than_0_or_nan_is_0() {
 }
 
 #[test]
-fn far_from_the_origin_and_at_any_scale_it_is_the_same() {
+fn results_are_the_same_far_from_the_origin_and_at_any_scale() {
     let (points, falloff) = (strewn(500, [0.0; 3], 1.0), smooth());
     let gust = Sphere { noise: 0.5, ..sphere([0.25, 0.0, 0.0], 0.75) };
     let here = evaluate(&points, &only(&falloff, &[gust])).values;

@@ -46,7 +46,7 @@ fn a_closed_curve_whose_tip_is_its_root_is_finite() {
 }
 
 #[test]
-fn wind_along_the_curve_leaves_it_and_wind_against_it_turns_it_over() {
+fn wind_along_a_curve_leaves_it_and_wind_against_it_turns_it_over() {
     let ramp = one();
     let along = Groom::of(&[straight([0.0; 3], [1.0, 0.0, 0.0], 4)]);
     assert_eq!(bits(&along.bend(&plain(&ramp)).points), bits(&along.points));
@@ -134,14 +134,14 @@ fn denormal_tiny_and_huge_scenes_are_finite() {
 }
 
 #[test]
-fn ten_thousand_kilometres_away_only_the_storage_is_coarse() {
+fn ten_thousand_kilometres_from_the_origin_only_storage_loses_precision() {
     let ramp = one();
     let groom = tangled(64, 9).map(|cv| vector::add(cv, [1e7, -1e7, 1e7]));
     assert_kept(&groom, &groom.bend(&plain(&ramp)));
 }
 
 #[test]
-fn envelopes_below_0_and_nan_are_none_and_above_1_are_more() {
+fn envelopes_below_0_and_nan_count_as_0_and_above_1_bend_more() {
     let ramp = one();
     let groom = Groom::of(&[straight([0.0; 3], [0.0, 1.0, 0.0], 2)]);
     let with = |envelope: &[f32]| groom.bend(&Bend { envelope: Some(envelope), ..plain(&ramp) });
@@ -156,7 +156,7 @@ fn envelopes_below_0_and_nan_are_none_and_above_1_are_more() {
 }
 
 #[test]
-fn parameters_at_absurd_ends_are_finite() {
+fn extreme_parameters_give_finite_results() {
     let field = Field::new(NoiseKind::Billow, 16, 1.0, 5);
     let groom = tangled(32, 9);
     let zeros = vec![0.0; groom.points.len()];

@@ -38,7 +38,7 @@ fn a_quarter_turn_at_once_lays_the_curve_along_the_wind() {
 }
 
 #[test]
-fn segment_k_of_a_straight_curve_makes_theta_0_times_1_minus_g_to_the_k() {
+fn segment_k_of_a_straight_curve_ends_at_theta_0_times_1_minus_g_to_the_k() {
     let ramp = one();
     for theta in [1e-3, 0.3, 1.2, PI / 2.0, 2.7, 3.1] {
         for g in [0.05f32, 0.3, 0.5, 0.9, 1.0] {
@@ -141,7 +141,7 @@ fn scene_and_wind_turned_moved_or_scaled_together_give_the_same_shape() {
 }
 
 #[test]
-fn scaling_by_a_power_of_two_changes_no_digit() {
+fn scaling_by_a_power_of_two_is_exact() {
     let ramp = one();
     let groom = tangled(50, 12);
     let bent = groom.bend(&plain(&ramp)).points;
@@ -158,7 +158,7 @@ fn noisy(field: &numerics::noise::Field) -> BendNoise<'_> {
 }
 
 #[test]
-fn gradient_noise_leaves_a_root_on_its_lattice_alone() {
+fn gradient_noise_has_no_effect_at_a_root_on_its_lattice() {
     let (ramp, field) = (one(), Field::new(NoiseKind::Perlin, 3, 0.5, 1));
     let with = Bend { noise: Some(noisy(&field)), ..plain(&ramp) };
     let at = |root| Groom::of(&[straight(root, [0.0, 1.0, 0.0], 4)]);
@@ -184,7 +184,7 @@ fn the_pattern_scrolls_downwind() {
 }
 
 #[test]
-fn noise_sits_where_the_rest_roots_are_asked_to_be() {
+fn noise_is_sampled_at_the_given_roots() {
     let (ramp, field) = (one(), Field::new(NoiseKind::Billow, 2, 0.5, 1));
     let roots: Vec<_> = (0..20).map(|i| [0.3 * i as f32, 0.1, 0.7]).collect();
     let curves =
@@ -230,7 +230,7 @@ fn blend_0_keeps_the_bits_1_turns_in_full_and_a_half_by_half() {
 }
 
 #[test]
-fn what_has_no_wind_keeps_its_bits() {
+fn without_wind_curves_keep_their_bits() {
     let (ramp, zero) = (one(), Ramp::constant(0.0));
     let groom = tangled(100, 9);
     let calm: Vec<f32> = (0..groom.points.len()).map(|cv| if cv % 2 == 0 { 0.0 } else { -1.0 }).collect();

@@ -1,4 +1,4 @@
-//! Shared by the bend's tests: curves, a plain bend to start from, measures of a result.
+//! Shared by the tests of bending: curves, a plain bend, and measurements of results.
 
 mod extremes;
 mod laws;
@@ -9,7 +9,7 @@ use numerics::ramp::Interpolation;
 use numerics::random::Key;
 use numerics::vector::{self, DVec3, Vec3, to_f64};
 
-/// Curves as CVs a curve, joined.
+/// Curves, their CVs in one list.
 struct Groom {
     starts: Vec<u32>,
     points: Vec<Vec3>,
@@ -28,7 +28,7 @@ impl Groom {
         bend(&self.starts, &self.points, with)
     }
 
-    /// Positions of every CV changed.
+    /// With all CVs mapped.
     fn map(&self, change: impl Fn(Vec3) -> Vec3) -> Self {
         Self { starts: self.starts.clone(), points: self.points.iter().map(|cv| change(*cv)).collect() }
     }
@@ -46,13 +46,13 @@ fn tangled(curves: u64, most: u64) -> Groom {
         let key = Key::new(11).of(i);
         let cvs = 1 + key.of(0).u64() % most;
         let mut at = [1, 2, 3].map(|axis| key.of(axis).between([-3.0, 3.0]));
-        let mut way = [0.3, 1.0, -0.2];
+        let mut direction = [0.3, 1.0, -0.2];
         (0..cvs)
             .map(|cv| {
                 let before = at;
                 let turn = [0, 1, 2].map(|axis| key.of(4).of(cv).of(axis).between([-0.5, 0.5]));
-                way = vector::add(way, turn);
-                at = vector::add(at, vector::scale(way, 1.0 / cvs as f32));
+                direction = vector::add(direction, turn);
+                at = vector::add(at, vector::scale(direction, 1.0 / cvs as f32));
                 before
             })
             .collect()
@@ -103,13 +103,13 @@ fn length(points: &[Vec3]) -> f64 {
     points.windows(2).map(|pair| distance(pair[0], pair[1])).sum()
 }
 
-/// Distance of a position this large from the next.
+/// Spacing of f32 numbers of this size.
 fn ulp(largest: f32) -> f64 {
     f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
 }
 
-/// Roots keep their bits, all is finite, and every segment and curve its length to 1e-5 of the
-/// curve's and 4 ulp of the positions.
+/// Roots keep their bits, all is finite, and segments and curves keep their lengths within 1e-5 of the curve's and 4 ulp
+/// of the positions.
 fn assert_kept(groom: &Groom, bent: &Bent) {
     assert!(bent.max_angle.is_finite() && bent.length_error.is_finite());
     for ends in groom.starts.windows(2) {
