@@ -119,18 +119,19 @@ fn widest_level() -> Level {
 /// `kernel! { pub fn bend_group(group: &Group<'_>) -> Reached = group_body; }`
 #[macro_export]
 macro_rules! kernel {
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)? = $body:path;) => {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $type:ty),* $(,)?)
+     $(-> $out:ty)? = $body:path;) => {
         $(#[$meta])*
         #[allow(unsafe_code)]
-        $vis fn $name(path: $crate::simd::Path, $($arg: $type),*) $(-> $out)? {
+        $vis fn $name $(<$life>)? (path: $crate::simd::Path, $($arg: $type),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2")]
-                fn avx2($($arg: $type),*) $(-> $out)? {
+                fn avx2 $(<$life>)? ($($arg: $type),*) $(-> $out)? {
                     $body($($arg),*)
                 }
                 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512cd,avx512dq,avx512vl")]
-                fn avx512($($arg: $type),*) $(-> $out)? {
+                fn avx512 $(<$life>)? ($($arg: $type),*) $(-> $out)? {
                     $body($($arg),*)
                 }
                 match path.level() {

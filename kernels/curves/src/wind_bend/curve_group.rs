@@ -48,7 +48,7 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
     let (points, arc) = (&scratch.points, &scratch.arc);
 
     let wind_direction = WindDirection::new(bend, group, &curves, &unit);
-    let mut towards = wind_direction.at(&F32x16::splat(0.0));
+    let mut towards = [F32x16::splat(0.0); 3];
     let mut share = Share::new(bend, length);
     let mut chain = Chain::new();
     let mut tally = Tally::new();
@@ -56,7 +56,7 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
     curves.write(0, &before, out);
     for step in 0..curves.longest - 1 {
         let (pivot, next) = (&points[step], &points[step + 1]);
-        if wind_direction.varies() {
+        if step == 0 || wind_direction.varies() {
             towards = wind_direction.at(&arc[step]);
         }
         let at = curves.at(step);
