@@ -4,7 +4,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::goals::{HeldBody, GoalLimits, goal_shape};
+use bodies::goals::{GoalLimits, HeldBody, goal_shape};
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use curves::lattice::{DeformationLattice, Extrapolation, LatticeBasis, control_points};
 use numerics::random::Key;

@@ -1,5 +1,7 @@
 //! Least times of interleaved runs, and their ratio to a fixed loop: what can be compared between machines and days.
 
+#![allow(dead_code, reason = "each bench uses part of it")]
+
 use std::time::Duration;
 
 use engine::clock::Stopwatch;

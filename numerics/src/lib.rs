@@ -9,7 +9,6 @@
 //! width. A loop over something else inside of it, a choice of code or a bound to check would keep
 //! it from that, so those stay outside.
 
-#![deny(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod affine;

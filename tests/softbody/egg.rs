@@ -1,7 +1,7 @@
 //! `graphs/egg_crack`.
 
-use super::cooked::cook_file;
-use super::{points, volume};
+use crate::cooked::cook_file;
+use crate::measure::{distance, points, volume};
 use engine::geometry::Geometry;
 
 /// Whether a tet has the point inside, by more than rounding of f32 positions.
@@ -38,7 +38,7 @@ fn an_egg_drapes_over_the_rim_with_its_yolk_inside() {
     for frame in 1..=60 {
         let now = points(&eggs[frame - 1]);
         for (from, to) in pin_at(1).iter().zip(pin_at(frame)) {
-            for (p, q) in rest.iter().zip(&now).filter(|(p, _)| super::distance(p, from) <= 0.006) {
+            for (p, q) in rest.iter().zip(&now).filter(|(p, _)| distance(p, from) <= 0.006) {
                 held += 1;
                 worst = (0..3).map(|k| (q[k] - p[k] - (to[k] - from[k])).abs()).fold(worst, f64::max);
             }

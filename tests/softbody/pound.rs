@@ -1,7 +1,7 @@
 //! `graphs/dough_pound`: R's conflict between a hand that presses and a shape that is asked for.
 
-use super::cooked::cook_file;
-use super::{distance, points};
+use crate::cooked::cook_file;
+use crate::measure::{distance, points};
 
 /// Longest side of the dough, metres.
 const SIZE: f64 = 0.16;

@@ -1,7 +1,7 @@
 //! `graphs/dough_rolling`.
 
-use super::cooked::cook_file;
-use super::{points, volume_of};
+use crate::cooked::cook_file;
+use crate::measure::{points, volume_of};
 use engine::geometry::Geometry;
 
 /// How high dough is across the place where the pin's axis is at x, metres over the ground.

@@ -11,7 +11,7 @@ use engine::geometry::{Attr, Component, Geometry};
 use engine::graph::Body;
 use engine::time::Frame;
 
-use super::cooked::{fault, graph, metrics};
+use crate::cooked::{fault, graph, metrics};
 
 pub(crate) type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
 
@@ -174,7 +174,7 @@ pub(crate) struct Cooked {
 impl Cooked {
     /// Particles at the frame asked for in this place.
     pub(crate) fn at(&self, place: usize) -> Vec<[f64; 3]> {
-        super::points(self.tets[place].as_ref().unwrap())
+        crate::measure::points(self.tets[place].as_ref().unwrap())
     }
 
     /// Particles at the last frame.
@@ -183,12 +183,12 @@ impl Cooked {
     }
 
     /// Values of a metric at the frames that have it.
-    pub(crate) fn said(&self, name: &str) -> Vec<f64> {
+    pub(crate) fn metric(&self, name: &str) -> Vec<f64> {
         self.metrics.get(name).map(|values| values.values().copied().collect()).unwrap_or_default()
     }
 
     /// The largest of them.
     pub(crate) fn most(&self, name: &str) -> f64 {
-        self.said(name).into_iter().fold(f64::NEG_INFINITY, f64::max)
+        self.metric(name).into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 }

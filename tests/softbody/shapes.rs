@@ -69,14 +69,14 @@ pub(crate) fn springs(body: &Component, modulus: f64) -> Vec<Spring> {
     let mut volumes: BTreeMap<[usize; 2], f64> = BTreeMap::new();
     for tet in body.tet_corners() {
         let corners = tet.map(|corner| corner as usize);
-        let volume = super::volume(corners.map(|corner| points[corner])).abs() / 6.0;
+        let volume = crate::measure::volume(corners.map(|corner| points[corner])).abs() / 6.0;
         for [a, b] in [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] {
             let [a, b] = [corners[a], corners[b]];
             *volumes.entry([a.min(b), a.max(b)]).or_default() += volume;
         }
     }
     let spring = |(ends, volume): ([usize; 2], f64)| {
-        let length = super::distance(&points[ends[0]], &points[ends[1]]);
+        let length = crate::measure::distance(&points[ends[0]], &points[ends[1]]);
         Spring { ends, stiffness: modulus * volume / (length * length), length }
     };
     volumes.into_iter().map(spring).collect()

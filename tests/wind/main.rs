@@ -1,15 +1,15 @@
-//! The wind chain: how well it meets its laws, what it does at extremes, and figures of its nodes' help on the bear from
-//! frame to frame; all are printed as they are checked (`cargo test --test wind -- --nocapture`).
+//! The wind chain: how accurately it meets its laws, extreme scenes, and the figures of docs/wind.md for the bear. Everything
+//! checked is printed too: `cargo test --test wind -- --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 
 mod accuracy;
+#[path = "../accuracy_table/mod.rs"]
+mod accuracy_table;
 mod coherence;
 #[path = "../cooked/mod.rs"]
 mod cooked;
 mod extremes;
-#[path = "../laws/mod.rs"]
-mod laws;
 mod pictures;
 mod shelter;
 mod storm;

@@ -1,9 +1,10 @@
-//! Chores of the repository: `cargo xtask new-node NAME`, `cargo xtask bless`.
+//! Chores of the repository: `cargo xtask new-node NAME`, `cargo xtask bless [EXPECTATION]…`.
 
+mod bless;
 mod new_node;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use clap::Parser;
 
@@ -18,14 +19,17 @@ enum Chore {
         #[arg(long, default_value = "geometry")]
         family: String,
     },
-    /// Store the expectations of the tests anew, and show what changed
-    Bless,
+    /// Store the expectations of tests and benches anew, and show what changed
+    Bless {
+        /// Which; all if none is named
+        expectations: Vec<bless::Expectation>,
+    },
 }
 
 fn main() -> ExitCode {
     let result = match Chore::parse() {
         Chore::NewNode { name, family } => new_node::write(&root(), &name, &family),
-        Chore::Bless => bless(&root()),
+        Chore::Bless { expectations } => bless::store(&root(), &expectations),
     };
     match result {
         Ok(said) => {
@@ -37,21 +41,6 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Runs the tests with stored expectations so that they write them, then shows the difference.
-fn bless(root: &Path) -> Result<String, String> {
-    let run = |program: &str, arguments: &[&str]| {
-        let status = Command::new(program).args(arguments).current_dir(root).env("BLESS", "1").status();
-        status.map_err(|error| format!("`{program}` could not be run: {error}"))
-    };
-    for arguments in [&["test", "--test", "graphs"][..], &["test", "-p", "engine", "stored_messages"]] {
-        if !run("cargo", arguments)?.success() {
-            return Err(format!("`cargo {}` failed", arguments.join(" ")));
-        }
-    }
-    run("git", &["--no-pager", "diff", "--stat", "--patch", "--", "*.txt"])?;
-    Ok("stored anew; commit what you meant to change".into())
 }
 
 /// The repository's root.

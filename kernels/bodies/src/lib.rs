@@ -4,7 +4,6 @@
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
-#![deny(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod collision;

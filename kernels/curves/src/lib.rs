@@ -4,7 +4,6 @@
 //! All that [`numerics`] promises holds: the same bits on any CPU and for any number of threads. How a kernel is written
 //! is said there.
 
-#![deny(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod attach;

@@ -25,7 +25,7 @@ fn released() -> ([f64; 2], f64) {
         [(distance(&a, &b) / spring.length - 1.0).abs(), storage(&stored) / spring.length]
     });
     let worst = strains.reduce(|a, b| if b[0] > a[0] { b } else { a }).unwrap();
-    (worst, cooked.said("elastic").last().unwrap() / (modulus * side * side * side))
+    (worst, cooked.metric("elastic").last().unwrap() / (modulus * side * side * side))
 }
 
 /// A goal alone pulls at a block: how many particles of its surface move, of how many.
@@ -34,7 +34,7 @@ fn pulled_surface() -> (usize, usize) {
     let scene = Scene::of(body.clone()).goal(flat(&body), 2.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
     let cooked = scene.set("stiffness", 0).set("volume", 0).run(6);
     let way = |from: &[V], to: &[V]| from.iter().zip(to).map(|(a, b)| distance(a, b)).collect::<Vec<_>>();
-    let skin = |place: usize| crate::points(cooked.surface[place].as_ref().unwrap());
+    let skin = |place: usize| crate::measure::points(cooked.surface[place].as_ref().unwrap());
     assert!(largest(way(&cooked.at(0), &cooked.at(5))) > 0.01, "what is inside heads for the goal");
     let surface = way(&skin(0), &skin(5));
     (surface.iter().filter(|way| **way > 0.0).count(), surface.len())

@@ -75,7 +75,7 @@ fn cantilever() -> [f64; 2] {
     let rest: Vec<V> = beam.positions().iter().map(|p| p.map(f64::from)).collect();
     let mut weights = vec![[0.0; 3]; rest.len()];
     for tet in beam.tet_corners() {
-        let volume = crate::volume(tet.map(|corner| rest[corner as usize])) / 6.0;
+        let volume = crate::measure::volume(tet.map(|corner| rest[corner as usize])) / 6.0;
         tet.iter().for_each(|corner| weights[*corner as usize][1] -= 250.0 * volume * f64::from(9.81_f32));
     }
     let held: Vec<bool> = rest.iter().map(|p| p[0] == 0.0).collect();
@@ -104,15 +104,17 @@ fn modulus(cells: u32) -> f64 {
     let middle = |x: f32| mean(&end(x).iter().map(|i| points[*i]).collect::<Vec<_>>())[0];
     // Away from the ends that are held; F = 2U ÷ Δ on 1 m².
     let strain = middle(3.0) - middle(2.0) - 1.0;
-    2.0 * cooked.said("elastic").last().unwrap() / f64::from(PULL) / strain / 1e5
+    2.0 * cooked.metric("elastic").last().unwrap() / f64::from(PULL) / strain / 1e5
 }
 
-pub(super) fn figures() -> Vec<Figure> {
-    let moduli = [4, 6, 8, 10].map(modulus);
-    let apart = largest(moduli.iter().flat_map(|a| moduli.map(|b| a / b - 1.0)));
+pub(super) fn figures(effort: Effort) -> Vec<Figure> {
+    let cells = effort.choose(&[4, 6][..], &[4, 6, 8, 10]);
+    let moduli: Vec<f64> = cells.iter().map(|cells| modulus(*cells)).collect();
+    let apart = largest(moduli.iter().flat_map(|a| moduli.iter().map(move |b| a / b - 1.0)));
     vec![
         Figure::stored("A beam that came to rest: from the balance of its springs", [cantilever()], 1e-6, " L"),
-        Figure::within("modulus of a pulled bar ÷ `stiffness`, 4 to 10 cells across", &moduli, [0.88, 1.12]),
-        Figure::error("between those resolutions", apart, 3e-2, ""),
+        Figure::within("modulus of a pulled bar ÷ `stiffness`, 4 to 10 cells across", &moduli, [0.88, 1.12])
+            .has_coarse_form(effort),
+        Figure::error("between those resolutions", apart, 3e-2, "").has_coarse_form(effort),
     ]
 }

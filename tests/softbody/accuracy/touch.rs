@@ -116,7 +116,7 @@ fn rolled(modulus: f64) -> (f64, usize, usize) {
     let cooked = scene.set("ground", true).set("ground_height", -THICKNESS).run(31);
     let (mut passed, mut count) = (0, 0);
     for frame in 0..31 {
-        let pin = crate::points(&pin(Time::whole(frame as i64 + 1)));
+        let pin = crate::measure::points(&pin(Time::whole(frame as i64 + 1)));
         let points = cooked.at(frame);
         passed += points.iter().filter(|p| within(&pin, p) || p[1] < -THICKNESS).count();
         count += points.len();
@@ -128,8 +128,8 @@ pub(super) fn figures() -> Vec<Figure> {
     let sticks = [0.7, 1.0, 1e6].map(|friction| on_slope(friction)[0]);
     let slides = [0.0, 0.3, 0.5].map(|friction| (on_slope(friction)[1] - 1.0).abs());
     let [cube, flat] = [6, 3].map(pressed);
-    let volume = |pressed: &Cooked| (pressed.said("volume_ratio").last().unwrap() - 1.0).abs();
-    let turned = |pressed: &Cooked| *pressed.said("inverted_tets").last().unwrap() as usize;
+    let volume = |pressed: &Cooked| (pressed.metric("volume_ratio").last().unwrap() - 1.0).abs();
+    let turned = |pressed: &Cooked| *pressed.metric("inverted_tets").last().unwrap() as usize;
     let deepest = |pressed: &Cooked| pressed.most("deepest_overlap") / THICKNESS;
     let rolled = [2e4, 5e3].map(rolled);
     let overlap = largest(rolled.iter().map(|found| found.0).chain([deepest(&cube), deepest(&flat)]));

@@ -15,9 +15,9 @@ use engine::geometry::{Attr, Component, Geometry, P};
 use engine::time::Frame;
 use numerics::random::Key;
 
-use super::distance;
-use super::scene::{Cooked, Scene};
-use super::shapes::{block, changed, cuboid};
+use crate::measure::{distance, points};
+use crate::scene::{Cooked, Scene};
+use crate::shapes::{block, changed, cuboid};
 
 type V = [f64; 3];
 
@@ -80,8 +80,7 @@ fn faults(scene: &Scene, cooked: &Cooked) -> Vec<String> {
     let corners = cooked.tets[0].as_ref().unwrap().tets().unwrap().tet_corners();
     let rest = cooked.at(0);
     for frame in 0..cooked.tets.len() {
-        let [surface, points] =
-            [&cooked.surface, &cooked.tets].map(|frames| super::points(frames[frame].as_ref().unwrap()));
+        let [surface, points] = [&cooked.surface, &cooked.tets].map(|frames| points(frames[frame].as_ref().unwrap()));
         if !surface.iter().chain(&points).flatten().all(|x| x.is_finite()) {
             faults.push(format!("frame {} is not finite", frame + 1));
         }
@@ -108,7 +107,7 @@ fn rounding(points: &[V]) -> f64 {
 
 /// Tets that lie the other way round than at rest by more than rounding; those that were flat are none.
 fn inverted(rest: &[V], points: &[V], tets: &[[u32; 4]]) -> usize {
-    let volume = |at: &[V], tet: &[u32; 4]| super::volume(tet.map(|corner| at[corner as usize]));
+    let volume = |at: &[V], tet: &[u32; 4]| crate::measure::volume(tet.map(|corner| at[corner as usize]));
     let size = |at: &[V], tet: &[u32; 4]| {
         let far = tet.iter().map(|corner| distance(&at[*corner as usize], &at[tet[0] as usize]));
         far.fold(0.0, f64::max)

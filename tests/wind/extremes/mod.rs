@@ -22,7 +22,7 @@ use numerics::random::Key;
 use numerics::shapes::icosphere;
 use numerics::vector::{self, DVec3, to_f64};
 
-use super::cooked::{fault, graph, metrics};
+use crate::cooked::{fault, graph, metrics};
 
 type Point = [f32; 3];
 type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;

@@ -1,0 +1,76 @@
+//! `bless`: stored expectations written anew.
+
+use std::path::Path;
+use std::process::Command;
+
+use clap::ValueEnum;
+
+/// Something that is stored and checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Expectation {
+    /// Bits of the example graphs' first frames: tests/graphs.txt
+    Graphs,
+    /// Messages of faults in graphs: engine/src/graph/tests/faults.txt
+    Messages,
+    /// Tables of laws in docs/, and bits of the last frames of scenes with a solver: benches/graphs.txt
+    Laws,
+    /// Counts of instructions, where valgrind is installed: benches/instructions.txt
+    Instructions,
+}
+
+impl Expectation {
+    /// What of cargo writes it.
+    fn command(self) -> &'static [&'static str] {
+        match self {
+            Self::Graphs => &["test", "--test", "graphs", "every_example_has_the_stored_bits"],
+            Self::Messages => &["test", "-p", "engine", "--lib", "stored_messages"],
+            Self::Laws => &["bench", "--bench", "laws", "--", "--bless"],
+            Self::Instructions => &["bench", "--bench", "instructions", "--", "--bless"],
+        }
+    }
+
+    /// The files it is stored in.
+    fn files(self) -> &'static [&'static str] {
+        match self {
+            Self::Graphs => &["tests/graphs.txt"],
+            Self::Messages => &["engine/src/graph/tests/faults.txt"],
+            Self::Laws => &["docs/wind.md", "docs/softbody.md", "benches/graphs.txt"],
+            Self::Instructions => &["benches/instructions.txt"],
+        }
+    }
+}
+
+/// Stores expectations anew, all of them if none is named, and shows the difference.
+///
+/// # Errors
+/// Where what writes one of them fails; the others are stored all the same.
+pub(crate) fn store(root: &Path, named: &[Expectation]) -> Result<String, String> {
+    let all = if named.is_empty() { Expectation::value_variants() } else { named };
+    let run = |program: &str, arguments: &[&str]| {
+        let status = Command::new(program).args(arguments).current_dir(root).env("BLESS", "1").status();
+        status.map_err(|error| format!("`{program}` could not be run: {error}"))
+    };
+    let mut failed = Vec::new();
+    for expectation in all {
+        if !run("cargo", expectation.command())?.success() {
+            failed.push(format!("`cargo {}` failed", expectation.command().join(" ")));
+        }
+    }
+    let files: Vec<&str> = all.iter().flat_map(|expectation| expectation.files()).copied().collect();
+    run("git", &[&["--no-pager", "diff", "--stat", "--patch", "--"], &files[..]].concat())?;
+    if failed.is_empty() { Ok("stored; commit the changes you intended".into()) } else { Err(failed.join("\n")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stored_file_exists() {
+        for expectation in Expectation::value_variants() {
+            for file in expectation.files() {
+                assert!(crate::root().join(file).exists(), "{expectation:?}: {file}");
+            }
+        }
+    }
+}
