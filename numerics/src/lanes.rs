@@ -1,8 +1,8 @@
-//! Sixteen numbers side by side: the data of one step of a kernel, an element a lane.
+//! Sixteen numbers side by side: the data of one step of a kernel, one element a lane.
 //!
 //! A kernel is written as scalar, branch-free functions, and as loops over [`LANES`] that call
-//! them; inside a function of [`crate::simd`] the compiler turns such a loop into vectors of the
-//! path's width. So the code of one value is the code of sixteen, and their bits are the same.
+//! them; inside a function of [`crate::simd`] the compiler vectorises such a loop to the path's width. So one value and
+//! sixteen are computed by the same code, and their bits are the same.
 
 /// Elements handled side by side, on every path.
 pub const LANES: usize = 16;
@@ -29,7 +29,7 @@ impl F32x16 {
         out
     }
 
-    /// The lesser of each lane; `other`'s where one is no number.
+    /// The lesser of each lane; `other`'s where one is NaN.
     #[inline(always)]
     pub fn least(&self, other: &Self) -> Self {
         let mut out = *other;
@@ -39,7 +39,7 @@ impl F32x16 {
         out
     }
 
-    /// The larger of each lane; `other`'s where one is no number.
+    /// The larger of each lane; `other`'s where one is NaN.
     #[inline(always)]
     pub fn most(&self, other: &Self) -> Self {
         let mut out = *other;
@@ -50,7 +50,7 @@ impl F32x16 {
     }
 }
 
-/// A vector or a quaternion a lane, a component an array.
+/// A vector or quaternion a lane, stored by component.
 pub type Lanes<const N: usize> = [F32x16; N];
 
 /// The vector of one lane.

@@ -1,13 +1,12 @@
-//! What all kernels stand on: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, triangle trees and
-//! shapes; plain slices in, plain slices out; knows no node and no geometry.
+//! The foundation of all kernels: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, triangle trees
+//! and shapes. Plain slices in, plain slices out; it knows neither nodes nor geometry.
 //!
 //! Promise: the same bits on any x86-64 or aarch64 CPU and for any number of threads. Sums have a
 //! fixed order, products and sums are never fused, transcendental functions are our own.
 //!
-//! How a kernel is written: scalar, branch-free functions, and loops over [`lanes::LANES`] that call
-//! them, inside a function made by `simd::kernel!`. Each such loop becomes vectors of the CPU's
-//! width. A loop over something else inside of it, a choice of code or a bound to check would keep
-//! it from that, so those stay outside.
+//! How a kernel is written: scalar, branch-free functions, called from loops over [`lanes::LANES`] inside a function
+//! made by `simd::kernel!`. The compiler vectorises each such loop to the CPU's width. Inner loops over anything else,
+//! branches and bounds checks would prevent that, so they stay outside.
 
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 

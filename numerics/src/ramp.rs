@@ -1,16 +1,15 @@
-//! Ramps: a value along 0..1 given by keys, held beyond the first and the last.
+//! Ramps: a function of x given by keys, constant before the first and after the last.
 //!
-//! Exact at every key, on one lane or sixteen with the same bits. `Smooth` is a smoothstep an
-//! interval (slope 0 at every key), never an overshoot. Limit: keys within ±1e30, so that no
-//! difference of two overflows.
+//! Exact at every key, and the same bits for one value as for sixteen. `Smooth` is a smoothstep on each interval (slope 0
+//! at every key), so it never overshoots. Limit: keys within ±1e30, so that differences do not overflow.
 
 use crate::lanes::{F32x16, LANES, get, set};
 use std::{error, fmt};
 
-/// How a ramp runs from one key to the next.
+/// How a ramp interpolates between keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
-    /// Straight.
+    /// Linear.
     #[default]
     Linear,
     /// By 3t² − 2t³ of each interval.
@@ -19,7 +18,7 @@ pub enum Interpolation {
     Constant,
 }
 
-/// Checked keys and what joins them.
+/// Validated keys and their interpolation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramp {
     keys: Vec<[f32; 2]>,
@@ -29,10 +28,10 @@ pub struct Ramp {
 /// Largest magnitude of a key's x and y.
 const LARGEST: f32 = 1e30;
 
-/// Up to here the keys are tried one by one on all lanes at once; above, lane by lane in halves.
+/// Up to this number of keys all are tried on all lanes at once; above, a binary search per lane.
 const FEW_KEYS: usize = 24;
 
-/// Intervals tried in one pass over the lanes: most ramps have no more keys.
+/// Intervals tried in one pass over the lanes: most ramps have no more.
 const AT_ONCE: usize = 4;
 
 /// What is wrong with the keys of a ramp; `key` counts from 0.
@@ -95,7 +94,7 @@ impl Ramp {
         Ok(Self { keys, interpolation })
     }
 
-    /// `value` everywhere; a value that is no number within ±1e30 counts as 0.
+    /// `value` everywhere; NaN and values beyond ±1e30 count as 0.
     pub fn constant(value: f32) -> Self {
         let y = if (-LARGEST..=LARGEST).contains(&value) { value } else { 0.0 };
         Self { keys: vec![[0.0, y]], interpolation: Interpolation::Constant }
@@ -106,12 +105,12 @@ impl Ramp {
         &self.keys
     }
 
-    /// What joins the keys.
+    /// The interpolation between keys.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
-    /// The largest value: one of the keys', because no interpolation overshoots.
+    /// The largest value, which is that of a key, as no interpolation overshoots.
     pub fn max(&self) -> f32 {
         self.keys.iter().map(|key| key[1]).fold(f32::NEG_INFINITY, f32::max)
     }
@@ -121,17 +120,17 @@ impl Ramp {
         self.keys.iter().map(|key| key[1]).fold(f32::INFINITY, f32::min)
     }
 
-    /// The one value, where all keys have the same.
+    /// The value, if all keys have the same.
     pub fn is_constant(&self) -> Option<f32> {
         let first = self.keys[0][1];
         self.keys.iter().all(|key| key[1] == first).then_some(first)
     }
 
-    /// The value at `x`; a NaN reads the first key.
+    /// The value at `x`; that of the first key for NaN.
     pub fn eval(&self, x: f32) -> f32 {
         let right = self.keys.partition_point(|key| key[0] <= x);
         let left = self.keys[right.saturating_sub(1)];
-        // Left of the first key and right of the last, an interval of one key holds its value.
+        // Left of the first key and right of the last, both ends of the interval are the same key.
         let next = if right == 0 { left } else { *self.keys.get(right).unwrap_or(&left) };
         between(left, next, x, self.interpolation)
     }
@@ -142,7 +141,7 @@ impl Ramp {
         if self.keys.len() > FEW_KEYS {
             return F32x16::from_fn(|lane| self.eval(at.0[lane]));
         }
-        // Left of the first key, an interval of one key holds its value.
+        // Left of the first key, both ends of the interval are that key.
         let [x, y] = self.keys[0].map(F32x16::splat);
         let mut found = [x, y, x, y];
         for start in (0..self.keys.len()).step_by(AT_ONCE) {
@@ -161,8 +160,8 @@ impl Ramp {
         })
     }
 
-    /// The intervals that begin at key `start` and after it, each its two keys; the last key's, and
-    /// those beyond it that nothing reaches, hold their value.
+    /// The intervals that begin at key `start` and the following ones, as pairs of keys; that of the last key is constant,
+    /// those beyond it are never selected.
     #[inline(always)]
     fn intervals(&self, start: usize) -> [[f32; 4]; AT_ONCE] {
         std::array::from_fn(|i| match (self.keys.get(start + i), self.keys.get(start + i + 1)) {
@@ -204,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_met_exactly_and_ends_are_held() {
+    fn ramps_are_exact_at_keys_and_constant_beyond_them() {
         let keys = vec![[-0.3, 0.7], [0.1, -0.2], [0.35, 1.1], [0.9, 1.1]];
         for kind in KINDS {
             let ramp = Ramp::new(keys.clone(), kind).unwrap();
@@ -259,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_values_and_constancy_are_told() {
+    fn minimum_maximum_and_constancy_are_known() {
         let ramp = Ramp::new(vec![[0.0, 0.2], [0.5, 3.0], [1.0, 1.0]], Interpolation::Smooth).unwrap();
         assert_eq!((ramp.min(), ramp.max(), ramp.is_constant()), (0.2, 3.0, None));
         let flat = Ramp::new(vec![[0.0, 0.3], [1.0, 0.3]], Interpolation::Smooth).unwrap();

@@ -1,14 +1,14 @@
 //! Counter-based random numbers: a pure function of a seed and of indices, with no state to advance.
 //!
-//! `Key::new(seed).of(gust).of(RADIUS).f32()` is the same number whoever asks, in whatever order, on
-//! whatever thread. A key is 64 bits; every step is SplitMix64's finaliser (Steele, Lea & Flood
+//! `Key::new(seed).of(gust).of(RADIUS).f32()` is the same number in any order of evaluation and on any thread. A key is
+//! 64 bits; every step is SplitMix64's finaliser (Steele, Lea & Flood
 //! 2014), so single-bit changes of the seed or of any index change half of the result's bits.
-//! Limit: for pictures, not for secrets, and two of n keys meet by chance once n nears 2³².
+//! Limit: for pictures, not for cryptography; two of n keys collide by chance once n nears 2³².
 
 /// Golden ratio × 2⁶⁴: SplitMix64's increment, which keeps neighbouring indices far apart.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A place in the tree of random numbers; read a number from it or go on to a child.
+/// A node in the tree of random numbers: read a number from it or descend to a child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key(u64);
 
@@ -28,7 +28,7 @@ impl Key {
     /// 64 uniform bits.
     #[inline]
     pub const fn u64(self) -> u64 {
-        // One more round: the bits shown are not the state that children start from.
+        // One more round: the returned bits are not the state that children start from.
         mix64(self.0 ^ GOLDEN.rotate_left(32))
     }
 
@@ -87,7 +87,7 @@ mod tests {
     const N: u64 = 1 << 16;
 
     #[test]
-    fn numbers_stay_what_they_were_when_files_were_written() {
+    fn numbers_never_change_between_versions() {
         // SplitMix64 seeded with 0 gives 0xe220a8397b1dcdaf first: the published test vector.
         assert_eq!(mix64(GOLDEN), 0xe220_a839_7b1d_cdaf);
         assert_eq!(Key::new(0), Key(0xe220_a839_7b1d_cdaf));
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn between_holds_its_ends_either_way_round() {
+    fn between_stays_within_its_ends_in_either_order() {
         for index in 0..1000 {
             let key = Key::new(1).of(index);
             assert_eq!(key.between([2.5, 2.5]), 2.5);

@@ -1,9 +1,8 @@
-//! Which vector instructions the kernels use: chosen once at run time, never changing a bit.
+//! Which vector instructions kernels use: chosen once at run time, without any effect on results.
 //!
-//! A kernel is compiled once a path, from the same source, by `kernel!`; it runs the widest the CPU
-//! has. Multiplications and additions are never fused and kernels work lane by lane, so every path
-//! gives the same bits. Limit: other architectures than x86-64 have the baseline path alone (on
-//! aarch64 that is NEON).
+//! `kernel!` compiles a function once for each path, from the same source; the widest that the CPU has is run. Multiplications and additions are never fused and kernels work lane by lane, so every path
+//! gives the same bits. Limit: architectures other than x86-64 only have the baseline path (NEON on
+//! aarch64).
 
 use std::sync::OnceLock;
 use std::{env, error, fmt};
@@ -11,11 +10,11 @@ use std::{env, error, fmt};
 /// The environment variable that forces a path: `baseline`, `avx2` or `widest`.
 pub const VARIABLE: &str = "CONVECT_SIMD";
 
-/// A path that this CPU can run; there is no way to hold another.
+/// A path that this CPU can run; no other can be constructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path(Level);
 
-/// Which of the copies of a kernel a path runs, narrowest first.
+/// The compiled copy of a kernel that a path runs, narrowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// What every CPU of the build's target has: SSE2, or NEON.
@@ -26,7 +25,7 @@ pub enum Level {
     Avx512,
 }
 
-/// `CONVECT_SIMD` holds a word that names no path.
+/// `CONVECT_SIMD` has a value that names no path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownPath(String);
 
@@ -39,21 +38,21 @@ impl fmt::Display for UnknownPath {
 impl error::Error for UnknownPath {}
 
 impl Path {
-    /// The path every CPU has.
+    /// The path that every CPU has.
     pub const BASELINE: Self = Self(Level::Baseline);
 
-    /// The widest this CPU has.
+    /// The widest path of this CPU.
     pub fn widest() -> Self {
         Self(widest_level())
     }
 
-    /// All this CPU has, narrowest first.
+    /// All paths of this CPU, narrowest first.
     pub fn all() -> Vec<Self> {
         let levels = [Level::Baseline, Level::Avx2, Level::Avx512];
         levels.into_iter().filter(|level| *level <= widest_level()).map(Self).collect()
     }
 
-    /// The path that `word` asks for, or the widest below it that this CPU has; none is the widest.
+    /// The path that `word` names, or the widest below it that this CPU has; `None` is the widest.
     pub fn asked(word: Option<&str>) -> Result<Self, UnknownPath> {
         let level = match word {
             None | Some("" | "widest") => Level::Avx512,
@@ -64,15 +63,15 @@ impl Path {
         Ok(Self(level.min(widest_level())))
     }
 
-    /// The path that the environment asks for; the program asks once at its start, to report a word
-    /// that names none.
+    /// The path that the environment names; the program calls this once at its start, to report a word that names
+    /// none.
     pub fn from_environment() -> Result<Self, UnknownPath> {
         let word = env::var_os(VARIABLE).map(|word| word.to_string_lossy().into_owned());
         Self::asked(word.as_deref())
     }
 
-    /// The path that kernels run where the caller names none: the environment's, read once; the
-    /// widest where that is no path.
+    /// The path that kernels run where the caller names none: the environment's, read once; the widest where that names
+    /// no path.
     pub fn chosen() -> Self {
         static CHOSEN: OnceLock<Path> = OnceLock::new();
         *CHOSEN.get_or_init(|| Self::from_environment().unwrap_or_else(|_| Self::widest()))
@@ -87,7 +86,7 @@ impl Path {
         }
     }
 
-    /// Which copy of a kernel it runs.
+    /// The copy of a kernel that it runs.
     pub fn level(self) -> Level {
         self.0
     }
@@ -154,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_word_names_a_path_or_a_narrower_one() {
+    fn a_word_names_a_path_or_falls_back_to_a_narrower_one() {
         assert_eq!(Path::asked(None), Ok(Path::widest()));
         assert_eq!(Path::asked(Some("widest")), Ok(Path::widest()));
         assert_eq!(Path::asked(Some("baseline")), Ok(Path::BASELINE));

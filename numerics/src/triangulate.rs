@@ -1,13 +1,13 @@
-//! Polygons to triangles by ear clipping: concave ones too.
+//! Triangulation of polygons by ear clipping, concave ones included.
 //!
-//! Promise: a polygon of n corners gives exactly n − 2 triangles, in its own winding, whatever its shape; a simple flat
-//! one is covered exactly once. At most `TESTS_PER_PAIR`·n² point-in-triangle tests, and a polygon of more than
-//! `MOST_CORNERS` corners is fanned, so no polygon hangs. Limit: a polygon that crosses itself or is not flat is cut
-//! somehow; holes need a bridge, two corners at one place.
+//! Promise: a polygon of n corners gives exactly n − 2 triangles with its winding, whatever its shape; a simple flat
+//! polygon is covered exactly once. At most `TESTS_PER_PAIR`·n² point-in-triangle tests, and polygons of more than
+//! `MOST_CORNERS` corners become fans, so the time is bounded. Limit: the triangulation of a polygon that crosses itself
+//! or is not flat is arbitrary; holes need a bridge: two pairs of coincident corners.
 
-/// Above this a polygon becomes a fan around its first corner: n² tests of one face would be felt.
+/// Above this a polygon becomes a fan about its first corner: n² tests for one face would take too long.
 const MOST_CORNERS: usize = 4096;
-/// Point-in-triangle tests a pair of corners may cost. A star needs about 1, a spiral about 2.
+/// Most point-in-triangle tests per pair of corners. A star needs about 1, a spiral about 2.
 const TESTS_PER_PAIR: usize = 8;
 
 /// Triangles of the polygon with these corners, as triples of rows of `corners`; none below three corners.
@@ -46,7 +46,7 @@ fn flatten(corners: &[[f32; 3]]) -> Option<Vec<[f64; 2]>> {
     Some(local.iter().map(|p| [p[u], p[v]]).collect())
 }
 
-/// Twice the area of a, b, c: positive where they turn left.
+/// Twice the signed area of a, b, c: positive where they turn left.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
@@ -60,14 +60,14 @@ fn clip_ears(flat: &[[f64; 2]]) -> Vec<[u32; 3]> {
     let (mut at, mut left, mut refused) = (0, count, 0);
     while left > 3 {
         let [a, b, c] = [previous[at], at, next[at]];
-        // A corner is cut where it is an ear; where a whole round found none, or the tests are spent, it is cut anyway.
+        // A corner is clipped where it is an ear; also where a whole round found none, or the budget of tests is spent.
         if refused >= left || budget == 0 || is_ear(flat, [a, b, c], &next, &mut budget) {
             triangles.push([a as u32, b as u32, c as u32]);
             next[a] = c;
             previous[c] = a;
             left -= 1;
             refused = 0;
-            // Leaving out a corner between two cuts keeps the triangles from becoming one thin fan.
+            // Skipping a corner between two ears avoids one thin fan of triangles.
             at = next[c];
         } else {
             refused += 1;
@@ -78,13 +78,13 @@ fn clip_ears(flat: &[[f64; 2]]) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// Whether the triangle at corner b turns left and holds no other corner of what is left of the polygon.
+/// Whether the triangle at corner b turns left and contains no other corner of the remaining polygon.
 fn is_ear(flat: &[[f64; 2]], [a, b, c]: [usize; 3], next: &[usize], budget: &mut usize) -> bool {
     let [pa, pb, pc] = [flat[a], flat[b], flat[c]];
     let area = turn(pa, pb, pc);
     if area <= 0.0 {
-        // A corner on the line between its neighbours covers nothing: cutting it changes no area. One that doubles
-        // back is left, as the line may be the polygon's border.
+        // A corner on the line between its neighbours: clipping it changes no area. One where the polygon doubles back
+        // stays, as that line may be part of the boundary.
         let between = (pb[0] - pa[0]) * (pc[0] - pb[0]) + (pb[1] - pa[1]) * (pc[1] - pb[1]) >= 0.0;
         return area == 0.0 && between;
     }
@@ -194,12 +194,12 @@ mod tests {
     }
 
     #[test]
-    fn polygons_that_are_none_end_with_as_many_triangles() {
+    fn degenerate_polygons_give_n_minus_2_triangles_too() {
         let nan = vec![[f32::NAN; 3]; 9];
         let same = vec![[1.0; 3]; 9];
         let line: Vec<_> = (0..9).map(|k| [k as f32, 0.0, 0.0]).collect();
         let bow = flat(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]);
-        // A star polygon that crosses itself at every edge, at the size where it would be felt.
+        // A star that crosses itself at every edge, of a size where quadratic time matters.
         let cross: Vec<_> = (0..4000).map(|k| [(k * 1237 % 4000) as f32, 0.0, (k * 2791 % 3989) as f32]).collect();
         for polygon in [nan, same, line, bow, cross] {
             assert_eq!(triangulate(&polygon).len(), polygon.len() - 2);

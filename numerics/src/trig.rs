@@ -1,8 +1,7 @@
-//! Transcendental functions of `f32`, our own: the same bits on every CPU, alone or sixteen at once.
+//! Transcendental functions of `f32` of our own: the same bits on every CPU, for one value or sixteen.
 //!
-//! Every function is branch-free plain arithmetic, so that a loop over lanes becomes vectors. Within
-//! 2 ulp of the true value: everywhere, but sine and cosine for |x| ≤ 2²⁰ only; beyond they stay in
-//! [−1, 1] and lose their phase. NaN gives NaN; sine and cosine of ±inf are NaN. Angles in radians.
+//! Every function is branch-free plain arithmetic, so that loops over lanes are vectorised. Within 2 ulp of the true value
+//! everywhere; sine and cosine only for |x| ≤ 2²⁰, beyond which they stay in [−1, 1] but lose their phase. NaN gives NaN; sine and cosine of ±inf are NaN. Angles in radians.
 //! Polynomials: minimax (Remez) of the reduced function's relative error, or Taylor where f64 holds
 //! many more digits than f32 shows.
 

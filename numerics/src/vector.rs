@@ -1,12 +1,12 @@
-//! Vectors of three and rotations: one definition a width for the whole workspace.
+//! Three-vectors and rotations: one definition for each precision in the whole workspace.
 //!
 //! `f32`, for geometry and lanes: plain arrays and branch-free functions, for one value or inside a loop over lanes; a
-//! quaternion is `[x, y, z, w]`, w its cosine. `f64`, where precision counts: nalgebra's types under short names, whose
-//! `dot`, `cross` and `norm` add up in the order of the axes; [`rotation`] is here because nalgebra's own takes the
+//! quaternion is `[x, y, z, w]`, with w the cosine. `f64`, where precision matters: nalgebra's types under short names,
+//! whose `dot`, `cross` and `norm` sum in the order of the axes; [`rotation`] is here because nalgebra's uses the
 //! platform's sine. Right-handed.
 //!
-//! Limit: squares are taken as they come. In `f32` lengths between 1e-18 and 1e18 are safe; a caller with others brings
-//! them there by [`power_of_two_to_one`] first, which changes no digit. [`direction`] is safe for any length.
+//! Limit: squares may overflow or vanish. In `f32` lengths between 1e-18 and 1e18 are safe; scale others by
+//! [`power_of_two_to_one`] first, which is exact. [`direction`] is safe for any length.
 
 use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
 
@@ -31,7 +31,7 @@ pub fn to_f32(v: DVec3) -> Vec3 {
     [v.x as f32, v.y as f32, v.z as f32]
 }
 
-/// The unit vector along `v`, however short or long that is; `None` where it is zero or not finite.
+/// The unit vector along `v`, for any length; `None` where it is zero or not finite.
 pub fn direction(v: DVec3) -> Option<DVec3> {
     let largest = v.amax();
     (largest > 0.0 && v.iter().all(|x| x.is_finite())).then(|| {
@@ -52,7 +52,7 @@ pub type Vec3 = [f32; 3];
 /// x, y, z, w with x² + y² + z² + w² = 1.
 pub type Quat = [f32; 4];
 
-/// No turn.
+/// The identity rotation.
 pub const IDENTITY: Quat = [0.0, 0.0, 0.0, 1.0];
 
 /// a + b.
@@ -105,8 +105,8 @@ pub fn largest(a: Vec3) -> f32 {
     if xy > z { xy } else { z }
 }
 
-/// The power of two that brings a `magnitude` ≥ 0 to 1…2 (a denormal one below 1, one above 2¹²⁶ to
-/// at most 4), and its inverse, both exact.
+/// The power of two that scales a `magnitude` ≥ 0 to 1…2 (denormals to less than 1, magnitudes above 2¹²⁶ to at most 4),
+/// and its inverse, both exact.
 #[inline(always)]
 pub fn power_of_two_to_one(magnitude: f32) -> (f32, f32) {
     let exponent = magnitude.to_bits() >> 23;
@@ -115,8 +115,8 @@ pub fn power_of_two_to_one(magnitude: f32) -> (f32, f32) {
     (f32::from_bits((254 - exponent) << 23), f32::from_bits(exponent << 23))
 }
 
-/// First `b`, then `a`, brought back to length 1 to first order: over any number of turns the length
-/// stays within rounding of 1 if it began there.
+/// The rotation `b` followed by `a`, renormalised to first order: over any number of compositions the length stays 1 up to
+/// rounding.
 #[inline(always)]
 pub fn compose(a: Quat, b: Quat) -> Quat {
     let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
@@ -128,7 +128,7 @@ pub fn compose(a: Quat, b: Quat) -> Quat {
     [x * unit, y * unit, z * unit, w * unit]
 }
 
-/// How far the turn `q` moves the end of `v`: the turned vector less `v`, exactly 0 for no turn.
+/// The rotated vector less `v`: exactly 0 for the identity.
 #[inline(always)]
 pub fn moved(q: Quat, v: Vec3) -> Vec3 {
     let axis = [q[0], q[1], q[2]];
@@ -137,13 +137,13 @@ pub fn moved(q: Quat, v: Vec3) -> Vec3 {
     add(scale(once, q[3]), cross(axis, once))
 }
 
-/// `v` turned by `q`.
+/// `v` rotated by `q`.
 #[inline(always)]
 pub fn turned(q: Quat, v: Vec3) -> Vec3 {
     add(v, moved(q, v))
 }
 
-/// A unit vector perpendicular to `v` (not zero), towards the world axis that `v` is least along.
+/// A unit vector perpendicular to `v` (not zero), near the world axis that `v` is least along.
 pub fn perpendicular(v: Vec3) -> Vec3 {
     let v = scale(v, power_of_two_to_one(largest(v)).0);
     let [x, y, z] = v.map(f32::abs);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_million_turns_keep_the_length() {
+    fn a_million_compositions_keep_the_length() {
         let step = crate::trig::sin_cos(0.3);
         let turn = [0.6 * step.0, 0.0, 0.8 * step.0, step.1];
         let mut q = IDENTITY;
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_is_found_at_any_length_and_not_where_there_is_none() {
+    fn direction_works_at_any_length_but_zero() {
         for size in [1e-300, 1.0, 1e300] {
             let along = direction(DVec3::new(3.0 * size, 0.0, -4.0 * size)).unwrap();
             assert!((along - DVec3::new(0.6, 0.0, -0.8)).norm() < 1e-15, "{size} {along}");

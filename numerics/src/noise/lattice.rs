@@ -1,13 +1,13 @@
-//! Where a point lies on the integer lattice, and random bits of a lattice point.
+//! The cell of a point on the integer lattice, and random bits of lattice points.
 //!
-//! A coordinate is an f64 and is split here into a whole cell and an f32 share of it, so noise is as
-//! smooth 1,000 km from the origin as beside it. Limits: cells wrap after 2³²; a coordinate beyond
+//! An f64 coordinate is split into an integer cell and an f32 fraction, so noise is as smooth 1,000 km from the origin as
+//! near it. Limits: cells wrap after 2³²; a coordinate beyond
 //! ±2⁵⁰ counts as ±2⁵⁰, and a NaN likewise.
 
 use crate::lanes::LANES;
 use crate::random::mix32;
 
-/// A point on the lattice: its cell, and how far in it the point is along each axis, 0..1.
+/// A point on the lattice: its cell, and its fraction of the cell along each axis, 0..1.
 #[derive(Clone, Copy)]
 pub(super) struct Point {
     pub(super) cell: [u32; 3],
@@ -69,7 +69,7 @@ impl Points {
     }
 }
 
-/// The cell that holds `x`, and how far in it `x` is: 0..1, 1 itself only by rounding to f32.
+/// The cell of `x` and the fraction in it: 0..1, where 1 occurs only by rounding to f32.
 #[inline(always)]
 fn split(x: f64) -> (u32, f32) {
     const FARTHEST: f64 = (1u64 << 50) as f64;
@@ -86,14 +86,14 @@ fn split(x: f64) -> (u32, f32) {
     (cell, share as f32)
 }
 
-/// Random bits of a cell's place along one axis; those of three axes, xored, go to [`point_bits`].
+/// Random bits of a cell's index along one axis; those of three axes, xored, go to [`point_bits`].
 #[inline(always)]
 pub(super) fn axis_bits(cell: u32, salt: u32) -> u32 {
     mix32(cell ^ salt)
 }
 
-/// 32 random bits of a lattice point. The axes' bits are well mixed already, but xored alone the
-/// four points of a square would cancel; one more product breaks that.
+/// 32 random bits of a lattice point. The axes' bits are well mixed, but with xor only the bits of the four points of a
+/// square would cancel; one more product avoids that.
 #[inline(always)]
 pub(super) fn point_bits(axes: u32) -> u32 {
     let bits = (axes ^ (axes >> 16)).wrapping_mul(0x7feb_352d);
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_coordinate_is_its_cell_and_its_share() {
+    fn coordinates_split_into_cell_and_fraction() {
         for (x, cell, share) in [
             (0.0, 0, 0.0),
             (0.25, 0, 0.25),
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn near_points_are_where_f64_has_them() {
+    fn the_f32_split_agrees_with_f64() {
         for x in [0.0, 0.25, 0.75, 2.5, 3.5, -0.25, -1.0, -1.5, 4_000_000.5, -2_000_000.5] {
             let (near, at) = (Point::near([x, 0.5, -0.5]), Point::at([f64::from(x), 0.5, -0.5]));
             assert_eq!((near.cell, near.share), (at.cell, at.share), "{x}");
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn absurd_coordinates_have_a_cell_and_a_share_all_the_same() {
+    fn extreme_coordinates_have_a_cell_and_a_fraction_too() {
         for x in [1e30, -1e30, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, 1e15, -1e15] {
             assert!((0.0..=1.0).contains(&split(x).1), "{x}");
         }

@@ -1,8 +1,7 @@
 //! Noise fields: three decorrelated smooth random components at every point of space.
 //!
-//! Octaves of gradient noise, its billowed form or wavelet noise; each of mean 0. The sum of octaves
-//! is divided by the root of its weights' squares, so its rms (0.27) does not depend on
-//! how many there are. Coordinates are f64, counted in cells of the first octave. Octave n has 2ⁿ
+//! Octaves of gradient noise, billow or wavelet noise; each of mean 0. The sum of octaves is divided by the root of the sum
+//! of its squared weights, so its rms (0.27) does not depend on their number. Coordinates are f64, counted in cells of the first octave. Octave n has 2ⁿ
 //! cells a cell and no offset: gradient noise of any number of octaves is 0 on the first's lattice.
 //! The same bits one point or sixteen at a time.
 
@@ -14,14 +13,14 @@ use crate::lanes::{F32x16, LANES, Lanes, get, set};
 use crate::random::Key;
 use lattice::{Point, Points};
 
-/// What a field is made of.
+/// The kind of noise of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseKind {
     /// Gradient noise: 0 on the lattice, C².
     Perlin,
-    /// The magnitude of gradient noise, less its mean: rounded lumps with creases between them.
+    /// The absolute value of gradient noise, less its mean: rounded lumps with creases between them.
     Billow,
-    /// Wavelet noise: each octave keeps to its own band; C¹.
+    /// Wavelet noise: each octave is band-limited; C¹.
     Wavelet,
 }
 
@@ -50,8 +49,7 @@ const BILLOW_MEAN: f32 = 0.22;
 const BILLOW_SCALE: f32 = 1.725;
 
 impl Field {
-    /// A field of 1…16 `octaves` (held to that), each `roughness` times the one before (a negative or
-    /// NaN one counts as 0, one above 1 as 1).
+    /// A field of 1…16 `octaves` (clamped), each `roughness` times the previous one (clamped to 0..1, NaN counts as 0).
     pub fn new(kind: NoiseKind, octaves: u32, roughness: f32, seed: u64) -> Self {
         let roughness = f64::from(if roughness > 0.0 { roughness.min(1.0) } else { 0.0 });
         let wanted = (octaves as usize).clamp(1, MAX_OCTAVES);
@@ -84,7 +82,7 @@ impl Field {
         let mut sum = [F32x16::splat(0.0); 3];
         for octave in &self.octaves {
             let points = Points::at(points, octave.scale);
-            // A loop a kind: a choice inside of one would keep it from becoming vectors.
+            // One loop for each kind: a branch inside a loop would prevent its vectorisation.
             match self.kind {
                 NoiseKind::Perlin => octave.add_lanes(NoiseKind::Perlin, &points, &mut sum),
                 NoiseKind::Billow => octave.add_lanes(NoiseKind::Billow, &points, &mut sum),

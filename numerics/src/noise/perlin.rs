@@ -1,7 +1,7 @@
 //! Gradient noise (Perlin 2002): 0 at every lattice point, C² across cells by the quintic fade.
 //!
-//! Gradients are the 12 edges of a cube, chosen by hashing the lattice point: no table, so no period
-//! but the cells' own 2³². Three components share a hash and take bits of their own from it.
+//! Gradients are the 12 edge directions of a cube, chosen by hashing the lattice point: without a table, so the only period
+//! is that of cells, 2³². Three components use different bits of one hash.
 
 use super::lattice::{Point, axis_bits, point_bits};
 use crate::vector::lerp;
@@ -10,7 +10,7 @@ use crate::vector::lerp;
 #[inline(always)]
 pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
     let [x, y, z] = point.share;
-    // `salt` turned keeps equal places along two axes apart.
+    // Rotated bits of `salt` distinguish equal indices along different axes.
     let sides = |axis: usize| {
         let salt = salt.rotate_left(11 * axis as u32);
         [axis_bits(point.cell[axis], salt), axis_bits(point.cell[axis].wrapping_add(1), salt)]

@@ -1,4 +1,4 @@
-//! What a noise field promises, by statistics over many cells.
+//! Statistics of noise fields over many cells.
 
 use super::*;
 
@@ -60,7 +60,7 @@ fn components_seeds_and_points_2_cells_apart_are_uncorrelated() {
 }
 
 #[test]
-fn mirrored_and_swapped_places_are_uncorrelated() {
+fn mirrored_and_swapped_points_are_uncorrelated() {
     // A hash that mixes the axes weakly shows itself here.
     let field = Field::new(NoiseKind::Perlin, 1, 0.5, 3);
     let value = |p| f64::from(field.at(p)[0]);
@@ -72,7 +72,7 @@ fn mirrored_and_swapped_places_are_uncorrelated() {
 }
 
 #[test]
-fn gradient_noise_is_0_on_the_lattice_in_any_octave_and_not_beside_it() {
+fn gradient_noise_is_0_exactly_on_the_lattice_in_any_octave() {
     let field = Field::new(NoiseKind::Perlin, 6, 0.7, 8);
     for i in -20..20 {
         let cell = [f64::from(i), f64::from(3 * i), f64::from(1_000_000 - i)];
@@ -104,7 +104,7 @@ fn gradient_noise_is_c2_across_faces_and_wavelet_noise_c1_only() {
 }
 
 #[test]
-fn far_from_the_origin_noise_is_as_smooth_as_beside_it() {
+fn noise_is_as_smooth_far_from_the_origin_as_near_it() {
     for kind in KINDS {
         let field = Field::new(kind, 2, 0.5, 8);
         for far in [1e3, 1e6, 1e9] {
@@ -137,7 +137,7 @@ fn lanes_give_the_bits_of_one_point() {
 }
 
 #[test]
-fn roughness_0_is_one_octave_and_odd_numbers_are_held_to_the_range() {
+fn roughness_0_is_one_octave_and_out_of_range_numbers_are_clamped() {
     let point = [0.3, 1.7, -2.2];
     let one = Field::new(NoiseKind::Perlin, 1, 0.5, 2).at(point);
     assert_eq!(Field::new(NoiseKind::Perlin, 7, 0.0, 2).at(point), one);

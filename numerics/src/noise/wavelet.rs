@@ -1,11 +1,10 @@
-//! Wavelet noise (Cook & DeRose 2005): noise of one octave that holds almost nothing of the next
-//! coarser one, so that it neither aliases nor adds to what lower octaves already draw.
+//! Wavelet noise (Cook & DeRose 2005): an octave has almost no energy in the band of the next coarser one, so it neither
+//! aliases nor adds to lower octaves.
 //!
-//! A periodic tile of random coefficients, less what survives halving and doubling its resolution,
-//! is read through a quadratic B-spline (C¹). Limits: it repeats after [`TILE`] cells, and unlike
-//! gradient noise it is not 0 on the lattice. The paper's last step (the tile plus itself moved by an
-//! odd offset, to even out variance) is left out: it would bring 4 % of the energy back to the coarser
-//! octave.
+//! A periodic tile of random coefficients, less what survives downsampling and upsampling by 2, is evaluated by quadratic
+//! B-splines (C¹). Limits: it repeats after [`TILE`] cells, and unlike gradient noise it is not 0 on the lattice. The last
+//! step of the paper (adding the tile to itself, moved by an odd offset, to even out the variance) is left out: it would
+//! return 4 % of the energy to the coarser octave.
 
 use super::lattice::Point;
 use crate::random::{Key, mix32};
@@ -22,15 +21,15 @@ pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
     let tile = tile();
     let axis = |axis: usize| {
         let share = point.share[axis];
-        // The three B-splines that reach the point are those centred nearest to it.
+        // Three B-splines reach the point: the nearest ones.
         let right = share > 0.5;
         let t = if right { 1.5 - share } else { 0.5 - share };
         let [before, after] = [0.5 * t * t, 0.5 * (1.0 - t) * (1.0 - t)];
-        // By whole cells of the coarser octave: moved by half of one, 4 % of the energy would be that octave's.
+        // An even offset, whole cells of the coarser octave: an odd one would leave 4 % of the energy in that octave.
         let moved = mix32(salt.wrapping_add(axis as u32)) & !1;
         let middle = point.cell[axis].wrapping_add(u32::from(right)).wrapping_add(moved);
-        let place = |step: u32| middle.wrapping_add(step).wrapping_sub(1) as usize % TILE;
-        ([0, 1, 2].map(place), [before, 1.0 - before - after, after])
+        let index = |step: u32| middle.wrapping_add(step).wrapping_sub(1) as usize % TILE;
+        ([0, 1, 2].map(index), [before, 1.0 - before - after, after])
     };
     let [(i, u), (j, v), (k, w)] = [axis(0), axis(1), axis(2)];
     let mut sum = [0.0; 4];
@@ -48,8 +47,8 @@ pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
     [sum[0], sum[1], sum[2]]
 }
 
-/// The coefficients, x fastest: three components and a filler, for aligned reads. Made on first use,
-/// on the calling thread alone (a pool's thread that waits here must not be given other work).
+/// The coefficients, x fastest: three components and padding, for aligned reads. Computed on first use, on the calling
+/// thread only (a pool's thread that waits here must not be given other work).
 pub(super) fn tile() -> &'static [[f32; 4]] {
     static MADE: OnceLock<Vec<[f32; 4]>> = OnceLock::new();
     MADE.get_or_init(|| {
@@ -63,7 +62,7 @@ pub(super) fn tile() -> &'static [[f32; 4]] {
     })
 }
 
-/// Random coefficients less their own coarse half.
+/// Random coefficients less their downsampled and upsampled copy.
 fn component_tile(component: u64) -> Vec<f64> {
     let key = Key::new(component);
     let random: Vec<f64> = (0..TILE * TILE * TILE).map(|cell| bell(key.of(cell as u64))).collect();
@@ -108,7 +107,7 @@ const ANALYSIS: [f64; 16] = [
     -0.008_233, -0.000_938, 0.003_546, 0.000_410, -0.001_528, 0.000_334,
 ];
 
-/// The coarse coefficients that draw a line best.
+/// Downsamples: the coarse coefficients that approximate a line best.
 pub(super) fn halve(line: &Line) -> [f64; TILE / 2] {
     std::array::from_fn(|coarse| {
         let tap = |distance: usize| {
@@ -120,7 +119,7 @@ pub(super) fn halve(line: &Line) -> [f64; TILE / 2] {
     })
 }
 
-/// The fine coefficients that draw what coarse ones do: a B-spline is a sum of four of half its size.
+/// Upsamples exactly: a quadratic B-spline is a sum of four of half its size.
 fn double(coarse: &[f64; TILE / 2]) -> Line {
     std::array::from_fn(|fine| {
         let near = coarse[fine / 2];
@@ -150,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn halving_what_was_doubled_gives_it_back() {
+    fn halve_inverts_double() {
         let coarse = std::array::from_fn(|i| Key::new(3).of(i as u64).f64() - 0.5);
         let back = halve(&double(&coarse));
         for (a, b) in coarse.iter().zip(back) {
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_field_is_whole_across_cells_halves_and_the_tile_s_edge() {
+    fn noise_is_continuous_across_cells_and_the_edge_of_the_tile() {
         for x in [0.0, 0.5, 1.0, 63.5, 64.0, -0.5] {
             let at = |x: f64| noise(Point::at([x, 0.3, 7.8]), 5);
             for (a, b) in at(x - 1e-6).into_iter().zip(at(x + 1e-6)) {

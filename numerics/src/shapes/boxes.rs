@@ -8,7 +8,7 @@ use super::{Polygons, coordinate};
 pub fn block(size: [f64; 3], n: [usize; 3]) -> Polygons {
     let mut block = Polygons::default();
     let rim = rim(n[0], n[2]);
-    let place = |column: usize, axis: usize| coordinate(size[axis], column, n[axis]);
+    let at = |column: usize, axis: usize| coordinate(size[axis], column, n[axis]);
 
     let floor = sheet(&mut block, size, n, 0);
     let mut below: Vec<usize> = rim.iter().map(|at| floor(*at)).collect();
@@ -21,7 +21,7 @@ pub fn block(size: [f64; 3], n: [usize; 3]) -> Polygons {
             above
         } else {
             let first = block.points.len();
-            block.points.extend(rim.iter().map(|[x, z]| [place(*x, 0), place(layer, 1), place(*z, 2)]));
+            block.points.extend(rim.iter().map(|[x, z]| [at(*x, 0), at(layer, 1), at(*z, 2)]));
             (first..block.points.len()).collect()
         };
         for k in 0..rim.len() {
@@ -39,7 +39,7 @@ pub fn block(size: [f64; 3], n: [usize; 3]) -> Polygons {
     block
 }
 
-/// A flat sheet in x and z at height 0, facing up, `n` quads either way. Open.
+/// A flat sheet in x and z at height 0, facing up, `n` quads along each side. Open.
 pub fn grid(size: [f64; 2], n: usize) -> Polygons {
     let mut grid = Polygons::default();
     let point = sheet(&mut grid, [size[0], 0.0, size[1]], [n, 1, n], 0);
@@ -49,7 +49,7 @@ pub fn grid(size: [f64; 2], n: usize) -> Polygons {
     grid
 }
 
-/// Adds a layer's points, x fastest; gives the point at a column and row.
+/// Adds a layer's points, x fastest; returns the index of the point at a column and row.
 fn sheet(to: &mut Polygons, size: [f64; 3], n: [usize; 3], layer: usize) -> impl Fn([usize; 2]) -> usize + use<> {
     let first = to.points.len();
     let y = coordinate(size[1], layer, n[1]);
@@ -65,7 +65,7 @@ fn cells(columns: usize, rows: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..rows).flat_map(move |z| (0..columns).map(move |x| (x, z)))
 }
 
-/// Columns and rows once round a sheet's border, counter-clockwise from above: +z side first, then +x.
+/// Columns and rows around a sheet's border, counter-clockwise from above: +z side first, then +x.
 fn rim(columns: usize, rows: usize) -> Vec<[usize; 2]> {
     let front = (0..columns).map(|x| [x, rows]);
     let right = (0..rows).map(|k| [columns, rows - k]);

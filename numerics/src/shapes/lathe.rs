@@ -1,11 +1,10 @@
-//! Shapes that a lathe turns: a profile, once round the y axis.
+//! Solids of revolution: a profile rotated about the y axis.
 //!
-//! A profile runs so that outside is on its right. Poles are single points with triangles around them, all else is
-//! quads. Promise and limit: see [`super`].
+//! Outside is on the right of a profile. Poles are single points with triangles around them; all other faces are quads. Promise and limit: see [`super`].
 
 use super::{Polygons, coordinate};
 
-/// One row of a profile: how far it is from the axis along x and along z, and its height.
+/// One point of a profile: its distances from the axis along x and z, and its height.
 #[derive(Clone, Copy)]
 struct Row {
     x: f64,
@@ -16,9 +15,9 @@ struct Row {
 /// How a profile ends.
 #[derive(Clone, Copy, PartialEq)]
 enum Ends {
-    /// On the axis: the first and last row are points.
+    /// On the axis: the first and the last row are single points.
     Poles,
-    /// Where it began.
+    /// Closed: the last row is joined to the first.
     Loop,
 }
 
@@ -51,7 +50,7 @@ pub fn capsule(size: [f64; 3], n: usize) -> Polygons {
         return sphere(size, n);
     }
     let quarter = quarter(n);
-    // The outermost rows are written as `b`: `straight + dome` may round off it.
+    // The outermost rows are exactly at `b`: `straight + dome` may round.
     let height = |cos: f64| if cos == 1.0 { b } else { straight + dome * cos };
     let lower = quarter.iter().map(|[cos, sin]| Row { x: a * sin, y: 0.0 - height(*cos), z: c * sin });
     let side = (1..n).map(|k| Row { x: a, y: coordinate(2.0 * straight, k, n), z: c });
@@ -132,7 +131,7 @@ fn halves(size: [f64; 3]) -> [f64; 3] {
     size.map(|x| 0.5 * x)
 }
 
-/// Cosine and sine from 0 to a quarter turn in `n` steps, both ends exact, each the other backwards.
+/// Cosine and sine from 0 to a quarter turn in `n` steps, exact at both ends, and each the reverse of the other.
 fn quarter(n: usize) -> Vec<[f64; 2]> {
     let sine = |k: usize| match k {
         0 => 0.0,
@@ -142,12 +141,12 @@ fn quarter(n: usize) -> Vec<[f64; 2]> {
     (0..=n).map(|k| [sine(n - k), sine(k)]).collect()
 }
 
-/// Cosine and sine once round, `n` steps a quarter, without the end that is the start.
+/// Cosine and sine of a full turn, `n` steps a quarter, without the end, which equals the start.
 fn around(n: usize) -> impl Iterator<Item = [f64; 2]> {
     let quarter = quarter(n);
     (0..4 * n).map(move |step| {
         let [cos, sin] = quarter[step % n];
-        // Less than nothing is written `0.0 - x`, which is 0, not −0, where x is 0.
+        // Negation is written `0.0 - x`, which is 0 rather than −0 where x is 0.
         match step / n {
             0 => [cos, sin],
             1 => [0.0 - sin, cos],

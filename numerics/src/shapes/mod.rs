@@ -1,11 +1,10 @@
-//! Shapes of polygons: boxes, and what a lathe turns.
+//! Polygonal shapes: boxes and solids of revolution.
 //!
-//! Every shape is centred on the origin in its bounds, y up, and all but the icosphere fill the bounds asked for to the
-//! last bit. `n` is the
-//! number of quads along an edge of a box, and along a quarter turn of anything round, so that even 1 is a solid: round
-//! shapes have vertices on both axes and are mirror symmetric to the bit. Promise: solids are closed, every edge
-//! between two faces, outward counter-clockwise. Limit: corners of round shapes lie on the true surface, so volume and
-//! area are less than its own, by a share of the order of 1 ÷ n²; a size of 0 makes faces without area.
+//! Every shape is centred on the origin, y up, and all but the icosphere have exactly the bounds asked for. `n` is the
+//! number of quads along an edge of a box, and along a quarter turn of anything round, so that even 1 gives a solid; round
+//! shapes have vertices on the axes and are exactly mirror symmetric. Promise: solids are closed, every edge belongs to two
+//! faces, faces are counter-clockwise seen from outside. Limit: corners of round shapes lie on the true surface, so volume
+//! and area are less than the true ones, by a share of order 1 ÷ n²; a size of 0 makes faces without area.
 
 mod boxes;
 mod icosphere;
@@ -15,7 +14,7 @@ pub use boxes::{block, grid};
 pub use icosphere::icosphere;
 pub use lathe::{bowl, capsule, cylinder, sphere, torus};
 
-/// Polygons as a mesh takes them.
+/// A polygon mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Polygons {
     /// Corners of each face, 3 or 4.
@@ -27,7 +26,7 @@ pub struct Polygons {
 }
 
 impl Polygons {
-    /// The faces cut into triangles, each from its first corner.
+    /// The faces as triangles, each face a fan from its first corner.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::new();
         let mut rest = &self.corners[..];
@@ -45,7 +44,7 @@ impl Polygons {
     }
 }
 
-/// The `k`th of `n` steps along an edge centred on 0: mirrored to the bit, its ends exactly half the size.
+/// The `k`th of `n` steps along an edge centred on 0: exactly symmetric, with ends at exactly half the size.
 fn coordinate(size: f64, k: usize, n: usize) -> f64 {
     let twice = 2 * k;
     if twice < n {

@@ -28,7 +28,7 @@ fn area(shape: &Polygons) -> f64 {
     triangles(shape).iter().map(|[a, b, c]| (b - a).cross(&(c - a)).norm()).sum::<f64>() / 2.0
 }
 
-/// Edges by how often they are walked one way less the other, and in all: a closed surface walks each once either way.
+/// Number of directed edges that do not have exactly one counterpart: 0 for a closed surface.
 fn open_edges(shape: &Polygons) -> usize {
     let mut walks: BTreeMap<[u32; 2], usize> = BTreeMap::new();
     let mut first = 0;
@@ -83,7 +83,7 @@ fn solids_are_closed_face_outwards_and_fill_their_bounds_exactly() {
 }
 
 #[test]
-fn no_coordinate_is_minus_zero() {
+fn no_coordinate_is_negative_zero() {
     for (name, shape, _) in solids([1.0, 2.0, 3.0], 4) {
         assert!(shape.points.as_flattened().iter().all(|x| *x != 0.0 || x.is_sign_positive()), "{name}");
     }
@@ -110,7 +110,7 @@ fn a_cylinder_is_a_prism_of_four_n_sides() {
     }
 }
 
-/// A way to make a shape, and the volume and area it approaches.
+/// A shape, and the volume and area that it approaches.
 type Limiting = (&'static str, fn(usize) -> Polygons, f64, f64);
 
 #[test]
@@ -178,7 +178,7 @@ fn a_low_torus_has_a_round_tube_and_a_high_one_keeps_its_hole() {
 }
 
 #[test]
-fn a_capsule_without_room_for_its_side_is_a_sphere() {
+fn a_capsule_too_short_for_a_side_is_a_sphere() {
     assert_eq!(capsule([1.0; 3], 4), sphere([1.0; 3], 4));
     assert_eq!(capsule([1.0, 0.5, 1.0], 4), sphere([1.0, 0.5, 1.0], 4));
     assert_eq!(open_edges(&capsule([1.0, 1.0 + 1e-12, 1.0], 3)), 0);

@@ -9,21 +9,21 @@ use rayon::prelude::*;
 /// The nearest point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
-    /// On which triangle.
+    /// Index of its triangle.
     pub triangle: u32,
-    /// Shares of its corners, ≥ 0, together 1.
+    /// Barycentric weights of its corners: ≥ 0, with sum 1.
     pub weights: [f32; 3],
-    /// Where, in metres.
+    /// Its position, metres.
     pub point: Vec3,
-    /// How far away, in metres.
+    /// Its distance, metres.
     pub distance: f32,
 }
 
-/// A box is entered unless it is farther than the nearest triangle by more than this share of the
-/// distance squared: above the rounding of both.
+/// A box is visited unless it is farther than the nearest triangle by more than this share of the squared distance, which
+/// is above the rounding of both.
 const ROUNDING: f32 = 1e-6;
 
-/// Points that a task looks from: some 30 µs of work.
+/// Query points of a task: some 30 µs of work.
 const TASK: usize = 64;
 
 kernel! {
@@ -65,9 +65,8 @@ impl TriangleTree {
         closest_point(path, self, p, reach)
     }
 
-    /// The nearest point of the surface within `reach` metres of `p`, to a few roundings of the
-    /// distance and of the triangle's size; of equally near triangles the one of lowest index. None
-    /// where `p` is not finite.
+    /// The nearest point of the surface within `reach` metres of `p`, accurate to a few ulp of the distance and of the
+    /// triangle's size; of equally near triangles the one of lowest index. `None` where `p` is not finite.
     #[inline(always)]
     pub fn closest(&self, p: Vec3, reach: f32) -> Option<Closest> {
         let top = self.levels.len().checked_sub(1)?;
@@ -103,7 +102,7 @@ impl TriangleTree {
     }
 }
 
-/// The lane of least `squares` among `lanes`, the first of equals, if it may be as near as `limit`.
+/// The lane among `lanes` with the least of `squares`, the first of equals, if it may be as near as `limit`.
 #[inline(always)]
 fn nearest(squares: &F32x16, mut lanes: u16, limit: f32) -> Option<usize> {
     let (mut least, mut at) = (limit, None);
@@ -136,7 +135,7 @@ impl Boxes {
         }
         let mut mask = 0;
         for lane in 0..LANES {
-            // A blank lane is infinitely far.
+            // An unused lane is infinitely far.
             let square = squares.0[lane];
             mask |= u16::from((square * (1.0 - ROUNDING) <= limit) & (square < f32::INFINITY)) << lane;
         }
@@ -145,7 +144,7 @@ impl Boxes {
 }
 
 impl Block {
-    /// The corners of a lane's triangle as seen from `p`.
+    /// The corners of a lane's triangle relative to `p`.
     #[inline(always)]
     pub fn around(&self, lane: usize, p: Vec3) -> [Vec3; 3] {
         let [a, b, c] = &self.corners;
@@ -188,9 +187,9 @@ impl Found {
     }
 }
 
-/// Distance squared of the origin to the nearest point of a triangle, and the weights of its second and
-/// third corner there. On the inside from the triangle's own coordinates, else the nearest of the
-/// nearest points of the three sides: right for triangles of no area too.
+/// Squared distance from the origin to the nearest point of a triangle, and the weights of its second and third corner
+/// there. From barycentric coordinates inside, else the nearest of the nearest points of the three sides, which is correct
+/// for triangles without area too.
 #[inline(always)]
 fn nearest_on(corners: [Vec3; 3]) -> (f32, f32, f32) {
     let [a, b, c] = corners;
@@ -230,7 +229,7 @@ fn between([a, b, c]: [Vec3; 3], u: f32, v: f32) -> Vec3 {
     vector::add(a, vector::add(scale(sub(b, a), u), scale(sub(c, a), v)))
 }
 
-/// How far along `side` from `start` is nearest to the origin, 0..1; 0 on a side of no length.
+/// The parameter, 0..1, of the point nearest to the origin along `side` from `start`; 0 on a side of no length.
 #[inline(always)]
 fn along(start: Vec3, side: Vec3) -> f32 {
     let square = dot(side, side);

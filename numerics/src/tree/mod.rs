@@ -1,14 +1,14 @@
-//! A 16-wide box tree over triangles, built once and refitted where points move.
+//! A 16-wide bounding volume hierarchy over triangles, built once and refitted when points move.
 //!
-//! Triangles are split at medians until sixteen are left, which become a [`Block`]; sixteen blocks are
-//! the lanes of one [`Boxes`], sixteen of those the lanes of the next, so nothing points anywhere: the
-//! children of box n are 16n…16n+15 a level down, all full but the last of a level.
+//! Triangles are split at medians down to groups of sixteen, each a [`Block`]; sixteen blocks are the lanes of one
+//! [`Boxes`], sixteen of those the lanes of the next, so no pointers are needed: the children of box n are 16n…16n+15 one
+//! level down, and all boxes but the last of a level are full.
 //!
-//! Promise: the same tree on any number of threads, and the same bits from queries on every SIMD path;
-//! no triangle that a query's own box meets is missed. Queries are inlined, so inside a `kernel!` they
-//! run its vectors; there, go through blocks by [`TriangleTree::walk`]. Triangles without area are kept as the segments or points they are; one with a
-//! corner that is not finite is left out until a refit makes it finite. Limit: [`TriangleTree::closest`] takes
-//! fourth powers of lengths as they come, in f32, so edges and distances should lie between 1e-9 and 1e9.
+//! Promise: the same tree on any number of threads, and the same bits from queries on every SIMD path; a query misses no
+//! triangle whose box it meets. Queries are inlined, so inside a `kernel!` they use its vectors; iterate blocks by
+//! [`TriangleTree::walk`] there. Triangles without area are kept as segments or points; a triangle with a corner that is
+//! not finite is left out until a refit makes it finite. Limit: [`TriangleTree::closest`] computes fourth powers of
+//! lengths in f32, so edges and distances should lie between 1e-9 and 1e9.
 
 mod closest;
 mod split;
@@ -23,17 +23,17 @@ pub use visit::{Cuboid, Region, Walk};
 /// The index of a lane that holds no triangle.
 pub const NONE: u32 = u32::MAX;
 
-/// Sixteen triangles side by side, by corner and axis; a blank lane repeats the block's first triangle
-/// with index [`NONE`].
+/// Sixteen triangles side by side, by corner and axis; an unused lane repeats the block's first triangle with index
+/// [`NONE`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
     /// The corners, in metres.
     pub corners: [Lanes<3>; 3],
-    /// Which triangle each lane is, rising.
+    /// Index of each lane's triangle, ascending.
     pub triangle: [u32; LANES],
 }
 
-/// Sixteen boxes side by side; a blank lane is an empty box (low +inf, high −inf), which meets nothing.
+/// Sixteen boxes side by side; an unused lane is an empty box (low +inf, high −inf), which meets nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Boxes {
     /// The least of each coordinate.
@@ -45,10 +45,10 @@ pub struct Boxes {
 const EMPTY_LOW: Vec3 = [f32::INFINITY; 3];
 const EMPTY_HIGH: Vec3 = [f32::NEG_INFINITY; 3];
 
-/// Levels of boxes that 2³² triangles need, at most.
+/// Levels of boxes that 2³² triangles need.
 const MOST_LEVELS: usize = 8;
 
-/// Blocks, or boxes, that a task refits at least: some 20 µs of work.
+/// Blocks or boxes that a task refits at least: some 20 µs of work.
 const TASK: usize = 64;
 
 /// The tree. A default one is empty.
@@ -57,12 +57,11 @@ pub struct TriangleTree {
     /// Points and index of the triangle of each lane of each block.
     members: Vec<Member>,
     blocks: Vec<Block>,
-    /// `levels[0]` has a lane a block, every other a lane for each box of the one before; the last has
-    /// one box.
+    /// `levels[0]` has a lane a block, every other level a lane for each box of the previous one; the last has one box.
     levels: Vec<Vec<Boxes>>,
 }
 
-/// A triangle as it came in.
+/// An input triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Member {
     points: [u32; 3],
@@ -82,7 +81,7 @@ impl TriangleTree {
         tree
     }
 
-    /// A tree over the same triangles, in the same order, where `points` are now.
+    /// A tree over the same triangles, in the same order, at the positions `points`.
     ///
     /// # Panics
     /// As [`TriangleTree::refit`].
@@ -93,7 +92,7 @@ impl TriangleTree {
         tree
     }
 
-    /// Moves the triangles to where `points` are now; their order in the tree stays as it was built.
+    /// Moves the triangles to the positions `points`; their order in the tree stays.
     ///
     /// # Panics
     /// Where there are fewer points than the tree was built on.
@@ -132,7 +131,7 @@ impl TriangleTree {
         self.levels.last().map_or((EMPTY_LOW, EMPTY_HIGH), |top| top[0].bounds())
     }
 
-    /// All blocks. One whose triangles are all left out has no triangle on any lane.
+    /// All blocks. A block may have no triangle, where all of its triangles are left out.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
@@ -163,7 +162,7 @@ impl Block {
         block
     }
 
-    /// Lowest and highest corner of the triangles: empty where there is none.
+    /// Lowest and highest corner of the triangles: those of an empty box where there is none.
     fn bounds(&self) -> (Vec3, Vec3) {
         if self.triangle == [NONE; LANES] {
             return (EMPTY_LOW, EMPTY_HIGH);
@@ -172,7 +171,7 @@ impl Block {
         boxes.bounds()
     }
 
-    /// The box of each lane's triangle; a blank lane has that of the one it repeats.
+    /// The box of each lane's triangle; an unused lane has that of the triangle it repeats.
     #[inline(always)]
     pub fn boxes(&self) -> Boxes {
         let [a, b, c] = &self.corners;
@@ -183,7 +182,7 @@ impl Block {
 }
 
 impl Boxes {
-    /// The boxes of up to sixteen things.
+    /// The boxes of up to sixteen items.
     fn around<T>(things: &[T], bounds: impl Fn(&T) -> (Vec3, Vec3)) -> Self {
         let mut boxes = Self { low: EMPTY_LOW.map(F32x16::splat), high: EMPTY_HIGH.map(F32x16::splat) };
         for (lane, thing) in things.iter().enumerate() {
@@ -202,13 +201,13 @@ impl Boxes {
     }
 }
 
-/// The lesser; `b` where one is no number.
+/// The lesser; `b` where one is NaN.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The larger; `b` where one is no number.
+/// The larger; `b` where one is NaN.
 #[inline(always)]
 fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }

@@ -1,20 +1,19 @@
-//! In which order the triangles lie in the tree: sixteen after sixteen that are close together.
+//! The order of the triangles in the tree: runs of sixteen that are close together.
 
 use super::{LANES, least, most};
 use crate::vector::Vec3;
 
-/// Triangles below which a half is not worth handing to another thread.
+/// Below this number of triangles a half is not worth a task of its own.
 const TASK: usize = 1024;
 
-/// A triangle by the middle of its box: as whole numbers that order like the coordinates do, so that a
-/// comparison is one of integers. One that is not finite comes last.
+/// A triangle by the centre of its box, as integers that order like the coordinates. One that is not finite comes last.
 #[derive(Clone, Copy)]
 struct Item {
     middle: [u32; 3],
     triangle: u32,
 }
 
-/// The triangles' indices; sixteen that follow each other are a block, and so on up the tree.
+/// The triangles' indices; each run of sixteen is a block, and so on up the tree.
 pub(super) fn order(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     assert!(triangles.len() < u32::MAX as usize, "{} triangles are too many", triangles.len());
     let item = |(triangle, corners): (usize, &[u32; 3])| {
@@ -45,7 +44,7 @@ fn split(items: &mut [Item]) {
     halve(items, child);
 }
 
-/// Orders the triangles of some lanes of a box; each lane but the last has `child` of them.
+/// Orders the triangles of some lanes of a box; each lane but the last has `child` triangles.
 fn halve(items: &mut [Item], child: usize) {
     let lanes = items.len().div_ceil(child);
     if lanes <= 1 {
@@ -64,7 +63,7 @@ fn halve(items: &mut [Item], child: usize) {
     }
 }
 
-/// The axis along which the middles lie farthest apart.
+/// The axis along which the centres extend farthest.
 fn longest(items: &[Item]) -> usize {
     let (mut low, mut high) = ([u32::MAX; 3], [0; 3]);
     for item in items {
@@ -85,13 +84,13 @@ fn longest(items: &[Item]) -> usize {
     }
 }
 
-/// A whole number that orders as the finite `x` does.
+/// An integer that orders like the finite `x`.
 fn rank(x: f32) -> u32 {
     let bits = x.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// The number of a rank.
+/// The inverse of [`rank`].
 fn value(rank: u32) -> f32 {
     f32::from_bits(if rank >> 31 == 1 { rank & !(1 << 31) } else { !rank })
 }
@@ -101,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranks_order_as_their_numbers_and_lead_back_to_them() {
+    fn ranks_order_like_their_numbers_and_have_an_inverse() {
         let rising = [f32::MIN, -1.5, -1e-40, 0.0, 1e-40, 2.0, f32::MAX];
         assert!(rising.windows(2).all(|pair| rank(pair[0]) < rank(pair[1])));
         assert!(rising.iter().all(|x| value(rank(*x)).to_bits() == x.to_bits()));

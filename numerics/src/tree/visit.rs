@@ -1,17 +1,16 @@
-//! Which blocks a part of space meets.
+//! Which blocks a region of space meets.
 
 use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
 use crate::vector::Vec3;
 
-/// A part of space that asks which boxes it meets.
+/// A region of space that finds which boxes it meets.
 pub trait Region {
-    /// A bit for each lane whose box has a part in the region, or more; none for blank lanes. To be
-    /// `#[inline(always)]`, and so without closures, where a kernel walks by it.
+    /// A bit for each lane whose box meets the region; extra bits are allowed, except for unused lanes. For use in kernels
+    /// it must be `#[inline(always)]` and without closures.
     fn meeting(&self, boxes: &Boxes) -> u16;
 }
 
-/// A box, its faces included; a point or a piece of an axis where it has no width. One with a
-/// coordinate that is no number meets nothing.
+/// A box, its faces included; it may be a point or a segment along an axis. One with a NaN coordinate meets nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     /// The least of each coordinate.
@@ -37,11 +36,10 @@ impl Region for Cuboid {
 }
 
 impl TriangleTree {
-    /// The places in [`TriangleTree::blocks`] of all blocks that have a triangle whose box meets `region`,
-    /// rising, each with a bit for each lane of such a triangle.
+    /// The indices in [`TriangleTree::blocks`] of all blocks that have a triangle whose box meets `region`, ascending, each
+    /// with a bit for each lane of such a triangle.
     ///
-    /// In a kernel this, rather than a visit with a closure: what closures do is not compiled for the
-    /// kernel's path.
+    /// In a kernel use this rather than a visit with a closure: closures are not compiled for the kernel's path.
     #[inline(always)]
     pub fn walk<R: Region>(&self, region: R) -> Walk<'_, R> {
         let top = self.levels.len();
@@ -67,15 +65,15 @@ impl TriangleTree {
 pub struct Walk<'a, R> {
     tree: &'a TriangleTree,
     region: R,
-    /// At each level the box that is open, and its lanes still to be entered.
+    /// At each level the current box, and its lanes still to be visited.
     open: [usize; MOST_LEVELS],
     lanes: [u16; MOST_LEVELS],
-    /// Where it is; above the last at the end.
+    /// The current level; above the last one at the end.
     level: usize,
 }
 
 impl<R> Walk<'_, R> {
-    /// The region, which may shrink on the way.
+    /// The region, which may shrink during the walk.
     #[inline(always)]
     pub fn region(&mut self) -> &mut R {
         &mut self.region
