@@ -71,27 +71,4 @@ impl Unit {
             Self::Joules => "J",
         }
     }
-
-    /// Power of length in the unit: what a number is multiplied by when the scene is scaled is scale to this power
-    /// (kilograms and seconds kept).
-    pub fn length_power(self) -> i32 {
-        match self {
-            Self::Metres | Self::MetresPerSecond | Self::MetresPerSecondSquared => 1,
-            Self::CubicMetresPerSecond => 3,
-            Self::Joules => 2,
-            Self::PerMetre | Self::Pascal | Self::PascalSeconds => -1,
-            Self::PerSquareMetre => -2,
-            Self::KilogramsPerCubicMetre => -3,
-            Self::None
-            | Self::Seconds
-            | Self::Frames
-            | Self::Frame
-            | Self::Degrees
-            | Self::Radians
-            | Self::PerSecond
-            | Self::PerSecondSquared
-            | Self::Hertz
-            | Self::NewtonsPerMetre => 0,
-        }
-    }
 }
