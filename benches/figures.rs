@@ -1,7 +1,7 @@
 //! The README's figures: `cargo bench --bench figures`.
 //!
-//! Each figure is the least of several runs, interleaved with a fixed calibration loop; the ratio to that loop is what
-//! can be compared between machines and days.
+//! Each figure is the minimum of several runs, interleaved with a fixed calibration loop; ratios to that loop can be
+//! compared between machines and days.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -80,7 +80,7 @@ const CURVES: Input = Input::one("curves", Kind::Curves, "Curves.");
 const SHIFT: Param<f64> = Param::double("shift", 0.0, "Does nothing.");
 const OUT: Output = Output::like("curves", &CURVES, "The curves.");
 
-/// Reads the clock, and hands on what it got.
+/// Depends on the frame; passes its input on.
 static TRIVIAL: Node = Node::new(
     "Trivial",
     1,

@@ -1,4 +1,4 @@
-//! What the engine itself costs: nodes that do nothing, a thousand frames of them, and the time a node and frame takes.
+//! Overhead of the engine: the time per node and frame of a chain of nodes that do nothing.
 //!
 //! `cargo bench --bench overhead -- [NODES] [FRAMES] [THREADS]`
 
@@ -23,7 +23,7 @@ static SOURCE: Node = Node::new(
 )
 .outputs(&[&MADE]);
 
-/// Looks at the clock, and hands on what it got.
+/// Depends on the frame; passes its input on.
 static FRAME: Node = Node::new(
     "Frame",
     1,
@@ -47,7 +47,7 @@ impl Chain for Nothing {
     }
 }
 
-/// Looks back eight frames, and hands on what it got.
+/// Reads eight past frames; passes its input on.
 static WINDOW: Node = Node::new("Window", 1, "Hands points on.", Cook::window::<Nothing>(|_, _| Past::frames(8)))
     .inputs(&[&POINTS])
     .outputs(&[&OUT]);
@@ -67,7 +67,7 @@ fn graph(node: &'static Node, count: usize, frames: i64) -> Graph {
     Graph { scene: Scene { last: frames, ..Scene::default() }, nodes, outputs, ..Graph::default() }
 }
 
-/// Microseconds a node and frame.
+/// Microseconds per node and frame.
 fn cost(node: &'static Node, count: usize, frames: i64, threads: usize) -> Result<f64, String> {
     let graph = graph(node, count, frames);
     let engine = Engine::new(&Settings { threads, ..Settings::default() })?;

@@ -1,4 +1,4 @@
-//! What the wind chain costs: `cargo bench --bench wind`.
+//! Times of the wind chain: `cargo bench --bench wind`.
 //!
 //! Chains of Curve_Wind_Shielding, Curve_Wind_Gusts, Curve_Wind, Curve_Jiggle and Curve_Wind_Collision, on upright fur
 //! on a sphere of 20,480 triangles and on the bear of `graphs/`; frames in order, no cache, nothing written. Then
@@ -29,15 +29,15 @@ const ROUNDS: usize = 5;
 /// Of the fur on the unit sphere.
 const LENGTH: f64 = 0.1;
 
-/// What of the chain is there.
+/// Which nodes the chain has.
 #[derive(Clone, Copy)]
 struct Chain<'p> {
     name: &'p str,
-    /// The params of shelter, if there is any.
+    /// Params of shielding, if the chain has it.
     shielding: Option<&'p str>,
-    /// Whether the wind turns, so that shelter is looked for anew at every frame.
+    /// Whether the wind turns, so that shielding is computed at every frame.
     turns: bool,
-    /// The params of collision, if there is any.
+    /// Params of collision, if the chain has it.
     collision: Option<&'p str>,
 }
 
@@ -48,10 +48,10 @@ const SMOOTH: Chain<'_> =
 const NO_COLLISION: Chain<'_> = Chain { name: "no collision", collision: None, ..FULL };
 const NO_COLLIDERS: Chain<'_> = Chain { name: "gusts + wind + jiggle", shielding: None, ..NO_COLLISION };
 
-/// What it blows on.
+/// The curves.
 #[derive(Clone, Copy)]
 enum Fur {
-    /// That many curves of that many CVs on a sphere.
+    /// Number of curves and CVs per curve, on a sphere.
     Sphere(usize, usize),
     Bear,
 }
@@ -83,7 +83,7 @@ fn main() {
         for (curves, cvs, graph) in &larger {
             figures.add(format!("full chain, {curves} × {cvs}"), 6, cook(&two, graph, 1..=6).cooking);
         }
-        // What the first frame finds out once is in all of them, so they are of as many frames.
+        // The first frame builds what later ones reuse, so runs that are compared have the same number of frames.
         figures.add("full chain, 10,000 × 5, the first 6 frames", 6, cook(&two, &small[0].1, 1..=6).cooking);
         let report = cook(&two, &largest, 1..=6);
         figures.add("full chain, 1,000,000 × 5", 6, report.cooking);
@@ -97,7 +97,7 @@ fn main() {
     work_and_precision(&one);
 }
 
-/// Where tips are in frames 1…4, and the milliseconds that collision took of one.
+/// Tips at frames 1…4, and milliseconds of collision per frame.
 fn tips(engine: &Engine, collision: Option<&str>) -> (Vec<[f32; 3]>, f64) {
     let graph = graph(Chain { name: "", shielding: None, turns: true, collision }, Fur::Sphere(10_000, 5), 4);
     let (mut tips, mut least) = (Vec::new(), f64::INFINITY);
@@ -116,7 +116,7 @@ fn tips(engine: &Engine, collision: Option<&str>) -> (Vec<[f32; 3]>, f64) {
     (tips, least)
 }
 
-/// Error of tips ÷ length, against first contact without a gap, of the curves that meet something.
+/// Error of tips ÷ length against exact first contact without a gap, for the curves that touch something.
 fn work_and_precision(engine: &Engine) {
     let (free, _) = tips(engine, None);
     let (reference, _) = tips(engine, Some(r#""gap": 0"#));
@@ -170,7 +170,7 @@ fn cook_into(
     report
 }
 
-/// A chain on fur; the wind turns where shielding is to be looked for anew.
+/// A chain on fur.
 fn graph(chain: Chain<'_>, fur: Fur, last: i64) -> Graph {
     let mut nodes = String::from(
         r#""fur": { "type": "Curve_In", "params": { "file": "../assets/fur_bear_10k_curves.obj" } },
@@ -211,7 +211,7 @@ fn graph(chain: Chain<'_>, fur: Fur, last: i64) -> Graph {
     graph
 }
 
-/// Puts a geometry in a node's place.
+/// Replaces a node by a geometry.
 fn give(graph: &mut Graph, id: &str, geometry: Geometry) {
     let node = graph.nodes.iter_mut().find(|node| &*node.id == id).expect("a node");
     node.body = Body::Given { at: Arc::new(move |_| geometry.clone()), moves: false };

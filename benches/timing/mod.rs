@@ -1,4 +1,4 @@
-//! Least times of interleaved runs, and their ratio to a fixed loop: what can be compared between machines and days.
+//! Minimum times of interleaved runs, and their ratios to a fixed loop, which can be compared between machines and days.
 
 #![allow(dead_code, reason = "each bench uses part of it")]
 
@@ -7,7 +7,7 @@ use std::time::Duration;
 use engine::clock::Stopwatch;
 use engine::cook::Engine;
 
-/// Threads and instructions that times were taken with.
+/// Prints the number of threads and the SIMD path.
 pub(crate) fn print_machine(engine: &Engine) {
     println!("{} threads, SIMD path {}", engine.threads(), numerics::simd::Path::chosen().name());
 }

@@ -1,4 +1,4 @@
-//! What the expression language promises of any text.
+//! Guarantees of the expression language for arbitrary text.
 
 use engine::expr::{Env, Expr, ExprError, Program, Scope, Uses, Width};
 use engine::geometry::Column;
@@ -14,8 +14,8 @@ const ROWS: [usize; 3] = [0, 3, 70];
 /// Evaluates `text` as an expression and runs it as a program.
 ///
 /// # Panics
-/// Where a fault has no place in the text, a value hangs on what its text does not use, or a program gives attributes
-/// other than those it promises.
+/// If a fault has no position in the text, a value depends on something its text does not use, or a program writes other
+/// attributes than it declares.
 pub(crate) fn check(text: &str) {
     match Expr::parse(text, &SCOPE) {
         Ok(expr) => check_expr(&expr),
@@ -57,7 +57,7 @@ fn check_expr(expr: &Expr) {
     }
 }
 
-/// Columns of every type, with what is largest and smallest in them.
+/// Columns of every type, with the largest and smallest numbers.
 fn columns(rows: usize) -> Vec<(&'static str, Column)> {
     const SINGLE: [f32; 7] = [0.0, 1.0, -0.0, f32::MAX, f32::MIN_POSITIVE, -0.75, f32::MIN];
     const WHOLE: [i32; 5] = [0, i32::MAX, -1, i32::MIN, 3];

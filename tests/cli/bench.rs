@@ -25,7 +25,7 @@ pub(crate) const GRAPH: &str = r#"// grass.json
 }
 "#;
 
-/// A wind that turns round through nothing at frame 2; its output `still` does not mind.
+/// The wind's direction is zero at frame 2, which fails; the output `still` does not depend on it.
 pub(crate) const CALM_AT_2: &str = r#"{
   "convect": 1,
   "scene": { "frames": [1, 3] },
@@ -114,7 +114,7 @@ impl Bench {
     }
 }
 
-/// Names in a folder, hidden ones too, in order; none where there is no folder.
+/// Names in a folder, sorted, with hidden ones; empty where there is no folder.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -125,7 +125,7 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
 /// How a run ended.
 #[derive(Debug)]
 pub(crate) struct Ran {
-    /// `None` where a signal ended it.
+    /// `None` if a signal ended the process.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
     pub(crate) stderr: String,

@@ -46,7 +46,7 @@ fn faults_as_json_go_to_stdout_alone() {
 }
 
 #[test]
-fn a_plan_says_how_often_each_node_cooks_and_what_is_left_out() {
+fn explain_shows_how_often_each_node_cooks_and_what_is_left_out() {
     let bench = Bench::new();
     let text = bench.done(&["explain", "g.json", "--output", "still"]);
     assert!(text.contains("no requested output depends on it"), "{text}");
@@ -59,7 +59,7 @@ fn a_plan_says_how_often_each_node_cooks_and_what_is_left_out() {
 }
 
 #[test]
-fn a_plan_says_how_far_back_a_window_looks_and_what_that_costs() {
+fn explain_shows_how_far_back_a_window_reads_and_its_cost() {
     let bench = Bench::with_graph(
         r#"{ "convect": 1, "scene": { "frames": [1, 96] },
              "nodes": {
@@ -84,7 +84,7 @@ fn the_schema_is_json_that_names_every_node() {
 }
 
 #[test]
-fn completions_are_there_for_every_shell() {
+fn every_shell_has_completions() {
     let bench = Bench::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let text = bench.done(&["completions", shell]);
@@ -93,7 +93,7 @@ fn completions_are_there_for_every_shell() {
 }
 
 #[test]
-fn help_and_version_are_answers() {
+fn help_and_version_exit_with_0() {
     let bench = Bench::new();
     let help = bench.done(&["--help"]);
     for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "schema", "completions"] {

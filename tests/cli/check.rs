@@ -17,7 +17,7 @@ fn said(kind: &str, params: &str) -> (Option<i32>, String) {
 }
 
 #[test]
-fn geometry_written_into_the_graph_is_looked_at() {
+fn geometry_written_into_the_graph_is_checked() {
     let curve = r#""points": [[0, 0, 0], [0, 1, 0]]"#;
     let square = r#""points": [[0, 0, 0], [1, 0, 0], [1, 0, 1]]"#;
     let tet = r#""points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"#;
@@ -84,7 +84,7 @@ fn a_gap_in_a_sequence_is_found_before_anything_cooks() {
 }
 
 #[test]
-fn params_that_leave_their_range_on_the_way_are_found() {
+fn params_that_leave_their_range_at_some_frame_are_found() {
     let bench = Bench::with_graph(CALM_AT_2);
     let ran = check(&bench);
     let expected = "g.json:8:31: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction, \
@@ -105,7 +105,7 @@ fn params_that_leave_their_range_on_the_way_are_found() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_no_file_is_refused_without_waiting() {
+fn pipes_and_devices_are_refused_without_waiting() {
     let bench = Bench::new();
     let made = std::process::Command::new("mkfifo").arg(bench.path("pipe")).status();
     if !made.is_ok_and(|status| status.success()) {
@@ -126,7 +126,7 @@ fn what_is_no_file_is_refused_without_waiting() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_graph_may_come_from_stdin_and_its_paths_start_where_the_program_does() {
+fn a_graph_from_stdin_has_paths_relative_to_the_working_directory() {
     let bench = Bench::new();
     let graph = std::fs::File::open(bench.path("g.json")).unwrap();
     let output = bench.command(&["check", "/dev/stdin"]).stdin(graph).output().unwrap();
@@ -134,7 +134,7 @@ fn a_graph_may_come_from_stdin_and_its_paths_start_where_the_program_does() {
 }
 
 #[test]
-fn a_packed_graph_is_called_so() {
+fn a_compressed_graph_is_recognised_and_refused() {
     let bench = Bench::new();
     std::fs::write(bench.path("g.json"), b"\x1f\x8b\x08\0\0\0\0\0\0\x03").unwrap();
     assert_eq!(check(&bench).stderr, "g.json:1:1: the file looks like gzip, expected a text; unpack it first\n");

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::bench::Bench;
 
 #[test]
-fn a_geometry_comes_back_through_every_format_that_is_read() {
+fn geometry_survives_a_round_trip_through_every_readable_format() {
     let bench = Bench::new();
     for (from, to) in [("grass.obj", "a.ply"), ("a.ply", "b.json"), ("b.json", "c.obj")] {
         let ran = bench.run(&["convert", from, to]);
@@ -16,7 +16,7 @@ fn a_geometry_comes_back_through_every_format_that_is_read() {
 }
 
 #[test]
-fn what_a_format_drops_is_told() {
+fn what_a_format_drops_is_noted() {
     let bench = Bench::new();
     bench.write("a.json", r#"{"points": {"points": [[0, 0, 0]], "point_attributes": {"heat": [1.5]}}}"#);
     let ran = bench.run(&["convert", "a.json", "a.obj"]);
@@ -75,7 +75,7 @@ fn a_sequence_becomes_one_file_or_a_file_a_frame() {
 }
 
 #[test]
-fn a_sequence_that_has_no_place_or_is_not_there_is_refused() {
+fn a_sequence_without_a_valid_target_or_files_is_refused() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
     let ran = bench.run(&["convert", "out/grass.####.json", "all.ply"]);
@@ -91,7 +91,7 @@ fn a_sequence_that_has_no_place_or_is_not_there_is_refused() {
 }
 
 #[test]
-fn lengths_are_scaled() {
+fn conversion_scales_lengths() {
     let bench = Bench::new();
     bench.write(
         "a.json",

@@ -124,7 +124,7 @@ fn files_that_were_there_are_replaced() {
 }
 
 #[test]
-fn code_reads_the_controls_and_its_faults_stand_where_they_are() {
+fn code_reads_controls_and_its_faults_have_line_and_column() {
     let graph = r#"{
   "convect": 1,
   "scene": { "frames": [1, 3] },

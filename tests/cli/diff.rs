@@ -31,7 +31,7 @@ fn a_geometry_is_the_same_as_itself_in_any_format_that_holds_it() {
 }
 
 #[test]
-fn what_differs_is_counted_measured_and_placed() {
+fn differences_are_counted_measured_and_located() {
     let bench = bench();
     let line = "points: `P`: 1 of 6 numbers differ, by at most 0.5 (point 1) and 0.0833333 on average; \
                 the first is point 1[1]: 2.0 and 2.5\ndifferent\n";
@@ -49,7 +49,7 @@ fn what_differs_is_counted_measured_and_placed() {
 }
 
 #[test]
-fn a_tolerance_passes_what_is_within_and_still_says_how_far() {
+fn differences_within_the_tolerance_pass_and_are_still_reported() {
     let bench = bench();
     let same = "the same within 0.5; `P` of points is 0.5 apart\n";
     assert_eq!(ran(&bench, &["a.json", "b.json", "--tolerance", "0.5"]), (Some(0), same.into()));
@@ -59,7 +59,7 @@ fn a_tolerance_passes_what_is_within_and_still_says_how_far() {
 }
 
 #[test]
-fn counts_components_and_attributes_of_one_side_are_told() {
+fn counts_components_and_attributes_of_one_side_are_reported() {
     let bench = bench();
     bench.write(
         "c.json",
@@ -93,7 +93,7 @@ fn two_cooks_are_compared_frame_by_frame_whatever_their_format() {
 }
 
 #[test]
-fn trouble_is_2() {
+fn errors_of_diff_exit_with_2() {
     let bench = bench();
     bench.write("broken.obj", "v 0 0\n");
     for args in [["a.json", "missing.json"], ["broken.obj", "a.json"], ["a.json", "."], ["a.txt", "a.json"]] {

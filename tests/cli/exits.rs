@@ -16,7 +16,7 @@ const CURVE: &str = r#""a": {"type": "Curve_In", "params": {"points": [[0, 0, 0]
 const MISSING: &str = r#""a": {"type": "Curve_In", "params": {"file": "missing.obj"}}"#;
 
 #[test]
-fn a_graph_that_cannot_be_opened_is_1_and_one_that_cannot_be_parsed_3() {
+fn an_unreadable_graph_exits_with_1_and_an_unparsable_one_with_3() {
     for verb in ["cook", "check", "explain"] {
         assert_eq!(code("", &[verb, "missing.json"]), Some(1), "{verb}");
         assert_eq!(code("", &[verb, "."]), Some(1), "{verb} of a folder");
@@ -26,7 +26,7 @@ fn a_graph_that_cannot_be_opened_is_1_and_one_that_cannot_be_parsed_3() {
 }
 
 #[test]
-fn a_wrong_command_line_is_2() {
+fn a_wrong_command_line_exits_with_2() {
     let graph = graph(CURVE);
     for args in [
         &["cook"][..],
@@ -50,14 +50,14 @@ fn a_wrong_command_line_is_2() {
 }
 
 #[test]
-fn an_unknown_simd_path_is_2() {
+fn an_unknown_simd_path_exits_with_2() {
     let bench = Bench::new();
     let output = bench.command(&["cook", "g.json"]).env("CONVECT_SIMD", "mmx").output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }
 
 #[test]
-fn a_graph_that_is_wrong_is_3() {
+fn an_invalid_graph_exits_with_3() {
     for nodes in [
         r#""a": {"type": "Curve_Inn"}"#,
         r#""a": {"type": "Curve_Wind"}"#,
@@ -72,7 +72,7 @@ fn a_graph_that_is_wrong_is_3() {
 }
 
 #[test]
-fn a_format_that_cannot_hold_an_output_is_3_before_anything_is_cooked() {
+fn a_format_that_cannot_hold_an_output_exits_with_3_before_cooking() {
     let tets = r#""a": {"type": "Tet_In", "params": {
         "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "tets": [[0, 1, 2, 3]]}}"#;
     let bench = Bench::with_graph(&graph(tets));
@@ -82,7 +82,7 @@ fn a_format_that_cannot_hold_an_output_is_3_before_anything_is_cooked() {
 }
 
 #[test]
-fn a_file_of_the_graph_that_is_missing_or_broken_is_1() {
+fn a_missing_or_broken_input_file_exits_with_1() {
     assert_eq!(code(&graph(MISSING), &["cook", "g.json"]), Some(1));
     for obj in ["v 0 nan 0\nl 1 1\n", "v 0 0 0\nl 1 9999999999\n", "f 1 2 3\n", "\0\u{1}\u{2}", ""] {
         let bench = Bench::with_graph(&graph(&MISSING.replace("missing", "hostile")));
@@ -93,7 +93,7 @@ fn a_file_of_the_graph_that_is_missing_or_broken_is_1() {
 }
 
 #[test]
-fn of_two_classes_the_lowest_is_told() {
+fn of_two_classes_of_faults_the_lowest_exit_code_is_used() {
     let both = format!(r#"{MISSING}, "b": {{"type": "Curve_Inn"}}"#);
     let ran = Bench::with_graph(&graph(&both)).run(&["check", "g.json"]);
     assert_eq!(ran.code, Some(1));
@@ -101,7 +101,7 @@ fn of_two_classes_the_lowest_is_told() {
 }
 
 #[test]
-fn a_node_that_fails_at_a_frame_is_4_and_spoils_only_its_output() {
+fn a_node_that_fails_at_a_frame_exits_with_4_and_affects_only_its_output() {
     let bench = Bench::with_graph(CALM_AT_2);
     let ran = bench.run(&["cook", "g.json", "--format", "json"]);
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
@@ -117,7 +117,7 @@ fn a_node_that_fails_at_a_frame_is_4_and_spoils_only_its_output() {
 }
 
 #[test]
-fn what_cannot_be_written_is_1() {
+fn an_output_that_cannot_be_written_exits_with_1() {
     let graph = graph(CURVE);
     let bench = Bench::with_graph(&graph);
     bench.write("file", "");
@@ -139,7 +139,7 @@ fn what_cannot_be_written_is_1() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_without_permission_is_1() {
+fn a_folder_without_permission_exits_with_1() {
     use std::os::unix::fs::PermissionsExt;
     let bench = Bench::new();
     fs::create_dir(bench.path("locked")).unwrap();
@@ -155,7 +155,7 @@ fn a_folder_without_permission_is_1() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_stdout_that_is_full_is_1() {
+fn a_full_stdout_exits_with_1() {
     let bench = Bench::new();
     for args in [&["nodes"][..], &["explain", "g.json"], &["stats", "grass.obj"], &["completions", "bash"]] {
         let full = fs::File::options().write(true).open("/dev/full").unwrap();
@@ -167,7 +167,7 @@ fn a_stdout_that_is_full_is_1() {
 }
 
 #[test]
-fn what_the_graph_reads_is_never_written_over() {
+fn input_files_are_never_overwritten() {
     let bench = Bench::new();
     bench.write("hair.0001.obj", "v 0 0 0\nv 0 1 0\nl 1 2\n");
     let graph = r#"{"convect": 1, "nodes": {"c": {"type": "Curve_In", "params": {"file": "hair.####.obj"}}}, "outputs": {"hair": "c"}}"#;
@@ -185,7 +185,7 @@ fn what_the_graph_reads_is_never_written_over() {
 }
 
 #[test]
-fn nobody_listening_on_stderr_changes_no_exit_code() {
+fn a_closed_stderr_changes_no_exit_code() {
     let bench = Bench::new();
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
     let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_convect"));
@@ -194,7 +194,7 @@ fn nobody_listening_on_stderr_changes_no_exit_code() {
 }
 
 #[test]
-fn more_threads_than_any_machine_has_are_a_wrong_command_line() {
+fn an_absurd_number_of_threads_is_a_wrong_command_line() {
     let bench = Bench::new();
     let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_convect"));
     let ended = program.current_dir(bench.path("")).args(["cook", "g.json", "--threads", "100000"]).output().unwrap();

@@ -11,14 +11,14 @@ fn stderr(graph: &str, args: &[&str]) -> String {
 }
 
 #[test]
-fn a_file_that_ends_too_early_says_where_it_was_open() {
+fn the_message_for_a_truncated_file_says_what_was_left_open() {
     let expected =
         "g.json:1:26: the file ends inside the object that opens on line 1, column 25; is the rest missing?\n";
     assert_eq!(stderr(r#"{"convect": 1, "nodes": {"#, &["check", "g.json"]), expected);
 }
 
 #[test]
-fn all_faults_are_told_at_once_each_with_place_and_hint() {
+fn all_faults_are_reported_at_once_each_with_position_and_hint() {
     let graph = r#"{
   "convect": 1,
   "nodes": {
@@ -41,7 +41,7 @@ g.json:8:21: outputs.o: there is no node `wnd`; did you mean `wind`?
 }
 
 #[test]
-fn a_circle_is_told_node_by_node() {
+fn a_cycle_is_reported_node_by_node() {
     let graph = r#"{"convect": 1, "nodes": {
   "a": {"type": "Curve_Wind", "inputs": {"curves": "b"}}, "b": {"type": "Curve_Wind", "inputs": {"curves": "a"}}},
   "outputs": {"o": "a"}}"#;
@@ -51,7 +51,7 @@ fn a_circle_is_told_node_by_node() {
 }
 
 #[test]
-fn a_broken_file_is_told_with_its_line() {
+fn a_broken_file_is_reported_with_its_line() {
     let bench = Bench::new();
     bench.write("grass.obj", "v 0 0 0\nv 0 nan 0\n");
     let expected = "g.json:7:57: nodes.blades.params.file: `grass.obj`: line 2: `nan` is not a finite number\n";
@@ -59,7 +59,7 @@ fn a_broken_file_is_told_with_its_line() {
 }
 
 #[test]
-fn a_node_that_fails_is_told_with_its_frame_and_what_became_of_its_output() {
+fn a_failed_node_is_reported_with_its_frame_and_its_output() {
     let expected = "`wind` (Curve_Wind) at frame 2: `wind_dir` is [0, 0, 0], which has no direction; \
                     give a vector that is not zero, such as [1, 0, 0]\n";
     let cook = |format| stderr(CALM_AT_2, &["cook", "g.json", "-q", "--format", format]);
@@ -68,7 +68,7 @@ fn a_node_that_fails_is_told_with_its_frame_and_what_became_of_its_output() {
 }
 
 #[test]
-fn a_set_that_is_wrong_is_told_by_its_key() {
+fn a_wrong_set_is_reported_by_its_key() {
     let graph = crate::bench::GRAPH;
     assert_eq!(
         stderr(graph, &["cook", "g.json", "--set", "wind.nois=1"]),
@@ -82,7 +82,7 @@ fn a_set_that_is_wrong_is_told_by_its_key() {
 }
 
 #[test]
-fn what_is_in_the_way_of_a_file_is_told() {
+fn an_obstacle_to_writing_a_file_is_reported() {
     let graph = crate::bench::GRAPH;
     assert_eq!(stderr(graph, &["cook", "none.json"]), "the graph `none.json` does not exist\n");
     assert_eq!(
@@ -97,7 +97,7 @@ fn what_is_in_the_way_of_a_file_is_told() {
 }
 
 #[test]
-fn usd_is_not_read_yet_and_that_is_said() {
+fn reading_usd_is_refused_with_a_reason() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json"]);
     let expected = "`out/grass.usdc`: convect does not read USD yet; \

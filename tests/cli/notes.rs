@@ -1,4 +1,4 @@
-//! Notes: what is no error and would be missed, on stderr and in the report.
+//! Notes on stderr and in the report: conditions that are not errors but are easy to miss.
 
 use serde_json::Value;
 
@@ -28,7 +28,7 @@ fn two_curves(params: &str, output: &str) -> Bench {
 }
 
 #[test]
-fn an_attribute_that_is_not_as_the_node_reads_it_is_told() {
+fn an_attribute_of_the_wrong_owner_or_type_is_noted() {
     let bench = two_curves(r#""element_attributes": {"envelope": [0.0, 1.0]}"#, r#""wind""#);
     let expected = "`wind` (Curve_Wind) does not read `envelope` of the curves, which is one float for each curve; \
                     it reads one float for each CV";
@@ -38,7 +38,7 @@ fn an_attribute_that_is_not_as_the_node_reads_it_is_told() {
 }
 
 #[test]
-fn an_attribute_that_no_frame_has_is_told() {
+fn a_requested_attribute_that_no_frame_has_is_noted() {
     let attributes = r#""attributes": {"clumps": [0.0, 1.0, 2.0, 3.0], "gain": [0.0, 1.0, 2.0, 3.0]}"#;
     let bench = two_curves(attributes, r#"{"from": "wind", "attributes": ["P", "clump", "gain", "zebra"]}"#);
     let expected = [
@@ -51,7 +51,7 @@ fn an_attribute_that_no_frame_has_is_told() {
 }
 
 #[test]
-fn what_a_format_drops_is_told_once_an_output() {
+fn what_a_format_drops_is_noted_once_per_output() {
     let bench = two_curves(r#""attributes": {"gain": [0.0, 1.0, 2.0, 3.0]}, "width": 0.1"#, r#""wind""#);
     let expected = ["output `o` is without `gain` of curves, `width` of curves: obj cannot hold it; usdc and json can"];
     assert_eq!(notes(&bench, &["--format", "obj"]), expected);

@@ -27,7 +27,7 @@ fn threads_and_memory_change_nothing() {
 }
 
 #[test]
-fn frames_alone_in_halves_and_between_others_are_the_same() {
+fn frames_cooked_alone_in_halves_and_in_steps_have_the_same_bits() {
     let bench = Bench::new();
     let expected = forward(&bench);
     for (out, runs) in

@@ -88,7 +88,7 @@ fn a_file_without_geometry_says_so() {
 }
 
 #[test]
-fn what_is_no_geometry_is_refused() {
+fn an_invalid_geometry_file_is_refused() {
     let bench = Bench::new();
     bench.write("a.txt", "v 0 0 0");
     for file in ["a.txt", "g.json", "missing.obj", "."] {

@@ -54,7 +54,7 @@ fn ctrl_c_leaves_whole_frames_and_no_temporary() {
 }
 
 #[test]
-fn being_asked_to_end_is_like_ctrl_c_and_nohup_outlives_its_terminal() {
+fn sigterm_acts_like_ctrl_c_and_nohup_survives_its_terminal() {
     let bench = Bench::new();
     let cook = bench.command(&["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass"]);
     let mut nohup = Command::new("nohup");
@@ -100,7 +100,7 @@ fn ctrl_c_stops_a_conversion_between_two_files() {
 }
 
 #[test]
-fn what_a_kill_leaves_the_next_cook_sweeps() {
+fn the_next_cook_removes_the_temporaries_of_a_killed_one() {
     let bench = Bench::new();
     let mut child = start(&bench, &["cook", "g.json", "--frames", LONG, "--output", "grass"]);
     wait_for(1, &bench.path("out"));
@@ -134,7 +134,7 @@ fn a_killed_cook_resumes_from_its_cache_with_the_same_bits() {
 }
 
 #[test]
-fn a_reader_that_has_seen_enough_is_no_trouble() {
+fn a_closed_pipe_on_stdout_is_not_an_error() {
     let bench = Bench::new();
     bench.write("other.obj", "v 0 0 0\n");
     for (args, code) in [
@@ -176,7 +176,7 @@ impl Drop for TinyDisk<'_> {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_told_and_holds_nothing_half_written() {
+fn a_full_disk_is_reported_and_leaves_no_partial_file() {
     let bench = Bench::new();
     let disk = bench.path("disk");
     let Some(_mounted) = TinyDisk::at(&disk) else {
@@ -197,7 +197,7 @@ fn a_full_disk_is_told_and_holds_nothing_half_written() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_under_the_cache_is_told_once_and_does_not_stop_the_cook() {
+fn a_full_disk_under_the_cache_is_reported_once_and_does_not_stop_the_cook() {
     let bench = Bench::new();
     let disk = bench.path("disk");
     let Some(_mounted) = TinyDisk::at(&disk) else {

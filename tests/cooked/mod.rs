@@ -24,7 +24,7 @@ type Frames = Vec<Vec<Geometry>>;
 /// By node, name and frame.
 pub(crate) type Metrics = BTreeMap<String, BTreeMap<String, BTreeMap<Frame, f64>>>;
 
-/// A graph of these nodes, its outputs so many of them, over frames 1…`frames`.
+/// A graph of these nodes, over frames 1…`frames`, with these outputs.
 pub(crate) fn graph(nodes: &str, outputs: &[&str], frames: i64) -> Graph {
     load(&text(nodes, outputs, frames), outputs, &[]).unwrap_or_else(|fault| panic!("{fault}"))
 }
@@ -42,7 +42,7 @@ fn text(nodes: &str, outputs: &[&str], frames: i64) -> String {
     )
 }
 
-/// What these nodes deliver at frames 1…`frames`: of each output all frames.
+/// Every output of these nodes at frames 1…`frames`.
 pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
     cook_graph(&graph(nodes, outputs, frames), frames).0
 }
@@ -54,7 +54,7 @@ pub(crate) fn cook_file(example: &str, outputs: &[&str], frames: i64) -> (Frames
     cook_graph(&graph, frames)
 }
 
-/// The first output at `frames`, in the order asked for, on so many threads.
+/// The first output at `frames`, cooked in that order on `threads` threads.
 pub(crate) fn cook_in_order(graph: &Graph, frames: &[i64], threads: usize) -> Vec<Arc<Geometry>> {
     let engine = Engine::new(&Settings { threads, ..Settings::default() }).unwrap();
     let frames: Vec<Frame> = frames.iter().copied().map(Frame::whole).collect();

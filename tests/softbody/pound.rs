@@ -1,4 +1,4 @@
-//! `graphs/dough_pound`: R's conflict between a hand that presses and a shape that is asked for.
+//! `graphs/dough_pound`: the conflict that paper R describes, between a hand that presses and a goal shape.
 
 use crate::cooked::cook_file;
 use crate::measure::{distance, points};
@@ -20,7 +20,7 @@ fn goals_inside_leave_the_dent_that_goals_on_all_take_away() {
         let all = at(output, frame);
         (skin..all.len()).map(|k| distance(&all[k], &goal[k])).sum::<f64>() / (all.len() - skin) as f64 / SIZE
     };
-    // Under the hand is what lies within 2.5 cm of its lowest point and looks up.
+    // Under the hand: upper surface particles within 2.5 cm of its lowest point.
     let hand = at(5, 16);
     let tip = hand.iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
     let under: Vec<usize> = (0..skin)

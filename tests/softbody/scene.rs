@@ -1,4 +1,4 @@
-//! A Softbody node and what it is given, cooked in memory.
+//! A Softbody node with its inputs, cooked in memory.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -28,7 +28,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// A body that touches nothing, not even itself.
+    /// A body alone, without self-collision.
     pub(crate) fn of(body: impl Into<Geometry>) -> Self {
         Self {
             bodies: vec![body.into()],
@@ -50,7 +50,7 @@ impl Scene {
         self
     }
 
-    /// A shape of a body, to be in at a frame and held there for so many.
+    /// A goal shape for a body, due at `frame` and held for `hold` frames.
     pub(crate) fn goal(mut self, shape: Component, frame: f32, strength: f32, hold: f32) -> Self {
         let mut shape = shape;
         for (name, value) in [("goal_frame", frame), ("goal_strength", strength), ("goal_hold", hold)] {
@@ -60,7 +60,7 @@ impl Scene {
         self
     }
 
-    /// Hard pins at these points, each for what is within `radius` of it at frame 1.
+    /// Hard pins at these points; each holds the particles within `radius` of it at frame 1.
     pub(crate) fn pins(self, radius: f32, at: impl Fn(Frame) -> Vec<[f32; 3]> + Send + Sync + 'static) -> Self {
         let pins = move |frame: Frame| {
             let places = at(frame);
@@ -74,7 +74,7 @@ impl Scene {
         Self { pins: Some(Arc::new(pins)), ..self }
     }
 
-    /// At so many frames a second.
+    /// At `fps` frames a second.
     pub(crate) fn at(self, fps: f64) -> Self {
         Self { fps, ..self }
     }
@@ -85,7 +85,7 @@ impl Scene {
         self
     }
 
-    /// The height above which particles are kept from the ground; none where there is none.
+    /// The height below which no particle may be; `None` without a ground.
     pub(crate) fn kept_from_ground(&self) -> Option<f64> {
         let number = |name: &str, default: f64| self.params.get(name).map_or(default, |value| value.parse().unwrap());
         let there = self.params.get("ground").is_some_and(|value| value == "true");
@@ -121,7 +121,7 @@ impl Scene {
         fault(&self.nodes(), "soft")
     }
 
-    /// Cooks these frames on so many threads.
+    /// Cooks `frames` on `threads` threads.
     pub(crate) fn cook(&self, frames: impl IntoIterator<Item = i64>, threads: usize) -> Cooked {
         let frames: Vec<Frame> = frames.into_iter().map(Frame::whole).collect();
         let last = frames.last().map_or(1, |frame| frame.floor_number().max(1));
@@ -159,10 +159,10 @@ impl Scene {
     }
 }
 
-/// What came out.
+/// The result.
 #[derive(PartialEq)]
 pub(crate) struct Cooked {
-    /// By frame asked for.
+    /// One entry per requested frame.
     pub(crate) surface: Vec<Option<Arc<Geometry>>>,
     pub(crate) tets: Vec<Option<Arc<Geometry>>>,
     /// By name and frame.
@@ -172,7 +172,7 @@ pub(crate) struct Cooked {
 }
 
 impl Cooked {
-    /// Particles at the frame asked for in this place.
+    /// Particles at a requested frame, by its index in the request.
     pub(crate) fn at(&self, place: usize) -> Vec<[f64; 3]> {
         crate::measure::points(self.tets[place].as_ref().unwrap())
     }

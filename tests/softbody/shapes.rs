@@ -1,4 +1,4 @@
-//! Blocks of cubes and plates, and the springs that a block is made of: van Gelder's, worked beside the solver's own.
+//! Blocks and plates, and the springs of a block by van Gelder's formula, computed without the solver.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ pub(crate) fn block(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
     cut(cells, side, low, |_| 0)
 }
 
-/// The same, each cube cut as the mirror image of the next: of an even count of cells along an axis, both halves are.
+/// The same, each cube cut as the mirror image of its neighbours, so that a block with an even number of cells is symmetric.
 pub(crate) fn mirrored(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
     cut(cells, side, low, |[x, y, z]| (x & 1) + 2 * (y & 1) + 4 * (z & 1))
 }
@@ -40,7 +40,7 @@ fn cut(cells: [u32; 3], side: f64, low: [f64; 3], turned: impl Fn([u32; 3]) -> u
     Component::tets(tets, points).unwrap()
 }
 
-/// The same with every point where `change` puts it.
+/// The same tets with every point moved by `change`.
 pub(crate) fn changed(body: &Component, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Component {
     let place = |(k, p): (usize, &[f32; 3])| change(k, p.map(f64::from)).map(|x| x as f32);
     let points = body.positions().iter().enumerate().map(place).collect();

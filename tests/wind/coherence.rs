@@ -25,7 +25,7 @@ fn distance(a: Vec3, b: Vec3) -> f32 {
 }
 
 #[test]
-fn coherent_collision_hardly_jumps_more_than_the_wind() {
+fn coherent_collision_adds_few_jumps_to_those_of_the_wind() {
     let collision = |name: &str, coherence: f32| {
         format!(
             r#", "{name}": {{ "type": "Curve_Wind_Collision", "params": {{ "coherence": {coherence} }},

@@ -7,7 +7,7 @@ use crate::cooked::cook_file;
 use crate::storm::{crossings, skin};
 
 #[test]
-fn figure_1_goes_through_the_skin_without_collisions_alone_and_is_calm_in_the_lee() {
+fn figure_1_crosses_the_skin_only_without_collisions_and_is_calm_in_the_lee() {
     let outputs = ["wind", "collided", "lee_collided", "lee", "skin", "fur"];
     let (cooked, metrics) = cook_file("fig1", &outputs, 1);
     let part = |output: usize| -> &Component { cooked[output][0].curves().unwrap() };
@@ -45,7 +45,7 @@ fn figure_1_goes_through_the_skin_without_collisions_alone_and_is_calm_in_the_le
 }
 
 #[test]
-fn figure_2_lets_in_all_wind_at_the_controls_centre_and_none_from_its_boundary() {
+fn figure_2_has_full_influence_at_the_controls_centre_and_none_beyond_its_boundary() {
     let (cooked, _) = cook_file("fig2", &["gusts"], 48);
     let (mut nearest, mut beyond) = ([f64::INFINITY, 0.0], 0.0_f32);
     let mut worst = 0.0_f64;

@@ -34,7 +34,7 @@ fn changes(frames: &[Vec<f32>]) -> [f64; 3] {
 }
 
 #[test]
-fn smooth_shelter_does_not_pop_as_the_wind_turns() {
+fn smooth_shielding_does_not_pop_as_the_wind_turns() {
     let figures = [0.0, 0.5, 1.0].map(|smooth| (smooth, changes(&turning(smooth, 60))));
     for (smooth, [largest, jumps, mean]) in figures {
         println!(

@@ -63,7 +63,7 @@ fn length_error(curves: &Component, rest: &Component) -> f64 {
 }
 
 #[test]
-fn fur_in_a_storm_keeps_off_the_skin_and_its_lengths() {
+fn fur_in_a_storm_stays_outside_the_skin_and_keeps_its_lengths() {
     let (cooked, metrics) = cook_file("bear_storm", &["fur_out", "skin", "grown", "fur"], FRAMES);
     let part = |output: usize, frame: usize| -> &Geometry { &cooked[output][frame] };
     let unfreed: &BTreeMap<_, f64> = &metrics["fur_out"]["unfreed_segments"];

@@ -1,18 +1,18 @@
-//! What bodies are asked for: goals, pins, springs that join them. The node's.
+//! Goals, pins and coupling springs; measured on the node.
 
 use engine::time::Frame as Time;
 
 use super::*;
 use crate::scene::Scene;
 
-/// A block of 0.3 m, half as high and wider by as much.
+/// The block of 0.3 m at half its height and the same volume.
 fn flat(body: &engine::geometry::Component) -> engine::geometry::Component {
     let wider = std::f64::consts::SQRT_2;
     shapes::changed(body, |_, [x, y, z]| [x * wider, y * 0.5, z * wider])
 }
 
-/// Whose goal was reached, became its shape at rest and let go: the largest strain of its springs off the goal's lengths,
-/// with what storing takes, and the energy left in them ÷ E·V.
+/// After the goal was reached, became the rest shape and was released: the largest strain of a spring relative to its
+/// length in the goal, with the rounding of stored positions, and the elastic energy left ÷ E·V.
 fn released() -> ([f64; 2], f64) {
     let (modulus, side) = (1e4, 0.3_f64);
     let body = shapes::block([3; 3], 0.1, [0.0; 3]);
@@ -28,7 +28,7 @@ fn released() -> ([f64; 2], f64) {
     (worst, cooked.metric("elastic").last().unwrap() / (modulus * side * side * side))
 }
 
-/// A goal alone pulls at a block: how many particles of its surface move, of how many.
+/// A goal is the only force on a block: the number of surface particles that move, and the number of all.
 fn pulled_surface() -> (usize, usize) {
     let body = shapes::block([3; 3], 0.1, [0.0; 3]);
     let scene = Scene::of(body.clone()).goal(flat(&body), 2.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
@@ -40,11 +40,11 @@ fn pulled_surface() -> (usize, usize) {
     (surface.iter().filter(|way| **way > 0.0).count(), surface.len())
 }
 
-/// How many times a pinned particle is not, to the bit, where the animation puts it, of how many.
+/// How often a pinned particle is not exactly where the animation puts it, and how often it could be.
 fn off_pins() -> [usize; 2] {
     let body = shapes::block([4, 2, 2], 0.1, [0.0; 3]);
     let held: Vec<usize> = (0..body.point_count()).filter(|i| body.positions()[*i][0] == 0.0).collect();
-    // All nine hang on one point, as on a hand that wanders and comes back to a place of f32.
+    // One moving point pins all nine.
     let hand = |frame: Time| {
         let at = frame.number() - 1.0;
         [0.1 * libm::sin(at), 0.1 + 0.03 * at, 0.1 * libm::cos(0.7 * at)].map(|x| x as f32)
@@ -69,7 +69,7 @@ fn off_pins() -> [usize; 2] {
     [off, 24 * near.len()]
 }
 
-/// The longest that a coupling spring gets by its length at rest, between a cube that is held and one that hangs on it.
+/// The largest length ÷ rest length of the coupling springs between a cube that is pinned and one that hangs from it.
 fn joined() -> f64 {
     let (lower, upper) = (shapes::block([2; 3], 0.05, [0.0; 3]), shapes::block([2; 3], 0.05, [0.0, 0.102, 0.0]));
     let top: Vec<[f32; 3]> = upper.positions().iter().filter(|p| p[1] > 0.2).copied().collect();

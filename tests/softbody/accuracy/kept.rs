@@ -1,4 +1,4 @@
-//! What has to be kept: momentum, energy, shape in free fall. The solver's, as the node gives no velocities.
+//! Conservation of momentum and energy, and free fall; measured on the solver, as the node gives no velocities.
 
 use std::f64::consts::TAU;
 
@@ -71,7 +71,7 @@ fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
     (lost, reports.iter().map(|report| report.euler_steps).sum())
 }
 
-/// The most that energy rises above the start in 100 steps, as a share of it.
+/// The largest relative rise of energy above its initial value in 100 steps.
 fn gained(integrator: Integrator, volume: f64, damping: f64) -> f64 {
     let (body, mut state) = thrown(damping);
     let each = state.velocities.iter().zip(body.masses());
@@ -85,7 +85,7 @@ fn gained(integrator: Integrator, volume: f64, damping: f64) -> f64 {
     largest(reports.iter().map(|report| (report.kinetic + report.elastic + report.volume_energy) / start - 1.0))
 }
 
-/// The largest error of a particle's way in a second of free fall, metres, of 9.8: `fallen` is the way along gravity.
+/// The largest error of a particle's displacement in a second of free fall, metres; `fallen` × gravity is exact.
 fn fall(integrator: Integrator, fallen: f64) -> f64 {
     let body = block([6, 5, 4], 0.1, 1e6, 0.01);
     let start = State::at_rest(&body);

@@ -63,7 +63,7 @@ fn made(points: &[V], tets: &[[u32; 4]], modulus: f64, damping: f64, joints: &[B
     SoftBody::new(&Mesh { points, tets, ..Mesh::default() }, &material, joints).unwrap()
 }
 
-/// Steps through so many frames; gives what each reports.
+/// Steps through `frames` frames; a report for each.
 fn steps(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, frames: usize) -> Vec<FrameReport> {
     let mut solver = BodySolver::new(body);
     (0..frames).map(|_| solver.step(body, state, frame)).collect()
@@ -78,6 +78,6 @@ fn mean(points: &[V]) -> V {
 }
 
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    // What is no number is the largest of all.
+    // NaN counts as the largest.
     values.into_iter().fold(0.0, |most, x| if x > most || x.is_nan() { x } else { most })
 }

@@ -85,7 +85,7 @@ fn cantilever() -> [f64; 2] {
     [largest(found.iter().zip(&exact).map(|(a, b)| distance(a, b))), storage(&stored)]
 }
 
-/// Effective modulus of a bar of 1 m², 5 m long, pulled by 1 %, ÷ what was asked for, at so many cells across.
+/// Effective modulus ÷ `stiffness` of a bar of 1 m² by 5 m, stretched by 1 %, with `cells` cells across.
 fn modulus(cells: u32) -> f64 {
     const PULL: f32 = 0.05;
     let bar = shapes::block([5 * cells, cells, cells], 1.0 / f64::from(cells), [0.0; 3]);

@@ -1,4 +1,4 @@
-//! One spring, and springs in a row, against closed forms. R1's bodies are nothing else.
+//! Single springs and chains of springs, of which all bodies are made, against closed forms.
 
 use std::f64::consts::TAU;
 
@@ -47,13 +47,13 @@ fn every_spring() -> f64 {
     largest(each)
 }
 
-/// How fast errors fall with the step, each halving of it.
+/// Order of convergence, from each halving of the step.
 fn orders(integrator: Integrator) -> Vec<f64> {
     let errors = [200, 400, 800].map(|steps| error(1.0, 1.0, 0.1, steps, integrator));
     errors.windows(2).map(|pair| libm::log2(pair[0] / pair[1])).collect()
 }
 
-/// The most that energy and stretch rise above their start, as a share of it, at steps of 1e-3 to 1e9 s for ω = √2.
+/// The largest relative rise of energy and stretch above their initial values, at steps of 1e-3 to 1e9 s for ω = √2.
 fn beyond_start() -> f64 {
     let start = 0.5 * STRETCH * STRETCH;
     let one = |seconds: f64, integrator: Integrator| {

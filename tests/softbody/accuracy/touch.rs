@@ -1,4 +1,4 @@
-//! What bodies do against ground, plates and a rolling pin: the node's.
+//! Contact with the ground, with plates and with a rolling pin; measured on the node.
 
 use engine::geometry::{Component, Geometry};
 use engine::time::Frame as Time;
@@ -50,7 +50,7 @@ fn on_slope(friction: f64) -> [f64; 2] {
     [(b - a).abs() / 0.4, (c - 2.0 * b + a) / (G * (sine - friction * cosine))]
 }
 
-/// A block of 0.6 by 0.6 m and so many cells of 0.1 m high, pressed to half that by plates.
+/// A block of 0.6 by 0.6 m, `cells` cells of 0.1 m high, pressed to half its height between plates.
 fn pressed(cells: u32) -> Cooked {
     let height = 0.1 * f64::from(cells);
     let block = shapes::mirrored([6, cells, 6], 0.1, [0.0, THICKNESS, 0.0]);

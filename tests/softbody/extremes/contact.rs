@@ -31,7 +31,7 @@ fn swept() -> Scene {
 }
 
 #[test]
-fn plates_that_leave_no_room_and_hands_that_go_through_are_met_or_published() {
+fn overlap_with_plates_that_leave_no_room_and_hands_that_pass_through_is_prevented_or_published() {
     let still = |low: V, high: V| move |_: Frame| cuboid(low, high);
     let flipping = |frame: Frame| {
         let side = if frame.floor_number() % 2 == 0 { -1.0 } else { 1.0 };
@@ -61,7 +61,7 @@ fn crushed_by(_: Frame) -> Geometry {
 }
 
 #[test]
-fn friction_gravity_and_speed_beyond_reason_end_on_the_ground() {
+fn bodies_of_extreme_friction_gravity_and_speed_come_to_rest_on_the_ground() {
     let sliding = |friction: &str| grounded(cube(0.001)).set("friction", friction).set("initial_velocity", "[3, 0, 0]");
     hold([
         ("μ 0", sliding("0")),

@@ -1,4 +1,4 @@
-//! Nothing at all, and hardly anything.
+//! Empty and degenerate bodies and colliders.
 
 use super::*;
 
@@ -7,7 +7,7 @@ fn mesh(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Geometry {
 }
 
 #[test]
-fn colliders_of_nothing_and_of_next_to_nothing_stop_nothing_else() {
+fn empty_and_degenerate_colliders_do_not_disturb_the_others() {
     let against = |points: &[[f32; 3]], triangles: &[[u32; 3]]| {
         let mesh = mesh(points, triangles);
         grounded(cube(0.02)).collider(move |_| mesh.clone())
@@ -27,7 +27,7 @@ fn colliders_of_nothing_and_of_next_to_nothing_stop_nothing_else() {
 }
 
 #[test]
-fn bodies_of_nothing_come_out_as_nothing_or_are_refused() {
+fn empty_bodies_give_empty_results_or_are_refused() {
     let nothing = || Component::tets(vec![], vec![]).unwrap();
     let cooked =
         hold([("an empty body", grounded(nothing())), ("and one beside it", grounded(nothing()).and(cube(0.02)))]);

@@ -1,4 +1,4 @@
-//! Numbers that no scene should have: at the ends of f32, far away, beyond the ranges of params, no numbers at all.
+//! Extreme numbers: at the ends of f32, far from the origin, outside the ranges of params, NaN and infinity.
 
 use super::*;
 use engine::param::Shape;
@@ -15,7 +15,7 @@ fn scaled(scale: f64, fits: bool) -> Scene {
 }
 
 #[test]
-fn a_scene_of_any_size_and_place_and_frames_of_any_length_are_met() {
+fn scenes_of_any_scale_position_and_frame_rate_stay_finite() {
     let away = |way: f64| Scene::of(changed(&cube(0.0), move |_, p| p.map(|x| x + way))).set("ground", true);
     let at = |fps: f64| grounded(cube(0.02)).at(fps);
     hold([
@@ -36,7 +36,7 @@ fn a_scene_of_any_size_and_place_and_frames_of_any_length_are_met() {
 }
 
 #[test]
-fn what_is_no_number_is_refused_by_name_wherever_it_stands() {
+fn nan_and_infinity_are_refused_by_name_in_every_input() {
     let tets = |name: &'static str, bad: f32| {
         let mut body = with(cube(0.02), "soft", |_| 1.0);
         match name {
@@ -75,7 +75,7 @@ fn what_is_no_number_is_refused_by_name_wherever_it_stands() {
 }
 
 #[test]
-fn keyframes_in_any_order_doubled_single_or_none_are_met_or_refused_by_name() {
+fn unsorted_duplicate_single_and_missing_keyframes_work_or_are_refused_by_name() {
     let keyed = |keys: &str| grounded(cube(0.02)).set("stiffness", format!(r#"{{ "keyframes": {keys} }}"#));
     hold([("a single one", keyed("[[3, 1e4]]")), ("1e-3 to 1e12 in a frame", keyed("[[2, 1e-3], [3, 1e12]]"))]);
     for keys in ["[]", "[[3, 1e4], [1, 1e3]]", "[[2, 1e4], [2, 1e3]]"] {
@@ -85,7 +85,7 @@ fn keyframes_in_any_order_doubled_single_or_none_are_met_or_refused_by_name() {
 }
 
 #[test]
-fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
+fn params_accept_both_ends_of_their_range_and_refuse_values_just_outside() {
     let node = convect::CATALOGUE.nodes().find(|node| node.name == "Softbody").unwrap();
     let goal = changed(&cube(0.002), |_, [x, y, z]| [1.2 * x, 0.7 * y, 1.2 * z]);
     // Something for every param to act on.

@@ -11,7 +11,7 @@ const SOFT: &str = r#"{ "value": 1, "attribute": "soft" }"#;
 const LIGHT: &str = r#"{ "value": 1000, "attribute": "light" }"#;
 
 #[test]
-fn springs_and_masses_of_any_size_in_one_body_hold_together() {
+fn bodies_with_springs_and_masses_of_any_ratio_hold_together() {
     // k of an edge of 3 cm is some hundredth of E.
     let soft = |body: Component| with(body, "soft", |i| power(3, i, [-4.0, 14.0]));
     let light = |body: Component| with(body, "light", |i| if i % 2 == 0 { 1.0 } else { 1e-6 });
@@ -31,7 +31,7 @@ fn springs_and_masses_of_any_size_in_one_body_hold_together() {
 }
 
 #[test]
-fn bodies_of_one_tet_of_pieces_and_of_turned_and_flat_tets_move() {
+fn single_disconnected_inverted_and_flat_tets_move() {
     let corner = |points: Vec<[f32; 3]>, tets: Vec<[u32; 4]>| Component::tets(tets, points).unwrap();
     let one = [[0.0, 0.02, 0.0], [0.1, 0.02, 0.0], [0.0, 0.12, 0.0], [0.0, 0.02, 0.1]];
     let turned = {
@@ -63,7 +63,7 @@ fn bodies_of_one_tet_of_pieces_and_of_turned_and_flat_tets_move() {
 }
 
 #[test]
-fn pins_that_hold_all_or_tear_at_a_body_are_where_they_are_put() {
+fn pinned_particles_follow_pins_that_hold_everything_or_tear_the_body() {
     let body = cube(0.0);
     let all: Vec<[f32; 3]> = body.positions().to_vec();
     let side: Vec<[f32; 3]> = all.iter().filter(|p| p[0] == 0.0).copied().collect();
@@ -91,7 +91,7 @@ fn pins_that_hold_all_or_tear_at_a_body_are_where_they_are_put() {
 }
 
 #[test]
-fn goals_that_cannot_be_reached_or_change_every_frame_are_headed_for() {
+fn bodies_move_towards_goals_that_are_unreachable_or_change_every_frame() {
     let body = cube(0.0);
     let far = changed(&body, |_, [x, y, z]| [x + 1e3, y, z]);
     let nearer = |way: f64| changed(&body, move |_, [x, y, z]| [x + way, y, z]);

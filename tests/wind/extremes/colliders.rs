@@ -31,7 +31,7 @@ fn pressed() -> Scene {
 }
 
 #[test]
-fn curves_that_start_within_a_collider_are_counted_and_never_worse_off() {
+fn curves_that_start_inside_a_collider_are_counted_and_do_not_get_deeper() {
     let sunken = |share: f32, length: f32| {
         let sunken = move |_| moved(curves(&hairs(20, 5, length)), |p| p.map(|x| share * x));
         pressed().fur(sunken)
@@ -58,7 +58,7 @@ fn curves_that_start_within_a_collider_are_counted_and_never_worse_off() {
 }
 
 #[test]
-fn colliders_of_any_kind_are_not_passed() {
+fn no_kind_of_collider_is_passed_through() {
     let thin = pressed().fur(|_| curves(&grass(0.01, 2))).skin(|_| sheets(&[0.0, -1e-6]));
     let reversed = pressed().skin(|_| ball_of(|all| all.into_iter().map(|[a, b, c]| [a, c, b]).collect()));
     let flipping = |frame: Frame| {
@@ -84,7 +84,7 @@ fn colliders_of_any_kind_are_not_passed() {
 }
 
 #[test]
-fn steps_and_offsets_at_their_ends_keep_to_the_promises() {
+fn extreme_steps_and_offsets_keep_the_guarantees() {
     let out = |params: &str| pressed().with("out", params);
     hold([
         ("1 step", out(r#""method": "steps", "rotation_steps": 1"#)),

@@ -1,4 +1,4 @@
-//! Nothing at all, and hardly anything.
+//! Empty and degenerate curves and colliders.
 
 use super::*;
 use crate::cooked::cook;
@@ -13,7 +13,7 @@ fn on(points: &[Point], triangles: &[[u32; 3]]) -> Scene {
 }
 
 #[test]
-fn nothing_and_hardly_anything_go_through() {
+fn empty_and_degenerate_curves_pass_through_every_node() {
     let root = [0.0, 0.5, 0.0];
     let cooked = hold([
         ("no curves", of(vec![])),
@@ -44,7 +44,7 @@ fn triangles_without_area_among_others_change_nothing() {
 }
 
 #[test]
-fn curves_without_a_skin_blow_and_swing() {
+fn curves_without_a_skin_bend_and_swing() {
     let nodes = r#"
         "fur": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0], [0, 2, 0]] } },
         "gusts": { "type": "Curve_Wind_Gusts", "inputs": { "curves": "fur" }, "params": { "base": 0.5 } },

@@ -106,7 +106,7 @@ impl Scene {
         fault(&self.nodes(), "out")
     }
 
-    /// Cooks frames 1 to 3 on so many threads.
+    /// Cooks frames 1 to 3 on `threads` threads.
     fn cook(&self, threads: usize) -> Cooked {
         self.cook_some(&NODES, &[1, 2, 3], threads)
     }

@@ -1,4 +1,4 @@
-//! Numbers that no scene should have: at the ends of f32, far away, beyond the ranges of params, no numbers at all.
+//! Extreme numbers: at the ends of f32, far from the origin, outside the ranges of params, NaN and infinity.
 
 use super::*;
 use engine::geometry::{Attr, Kind, PREF};
@@ -44,13 +44,13 @@ fn a_scene_of_any_size_and_place_is_finite_and_keeps_its_lengths() {
 }
 
 #[test]
-fn frames_of_any_length_are_met() {
+fn any_frame_rate_gives_finite_curves() {
     let at = |fps: f64| Scene { fps, ..Scene::new() };
     hold([("a frame of 1,000 s", at(1e-3)), ("a frame of 1 µs", at(1e6))]);
 }
 
 #[test]
-fn what_is_no_number_is_refused_by_name_wherever_it_stands() {
+fn nan_and_infinity_are_refused_by_name_in_every_input() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for name in ["P", "envelope", "Pref", "soft"] {
             let scene = Scene::new().fur(move |_| {
@@ -77,7 +77,7 @@ fn what_is_no_number_is_refused_by_name_wherever_it_stands() {
 }
 
 #[test]
-fn params_take_both_ends_of_their_range_and_refuse_what_is_just_outside() {
+fn params_accept_both_ends_of_their_range_and_refuse_values_just_outside() {
     let (mut ends, mut outside) = (0, 0);
     for (id, name) in [
         ("gusts", "Curve_Wind_Gusts"),

@@ -18,7 +18,7 @@ fn enveloped(value: f32) -> Scene {
 }
 
 #[test]
-fn wind_from_anywhere_bends_and_never_breaks() {
+fn wind_from_any_direction_bends_curves_and_keeps_their_lengths() {
     let upright = |_| {
         curves(&(0..20).map(|k| (0..5).map(|cv| [0.1 * k as f32, 0.1 * cv as f32, 0.0]).collect()).collect::<Vec<_>>())
     };
@@ -49,7 +49,7 @@ fn wind_from_anywhere_bends_and_never_breaks() {
 }
 
 #[test]
-fn envelopes_beyond_their_range_and_gusts_by_the_thousand_are_met() {
+fn envelopes_out_of_range_and_thousands_of_gusts_give_finite_curves() {
     let gusts = |params: &str| Scene::new().with("gusts", format!(r#"{params}, "start_frame_range": [-100, 1]"#));
     hold([
         ("envelopes below 0", enveloped(-3.0)),
@@ -71,7 +71,7 @@ fn envelopes_beyond_their_range_and_gusts_by_the_thousand_are_met() {
 }
 
 #[test]
-fn springs_of_any_stiffness_and_damping_swing_and_hold() {
+fn springs_of_any_stiffness_and_damping_are_stable() {
     let swing = |params: &str| Scene::new().with("swing", params);
     let cooked = hold([
         ("1e-6 Hz", swing(r#""frequency": 1e-6"#)),
@@ -93,7 +93,7 @@ fn springs_of_any_stiffness_and_damping_swing_and_hold() {
 }
 
 #[test]
-fn curves_of_2_and_of_10_000_cvs_are_met_by_every_node() {
+fn every_node_handles_curves_of_2_and_of_10_000_cvs() {
     hold([
         ("2 CVs", Scene::new().fur(|_| curves(&hairs(40, 2, 0.3)))),
         ("10,000 CVs", Scene::new().fur(|_| curves(&hairs(2, 10_000, 0.3))).with("hairs", r#""density": 1"#)),
@@ -125,7 +125,7 @@ fn a_million_curves_go_through_the_chain() {
 }
 
 #[test]
-fn a_million_curves_are_carried_and_filled_between() {
+fn a_million_curves_are_attached_and_interpolated() {
     let turning =
         |frame: Frame| moved(ball(), |[x, y, z]| if frame.floor_number() == 2 { [z, y, -x] } else { [x, y, z] });
     let cooked = million().skin(turning).cook_some(&["grown", "hairs"], &[2], 2);
