@@ -1,4 +1,4 @@
-//! How long collision takes: `cargo bench --bench collide`.
+//! Times of collision: `cargo bench --bench collide`.
 //!
 //! Fur on a sphere of 20,480 triangles, its curves bent by wind across it.
 
@@ -11,7 +11,7 @@ use numerics::tree::TriangleTree;
 use numerics::vector::{Vec3, scale};
 use std::time::Duration;
 
-/// Rounds of each case, and how many cases: `cargo bench --bench collide -- 1 1` is a run to profile.
+/// Arguments: rounds of each case, and number of cases; `cargo bench --bench collide -- 1 1` is a run for profiling.
 fn arg(k: usize, default: usize) -> usize {
     std::env::args().nth(k).and_then(|word| word.parse().ok()).unwrap_or(default)
 }

@@ -1,4 +1,4 @@
-//! Prints how long gusts take: the minimum of interleaved runs, a line a case and SIMD path.
+//! Times of evaluating gusts: the minimum of interleaved runs, one line for each case and SIMD path.
 //!
 //! `cargo bench --bench gusts`; threads by `RAYON_NUM_THREADS`.
 

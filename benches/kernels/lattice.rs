@@ -1,4 +1,4 @@
-//! Prints how long lattices take on a million points, and goals on balls of tets: the minimum of several runs.
+//! Times of lattice deformation of a million points, and of goals on balls of tets: the minimum of several runs.
 //!
 //! `cargo bench --bench lattice`; threads by `RAYON_NUM_THREADS`.
 

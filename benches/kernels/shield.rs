@@ -1,5 +1,5 @@
-//! Prints how long shielding takes, the trees of the colliders included: the minimum of runs, a line a
-//! case and SIMD path.
+//! Times of shielding, including the trees of the colliders: the minimum of several runs, one line for each case and SIMD
+//! path.
 //!
 //! `cargo bench --bench shield`; threads by `RAYON_NUM_THREADS`.
 

@@ -1,5 +1,5 @@
-//! Prints how long a triangle tree takes to build, to refit and to find nearest points: the minimum of
-//! runs, a line a mesh.
+//! Times of building and refitting a triangle tree and of finding nearest points: the minimum of several runs, one line
+//! for each mesh.
 //!
 //! `cargo bench --bench tree`; threads by `RAYON_NUM_THREADS`.
 

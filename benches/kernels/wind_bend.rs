@@ -1,4 +1,4 @@
-//! Prints how long a bend takes: the minimum of interleaved runs, a line a case and SIMD path.
+//! Times of bending curves: the minimum of interleaved runs, one line for each case and SIMD path.
 //!
 //! `cargo bench --bench wind_bend`; threads by `RAYON_NUM_THREADS`.
 

@@ -1,7 +1,7 @@
-//! The numbers of a geometry: counts, bounds, lengths, areas, volumes, and the range of every attribute.
+//! Measurements of a geometry: counts, bounds, lengths, areas, volumes, and the range of every attribute.
 //!
 //! Sums are f64 in the order of the rows, so the same file gives the same digits everywhere. NaN and infinity are
-//! counted and left out of all else.
+//! counted and excluded from all else.
 
 use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, Table, Topology, Volume};
 
@@ -9,7 +9,7 @@ use numerics::vector::to_f64;
 
 use super::surface::{SurfaceStats, tet_volume};
 
-/// Least, greatest and sum of some numbers; there is one at least.
+/// Least, greatest and sum of one or more numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spread {
     count: usize,
@@ -19,7 +19,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Of the finite ones among `numbers`; `None` where there is none.
+    /// Of the finite ones of `numbers`; `None` without any.
     pub(super) fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         numbers.into_iter().filter(|x| x.is_finite()).fold(None, |spread, x| {
             let so_far = spread.unwrap_or(Self { count: 0, min: x, max: x, sum: 0.0 });
@@ -33,7 +33,7 @@ impl Spread {
     }
 }
 
-/// An attribute, number by number of a row.
+/// Statistics of an attribute, component by component.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct AttributeStats {
     pub(super) name: Name,
@@ -41,7 +41,7 @@ pub(super) struct AttributeStats {
     pub(super) rows: usize,
     /// NaN and infinities.
     pub(super) not_finite: usize,
-    /// One for each number of a row; `None` without a finite one.
+    /// One for each component of a row; `None` without a finite one.
     pub(super) spreads: Vec<Option<Spread>>,
 }
 
@@ -55,7 +55,7 @@ impl AttributeStats {
     }
 }
 
-/// The numbers of all rows, row by row.
+/// The components of all rows, row by row.
 fn numbers(column: &Column) -> Vec<f64> {
     fn wide<const N: usize, T: Copy + Into<f64>>(rows: &[[T; N]]) -> Vec<f64> {
         rows.as_flattened().iter().map(|x| (*x).into()).collect()
@@ -70,7 +70,7 @@ fn numbers(column: &Column) -> Vec<f64> {
     }
 }
 
-/// What only one kind of component has.
+/// Measurements that only one kind of component has.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
     /// CVs a curve, and lengths in metres.
@@ -79,7 +79,7 @@ pub(super) enum Shape {
     Mesh(SurfaceStats),
     /// Nothing.
     Points,
-    /// Signed volumes in m³; an inverted tet has none above 0.
+    /// Signed volumes in m³, and the number of tets whose volume is not positive.
     Tets { volume: Option<Spread>, inverted: usize },
 }
 
@@ -106,14 +106,14 @@ pub(super) struct VolumeStats {
     pub(super) attributes: Vec<AttributeStats>,
 }
 
-/// Everything.
+/// All measurements of a geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Stats {
     pub(super) parts: Vec<PartStats>,
     pub(super) volume: Option<VolumeStats>,
 }
 
-/// The numbers of `geometry`.
+/// Measures `geometry`.
 pub(super) fn stats(geometry: &Geometry) -> Stats {
     Stats { parts: geometry.parts().map(part).collect(), volume: geometry.volume().map(volume) }
 }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_counted_and_left_out() {
+    fn non_finite_numbers_are_counted_and_excluded() {
         let mut points = Component::points(vec![[0.0; 3]; 4]);
         points.set(Attr::point("heat"), vec![1.0_f32, f32::NAN, 3.0, f32::INFINITY]).unwrap();
         let stats = part(&points);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_attribute_has_a_range_a_number_of_its_rows() {
+    fn an_attribute_has_a_range_for_each_component() {
         let column = Column::new(vec![[1, -2, 3], [5, 0, 3]]);
         let stats = AttributeStats::of(&"clump".into(), &column);
         let ranges: Vec<_> = stats.spreads.iter().flatten().map(|x| (x.min, x.max, x.mean())).collect();
@@ -204,14 +204,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_range() {
+    fn empty_components_have_no_range() {
         let empty = part(&Component::curves(vec![], vec![]).unwrap());
         assert_eq!((empty.bounds, &empty.shape), (None, &Shape::Curves { cvs: None, length: None }));
         assert_eq!(empty.attributes[0].1[0].spreads, [None; 3]);
     }
 
     #[test]
-    fn tets_that_are_inside_out_or_flat_are_counted() {
+    fn inverted_and_flat_tets_are_counted() {
         let corners = vec![[0.0; 3], [6.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let tets = Component::tets(vec![[0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 2]], corners).unwrap();
         let Shape::Tets { volume: Some(volume), inverted } = shape(&tets) else { panic!("no tets") };

@@ -1,4 +1,4 @@
-//! Stats as text and as JSON.
+//! Statistics as text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::measure::{AttributeStats, PartStats, Shape, Spread, Stats, VolumeStat
 use crate::geometry_file::GeometryFile;
 use crate::numbers::{decimal, short};
 
-/// JSON: an object a component, with the tables of the json form.
+/// JSON: one object for each component, with the tables of the json format.
 pub(super) fn json(name: &str, file: &GeometryFile, stats: &Stats) -> String {
     let mut all = json!({"file": name, "format": file.format.name(), "bytes": file.bytes});
     for part in &stats.parts {
@@ -71,7 +71,7 @@ fn attributes_json(attributes: &[AttributeStats]) -> Value {
     attributes.iter().map(|one| (one.name.to_string(), attribute_json(one))).collect::<Map<_, _>>().into()
 }
 
-/// Least, greatest and mean are numbers where rows are, else lists.
+/// Least, greatest and mean: numbers for scalar attributes, else lists.
 fn attribute_json(attribute: &AttributeStats) -> Value {
     let each = |number: &dyn Fn(&Spread) -> f64| match attribute.spreads.as_slice() {
         [one] => json!(one.as_ref().map(number)),
@@ -92,7 +92,7 @@ fn spread_json(spread: Option<&Spread>) -> Value {
     )
 }
 
-/// The name of an owner's table in the json form.
+/// The name of an owner's table in the json format.
 fn table_name(owner: Owner) -> &'static str {
     match owner {
         Owner::Point => "point_attributes",
@@ -101,12 +101,12 @@ fn table_name(owner: Owner) -> &'static str {
     }
 }
 
-/// A number of an attribute as its file would say it.
+/// A number of an attribute as written in its file.
 fn as_stored(attribute: &AttributeStats, number: f64) -> f64 {
     if attribute.kind.is_float() { decimal(number as f32) } else { number }
 }
 
-/// Text, a block a component.
+/// Text, one block for each component.
 pub(super) fn text(name: &str, file: &GeometryFile, stats: &Stats) -> String {
     let mut text = format!("{name}: {}, {} bytes\n", file.format, file.bytes);
     for part in &stats.parts {
@@ -170,7 +170,7 @@ fn volume_text(volume: &VolumeStats, text: &mut String) {
     attributes_text(&Owner::Once.to_string(), &volume.attributes, text);
 }
 
-/// A line an attribute: what owns it, its type, its range.
+/// One line for each attribute: its owner, type and range.
 fn attributes_text(owner: &str, attributes: &[AttributeStats], text: &mut String) {
     for attribute in attributes {
         let each = |number: &dyn Fn(&Spread) -> f64| match attribute.spreads.as_slice() {

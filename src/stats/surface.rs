@@ -1,8 +1,8 @@
-//! What the polygons of a mesh add up to: edges, area and volume.
+//! Totals over the polygons of a mesh: edges, area and volume.
 //!
 //! Exact up to f64 rounding, summed in the order of the faces. The area of a polygon is the length of its vector area:
-//! the true one where the polygon is planar, convex or not. The volume is that of the polygons as fans about their first
-//! corners; it has a sense only where the surface is closed, and is given only there.
+//! the true area where the polygon is planar, convex or not. The volume is that of the polygons as fans about their first
+//! corners; it is defined for closed surfaces only.
 
 use engine::geometry::Faces;
 use numerics::vector::{DVec3, to_f64};
@@ -20,12 +20,12 @@ pub(super) struct SurfaceStats {
     pub(super) manifold: usize,
     /// Edges of more than two faces.
     pub(super) non_manifold: usize,
-    /// Edges of two faces that face opposite ways.
+    /// Edges of two faces with inconsistent winding.
     pub(super) flipped: usize,
     /// m².
     pub(super) area: f64,
-    /// m³, positive where the faces look outwards; `None` where the surface is not closed: where an edge is not run
-    /// through as often one way as the other.
+    /// m³, positive where faces are counter-clockwise seen from outside; `None` where the surface is not closed: where some
+    /// edge is not used equally often in both directions.
     pub(super) volume: Option<f64>,
 }
 
@@ -58,7 +58,7 @@ impl SurfaceStats {
                 _ => surface.non_manifold += 1,
             }
         }
-        // About a point near the mesh: far from it, the products would cancel.
+        // Relative to a point of the mesh: far from the origin the products would cancel.
         let about = positions.first().copied().map_or(DVec3::zeros(), to_f64);
         let point = |corner: u32| to_f64(positions[corner as usize]) - about;
         let mut volume = 0.0;
@@ -85,7 +85,7 @@ struct Edge {
     ascends: bool,
 }
 
-/// The edges of all faces. A corner that is named twice in a row makes none.
+/// The edges of all faces. A corner that is repeated makes none.
 fn directed_edges(faces: &Faces) -> Vec<Edge> {
     let mut edges = Vec::with_capacity(faces.corners.len());
     for face in faces.iter() {
