@@ -85,3 +85,25 @@ fn names_are_unique_and_lead_to_their_file() {
         assert!(found, "{}: no file or folder `{module}` in any family", node.name);
     }
 }
+
+/// The node of docs/writing_nodes.md.
+#[path = "../docs/examples/curve_helix.rs"]
+mod curve_helix;
+
+/// What `cargo xtask new-node` writes; xtask's tests see to it that these are its texts.
+#[path = "new_nodes/curve_full.rs"]
+mod curve_full;
+#[path = "new_nodes/curve_plain.rs"]
+mod curve_plain;
+
+#[test]
+fn the_guide_for_authors_shows_the_node_that_is_compiled() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = fs::read_to_string(root.join("docs/writing_nodes.md")).unwrap();
+    let node = fs::read_to_string(root.join("docs/examples/curve_helix.rs")).unwrap();
+    let (production, _) = node.split_once("#[cfg(test)]").unwrap();
+    assert!(
+        guide.contains(production.trim_end()),
+        "docs/writing_nodes.md quotes another node than docs/examples/curve_helix.rs"
+    );
+}

@@ -106,8 +106,8 @@ impl Bench {
     /// # Panics
     /// Where the node has no such param.
     #[must_use]
-    pub fn set<T: ParamType>(self, param: Param<T>, value: T) -> Self {
-        self.source(param.name(), Source::Constant(value.value()))
+    pub fn set<T: ParamType>(self, param: Param<T>, value: T::Value) -> Self {
+        self.source(param.name(), Source::Constant(T::erase(value)))
     }
 
     /// Keys a param, straight from key to key.
@@ -115,8 +115,8 @@ impl Bench {
     /// # Panics
     /// Where the node has no such param.
     #[must_use]
-    pub fn keyed<T: ParamType>(self, param: Param<T>, keys: &[(f64, T)]) -> Self {
-        let keys = keys.iter().map(|(frame, value)| (*frame, value.clone().value())).collect();
+    pub fn keyed<T: ParamType>(self, param: Param<T>, keys: &[(f64, T::Value)]) -> Self {
+        let keys = keys.iter().map(|(frame, value)| (*frame, T::erase(value.clone()))).collect();
         let keys = Keyframes { keys, interpolation: Interpolation::Linear };
         self.source(param.name(), Source::Keys(Arc::new(keys), T::shape()))
     }

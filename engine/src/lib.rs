@@ -23,10 +23,10 @@ pub mod prelude {
         Runs, SHIELDED, THICKNESS, Topology, UVW, V, Volume, WIDTH,
     };
     pub use crate::node::{
-        AttrDecl, AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past,
-        StepCx, Times, Wires,
+        AttrDecl, AttrNames, Chain, Cook, CurveLoop, Cx, Edited, Fill, FrameCx, Input, LeftOut, Many, Metric,
+        MetricValues, Node, Opt, Output, Outputs, Past, StepCx, Times, Wires,
     };
     pub use crate::param::{Clock, Code, Maskable, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;
-    pub use crate::{choice, inputs, params};
+    pub use crate::{choice, inputs, metrics, params};
 }

@@ -1,20 +1,20 @@
-//! Attribute_Expr: attributes made of attributes, by a few lines of code.
+//! Attribute_Expr: computes attributes from attributes, by a few lines of code.
 //!
-//! The language is [`engine::expr`]'s. A row sees itself: its own attributes, what stands once for the whole component,
-//! and over the points of curves also those of the curve. A well-known attribute that is missing reads as the value
-//! that changes nothing (`envelope` 1, `width` 0, `v` 0, `orient` no turn, `Pref` the position), so that code runs on
-//! raw curves. `rand` and `noise` hang on `seed`, and `seed` in the code is the node's, the scene's mixed in.
+//! The language is that of [`engine::expr`]. Each row sees its own attributes, those with one row for the whole
+//! component, and, on points of curves, also those of the curve. A missing well-known attribute has its neutral value
+//! (`envelope` 1, `width` 0, `v` 0, `orient` no rotation, `Pref` the position), so that code runs on curves straight
+//! from a file. `rand` and `noise` depend on `seed`, which is the node's seed mixed with the scene's.
 
 use engine::expr::{Env, ExprError, Program, RunError};
 use engine::prelude::*;
 
 inputs! { INPUTS:
-    GEOMETRY: Input = Input::any("geometry", "What gets the attributes.");
+    GEOMETRY: Input = Input::any("geometry", "The geometry whose attributes are computed.");
 }
 
 choice! {
-    /// Which component the code runs on.
-    pub enum Part {
+    /// The component that the code runs on.
+    enum Part {
         Curves = "curves": "the curves",
         Mesh = "mesh": "the mesh",
         Points = "points": "the loose points",
@@ -23,54 +23,55 @@ choice! {
 }
 
 choice! {
-    /// What a row is.
-    pub enum Over {
-        Points = "points": "every CV, vertex, particle or tet point",
+    /// The rows that the code runs on.
+    enum Over {
+        Points = "points": "every CV, vertex, particle or point of a tet",
         Elements = "elements": "every curve, face or tet",
     }
 }
 
 params! { PARAMS:
     CODE: Param<Code> = Param::code("code",
-        "One assignment a line: `envelope = clamp(envelope*P.y, 0, 1)`, `P.y += 0.1*sin(time)`, `let h = P.y*2`. A new \
-         name makes an attribute, a number or a vector as its value is. Known are attributes by name, `.x .y .z .w`, \
-         `frame time fps seed pi`, `i` (the row, from 0), `count`, and the graph's controls, before attributes of the same \
-         name: those are `@name`; `+ - * / % ^`, comparisons, `&& || !`, `a ? b : \
-         c`; sin cos tan sqrt exp log pow abs floor ceil min max clamp mix smoothstep noise rand vec length dot cross \
-         normalize and others. Angles are radians. Empty, it does nothing.");
-    COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "What it runs on.");
-    OVER: Param<Over> = Param::choice("over", Over::Points, "What a row is.");
-    SEED: Param<Seed> = Param::seed("Other numbers give other `rand` and `noise`.");
+        "One assignment per line: `envelope = clamp(envelope*P.y, 0, 1)`, `P.y += 0.1*sin(time)`, `let h = P.y*2`. A \
+         new name creates an attribute, a number or a vector like its value. Names are attributes, with `.x .y .z .w`, \
+         `frame time fps seed pi`, `i` (the row, from 0), `count`, and the graph's controls; an attribute with the \
+         name of a control is `@name`. Operators are `+ - * / % ^`, comparisons, `&& || !` and `a ? b : c`; functions \
+         sin cos tan sqrt exp log pow abs floor ceil min max clamp mix smoothstep noise rand vec length dot cross \
+         normalize and others. Angles are in radians. Empty code does nothing.");
+    COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "The component that the code runs on.");
+    OVER: Param<Over> = Param::choice("over", Over::Points, "The rows that the code runs on.");
+    SEED: Param<Seed> = Param::seed("Selects other values of `rand` and `noise`.");
 }
 
-const CHANGED: Output = Output::like("geometry", &GEOMETRY, "The same, with the attributes that the code assigns.");
+const CHANGED: Output = Output::like("geometry", &GEOMETRY, "The geometry with the attributes that the code assigns.");
 
-const ROWS: Metric = Metric::new("rows", Unit::None, "Points or elements that the code ran over.");
+metrics! { METRICS:
+    ROWS = Metric::new("rows", Unit::None, "Number of points or elements that the code ran on.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Attribute_Expr",
     1,
-    "Makes or changes attributes, positions included, by an expression for every point or element. A row sees its own \
-     attributes and those of the whole; over the points of curves also the curve's. Missing well-known attributes read \
-     as what changes nothing: `envelope` 1, `width` and `v` 0.",
+    "Creates or changes attributes, positions included, by expressions evaluated for every point or element. Each sees \
+     its own attributes and those of the whole component; points of curves also see the curve's. Missing well-known \
+     attributes have their neutral value: `envelope` 1, `width` and `v` 0.",
     Cook::Frame { cook, reads_clock },
 )
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&CHANGED])
 .attributes(attributes)
-.metrics(&[&ROWS])
+.metrics(METRICS)
 .checks(|params| checked_program(&params.get(CODE), params).map(drop))
-.leaves_out(|params, _| match program(&params.get(CODE)) {
-    Ok(program) if program.writes().is_empty() => vec![LeftOut::new("code", "it assigns nothing")],
-    _ => Vec::new(),
+.neutral(|params, _| {
+    let idle = program(&params.get(CODE)).is_ok_and(|program| program.writes().is_empty());
+    idle.then_some("`code` assigns nothing")
 });
 
-/// The program that the code is.
+/// The compiled code.
 ///
 /// # Errors
-/// Every line's fault, with its line and column; the hint is the first's.
+/// The faults of all lines, with line and column, and the first hint.
 fn program(code: &Code) -> Result<&Program> {
     code.program().map_err(|faults| {
         let place = |fault: &ExprError| format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
@@ -80,7 +81,7 @@ fn program(code: &Code) -> Result<&Program> {
     })
 }
 
-/// The program, where there may be rows for it to run over.
+/// The compiled code, if it can run on the chosen rows.
 ///
 /// # Errors
 /// Those of the code; rows that no geometry has.
@@ -90,19 +91,19 @@ fn checked_program<'c>(code: &'c Code, params: &Params) -> Result<&'c Program> {
     let fact = match params.get(COMPONENT) {
         Part::Points if elements => "loose points have no elements",
         _ if elements && program.writes().iter().any(|name| name == P.name) => {
-            "`P` belongs to points, and the code runs over elements"
+            "`P` belongs to points, and the code runs on elements"
         }
         _ => return Ok(program),
     };
     Err(Error::refused(fact).hint("set `over` to \"points\""))
 }
 
-/// The frame rate counts as the clock: it is the scene's, not a param.
+/// The frame rate counts as the clock: it belongs to the scene, not to the params.
 fn reads_clock(params: &Params) -> bool {
     program(&params.get(CODE)).is_ok_and(|program| program.uses().time || program.uses().fps)
 }
 
-/// What is written is read too: points and elements of other components may have an attribute of that name.
+/// Written attributes are read too: points and elements of other components may have an attribute of that name.
 fn attributes(params: &Params) -> [AttrNames; 2] {
     let names = |lists: &[&[String]]| {
         AttrNames::These(lists.iter().flat_map(|list| list.iter()).map(|name| Name::from(name.as_str())).collect())
@@ -117,9 +118,6 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let code = cx.get(CODE);
     let program = checked_program(&code, cx.params())?;
     let mut geometry = cx.input(GEOMETRY).clone();
-    if program.writes().is_empty() {
-        return Ok(CHANGED.with(geometry));
-    }
     let part = part(&mut geometry, cx.get(COMPONENT))?;
     let owner = match cx.get(OVER) {
         Over::Points => Owner::Point,
@@ -151,7 +149,7 @@ fn part(geometry: &mut Geometry, component: Part) -> Result<&mut Component> {
     geometry.part_mut(kind).ok_or_else(|| Error::refused(format!("`geometry` has no {kind}")).hint(hint))
 }
 
-/// The columns that the program writes.
+/// The columns that the code writes.
 fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Result<Vec<(String, Column)>> {
     let table = part.table(owner);
     let lent: Vec<(&str, Column)> = program
@@ -168,7 +166,7 @@ fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Resu
     program.run(env, &columns, table.rows()).map_err(|error| explained(error, part, owner))
 }
 
-/// An attribute that rows of `owner` do not have themselves: of the whole, of a CV's curve, or neutral.
+/// An attribute that rows of `owner` do not have themselves: that of the whole component, of a CV's curve, or neutral.
 fn lent(part: &Component, owner: Owner, name: &str) -> Option<Column> {
     if let Some(column) = part.table(Owner::Once).column(name) {
         return Some(column.gather(&vec![0; part.table(owner).rows()]));
@@ -188,17 +186,17 @@ fn other(owner: Owner) -> Owner {
     if owner == Owner::Point { Owner::Element } else { Owner::Point }
 }
 
-/// Refuses an attribute that the other kind of row has: two of one name would go their own ways.
+/// Refuses an attribute that the other kind of row has: two with one name would diverge.
 fn check_owner(part: &Component, owner: Owner, name: &str) -> Result<()> {
     let theirs = other(owner);
     if part.table(owner).column(name).is_none() && part.table(theirs).column(name).is_some() {
-        let fact = format!("`{name}` of the {} belongs to {theirs}s, and the code runs over {owner}s", part.kind());
+        let fact = format!("`{name}` of the {} belongs to {theirs}s, and the code runs on {owner}s", part.kind());
         return Err(Error::refused(fact).hint(format!("set `over` to \"{theirs}s\", or assign to another name")));
     }
     Ok(())
 }
 
-/// The error, with a hint where the code names what the other kind of row has.
+/// The error, with a hint if the code names an attribute of the other kind of row.
 fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
     let RunError::Code(fault) = &error else { return error.into() };
     let theirs = part.table(other(owner));
@@ -355,7 +353,7 @@ mod tests {
         );
         assert_eq!(
             refused(&code("shielded = 1")),
-            "`shielded` of the curves belongs to elements, and the code runs over points; \
+            "`shielded` of the curves belongs to elements, and the code runs on points; \
              set `over` to \"elements\", or assign to another name"
         );
         let mut mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[1.0; 3]; 3]).unwrap();
@@ -371,7 +369,7 @@ mod tests {
         let positions = code("P = P*2").set(OVER, Over::Elements);
         assert_eq!(
             refused(&positions),
-            "`P` belongs to points, and the code runs over elements; set `over` to \"points\""
+            "`P` belongs to points, and the code runs on elements; set `over` to \"points\""
         );
         let absent = code("a = 1").set(COMPONENT, Part::Tets);
         assert_eq!(refused(&absent), "`geometry` has no tets; set `component`; it has curves");

@@ -1,15 +1,15 @@
 //! Curve_Attach: curves follow the skin that they grew on.
 //!
-//! Each root is bound to its nearest point of `rest_skin` and to its distance from it, and from there carried to `skin`
-//! ([`curves::attach`]): the whole curve turns about it by the rotation nearest to how the skin around it has
-//! deformed, and moves with it. So curves stay as long as they are and neighbours turn alike on either side of an edge,
-//! however the skin stretches. What Transform turns is turned: `v`, `N`, `orient`. `Pref`, where the curves have none,
-//! becomes what they were before, so that what is sampled at rest sticks to them.
+//! Each root is bound to its closest point on `rest_skin`, at its distance from it, and carried to `skin`
+//! ([`curves::attach`]): the whole curve moves with that point and rotates about it by the rotation closest to the
+//! local deformation of the skin. So curves keep their lengths, and neighbours on either side of an edge rotate alike,
+//! however the skin stretches. `v`, `N` and `orient` rotate too. If the curves have no `Pref`, it is set to their
+//! positions before, so that anything sampled at rest sticks to them.
 //!
-//! Where the skin around a root has no direction left (scaled to nothing, or to a line), its curve moves and does not
-//! turn, and is counted; a single face that is lost leaves its curves to its neighbours. A face turned inside out turns
-//! its curves inwards. The motion of the skin is not added to `v`. The binding is kept as long as the roots and `rest_skin`
-//! stand still, so curves that already move at rest cost no more.
+//! Where the skin around a root is degenerate (collapsed to a point or a line), its curve moves without rotating, and
+//! is counted; if a single face collapses, its neighbours carry its curves. A face turned inside out turns its curves
+//! inwards. The motion of the skin is not added to `v`. The binding is cached as long as the roots and `rest_skin` do
+//! not change, also for curves that move otherwise.
 
 use curves::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
 use engine::prelude::*;
@@ -19,24 +19,24 @@ use crate::shared::kept::Roots;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they grew on `rest_skin`, root first.");
-    REST_SKIN: Input = Input::one("rest_skin", Kind::Mesh, "The mesh as it was when the curves grew on it.");
-    SKIN: Input = Input::one("skin", Kind::Mesh, "The same mesh as it is now: other places, the same faces.");
+    REST_SKIN: Input = Input::one("rest_skin", Kind::Mesh, "The mesh on which the curves were grown.");
+    SKIN: Input = Input::one("skin", Kind::Mesh, "The same mesh in its current pose: the same faces, other positions.");
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The curves on `skin`. Lengths are kept.");
+const OUT: Output = Output::like("curves", &CURVES, "The curves, carried to `skin`. Lengths are kept.");
 
-const BOUND: Metric = Metric::new("bound", Unit::Metres, "How far from `rest_skin` the farthest root is.");
-const UNTURNED: Metric =
-    Metric::new("unturned", Unit::None, "Curves that only move, as the skin around them has lost its directions.");
-const LENGTH_ERROR: Metric =
-    Metric::new("length_error", Unit::None, "The largest change of a length, as a share of the curve's length.");
+metrics! { METRICS:
+    BOUND = Metric::new("bound", Unit::Metres, "The largest distance of a root from `rest_skin`.");
+    UNTURNED = Metric::new("unturned", Unit::None,
+        "Curves that move without rotating, as the skin around them is degenerate.");
+    LENGTH_ERROR = Metric::length_error();
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Attach",
     1,
-    "Carries curves along with the skin that they grew on. Roots stay where they are on its faces; each curve turns as \
-     the skin around its root does and keeps its shape and length. A root away from the skin keeps its distance.",
+    "Carries curves along with the skin that they grew on. Roots stay at their positions on its faces; each curve \
+     rotates with the skin around its root and keeps its shape and length. A root off the skin keeps its distance.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -44,25 +44,26 @@ pub static NODE: Node = Node::new(
 .reads(&[&P, &PREF])
 .writes(&[&P, &PREF])
 .attributes(|_| {
-    // Only what is there is turned, so whoever needs it after this needs it before.
+    // Existing attributes alone are rotated, so they are read as well.
     [(); 2].map(|()| AttrNames::These([V.name, N.name, ORIENT.name].map(Name::from).to_vec()))
 })
-.metrics(&[&BOUND, &UNTURNED, &LENGTH_ERROR]);
+.metrics(METRICS);
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (curves, rest, skin) = (cx.part(CURVES), cx.part(REST_SKIN), cx.part(SKIN));
     if !same_faces(rest, skin) {
         let [skin, rest] = [skin, rest].map(counted);
-        let fact = format!("`skin` has {skin}, `rest_skin` {rest}, or they are joined otherwise");
+        let fact = format!("`skin` has {skin}, `rest_skin` {rest}, or their topology differs");
         return Err(Error::refused(fact).hint(
-            "they are poses of one mesh; a mirroring Transform turns faces round, so mirror what comes out instead",
+            "give two poses of one mesh; a mirroring Transform reverses faces, so mirror the output of this node \
+             instead",
         ));
     }
     let roots = Roots::of(curves);
     let binding = rest.kept(roots.clone(), || bind(&roots.0, rest))?;
     cx.check_cancelled()?;
 
-    let mut out = curves.clone();
+    let mut out = cx.edit(CURVES);
     if cx.wants(PREF) && curves.get(PREF).is_none() {
         let rest = curves.table(Owner::Point).column(P.name).cloned().expect("every component has `P`");
         out.set_column(Owner::Point, PREF.name, rest)?;
@@ -79,9 +80,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         out.set(P, carried.points)?;
         turn_attributes(&mut out, &poses);
     }
-    let mut geometry = cx.input(CURVES).clone();
-    geometry.put(out);
-    Ok(OUT.with(geometry))
+    Ok(OUT.with(out))
 }
 
 /// Binds the roots.
@@ -90,12 +89,12 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 /// Where there are roots and nothing to bind them to.
 fn bind(roots: &[[f32; 3]], rest: &Component) -> Result<Binding> {
     Binding::nearest(rest.positions(), &rest.triangles().corners, roots).ok_or_else(|| {
-        let fact = format!("`rest_skin` has no face for {} curves to hold on to", roots.len());
-        Error::refused(fact).hint("connect the mesh that the curves grew on")
+        let fact = format!("`rest_skin` has no face to attach {} curves to", roots.len());
+        Error::refused(fact).hint("wire the mesh that the curves grew on")
     })
 }
 
-/// Turns vectors and orientations, a row a CV or a row a curve.
+/// Rotates vectors and orientations, of CVs and of curves.
 fn turn_attributes(curves: &mut Component, poses: &[Pose]) {
     let by_cv = curves.runs().starts().to_vec();
     let by_curve: Vec<u32> = (0..by_cv.len() as u32).collect();

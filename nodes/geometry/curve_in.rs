@@ -7,32 +7,32 @@ use std::sync::Arc;
 
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
-        "An obj, ply or json file with curves. A run of `#` in its name stands for the frame number: `fur.####.obj`.");
+        "An obj, ply or json file with curves. A run of `#` in its name stands for the frame number, as in \
+         `fur.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
+        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "CVs written into the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);
     COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts",
-        "CVs of each curve in `points`. Empty, all of them are one curve.");
+        "Number of CVs of each curve in `points`. If empty, they all belong to one curve.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes added to the curves, a row a CV.");
+        "Attributes added to the curves, one row per CV.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added to the curves, a row a curve.");
+        "Attributes added to the curves, one row per curve.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
     WIDTH_PARAM: Param<f32> = Param::float("width", 0.0,
-        "Width of every curve. 0 keeps what the file says.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
+        "Width of every curve. 0 keeps the widths in the file.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
 }
 
 const CURVES: Output = Output::new("curves", &[Kind::Curves], "The curves.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_In",
     2,
-    "Curves from a file, or written into the graph: fur, grass, fibres. Other geometry in the file is left; Mesh_In reads \
-     its polygons.",
+    "Curves from a file, or written into the graph: fur, grass, fibres. Other geometry in the file is ignored; \
+     Mesh_In reads its polygons.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

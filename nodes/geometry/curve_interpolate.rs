@@ -1,15 +1,15 @@
 //! Curve_Interpolate: hairs that fill the skin between guide curves.
 //!
-//! At the scene's first frame roots are spread over the skin as Curve_Scatter does it, and each hair is bound to the
-//! guides whose roots are nearest, with weights that are 0 before a guide is exchanged for another
-//! ([`curves::guides`]). Both are kept from then on, so nothing hangs on where guides are blown: a hair is at every
-//! frame the same mix of its guides' shapes as they are now, and any frame cooks alone. Shapes are mixed in the frames
-//! of the roots: on a curved skin a hair stands on it as its guides do, and where the skin moves, frames turn as in
-//! Curve_Attach. Roots stay on their faces. A hair at a guide's root is that guide.
+//! At the scene's first frame roots are distributed over the skin as in Curve_Scatter, and each hair is bound to the
+//! guides with the nearest roots; weights fall to 0 before one guide is replaced by another ([`curves::guides`]). Both
+//! are kept for all frames and do not depend on the guides' motion: at every frame a hair is the same blend of the
+//! current shapes of its guides, so any frame cooks alone. Shapes are blended in the roots' local frames: on a curved
+//! skin hairs stand at the same angle as their guides, and where the skin moves, the frames rotate as in Curve_Attach.
+//! Roots stay on their faces. A hair at a guide's root equals that guide.
 //!
-//! Numbers on the guides are mixed alike, `v` and `N` turned along; whole numbers, and `orient`, are those of the
-//! heaviest guide. `curve_id` is the hair's place in the endless list of roots, `Pref` the hair at the scene's first
-//! frame, `uvw` the skin's where it has one.
+//! Float attributes of the guides are blended with the same weights, `v` and `N` rotated as well; integers, and
+//! `orient`, are those of the guide with the largest weight. `curve_id` is the hair's index in the infinite sequence of
+//! roots, `Pref` the hair at the scene's first frame, `uvw` the skin's if it has one.
 
 use curves::attach::{Binding, Pose};
 use curves::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
@@ -21,44 +21,45 @@ use crate::shared::kept::{Array, Roots};
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
 inputs! { INPUTS:
-    GUIDES: Input = Input::one("guides", Kind::Curves, "Curves on the skin, root first. They may move; their CVs must stay.")
+    GUIDES: Input = Input::one("guides", Kind::Curves, "Guide curves on the skin, root first. They may move, but must \
+        keep their CVs.")
         .read_at(|_| Times::START.and(Times::NOW));
-    SKIN: Input = Input::one("skin", Kind::Mesh, "The mesh that hairs grow on. It may move; its faces must stay.")
+    SKIN: Input = Input::one("skin", Kind::Mesh, "The mesh that hairs grow on. It may move, but must keep its faces.")
         .read_at(|_| Times::START.and(Times::NOW));
 }
 
 params! { PARAMS:
-    DENSITY: Param<f32> = Param::float("density", 10_000.0, "Hairs on a square metre, before the mask.")
+    DENSITY: Param<f32> = Param::float("density", 10_000.0, "Number of hairs per square metre, before the mask.")
         .unit(Unit::PerSquareMetre).at_least(0.0).soft(0.0, 1_000_000.0);
     COUNT: Param<i64> = Param::int("guides", 3,
-        "How many of the nearest guides a hair is a mix of: 1 gathers hairs into clumps around their guides, more make \
-         the coat smoother.").within(1.0, MOST_GUIDES as f64).soft(1.0, 8.0);
-    CVS: Param<i64> = Param::int("cvs", 0, "CVs of each hair. 0 takes as many as the guide that has most.")
+        "Number of nearest guides that a hair is blended from: 1 makes clumps around the guides, more make a smoother \
+         coat.").within(1.0, MOST_GUIDES as f64).soft(1.0, 8.0);
+    CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 takes that of the guide with the most CVs.")
         .within(0.0, 10_000.0).soft(0.0, 32.0);
-    SEED: Param<Seed> = Param::seed("Other numbers give other places.");
+    SEED: Param<Seed> = Param::seed("Selects other positions.");
     MASK: Param<Name> = Param::text("mask", "",
-        "A point attribute of the skin that multiplies the density. Empty, there is none.").fixed();
+        "A point attribute of the skin that multiplies the density. If empty, there is no mask.").fixed();
 }
 
 const CURVES: Output = Output::new(
     "curves",
     &[Kind::Curves],
-    "The hairs, root first, with `Pref`, `curve_id` and what their guides have.",
+    "The hairs, root first, with `Pref`, `curve_id` and the attributes of their guides.",
 );
 
-const GROWN: Metric = Metric::new("curves", Unit::None, "Hairs that grew.");
-const LENGTH_ERROR: Metric = Metric::new(
-    "length_error",
-    Unit::None,
-    "The largest difference of a hair's length from the mix of its guides' lengths, as a share of that.",
-);
+metrics! { METRICS:
+    GROWN = Metric::new("curves", Unit::None, "Number of hairs grown.");
+    LENGTH_ERROR = Metric::new("length_error", Unit::None,
+        "The largest difference between a hair's length and the blended length of its guides, as a share of the \
+         latter.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Interpolate",
     1,
-    "Fills a skin with hairs between guide curves. Each hair has the mixed shape and length of the guides nearest to its \
-     root and moves as they do; where guides disagree, hairs turn from one to the other and do not shrink.",
+    "Fills a skin with hairs between guide curves. Each hair blends the shapes and lengths of the guides nearest to \
+     its root and moves with them; where guides point different ways, hairs change direction gradually and do not \
+     shrink.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -66,11 +67,11 @@ pub static NODE: Node = Node::new(
 .outputs(&[&CURVES])
 .writes(&[&P, &PREF, &CURVE_ID])
 .attributes(|_| [AttrNames::All, AttrNames::All])
-.metrics(&[&GROWN, &LENGTH_ERROR])
+.metrics(METRICS)
 .changes_topology();
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    let (rest, skin) = (planting::kept_faces(cx.at_start(SKIN), cx.part(SKIN))?, cx.part(SKIN));
+    let (rest, skin) = (planting::kept_faces(cx.part_at_start(SKIN), cx.part(SKIN))?, cx.part(SKIN));
     let (first, guides) = (guides_at_start(cx)?, cx.part(GUIDES));
     let cvs = match cx.get(CVS) {
         0 => guides.runs().counts().max().unwrap_or(2) as usize,
@@ -109,26 +110,25 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 /// # Errors
 /// Where they had other CVs.
 fn guides_at_start<'c>(cx: &'c Cx) -> Result<&'c Component> {
-    let first = cx.at_start(GUIDES).curves().expect("the engine refuses a wire that lacks what its input needs");
-    let now = cx.part(GUIDES);
+    let (first, now) = (cx.part_at_start(GUIDES), cx.part(GUIDES));
     if first.runs() == now.runs() {
         return Ok(first);
     }
     let fact = format!(
-        "`guides` has {} curves and {} CVs, at the scene's first frame {} and {}, or they are shared out otherwise",
+        "`guides` has {} curves and {} CVs, at the scene's first frame {} and {}, or they are distributed differently",
         now.element_count(),
         now.point_count(),
         first.element_count(),
         first.point_count()
     );
-    Err(Error::refused(fact).hint("hairs are mixed of guides that move but keep their CVs"))
+    Err(Error::refused(fact).hint("guides may move, but must keep their CVs"))
 }
 
 fn moved(root: &[f64; 3], pose: &Pose) -> [f64; 3] {
     [0, 1, 2].map(|k| root[k] + pose.shift[k])
 }
 
-/// What a coat hangs on.
+/// What a coat depends on.
 #[derive(PartialEq)]
 struct Asked {
     guides: Roots,
@@ -152,7 +152,7 @@ impl Asked {
     }
 }
 
-/// Where hairs grow and what they are made of: the same at every frame.
+/// Roots, guides and weights of the hairs: the same at every frame.
 struct Coat {
     ids: Vec<i32>,
     spots: Vec<Spot>,
@@ -180,7 +180,7 @@ impl Coat {
             .collect();
         let hairs = Binding::on(points, triangles, &spots);
         let Roots(guide_roots) = Roots::of(guides);
-        // Where there is nothing to hold on to, nothing grows either.
+        // On a skin without faces no hairs grow, so no guide needs a binding.
         let guides = Binding::nearest(points, triangles, &guide_roots);
         let guides = guides.unwrap_or_else(|| Binding::on(points, triangles, &[]));
         let stands = |places: &[[f32; 3]], normals: Vec<[f64; 3]>| -> Vec<Stand> {
@@ -193,7 +193,7 @@ impl Coat {
         Ok(Self { ids, spots, roots, mix, hairs, guides })
     }
 
-    /// How hairs' roots and guides' roots have moved with the skin.
+    /// The motion of the skin at the roots of hairs and of guides.
     fn carried(&self, skin: &Component) -> (Vec<Pose>, Vec<Pose>) {
         (self.hairs.carry(skin.positions()), self.guides.carry(skin.positions()))
     }
@@ -205,7 +205,7 @@ impl Coat {
     }
 }
 
-/// Gives hairs what their guides have.
+/// Transfers the guides' attributes to the hairs.
 fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shapes, now: &Blend) -> Result<()> {
     let own = |name: &str| [P.name, PREF.name, CURVE_ID.name].contains(&name);
     for (owner, name, column) in guides.columns().filter(|(_, name, _)| !own(name)) {

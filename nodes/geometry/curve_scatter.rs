@@ -1,13 +1,13 @@
 //! Curve_Scatter: straight blades of grass or hair, spread evenly over a skin.
 //!
-//! Roots are chosen on the skin as it is at the scene's first frame ([`curves::scatter`]) and stay on their faces
-//! while it moves, so blades neither pop nor slide; there, too, `Pref` is taken and the mask read. The places are the
-//! first of one endless list: a higher density keeps every blade and adds some between, and a mask keeps fewer of the
-//! first where it is lower, so that it thins evenly. A blade's place in the list is its `curve_id`, which its length and
-//! lean are drawn by (`id` is left for points). Curves stand in the order of the skin's faces.
+//! Roots are chosen on the skin at the scene's first frame ([`curves::scatter`]) and stay on their faces while it
+//! moves, so blades neither pop nor slide; `Pref` and the mask are taken from that frame too. Roots are a prefix of one
+//! infinite sequence: a higher density keeps every blade and adds others between them, and a lower mask keeps a shorter
+//! prefix, so that it thins evenly. A blade's index in the sequence is its `curve_id`, from which its length and lean
+//! are drawn (`id` is reserved for points). Curves are in the order of the skin's faces.
 //!
-//! Each frame of a moving skin costs as much as the first; Curve_Attach moves curves that were grown on a still one.
-//! Distances are straight through space: nearby folds that face the same way share their room.
+//! Each frame of a moving skin costs as much as the first; Curve_Attach is cheaper for curves grown on a still skin.
+//! Distances are Euclidean: nearby folds that face the same way share their density.
 
 use curves::scatter::{Blade, Spot, grow, vertex_normals};
 use engine::prelude::*;
@@ -16,38 +16,40 @@ use numerics::random::Key;
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
 inputs! { INPUTS:
-    SKIN: Input = Input::one("skin", Kind::Mesh, "The mesh that the curves grow on. It may move; its faces must stay.")
+    SKIN: Input = Input::one("skin", Kind::Mesh, "The mesh that the curves grow on. It may move, but must keep its \
+        faces.")
         .read_at(|_| Times::START.and(Times::NOW));
 }
 
 params! { PARAMS:
-    DENSITY: Param<f32> = Param::float("density", 1000.0, "Curves on a square metre, before the mask.")
+    DENSITY: Param<f32> = Param::float("density", 1000.0, "Number of curves per square metre, before the mask.")
         .unit(Unit::PerSquareMetre).at_least(0.0).soft(0.0, 100_000.0);
-    LENGTH: Param<Span> = Param::span("length", [0.05, 0.1], "Shortest and longest curve, root to tip.")
+    LENGTH: Param<Span> = Param::span("length", [0.05, 0.1], "Length of the shortest and the longest curve.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0);
-    CVS: Param<i64> = Param::int("cvs", 5, "CVs of each curve, evenly apart.").within(2.0, 10_000.0).soft(2.0, 32.0);
+    CVS: Param<i64> = Param::int("cvs", 5, "Number of CVs of each curve, evenly spaced.").within(2.0, 10_000.0).soft(2.0, 32.0);
     LEAN: Param<f32> = Param::float("lean", 0.2,
-        "How far a curve may lean away from the skin's normal, as a share of a right angle: 0 all stand up, 1 some lie \
-         flat. Each leans by its own share, to its own side.").at_least(0.0).soft(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Other numbers give other places, lengths and sides.");
+        "Largest angle between a curve and the skin's normal, as a share of 90 degrees: at 0 all are upright, at 1 \
+         some lie flat. Angle and direction are random for each curve.").at_least(0.0).soft(0.0, 1.0);
+    SEED: Param<Seed> = Param::seed("Selects other positions, lengths and directions.");
     MASK: Param<Name> = Param::text("mask", "",
-        "A point attribute of the skin that multiplies the density. Empty, there is none.").fixed();
+        "A point attribute of the skin that multiplies the density. If empty, there is no mask.").fixed();
 }
 
 const CURVES: Output = Output::new(
     "curves",
     &[Kind::Curves],
-    "The curves, root first, with `Pref`, `curve_id` and, where the skin has it, the `uvw` of the root.",
+    "The curves, root first, with `Pref`, `curve_id` and, if the skin has it, the `uvw` of the root.",
 );
 
-const GROWN: Metric = Metric::new("curves", Unit::None, "Curves that grew.");
+metrics! { METRICS:
+    GROWN = Metric::new("curves", Unit::None, "Number of curves grown.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Scatter",
     2,
-    "Grows straight curves on a mesh, evenly spread, neither in rows nor in clumps. They stay on their faces while the \
-     skin moves. A higher density adds curves between those that were there.",
+    "Grows straight curves on a mesh, evenly distributed without rows or clumps. They stay on their faces while the \
+     skin moves. A higher density adds curves between the existing ones.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -59,24 +61,24 @@ pub static NODE: Node = Node::new(
     let mask = Some(params.get(MASK)).filter(|mask| !mask.is_empty());
     [AttrNames::These(mask.into_iter().collect()), AttrNames::These(Vec::new())]
 })
-.metrics(&[&GROWN])
+.metrics(METRICS)
 .changes_topology();
 
-/// What is drawn for each curve.
+/// Random numbers of each curve.
 const LENGTH_DRAW: u64 = 0;
 const LEAN_DRAW: u64 = 1;
 const SIDE_DRAW: u64 = 2;
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let skin = cx.part(SKIN);
-    let rest = planting::kept_faces(cx.at_start(SKIN), cx.part(SKIN))?;
+    let rest = planting::kept_faces(cx.part_at_start(SKIN), skin)?;
     let cvs = cx.get(CVS) as usize;
     let planting =
         Planting { density: cx.get(DENSITY), mask: planting::mask(&cx.get(MASK), rest)?, cvs, seed: cx.get(SEED) };
     let spots = planting.spots(cx, rest)?;
     cx.check_cancelled()?;
 
-    // As they are cut at the first frame: on a face that bends, a moving cut would let roots slide.
+    // The triangulation of the first frame: if it changed on a face that bends, roots would slide.
     let triangles = &rest.triangles().corners;
     let key = Key::new(u64::from(cx.get(SEED).0));
     let shapes: Vec<Blade> = spots.iter().map(|(place, spot)| blade(cx, *spot, key.of(*place as u64))).collect();
@@ -106,7 +108,7 @@ fn blade(cx: &Cx, root: Spot, key: Key) -> Blade {
     }
 }
 
-/// The skin's own normals, or else those of its faces around each point.
+/// The skin's own normals, or those computed from the faces around each point.
 fn normals(skin: &Component, triangles: &[[u32; 3]]) -> Vec<[f64; 3]> {
     match skin.get(N) {
         Some(normals) => normals.iter().map(|normal| normal.map(f64::from)).collect(),

@@ -1,17 +1,17 @@
-//! Lattice_Deform: space is a block of jelly, and control points in it are pulled about.
+//! Lattice_Deform: free-form deformation by a box of control points.
 //!
-//! R2 shapes liquids with "lattice deformers", and a goal shape of a soft body (R1) has to have the faces of the body's
-//! surface: a lattice moves points and nothing else. The map is Sederberg and Parry's ([`curves::lattice`]): Bernstein
-//! polynomials over the whole box, or tents over its cells. Offsets, not places, are set and keyed, so what is not
-//! mentioned is not moved.
+//! R2 shapes liquids with "lattice deformers"; and the goal shape of a soft body (R1) must have the faces of the body's
+//! surface, which a lattice preserves, as it moves points alone. The map is Sederberg and Parry's
+//! ([`curves::lattice`]): Bernstein polynomials over the whole box, or trilinear interpolation in its cells. Offsets,
+//! not positions, are set and keyed, so the default moves nothing.
 //!
 //! What the sources leave open:
-//! * Outside the box there is no lattice. By default points there move as the nearest of the box does, so nothing tears and
-//!   nothing runs away; or the box's edges go straight on.
-//! * `v` goes along as a vector, `N` stays perpendicular and on the side that the faces' winding says, also where space is
-//!   folded over; `orient` turns by the rotation nearest to how space around it is deformed. A vector of an element follows
-//!   what becomes of space in the middle of its points. `width`, `thickness` and all else stay as they are.
-//! * The motion of keyed offsets is not added to `v`. A volume's grid lies along the axes: it is refused.
+//! * Outside the box the map is not defined. By default points there move like the closest point of the box, so nothing
+//!   tears and nothing diverges; or the deformation is extrapolated linearly.
+//! * `v` is mapped as a vector; `N` stays perpendicular and on the side given by the faces' winding, also where space
+//!   is folded over; `orient` rotates by the rotation closest to the local deformation. Vectors of an element follow
+//!   the deformation at the mean of its points. `width`, `thickness` and all other attributes pass through.
+//! * The motion of keyed offsets is not added to `v`. A volume's grid is aligned with the axes: it is refused.
 
 use curves::lattice::{DeformationLattice, Deformed, Extrapolation, LatticeBasis};
 use curves::lattice::{control_points, map_normals, map_orientations, map_vectors};
@@ -21,66 +21,62 @@ use numerics::volume;
 use std::sync::Arc;
 
 choice! {
-    /// How control points share in what is between them.
-    pub enum Basis {
-        Trilinear = "trilinear": "straight from one to the next: each cell is moved by its eight corners alone, and creases \
-                show where cells meet",
-        Bernstein = "bernstein": "smooth: each control point moves the whole box, most where it is",
+    /// Interpolation between control points.
+    BasisChoice for LatticeBasis {
+        LatticeBasis::Trilinear => "trilinear": "linear: each cell is moved by its eight corners alone, and creases \
+            show where cells meet",
+        LatticeBasis::Bernstein => "bernstein": "smooth: each control point moves the whole box, most strongly near \
+            itself",
     }
 }
 
 choice! {
-    /// What becomes of what is outside the box.
-    pub enum Outside {
-        Hold = "hold": "it moves as the nearest point of the box does",
-        Extend = "extend": "the edges of the box go straight on, so what is far away moves far",
+    /// The deformation outside the box.
+    OutsideChoice for Extrapolation {
+        Extrapolation::Hold => "hold": "points move like the closest point of the box",
+        Extrapolation::Extend => "extend": "the deformation is extrapolated linearly, so distant points move far",
     }
 }
 
-/// A quarter of a million control points; nobody pulls at more by hand.
+/// A quarter of a million control points: more than anybody sets by hand.
 const MOST_DIVISIONS: f64 = 64.0;
 
 inputs! { INPUTS:
-    GEOMETRY: Input = Input::any("geometry", "What is deformed: curves, meshes, points and tets.");
+    GEOMETRY: Input = Input::any("geometry", "The geometry to deform: curves, meshes, points and tets.");
 }
 
 params! { PARAMS:
     DIVISIONS: Param<[i64; 3]> = Param::int3("divisions", [1; 3],
-        "Cells along x, y and z. Control points are one more each way.").within(1.0, MOST_DIVISIONS).soft(1.0, 8.0).fixed();
+        "Number of cells along x, y and z. There is one more control point than cells along each axis.")
+        .within(1.0, MOST_DIVISIONS).soft(1.0, 8.0).fixed();
     FROM: Param<[f64; 3]> = Param::dvec3("from", [-0.5; 3],
         "The lower corner of the box.").unit(Unit::Metres).when(bends);
     TO: Param<[f64; 3]> = Param::dvec3("to", [0.5; 3],
         "The upper corner of the box.").unit(Unit::Metres).when(bends);
     OFFSETS: Param<Arc<Vec<[f32; 3]>>> = Param::vec3s("offsets",
-        "How far each control point is pulled, in metres: first all along x at the lowest y and z, then the next y, then \
-         the next z. None pulls at nothing. Keys run straight from list to list.");
-    BASIS: Param<Basis> = Param::choice("basis", Basis::Bernstein,
-        "How control points share in what is between them. With one division both are the same.").when(bends);
-    OUTSIDE: Param<Outside> = Param::choice("outside", Outside::Hold, "What becomes of what is outside the box.")
+        "Offset of each control point, in metres: x varies fastest, then y, then z. If empty, nothing moves. Keys are \
+         interpolated linearly.");
+    BASIS: Param<BasisChoice> = Param::choice("basis", LatticeBasis::Bernstein,
+        "How the deformation is interpolated between control points. With one division both are the same.").when(bends);
+    OUTSIDE: Param<OutsideChoice> = Param::choice("outside", Extrapolation::Hold, "How points outside the box move.")
         .when(bends);
 }
 
-const DEFORMED: Output = Output::like("geometry", &GEOMETRY, "The same, deformed.");
+const DEFORMED: Output = Output::like("geometry", &GEOMETRY, "The deformed geometry.");
 
-const FOLDED: Metric =
-    Metric::new("folded", Unit::None, "Points where the lattice presses space flat or turns it inside out.");
-const MIN_JACOBIAN: Metric = Metric::new(
-    "min_jacobian",
-    Unit::None,
-    "The share of its volume that space keeps where a point is squeezed most; below 0 it is inside out.",
-);
-const VOLUME_RATIO: Metric = Metric::new(
-    "volume_ratio",
-    Unit::None,
-    "Volume of the tets, without them of what a closed mesh encloses, as a share of what it was.",
-);
+metrics! { METRICS:
+    FOLDED = Metric::new("folded", Unit::None, "Points at which the lattice flattens space or turns it inside out.");
+    MIN_JACOBIAN = Metric::new("min_jacobian", Unit::None,
+        "The smallest local change of volume at a point, as a factor; below 0 space is inside out.").neutral(1.0);
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None,
+        "Volume of the tets, or that enclosed by a closed mesh, relative to before.").neutral(1.0);
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Lattice_Deform",
     1,
-    "Bends, bulges, squeezes and twists geometry of any kind by a box of control points around it. Points move with the \
-     control points near them; velocities, normals and orientations turn along; what joins the points stays as it is, so a \
+    "Bends, bulges, squeezes and twists geometry of any kind by a box of control points around it. Points move with \
+     the control points near them; velocities, normals and orientations follow. Topology does not change, so a \
      deformed surface can be the goal of a soft body.",
     Cook::Pure(cook),
 )
@@ -89,26 +85,23 @@ pub static NODE: Node = Node::new(
 .outputs(&[&DEFORMED])
 .writes(&[&P])
 .attributes(|_| {
-    // Only what is there is changed, so whoever needs it after this needs it before.
+    // Existing attributes alone are changed, so they are read as well.
     [(); 2].map(|()| AttrNames::These(FOLLOWING.map(Name::from).to_vec()))
 })
-.metrics(&[&FOLDED, &MIN_JACOBIAN, &VOLUME_RATIO])
+.metrics(METRICS)
 .checks(|params| lattice(params, &params.get(OFFSETS)).map(|_| ()))
-.leaves_out(leaves_out);
+.neutral(|params, _| (!bends(params)).then_some("`offsets` move nothing"));
 
-/// Attributes that turn along.
+/// Attributes that follow the deformation.
 const FOLLOWING: [&str; 3] = [V.name, N.name, ORIENT.name];
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut geometry = cx.input(GEOMETRY).clone();
     let offsets = cx.get(OFFSETS);
-    let Some(lattice) = lattice(cx.params(), &offsets)? else {
-        publish(cx, [], Some(1.0));
-        return Ok(DEFORMED.with(geometry));
-    };
+    let Some(lattice) = lattice(cx.params(), &offsets)? else { return Ok(DEFORMED.with(geometry)) };
     if geometry.volume().is_some() {
-        return Err(Error::refused("a volume cannot be bent: its grid lies along the axes")
-            .hint("deform what it is made from, or its surface"));
+        return Err(Error::refused("a volume cannot be deformed: its grid is aligned with the axes")
+            .hint("deform the geometry that it is made from, or its surface"));
     }
     let before = geometry.clone();
     let mut reached = Vec::new();
@@ -124,15 +117,15 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(DEFORMED.with(geometry))
 }
 
-/// Whether any control point is pulled.
+/// Whether any control point is moved.
 fn bends(params: &Params) -> bool {
     params.get(OFFSETS).as_flattened().iter().any(|x| *x != 0.0)
 }
 
-/// The lattice that the params say; none where it moves nothing.
+/// The lattice given by the params; `None` if it moves nothing.
 ///
 /// # Errors
-/// Where there are offsets, and not one a control point, or the box is empty.
+/// Where the number of offsets is not that of the control points, or the box is empty.
 fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<DeformationLattice<'a>>> {
     let divisions = params.get(DIVISIONS).map(|cells| cells as usize);
     let expected = control_points(divisions).unwrap_or(usize::MAX);
@@ -150,22 +143,16 @@ fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<Deform
         return Ok(None);
     }
     let (from, to) = (params.get(FROM), params.get(TO));
-    let basis = match params.get(BASIS) {
-        Basis::Trilinear => LatticeBasis::Trilinear,
-        Basis::Bernstein => LatticeBasis::Bernstein,
-    };
-    let outside = match params.get(OUTSIDE) {
-        Outside::Hold => Extrapolation::Hold,
-        Outside::Extend => Extrapolation::Extend,
-    };
-    DeformationLattice::new([from, to], divisions, offsets, basis, outside).map(Some).ok_or_else(|| {
-        Error::refused(format!("`from` is {from:?} and `to` {to:?}, which is no box"))
-            .of(TO.name())
-            .hint("expected each number of `to` to be more than that of `from`; around what is flat, too")
-    })
+    DeformationLattice::new([from, to], divisions, offsets, params.get(BASIS), params.get(OUTSIDE))
+        .map(Some)
+        .ok_or_else(|| {
+            Error::refused(format!("`from` is {from:?} and `to` {to:?}, which is not a box"))
+                .of(TO.name())
+                .hint("expected each component of `to` to be greater than that of `from`, around flat geometry too")
+        })
 }
 
-/// A component, deformed, and what that came to; columns that stay are shared.
+/// The deformed component, with the measures of its deformation; columns that do not change are shared.
 fn deformed(part: &Component, lattice: &DeformationLattice) -> Result<(Component, Deformed)> {
     let mut out = part.clone();
     let has = |owner: Owner| FOLLOWING.iter().any(|name| part.table(owner).column(name).is_some());
@@ -178,13 +165,13 @@ fn deformed(part: &Component, lattice: &DeformationLattice) -> Result<(Component
     Ok((out, moved))
 }
 
-/// Turns vectors, normals and orientations of points or elements.
+/// Maps vectors, normals and orientations of points or elements.
 fn turn(part: &mut Component, owner: Owner, jacobians: &[DMat3]) {
     let (v, n, orient) = match owner {
         Owner::Element => (Attr::element(V.name), Attr::element(N.name), Attr::element(ORIENT.name)),
         _ => (V, N, ORIENT),
     };
-    // Asked first: what is edited is copied.
+    // Checked first, as editing copies.
     let there = |part: &Component, name: &str| part.table(owner).column(name).is_some();
     if there(part, V.name)
         && let Some(rows) = part.edit(v)
@@ -223,7 +210,7 @@ fn middles(part: &Component) -> Vec<[f32; 3]> {
     }
 }
 
-/// Volume of a geometry's tets, else of what its mesh encloses; kept with what was measured.
+/// Volume of a geometry's tets, or that enclosed by its mesh; cached with the component.
 #[derive(Clone, Copy)]
 struct Enclosed(Option<f64>);
 
@@ -238,7 +225,7 @@ fn enclosed(geometry: &Geometry) -> Option<f64> {
     part.derived(measure).0
 }
 
-/// The volume after, as a share of that before; none where that was none.
+/// The volume after relative to that before; `None` if there was none.
 fn volume_ratio(before: &Geometry, after: &Geometry) -> Option<f64> {
     let before = enclosed(before).filter(|volume| *volume != 0.0)?;
     Some(enclosed(after)? / before)
@@ -254,13 +241,6 @@ fn publish(cx: &Cx, reached: impl IntoIterator<Item = Deformed>, volume_ratio: O
     cx.publish(MIN_JACOBIAN, if least.is_finite() { least } else { 1.0 });
     if let Some(ratio) = volume_ratio.filter(|ratio| ratio.is_finite()) {
         cx.publish(VOLUME_RATIO, ratio);
-    }
-}
-
-fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
-    match bends(params) {
-        true => Vec::new(),
-        false => vec![LeftOut::new("deformation", "`offsets` pull at nothing")],
     }
 }
 

@@ -1,18 +1,18 @@
 //! The geometry family: sources, and helpers that any scene needs.
 
-pub mod attribute_expr;
-pub mod curve_attach;
-pub mod curve_in;
-pub mod curve_interpolate;
-pub mod curve_scatter;
-pub mod lattice_deform;
-pub mod merge;
-pub mod mesh_in;
-pub mod mesh_primitive;
-pub mod point_in;
+mod attribute_expr;
+mod curve_attach;
+mod curve_in;
+mod curve_interpolate;
+mod curve_scatter;
+mod lattice_deform;
+mod merge;
+mod mesh_in;
+mod mesh_primitive;
+mod point_in;
 mod shared;
-pub mod tet_in;
-pub mod transform;
+mod tet_in;
+mod transform;
 
 use engine::node::Node;
 

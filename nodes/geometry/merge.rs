@@ -1,25 +1,24 @@
-//! Merge: several geometries as one.
+//! Merge: joins several geometries into one.
 //!
-//! Component by component, points and elements in the order of the wires. An attribute that one wire lacks gets the
-//! value that changes nothing there (`envelope` 1, `orient` no turn, `Pref` the position), else 0. `id`s are kept as
-//! they are. A volume cannot be joined with another: two are refused. What stands once for a whole component is the
-//! first wire's that has it.
+//! Component by component, with points and elements in the order of the wires. Where one wire lacks an attribute, it
+//! gets the attribute's neutral value (`envelope` 1, `orient` no rotation, `Pref` the position), otherwise 0. `id`s are
+//! not renumbered. Two volumes cannot be joined and are refused. An attribute with one row for the whole component is
+//! taken from the first wire that has it.
 
 use engine::geometry::ColumnType;
 use engine::prelude::*;
 
 inputs! { INPUTS:
-    GEOMETRY: Input<Many> = Input::any_many("geometry", "What is put together, in this order.");
+    GEOMETRY: Input<Many> = Input::any_many("geometry", "The geometries to join, in this order.");
 }
 
-const MERGED: Output = Output::union("geometry", &GEOMETRY, "All of it.");
+const MERGED: Output = Output::union("geometry", &GEOMETRY, "The joined geometry.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Merge",
     1,
-    "Puts geometries together: curves with curves, meshes with meshes, in the order of the wires. An attribute that one \
-     of them lacks is 0 there; `envelope` is 1, `orient` no turn, and `Pref` where the point is.",
+    "Joins geometries into one: curves with curves, meshes with meshes, in the order of the wires. Where one of them \
+     lacks an attribute it is 0; `envelope` is 1, `orient` no rotation, and `Pref` the position.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -51,7 +50,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(MERGED.with(merged))
 }
 
-/// All parts, each with its wire, as one; `None` where there is none, and a single one shared.
+/// All parts joined, each given with its wire. A single part is shared, not copied.
 fn union(parts: &[(usize, &Component)]) -> Result<Option<Component>> {
     let [(first, head), tail @ ..] = parts else { return Ok(None) };
     if tail.is_empty() {
@@ -65,10 +64,10 @@ fn union(parts: &[(usize, &Component)]) -> Result<Option<Component>> {
     Ok(Some(union))
 }
 
-/// Which attributes points and elements of any part have.
+/// The attributes of points and elements that any part has.
 ///
 /// # Errors
-/// Where two parts have one of another type.
+/// Where two parts have the same attribute with different types.
 fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result<Vec<(Owner, Name)>> {
     let mut found: Vec<(Owner, Name, ColumnType, usize)> = Vec::new();
     for (wire, part) in std::iter::once(&(first, head)).chain(tail) {
@@ -90,7 +89,7 @@ fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result
     Ok(found.into_iter().map(|(owner, name, ..)| (owner, name)).collect())
 }
 
-/// The part with neutral values where it lacks one of the names and such a value is known.
+/// The part with the neutral value of each attribute that it lacks, where there is one.
 fn completed(part: &Component, names: &[(Owner, Name)]) -> Result<Component> {
     let mut part = part.clone();
     for (owner, name) in names {

@@ -7,30 +7,31 @@ use std::sync::Arc;
 
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
-        "An obj, ply or json file with polygons. A run of `#` in its name stands for the frame number: `skin.####.obj`.");
+        "An obj, ply or json file with polygons. A run of `#` in its name stands for the frame number, as in \
+         `skin.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
+        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Vertices written into the graph instead of a file.").unit(Unit::Metres);
-    COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts", "Corners of each face. Empty, all faces are triangles.");
+    COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts", "Number of corners of each face. If empty, all faces are \
+        triangles.");
     INDICES: Param<Arc<Vec<i32>>> = Param::inline("indices",
-        "Vertices of the faces' corners, from 0, face after face, counter-clockwise seen from outside.");
+        "The vertex of each face corner, counted from 0, face after face, counter-clockwise as seen from outside.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes added to the mesh, a row a vertex.");
+        "Attributes added to the mesh, one row per vertex.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added to the mesh, a row a face.");
+        "Attributes added to the mesh, one row per face.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The mesh.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Mesh_In",
     2,
-    "A mesh from a file, or written into the graph: skins, colliders, bowls. Other geometry in the file is left.",
+    "A mesh from a file, or written into the graph: skins, colliders, bowls. Other geometry in the file is ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -53,8 +54,8 @@ fn inline(cx: &Cx) -> Result<Component> {
     let indices = source::wholes(INDICES, &cx.get(INDICES), 0)?;
     let counts = match cx.get(COUNTS).as_slice() {
         [] if !indices.len().is_multiple_of(3) => {
-            let fact = format!("`indices` has {} numbers, which is no whole number of triangles", indices.len());
-            return Err(Error::refused(fact).hint("write `counts` where faces have more than three corners"));
+            let fact = format!("`indices` has {} numbers, which is not a multiple of 3", indices.len());
+            return Err(Error::refused(fact).hint("write `counts` if faces have more than three corners"));
         }
         [] => vec![3; indices.len() / 3],
         counts => source::wholes(COUNTS, counts, 3)?,
@@ -103,7 +104,7 @@ mod tests {
     fn corners_that_are_no_vertex_are_refused() {
         let error = |indices: Vec<i32>| square().set(INDICES, Arc::new(indices)).try_cook().unwrap_err().fact;
         assert_eq!(error(vec![0, 1, 4]), "`indices` has 4 as number 2, but there are 4 `points`");
-        assert_eq!(error(vec![0, 1]), "`indices` has 2 numbers, which is no whole number of triangles");
+        assert_eq!(error(vec![0, 1]), "`indices` has 2 numbers, which is not a multiple of 3");
         assert_eq!(error(vec![0, 1, -1]), "`indices` has -1 at place 2, counted from 0");
     }
 

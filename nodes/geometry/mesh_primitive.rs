@@ -1,50 +1,50 @@
-//! Mesh_Primitive: a simple shape to press, pour and grow on.
+//! Mesh_Primitive: simple shapes, as colliders, bodies and skins.
 //!
-//! Solids are closed, faces outward counter-clockwise; the grid is open and faces up. Every shape is centred on the
-//! origin and fills `size` to the last bit; its making is in [`numerics::shapes`].
+//! Solids are closed, with faces counter-clockwise as seen from outside; the grid is open and faces up. Every shape is
+//! centred on the origin and has exactly the bounds of `size`; [`numerics::shapes`] makes them.
 
 use engine::prelude::*;
 use numerics::shapes::{self, Polygons};
 
 choice! {
-    /// Which shape.
-    pub enum Solid {
-        Box = "box": "six sides of quads",
-        Sphere = "sphere": "an ellipsoid, its poles on y",
-        Cylinder = "cylinder": "upright, with flat lids",
-        Capsule = "capsule": "an upright cylinder with domes, as long as it is higher than wide",
-        Grid = "grid": "a flat sheet in x and z, open, facing up; the height of `size` does not matter",
-        Torus = "torus": "a ring lying flat, its tube round while the height is at most a third of the width",
-        Bowl = "bowl": "half a hollow ellipsoid, open at the top",
-        Plate = "plate": "a box as high as `thickness`; the height of `size` does not matter",
+    /// The shape.
+    enum Solid {
+        Box = "box": "a box of quads",
+        Sphere = "sphere": "a sphere or ellipsoid with its poles on the y axis",
+        Cylinder = "cylinder": "an upright cylinder with flat caps",
+        Capsule = "capsule": "an upright cylinder with rounded caps; its straight part is as long as the height \
+            exceeds the width",
+        Grid = "grid": "a flat open sheet in x and z, facing up; the height of `size` does not matter",
+        Torus = "torus": "a flat-lying ring; its tube is round as long as the height is at most a third of the width",
+        Bowl = "bowl": "the lower half of a hollow ellipsoid, open at the top",
+        Plate = "plate": "a box with height `thickness`; the height of `size` does not matter",
     }
 }
 
-/// At this many the largest shapes have 3 million vertices and take a fifth of a gigabyte.
+/// With this many the largest shapes have 3 million vertices and take 200 MB.
 const MOST_DIVISIONS: f64 = 512.0;
 
 params! { PARAMS:
-    SHAPE: Param<Solid> = Param::choice("shape", Solid::Box, "What it is.");
+    SHAPE: Param<Solid> = Param::choice("shape", Solid::Box, "The shape.");
     SIZE: Param<[f32; 3]> = Param::vec3("size", [1.0; 3],
-        "Width, height and depth of the whole shape. 0 flattens it.").unit(Unit::Metres).at_least(0.0);
+        "Width, height and depth of the whole shape. 0 makes it flat.").unit(Unit::Metres).at_least(0.0);
     DIVISIONS: Param<i64> = Param::int("divisions", 16,
-        "Quads along an edge of what is straight, and along a quarter turn of what is round.")
+        "Number of quads along a straight edge, or along a quarter of a circle.")
         .within(1.0, MOST_DIVISIONS).soft(1.0, 64.0);
     THICK: Param<f32> = Param::float("thickness", 0.01,
-        "How thick the wall of a bowl is, at its rim and at its bottom, or how thick a plate.")
+        "Wall thickness of a bowl, at its rim and at its bottom; height of a plate.")
         .unit(Unit::Metres).above(0.0).soft(0.001, 0.1)
         .when(|params| matches!(params.get(SHAPE), Solid::Bowl | Solid::Plate));
 }
 
 const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The shape, with `uvw`.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Mesh_Primitive",
     1,
     "A box, sphere, cylinder, capsule, grid, torus, bowl or plate, centred on the origin. Solids are closed and face \
-     outwards, so they can collide, be filled and be cut into tets. `uvw` is the place in the shape's bounds, 0 to 1 \
-     along x, y and z.",
+     outwards, so they can collide, be filled and be divided into tets. `uvw` is the position within the shape's \
+     bounds, 0 to 1 along x, y and z.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -78,14 +78,14 @@ fn mesh(cx: &Cx, size: [f64; 3], Polygons { counts, corners, points }: Polygons)
     let positions = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let mut mesh = Component::mesh(counts, corners, positions)?;
     if cx.wants(UVW) {
-        // A direction without extent has no place in it: its middle stands for all.
+        // Along an axis on which the shape is flat, all points are in the middle.
         let place = |k: usize, x: f64| if size[k] > 0.0 { (x / size[k] + 0.5) as f32 } else { 0.5 };
         mesh.set(UVW, points.iter().map(|p| [0, 1, 2].map(|k| place(k, p[k]))).collect())?;
     }
     Ok(MESH.with(Geometry::from(mesh)))
 }
 
-/// Refuses a bowl that its wall fills.
+/// Refuses a bowl whose wall fills it.
 fn check(params: &Params) -> Result<()> {
     match params.get(SHAPE) == Solid::Bowl && params.get(THICK) >= hollow(params) {
         true => Err(no_hollow(params)),
@@ -93,7 +93,7 @@ fn check(params: &Params) -> Result<()> {
     }
 }
 
-/// A wall as thick as this fills a bowl, metres.
+/// The wall thickness that fills a bowl, metres.
 fn hollow(params: &Params) -> f32 {
     let [x, y, z] = params.get(SIZE);
     (0.5 * x).min(y).min(0.5 * z)
@@ -177,8 +177,7 @@ mod tests {
 
     #[test]
     fn thickness_matters_to_bowls_and_plates_alone() {
-        for place in 0..Solid::OPTIONS.len() {
-            let shape = Solid::at(place).unwrap();
+        for shape in Solid::VALUES.iter().copied() {
             let cook = |thickness| bench(&NODE).set(SHAPE, shape).set(DIVISIONS, 2).set(THICK, thickness).cook();
             let differs = cook(0.1).mesh().positions() != cook(0.2).mesh().positions();
             assert_eq!(differs, matches!(shape, Solid::Bowl | Solid::Plate), "{shape:?}");

@@ -7,24 +7,25 @@ use std::sync::Arc;
 
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
-        "An obj, ply or json file with points. A run of `#` in its name stands for the frame number: `drops.####.ply`.");
+        "An obj, ply or json file with points. A run of `#` in its name stands for the frame number, as in \
+         `drops.####.ply`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
+        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
-    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added, a row a point.");
+    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added to the points, one row \
+        per point.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("points", &[Kind::Points], "The points.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Point_In",
     2,
-    "Loose points from a file, or written into the graph: particles, pins. Other geometry in the file is left.",
+    "Loose points from a file, or written into the graph: particles, pins. Other geometry in the file is ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

@@ -7,28 +7,28 @@ use std::sync::Arc;
 
 params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
-        "A json file with tets. A run of `#` in its name stands for the frame number: `dough.####.json`.");
+        "A json file with tets. A run of `#` in its name stands for the frame number, as in `dough.####.json`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "Which file of a numbered sequence is read. Between frames it is that of the whole frame before.")
+        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
     TETS: Param<Arc<Vec<[u32; 4]>>> = Param::inline("tets",
-        "Four points a tet, from 0; the fourth lies on the side from which the first three run counter-clockwise.");
-    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added, a row a point.");
+        "Four point indices per tet, counted from 0. Seen from the fourth point, the first three run \
+         counter-clockwise.");
+    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added to the tets, one row per point.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added, a row a tet.");
+        "Attributes added to the tets, one row per tet.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities: 0.01 for a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Tet_In",
     2,
-    "Tets from a file, or written into the graph: soft bodies made elsewhere. Other geometry in the file is left.",
+    "Tets from a file, or written into the graph: soft bodies made elsewhere. Other geometry in the file is ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -58,7 +58,8 @@ mod tests {
     fn conforms_to_its_declaration() {
         let (_folder, files) = numbered_files("json", |frame| {
             format!(
-                "{{\"tets\": {{\"indices\": [[0, 1, 2, 3]], \"points\": [[0.0, 0.0, 0.0], [0.0, {frame}.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]}}}}"
+                "{{\"tets\": {{\"indices\": [[0, 1, 2, 3]], \"points\": [[0.0, 0.0, 0.0], [0.0, {frame}.0, 0.0], [1.0, \
+                 0.0, 0.0], [0.0, 0.0, 1.0]]}}}}"
             )
         });
         conformance(&NODE)

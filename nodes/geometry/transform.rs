@@ -1,13 +1,14 @@
-//! Transform: moves, turns and scales a geometry.
+//! Transform: translates, rotates and scales a geometry.
 //!
-//! About `pivot`: first scale, then rotate, then translate; in f64, rounded once. What follows: `P`; `v` as a vector;
-//! `N` so that it stays perpendicular and outward; `orient` by the rotation alone, as a quaternion says no scale;
-//! `width` and `thickness` as lengths, by the cube root of how volumes grow. All else goes through untouched, `Pref`
-//! and `uvw` on purpose: they say where a point was, so that noise and textures stay put.
+//! It scales, then rotates about `pivot`, then translates; in f64, rounded once. It transforms `P`; `v` as a vector;
+//! `N` so that it stays perpendicular and outward; `orient` by the rotation alone, as a quaternion cannot hold a scale;
+//! `width` and `thickness` as lengths, by the cube root of the change in volume. All other attributes pass through,
+//! `Pref` and `uvw` on purpose: they hold rest positions and texture coordinates, so that noise and textures stay
+//! attached.
 //!
-//! A mirroring scale turns faces and tets round, so that outside stays outside. The motion of an animated Transform is
-//! not added to `v`. A volume's grid lies along the axes: it can be moved, and scaled alike in all directions, else it
-//! is refused.
+//! A mirroring scale reverses the winding of faces and tets, so that outside stays outside. The motion of an animated
+//! Transform is not added to `v`. A volume's grid is aligned with the axes: it can be translated and scaled uniformly;
+//! anything else is refused.
 
 use engine::geometry::{Grid, Table};
 use engine::prelude::*;
@@ -15,27 +16,26 @@ use numerics::affine::Affine;
 use std::sync::Arc;
 
 inputs! { INPUTS:
-    GEOMETRY: Input = Input::any("geometry", "What is moved.");
+    GEOMETRY: Input = Input::any("geometry", "The geometry to transform.");
 }
 
 params! { PARAMS:
-    TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "How far it is moved, last.").unit(Unit::Metres);
+    TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Translation, applied last.").unit(Unit::Metres);
     ROTATE: Param<Turn> = Param::rotation("rotate",
-        "Turns about x, then y, then z, through the pivot. Between keys it turns about one axis.");
+        "Rotation about the pivot: about x, then y, then z. Between keys it rotates about a single axis.");
     SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
-        "Stretches along x, y and z from the pivot, first. Below 0 mirrors, 0 flattens.").soft(0.01, 100.0);
+        "Scale along x, y and z about the pivot, applied first. Negative values mirror, 0 flattens.").soft(0.01, 100.0);
     PIVOT: Param<[f64; 3]> = Param::dvec3("pivot", [0.0; 3],
-        "The point that rotation and scale leave where it is.").unit(Unit::Metres).when(is_linear);
+        "The point that rotation and scale leave in place.").unit(Unit::Metres).when(is_linear);
 }
 
-const MOVED: Output = Output::like("geometry", &GEOMETRY, "The same, moved.");
+const MOVED: Output = Output::like("geometry", &GEOMETRY, "The transformed geometry.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Transform",
     1,
-    "Scales, then rotates, then moves a geometry of any kind. Velocities, normals, orientations and widths follow; rest \
-     positions and texture coordinates stay. A mirrored mesh keeps its outside.",
+    "Scales, then rotates, then translates a geometry of any kind. Velocities, normals, orientations and widths are \
+     transformed too; rest positions and texture coordinates stay. Faces of a mirrored mesh still face outwards.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -43,19 +43,20 @@ pub static NODE: Node = Node::new(
 .outputs(&[&MOVED])
 .writes(&[&P])
 .attributes(|_| {
-    // Only what is there is changed, so whoever needs it after this needs it before.
+    // Existing attributes alone are changed, so they are read as well.
     [(); 2].map(|()| AttrNames::These(FOLLOWING.map(Name::from).to_vec()))
+})
+.neutral(|params, _| {
+    let affine = affine(params, params.get(TRANSLATE), params.get(PIVOT));
+    affine.is_identity().then_some("it is the identity")
 });
 
-/// Attributes that follow a scale or a turn.
+/// Attributes that a scale or a rotation changes.
 const FOLLOWING: [&str; 5] = [V.name, N.name, ORIENT.name, WIDTH.name, THICKNESS.name];
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut geometry = cx.input(GEOMETRY).clone();
     let affine = affine(cx.params(), cx.get(TRANSLATE), cx.get(PIVOT));
-    if affine.is_identity() {
-        return Ok(MOVED.with(geometry));
-    }
     for kind in Kind::ALL {
         if let Some(part) = geometry.part(kind) {
             geometry.put(moved(part, &affine)?);
@@ -76,7 +77,7 @@ fn is_linear(params: &Params) -> bool {
     affine(params, [0.0; 3], [0.0; 3]).is_linear()
 }
 
-/// The component, moved; columns that stay are shared.
+/// The transformed component; columns that do not change are shared.
 fn moved(part: &Component, affine: &Affine) -> Result<Component> {
     let mut part = if affine.mirrors() { turned_round(part)? } else { part.clone() };
     if let Some(rows) = part.edit(P) {
@@ -96,7 +97,7 @@ fn moved(part: &Component, affine: &Affine) -> Result<Component> {
     Ok(part)
 }
 
-/// Changes the rows of an attribute, whoever owns it: a face may have a normal, a curve a width.
+/// Changes the rows of an attribute of `owner`: faces may have normals, curves a width.
 fn follow<T: Item>(part: &mut Component, owner: Owner, attribute: Attr<T>, change: impl Fn(&mut [T])) {
     if part.table(owner).get::<T>(attribute.name).is_some() {
         let attribute = match owner {
@@ -108,7 +109,7 @@ fn follow<T: Item>(part: &mut Component, owner: Owner, attribute: Attr<T>, chang
     }
 }
 
-/// The component with faces and tets wound the other way; a face begins at the same corner.
+/// The component with the winding of faces and tets reversed; each face keeps its first corner.
 fn turned_round(part: &Component) -> Result<Component> {
     let topology = match part.topology() {
         Topology::Mesh(faces) => {
@@ -123,17 +124,17 @@ fn turned_round(part: &Component) -> Result<Component> {
     Ok(Component::from_tables(topology, tables)?)
 }
 
-/// The volume, its grid moved.
+/// The volume with its grid transformed.
 ///
 /// # Errors
-/// Where the grid would not lie along the axes any more, or its cells not be cubes.
+/// Where the grid would no longer be aligned with the axes, or its cells would not be cubes.
 fn moved_volume(volume: &Volume, affine: &Affine, cx: &Cx) -> Result<Volume> {
     let [x, y, z] = cx.get(SCALE);
     let turned = cx.get(ROTATE).0[..3].iter().any(|x| *x != 0.0);
     if turned || x != y || y != z || x <= 0.0 {
-        let refused = if turned { "turned" } else { "scaled by different numbers, by 0 or less" };
-        return Err(Error::refused(format!("a volume cannot be {refused}: its grid lies along the axes"))
-            .hint("turn what it is made from, or its surface"));
+        let refused = if turned { "rotated" } else { "scaled non-uniformly, by 0 or by a negative number" };
+        return Err(Error::refused(format!("a volume cannot be {refused}: its grid is aligned with the axes"))
+            .hint("transform the geometry that it is made from, or its surface"));
     }
     let grid = volume.grid();
     let mut origin = [grid.origin];
@@ -284,7 +285,7 @@ mod tests {
     fn a_volume_is_not_turned_or_stretched() {
         let volume = bench(&NODE).input(GEOMETRY, volume());
         let turned = volume.clone().set(ROTATE, degrees(0.0, 90.0, 0.0)).try_cook().unwrap_err();
-        assert_eq!(turned.fact, "a volume cannot be turned: its grid lies along the axes");
+        assert_eq!(turned.fact, "a volume cannot be rotated: its grid is aligned with the axes");
         for scale in [[1.0, 2.0, 1.0], [-1.0; 3], [0.0; 3]] {
             assert!(volume.clone().set(SCALE, scale).try_cook().is_err());
         }

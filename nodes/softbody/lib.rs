@@ -1,10 +1,10 @@
 //! The softbody family: dough and eggs (paper R).
 
 mod shared;
-pub mod softbody;
-pub mod softbody_goal;
-pub mod softbody_pin;
-pub mod tetrahedralize;
+mod softbody;
+mod softbody_goal;
+mod softbody_pin;
+mod tetrahedralize;
 
 use engine::node::Node;
 

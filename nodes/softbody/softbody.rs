@@ -1,15 +1,15 @@
-//! Softbody: dough that is pounded, rolled and directed, an egg that cracks open.
+//! Softbody: simulates soft bodies, such as dough that is pounded, rolled and directed, or an egg that cracks open.
 //!
-//! R1: "mass-spring systems" on Delaunay tetrahedra, with collisions, goal shapes for "the internal particles of the dough",
-//! constraints that are animated, and springs that couple the yolk with the white. The solver is [`bodies::mass_spring`], contacts
-//! are found by [`bodies::collision`].
+//! R1: "mass-spring systems" on Delaunay tetrahedra, with collisions, goal shapes for "the internal particles of the
+//! dough", animated constraints, and springs that couple the yolk with the white. The solver is
+//! [`bodies::mass_spring`]; [`bodies::collision`] finds contacts.
 //!
 //! Departures, and what R leaves open:
-//! * Springs alone let bodies turn inside out and lose volume: pressures keep it, by `volume`.
-//! * One implicit step a frame instead of many explicit ones, whatever the stiffness; it says how far off it may be.
-//! * Contact is part of what is solved for, not a projection afterwards.
-//! * Goals act on inner particles with critical damping: bodies come to rest in them.
-//! * What the body is made of is read at the start; numbers may be keyed, masks stand still.
+//! * Springs alone let bodies turn inside out and lose volume: pressures scaled by `volume` preserve it.
+//! * One implicit step per frame instead of many explicit ones, whatever the stiffness; its error is estimated.
+//! * Contacts are part of the system that is solved, not a projection afterwards.
+//! * Goals act on inner particles with critical damping, so bodies come to rest in them.
+//! * Materials are read at the start: their numbers may be keyed, their masks may not change.
 
 use std::sync::{Arc, OnceLock};
 
@@ -33,151 +33,168 @@ mod pins;
 mod setup;
 
 choice! {
-    /// Which particles goals pull.
-    pub enum GoalOn {
-        Interior = "interior": "those inside: the surface is free to answer to what touches it",
-        Surface = "surface": "those on surfaces",
-        All = "all": "all: what touches the body hardly dents it",
+    /// The particles that goals pull.
+    enum GoalOn {
+        Interior = "interior": "inner particles: the surface remains free to respond to contacts",
+        Surface = "surface": "particles on the surface",
+        All = "all": "all particles: contacts hardly dent the body",
     }
 }
 
 choice! {
-    /// How time is stepped through.
-    pub enum Stepping {
-        Default = "default": "one step of second order a frame, or as many as contacts need; calmer steps where it begins \
-                              off balance",
-        Accurate = "accurate": "as many steps as keep the estimated error of a frame within `tolerance`: a reference",
-        Euler = "euler": "implicit Euler: of first order, calms all motion",
+    /// The time integrator.
+    enum Stepping {
+        Default = "default": "one second-order step per frame, or as many as contacts need; damped steps where a \
+                              motion starts abruptly",
+        Accurate = "accurate": "as many steps as keep the estimated error of each frame within `tolerance`: for \
+            reference",
+        Euler = "euler": "implicit Euler: first order, damps all motion",
     }
 }
 
-/// Times within a step at which colliders are looked at.
+/// Number of times within a step at which colliders are sampled.
 const COLLIDER_SAMPLES: u8 = 4;
 
 inputs! { INPUTS:
     BODIES: Input<Many> = Input::many("bodies", Kind::Tets,
-        "Bodies, as Tetrahedralize makes them, where they start. A surface beside the tets comes out moved along; without \
-         one the tets' outside does.").read_at(|_| Times::START);
+        "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets moves with \
+         them; without one, the boundary of the tets is used.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that bodies cannot pass: hands, rolling pins, bowls. They may move, turn and deform.")
+        "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
     GOALS: Input<Many> = Input::many("goals", Kind::Tets,
-        "Shapes that bodies shall take at their frames, by Softbody_Goal. One belongs to the body with the same tets.");
+        "Target shapes from Softbody_Goal, which bodies reach at the goals' frames. A goal applies to the body with \
+         the same tets.");
     PINS: Input<Many> = Input::many("pins", Kind::Points,
-        "Animated points that hold what is near them at the start, by Softbody_Pin.")
+        "Animated points from Softbody_Pin, which hold the particles near them at the start.")
         .read_at(|_| Times::START.and(Times::within_step(1)));
 }
 
 params! { PARAMS:
     START_FRAME: Param<i64> = Param::int("start_frame", 1,
-        "The frame at which bodies are as they come in.").unit(Unit::Frame).default_scene_start().fixed();
-    GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "What pulls on everything.")
+        "The frame at which the simulation starts from `bodies`.").unit(Unit::Frame).default_scene_start().fixed();
+    GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "Acceleration of gravity.")
         .unit(Unit::MetresPerSecondSquared);
-    DENSITY: Param<Maskable> = Param::maskable("density", 1000.0, "How heavy a body is for its volume.")
+    DENSITY: Param<Maskable> = Param::maskable("density", 1000.0, "Mass per volume.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
-        "How much it resists being stretched (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
+        "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
-        "How soon wobbling dies away: the time by which springs lag behind their stretch. 0 rings on.")
+        "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
+         wobbling.")
         .unit(Unit::Seconds).at_least(0.0).soft(0.0, 0.1);
-    DRAG: Param<f32> = Param::float("drag", 0.0, "Against all motion, as in thick air.")
+    DRAG: Param<f32> = Param::float("drag", 0.0, "Damping of all motion, as by thick air.")
         .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0);
     VOLUME: Param<f32> = Param::float("volume", 1.0,
-        "Share of lost volume that is fought, inside-out tets included; 0 leaves springs alone, which crumple.")
+        "Strength of volume preservation, also against tets turning inside out. At 0 there are only springs, and \
+         bodies crumple.")
         .within(0.0, 1.0);
     PLASTIC_YIELD: Param<f32> = Param::float("plastic_yield", 0.0,
-        "Strain beyond which a spring gives way for good: 0.05 keeps most dents, 0 none.").at_least(0.0).soft(0.0, 0.5);
+        "Strain beyond which deformation becomes permanent: at 0.05 most dents stay. 0 turns plasticity off.")
+        .at_least(0.0).soft(0.0, 0.5);
     PLASTIC_CREEP: Param<f32> = Param::float("plastic_creep", 0.0,
-        "How fast strain beyond `plastic_yield` becomes the shape: 10 within a few frames, 0 never.")
+        "How fast strain beyond `plastic_yield` becomes permanent: at 10 within a few frames, at 0 never.")
         .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 50.0);
     RESET_TO_GOALS: Param<f32> = Param::float("reset_to_goals", 1.0,
-        "How much the shape of a goal becomes the body's shape at rest once its frame is passed: 1 stays there when let go, \
-         0 springs back.").within(0.0, 1.0);
-    RESET_FRAMES: Param<i64> = Param::int("reset_frames", 4, "Frames that takes; at once is a jolt.")
+        "How far the body's rest shape changes to that of a goal once the goal's frame is passed: at 1 the body keeps \
+         the goal's shape when released, at 0 it springs back.").within(0.0, 1.0);
+    RESET_FRAMES: Param<i64> = Param::int("reset_frames", 4, "Number of frames over which the rest shape changes; a \
+        sudden change jolts the body.")
         .unit(Unit::Frames).within(0.0, 1e4).soft(0.0, 24.0);
     KEEP_DENTS: Param<f32> = Param::float("keep_dents", 1.0,
-        "Share of dents that stays when the shape at rest becomes a goal's.").within(0.0, 1.0);
-    GOAL_ON: Param<GoalOn> = Param::choice("goal_on", GoalOn::Interior, "Which particles goals pull.");
+        "Share of plastic dents that is kept when the rest shape changes to that of a goal.").within(0.0, 1.0);
+    GOAL_ON: Param<GoalOn> = Param::choice("goal_on", GoalOn::Interior, "The particles that goals pull.");
     COUPLING_RADIUS: Param<f64> = Param::double("coupling_radius", 0.0,
-        "How near surfaces of two bodies that face each other are at the start to be joined by springs; 0 joins none.")
+        "Surfaces of two bodies that face each other within this distance at the start are joined by springs. 0 joins \
+         none.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1).fixed();
-    COUPLING_STIFFNESS: Param<f64> = Param::double("coupling_stiffness", 10.0, "How hard each of those springs pulls.")
+    COUPLING_STIFFNESS: Param<f64> = Param::double("coupling_stiffness", 10.0, "Stiffness of each of those springs.")
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 1e3).fixed().when(couples);
     COUPLING_BREAK: Param<f32> = Param::float("coupling_break", 0.0,
-        "How many times as long as at the start one of them tears; 0 never.").at_least(0.0).soft(0.0, 3.0).when(couples);
+        "Length, relative to that at the start, at which one of those springs tears. 0 never tears.")
+        .at_least(0.0).soft(0.0, 3.0).when(couples);
     THICKNESS: Param<f32> = Param::float("thickness", 1e-3,
-        "Distance that surfaces keep from each other. About a tenth of the tets' edges is easy; thinner costs more steps.")
+        "Distance that surfaces keep from each other. A tenth of the tets' edge length is cheap; smaller values need \
+         more time steps.")
         .unit(Unit::Metres).above(0.0).soft(1e-4, 1e-2);
     FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
-        "How much touching surfaces hold on to each other: 0 slides, 1 holds on a slope of 45 degrees.")
+        "Coefficient of friction: 0 slides freely, 1 holds on a slope of 45 degrees.")
         .at_least(0.0).soft(0.0, 1.0);
-    SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether a body's surface cannot pass itself.");
-    BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies cannot pass each other.");
-    GROUND: Param<bool> = Param::bool("ground", false, "Whether there is a level ground. It wins over colliders.");
-    GROUND_HEIGHT: Param<f32> = Param::float("ground_height", 0.0, "Where the ground is.")
+    SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether bodies collide with themselves.");
+    BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies collide with each other.");
+    GROUND: Param<bool> = Param::bool("ground", false, "Whether there is a level ground. It takes precedence over \
+        colliders.");
+    GROUND_HEIGHT: Param<f32> = Param::float("ground_height", 0.0, "Height of the ground.")
         .unit(Unit::Metres).when(|params| params.get(GROUND));
-    INTEGRATOR: Param<Stepping> = Param::choice("integrator", Stepping::Default, "How time is stepped through.");
+    INTEGRATOR: Param<Stepping> = Param::choice("integrator", Stepping::Default, "The time integrator.");
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-3,
-        "Error that a frame may add, as a share of the bodies' size.").above(0.0).soft(1e-6, 1e-2)
+        "Error allowed per frame, relative to the size of the bodies.").above(0.0).soft(1e-6, 1e-2)
         .when(|params| params.get(INTEGRATOR) == Stepping::Accurate);
-    SUBSTEPS: Param<i64> = Param::int("substeps", 0, "Steps in a frame; 0 takes as many as needed.").within(0.0, 256.0)
+    SUBSTEPS: Param<i64> = Param::int("substeps", 0, "Number of time steps per frame. 0 takes as many as needed.")
+        .within(0.0, 256.0)
         .soft(0.0, 16.0);
-    INITIAL_VELOCITY: Param<[f32; 3]> = Param::vec3("initial_velocity", [0.0; 3], "How fast bodies are at the start.")
+    INITIAL_VELOCITY: Param<[f32; 3]> = Param::vec3("initial_velocity", [0.0; 3], "Velocity of the bodies at the start.")
         .unit(Unit::MetresPerSecond).fixed();
-    TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0, "Seconds that pass for a second of frames; 0 stops time.")
+    TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0, "Speed of time: simulated seconds per second of frames. 0 \
+        stops time.")
         .at_least(0.0).soft(0.0, 2.0);
 }
 
 const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
-    "The surfaces that came in beside the tets, moved along with all they carry; the tets' outside where there was none.",
+    "The surface meshes that came with the tets, moved with them, attributes included; the boundary of the tets if \
+     there were none.",
 );
-const TETS: Output = Output::new("tets", &[Kind::Tets], "The tets, moved.");
+const TETS: Output = Output::new("tets", &[Kind::Tets], "The tets, in their simulated positions.");
 
-macro_rules! metrics {
-    ($($name:ident = $text:literal, $unit:expr, $help:literal;)*) => {
-        $(const $name: Metric = Metric::new($text, $unit, $help);)*
-        /// In the order of [`said`].
-        const METRICS: &[&Metric] = &[$(&$name),*];
-    };
+metrics! { METRICS:
+    NEWTON = Metric::new("newton", Unit::None, "Newton iterations in the frame.");
+    CG = Metric::new("cg", Unit::None, "Iterations of linear solves in the frame.");
+    RESIDUAL = Metric::new("residual", Unit::None, "The largest residual left by a solve, relative to its first.");
+    CAPS_HIT = Metric::new("caps_hit", Unit::None,
+        "Solves that ended before they converged, and particles whose motion had to be limited.")
+        .warn_above(0.0, "At these frames the solver reached its iteration limit, so motion may be damped or contacts \
+            may be deeper than `thickness`. Set more `substeps`, or lower the stiffness or the speed of colliders.");
+    ERROR_ESTIMATE = Metric::new("error_estimate", Unit::Metres, "Estimated error in positions that the frame added.");
+    KINETIC = Metric::new("kinetic", Unit::Joules, "Kinetic energy.");
+    ELASTIC = Metric::new("elastic", Unit::Joules, "Elastic energy of the springs.");
+    GOAL_ENERGY = Metric::new("goal_energy", Unit::Joules, "Potential energy of the goals.");
+    RESET_ENERGY = Metric::new("reset_energy", Unit::Joules,
+        "Energy added when the rest shape was changed to that of a goal; negative where it was released.");
+    PLASTIC_WORK = Metric::new("plastic_work", Unit::Joules,
+        "Elastic energy that plastic flow dissipated after the frame's steps: it is missing from the next frame's \
+         `elastic`.");
+    ENERGY_SHED = Metric::new("energy_shed", Unit::Joules, "Energy removed to prevent a spurious gain.");
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to that at rest.");
+    WORST_STRETCH = Metric::new("worst_stretch", Unit::None,
+        "The largest ratio of a spring's length to its rest length, or of its rest length to its length.");
+    INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")
+        .warn_above(0.0, "Parts of a body are turned inside out: something squeezes it harder than it can resist. \
+            Raise `volume` or `stiffness`, slow the colliders, or leave more room between them.");
+    CONTACTS = Metric::new("contacts", Unit::None, "Active contacts.");
+    DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
+        "How far the worst contact is closer than `thickness`.");
+    LET_GO = Metric::new("let_go", Unit::None,
+        "Edges of the surface longer than 8 times their rest length, which colliders release.")
+        .warn_above(0.0, "A collider has caught the skin and stretched it to more than 8 times its length, so it is \
+            released there. Give the collider a smoother shape, lower `friction`, or raise `stiffness`.");
+    GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres, "Mean distance of pulled particles from their goals.");
+    PINNED = Metric::new("pinned", Unit::None,
+        "Particles that pins hold or pull. If it is 0, none was within a pin's `radius` at the start.");
+    TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
+    SUBSTEPS_USED = Metric::new("substeps_used", Unit::None, "Number of time steps in the frame.");
 }
 
-metrics! {
-    NEWTON = "newton", Unit::None, "Newton iterations of the frame.";
-    CG = "cg", Unit::None, "Iterations of linear solves.";
-    RESIDUAL = "residual", Unit::None, "The largest share of a stage's first residual that was left of it.";
-    CAPS_HIT = "caps_hit", Unit::None, "Solves that stopped short of what was asked, and particles that had to be stopped.";
-    ERROR_ESTIMATE = "error_estimate", Unit::Metres, "Estimated error of positions that the frame added.";
-    KINETIC = "kinetic", Unit::Joules, "Energy of motion.";
-    ELASTIC = "elastic", Unit::Joules, "Energy in springs.";
-    GOAL_ENERGY = "goal_energy", Unit::Joules, "Energy in goals.";
-    RESET_ENERGY = "reset_energy", Unit::Joules, "Energy that a goal brought as it became the shape at rest; below 0 freed.";
-    PLASTIC_WORK = "plastic_work", Unit::Joules,
-        "Elastic energy that plastic flow dissipated after the frame's steps: it is missing from the next frame's `elastic`.";
-    ENERGY_SHED = "energy_shed", Unit::Joules, "Energy taken away because a step would have made it of nothing.";
-    VOLUME_RATIO = "volume_ratio", Unit::None, "Volume as a share of that at rest.";
-    WORST_STRETCH = "worst_stretch", Unit::None, "The largest length of a spring by its length at rest, or the reverse.";
-    INVERTED_TETS = "inverted_tets", Unit::None, "Tets inside out.";
-    CONTACTS = "contacts", Unit::None, "Contacts that push.";
-    DEEPEST_OVERLAP = "deepest_overlap", Unit::Metres, "How far the worst contact is nearer than `thickness`.";
-    LET_GO = "let_go", Unit::None, "Edges of the surface drawn out to over 8 times their length: colliders let them go.";
-    GOAL_DISTANCE = "goal_distance", Unit::Metres, "Mean distance of pulled particles to where goals draw them.";
-    PINNED = "pinned", Unit::None, "Particles that pins hold or pull; 0: none was within their `radius` at the start.";
-    TORN = "torn", Unit::None, "Coupling springs torn since the start.";
-    SUBSTEPS_USED = "substeps_used", Unit::None, "Steps that the frame took.";
-}
-
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Softbody",
     2,
-    "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, rub and press against colliders, the ground, each \
-     other and themselves, keep their volume and, where they are plastic, their dents; goals direct them and pins hold \
-     them. Stiffness does not hang on how finely they are cut, and none blows up, stiff or soft, \
-     light beside heavy, from any start. Inner particles collide with nothing: dough of a few hundred pascals and less may \
-     fall out of its skin.",
+    "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble and collide with friction against colliders, the \
+     ground, each other and themselves. They keep their volume and, if plastic, their dents; goals direct them and \
+     pins hold them. Stiffness is independent of mesh resolution, and the solver is stable for any stiffness, mass and \
+     initial state. Inner particles do not collide: dough softer than a few hundred pascals may fall out of its \
+     skin.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)
@@ -198,25 +215,25 @@ pub static NODE: Node = Node::new(
 .metrics(METRICS)
 .leaves_out(leaves_out);
 
-/// Bodies on their way.
+/// The state of the simulation.
 #[derive(Serialize, Deserialize)]
 struct Run {
     inputs: StartInputs,
     state: State,
-    /// Values of the metrics at the frame it stands at; none at the start.
-    said: Vec<f64>,
-    /// What only hangs on what was given: made anew after a checkpoint.
+    /// What the last step measured; empty at the start.
+    metrics: MetricValues,
+    /// Computed from `inputs` alone, so it is computed again after a checkpoint.
     #[serde(skip)]
     setup: OnceLock<Arc<SimulationSetup>>,
     #[serde(skip)]
     solving: Option<Solving>,
 }
 
-/// The solver's memory.
+/// The solver with its body.
 struct Solving {
     body: SoftBody,
     solver: BodySolver,
-    /// Density, stiffness and damping that the body has.
+    /// The body's density, stiffness and damping.
     values: [f32; 3],
 }
 
@@ -228,7 +245,7 @@ impl Chain for Run {
         let mut state = State::at_rest(&solving.body);
         state.velocities.fill(cx.get(INITIAL_VELOCITY).map(f64::from));
         let setup = OnceLock::from(Arc::new(setup));
-        Ok(Self { inputs, state, said: Vec::new(), setup, solving: Some(solving) })
+        Ok(Self { inputs, state, metrics: MetricValues::default(), setup, solving: Some(solving) })
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
@@ -242,14 +259,14 @@ impl Chain for Run {
         let seconds = cx.dt() * f64::from(cx.get(TIME_SCALE));
         let on = cx.get(GOAL_ON);
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
-        let goals = Goals::of(&self.inputs, &setup, cx.input(GOALS), cx.get(START_FRAME) as f64)?;
+        let goals = Goals::of(&self.inputs, &setup, &cx.part(GOALS), cx.get(START_FRAME) as f64)?;
         let (mut pulled, mut held) = (Vec::new(), Vec::new());
         goals.pull(times, on, &mut pulled);
-        let drawn = pulled.len();
+        let by_goals = pulled.len();
         if let [(_, before), .., (_, now)] = cx.samples(PINS) {
-            pins::pull(&setup.holds, [before, now], cx.frame(), &mut held, &mut pulled)?;
+            pins::pull(&setup.pins, [before, now], cx.frame(), &mut held, &mut pulled)?;
         }
-        let pinned = held.len() + pulled.len() - drawn;
+        let pinned = held.len() + pulled.len() - by_goals;
         let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
         let (friction, thickness) = (f64::from(contact_friction.value), f64::from(cx.get(THICKNESS)));
         let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
@@ -299,16 +316,19 @@ impl Chain for Run {
         }
         let far = goals.distance(times[1], on, &self.state.positions);
         let let_go = if obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
-        self.said = said(&report, [brought, plastic_work], let_go, far.unwrap_or(0.0), pinned, &self.state);
+        self.metrics = measured(&report, &self.state);
+        self.metrics.set(RESET_ENERGY, brought);
+        self.metrics.set(PLASTIC_WORK, plastic_work);
+        self.metrics.set(LET_GO, let_go as f64);
+        self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
+        self.metrics.set(PINNED, pinned as f64);
         self.solving = Some(solving);
         Ok(())
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let setup = self.setup(cx)?;
-        for (metric, value) in METRICS.iter().zip(&self.said) {
-            cx.publish(**metric, *value);
-        }
+        cx.publish_all(&self.metrics);
         let narrow = |p: [f64; 3]| p.map(|x| x as f32);
         let (mut surface, mut tets) = (setup.surface.clone(), setup.body.clone());
         surface
@@ -318,7 +338,7 @@ impl Chain for Run {
     }
 }
 
-/// Length below which a coupling spring of length 0 does not tear, as a share of the bodies' size.
+/// Length below which a coupling spring of rest length 0 does not tear, relative to the size of the bodies.
 const NEAR: f64 = 1e-6;
 
 impl Run {
@@ -337,7 +357,7 @@ impl Solving {
         Ok(Self { solver: BodySolver::new(&body), body, values: material.values() })
     }
 
-    /// With what bodies consist of now.
+    /// With the current material.
     fn of(mut self, material: &MaterialFields) -> Result<Self> {
         if self.values != material.values() {
             self.body.set_material(&material.material()).map_err(refusal)?;
@@ -347,39 +367,25 @@ impl Solving {
     }
 }
 
-/// Values in the order of [`METRICS`].
-fn said(
-    report: &FrameReport,
-    [reset_energy, plastic_work]: [f64; 2],
-    let_go: usize,
-    goal_distance: f64,
-    pinned: usize,
-    state: &State,
-) -> Vec<f64> {
-    let torn = state.torn.iter().filter(|torn| **torn).count();
-    vec![
-        f64::from(report.newton),
-        f64::from(report.cg),
-        report.residual,
-        f64::from(report.caps_hit + report.stopped),
-        report.error_estimate,
-        report.kinetic,
-        report.elastic,
-        report.goal_energy,
-        reset_energy,
-        plastic_work,
-        report.energy_removed,
-        report.volume_ratio,
-        report.worst_stretch,
-        f64::from(report.inverted_tets),
-        f64::from(report.contacts),
-        report.deepest_overlap,
-        let_go as f64,
-        goal_distance,
-        pinned as f64,
-        torn as f64,
-        f64::from(report.substeps),
-    ]
+fn measured(report: &FrameReport, state: &State) -> MetricValues {
+    let mut metrics = MetricValues::default();
+    metrics.set(NEWTON, report.newton);
+    metrics.set(CG, report.cg);
+    metrics.set(RESIDUAL, report.residual);
+    metrics.set(CAPS_HIT, report.caps_hit + report.stopped);
+    metrics.set(ERROR_ESTIMATE, report.error_estimate);
+    metrics.set(KINETIC, report.kinetic);
+    metrics.set(ELASTIC, report.elastic);
+    metrics.set(GOAL_ENERGY, report.goal_energy);
+    metrics.set(ENERGY_SHED, report.energy_removed);
+    metrics.set(VOLUME_RATIO, report.volume_ratio);
+    metrics.set(WORST_STRETCH, report.worst_stretch);
+    metrics.set(INVERTED_TETS, report.inverted_tets);
+    metrics.set(CONTACTS, report.contacts);
+    metrics.set(DEEPEST_OVERLAP, report.deepest_overlap);
+    metrics.set(TORN, state.torn.iter().filter(|torn| **torn).count() as f64);
+    metrics.set(SUBSTEPS_USED, report.substeps);
+    metrics
 }
 
 fn couples(params: &Params) -> bool {

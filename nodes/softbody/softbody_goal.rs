@@ -1,13 +1,14 @@
-//! Softbody_Goal: a shape that a body shall take, its inside included.
+//! Softbody_Goal: a target shape of a soft body, interior included.
 //!
 //! R1: "we only directed the internal particles of the dough to match the 'internal' goal shapes. This made the surface
 //! move freely … and respond to collisions". R does not say where internal goal shapes come from. Here an artist shapes
-//! the surface, and its inside follows as the static equilibrium of an elastic body whose surface is held there
-//! ([`bodies::goals`]): the cotangent Laplacian of the tets, which turns, stretches and shears the inside exactly as an
-//! affine change of the surface does. Springs would leave a grain of their own in it.
+//! the surface, and the interior follows as the static equilibrium of an elastic body with that surface
+//! ([`bodies::goals`]): the cotangent Laplacian of the tets, which reproduces affine deformations of the surface
+//! exactly. The network of springs would not.
 //!
-//! The shape has the points of the body's surface, in their order: the surface that comes out of Tetrahedralize, moved by
-//! Lattice_Deform or modelled. Where a body brings its surface along, faces are compared too; else points are counted.
+//! The shape has the points of the body's surface, in their order: the surface mesh from Tetrahedralize, deformed by
+//! Lattice_Deform or by hand. If the body comes with its surface mesh, faces are compared too, otherwise the number of
+//! points.
 
 use bodies::goals::{GoalLimits, GoalShape, HeldBody, goal_shape};
 use engine::prelude::*;
@@ -16,49 +17,48 @@ use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, SURFACE_PO
 
 inputs! { INPUTS:
     BODY: Input = Input::one("body", Kind::Tets,
-        "The body at rest, as Tetrahedralize makes it; its `surface_point` tells which points are on the surface.");
+        "The body at rest, from Tetrahedralize; its `surface_point` tells which points are on the surface.");
     SHAPE: Input = Input::one("shape", Kind::Mesh,
-        "Where the surface belongs: the mesh that came out of Tetrahedralize beside the tets, with other places and the \
-         same faces.");
+        "The target shape of the surface: the surface mesh from Tetrahedralize with other positions and the same \
+         faces.");
 }
 
 params! { PARAMS:
     FRAME: Param<f32> = Param::float("frame", 1.0,
-        "The frame at which the body shall have the shape. Between the goals of a body it heads from one to the next.")
+        "The frame at which the body reaches the shape. Between two goals it moves from one to the next.")
         .unit(Unit::Frame).fixed();
     STRENGTH: Param<f32> = Param::float("strength", 100.0,
-        "How hard the body is pulled there: acceleration by distance. 0 does not pull; some 200 times stiffness ÷ (density · \
-         size²) brings it within a hundredth of its size: 4e4 for dough of 5e3 Pa and 0.16 m, 1e3 for a metre of it.")
+        "How strongly the body is pulled to the shape: acceleration per distance. 0 does not pull; about 200 · \
+         stiffness ÷ (density · size²) brings it within 1 % of its size: 4e4 for dough of 5e3 Pa and 0.16 m, 1e3 for 1 \
+         m.")
         .unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 1e5);
     HOLD: Param<f32> = Param::float("hold", 0.0,
-        "How long the body is held there before it heads for the next goal, or is let go.")
+        "How long the body is held in the shape before it moves to the next goal, or is released.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 48.0);
 }
 
-const GOAL: Output = Output::new("goal", &[Kind::Tets], "The body in the shape, with what the goal asks for.");
+const GOAL: Output =
+    Output::new("goal", &[Kind::Tets], "The body in the target shape, with the attributes of the goal.");
 
-const INVERTED: Metric = Metric::new(
-    "inverted_tets",
-    Unit::None,
-    "Tets that the shape turns inside out or presses flat: the surface crosses itself, or bends too sharply.",
-);
-const VOLUME_RATIO: Metric =
-    Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, as a share of its own.");
-const CG: Metric = Metric::new("cg", Unit::None, "Steps of conjugate gradients that found the inside.");
-const RESIDUAL: Metric =
-    Metric::new("residual", Unit::None, "Force that is left on points inside, as a share of what the surface exerts.");
-const LOOSE: Metric = Metric::new(
-    "loose_points",
-    Unit::None,
-    "Points that no surface holds, themselves or through tets: they stay where they are.",
-);
+metrics! { METRICS:
+    INVERTED = Metric::new("inverted_tets", Unit::None,
+        "Tets that are flat or inside out in the shape: its surface crosses itself, or bends too sharply.")
+        .warn_above(0.0, "The shape cannot be reached without turning parts of the body inside out. Look for places \
+            where its surface crosses itself or bends sharply, and smooth them.");
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, relative to its own.");
+    CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
+    RESIDUAL = Metric::new("residual", Unit::None,
+        "Force left on inner points, relative to that exerted by the surface.");
+    LOOSE = Metric::new("loose_points", Unit::None,
+        "Points that are not connected to the surface: they keep their positions.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Softbody_Goal",
     1,
-    "Makes a goal of a shape for the surface of a soft body: the inside is brought along as if it were elastic. Give it to \
-     Softbody to be in that shape at a frame. The body and the shape need the same points and faces.",
+    "Turns a target shape of a body's surface into a goal: the interior follows as if it were elastic. Wire it into \
+     `goals` of Softbody, and the body reaches the shape at that frame. The body and the shape must have the same \
+     points and faces.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -66,14 +66,14 @@ pub static NODE: Node = Node::new(
 .outputs(&[&GOAL])
 .reads(&[&P, &SURFACE_POINT])
 .writes(&[&P, &GOAL_FRAME, &GOAL_STRENGTH, &GOAL_HOLD])
-.metrics(&[&INVERTED, &VOLUME_RATIO, &CG, &RESIDUAL, &LOOSE]);
+.metrics(METRICS);
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (body, shape) = (cx.part(BODY), cx.part(SHAPE));
     let rows = surface(body, cx.input(BODY).mesh(), shape)?;
     cx.check_cancelled()?;
     let held = HeldBody { points: body.positions(), tets: body.tet_corners(), rows, shape: shape.positions() };
-    // Keyed strengths ask again every frame.
+    // Cached, as keyed strengths cook every frame.
     let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
     publish(cx, &found);
     let mut out = body.clone();
@@ -84,7 +84,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(GOAL.with(Geometry::from(out)))
 }
 
-/// The row of `shape` that each point of the body is brought to; below 0 inside.
+/// The row of `shape` to which each point of the body belongs; below 0 inside.
 ///
 /// # Errors
 /// Where the body does not say, or `shape` is not its surface.
@@ -100,7 +100,7 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
     let fact = match along {
         Some(along) if along.topology() != shape.topology() || along.point_count() != shape.point_count() => {
             let (shape, own) = (counted(shape), counted(along));
-            format!("`shape` has {shape}, the surface of `body` {own}, or they are joined otherwise")
+            format!("`shape` has {shape}, the surface of `body` {own}, or their topology differs")
         }
         Some(along) if held > along.point_count() => {
             format!("`{name}` of `body` goes up to {}, and its surface has {} points", held - 1, along.point_count())
@@ -119,8 +119,8 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
     ))
 }
 
-/// What a goal's points hang on besides the body's places and tets. Columns are the very same arrays, which it keeps
-/// alive: no other can come to lie at their address.
+/// What a goal's points depend on besides the body's positions and tets. Columns are compared by address; they are kept
+/// alive, so that no address is reused.
 struct Asked {
     rows: Option<Column>,
     shape: Option<Column>,

@@ -1,9 +1,9 @@
-//! Softbody_Pin: animated points that hold what is near them at the start.
+//! Softbody_Pin: animated points that hold the particles near them.
 //!
-//! R1: "we had to constrain the egg white at several points and animate the constraints to encourage the natural draping
-//! behaviour". The points are those that come in; how far, how hard and how long they hold is written on them, so that
-//! pins of several kinds can be merged. Softbody does the holding: at its start frame each point takes the particles within
-//! `pin_radius`, and from then on they move as it does.
+//! R1: "we had to constrain the egg white at several points and animate the constraints to encourage the natural
+//! draping behaviour". The points are the input's; radius, strength and release frame become attributes on them, so
+//! that different pins can be merged. Softbody does the rest: at its start frame each point is assigned the particles
+//! within `pin_radius`, which move with it from then on.
 
 use engine::prelude::*;
 
@@ -13,28 +13,27 @@ use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
 const NEVER: f32 = 1e9;
 
 inputs! { INPUTS:
-    TARGETS: Input = Input::one("targets", Kind::Points, "Animated points. They must stay as many, in the same order.");
+    TARGETS: Input = Input::one("targets", Kind::Points, "Animated points. Their number and order must not change.");
 }
 
 params! { PARAMS:
     RADIUS: Param<f32> = Param::float("radius", 0.01,
-        "How far around a point particles are held, where it is when the simulation starts.")
+        "Distance from a point within which particles are held, measured when the simulation starts.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     STRENGTH: Param<f32> = Param::float("strength", 0.0,
-        "How hard particles are pulled to their places: acceleration by distance. 0 holds them there exactly, whatever \
-         pulls the other way.").unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 10_000.0);
+        "How strongly particles are pulled to their positions: acceleration per distance. 0 holds them exactly, \
+         against any force.").unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 10_000.0);
     RELEASE: Param<f32> = Param::float("release", NEVER,
-        "The frame from which they are let go. By default that never comes.").unit(Unit::Frame);
+        "The frame from which particles are released. The default is never reached.").unit(Unit::Frame);
 }
 
-const PINS: Output = Output::like("pins", &TARGETS, "The same points, with what they hold.");
+const PINS: Output = Output::like("pins", &TARGETS, "The points, with the attributes of pins.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Softbody_Pin",
     1,
-    "Makes pins of animated points: what is near one when a soft body starts goes where it goes. Several pins, firm and \
-     soft ones, can be merged.",
+    "Turns animated points into pins: the particles near one when a simulation starts move with it. Different pins, \
+     rigid and soft ones, can be merged.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -43,14 +42,12 @@ pub static NODE: Node = Node::new(
 .writes(&[&PIN_RADIUS, &PIN_STRENGTH, &PIN_RELEASE]);
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    let mut pins = cx.part(TARGETS).clone();
+    let mut pins = cx.edit(TARGETS);
     for (attribute, param) in [(PIN_RADIUS, RADIUS), (PIN_STRENGTH, STRENGTH), (PIN_RELEASE, RELEASE)] {
         let everywhere = vec![cx.get(param); pins.point_count()];
         pins.set(attribute, everywhere)?;
     }
-    let mut geometry = cx.input(TARGETS).clone();
-    geometry.put(pins);
-    Ok(PINS.with(geometry))
+    Ok(PINS.with(pins))
 }
 
 #[cfg(test)]

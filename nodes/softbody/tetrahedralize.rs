@@ -1,17 +1,19 @@
-//! Tetrahedralize: closed surfaces as bodies of tets.
+//! Tetrahedralize: fills closed surfaces with tets.
 //!
-//! R1: "create a Delaunay tetrahedralization of our input surface and convert the internal nodes and edges into internal
-//! particles and springs", for "an unbiased set of springs that cover the volume". The making is in [`bodies::tets`].
+//! R1: "create a Delaunay tetrahedralization of our input surface and convert the internal nodes and edges into
+//! internal particles and springs", for "an unbiased set of springs that cover the volume". [`bodies::tets`] does the
+//! work.
 //!
 //! What R leaves open:
-//! * R's internal nodes come from nowhere in particular. Here they are a body-centred cubic lattice at the surface's mean
-//!   edge length, each moved a little and all kept half an edge from the surface: of its points alone, a body's springs
-//!   would all run from skin to skin.
-//! * A closed shell within another is the wall of a cavity, and one within that a body again: the white of an egg ends
-//!   where the yolk begins. Inside is what the surface winds around once.
-//! * A surface's edge may be none of the tets'. No list of those is kept: the surface that rides along has the edges, and
-//!   [`bodies::tets::missing_edges`] tells which the tets lack, so that they cannot fall out of step.
-//! * Flat tets, whose volume says nothing, stay, as their edges are good springs, and are marked `sliver`.
+//! * R does not say where internal nodes come from. Here they are a body-centred cubic lattice with the surface's mean
+//!   edge length, slightly jittered and kept half an edge from the surface: without internal nodes all springs of a
+//!   body would run from skin to skin.
+//! * A closed shell within another is the wall of a cavity, and one within that is a body again: the white of an egg
+//!   ends where the yolk begins. The inside is where the surface has winding number 1.
+//! * Some edges of the surface may not be edges of tets. No list of them is stored: the output includes the surface,
+//!   and [`bodies::tets::missing_edges`] finds them, so the two cannot become inconsistent.
+//! * Slivers, flat tets without a meaningful volume, are kept, as their edges are good springs, and are marked
+//!   `sliver`.
 
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use engine::prelude::*;
@@ -19,75 +21,70 @@ use engine::prelude::*;
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
 
 choice! {
-    /// What is done about a surface that is not in order.
-    pub enum Repair {
-        None = "none": "nothing: whatever is wrong is a fault that names the place",
-        Safe = "safe": "what moves no point and opens nothing: points at one place are joined where the surface is open \
-                or hangs together there, points without a face and faces without three points or on another's points \
-                are dropped, and faces are turned to look away from the body. Holes, crossings and edges of three faces \
-                are faults still",
+    /// The repair of an invalid surface.
+    enum Repair {
+        None = "none": "no repair: any defect is refused, with its place",
+        Safe = "safe": "repairs that neither move points nor open the surface: coincident points are merged where the \
+                surface is open or connected there, points without faces, degenerate and duplicate faces are removed, \
+                and faces are oriented outwards. Holes, intersections and edges with three faces are still refused",
     }
 }
 
 inputs! { INPUTS:
     SURFACE: Input = Input::one("surface", Kind::Mesh,
-        "Closed surfaces, each a body; one within another walls off a cavity. Coarse faces make a coarse body.");
+        "Closed surfaces, one per body; a surface within another is the wall of a cavity. Coarse faces make a coarse \
+         body.");
 }
 
 params! { PARAMS:
     SPACING: Param<f64> = Param::double("spacing", 0.0,
-        "About how far apart points inside are. 0 takes the mean length of the surface's edges; half as much makes eight \
-         times as many points.").unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0).when(|params| params.get(INTERIOR));
+        "Approximate distance between inner points. 0 takes the mean edge length of the surface; half of that makes \
+         eight times as many points.")
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0).when(|params| params.get(INTERIOR));
     INTERIOR: Param<bool> = Param::bool("interior", true,
-        "Whether there are points inside. Without, all tets run from skin to skin: few, long and thin.");
-    REPAIR: Param<Repair> = Param::choice("repair", Repair::Safe, "What is done about a surface that is not in order.");
+        "Whether there are inner points. Without them all tets run from skin to skin: they are few, long and thin.");
+    REPAIR: Param<Repair> = Param::choice("repair", Repair::Safe, "How an invalid surface is repaired.");
 }
 
 const TETS: Output = Output::new(
     "tets",
     &[Kind::Tets, Kind::Mesh],
-    "The tets, and the repaired surface. The first points of the tets are the surface's, in its order.",
+    "The tets, with the repaired surface. The first points of the tets are those of the surface, in its order.",
 );
 
 /// 0 inside, 1 on the outside of a body, 2 on the wall of a cavity.
 const SIDE: Attr<i32> = Attr::point("side");
-/// Which body a tet is part of, from 0 in the order of their first faces.
+/// The body of each tet, from 0, in the order of the bodies' first faces.
 const BODY: Attr<i32> = Attr::element("body");
 
-const COUNT: Metric = Metric::new("tets", Unit::None, "How many tets there are.");
-const BODIES: Metric = Metric::new("bodies", Unit::None, "How many bodies they make.");
-const MIN_DIHEDRAL: Metric =
-    Metric::new("min_dihedral", Unit::Radians, "Smallest angle between two faces of a tet that is no sliver.");
-const QUALITY_MEDIAN: Metric = Metric::new(
-    "quality_median",
-    Unit::None,
-    "Median of the tets' quality: three times the radius of the inner sphere by that of the outer, 1 for a regular tet.",
-);
-const VOLUME_ERROR: Metric = Metric::new(
-    "volume_error",
-    Unit::None,
-    "How much the volume of the tets differs from that of the surface, as a share of it.",
-);
-const MISSING_FACES: Metric = Metric::new(
-    "missing_faces",
-    Unit::None,
-    "Faces of the surface that are no face of a tet: the tets there cut a corner or bulge.",
-);
-const MISSING_EDGES: Metric =
-    Metric::new("missing_edges", Unit::None, "Edges of the surface that are no edge of a tet.");
-const BARE_POINTS: Metric = Metric::new("bare_points", Unit::None, "Points of the surface that no tet has.");
-const SLIVERS: Metric = Metric::new("slivers", Unit::None, "Tets too flat for their volume to mean anything.");
-const REPAIRS: Metric =
-    Metric::new("repairs", Unit::None, "Points joined or dropped, and faces dropped, trimmed or turned.");
+metrics! { METRICS:
+    COUNT = Metric::new("tets", Unit::None, "Number of tets.");
+    BODIES = Metric::new("bodies", Unit::None, "Number of bodies.");
+    MIN_DIHEDRAL = Metric::new("min_dihedral", Unit::Radians,
+        "The smallest dihedral angle of a tet, slivers excluded.");
+    QUALITY_MEDIAN = Metric::new("quality_median", Unit::None,
+        "Median quality of the tets: three times the inradius ÷ the circumradius, 1 for a regular tet.");
+    VOLUME_ERROR = Metric::new("volume_error", Unit::None,
+        "Relative difference between the volume of the tets and that of the surface.");
+    MISSING_FACES = Metric::new("missing_faces", Unit::None,
+        "Faces of the surface that are not faces of tets: there the tets cut a corner or bulge.");
+    MISSING_EDGES = Metric::new("missing_edges", Unit::None, "Edges of the surface that are not edges of tets.");
+    BARE_POINTS = Metric::new("bare_points", Unit::None, "Points of the surface that belong to no tet.")
+        .warn_above(0.0, "These points of the surface belong to no tet, so nothing but springs along the surface moves \
+            them. Look for thin spikes and doubled walls, and thicken or remove them.");
+    SLIVERS = Metric::new("slivers", Unit::None, "Tets too flat to have a meaningful volume.");
+    REPAIRS = Metric::new("repairs", Unit::None,
+        "Points merged or removed, and faces removed, trimmed or reoriented.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Tetrahedralize",
     1,
-    "Fills closed surfaces with tets, so that they can be simulated as soft bodies. Points inside lie about as far \
-     apart as those of the surface. On the tets' points: `surface_point`, the surface's point each one is (−1 inside), \
-     and `side`, 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. On the tets: `body`, numbered from 0, \
-     and `sliver`, 1 where a tet is too flat for its volume to mean anything. The surface rides along.",
+    "Fills closed surfaces with tets, so that they can be simulated as soft bodies. Inner points are about as far \
+     apart as those of the surface. Attributes of points: `surface_point`, the corresponding point of the surface (−1 \
+     inside), and `side`, 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. Attributes of tets: `body`, \
+     counted from 0, and `sliver`, 1 for tets too flat to have a meaningful volume. The output includes the surface \
+     mesh.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -95,18 +92,7 @@ pub static NODE: Node = Node::new(
 .outputs(&[&TETS])
 .reads(&[&P])
 .writes(&[&P, &SURFACE_POINT, &SIDE, &BODY, &SLIVER])
-.metrics(&[
-    &COUNT,
-    &BODIES,
-    &MIN_DIHEDRAL,
-    &QUALITY_MEDIAN,
-    &VOLUME_ERROR,
-    &MISSING_FACES,
-    &MISSING_EDGES,
-    &BARE_POINTS,
-    &SLIVERS,
-    &REPAIRS,
-])
+.metrics(METRICS)
 .leaves_out(leaves_out)
 .changes_topology();
 
@@ -123,7 +109,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(TETS.with(Geometry::from(tets(cx, &closed, solid)?).with(repaired)))
 }
 
-/// The bodies, with what the node writes on them.
+/// The bodies with the attributes that the node writes.
 fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
     let mut tets = Component::tets(solid.tets, solid.points)?;
     if cx.wants(SURFACE_POINT) {
@@ -148,7 +134,7 @@ fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
     Ok(tets)
 }
 
-/// The mesh with its repairs and all its attributes; the very one that came in where none was needed.
+/// The repaired mesh with all its attributes; the input itself if no repair was needed.
 fn repaired(mesh: &Component, closed: &ClosedSurface) -> Result<Component> {
     if closed.changes.is_none() {
         return Ok(mesh.clone());

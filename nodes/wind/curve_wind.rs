@@ -2,13 +2,14 @@
 //!
 //! W2. At each CV the rest of the curve turns about it, from the direction of its current tip towards the wind plus
 //! noise; the angle is scaled by `global_rotate`, `ramp_rotate` (along the curve) and the CV's `envelope`. Noise is
-//! sampled at the root, moved along the wind by the arc length × `waviness`.
+//! sampled at the root, offset along the wind by arc length × `waviness`.
 //!
 //! Departures:
-//! * Noise moves **downwind** with time, by ∫ `scroll` · wind dt: W scrolls nothing, and moving it with the frame would
-//!   jump where speed or direction are keyed.
-//! * A curve of n segments bends more than one of n/2: `resolution_free` takes a share of the angle a length instead.
-//! * `blend` turns each segment back towards where it came from, so that half a wind keeps lengths too.
+//! * Noise moves **downwind** with time, by ∫ `scroll` · wind dt: W does not scroll the noise, and an offset
+//!   proportional to the frame number would jump where speed or direction are keyed.
+//! * In the paper a curve of n segments bends more than one of n/2; `resolution_free` turns by a share of the angle per
+//!   length instead.
+//! * `blend` scales each segment's turn instead of mixing positions, so that a partial wind keeps lengths too.
 
 use crate::shared::direction::unit_direction;
 use curves::wind_bend::{Bend, BendMode, BendNoise, bend};
@@ -19,89 +20,91 @@ use std::sync::Arc;
 
 choice! {
     /// What varies the wind's direction.
-    pub enum Noise {
-        None = "none": "the wind is the same everywhere",
-        Perlin = "perlin": "smooth, in all sizes from a gust to a flutter",
-        Billow = "billow": "rounded swells with creases between them",
-        Wavelet = "wavelet": "each octave keeps to its own size, so detail does not shimmer",
+    NoiseChoice for Option<NoiseKind> {
+        None => "none": "the wind is the same everywhere",
+        Some(NoiseKind::Perlin) => "perlin": "smooth, with detail from gusts down to flutter",
+        Some(NoiseKind::Billow) => "billow": "rounded swells with creases between them",
+        Some(NoiseKind::Wavelet) => "wavelet": "each octave is limited to its own scale, so detail does not shimmer",
     }
 }
 
 choice! {
     /// Where noise is sampled.
-    pub enum Space {
-        World = "world": "where the root is now, so a moving animal runs through the pattern",
-        Rest = "rest": "where the root was at rest, so the pattern sticks to a moving animal: `Pref` of the root where \
-                the curves have it, else its place at the scene's first frame",
+    enum Space {
+        World = "world": "at the root's current position, so a moving animal runs through the pattern",
+        Rest = "rest": "at the root's rest position, so the pattern sticks to a moving animal: `Pref` of the root if \
+                the curves have it, otherwise its position at the scene's first frame",
     }
 }
 
 choice! {
-    /// How the angle is shared out along the curve.
-    pub enum Mode {
-        Paper = "paper": "every CV turns by the same share, so more CVs bend more",
-        ResolutionFree = "resolution_free": "the bend is the same for any number of CVs, as `reference_segments` \
-                segments of the paper's mode; a share of 1 or more lies along the wind at once",
+    /// How the turn is distributed along the curve.
+    enum Mode {
+        Paper = "paper": "every CV turns by the same share of the remaining angle, so curves with more CVs bend more",
+        ResolutionFree = "resolution_free": "the bend does not depend on the number of CVs; it is that of \
+                `reference_segments` segments in `paper` mode. A share of 1 or more lies along the wind from the root",
     }
 }
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves, root first. Their `envelope` scales the wind CV by CV.")
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves, root first. Their `envelope` scales the wind at \
+        each CV.")
         .read_at(|params| if rest_from_start(params) { Times::NOW.and(Times::START) } else { Times::NOW });
 }
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "Where the wind blows to. Its length does not matter.").history();
-    NOISE: Param<Noise> = Param::choice("noise", Noise::Perlin, "What varies the wind's direction from place to place.");
+        "The direction that the wind blows towards. Its length does not matter.").history();
+    NOISE: Param<NoiseChoice> = Param::choice("noise", Some(NoiseKind::Perlin),
+        "The noise that varies the wind's direction from place to place.");
     AMPLITUDE: Param<f32> = Param::float("amplitude", 0.5,
-        "How far noise turns the wind: 0 leaves it straight, 1 makes noise as strong as the wind.")
+        "Strength of the noise relative to the wind: 0 leaves the wind straight, at 1 both are equally strong.")
         .at_least(0.0).soft(0.0, 2.0).when(has_kind);
     FREQUENCY: Param<f64> = Param::double("frequency", 2.0,
-        "How fine the noise is: its largest swirls are about one over this across.")
+        "How fine the noise is: its largest features are about 1/frequency across.")
         .unit(Unit::PerMetre).at_least(0.0).soft(0.1, 20.0).when(has_noise);
-    OCTAVES: Param<i64> = Param::int("octaves", 2, "Sizes of swirls, each half as large as the one before.")
+    OCTAVES: Param<i64> = Param::int("octaves", 2, "Number of scales of noise, each half the size of the one before.")
         .within(1.0, 16.0).soft(1.0, 4.0).when(has_noise);
     ROUGHNESS: Param<f32> = Param::float("roughness", 0.5,
-        "How strong each smaller size is: 0 leaves only the largest, 1 makes all equally strong.")
+        "Strength of each octave relative to the one before: 0 leaves only the largest, at 1 all are equally strong.")
         .within(0.0, 1.0).when(|params| has_noise(params) && params.get(OCTAVES) > 1);
     SCROLL: Param<f64> = Param::double("scroll", 1.0,
-        "How fast the pattern of noise moves downwind. 0 holds it still.")
+        "How fast the noise pattern moves downwind. 0 holds it still.")
         .unit(Unit::MetresPerSecond).soft(-10.0, 10.0).history().when(has_noise);
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
-        "Whether the pattern of noise stays in the world or on the animal.").when(has_noise);
+        "Whether the noise pattern stays in the world or sticks to the animal.").when(has_noise);
     WAVINESS: Param<f32> = Param::float("waviness", 0.0,
-        "How far along the wind noise is sampled, as a share of the arc length from the root: 0 bends a curve as one, \
-         1 and more make waves run through it.")
+        "How far the noise changes along a curve, relative to arc length: at 0 each curve bends as a whole, from about \
+         1 waves run through it.")
         .soft(0.0, 4.0).when(has_noise);
     GLOBAL_ROTATE: Param<Maskable> = Param::maskable("global_rotate", 0.5,
-        "Share of the angle to the wind by which each CV turns the rest of the curve: 0 leaves the curves alone, 1 lays \
-         them along the wind.").soft(0.0, 1.0);
+        "Share of the angle to the wind by which each CV turns the rest of its curve: 0 leaves the curves alone, 1 \
+         lays them along the wind.").soft(0.0, 1.0);
     RAMP_ROTATE: Param<Arc<Ramp>> = Param::ramp("ramp_rotate", &[[0.0, 1.0]],
-        "Scales the turn along the curve, from root (0) to tip (1): less at the root makes a stiff base.");
-    MODE: Param<Mode> = Param::choice("mode", Mode::Paper, "How the turn is shared out along the curve.");
+        "Scales the turn along the curve, from root (0) to tip (1). Lower values near the root make a stiff base.");
+    MODE: Param<Mode> = Param::choice("mode", Mode::Paper, "How the turn is distributed along the curve.");
     REFERENCE_SEGMENTS: Param<i64> = Param::int("reference_segments", 4,
-        "Segments of a curve that bends as much in the paper's mode.")
+        "Number of segments in `paper` mode that gives the same bend.")
         .within(1.0, 10_000.0).soft(1.0, 32.0).when(|params| params.get(MODE) == Mode::ResolutionFree);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
-        "Share of each segment's turn that is kept: 0 leaves the curves alone, 1 is the whole wind. Lengths are kept at \
-         any value.").within(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Picks another pattern of noise.").when(has_noise);
+        "Share of each segment's turn that is applied: 0 leaves the curves alone, 1 applies the whole wind. Lengths \
+         are kept at any value.").within(0.0, 1.0);
+    SEED: Param<Seed> = Param::seed("Selects another noise pattern.").when(has_noise);
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The curves, bent. Lengths and roots are kept.");
+const OUT: Output = Output::like("curves", &CURVES, "The bent curves. Lengths and roots are unchanged.");
 
-const MAX_ANGLE: Metric = Metric::new("max_angle", Unit::Radians, "The largest turn of a segment.");
-const LENGTH_ERROR: Metric =
-    Metric::new("length_error", Unit::None, "The largest change of a length, as a share of the curve's length.");
+metrics! { METRICS:
+    MAX_ANGLE = Metric::new("max_angle", Unit::Radians, "The largest turn of a segment.");
+    LENGTH_ERROR = Metric::length_error();
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Wind",
     2,
-    "Wind bends curves, root to tip, without stretching them. Each CV turns the rest of its curve towards the wind, which \
-     noise varies from place to place and carries downwind. An `envelope` on the CVs, 1 where it is missing, scales the \
-     wind: gusts and shielding write it.",
+    "Wind bends curves, root to tip, without stretching them. Each CV turns the rest of its curve towards the wind, \
+     whose direction noise varies from place to place; the noise moves downwind. An `envelope` on the CVs (1 if \
+     missing) scales the wind; gusts and shielding write it.",
     Cook::Frame { cook, reads_clock: |params| has_noise(params) && params.get(SCROLL) != 0.0 },
 )
 .inputs(INPUTS)
@@ -109,36 +112,40 @@ pub static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE, &PREF])
 .writes(&[&P])
-.metrics(&[&MAX_ANGLE, &LENGTH_ERROR])
-.leaves_out(leaves_out)
+.metrics(METRICS)
+.neutral(|params, _| match params {
+    _ if params.get(GLOBAL_ROTATE).value == 0.0 => Some("`global_rotate` is 0"),
+    _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
+    _ => None,
+})
+.leaves_out(|params, _| match params {
+    _ if !has_kind(params) => vec![LeftOut::new("noise", "`noise` is \"none\"")],
+    _ if !has_noise(params) => vec![LeftOut::new("noise", "`amplitude` is 0")],
+    _ => Vec::new(),
+})
 .integrates(|params| direction(params).map(|x| x * params.get(SCROLL)));
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
-    let mut out = cx.input(CURVES).clone();
-    let curves = cx.part(CURVES);
-    let (rotate, blend) = (cx.mask(GLOBAL_ROTATE, curves)?, cx.mask(BLEND, curves)?);
-    if rotate.value == 0.0 || blend.value == 0.0 {
-        return still(cx, out);
-    }
-    let field = noise_kind(cx.params())
-        .map(|kind| Field::new(kind, cx.get(OCTAVES) as u32, cx.get(ROUGHNESS), u64::from(cx.get(SEED).0)));
-    let roots = if field.is_some() { noise_roots(cx, curves)? } else { None };
-    let ramp = cx.get(RAMP_ROTATE);
+    let mut curves = cx.edit(CURVES);
+    let field = cx.get(NOISE).filter(|_| has_noise(cx.params()));
+    let field =
+        field.map(|kind| Field::new(kind, cx.get(OCTAVES) as u32, cx.get(ROUGHNESS), u64::from(cx.get(SEED).0)));
+    let roots = if field.is_some() { noise_roots(cx, &curves)? } else { None };
     let bent = bend(
         curves.runs().starts(),
         curves.positions(),
         &Bend {
             wind: direction(cx.params()).map(|x| x as f32),
-            rotate,
+            rotate: cx.mask(GLOBAL_ROTATE, &curves)?,
             envelope: curves.get(ENVELOPE),
-            ramp: &ramp,
+            ramp: &cx.get(RAMP_ROTATE),
             mode: match cx.get(MODE) {
                 Mode::Paper => BendMode::Paper,
                 Mode::ResolutionFree => {
                     BendMode::ResolutionFree { reference_segments: cx.get(REFERENCE_SEGMENTS) as f32 }
                 }
             },
-            blend,
+            blend: cx.mask(BLEND, &curves)?,
             noise: field.as_ref().map(|field| BendNoise {
                 field,
                 amplitude: cx.get(AMPLITUDE),
@@ -151,15 +158,8 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     );
     cx.publish(MAX_ANGLE, f64::from(bent.max_angle));
     cx.publish(LENGTH_ERROR, f64::from(bent.length_error));
-    out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves").set(P, bent.points)?;
-    Ok(OUT.with(out))
-}
-
-/// Nothing turns: the curves go through as they are.
-fn still(cx: &FrameCx, out: Geometry) -> Result<Outputs> {
-    cx.publish(MAX_ANGLE, 0.0);
-    cx.publish(LENGTH_ERROR, 0.0);
-    Ok(OUT.with(out))
+    curves.set(P, bent.points)?;
+    Ok(OUT.with(curves))
 }
 
 /// The wind's direction, of length 1.
@@ -168,7 +168,7 @@ fn direction(params: &Params) -> [f64; 3] {
 }
 
 fn has_kind(params: &Params) -> bool {
-    params.get(NOISE) != Noise::None
+    params.get(NOISE).is_some()
 }
 
 fn has_noise(params: &Params) -> bool {
@@ -179,23 +179,13 @@ fn rest_from_start(params: &Params) -> bool {
     has_noise(params) && params.get(NOISE_SPACE) == Space::Rest
 }
 
-fn noise_kind(params: &Params) -> Option<NoiseKind> {
-    match params.get(NOISE) {
-        _ if !has_noise(params) => None,
-        Noise::None => None,
-        Noise::Perlin => Some(NoiseKind::Perlin),
-        Noise::Billow => Some(NoiseKind::Billow),
-        Noise::Wavelet => Some(NoiseKind::Wavelet),
-    }
-}
-
 /// What is added to a root to find its noise: the scene's origin, less how far the pattern has moved downwind.
 fn noise_origin(cx: &FrameCx) -> [f64; 3] {
     let moved = cx.integral(cx.frame());
     std::array::from_fn(|axis| cx.origin()[axis] - moved[axis])
 }
 
-/// Where each curve's noise is sampled, if not at its root as it is now.
+/// Where each curve's noise is sampled, if not at its current root.
 fn noise_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>> {
     if !rest_from_start(cx.params()) {
         return Ok(None);
@@ -203,7 +193,7 @@ fn noise_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>
     let rest = match curves.get(PREF) {
         Some(rest) => rest,
         None => {
-            let start = cx.at_start(CURVES).curves().expect("the engine refuses a wire without curves");
+            let start = cx.part_at_start(CURVES);
             if start.runs() != curves.runs() {
                 return Err(Error::refused(
                     "`noise_space` is \"rest\", but the curves are not those of the first frame",
@@ -214,21 +204,6 @@ fn noise_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>
         }
     };
     Ok(Some(curves.runs().ranges().map(|cvs| rest[cvs.start]).collect()))
-}
-
-fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
-    let rotate = params.get(GLOBAL_ROTATE).value;
-    if rotate == 0.0 {
-        return vec![LeftOut::new("all", "`global_rotate` is 0")];
-    }
-    if params.get(BLEND).value == 0.0 {
-        return vec![LeftOut::new("all", "`blend` is 0")];
-    }
-    match params.get(NOISE) {
-        Noise::None => vec![LeftOut::new("noise", "`noise` is \"none\"")],
-        _ if !has_noise(params) => vec![LeftOut::new("noise", "`amplitude` is 0")],
-        _ => Vec::new(),
-    }
 }
 
 #[cfg(test)]
@@ -250,7 +225,7 @@ mod tests {
     }
 
     fn calm(curves: Geometry) -> Bench {
-        bench(&NODE).input(CURVES, curves).set(NOISE, Noise::None)
+        bench(&NODE).input(CURVES, curves).set(NOISE, None)
     }
 
     /// Angle of each segment of the first curve to the wind along x, radians.

@@ -1,18 +1,20 @@
 //! Curve_Wind_Collision: curves bend around what the wind blows them into.
 //!
-//! W3. Root to tip, each segment turns from its rest direction, as far as the segments before it have already turned
-//! that, towards the direction wind gave it, until it meets a collider. A segment that was pushed into one by the turn
-//! of another is turned out first. `offset_root` brings roots off the skin, `offset_scale` keeps what wind presses flat
-//! at a share of its rest distance.
+//! W3. Root to tip, each segment starts from its rest direction, carried along by the turns of the segments before it,
+//! and turns towards the direction that the wind gave it until it meets a collider. A segment that the turn of another
+//! pushed into a collider is turned out first. `offset_root` lifts roots off the skin; `offset_scale` keeps curves that
+//! the wind presses flat at a share of their rest height.
 //!
 //! Departures:
-//! * `exact` stops at the first contact itself instead of the last of `rotation_steps` steps that misses: nothing passes
-//!   through a thin collider, and the cost does not grow with accuracy.
-//! * A stop keeps `gap` of arc, so that positions rounded to a file's f32 do not cross.
-//! * Neither W's collision nor the first contact is continuous in the wind. `coherence` leads directions out of the skin
-//!   beforehand by a map that is: on the bear, in wind that moves 0.50 % of all curves by more than a quarter of their length in a
-//!   frame, collision makes that 1.07 %, and 0.70 % at `coherence` 1 (tests/wind/coherence.rs).
-//! * `offset_scale` raises goals that lie lower and leaves those that lie higher: wind that lifts fur off is kept.
+//! * `exact` stops at the first contact itself instead of the last of `rotation_steps` steps that misses: nothing
+//!   passes through a thin collider, and the cost does not grow with accuracy.
+//! * Turns stop `gap` of arc length short of contact, so that positions rounded to a file's f32 do not cross.
+//! * Neither W's collision nor the first contact is continuous in the wind. `coherence` redirects segments out of the
+//!   skin beforehand by a continuous map: on the bear, in wind that moves 0.50 % of all curves by more than a quarter
+//!   of their length in a frame, collision raises that to 1.07 %, and to 0.70 % at `coherence` 1
+//!   (tests/wind/coherence.rs).
+//! * `offset_scale` raises segments that would lie lower and leaves those that lie higher: wind may lift fur off the
+//!   skin.
 
 use std::sync::Arc;
 
@@ -24,72 +26,74 @@ use crate::shared::surface::{Surface, tree};
 
 choice! {
     /// How a segment's turn is stopped.
-    pub enum Method {
-        Exact = "exact": "at the first contact, computed in closed form: nothing is missed",
-        Steps = "steps": "the paper's: turned in `rotation_steps` steps, of which the last that crosses nothing is kept",
+    enum Method {
+        Exact = "exact": "at the first contact, computed in closed form, so that no collider is missed",
+        Steps = "steps": "as in the paper: it turns in `rotation_steps` steps and stops before the first that crosses \
+                a collider",
     }
 }
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves where wind wants them.");
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves as the wind bends them.");
     REST: Input = Input::one("rest", Kind::Curves,
-        "The same curves before the wind, at the same frame: where they grow on a skin that moves.");
+        "The same curves before the wind, at the same frame: on a moving skin, attached to it.");
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that are in the way, the skin itself among them. They may move and deform.");
+        "Meshes that curves must not cross, the skin included. They may move and deform.");
     SKIN: Input<Opt> = Input::optional("skin", Kind::Mesh,
-        "The mesh that the curves grow on, for `offset_root` and `offset_scale`. Without it the first collider is taken.");
+        "The mesh that the curves grow on, for `offset_root` and `offset_scale`. By default the first collider.");
 }
 
 params! { PARAMS:
     METHOD: Param<Method> = Param::choice("method", Method::Exact, "How a segment's turn is stopped.");
-    ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Steps of a turn. More come nearer to the contact.")
+    ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Number of steps of a turn. With more, segments stop \
+        closer to the contact.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
-        "How far outside of the skin a root is brought, its curve with it. Below `gap` the beginning of a curve is not \
-         tested, as it lies in the skin.")
+        "How far outside the skin each root is moved, together with its curve. If this is less than `gap`, the first \
+         part of a curve is not tested, as it lies in the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     OFFSET_SCALE: Param<f64> = Param::double("offset_scale", -1.0,
-        "Keeps curves this many times as far off the skin as they are at rest: 1 keeps the coat's volume, less presses \
-         it down. Below 0 it is off.")
+        "Least height over the skin, relative to the curves' height at rest: 1 keeps the coat's volume, less lets the \
+         wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
-    GAP: Param<f64> = Param::double("gap", 1e-4, "The way that a turn stops short of what it meets.")
+    GAP: Param<f64> = Param::double("gap", 1e-4, "Arc length by which a turn stops short of a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
-    WIDTH: Param<Maskable> = Param::maskable("width", 0.0, "How thick curves are when they collide.")
+    WIDTH: Param<Maskable> = Param::maskable("width", 0.0, "Thickness of the curves in collisions.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<f64> = Param::double("coherence", 0.0,
-        "How far what wind blows into the skin is led out of it before it collides, so that it does not jump from one \
-         side to another as the wind turns: 0 is the paper's collision, 1 has hardly more jumps than the wind itself. \
-         What lies flat in the wind at 0 stands up a little the more the wind blows straight into the skin.")
+        "How strongly curves blown into the skin are redirected outward before collision, so that they do not flip \
+         from one side to another as the wind turns: 0 is the paper's collision, at 1 there are hardly more jumps than \
+         in the wind itself. The more directly the wind blows into the skin, the more this raises curves that would \
+         lie flat at 0.")
         .within(0.0, 1.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
-        "Share of each segment's collision that is kept: 0 leaves the curves to the wind, 1 lets nothing through. \
-         Lengths are kept at any value.").within(0.0, 1.0);
+        "Share of each segment's collision response that is applied: 0 leaves the curves to the wind, 1 lets nothing \
+         through. Lengths are kept at any value.").within(0.0, 1.0);
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The curves, around what is in their way. Lengths are kept.");
+const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the colliders. Lengths are kept.");
 
-const CROSSINGS_LEFT: Metric = Metric::new(
-    "crossings_left",
-    Unit::None,
-    "Segments that cross a collider as they are written; 0 while `blend` is 0.",
-);
-const UNFREED: Metric =
-    Metric::new("unfreed_segments", Unit::None, "Segments that no turn frees from the collider they are in.");
-const STARTED_INSIDE: Metric = Metric::new("started_inside", Unit::None, "Curves that cross a collider at rest.");
-const CONTACTS: Metric =
-    Metric::new("contacts", Unit::None, "Segments that a collider keeps from where wind wants them.");
-const DEEPEST: Metric =
-    Metric::new("deepest_overlap", Unit::Metres, "How far the deepest unfreed segment reaches through a surface.");
-const LENGTH_ERROR: Metric =
-    Metric::new("length_error", Unit::None, "The largest change of a length, as a share of the curve's length.");
+metrics! { METRICS:
+    CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
+        "Segments of the output that cross a collider; 0 while `blend` is 0.");
+    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that no turn frees from the collider they are in.")
+        .warn_above(0.0, "These segments still reach into a collider, because no turn about the CV before them frees \
+            them: roots deep in the skin, or curves between two colliders. Raise `offset_root`, or start from curves \
+            that are clear of the colliders.");
+    STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider at rest.");
+    CONTACTS = Metric::new("contacts", Unit::None,
+        "Segments that a collider stops short of where the wind blows them.");
+    DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
+        "How far the deepest unfreed segment reaches through a surface.");
+    LENGTH_ERROR = Metric::length_error();
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
     2,
-    "Curves bend around what wind blows them into. Each segment, root to tip, turns from where it grows towards where \
-     wind wants it, until it touches a collider. Put it after the wind, and give it the curves from before the wind as \
-     `rest`. What could not be freed is counted, not hidden.",
+    "Curves bend around what the wind blows them into. Each segment, root to tip, turns from its rest direction \
+     towards the direction that the wind gave it, until it touches a collider. Place it after the wind, and wire the \
+     curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -97,34 +101,40 @@ pub static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P])
-.metrics(&[&CROSSINGS_LEFT, &UNFREED, &STARTED_INSIDE, &CONTACTS, &DEEPEST, &LENGTH_ERROR])
-.leaves_out(leaves_out);
+.metrics(METRICS)
+.neutral(|params, wires| match params {
+    _ if wires.count(&COLLIDERS) == 0 => Some("no `colliders` are wired"),
+    _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
+    _ => None,
+})
+.leaves_out(|params, _| {
+    let mut left_out = Vec::new();
+    if params.get(COHERENCE) == 0.0 {
+        left_out.push(LeftOut::new("redirection", "`coherence` is 0"));
+    }
+    if params.get(OFFSET_SCALE) < 0.0 {
+        left_out.push(LeftOut::new("offset", "`offset_scale` is below 0"));
+    }
+    left_out
+});
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    let mut out = cx.input(CURVES).clone();
-    let (curves, rest) = (cx.part(CURVES), cx.part(REST));
+    let (mut curves, rest) = (cx.edit(CURVES), cx.part(REST));
     if curves.runs() != rest.runs() {
         return Err(Error::refused(format!(
             "`curves` ({}) and `rest` ({}) are not the same curves",
-            count(curves),
+            count(&curves),
             count(rest)
         ))
         .hint("give `rest` the curves as they were before the wind nodes"));
     }
-    let (width, blend) = (cx.mask(WIDTH, curves)?, cx.mask(BLEND, curves)?);
-    let colliders: Vec<&Component> = cx.input(COLLIDERS).iter().filter_map(|wire| wire.mesh()).collect();
-    let Some(first) = colliders.first().filter(|_| blend.value > 0.0) else {
-        for metric in [CROSSINGS_LEFT, UNFREED, STARTED_INSIDE, CONTACTS, DEEPEST, LENGTH_ERROR] {
-            cx.publish(metric, 0.0);
-        }
-        return Ok(OUT.with(out));
-    };
+    let colliders = cx.part(COLLIDERS);
     let trees: Vec<Arc<TriangleTree>> = colliders.iter().map(|mesh| tree(mesh)).collect();
     let obstacles: Vec<&TriangleTree> = trees.iter().map(Arc::as_ref).collect();
-    let skin = Surface::of(cx.input(SKIN).and_then(Geometry::mesh).unwrap_or(first));
+    let skin = cx.part(SKIN).or(colliders.first().copied()).map(Surface::of);
     let mut how = Collide {
         obstacles: &obstacles,
-        skin: Some(skin.skin()),
+        skin: skin.as_ref().map(Surface::skin),
         method: match cx.get(METHOD) {
             Method::Exact => ContactMethod::Exact,
             Method::Steps => ContactMethod::Steps(cx.get(ROTATION_STEPS) as u32),
@@ -134,12 +144,13 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         offset_root: cx.get(OFFSET_ROOT),
         offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
         at_rest: None,
-        blend,
-        width,
+        blend: cx.mask(BLEND, &curves)?,
+        width: cx.mask(WIDTH, &curves)?,
     };
     let starts = curves.runs().starts();
-    // While nothing moves, what is so at rest is looked at once.
-    let still = Still { obstacles: trees.clone(), skin: skin.tree().clone(), offset: how.offset_root };
+    // Computed once while nothing moves.
+    let tree = skin.as_ref().map(|skin| skin.tree().clone());
+    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
     how.at_rest = Some(&at_rest);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
@@ -149,14 +160,14 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
-    out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves").set(P, collided.points)?;
-    Ok(OUT.with(out))
+    curves.set(P, collided.points)?;
+    Ok(OUT.with(curves))
 }
 
-/// What curves at rest are looked at with; equal where trees are the very same.
+/// What curves at rest are tested against; equal where trees are the same objects.
 struct Still {
     obstacles: Vec<Arc<TriangleTree>>,
-    skin: Arc<TriangleTree>,
+    skin: Option<Arc<TriangleTree>>,
     offset: f64,
 }
 
@@ -165,7 +176,8 @@ impl PartialEq for Still {
         let same = |(a, b): (&Arc<TriangleTree>, &Arc<TriangleTree>)| Arc::ptr_eq(a, b);
         self.obstacles.len() == other.obstacles.len()
             && self.obstacles.iter().zip(&other.obstacles).all(same)
-            && Arc::ptr_eq(&self.skin, &other.skin)
+            && self.skin.iter().zip(&other.skin).all(same)
+            && self.skin.is_some() == other.skin.is_some()
             && self.offset == other.offset
     }
 }
@@ -173,23 +185,6 @@ impl PartialEq for Still {
 fn count(curves: &Component) -> String {
     let plural = |count: usize, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
     format!("{}, {}", plural(curves.element_count(), "curve"), plural(curves.point_count(), "CV"))
-}
-
-fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
-    if wires.count(&COLLIDERS) == 0 {
-        return vec![LeftOut::new("all", "there are no `colliders`")];
-    }
-    if params.get(BLEND).value == 0.0 {
-        return vec![LeftOut::new("all", "`blend` is 0")];
-    }
-    let mut left_out = Vec::new();
-    if params.get(COHERENCE) == 0.0 {
-        left_out.push(LeftOut::new("lead_out", "`coherence` is 0"));
-    }
-    if params.get(OFFSET_SCALE) < 0.0 {
-        left_out.push(LeftOut::new("offset", "`offset_scale` is below 0"));
-    }
-    left_out
 }
 
 #[cfg(test)]

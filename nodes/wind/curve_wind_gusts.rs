@@ -1,15 +1,17 @@
 //! Curve_Wind_Gusts: gusts let the wind in where they pass.
 //!
-//! W5. A gust is a sphere that travels with the wind from a plane across it, its influence 1 at its centre and 0 at its
-//! boundary; or a Gust_Control, placed by hand. `envelope` = incoming × clamp(`base` + Σ influences, 0, 1).
+//! W5. A gust is a sphere that travels with the wind from a plane perpendicular to it; its influence is 1 at its centre
+//! and 0 at its boundary. Or it is a Gust_Control, placed by hand. `envelope` = incoming × clamp(`base` + Σ influences,
+//! 0, 1).
 //!
 //! What W leaves open:
-//! * A gust is a pure function of seed, number and round, so any frame cooks alone. Its path is ∫ speed · wind dt from
-//!   its start: where wind or speeds are keyed, gusts on their way turn and hurry, and never jump. Its own speed is a
-//!   share of the range of speeds, drawn once. All other ranges are read at the frame that is cooked.
-//! * The launch plane lies upwind of the curves as they are at the scene's first frame, across the mean wind of the frame
-//!   before the gust's start, which is known whatever comes after.
-//! * Noise dents a sphere in its own space, by direction: no point beyond the drawn radius is touched, the centre stays 1.
+//! * A gust is a pure function of seed, index and repetition, so any frame cooks alone. Its path is ∫ speed · wind dt
+//!   from its start: where wind or speeds are keyed, gusts under way change course and speed, and never jump. The
+//!   position of its speed within the range is drawn once. All other ranges are read at the frame that is cooked.
+//! * The launch plane lies upwind of the curves at the scene's first frame, perpendicular to the mean wind over the
+//!   frame before the gust's start, which does not depend on anything later.
+//! * Noise dents a sphere in its own space, by direction: it reaches no point beyond its radius, and its centre stays
+//!   1.
 //! * A gust fades over its decay while it travels on.
 
 use crate::shared::direction::unit_direction;
@@ -22,65 +24,67 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves, not yet bent. Their `envelope` is scaled.")
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves, not yet bent by wind. Their `envelope` is scaled.")
         .read_at(|params| if sends(params) { Times::NOW.and(Times::START) } else { Times::NOW });
     CONTROLS: Input<Many> = Input::many("controls", Kind::Points, "Gusts placed by hand: Gust_Control nodes.");
 }
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "Where the wind blows to, and gusts with it. Its length does not matter.").history().when(is_asked);
-    NUM_GUSTS: Param<i64> = Param::int("num_gusts", 8, "How many gusts are sent. 0 leaves only those placed by hand.")
+        "The direction that the wind blows towards and gusts travel in. Its length does not matter.")
+        .history().when(is_asked);
+    NUM_GUSTS: Param<i64> = Param::int("num_gusts", 8, "Number of gusts. 0 leaves only those placed by hand.")
         .within(0.0, 1e6).soft(0.0, 100.0);
-    RADIUS_RANGE: Param<Span> = Param::span("radius_range", [0.3, 0.6], "How large a gust is, from its centre to where it ends.")
+    RADIUS_RANGE: Param<Span> = Param::span("radius_range", [0.3, 0.6], "Radius of a gust, from its centre to its \
+        boundary.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     RADIUS_NOISE_RANGE: Param<Span> = Param::span("radius_noise_range", [0.0, 0.3],
-        "How far noise dents a gust, as a share of its radius: 0 leaves it a ball, 1 lets dents reach its centre. It never \
-         grows.").within(0.0, 1.0).when(is_asked);
+        "How deeply noise dents a gust, as a share of its radius: 0 leaves it a sphere, at 1 dents reach its centre. \
+         Noise never enlarges a gust.").within(0.0, 1.0).when(is_asked);
     SPEED_RANGE: Param<Span> = Param::span("speed_range", [1.0, 3.0],
-        "How fast a gust travels. Keys change the speed of gusts on their way.")
+        "How fast a gust travels. Keys also change the speed of gusts that are under way.")
         .unit(Unit::MetresPerSecond).at_least(0.0).soft(0.0, 20.0).history().when(is_asked);
-    START_FRAME_RANGE: Param<Span> = Param::span("start_frame_range", [1.0, 48.0], "When a gust sets out.")
+    START_FRAME_RANGE: Param<Span> = Param::span("start_frame_range", [1.0, 48.0], "The frame at which a gust starts.")
         .unit(Unit::Frame).within(-1e9, 1e9).soft(-100.0, 1000.0).when(is_asked);
     LIFE_RANGE: Param<Span> = Param::span("life_range", [24.0, 96.0], "How long a gust keeps its full strength.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     DECAY_RANGE: Param<Span> = Param::span("decay_range", [6.0, 24.0],
-        "How long a gust takes to die down after its life, still travelling. 0 ends it at once.")
+        "How long a gust takes to fade after its life, while it still travels. 0 ends it at once.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     DISTANCE: Param<f64> = Param::double("distance", 0.0,
-        "How far upwind of the curves gusts set out. At 0 it is the largest radius, so that they come in from outside.")
+        "How far upwind of the curves gusts start. 0 takes the largest radius, so that they come in from outside.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     AREA: Param<[f32; 2]> = Param::vec2("area", [0.0; 2],
-        "How wide and how high the plane is from which gusts set out. A 0 is as wide, or high, as the curves look along \
-         the wind.").unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
+        "Width and height of the plane from which gusts start. 0 takes the width, or the height, of the curves as seen \
+         along the wind.").unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     REPEAT_EVERY: Param<f64> = Param::double("repeat_every", 0.0,
-        "After how many frames each gust is sent again, with other numbers. At 0 it is sent once.")
+        "Number of frames after which each gust is sent again with new random values. 0 sends it once.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
         "How much wind a gust lets in, from its centre (0) to its boundary (1).").when(is_asked);
     BASE: Param<f32> = Param::float("base", 0.0,
-        "How much wind there is without a gust: 0 is calm between gusts, 1 is all of it, so that gusts add nothing.")
+        "Wind without a gust: 0 is calm between gusts, 1 is the full wind, to which gusts add nothing.")
         .within(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Sends other gusts.").when(is_asked);
+    SEED: Param<Seed> = Param::seed("Selects other gusts.").when(is_asked);
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The same curves, their `envelope` scaled by the gusts.");
+const OUT: Output = Output::like("curves", &CURVES, "The curves, with their `envelope` scaled by the gusts.");
 
-const ACTIVE_GUSTS: Metric = Metric::new("active_gusts", Unit::None, "Gusts alive, not counting those placed by hand.");
-const REACHED_POINTS: Metric =
-    Metric::new("reached_points", Unit::None, "Points that some gust reaches, placed by hand or sent.");
-const DROPPED_GUSTS: Metric = Metric::new(
-    "dropped_gusts",
-    Unit::None,
-    "Gusts left out because more than 65,536 would be alive at once: the oldest rounds of each.",
-);
+metrics! { METRICS:
+    ACTIVE_GUSTS = Metric::new("active_gusts", Unit::None, "Gusts alive, not counting those placed by hand.");
+    REACHED_POINTS = Metric::new("reached_points", Unit::None, "CVs within any gust, including those placed by hand.");
+    DROPPED_GUSTS = Metric::new("dropped_gusts", Unit::None,
+        "Gusts left out because more than 65,536 would be alive at once: the oldest repetitions of each.")
+        .warn_above(0.0, "More than 65,536 gusts would be alive at once, so the oldest are missing. Lower `num_gusts`, \
+            `life_range` or `decay_range`, or raise `repeat_every`.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Gusts",
     1,
-    "Lets the wind in where gusts pass over curves: writes their `envelope`, which Curve_Wind scales the wind by. Gusts are \
-     balls sent with the wind, each with its own size, speed and time, and regions placed by hand with Gust_Control.",
+    "Gusts let the wind in where they pass: they write the curves' `envelope`, by which Curve_Wind scales the wind. \
+     Gusts are spheres that travel with the wind, each with its own size, speed and start, and regions placed by hand \
+     with Gust_Control.",
     Cook::Frame { cook, reads_clock: sends },
 )
 .inputs(INPUTS)
@@ -96,15 +100,19 @@ pub static NODE: Node = Node::new(
     &gust_control::RAMP,
 ])
 .writes(&[&ENVELOPE])
-.metrics(&[&ACTIVE_GUSTS, &REACHED_POINTS, &DROPPED_GUSTS])
+.metrics(METRICS)
+.neutral(|params, wires| {
+    let full = params.get(BASE) == 1.0 && params.get(FALLOFF).min() >= 0.0;
+    (full && wires.count(&CONTROLS) == 0).then_some("`base` is 1")
+})
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0)])
 .leaves_out(leaves_out)
 .integrates(direction)
 .integrates(|params| along(params, params.get(SPEED_RANGE).low))
 .integrates(|params| along(params, params.get(SPEED_RANGE).high));
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
-    let mut out = cx.input(CURVES).clone();
-    let curves = cx.part(CURVES);
+    let mut curves = cx.edit(CURVES);
     let controls = controls(cx)?;
     let (base, falloff) = (cx.get(BASE), cx.get(FALLOFF));
     let full = base == 1.0 && falloff.min() >= 0.0 && controls.iter().all(Control::only_adds);
@@ -121,24 +129,22 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     };
     cx.publish(REACHED_POINTS, reached as f64);
     if let Some(envelope) = envelope {
-        out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves").set(ENVELOPE, envelope)?;
+        curves.set(ENVELOPE, envelope)?;
     }
-    Ok(OUT.with(out))
+    Ok(OUT.with(curves))
 }
 
 fn controls(cx: &FrameCx) -> Result<Vec<Control>> {
     let mut controls = Vec::new();
-    for (place, wire) in cx.input(CONTROLS).iter().enumerate() {
-        let points = wire.points().expect("the engine refuses a wire without points");
-        controls.extend(gust_control::controls(points, place)?);
+    for (wire, points) in cx.part(CONTROLS).into_iter().enumerate() {
+        controls.extend(gust_control::controls(points, wire)?);
     }
     Ok(controls)
 }
 
-/// The gusts as they are at this frame, and how many were left out.
+/// The gusts alive at this frame, and how many were left out.
 fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
-    let start = cx.at_start(CURVES).curves().expect("the engine refuses a wire without curves");
-    let Some(bounds) = start.bounds() else { return (Vec::new(), 0) };
+    let Some(bounds) = cx.part_at_start(CURVES).bounds() else { return (Vec::new(), 0) };
     let ends = |range: Param<Span>| {
         let Span { low, high } = cx.get(range);
         [low, high]
@@ -168,9 +174,9 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
             (Plane::new(bounds, launch.wind, distance, area), launch)
         });
         let from = plane.at(gust.position);
-        let way = launch.way_to([slow, fast], gust);
+        let travelled = launch.travelled([slow, fast], gust);
         Sphere {
-            centre: std::array::from_fn(|axis| from[axis] + way[axis]),
+            centre: std::array::from_fn(|axis| from[axis] + travelled[axis]),
             radius: gust.radius,
             strength: gust.strength,
             noise: gust.noise,
@@ -180,28 +186,29 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
     (living.gusts.iter().map(sphere).collect(), living.dropped)
 }
 
-/// The wind where gusts start: at a whole frame, and over the frame before it.
+/// The wind around a whole frame at which gusts start.
 struct Launch {
     /// Its mean direction over the frame before, of length 1.
     wind: [f64; 3],
-    /// ∫ speed · wind up to the whole frame at either end of the range of speeds, and that of the frame before it.
+    /// ∫ speed · wind dt up to the whole frame, at the lower and the upper end of the range of speeds.
     upto: [[f64; 3]; 2],
+    /// The same over the frame before alone.
     step: [[f64; 3]; 2],
 }
 
-/// A mean of directions shorter than this has none of its own: the wind has turned about.
-const TURNED_ABOUT: f64 = 0.1;
+/// A mean of unit directions shorter than this has no reliable direction: the wind has reversed meanwhile.
+const REVERSED: f64 = 0.1;
 
 impl Launch {
     fn at(cx: &FrameCx, frame: i64) -> Self {
         let [toward, slow, fast] = cx.integrals(Frame::whole(frame));
         let [_, slow_before, fast_before] = cx.integrals(Frame::whole(frame - 1));
-        // Where the wind turned about within the frame before, what it was over more of them decides.
+        // Where the wind reversed within the frame before, its mean over more frames decides.
         let mean = |frames: i64| -> [f64; 3] {
             let [before] = cx.integrals(Frame::whole(frame - frames));
             difference(toward, before).map(|x| x * cx.fps() / frames as f64)
         };
-        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| DVec3::from(*mean).norm() > TURNED_ABOUT);
+        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| DVec3::from(*mean).norm() > REVERSED);
         Self {
             wind: wind.map_or_else(|| direction(cx.params()), unit_direction),
             upto: [slow, fast],
@@ -209,9 +216,10 @@ impl Launch {
         }
     }
 
-    /// How far a gust has come, given the integrals up to now. Within the frame in which it starts the wind is taken to
-    /// be that of the frame before: exact where it is constant, else a shift of its start that stays.
-    fn way_to(&self, now: [[f64; 3]; 2], gust: &Gust) -> [f64; 3] {
+    /// How far a gust has travelled, metres along each axis, given the integrals up to now. Within the frame in which
+    /// it starts, the wind is taken to be that of the frame before: exact where it is constant, otherwise a constant
+    /// offset of its start.
+    fn travelled(&self, now: [[f64; 3]; 2], gust: &Gust) -> [f64; 3] {
         let share = gust.start - gust.start.floor();
         let [slow, fast]: [[f64; 3]; 2] = std::array::from_fn(|end| {
             std::array::from_fn(|axis| now[end][axis] - self.upto[end][axis] - share * self.step[end][axis])
@@ -237,12 +245,12 @@ fn is_asked(params: &Params) -> bool {
     params.get(NUM_GUSTS) > 0
 }
 
-/// Whether gusts are sent that anything could feel.
+/// Whether gusts are sent that can reach anything.
 fn sends(params: &Params) -> bool {
     no_gusts(params).is_none()
 }
 
-/// Why no gust that is sent can be felt.
+/// Why no gust that is sent has an effect.
 fn no_gusts(params: &Params) -> Option<&'static str> {
     if !is_asked(params) {
         return Some("`num_gusts` is 0");
@@ -257,10 +265,6 @@ fn no_gusts(params: &Params) -> Option<&'static str> {
 }
 
 fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
-    let controlled = wires.count(&CONTROLS) > 0;
-    if params.get(BASE) == 1.0 && !controlled && params.get(FALLOFF).min() >= 0.0 {
-        return vec![LeftOut::new("all", "`base` is 1")];
-    }
     let mut left_out = Vec::new();
     match no_gusts(params) {
         Some(why) => left_out.push(LeftOut::new("gusts", why)),
@@ -269,8 +273,8 @@ fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
         }
         None => {}
     }
-    if !controlled {
-        left_out.push(LeftOut::new("controls", "nothing is wired into `controls`"));
+    if wires.count(&CONTROLS) == 0 {
+        left_out.push(LeftOut::new("controls", "no `controls` are wired"));
     }
     left_out
 }

@@ -1,17 +1,18 @@
 //! Curve_Wind_Shielding: curves in the lee of a collider receive less wind.
 //!
-//! W4. From each CV a ray of length `offset` runs upwind. The share of a curve's CVs whose ray meets a collider is its
+//! W4. From each CV a ray of length `offset` runs upwind. The share of a curve's CVs whose ray hits a collider is its
 //! `shielded` (W's alpha); its envelope is scaled by 1 − clamp(`shielded` · `shield`, 0, 1).
 //!
 //! Departures:
-//! * W scales the envelope *by* alpha · `shield`, which calms the exposed side. Its first sentence and figure 1 calm the
-//!   lee, and so do we.
-//! * Rays are cast from the CV upwind, in a frame that looks along the wind ([`curves::shield`]): a far offset costs
-//!   neither precision nor time. The skin that a CV lies on is not its own shelter, the far side of a body is.
-//! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through a
-//!   cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
-//!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5 and
-//!   0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 % (tests/wind/shelter.rs).
+//! * W scales the envelope *by* alpha · `shield`, which calms the exposed side. Its first sentence and figure 1 calm
+//!   the lee, and so does this node.
+//! * Rays are cast upwind from the CV, in a frame that looks along the wind ([`curves::shield`]), so a large offset
+//!   costs neither precision nor time. The skin that a CV lies on does not shelter it; the far side of a body does.
+//! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through
+//!   a cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
+//!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5
+//!   and 0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 %
+//!   (tests/wind/shelter.rs).
 
 use std::sync::Arc;
 
@@ -24,43 +25,46 @@ use crate::shared::surface::tree;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves,
-        "The curves as they grow, not yet bent by wind: so shelter stands still where skin and wind do.");
+        "The curves as they grow, before any wind bends them, so that shelter does not change while skin and wind stay \
+         the same.");
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that stop the wind, the skin among them. They may move.");
+        "Meshes that block the wind, the skin included. They may move.");
 }
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "Where the wind blows to. Its length does not matter.");
+        "The direction that the wind blows towards. Its length does not matter.");
     OFFSET: Param<f32> = Param::float("offset", 10.0,
-        "How far upwind of a CV a collider shelters it: a wall farther away than this does not. 0 shelters nothing.")
+        "How far upwind of a CV a collider still shelters it. 0 shelters nothing.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 100.0);
     SHIELD: Param<f32> = Param::float("shield", 1.0,
-        "Share of the wind that a wholly sheltered curve loses: 0 leaves the wind alone, 1 takes all of it. Above 1, \
-         curves sheltered in part are calm too.")
+        "Share of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above 1, \
+         partly sheltered curves become calm as well.")
         .at_least(0.0).soft(0.0, 1.0);
     SMOOTH: Param<f32> = Param::float("smooth", 0.0,
-        "Softens the edge of the lee, so that shelter does not pop as the wind turns: each CV looks upwind not along a \
-         line but through a cone, and is sheltered by the share of it that is covered. 0 is a line, 1 a cone with a \
-         half angle of 0.1 rad.")
+        "Softens the edge of the lee, so that shelter does not pop as the wind turns: each CV looks upwind through a \
+         cone instead of along a line, and is sheltered by the share of the cone that is covered. 0 is a line, 1 a \
+         cone with a half angle of 0.1 rad.")
         .within(0.0, 1.0);
     SKIN_GAP: Param<f32> = Param::float("skin_gap", 0.0,
-        "A CV this close to the plane of a face lies on it and is not sheltered by it. 0 allows for rounding alone; roots \
-         that lie deeper in the skin need their depth.")
+        "A face whose plane is this close to a CV does not shelter it, as the CV lies on that face. 0 allows for \
+         rounding alone; for roots that lie deeper in the skin, give their depth.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");
 
-const SHELTERED: Metric = Metric::new("sheltered_curves", Unit::None, "Curves with any shelter.");
-const RAYS: Metric = Metric::new("rays", Unit::None, "Rays, or cones, that were cast.");
+metrics! { METRICS:
+    SHELTERED = Metric::new("sheltered_curves", Unit::None, "Curves with any shelter.");
+    RAYS = Metric::new("rays", Unit::None, "Rays, or cones, that were cast.");
+}
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Shielding",
     1,
     "Curves in the lee of a collider receive less wind. Each CV looks upwind; the share of a curve's CVs that see a \
-     collider is its `shielded`, and scales its `envelope` down. Goes before Curve_Wind, on curves that are not yet bent.",
+     collider is its `shielded`, which scales its `envelope` down. Place it before Curve_Wind, on curves that are not \
+     yet bent.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -68,40 +72,45 @@ pub static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
 .writes(&[&ENVELOPE, &SHIELDED])
-.metrics(&[&SHELTERED, &RAYS])
-.leaves_out(leaves_out);
+.metrics(METRICS)
+.neutral(|params, wires| match params {
+    _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),
+    _ if params.get(OFFSET) == 0.0 => Some("`offset` is 0"),
+    _ => None,
+})
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0)])
+.leaves_out(|params, _| {
+    let stages = [(SHIELD, "envelope", "`shield` is 0"), (SMOOTH, "cones", "`smooth` is 0")];
+    let left_out = stages.into_iter().filter(|(param, ..)| params.get(*param) == 0.0);
+    left_out.map(|(_, stage, why)| LeftOut::new(stage, why)).collect()
+});
 
 /// Half the angle of a cone at `smooth` 1, radians.
 const WIDEST_CONE: f32 = 0.1;
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    let mut out = cx.input(CURVES).clone();
-    let curves = cx.part(CURVES);
+    let mut curves = cx.edit(CURVES);
     let amount = cx.get(SHIELD);
-    let meshes: Vec<&Component> = cx.input(COLLIDERS).iter().filter_map(|wire| wire.mesh()).collect();
-    let looks = cx.get(OFFSET) > 0.0 && !meshes.is_empty() && (amount > 0.0 || cx.wants(SHIELDED));
-    let shielded = if looks { sheltered(cx, curves, &meshes) } else { vec![0.0; curves.element_count()] };
+    let looks = amount > 0.0 || cx.wants(SHIELDED);
+    let shielded = if looks { sheltered(cx, &curves) } else { vec![0.0; curves.element_count()] };
     cx.check_cancelled()?;
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
     cx.publish(RAYS, if looks { curves.point_count() as f64 } else { 0.0 });
-    let envelope = (looks && amount > 0.0).then(|| scaled(curves, &shielded, amount));
-    let part = out.part_mut(Kind::Curves).expect("the engine refuses a wire without curves");
-    match envelope {
-        Some(envelope) => part.set(ENVELOPE, envelope)?,
-        None if part.get(ENVELOPE).is_none() => part.set(ENVELOPE, vec![1.0; part.point_count()])?,
-        None => {}
+    if amount > 0.0 || curves.get(ENVELOPE).is_none() {
+        let envelope = scaled(&curves, &shielded, amount);
+        curves.set(ENVELOPE, envelope)?;
     }
     if cx.wants(SHIELDED) {
-        part.set(SHIELDED, shielded)?;
+        curves.set(SHIELDED, shielded)?;
     }
-    Ok(OUT.with(out))
+    Ok(OUT.with(curves))
 }
 
-/// The share of each curve's CVs that the meshes shelter.
-fn sheltered(cx: &Cx, curves: &Component, meshes: &[&Component]) -> Vec<f32> {
+/// The share of each curve's CVs that the colliders shelter.
+fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
     let smooth = cx.get(SMOOTH);
-    let walls: Vec<Wall> = meshes.iter().map(|mesh| Wall::of(mesh, smooth > 0.0)).collect();
+    let walls: Vec<Wall> = cx.part(COLLIDERS).into_iter().map(|mesh| Wall::of(mesh, smooth > 0.0)).collect();
     let colliders: Vec<Collider> = walls.iter().map(Wall::collider).collect();
     let how = Shield {
         wind: cx.get(WIND_DIR),
@@ -112,7 +121,7 @@ fn sheltered(cx: &Cx, curves: &Component, meshes: &[&Component]) -> Vec<f32> {
     shield(curves.runs().starts(), curves.positions(), &colliders, &how)
 }
 
-/// A collider, and what is known of it while it stands still.
+/// A collider, and what is computed once while it does not move.
 struct Wall<'m> {
     points: &'m [[f32; 3]],
     triangles: Arc<Triangles>,
@@ -134,7 +143,7 @@ impl<'m> Wall<'m> {
     }
 }
 
-/// The envelope with each curve's shelter taken off; 1 where there was none.
+/// The envelope, 1 if missing, less each curve's shelter.
 fn scaled(curves: &Component, shielded: &[f32], amount: f32) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
     for (cvs, share) in curves.runs().ranges().zip(shielded) {
@@ -142,23 +151,6 @@ fn scaled(curves: &Component, shielded: &[f32], amount: f32) -> Vec<f32> {
         envelope[cvs].iter_mut().for_each(|envelope| *envelope *= left);
     }
     envelope
-}
-
-fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
-    if wires.count(&COLLIDERS) == 0 {
-        return vec![LeftOut::new("all", "no collider is wired")];
-    }
-    if params.get(OFFSET) == 0.0 {
-        return vec![LeftOut::new("all", "`offset` is 0")];
-    }
-    let mut left_out = Vec::new();
-    if params.get(SHIELD) == 0.0 {
-        left_out.push(LeftOut::new("envelope", "`shield` is 0"));
-    }
-    if params.get(SMOOTH) == 0.0 {
-        left_out.push(LeftOut::new("cones", "`smooth` is 0"));
-    }
-    left_out
 }
 
 #[cfg(test)]

@@ -1,58 +1,59 @@
 //! Gust_Control: a gust of wind placed by hand.
 //!
-//! W5, "the manual method": spheres, or an inner and an outer cube, moved, turned, scaled and keyed by the artist; a ramp
-//! sets the influence "within and from the boundary". It comes out as the points that draw it; `shared/gust_control.rs`
-//! says what stands on them.
+//! W5, "the manual method": spheres, or an inner and an outer cube, moved, rotated, scaled and keyed by the artist; a
+//! ramp sets the influence "within and from the boundary". The output is the control's outline as points;
+//! `shared/gust_control.rs` describes their attributes.
 //!
 //! Departures:
-//! * W says neither how influence runs between two cubes nor what the ramp is over. Here it runs along the ramp from the
-//!   centre (0) over the inner boundary (0.5) to the outer (1), on nested cubes; a sphere has one boundary, at 1.
-//! * `strength` may be negative: a place of calm within a gust.
+//! * W defines neither the influence between the two cubes nor the ramp's domain. Here the influence follows the ramp
+//!   from the centre (0) through the inner boundary (0.5) to the outer (1), on nested cubes; a sphere has one boundary,
+//!   at 1.
+//! * `strength` may be negative: a calm region within a gust.
 
 use crate::shared::gust_control;
-use curves::gusts::{self, outline};
+use curves::gusts::{ControlShape, outline};
 use engine::prelude::*;
 use numerics::affine::Affine;
 use numerics::ramp::Ramp;
 use std::sync::Arc;
 
 choice! {
-    /// What a control looks like.
-    pub enum Shape {
-        Sphere = "sphere": "a ball, an ellipsoid where it is scaled by different numbers",
-        Cubes = "cubes": "a cube within a cube: full inside the inner one, as the default ramp has it, and fading to the \
-                outer one",
+    /// The shape of a control.
+    ShapeChoice for ControlShape {
+        ControlShape::Sphere => "sphere": "a sphere, or an ellipsoid where the scales differ",
+        ControlShape::Cubes => "cubes": "a cube within a cube; with the default ramp, full influence inside the inner \
+                one, fading towards the outer one",
     }
 }
 
 params! { PARAMS:
-    SHAPE: Param<Shape> = Param::choice("shape", Shape::Sphere, "What the region looks like.");
-    TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Where its centre is.").unit(Unit::Metres);
+    SHAPE: Param<ShapeChoice> = Param::choice("shape", ControlShape::Sphere, "The shape of the region.");
+    TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Position of the centre.").unit(Unit::Metres);
     ROTATE: Param<Turn> = Param::rotation("rotate",
-        "Turns it about x, then y, then z, through its centre. Between keys it turns about one axis.");
+        "Rotates the region about its centre: about x, then y, then z. Between keys it rotates about a single axis.");
     SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
-        "The sphere's radius, or half the size of the inner cube, along its own x, y and z. A 0 leaves no region at all.")
+        "The sphere's radius, or half the inner cube's edge, along its own x, y and z. If any is 0, there is no \
+         region.")
         .unit(Unit::Metres).soft(0.01, 100.0);
     OUTER: Param<f32> = Param::float("outer", 2.0,
-        "How many times as large the outer cube is as the inner one. 1 ends the influence at the inner cube.")
-        .at_least(1.0).soft(1.0, 10.0).when(|params| params.get(SHAPE) == Shape::Cubes);
+        "Size of the outer cube relative to the inner one. At 1 the influence ends at the inner cube.")
+        .at_least(1.0).soft(1.0, 10.0).when(|params| params.get(SHAPE) == ControlShape::Cubes);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 1.0], [0.5, 1.0], [1.0, 0.0]],
-        "How much wind it lets in, from its centre (0) to its boundary (1). For cubes the inner boundary is at 0.5. \
-         Beyond the boundary it does nothing.");
+        "How much wind the region lets in, from its centre (0) to its boundary (1). For cubes the inner boundary is at \
+         0.5. Beyond the boundary there is no influence.");
     STRENGTH: Param<f32> = Param::float("strength", 1.0,
-        "Multiplies its influence. 0 turns it off, below 0 it takes wind away.").soft(-1.0, 1.0);
+        "Multiplies the influence. 0 turns it off, negative values take wind away.").soft(-1.0, 1.0);
 }
 
 const CONTROL: Output =
-    Output::new("control", &[Kind::Points], "Points that draw the region, for `controls` of Curve_Wind_Gusts.");
+    Output::new("control", &[Kind::Points], "The region's outline as points, for `controls` of Curve_Wind_Gusts.");
 
-/// See the module.
-pub static NODE: Node = Node::new(
+pub(crate) static NODE: Node = Node::new(
     "Gust_Control",
     1,
-    "Places a gust of wind by hand, as a sphere or as a cube within a cube. Key its place, turn and size to send it where \
-     the shot needs it, and wire it into `controls` of Curve_Wind_Gusts. Transform and Merge may come between: the points \
-     that draw it are the region.",
+    "Places a gust of wind by hand, as a sphere or as a cube within a cube. Key its position, rotation and size to \
+     send it where the shot needs it, and wire it into `controls` of Curve_Wind_Gusts. Transform and Merge may come \
+     between: the region follows its points.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -68,11 +69,7 @@ pub static NODE: Node = Node::new(
 .changes_topology();
 
 fn cook(cx: &Cx) -> Result<Outputs> {
-    let shape = match cx.get(SHAPE) {
-        Shape::Sphere => gusts::ControlShape::Sphere,
-        Shape::Cubes => gusts::ControlShape::Cubes,
-    };
-    let (outer, ramp) = (cx.get(OUTER), cx.get(RAMP));
+    let (shape, outer, ramp) = (cx.get(SHAPE), cx.get(OUTER), cx.get(RAMP));
     let mut outline = outline(shape, f64::from(outer), ramp.keys().len());
     Affine::new(cx.get(SCALE), cx.get(ROTATE).0, [0.0; 3], cx.get(TRANSLATE)).points(&mut outline);
     let points = gust_control::component(outline, shape, outer, cx.get(STRENGTH), &ramp)?;
@@ -83,7 +80,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 mod tests {
     use super::*;
     use conformance::{Bench, BenchResult, bench, conforms};
-    use curves::gusts::{Gusts, evaluate};
+    use curves::gusts::{Control, Gusts, evaluate};
     use engine::param::{Source, Value};
     use numerics::ramp::Interpolation;
 
@@ -120,7 +117,7 @@ mod tests {
 
     #[test]
     fn cubes_are_nested_from_the_centre_over_the_inner_to_the_outer_boundary() {
-        let out = linear(bench(&NODE)).set(SHAPE, Shape::Cubes).set(OUTER, 3.0).cook();
+        let out = linear(bench(&NODE)).set(SHAPE, ControlShape::Cubes).set(OUTER, 3.0).cook();
         let points = [[0.5, 0.4, -0.5], [1.0, 0.0, 1.0], [0.0, -2.0, 1.9], [2.9999, 0.0, 0.0], [3.001, 0.0, 0.0]];
         let felt = felt(&out, &points);
         assert!(close(&felt[..3], &[0.75, 0.5, 0.25]) && felt[3] < 1e-4 && felt[4] == 0.0);
@@ -157,11 +154,11 @@ mod tests {
             for count in [1, 2, 7, 900] {
                 let keys = (0..count).map(|k| [k as f32 / count as f32, (k % 3) as f32]).collect();
                 let ramp = Arc::new(Ramp::new(keys, kind).unwrap());
-                for shape in [Shape::Sphere, Shape::Cubes] {
+                for shape in [ControlShape::Sphere, ControlShape::Cubes] {
                     let out = bench(&NODE).set(SHAPE, shape).set(RAMP, ramp.clone()).cook();
                     let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
-                    let expected = gusts::Control::new(
-                        [gusts::ControlShape::Sphere, gusts::ControlShape::Cubes][usize::from(shape == Shape::Cubes)],
+                    let expected = Control::new(
+                        shape,
                         [0.0; 3],
                         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
                         2.0,
@@ -181,6 +178,6 @@ mod tests {
         }
         let error = bench(&NODE).set(TRANSLATE, [1e39, 0.0, 0.0]).try_cook().unwrap_err();
         assert_eq!(error.kind, ErrorKind::NotFinite);
-        assert!(bench(&NODE).set(OUTER, 0.5).set(SHAPE, Shape::Cubes).try_cook().is_err());
+        assert!(bench(&NODE).set(OUTER, 0.5).set(SHAPE, ControlShape::Cubes).try_cook().is_err());
     }
 }

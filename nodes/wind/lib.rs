@@ -1,11 +1,11 @@
 //! The wind family: wind on fur and grass (paper W).
 
-pub mod curve_jiggle;
-pub mod curve_wind;
-pub mod curve_wind_collision;
-pub mod curve_wind_gusts;
-pub mod curve_wind_shielding;
-pub mod gust_control;
+mod curve_jiggle;
+mod curve_wind;
+mod curve_wind_collision;
+mod curve_wind_gusts;
+mod curve_wind_shielding;
+mod gust_control;
 mod shared;
 
 use engine::node::Node;

@@ -12,6 +12,8 @@ pub(crate) enum Expectation {
     Graphs,
     /// Messages of faults in graphs: engine/src/graph/tests/faults.txt
     Messages,
+    /// What `cargo xtask new-node` writes: tests/new_nodes
+    Nodes,
     /// Tables of laws in docs/, and bits of the last frames of scenes with a solver: benches/graphs.txt
     Laws,
     /// Counts of instructions, where valgrind is installed: benches/instructions.txt
@@ -24,6 +26,7 @@ impl Expectation {
         match self {
             Self::Graphs => &["test", "--test", "graphs", "every_example_has_the_stored_bits"],
             Self::Messages => &["test", "-p", "engine", "--lib", "stored_messages"],
+            Self::Nodes => &["test", "-p", "xtask", "rendered_nodes"],
             Self::Laws => &["bench", "--bench", "laws", "--", "--bless"],
             Self::Instructions => &["bench", "--bench", "instructions", "--", "--bless"],
         }
@@ -34,6 +37,7 @@ impl Expectation {
         match self {
             Self::Graphs => &["tests/graphs.txt"],
             Self::Messages => &["engine/src/graph/tests/faults.txt"],
+            Self::Nodes => &["tests/new_nodes"],
             Self::Laws => &["docs/wind.md", "docs/softbody.md", "benches/graphs.txt"],
             Self::Instructions => &["benches/instructions.txt"],
         }

@@ -2,6 +2,7 @@
 
 mod bless;
 mod new_node;
+mod template;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -18,6 +19,18 @@ enum Chore {
         /// The family it belongs to: a folder of nodes/
         #[arg(long, default_value = "geometry")]
         family: String,
+        /// Whether its result depends on the time of the frame: windows and solvers start from docs/writing_nodes.md
+        #[arg(long, value_enum, default_value = "pure")]
+        time: Time,
+        /// Name of a param that a point attribute may mask
+        #[arg(long)]
+        mask: Option<String>,
+        /// Name of a ramp along the curve
+        #[arg(long)]
+        ramp: Option<String>,
+        /// Give each curve random numbers
+        #[arg(long)]
+        seed: bool,
     },
     /// Store the expectations of tests and benches anew, and show what changed
     Bless {
@@ -26,9 +39,21 @@ enum Chore {
     },
 }
 
+/// What a node knows of time.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Time {
+    /// Its inputs and params alone.
+    Pure,
+    /// The clock too.
+    Frame,
+}
+
 fn main() -> ExitCode {
     let result = match Chore::parse() {
-        Chore::NewNode { name, family } => new_node::write(&root(), &name, &family),
+        Chore::NewNode { name, family, time, mask, ramp, seed } => {
+            let options = template::Options { reads_clock: time == Time::Frame, mask, ramp, seed };
+            new_node::write(&root(), &name, &family, &options)
+        }
         Chore::Bless { expectations } => bless::store(&root(), &expectations),
     };
     match result {

@@ -3,26 +3,31 @@
 use std::fs;
 use std::path::Path;
 
-/// A node that moves curves; a start that passes conformance.
-const TEMPLATE: &str = include_str!("node.rs.txt");
+use crate::template::{Options, render};
 
 /// Writes node `name` into `family`; says what to do next.
 ///
 /// # Errors
-/// Where the name is no node's name, the family is unknown, or the node is there already.
-pub(crate) fn write(root: &Path, name: &str, family: &str) -> Result<String, String> {
+/// Where a name is not allowed, the family is unknown, or the node exists already.
+pub(crate) fn write(root: &Path, name: &str, family: &str, options: &Options) -> Result<String, String> {
     let module = module_name(name)?;
+    for param in options.mask.iter().chain(&options.ramp) {
+        check_param(param)?;
+    }
+    if options.mask.is_some() && options.mask == options.ramp {
+        return Err(format!("both params are named `{}`", options.mask.as_deref().unwrap_or_default()));
+    }
     let folder = root.join("nodes").join(family);
     let list = folder.join("lib.rs");
     let text = fs::read_to_string(&list)
-        .map_err(|error| format!("`{family}` is no family: `{}` could not be read: {error}", list.display()))?;
+        .map_err(|error| format!("there is no family `{family}`: `{}` could not be read: {error}", list.display()))?;
     let file = folder.join(format!("{module}.rs"));
     if file.exists() || folder.join(&module).exists() {
-        return Err(format!("`{}` is there already", file.display()));
+        return Err(format!("`{}` exists already", file.display()));
     }
     let text =
         with_module(&text, &module).ok_or_else(|| format!("`{}` has no list of modules to add to", list.display()))?;
-    let written = fs::write(&file, TEMPLATE.replace("NODE_NAME", name)).and_then(|()| fs::write(&list, text));
+    let written = fs::write(&file, render(name, options)).and_then(|()| fs::write(&list, text));
     written.map_err(|error| format!("`{}` could not be written: {error}", file.display()))?;
     Ok(format!("wrote nodes/{family}/{module}.rs and its lines in lib.rs; try: cargo test -p {family} {module}"))
 }
@@ -39,9 +44,16 @@ fn module_name(name: &str) -> Result<String, String> {
     }
 }
 
+fn check_param(name: &str) -> Result<(), String> {
+    let fits = name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        && name != "seed";
+    if fits { Ok(()) } else { Err(format!("`{name}` is not a param's name; write it like ramp_rotate")) }
+}
+
 /// The family's `lib.rs` with a module and a line in `NODES` more, both in order.
 fn with_module(text: &str, module: &str) -> Option<String> {
-    let text = inserted(text, &format!("pub mod {module};"), |line| line.starts_with("pub mod "))?;
+    let text = inserted(text, &format!("mod {module};"), |line| line.starts_with("mod "))?;
     if text.contains("= &[\n") {
         return inserted(&text, &format!("    &{module}::NODE,"), |line| line.starts_with("    &"));
     }
@@ -72,17 +84,22 @@ mod tests {
 
     #[test]
     fn a_module_and_its_node_are_put_in_order() {
-        let before =
-            "//! F.\n\npub mod a;\npub mod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &c::NODE,\n];\n";
-        let after = "//! F.\n\npub mod a;\npub mod b;\npub mod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n    &c::NODE,\n];\n";
+        let before = "//! F.\n\nmod a;\nmod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &c::NODE,\n];\n";
+        let after = "//! F.\n\nmod a;\nmod b;\nmod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n    &c::NODE,\n];\n";
         assert_eq!(with_module(before, "b").unwrap(), after);
     }
 
     #[test]
     fn a_list_on_one_line_is_broken() {
-        let before = "pub mod a;\n\npub static NODES: &[&Node] = &[&a::NODE];\n";
-        let after = "pub mod a;\npub mod b;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n];\n";
+        let before = "mod a;\n\npub static NODES: &[&Node] = &[&a::NODE];\n";
+        let after = "mod a;\nmod b;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n];\n";
         assert_eq!(with_module(before, "b").unwrap(), after);
+    }
+
+    #[test]
+    fn params_are_lower_case_words() {
+        assert!(check_param("ramp_rotate").is_ok());
+        assert!(["Ramp", "", "a b", "1st", "seed"].iter().all(|name| check_param(name).is_err()));
     }
 
     #[test]

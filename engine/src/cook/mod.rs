@@ -14,6 +14,7 @@ mod report;
 mod store;
 mod sweep;
 mod verify;
+mod warnings;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;

@@ -1,4 +1,5 @@
-//! Nodes with a state that runs through time: windows (restarted at fixed anchors) and solvers (run from their start).
+//! Nodes with a state that advances through time: windows (restarted at fixed anchors) and solvers (run from their
+//! start).
 
 use std::any::Any;
 
@@ -9,21 +10,31 @@ use super::{Cook, FrameCx, Outputs, StepCx};
 use crate::Result;
 use crate::param::{Clock, Params};
 
-/// A state that runs through whole frames, oldest first. Inputs of a frame are dropped once it is stepped over.
+/// A state that advances through whole frames, oldest first. A frame's inputs are dropped once the state has passed it.
 pub trait Chain: Send + Sync + Sized + 'static {
-    /// The state at its first frame: as if everything had always been as it is there.
+    /// The state at its first frame, as if everything had been at rest before.
     ///
     /// # Errors
     /// Where the inputs there are refused.
     fn start(cx: &FrameCx) -> Result<Self>;
 
-    /// Moves the state from the frame before to `cx.frame()`.
+    /// Advances the state from the previous frame to `cx.frame()`.
     ///
     /// # Errors
     /// Where an input is refused; the chain ends there.
     fn step(&mut self, cx: &StepCx) -> Result<()>;
 
-    /// What comes out at `cx.frame()`, where the state stands.
+    /// Advances the state to a frame at which the node is neutral ([`super::Node::neutral`]) and its output is its
+    /// input: here a node discards its motion, so that it starts from rest afterwards. By default the same as
+    /// [`Chain::step`].
+    ///
+    /// # Errors
+    /// Where an input is refused; the chain ends there.
+    fn step_neutral(&mut self, cx: &StepCx) -> Result<()> {
+        self.step(cx)
+    }
+
+    /// The output at `cx.frame()`, the frame of the state.
     ///
     /// # Errors
     /// Where the result is refused.
@@ -34,25 +45,25 @@ pub trait Chain: Send + Sync + Sized + 'static {
 pub trait Solver: Chain + Serialize + DeserializeOwned {}
 impl<S: Chain + Serialize + DeserializeOwned> Solver for S {}
 
-/// How much of the past a window hangs on, given its params at a frame.
+/// How far back a window depends on the past, given its params at a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Past {
-    /// Steps like the one to this frame after which nothing is left of what was before them; each leaves out its share.
-    /// 0: this step forgets all.
+    /// The number of steps like the one to this frame after which nothing earlier has an effect; 0: this step alone
+    /// determines the state.
     pub frames: u32,
-    /// Frames before the scene's first at which the state may begin; read at the scene's first frame. 0: what was before
-    /// the scene was as it is at its first frame.
+    /// The number of frames before the scene's first frame from which the state may start; read at the scene's first
+    /// frame. 0: before the scene everything was as at its first frame.
     pub preroll: u32,
 }
 
 impl Past {
-    /// That many frames, none before the scene's first.
+    /// That many frames, without a preroll.
     pub const fn frames(frames: u32) -> Self {
         Self { frames, preroll: 0 }
     }
 }
 
-/// A state of any type.
+/// A state, its type erased.
 pub(crate) type StateBox = Box<dyn Any + Send + Sync>;
 
 /// A chain's functions, its state's type erased.
@@ -63,7 +74,7 @@ pub struct ChainFns {
     pub(crate) output: fn(&StateBox, &FrameCx) -> Result<Outputs>,
 }
 
-/// What a solver has besides.
+/// What a solver needs in addition.
 #[derive(Clone, Copy)]
 pub struct SolverFns {
     pub(crate) save: fn(&StateBox) -> Option<Vec<u8>>,
@@ -81,23 +92,26 @@ impl ChainFns {
             start: |cx| Ok(Box::new(S::start(cx)?)),
             step: |state, cx| {
                 let state: &mut S = state.downcast_mut().expect("a chain's functions are all made for one state type");
-                state.step(cx)
+                if cx.is_neutral() { state.step_neutral(cx) } else { state.step(cx) }
             },
-            output: |state, cx| of::<S>(state).output(cx),
+            output: |state, cx| match cx.is_neutral() {
+                true => cx.node.pass_through(cx),
+                false => of::<S>(state).output(cx),
+            },
         }
     }
 }
 
 impl Cook {
-    /// A window: frame f depends on at least as many frames before it as `past` says, and on no more than the engine's
-    /// anchors add to that. The state starts that many frames before an anchor; anchors are fixed, so a frame's bits do
-    /// not depend on which frames are asked. Where params are animated, each step counts by its own: one that would take
-    /// n frames to forget all forgets an n-th.
+    /// A window: a frame depends on at least `past` frames before it, and on at most a fixed number more. The state
+    /// starts that many frames before an anchor; anchors are fixed, so a frame's bits do not depend on which frames are
+    /// requested. Where params are animated, a step whose `past` is n frames contributes 1/n.
     pub const fn window<S: Chain>(past: fn(&Params, Clock) -> Past) -> Self {
         Self::Window(ChainFns::of::<S>(), past)
     }
 
-    /// A solver: runs from `start_frame(params)`, or the scene's first frame, in order, whatever frames are asked.
+    /// A solver: it runs through all frames from `start_frame(params)`, or the scene's first frame, whichever are
+    /// requested.
     pub const fn solver<S: Solver>(start_frame: fn(&Params) -> Option<i64>) -> Self {
         Self::Solver(
             ChainFns::of::<S>(),

@@ -1,5 +1,5 @@
-//! What a node knows while it cooks. A pure node gets [`Cx`]; who may read the clock gets [`FrameCx`], who steps through
-//! time [`StepCx`]. Each derefs to the one before, so helpers take `&Cx`.
+//! The context of a node that is cooked: [`Cx`] for pure nodes, [`FrameCx`] for nodes that may read the clock,
+//! [`StepCx`] for steps through time. Each derefs to the one before, so helpers take `&Cx`.
 
 use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,12 +21,12 @@ pub(crate) struct InputData {
     pub(crate) steps: Vec<(Frame, Vec<Arc<Geometry>>)>,
 }
 
-/// What a node returns: a geometry for each of its outputs.
+/// What a node returns: one geometry per output.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs(pub(crate) Vec<(&'static str, Arc<Geometry>)>);
 
 impl Outputs {
-    /// These, and another output with its geometry.
+    /// Adds another output with its geometry.
     #[must_use]
     pub fn and(mut self, output: Output, geometry: impl Into<Arc<Geometry>>) -> Self {
         self.0.push((output.name, geometry.into()));
@@ -34,7 +34,7 @@ impl Outputs {
     }
 }
 
-/// What any node knows: its params and inputs.
+/// What every node can read: its params and inputs.
 pub struct Cx<'a> {
     pub(crate) node: &'static Node,
     pub(crate) params: Params,
@@ -46,7 +46,7 @@ pub struct Cx<'a> {
 
 impl Cx<'_> {
     /// The value of a param.
-    pub fn get<T: ParamType>(&self, param: Param<T>) -> T {
+    pub fn get<T: ParamType>(&self, param: Param<T>) -> T::Value {
         self.params.get(param)
     }
 
@@ -55,10 +55,10 @@ impl Cx<'_> {
         &self.params
     }
 
-    /// A masked param on `part`: its number, and the attribute that scales it a point, where one is named.
+    /// A maskable param on `part`: its number, with the point attribute that scales it if one is named.
     ///
     /// # Errors
-    /// Where the attribute is missing or not one number a point.
+    /// Where the attribute is missing or is not one float per point.
     pub fn mask<'c>(&self, param: Param<Maskable>, part: &'c Component) -> Result<Masked<'c, f32>> {
         let name = param.name();
         let Maskable { value, attribute } = self.get(param);
@@ -75,17 +75,20 @@ impl Cx<'_> {
         Err(Error::refused(format!("`{name}` is masked by `{attribute}`, {what}")).hint(format!("expected {expected}")))
     }
 
-    /// Whether anything downstream, or a file, takes that attribute of this node's result.
+    /// Whether anything downstream, or an output, reads that attribute of this node's result.
     pub fn wants<T: Item>(&self, attribute: Attr<T>) -> bool {
         self.wants_named(attribute.name)
     }
 
-    /// As [`Cx::wants`], of an attribute that the node does not know.
+    /// As [`Cx::wants`], for an attribute given by name.
     pub fn wants_named(&self, attribute: &str) -> bool {
         self.live.is_none_or(|live| live.iter().any(|name| **name == *attribute))
     }
 
-    /// Publishes a metric of this frame.
+    /// Publishes a metric at this frame.
+    ///
+    /// # Panics
+    /// Where the node does not declare it.
     pub fn publish(&self, metric: Metric, value: f64) {
         assert!(
             self.node.metrics.iter().any(|declared| declared.name == metric.name),
@@ -95,7 +98,7 @@ impl Cx<'_> {
         self.published.lock().unwrap_or_else(PoisonError::into_inner).push((metric.name, value));
     }
 
-    /// Ends the cook early where someone cancelled it: to be asked in loops that last.
+    /// Ends the cook early if it was cancelled; call it in long loops.
     ///
     /// # Errors
     /// Where the cook was cancelled.
@@ -112,13 +115,13 @@ impl Cx<'_> {
     }
 }
 
-/// Integrals over time of a node's integrands, kept by the engine from frame to frame.
+/// Integrals over time of a node's integrands, cached by the engine from frame to frame.
 pub(crate) trait History: Sync {
-    /// Of the integrand at `place`.
-    fn integral(&self, place: usize, upto: Frame) -> [f64; 3];
+    /// The integral of integrand `index`.
+    fn integral(&self, index: usize, upto: Frame) -> [f64; 3];
 }
 
-/// What a node knows that may read the clock.
+/// The context of a node that may read the clock.
 pub struct FrameCx<'a> {
     pub(crate) cx: Cx<'a>,
     pub(crate) frame: Frame,
@@ -150,27 +153,27 @@ impl FrameCx<'_> {
         self.clock.fps
     }
 
-    /// Where the scene's positions are relative to, metres.
+    /// The scene's origin, to which positions are relative, metres.
     pub fn origin(&self) -> [f64; 3] {
         self.origin
     }
 
-    /// ∫ of the node's first integrand from time 0 to `upto`, in its unit × seconds; `upto` lies in the past of the frame that
-    /// is cooked, or is that frame. Exact where the params it reads are constant, else 4-point Gauss a whole frame plus
-    /// the fraction, summed in frame order; so any frame cooks alone. Before the scene's start (or time 0, where that is
-    /// earlier) the params are taken to have held.
+    /// The integral of the node's first integrand from time 0 to `upto`, in its unit × seconds; `upto` is at most the
+    /// frame that is cooked. Exact where the params it reads are constant, otherwise 4-point Gauss quadrature per whole
+    /// frame and for the fraction, summed in frame order, so that any frame cooks alone. Before the scene's start, or
+    /// time 0 if that is earlier, params are taken to be constant.
     ///
     /// # Panics
-    /// Where the node declares no integrand, or asks for the future, which its key does not know.
+    /// Where the node declares no integrand, or `upto` is in the future, which its key does not cover.
     pub fn integral(&self, upto: Frame) -> [f64; 3] {
         let [integral] = self.integrals(upto);
         integral
     }
 
-    /// The same of the node's first `N` integrands.
+    /// The same for the node's first `N` integrands.
     ///
     /// # Panics
-    /// Where the node declares fewer, or asks for the future.
+    /// Where the node declares fewer, or `upto` is in the future.
     pub fn integrals<const N: usize>(&self, upto: Frame) -> [[f64; 3]; N] {
         let now = self.frame.max(Frame::whole(0));
         assert!(upto <= now, "it asks for an integral up to frame {upto}, which is after frame {now}");
@@ -183,7 +186,7 @@ impl FrameCx<'_> {
     }
 }
 
-/// What a window or solver knows while it steps from one frame to the next.
+/// The context of a window or solver that steps from one frame to the next.
 pub struct StepCx<'a> {
     pub(crate) cx: FrameCx<'a>,
     pub(crate) previous: Frame,
@@ -197,7 +200,7 @@ impl<'a> Deref for StepCx<'a> {
 }
 
 impl StepCx<'_> {
-    /// The frame the state stands at before the step.
+    /// The frame of the state before the step.
     pub fn previous(&self) -> Frame {
         self.previous
     }
@@ -207,8 +210,8 @@ impl StepCx<'_> {
         (self.frame.ticks() - self.previous.ticks()) as f64 / Frame::TICKS as f64 / self.clock.fps
     }
 
-    /// The wires of an input at the times within the step at which it was declared to be read, oldest first; the first
-    /// is the frame before, the last this frame. Where something upstream knows whole frames only, these two are all.
+    /// The wires of an input at its declared times within the step, oldest first; the first is the previous frame, the
+    /// last this frame. If something upstream exists at whole frames alone, there are no others.
     pub fn samples<A>(&self, input: super::Input<A>) -> &[(Frame, Vec<Arc<Geometry>>)] {
         &self.data(input.name()).steps
     }

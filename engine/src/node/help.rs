@@ -1,4 +1,4 @@
-//! Help of a node, from its declaration alone.
+//! The help page of a node, derived from its declaration.
 
 use std::fmt::Write as _;
 

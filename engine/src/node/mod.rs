@@ -1,21 +1,29 @@
-//! Node declarations: everything the engine, the help, the schema and the conformance suite know of a node stands in
-//! one constant, made of typed handles. There is no other registration than a line in the family's list.
+//! Node declarations: everything that the engine, the help, the schema and the conformance suite know of a node is
+//! declared in a single static, made of typed handles. The only registration is a line in the family's list.
 
 mod chain;
+mod curves;
 mod cx;
+mod edit;
 mod help;
+mod metric;
+mod neutral;
 mod ports;
 
 use crate::geometry::{Attr, ColumnType, Geometry, Item, Name, Owner};
-use crate::param::{Clock, ParamDecl, ParamSpec, Params, Unit};
+use crate::param::{Clock, ParamDecl, ParamSpec, Params};
 
 pub use chain::{Chain, Past, Solver};
 pub(crate) use chain::{ChainFns, SolverFns, StateBox};
+pub use curves::{CurveLoop, CurveView, Cv, MovedCurves};
 pub use cx::{Cx, FrameCx, Outputs, StepCx};
 pub(crate) use cx::{History, InputData};
+pub use edit::Edited;
+pub use metric::{Metric, MetricValues, Warning};
+pub use neutral::{Fill, WhyNeutral};
 pub use ports::{Arity, Carries, Input, InputDecl, InputSpec, Many, Needs, One, Opt, Output, Times, Wired};
 
-/// What kind of time a node needs, and the function that cooks it. The variant fixes what the function may know.
+/// How a node depends on time, and the function that cooks it. The variant fixes what the function may read.
 #[derive(Clone, Copy)]
 pub enum Cook {
     /// Inputs and params only.
@@ -27,14 +35,14 @@ pub enum Cook {
         /// Whether the clock matters, given the params.
         reads_clock: fn(&Params) -> bool,
     },
-    /// This frame and some before it.
+    /// This frame and a number of frames before it.
     Window(ChainFns, fn(&Params, Clock) -> Past),
-    /// Its own state of the frame before.
+    /// Its own state at the previous frame.
     Solver(ChainFns, SolverFns),
 }
 
 impl Cook {
-    /// The word help and reports use.
+    /// The word used in help and reports.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Pure(_) => "pure",
@@ -44,15 +52,15 @@ impl Cook {
         }
     }
 
-    /// Whether it has a state that moves from frame to frame.
+    /// Whether it has a state that advances from frame to frame.
     pub(crate) fn is_chain(&self) -> bool {
         matches!(self, Self::Window(..) | Self::Solver(..))
     }
 }
 
-/// An attribute whatever its type.
+/// An attribute of any type.
 pub trait AttrDecl: Sync {
-    /// Name, what owns a row, what a row is.
+    /// Name, owner of a row, type of a row.
     fn spec(&self) -> (&'static str, Owner, ColumnType);
 }
 
@@ -67,29 +75,11 @@ impl<T: Item> AttrDecl for Attr<T> {
 pub enum AttrNames {
     /// These.
     These(Vec<Name>),
-    /// Whatever is there.
+    /// All that the geometry has.
     All,
 }
 
-/// A number a node publishes once a frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Metric {
-    /// Name in reports.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: Unit,
-    /// What it says.
-    pub help: &'static str,
-}
-
-impl Metric {
-    /// A metric.
-    pub const fn new(name: &'static str, unit: Unit, help: &'static str) -> Self {
-        Self { name, unit, help }
-    }
-}
-
-/// A stage of a node that cannot change its result and is therefore not run.
+/// A stage of a node that is not run because it cannot change the result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
     /// The stage.
@@ -105,7 +95,7 @@ impl LeftOut {
     }
 }
 
-/// How many wires each input of a node has.
+/// The number of wires of each input of a node.
 pub struct Wires<'a>(pub(crate) &'a dyn Fn(&str) -> usize);
 
 impl Wires<'_> {
@@ -115,21 +105,21 @@ impl Wires<'_> {
     }
 }
 
-/// What a node integrates over time, given its params at one moment.
+/// What a node integrates over time, given its params at one time.
 pub type Integrand = fn(&Params) -> [f64; 3];
 
 /// Most integrands of a node.
 pub const MOST_INTEGRANDS: usize = 4;
 
-/// A node type: made as a `static`, read by everything.
+/// A node type, declared as a `static`.
 pub struct Node {
     /// Name in graph files.
     pub name: &'static str,
     /// Raised whenever the node's bits change.
     pub version: u32,
-    /// What it does to the picture: first sentence is the summary.
+    /// What it does to the picture; the first sentence is the summary.
     pub help: &'static str,
-    /// Time need and function.
+    /// Its dependence on time, and its function.
     pub cook: Cook,
     /// Inputs, in the order help lists them.
     pub inputs: &'static [&'static dyn InputDecl],
@@ -139,26 +129,30 @@ pub struct Node {
     pub outputs: &'static [&'static Output],
     /// Attributes read.
     pub reads: &'static [&'static dyn AttrDecl],
-    /// Attributes written. All others of the inputs go through untouched.
+    /// Attributes written. All others pass through from the inputs.
     pub writes: &'static [&'static dyn AttrDecl],
-    /// Attributes read and written where the params say which; added to the above.
+    /// Attributes read and written that depend on the params, in addition to the above.
     pub attributes: Option<fn(&Params) -> [AttrNames; 2]>,
     /// Whether elements and points come and go with time or params.
     pub changes_topology: bool,
     /// Metrics published.
     pub metrics: &'static [&'static Metric],
-    /// Stages that cannot matter, given params and wires.
+    /// When the node changes nothing, and why; see [`Node::neutral`].
+    pub neutral: Option<WhyNeutral>,
+    /// Attributes written even where it is neutral.
+    pub fills: &'static [Fill],
+    /// Stages that cannot change the result, given params and wires, where the node is not neutral.
     pub leaves_out: Option<fn(&Params, &Wires) -> Vec<LeftOut>>,
-    /// What is wrong with the params together, beyond their ranges; asked before anything cooks.
+    /// Refuses combinations of params, beyond their ranges; called before anything cooks.
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
     pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
-    /// What a window keeps that a cubic between its frames does not; see [`Node::mends_between`].
+    /// Restores what interpolation between a window's frames does not keep; see [`Node::mends_between`].
     pub mend_between: Option<MendBetween>,
 }
 
-/// Puts right an output of a window `share` of the way between two whole frames, whose outputs are `near`; `P` and `v` of
-/// `between` lie on the cubic through them, all else is that of the first.
+/// Corrects an output of a window between two whole frames, at `share` (0..1) from the first, whose outputs are `near`.
+/// `P` and `v` of `between` are interpolated by a cubic, everything else is that of the first frame.
 pub type MendBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
 
 impl Node {
@@ -177,6 +171,8 @@ impl Node {
             attributes: None,
             changes_topology: false,
             metrics: &[],
+            neutral: None,
+            fills: &[],
             leaves_out: None,
             checks: None,
             integrands: [None; MOST_INTEGRANDS],
@@ -219,7 +215,7 @@ impl Node {
         self
     }
 
-    /// Attributes it reads and writes, as its params say.
+    /// Attributes it reads and writes depending on its params.
     #[must_use]
     pub const fn attributes(mut self, attributes: fn(&Params) -> [AttrNames; 2]) -> Self {
         self.attributes = Some(attributes);
@@ -240,24 +236,24 @@ impl Node {
         self
     }
 
-    /// Stages that cannot matter.
+    /// Stages that cannot change the result.
     #[must_use]
     pub const fn leaves_out(mut self, leaves_out: fn(&Params, &Wires) -> Vec<LeftOut>) -> Self {
         self.leaves_out = Some(leaves_out);
         self
     }
 
-    /// What is wrong with the params together.
+    /// Refuses combinations of params before anything cooks.
     #[must_use]
     pub const fn checks(mut self, checks: fn(&Params) -> crate::Result<()>) -> Self {
         self.checks = Some(checks);
         self
     }
 
-    /// What is integrated over time; said again, another one, in that order.
+    /// Adds a function that is integrated over time.
     ///
     /// # Panics
-    /// While it is compiled, where it is said more than [`MOST_INTEGRANDS`] times.
+    /// At compile time, where it is called more than [`MOST_INTEGRANDS`] times.
     #[must_use]
     pub const fn integrates(mut self, integrand: Integrand) -> Self {
         let mut place = 0;
@@ -268,20 +264,20 @@ impl Node {
         self
     }
 
-    /// Called on each output of a window between two whole frames, where positions are interpolated: to keep what the
-    /// node keeps at whole frames, such as lengths.
+    /// Called for each output of a window between two whole frames, where positions are interpolated, to restore what
+    /// the node guarantees at whole frames, such as lengths.
     #[must_use]
     pub const fn mends_between(mut self, mend: MendBetween) -> Self {
         self.mend_between = Some(mend);
         self
     }
 
-    /// What is known of each param.
+    /// The specification of each param.
     pub fn param_specs(&self) -> Vec<ParamSpec> {
         self.params.iter().map(|param| param.spec()).collect()
     }
 
-    /// What is known of each input.
+    /// The specification of each input.
     pub fn input_specs(&self) -> Vec<InputSpec> {
         self.inputs.iter().map(|input| input.spec()).collect()
     }
@@ -306,7 +302,7 @@ impl std::fmt::Debug for Node {
     }
 }
 
-/// Writes a list of handles once: each becomes a constant, and the list names them all, so none can be read undeclared.
+/// Declares a node's params: each becomes a constant, and the list contains them all.
 ///
 /// `params! { PARAMS: OFFSET: Param<f32> = Param::float("offset", 10.0, "…"); … }`
 #[macro_export]
@@ -317,7 +313,7 @@ macro_rules! params {
     };
 }
 
-/// Writes a node's inputs once; see [`crate::params!`].
+/// Declares a node's inputs; see [`crate::params!`].
 #[macro_export]
 macro_rules! inputs {
     ($list:ident: $($(#[$meta:meta])* $name:ident : $t:ty = $value:expr;)*) => {

@@ -1,17 +1,17 @@
-//! Inputs and outputs of a node: typed handles, which components they need and carry, at which times they are read.
+//! Inputs and outputs of a node: typed handles, the components that they need and carry, and when inputs are read.
 
 use std::sync::Arc;
 
 use super::{Cx, Outputs};
-use crate::geometry::{Geometry, Kind};
+use crate::geometry::{Component, Geometry, Kind};
 use crate::param::Params;
 
-/// How many wires an input takes.
+/// The number of wires that an input takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arity {
     /// Exactly one.
     One,
-    /// None or one.
+    /// Zero or one.
     Optional,
     /// A list of at least this many.
     Many {
@@ -20,17 +20,17 @@ pub enum Arity {
     },
 }
 
-/// Which components an input needs.
+/// The components that an input needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     /// This one.
     Kind(Kind),
-    /// Any at all.
+    /// Any.
     Any,
 }
 
 impl Needs {
-    /// Whether a wire that carries `kinds` will do.
+    /// Whether a wire that carries `kinds` is sufficient.
     pub fn hold(self, kinds: &[Kind]) -> bool {
         match self {
             Self::Kind(kind) => kinds.contains(&kind),
@@ -39,7 +39,7 @@ impl Needs {
     }
 }
 
-/// At which times a node reads an input. A window or solver reads `now` at every whole frame it advances over.
+/// The times at which a node reads an input. A window or solver reads `now` at every whole frame it advances over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Times {
     /// At the frame that is cooked.
@@ -63,7 +63,7 @@ impl Times {
         Self { now: false, start: false, steps }
     }
 
-    /// These times and `other`.
+    /// Both these times and `other`.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         let steps = if self.steps > other.steps { self.steps } else { other.steps };
@@ -71,16 +71,16 @@ impl Times {
     }
 }
 
-/// All that is known of an input.
+/// The specification of an input.
 #[derive(Clone, Copy, Debug)]
 pub struct InputSpec {
     /// Name in graph files.
     pub name: &'static str,
     /// What it is for.
     pub help: &'static str,
-    /// How many wires.
+    /// The number of wires.
     pub arity: Arity,
-    /// Which components.
+    /// The components that it needs.
     pub needs: Needs,
     /// When it is read, given the params.
     pub times: fn(&Params) -> Times,
@@ -93,18 +93,31 @@ pub enum Opt {}
 /// An input with a list of wires.
 pub enum Many {}
 
-/// How a kind of input is handed to a node.
+/// How a node gets the wires of an input.
 pub trait Wired {
     /// `&Geometry`, `Option<&Geometry>` or `&[Arc<Geometry>]`.
     type View<'a>;
+    /// `&Component`, `Option<&Component>` or `Vec<&Component>`.
+    type Parts<'a>;
     #[doc(hidden)]
     fn view(wires: &[Arc<Geometry>]) -> Self::View<'_>;
+    #[doc(hidden)]
+    fn parts(wires: &[Arc<Geometry>], kind: Kind) -> Self::Parts<'_>;
+}
+
+/// The component of `kind`, which the engine has seen on every wire of an input that needs it.
+fn part_of(wire: &Arc<Geometry>, kind: Kind) -> &Component {
+    wire.part(kind).expect("the engine refuses a wire that lacks what its input needs")
 }
 
 impl Wired for One {
     type View<'a> = &'a Geometry;
     fn view(wires: &[Arc<Geometry>]) -> &Geometry {
         wires.first().expect("the graph was checked: a required input has a wire")
+    }
+    type Parts<'a> = &'a Component;
+    fn parts(wires: &[Arc<Geometry>], kind: Kind) -> &Component {
+        part_of(wires.first().expect("the graph was checked: a required input has a wire"), kind)
     }
 }
 
@@ -113,6 +126,10 @@ impl Wired for Opt {
     fn view(wires: &[Arc<Geometry>]) -> Option<&Geometry> {
         wires.first().map(Arc::as_ref)
     }
+    type Parts<'a> = Option<&'a Component>;
+    fn parts(wires: &[Arc<Geometry>], kind: Kind) -> Option<&Component> {
+        wires.first().map(|wire| part_of(wire, kind))
+    }
 }
 
 impl Wired for Many {
@@ -120,17 +137,29 @@ impl Wired for Many {
     fn view(wires: &[Arc<Geometry>]) -> &[Arc<Geometry>] {
         wires
     }
+    type Parts<'a> = Vec<&'a Component>;
+    fn parts(wires: &[Arc<Geometry>], kind: Kind) -> Vec<&Component> {
+        wires.iter().map(|wire| part_of(wire, kind)).collect()
+    }
 }
 
-/// A typed handle of an input, written once through [`crate::inputs!`].
+/// A typed handle of an input, declared through [`crate::inputs!`].
 pub struct Input<A = One> {
     spec: InputSpec,
     arity: std::marker::PhantomData<fn() -> A>,
 }
 
-/// An input whatever its arity.
+impl<A> Clone for Input<A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for Input<A> {}
+
+/// An input of any arity.
 pub trait InputDecl: Sync {
-    /// All that is known of it.
+    /// Its specification.
     fn spec(&self) -> InputSpec;
 }
 
@@ -151,6 +180,14 @@ impl<A> Input<A> {
     /// The name in graph files.
     pub const fn name(&self) -> &'static str {
         self.spec.name
+    }
+
+    /// The component that it needs.
+    fn kind(&self) -> Kind {
+        match self.spec.needs {
+            Needs::Kind(kind) => kind,
+            Needs::Any => panic!("it asks for the component of the input `{}`, which takes any", self.name()),
+        }
     }
 
     /// Read at these times instead of now.
@@ -191,14 +228,14 @@ impl Input<Many> {
     }
 }
 
-/// Which components an output carries.
+/// The components that an output carries.
 #[derive(Clone, Copy, Debug)]
 pub enum Carries {
     /// These.
     Kinds(&'static [Kind]),
-    /// What the input of that name carries.
+    /// Those of the input of that name.
     Like(&'static str),
-    /// What all wires of the list input of that name carry together.
+    /// Those of all wires of the list input of that name.
     Union(&'static str),
 }
 
@@ -207,9 +244,9 @@ pub enum Carries {
 pub struct Output {
     /// Name after the dot in `"id.port"`.
     pub name: &'static str,
-    /// What comes out.
+    /// What it carries, in words.
     pub help: &'static str,
-    /// Which components it carries.
+    /// The components that it carries.
     pub carries: Carries,
 }
 
@@ -219,12 +256,12 @@ impl Output {
         Self { name, help, carries: Carries::Kinds(kinds) }
     }
 
-    /// An output that carries what `input` carries.
+    /// An output with the components of `input`.
     pub const fn like<A>(name: &'static str, input: &Input<A>, help: &'static str) -> Self {
         Self { name, help, carries: Carries::Like(input.name()) }
     }
 
-    /// An output that carries what all wires of `input` carry together.
+    /// An output with the components of all wires of `input`.
     pub const fn union(name: &'static str, input: &Input<Many>, help: &'static str) -> Self {
         Self { name, help, carries: Carries::Union(input.name()) }
     }
@@ -236,22 +273,29 @@ impl Output {
 }
 
 impl Cx<'_> {
-    /// What comes in through an input, at the frame that is cooked.
+    /// The geometry of an input at the frame that is cooked.
     pub fn input<A: Wired>(&self, input: Input<A>) -> A::View<'_> {
         A::view(&self.data(input.name()).now)
     }
 
-    /// What came in through an input at the start; see [`Times::start`].
+    /// The geometry of an input at the start; see [`Times::start`].
     pub fn at_start<A: Wired>(&self, input: Input<A>) -> A::View<'_> {
         A::view(&self.data(input.name()).start)
     }
 
-    /// The component an input needs, at the frame that is cooked: the check before the cook saw to it.
-    pub fn part(&self, input: Input<One>) -> &crate::geometry::Component {
-        let kind = match input.spec.needs {
-            Needs::Kind(kind) => kind,
-            Needs::Any => panic!("it asks for the component of the input `{}`, which takes any", input.name()),
-        };
-        self.input(input).part(kind).expect("the engine refuses a wire that lacks what its input needs")
+    /// The component that an input needs, at the frame that is cooked; of a list of wires, the component of each.
+    ///
+    /// # Panics
+    /// Where the input takes any kind of component; so do [`Cx::part_at_start`] and [`Cx::edit`].
+    pub fn part<A: Wired>(&self, input: Input<A>) -> A::Parts<'_> {
+        A::parts(&self.data(input.name()).now, input.kind())
+    }
+
+    /// The component that an input needs, at the start; see [`Times::start`].
+    ///
+    /// # Panics
+    /// As [`Cx::part`].
+    pub fn part_at_start<A: Wired>(&self, input: Input<A>) -> A::Parts<'_> {
+        A::parts(&self.data(input.name()).start, input.kind())
     }
 }

@@ -9,17 +9,21 @@ pub struct ChoiceOption {
     pub help: &'static str,
 }
 
-/// An enum that a param can be; made by [`crate::choice!`].
-pub trait Choice: Copy + Send + Sync + 'static {
+/// The words of a param and the values they stand for; made by [`crate::choice!`].
+pub trait Choice: 'static {
+    /// What a node gets: an enum of its own, or one of its kernel.
+    type Value: Copy + PartialEq + Send + Sync + 'static;
     /// Its options, in order.
     const OPTIONS: &'static [ChoiceOption];
-    /// Place of this option.
-    fn place(self) -> usize;
-    /// The option at `place`.
-    fn at(place: usize) -> Option<Self>;
+    /// The value of each option.
+    const VALUES: &'static [Self::Value];
 }
 
-/// Declares an enum and its words: `choice! { /// Doc. pub enum Mode { Paper = "paper": "as the paper says", … } }`.
+/// Declares the words of a choice.
+///
+/// * An enum of the node's own: `choice! { /// Doc. pub enum Part { Mesh = "mesh": "the mesh", … } }`
+/// * Values that a kernel already has: `choice! { /// Doc. pub Basis for lattice::Basis { lattice::Basis::Bernstein =>
+///   "bernstein": "smooth", … } }`; `Basis` is the type of the handle, and `cx.get` gives the kernel's value.
 #[macro_export]
 macro_rules! choice {
     ($(#[$meta:meta])* $vis:vis enum $name:ident { $($option:ident = $word:literal : $help:literal),* $(,)? }) => {
@@ -27,11 +31,20 @@ macro_rules! choice {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         $vis enum $name { $(#[doc = $help] $option),* }
 
+        $crate::choice!(@words $name, $name, $($name::$option, $word, $help;)*);
+    };
+    ($(#[$meta:meta])* $vis:vis $name:ident for $value:ty { $($option:expr => $word:literal : $help:literal),* $(,)? }) => {
+        $(#[$meta])*
+        $vis enum $name {}
+
+        $crate::choice!(@words $name, $value, $($option, $word, $help;)*);
+    };
+    (@words $name:ident, $value:ty, $($option:expr, $word:literal, $help:literal;)*) => {
         impl $crate::param::Choice for $name {
+            type Value = $value;
             const OPTIONS: &'static [$crate::param::ChoiceOption] =
                 &[$($crate::param::ChoiceOption { word: $word, help: $help }),*];
-            fn place(self) -> usize { self as usize }
-            fn at(place: usize) -> Option<Self> { [$(Self::$option),*].get(place).copied() }
+            const VALUES: &'static [$value] = &[$($option),*];
         }
     };
 }

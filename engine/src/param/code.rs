@@ -1,4 +1,4 @@
-//! Code: assignments that a node runs over points or elements, with the graph's controls in scope.
+//! Code: assignments that a node runs on points or elements, with the graph's controls in scope.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub struct Code {
 }
 
 impl Code {
-    /// The code of a text that knows no controls.
+    /// The code of a text without controls.
     pub fn new(text: &str) -> Self {
         let program = Program::parse(text, &Scope::default());
         Self { text: text.into(), program: Arc::new(program), numbers: Arc::from([]) }
@@ -41,7 +41,7 @@ impl Code {
         &self.numbers
     }
 
-    /// Places of the controls that it reads.
+    /// Indices of the controls that it reads.
     fn reads(&self) -> &[usize] {
         self.program().map_or(&[], |program| &program.uses().controls)
     }
@@ -90,7 +90,7 @@ impl CodeSource {
         self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
     }
 
-    /// Whether a control that it reads moves. The clock that the code itself reads is the node's to declare.
+    /// Whether a control that it reads is animated. Use of the clock by the code itself is for the node to declare.
     pub(super) fn is_animated(&self) -> bool {
         self.controls.iter().enumerate().any(|(place, control)| self.reads(place) && control.is_animated())
     }

@@ -1,5 +1,5 @@
-//! Typed handles of params. A handle is the one place where a param's name, default, ranges, unit and help stand;
-//! help, schema, validation and conformance derive from it.
+//! Typed handles of params. A handle alone declares a param's name, default, ranges, unit and help; help, schema,
+//! validation and conformance derive from it.
 
 use super::code::Code;
 use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
@@ -12,20 +12,22 @@ use numerics::ramp::{Interpolation, Ramp};
 use std::sync::Arc;
 
 /// A type a param can have.
-pub trait ParamType: Clone + 'static {
+pub trait ParamType: 'static {
+    /// What a node gets: for most types the type itself.
+    type Value: Clone;
     /// How a default is written in a constant.
     type Default: Copy + Send + Sync + 'static;
     /// Which JSON it is read from.
     fn shape() -> Shape;
-    /// The default as a value.
-    fn erase(default: Self::Default) -> Value;
-    /// The typed value; `None` where the value is of another type.
-    fn typed(value: &Value) -> Option<Self>;
-    /// The value of a typed value.
-    fn value(self) -> Value;
+    /// The default as an erased value.
+    fn erase_default(default: Self::Default) -> Value;
+    /// The typed value; `None` where the erased value is of another type.
+    fn typed(value: &Value) -> Option<Self::Value>;
+    /// The erased value.
+    fn erase(value: Self::Value) -> Value;
 }
 
-/// A typed handle: written once, as a constant, through [`crate::params!`].
+/// A typed handle, declared as a constant through [`crate::params!`].
 pub struct Param<T: ParamType> {
     name: &'static str,
     help: &'static str,
@@ -41,7 +43,7 @@ impl<T: ParamType> Clone for Param<T> {
 
 impl<T: ParamType> Copy for Param<T> {}
 
-/// A param whatever its type.
+/// A param of any type.
 pub trait ParamDecl: Sync {
     /// Its name, kind, default, ranges, unit and help.
     fn spec(&self) -> ParamSpec;
@@ -53,7 +55,7 @@ impl<T: ParamType> ParamDecl for Param<T> {
             name: self.name,
             help: self.help,
             shape: T::shape(),
-            default: T::erase(self.default),
+            default: T::erase_default(self.default),
             facts: self.facts,
         }
     }
@@ -87,7 +89,7 @@ impl<T: ParamType> Param<T> {
         self
     }
 
-    /// The range that is usual; it guides help and viewers and refuses nothing.
+    /// The usual range, shown in help and viewers; values outside are allowed.
     pub const fn soft(mut self, low: f64, high: f64) -> Self {
         self.facts.soft = Some([low, high]);
         self
@@ -111,20 +113,20 @@ impl<T: ParamType> Param<T> {
         self
     }
 
-    /// Read only where `when` holds of the other params; elsewhere the node sees the default, and neither keys nor
-    /// plans depend on what was set.
+    /// Read only if `when` holds for the other params; otherwise the node sees the default, and neither keys nor plans
+    /// depend on its value.
     pub const fn when(mut self, when: fn(&Params) -> bool) -> Self {
         self.facts.when = Some(when);
         self
     }
 
-    /// Where the graph says nothing, the value is the current frame, rounded down.
+    /// If the graph does not set it, the value is the current frame, rounded down.
     pub const fn default_current_frame(mut self) -> Self {
         self.facts.unset = Unset::CurrentFrame;
         self
     }
 
-    /// Where the graph says nothing, the value is the scene's first frame.
+    /// If the graph does not set it, the value is the scene's first frame.
     pub const fn default_scene_start(mut self) -> Self {
         self.facts.unset = Unset::SceneStart;
         self
@@ -134,13 +136,14 @@ impl<T: ParamType> Param<T> {
 macro_rules! types {
     ($($t:ty, $default:ty, $shape:expr, $erase:expr, $value:pat => $typed:expr, $back:expr;)*) => {$(
         impl ParamType for $t {
+            type Value = Self;
             type Default = $default;
             fn shape() -> Shape { $shape }
-            fn erase(default: $default) -> Value { ($erase)(default) }
+            fn erase_default(default: $default) -> Value { ($erase)(default) }
             fn typed(value: &Value) -> Option<Self> {
                 match value { $value => Some($typed), _ => None }
             }
-            fn value(self) -> Value { ($back)(self) }
+            fn erase(value: Self) -> Value { ($back)(value) }
         }
     )*};
 }
@@ -186,13 +189,14 @@ types! {
         Value::Columns;
 }
 
-/// Vectors that may be left unwritten, which is not the same as an empty list.
+/// Vectors that may be absent, which differs from an empty list.
 impl ParamType for Option<Arc<Vec<[f32; 3]>>> {
+    type Value = Self;
     type Default = ();
     fn shape() -> Shape {
         Shape::Vec3s
     }
-    fn erase((): ()) -> Value {
+    fn erase_default((): ()) -> Value {
         Value::Nothing
     }
     fn typed(value: &Value) -> Option<Self> {
@@ -202,31 +206,33 @@ impl ParamType for Option<Arc<Vec<[f32; 3]>>> {
             _ => None,
         }
     }
-    fn value(self) -> Value {
-        self.map_or(Value::Nothing, Value::Vec3s)
+    fn erase(value: Self) -> Value {
+        value.map_or(Value::Nothing, Value::Vec3s)
     }
 }
 
 impl<T: Choice> ParamType for T {
-    type Default = T;
+    type Value = T::Value;
+    type Default = T::Value;
     fn shape() -> Shape {
         Shape::Choice(T::OPTIONS)
     }
-    fn erase(default: T) -> Value {
-        Value::Choice(default.place())
+    fn erase_default(default: T::Value) -> Value {
+        Self::erase(default)
     }
-    fn typed(value: &Value) -> Option<Self> {
+    fn typed(value: &Value) -> Option<T::Value> {
         match value {
-            Value::Choice(place) => T::at(*place),
+            Value::Choice(index) => T::VALUES.get(*index).copied(),
             _ => None,
         }
     }
-    fn value(self) -> Value {
-        Value::Choice(self.place())
+    fn erase(value: T::Value) -> Value {
+        let index = T::VALUES.iter().position(|known| *known == value);
+        Value::Choice(index.expect("a choice lists every value that its node names"))
     }
 }
 
-/// The f64 that prints as the f32 does: a default of 0.3 shows as 0.3, and is the f32 0.3 again when read.
+/// The f64 that prints like the f32: a default of 0.3 is shown as 0.3, and reads back as the same f32.
 fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
 }
@@ -336,7 +342,7 @@ impl Param<Name> {
 }
 
 impl Param<Code> {
-    /// Assignments that run over points or elements; they may name the graph's controls. None by default.
+    /// Assignments that run on points or elements and may use the graph's controls; empty by default.
     pub const fn code(name: &'static str, help: &'static str) -> Self {
         Self::new(name, "", help)
     }
@@ -376,7 +382,7 @@ impl Param<Arc<Ramp>> {
 }
 
 impl Param<Arc<Vec<[f32; 3]>>> {
-    /// A list of vectors, empty by default. Keys of equally long lists run from one to the next.
+    /// A list of vectors, empty by default. Keys with lists of equal length are interpolated.
     pub const fn vec3s(name: &'static str, help: &'static str) -> Self {
         Self::new(name, (), help)
     }
@@ -384,13 +390,13 @@ impl Param<Arc<Vec<[f32; 3]>>> {
 
 impl<T: Choice> Param<T> {
     /// One of a few words.
-    pub const fn choice(name: &'static str, default: T, help: &'static str) -> Self {
+    pub const fn choice(name: &'static str, default: T::Value, help: &'static str) -> Self {
         Self::new(name, default, help)
     }
 }
 
 impl<T: ParamType<Default = ()>> Param<T> {
-    /// Data written into the graph file itself, empty by default.
+    /// Data written into the graph file, empty by default.
     pub const fn inline(name: &'static str, help: &'static str) -> Self {
         Self::new(name, (), help).fixed()
     }

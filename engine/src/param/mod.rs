@@ -1,7 +1,7 @@
 //! Params: what an artist sets on a node.
 //!
-//! A node writes typed handles ([`Param`]) through [`crate::params!`]; the engine keeps erased [`Value`]s, resolved
-//! from a [`Source`] (a literal, keyframes, an expression) at each time they are read.
+//! A node declares typed handles ([`Param`]) through [`crate::params!`]; the engine keeps erased [`Value`]s, resolved
+//! from a [`Source`] (a literal, keyframes or an expression) at each time they are read.
 
 mod choice;
 mod code;
@@ -55,8 +55,8 @@ impl Params {
         Self { specs, values: values.into(), log }
     }
 
-    /// Whether the param at `index` of the declaration was ever read. Shared by clones, and by all that one plan resolved
-    /// for one node, at whatever frame.
+    /// Whether the param at `index` of the declaration was ever read. Shared by clones, and by all that one plan
+    /// resolved for one node, at whatever frame.
     pub fn was_read(&self, index: usize) -> bool {
         self.log.0.get(index).is_some_and(|read| read.load(Ordering::Relaxed))
     }
@@ -66,7 +66,7 @@ impl Params {
     /// # Panics
     /// Where the node does not declare the handle. `params!` makes that hard; the engine turns it into an error that
     /// names node and frame, and the conformance suite fails.
-    pub fn get<T: ParamType>(&self, param: Param<T>) -> T {
+    pub fn get<T: ParamType>(&self, param: Param<T>) -> T::Value {
         let place =
             self.specs.iter().position(|spec| std::ptr::eq(spec.name, param.name()) || spec.name == param.name());
         let place = place.unwrap_or_else(|| panic!("it reads the param `{}`, which it does not declare", param.name()));

@@ -13,7 +13,7 @@ use super::value::Value;
 use crate::expr::{Env, Expr};
 use crate::geometry::Name;
 
-/// What expressions know of the scene.
+/// What expressions can read of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     /// Frames a second.
@@ -30,7 +30,7 @@ pub type Keyframe = (f64, Value);
 pub struct Keyframes {
     /// At least one, frames strictly increasing.
     pub keys: Vec<Keyframe>,
-    /// How a value runs from one key to the next. Words, yes-or-no and texts hold whatever it is.
+    /// The interpolation between keys. Words, booleans and texts are always held.
     pub interpolation: Interpolation,
 }
 
@@ -41,20 +41,20 @@ pub enum Source {
     Constant(Value),
     /// Keyed.
     Keys(Arc<Keyframes>, Shape),
-    /// As many expressions as the shape has numbers, and the controls (numbers and vectors) they may name.
+    /// One expression for each number of the shape, and the controls (numbers and vectors) that they may use.
     Exprs(Arc<Vec<Expr>>, Shape, Arc<Vec<Source>>),
-    /// Code, and the controls it may name.
+    /// Code, and the controls that it may use.
     Code(CodeSource),
     /// The current frame, rounded down.
     CurrentFrame,
     /// A file; `####` in its path stands for the frame number when `numbered`. Opened when the params are resolved.
     File {
-        /// Where it lies.
+        /// Its path.
         path: Arc<Path>,
-        /// Whether the path holds `#`s that stand for the frame.
+        /// Whether a run of `#` in the path stands for the frame.
         numbered: bool,
     },
-    /// A number from a source, scaled point by point by an attribute.
+    /// A number from a source, scaled by a point attribute.
     Masked(Box<Source>, Name),
 }
 
@@ -113,7 +113,7 @@ impl Source {
     }
 }
 
-/// All numbers of all controls in a row, as expressions read them; 0 for those that are not `read`.
+/// The numbers of all controls, one after the other, as expressions read them; 0 for controls that are not `read`.
 pub(super) fn control_numbers(controls: &[Source], frame: f64, clock: Clock, read: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut numbers = Vec::new();
     for (place, control) in controls.iter().enumerate() {
@@ -131,10 +131,10 @@ pub(crate) fn mixed_seed(scene: i64, own: i64) -> i64 {
     i64::from(Key::new(scene as u64).of(own as u64).u32())
 }
 
-/// The whole number that an expression gives, up to the rounding of its own arithmetic; what is none is handed on as it
-/// is, and refused as any value of another shape.
+/// The integer that an expression gives, up to rounding errors of its arithmetic. Other numbers are returned unchanged,
+/// and refused later like any value of another shape.
 fn whole(x: f64) -> Option<i64> {
-    /// Of the number: enough for 0.1*30 to be 3 and for frame/24*24 to be the frame.
+    /// Relative: enough for 0.1*30 to be 3 and for frame/24*24 to be the frame.
     const ROUNDING: f64 = 1e-12;
     let nearest = x.round();
     let fits = nearest.abs() < 9.2e18 && (x - nearest).abs() <= ROUNDING * nearest.abs().max(1.0);
@@ -142,7 +142,7 @@ fn whole(x: f64) -> Option<i64> {
 }
 
 impl Value {
-    /// The number of a scalar; 0 of anything else.
+    /// The value of a scalar; 0 for anything else.
     pub fn number(&self) -> f64 {
         match self {
             Self::Float(x) | Self::Masked(x, _) => *x,
@@ -179,7 +179,7 @@ impl Keyframes {
     }
 }
 
-/// `share` of the way from `a` to `b`, number by number; what has no between holds `a`.
+/// Interpolates from `a` to `b` at `share`, number by number; values that cannot be interpolated hold `a`.
 fn blend(a: &Value, b: &Value, share: f64) -> Value {
     let mix = |a: f64, b: f64| a + (b - a) * share;
     fn each<const N: usize>(a: [f64; N], b: [f64; N], mix: impl Fn(f64, f64) -> f64) -> [f64; N] {

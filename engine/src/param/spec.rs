@@ -1,4 +1,4 @@
-//! What a declaration says of a param, whatever its type: what help, schema and validation read.
+//! The specification of a param of any type, as help, schema and validation read it.
 
 use super::Params;
 use super::choice::ChoiceOption;
@@ -124,14 +124,14 @@ impl std::fmt::Display for Bounds {
     }
 }
 
-/// What a handle says besides name, default and help.
+/// What a handle declares besides name, default and help.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Unit of the number.
     pub unit: Unit,
-    /// What is outside is refused.
+    /// Values outside are refused.
     pub hard: Bounds,
-    /// What is usual.
+    /// The usual range.
     pub soft: Option<[f64; 2]>,
     /// May not be animated.
     pub fixed: bool,
@@ -139,13 +139,13 @@ pub struct Facts {
     pub history: bool,
     /// May not be the zero vector.
     pub direction: bool,
-    /// Whether it is read at all, given the other params.
+    /// Whether it is read, given the other params.
     pub when: Option<fn(&Params) -> bool>,
-    /// What it is where the graph says nothing, if not the default.
+    /// Its value if the graph does not set it.
     pub unset: Unset,
 }
 
-/// What a param is where the graph says nothing.
+/// The value of a param that the graph does not set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unset {
     /// The declared default.
@@ -169,7 +169,7 @@ impl Facts {
     };
 }
 
-/// All that is known of a param.
+/// The specification of a param.
 #[derive(Clone, Debug)]
 pub struct ParamSpec {
     /// Name in graph files.
@@ -178,14 +178,14 @@ pub struct ParamSpec {
     pub help: &'static str,
     /// Which JSON it is read from.
     pub shape: Shape,
-    /// Value where the graph says nothing.
+    /// Value if the graph does not set it.
     pub default: Value,
     /// Unit, ranges, times.
     pub facts: Facts,
 }
 
 impl ParamSpec {
-    /// Why `value` may not be, or `None`. Expects a value of this shape.
+    /// Why `value` is refused: fact and hint; `None` if it is allowed. Expects a value of this shape.
     pub fn refuses(&self, value: &Value) -> Option<(String, String)> {
         let (name, hard) = (self.name, self.facts.hard);
         let range = || format!("expected {hard}{}", self.unit_text());
@@ -209,7 +209,7 @@ impl ParamSpec {
             }
             _ => return None,
         };
-        // A rotation's numbers are a quaternion's by now: finite is all one can ask.
+        // A rotation is already a quaternion here: its components need only be finite.
         let hard = if matches!(value, Value::Turn(_)) { Bounds::ALL } else { hard };
         if !numbers.iter().all(|x| hard.hold(*x)) {
             return outside(value.to_string());

@@ -1,14 +1,14 @@
-//! Rotations of params: degrees about x, then y, then z; between keys they turn about one axis.
+//! Rotations of params: degrees about x, then y, then z; between keys they rotate about a single axis.
 
 use super::value::Value;
 
-/// The unit quaternion of turning by `degrees` about x, then y, then z.
+/// The unit quaternion of a rotation by `degrees` about x, then y, then z.
 pub fn euler_to_turn(degrees: [f64; 3]) -> Value {
     Value::Turn(quaternion(degrees))
 }
 
-/// `share` of the way between two keyed rotations: about one fixed axis, at constant speed, the shorter way. Where the
-/// keys differ about one of x, y, z alone the numbers count, so keys 0 and 720 make two whole turns.
+/// Interpolates between two keyed rotations at `share`: about a fixed axis, at constant speed, along the shorter arc.
+/// If the keys differ in only one of x, y, z, the angle itself is interpolated, so keys 0 and 720 make two full turns.
 pub(super) fn between(from: [f64; 3], to: [f64; 3], share: f64) -> Value {
     let changed = (0..3).filter(|k| from[*k].to_bits() != to[*k].to_bits()).count();
     if changed <= 1 {

@@ -11,7 +11,7 @@ pub enum Unit {
     Seconds,
     /// frames
     Frames,
-    /// frame, a place on the axis
+    /// frame, a time
     Frame,
     /// degrees
     Degrees,

@@ -1,4 +1,4 @@
-//! Values of params: what a handle hands to a node, and the erased form the engine keeps.
+//! Values of params: what a node gets, and the erased form that the engine keeps.
 
 use std::sync::Arc;
 
@@ -19,16 +19,16 @@ pub struct Span {
 }
 
 impl Span {
-    /// The value at `share` (0…1) of the way from low to high.
+    /// The value at `share` (0…1) between low and high.
     pub fn at(self, share: f32) -> f32 {
         self.low + (self.high - self.low) * share
     }
 }
 
-/// A number that an attribute may scale point by point (⊗): the factor is `value` × the attribute.
+/// A number that a point attribute may scale (⊗): `value` × the attribute.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maskable {
-    /// The number where nothing masks it.
+    /// The number, or the factor of the attribute.
     pub value: f32,
     /// The point attribute that scales it.
     pub attribute: Option<Name>,
@@ -38,14 +38,14 @@ pub struct Maskable {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn(pub [f64; 4]);
 
-/// A number that seeds random choices, the scene's seed mixed in.
+/// A seed of random numbers, mixed with the scene's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed(pub u32);
 
 /// The erased value of a param at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Nothing was written.
+    /// Not set.
     Nothing,
     /// A number.
     Float(f64),
@@ -63,7 +63,7 @@ pub enum Value {
     Span([f64; 2]),
     /// A rotation as a unit quaternion x, y, z, w.
     Turn([f64; 4]),
-    /// One of the options, by place.
+    /// One of the options, by index.
     Choice(usize),
     /// A curve over 0…1.
     Ramp(Arc<Ramp>),
@@ -83,7 +83,7 @@ pub enum Value {
     Tets(Arc<Vec<[u32; 4]>>),
     /// Named attributes.
     Columns(Arc<Vec<(Name, Column)>>),
-    /// Assignments, and the controls they read.
+    /// Assignments with the controls that they read.
     Code(Code),
 }
 
@@ -136,7 +136,7 @@ impl Value {
     }
 }
 
-/// Shows a value as it would stand in a graph file.
+/// Shows a value as it is written in a graph file.
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         fn list<T: std::fmt::Display>(f: &mut std::fmt::Formatter<'_>, items: &[T]) -> std::fmt::Result {

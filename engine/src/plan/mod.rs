@@ -207,7 +207,7 @@ impl<'g> Plan<'g> {
             let place = declared.inputs.iter().position(|input| input.spec().name == name);
             place.map_or(0, |place| inputs[place].len())
         };
-        declared.leaves_out.map(|leaves_out| leaves_out(params, &Wires(&wires))).unwrap_or_default()
+        declared.left_out(params, &Wires(&wires))
     }
 
     /// The frame that stands for `frame` where `node` does not vary.

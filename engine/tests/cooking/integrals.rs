@@ -23,7 +23,7 @@ fn cook(net: &Net, frames: &[f64]) -> Cooked {
 
 #[test]
 fn constant_speed_is_exact_at_any_frame() {
-    let net = drift(1, Source::Constant(3.0_f32.value()), 0.0);
+    let net = drift(1, Source::Constant(f32::erase(3.0)), 0.0);
     let cooked = cook(&net, &[-12.0, 0.0, 10.5, 24.0, 1e8]);
     assert_eq!(cooked.xs(), [-1.5, 0.0, 1.3125, 3.0, 1.25e7]);
 }
@@ -41,7 +41,7 @@ fn keyed_speed_meets_the_closed_form() {
 #[test]
 fn smooth_keys_meet_the_closed_form() {
     // s(t) = 3t² − 2t³ with t = f/24: ∫₀^f = (t³ − t⁴/2) · 1 s.
-    let keys = vec![(0.0, 0.0_f32.value()), (24.0, 1.0_f32.value())];
+    let keys = vec![(0.0, f32::erase(0.0)), (24.0, f32::erase(1.0))];
     let keys = Keyframes { keys, interpolation: Interpolation::Smooth };
     let net = drift(1, Source::Keys(Arc::new(keys), f32::shape()), 0.0);
     let cooked = cook(&net, &[6.0, 12.0, 17.75]);

@@ -12,8 +12,8 @@ fn key(net: &Net, node: &str, frame: f64) -> Key {
     result_keys(&net.0, node, &[at(frame)]).unwrap_or_else(|error| panic!("{error}"))[0]
 }
 
-fn constant<T: ParamType>(value: T) -> Source {
-    Source::Constant(value.value())
+fn constant<T: ParamType<Value = T>>(value: T) -> Source {
+    Source::Constant(T::erase(value))
 }
 
 /// A row of the table: what is changed, and at which frames the key of which node changes by it.

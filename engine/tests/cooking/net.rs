@@ -101,8 +101,8 @@ impl Net {
 }
 
 impl<'n> Adding<'n> {
-    pub(crate) fn set<T: ParamType>(self, param: &str, value: T) -> Self {
-        self.source(param, Source::Constant(value.value()))
+    pub(crate) fn set<T: ParamType<Value = T>>(self, param: &str, value: T) -> Self {
+        self.source(param, Source::Constant(T::erase(value)))
     }
 
     pub(crate) fn keyed(self, param: &str, keys: &[(f64, f32)]) -> Self {
@@ -141,7 +141,7 @@ fn param_place(node: &Node, param: &str) -> usize {
 
 /// Numbers keyed, straight from key to key.
 pub(crate) fn keyed(keys: &[(f64, f32)]) -> Source {
-    let keys = keys.iter().map(|(frame, number)| (*frame, number.value())).collect();
+    let keys = keys.iter().map(|(frame, number)| (*frame, f32::erase(*number))).collect();
     Source::Keys(Arc::new(Keyframes { keys, interpolation: Interpolation::Linear }), f32::shape())
 }
 

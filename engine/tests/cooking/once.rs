@@ -73,7 +73,7 @@ fn a_held_key_is_cooked_once_while_it_holds() {
 #[test]
 fn a_value_that_comes_back_within_a_slice_is_cooked_once_there() {
     let probe = Probe::new();
-    let keys = (1..=8).map(|frame| (f64::from(frame), ((frame % 2) as f32).value())).collect();
+    let keys = (1..=8).map(|frame| (f64::from(frame), f32::erase((frame % 2) as f32))).collect();
     let keys = Keyframes { keys, interpolation: Interpolation::Constant };
     let mut net = Net::new(1, 8);
     let source = Source::Keys(Arc::new(keys), f32::shape());

@@ -155,7 +155,7 @@ fn what_else_comes_with_the_curves_goes_through() {
 fn other_faces_are_refused_with_both_counts() {
     let one = Component::mesh(vec![3], vec![0, 1, 2], floor().positions().to_vec()).unwrap();
     let error = attach(hair(), floor(), one).try_cook().unwrap_err();
-    let expected = "`skin` has 1 faces and 33 points, `rest_skin` 16 faces and 33 points, or they are joined otherwise";
+    let expected = "`skin` has 1 faces and 33 points, `rest_skin` 16 faces and 33 points, or their topology differs";
     assert_eq!(error.fact, expected);
 }
 
@@ -163,7 +163,7 @@ fn other_faces_are_refused_with_both_counts() {
 fn no_face_to_hold_on_to_is_refused_and_no_curves_are_fine() {
     let empty = || Component::mesh(vec![], vec![], vec![]).unwrap();
     let error = attach(hair(), empty(), empty()).try_cook().unwrap_err();
-    assert_eq!(error.fact, "`rest_skin` has no face for 100 curves to hold on to");
+    assert_eq!(error.fact, "`rest_skin` has no face to attach 100 curves to");
     let none = Component::curves(vec![], vec![]).unwrap();
     assert_eq!(attach(none.clone(), empty(), empty()).cook().curves().point_count(), 0);
     assert_eq!(attach(none, floor(), moved(&floor(), rolled)).cook().metrics["bound"], 0.0);

@@ -45,7 +45,7 @@ fn it_conforms() {
 #[test]
 fn offsets_of_an_affine_map_are_that_map() {
     let map = |[x, y, z]: [f64; 3]| [1.0 + 0.5 * y - 0.25 * x, 0.75 * z, 0.5 * x - 0.5 * z];
-    for basis in [Basis::Trilinear, Basis::Bernstein] {
+    for basis in [LatticeBasis::Trilinear, LatticeBasis::Bernstein] {
         let out = deform(ball()).set(OFFSETS, corners(map)).set(BASIS, basis).cook();
         for (rest, point) in ball().positions().iter().zip(out.mesh().positions()) {
             let by = map(rest.map(f64::from));
@@ -119,8 +119,8 @@ fn keys_of_offsets_run_straight_between() {
 fn outside_is_held_or_goes_on() {
     let wide = deform(Component::points(vec![[1.5, 0.0, 9.0]])).set(OFFSETS, wide());
     let at = |outside| wide.clone().set(OUTSIDE, outside).cook().part(Kind::Points).positions()[0];
-    assert_eq!(at(Outside::Hold), [2.0, 0.0, 9.0]);
-    assert_eq!(at(Outside::Extend), [3.0, 0.0, 9.0]);
+    assert_eq!(at(Extrapolation::Hold), [2.0, 0.0, 9.0]);
+    assert_eq!(at(Extrapolation::Extend), [3.0, 0.0, 9.0]);
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn what_is_no_lattice_is_refused() {
     assert_eq!(count.fact, "`offsets` has 9 vectors for the control points of 1×1×1 divisions");
     assert_eq!(count.hint.as_deref(), Some("expected 2×2×2 = 8, or none"));
     let flat = refused(deform(ball()).set(OFFSETS, wide()).set(TO, [0.5, -0.5, 0.5]));
-    assert_eq!(flat.fact, "`from` is [-0.5, -0.5, -0.5] and `to` [0.5, -0.5, 0.5], which is no box");
+    assert_eq!(flat.fact, "`from` is [-0.5, -0.5, -0.5] and `to` [0.5, -0.5, 0.5], which is not a box");
     let mut volume = Geometry::default();
     let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [1, 1, 1] };
     volume.put_volume(Volume::new(grid, vec![-0.25], [vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]).unwrap());
@@ -151,9 +151,9 @@ fn extreme_places_are_deformed_or_refused() {
     let at = |point: Point, outside| {
         deform(Component::points(vec![point])).set(OFFSETS, wide()).set(OUTSIDE, outside).try_cook()
     };
-    assert_eq!(at([1e30, 0.0, 0.0], Outside::Hold).unwrap().part(Kind::Points).positions(), [[1e30, 0.0, 0.0]]);
-    assert_eq!(at([1e30, 0.0, 0.0], Outside::Extend).unwrap().part(Kind::Points).positions(), [[2e30, 0.0, 0.0]]);
-    assert_eq!(at([3e38, 0.0, 0.0], Outside::Extend).unwrap_err().kind, ErrorKind::NotFinite);
+    assert_eq!(at([1e30, 0.0, 0.0], Extrapolation::Hold).unwrap().part(Kind::Points).positions(), [[1e30, 0.0, 0.0]]);
+    assert_eq!(at([1e30, 0.0, 0.0], Extrapolation::Extend).unwrap().part(Kind::Points).positions(), [[2e30, 0.0, 0.0]]);
+    assert_eq!(at([3e38, 0.0, 0.0], Extrapolation::Extend).unwrap_err().kind, ErrorKind::NotFinite);
     let empty = Component::curves(vec![], vec![]).unwrap();
     assert!(deform(empty).set(OFFSETS, wide()).cook().curves().positions().is_empty());
 }

@@ -1,12 +1,12 @@
-//! Keys of what nodes keep with a component; see [`Component::kept`].
+//! Keys of values that nodes cache with a component; see [`Component::kept`].
 
 use engine::prelude::*;
 
-/// Where curves are rooted, equal where the bits are.
+/// The roots of curves; equal if their bits are.
 #[derive(Clone, Debug)]
 pub(crate) struct Roots(pub(crate) Vec<[f32; 3]>);
 
-/// A column, equal where it is the very same array, which it keeps alive: no other can come to lie at its address.
+/// A column; equal if it is the same array. It keeps the array alive, so that its address is not reused.
 #[derive(Clone, Debug)]
 pub(crate) struct Array(Option<Column>);
 
@@ -25,7 +25,7 @@ impl PartialEq for Roots {
 }
 
 impl Array {
-    /// The attribute a point of that name, where there is one.
+    /// The point attribute of that name, if there is one.
     pub(crate) fn of(part: &Component, name: &str) -> Self {
         Self(part.table(Owner::Point).column(name).cloned())
     }

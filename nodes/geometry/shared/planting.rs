@@ -1,4 +1,4 @@
-//! Where curves grow on a skin: what Curve_Scatter and Curve_Interpolate have in common.
+//! Distributing roots over a skin, for Curve_Scatter and Curve_Interpolate.
 
 use curves::scatter::{Spot, Surface};
 use engine::prelude::*;
@@ -11,7 +11,7 @@ const MOST_CVS: f64 = (1_u32 << 26) as f64;
 pub(crate) struct Planting<'a> {
     /// Curves on a square metre.
     pub(crate) density: f32,
-    /// Multiplies the density, a value a point of the skin.
+    /// Multiplies the density, one value per point of the skin.
     pub(crate) mask: Option<&'a [f32]>,
     /// CVs of each curve.
     pub(crate) cvs: usize,
@@ -19,7 +19,7 @@ pub(crate) struct Planting<'a> {
 }
 
 impl Planting<'_> {
-    /// The roots, each with its place in the endless list of which a higher density takes more, by face.
+    /// The roots by face, each with its index in the infinite sequence of which a higher density takes a longer prefix.
     ///
     /// # Errors
     /// Where there would be more CVs than memory should hold.
@@ -27,7 +27,7 @@ impl Planting<'_> {
         let whole = skin.triangles();
         let triangles = &whole.corners;
         let share = |corner: u32| self.mask.map_or(1.0, |mask| f64::from(mask[corner as usize]).max(0.0));
-        // Only where something may grow, so that a bare plain around a meadow costs nothing.
+        // Triangles where nothing grows are left out, so that a bare plain around a meadow costs nothing.
         let fertile: Vec<u32> = (0..triangles.len() as u32)
             .filter(|triangle| triangles[*triangle as usize].iter().any(|corner| share(*corner) > 0.0))
             .collect();
@@ -64,7 +64,7 @@ impl Planting<'_> {
 /// The skin's mask of that name, where one is named.
 ///
 /// # Errors
-/// Where the skin has no such number a point.
+/// Where the skin has no such float per point.
 pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f32]>> {
     if name.is_empty() {
         return Ok(None);
@@ -76,24 +76,23 @@ pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f3
     Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected one float for each vertex"))
 }
 
-/// The skin at the scene's first frame, whose faces it must have kept.
+/// The skin at the scene's first frame.
 ///
 /// # Errors
-/// Where it has not.
-pub(crate) fn kept_faces<'c>(rest: &'c Geometry, now: &Component) -> Result<&'c Component> {
-    let rest = rest.mesh().expect("the engine refuses a wire that lacks what its input needs");
+/// Where its faces have changed since.
+pub(crate) fn kept_faces<'c>(rest: &'c Component, now: &Component) -> Result<&'c Component> {
     if super::faces::same_faces(rest, now) {
         return Ok(rest);
     }
     let [now, rest] = [now, rest].map(|mesh| (mesh.element_count(), mesh.point_count()));
     let fact = format!(
-        "`skin` has {} faces and {} points, at the scene's first frame {} and {}, or they are joined otherwise",
+        "`skin` has {} faces and {} points, at the scene's first frame {} and {}, or their topology differs",
         now.0, now.1, rest.0, rest.1
     );
-    Err(Error::refused(fact).hint("curves grow on a skin that moves but keeps its faces"))
+    Err(Error::refused(fact).hint("the skin may move, but must keep its faces"))
 }
 
-/// Whether both have the very same rows, or neither has any.
+/// Whether both share one array of rows, or neither has any.
 pub(crate) fn same_rows(a: &Component, b: &Component, name: &str) -> bool {
     match (a.table(Owner::Point).column(name), b.table(Owner::Point).column(name)) {
         (Some(a), Some(b)) => a.same(b),
@@ -102,7 +101,7 @@ pub(crate) fn same_rows(a: &Component, b: &Component, name: &str) -> bool {
     }
 }
 
-/// What the skin's `rows` are at each root, for all CVs of its curve.
+/// The skin's `rows` interpolated at each root, for all CVs of its curve.
 pub(crate) fn at_roots<'s>(
     rows: &[[f32; 3]],
     triangles: &[[u32; 3]],

@@ -1,4 +1,4 @@
-//! What the file sources share: one component of a file, or written into the graph itself, scaled.
+//! What file sources share: one component from a file, or written into the graph itself.
 
 use engine::files::File;
 use engine::geometry::GeometryError;
@@ -6,10 +6,10 @@ use engine::prelude::*;
 use formats::{Format, FormatError};
 use std::sync::Arc;
 
-/// The component of `kind` in a file; what else the file has is left.
+/// The component of `kind` in a file; other geometry is ignored.
 ///
 /// # Errors
-/// Where the file cannot be read as what its ending says, or has no such component.
+/// Where the file cannot be read in the format of its extension, or has no such component.
 pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
     let path = file.path().display();
     let refused = |error: FormatError| {
@@ -28,7 +28,7 @@ pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
     })
 }
 
-/// Attributes written into the graph: a row a point, a row an element.
+/// Attributes written into the graph, of points and of elements.
 pub(crate) struct Inline {
     pub(crate) points: Arc<Vec<(Name, Column)>>,
     pub(crate) elements: Arc<Vec<(Name, Column)>>,
@@ -38,7 +38,7 @@ impl Inline {
     /// Adds the attributes to a component.
     ///
     /// # Errors
-    /// Where one has the wrong number of rows or type.
+    /// Where one has the wrong type or number of rows.
     pub(crate) fn add_to(self, component: &mut Component) -> Result<()> {
         let lists =
             [(Owner::Point, &self.points, "attributes"), (Owner::Element, &self.elements, "element_attributes")];
@@ -52,7 +52,7 @@ impl Inline {
     }
 }
 
-/// Whole numbers that are written into the graph.
+/// Integers written into the graph.
 ///
 /// # Errors
 /// Where one of them is below `least`.
@@ -64,8 +64,8 @@ pub(crate) fn wholes(param: Param<Arc<Vec<i32>>>, numbers: &[i32], least: i32) -
     Ok(numbers.iter().map(|number| number.unsigned_abs()).collect())
 }
 
-/// The error of geometry that is written into the graph, in the words of its params; `indices` names the param with
-/// the elements' points.
+/// An error of geometry written into the graph, in terms of its params; `indices` is the param with the elements'
+/// points.
 pub(crate) fn explained(error: GeometryError, indices: &'static str) -> Error {
     match error {
         GeometryError::Counts { sum, points } => {
@@ -82,10 +82,10 @@ pub(crate) fn explained(error: GeometryError, indices: &'static str) -> Error {
     }
 }
 
-/// Which of the two ways to give a source its geometry is used.
+/// Checks that exactly one of `file` and inline points is given.
 ///
 /// # Errors
-/// Where both are, or neither.
+/// Where both or neither are.
 pub(crate) fn file_or_inline(file: Option<&File>, has_inline: bool) -> Result<()> {
     match (file, has_inline) {
         (Some(_), true) => Err(Error::refused("it has both a `file` and `points`").hint("remove one of them")),

@@ -1,22 +1,22 @@
-//! Attributes by which the family's nodes speak with each other.
+//! Attributes that the family's nodes exchange.
 
 use engine::prelude::*;
 
-/// On a body's points: the surface's point that each one is; −1 inside.
+/// Of a body's points: the corresponding point of the surface; −1 inside.
 pub(crate) const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
-/// On a body's tets: 1 where one is too flat for its volume to mean anything, else 0.
+/// Of a body's tets: 1 if a tet is too flat to have a meaningful volume, else 0.
 pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
 
-/// On a goal: the frame at which the body shall be there.
+/// Of a goal: the frame at which the body reaches it.
 pub(crate) const GOAL_FRAME: Attr<f32> = Attr::once("goal_frame");
-/// How hard it is pulled there, 1/s²: acceleration by distance.
+/// Of a goal: how strongly the body is pulled, 1/s² (acceleration per distance).
 pub(crate) const GOAL_STRENGTH: Attr<f32> = Attr::once("goal_strength");
-/// How many frames it is held there.
+/// Of a goal: number of frames for which the body is held.
 pub(crate) const GOAL_HOLD: Attr<f32> = Attr::once("goal_hold");
 
-/// On a pin: how far it reaches at the start, metres.
+/// Of a pin: its radius at the start, metres.
 pub(crate) const PIN_RADIUS: Attr<f32> = Attr::point("pin_radius");
-/// How hard it pulls, 1/s²; 0 holds exactly.
+/// Of a pin: how strongly it pulls, 1/s²; 0 holds exactly.
 pub(crate) const PIN_STRENGTH: Attr<f32> = Attr::point("pin_strength");
-/// The frame from which it lets go.
+/// Of a pin: the frame from which it releases its particles.
 pub(crate) const PIN_RELEASE: Attr<f32> = Attr::point("pin_release");

@@ -1,3 +1,3 @@
-//! What several nodes of the family need, and none of them is.
+//! Helpers shared by the family's nodes.
 
 pub(crate) mod attributes;

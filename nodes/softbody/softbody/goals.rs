@@ -1,6 +1,6 @@
-//! Which goals pull whom when, and when they become the shape at rest.
+//! When goals pull which particles, and when they become the rest shape.
 //!
-//! A body heads from its start to its first goal, is held there, heads for the next, and after the last is let go.
+//! A body moves from its start to its first goal, is held there, moves to the next, and is released after the last.
 
 use std::sync::Arc;
 
@@ -12,30 +12,30 @@ use super::setup::{SimulationSetup, StartInputs};
 use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH};
 
 /// A goal of a body.
-struct Aim<'a> {
+struct GoalKey<'a> {
     frame: f64,
     strength: f64,
     hold: f64,
-    places: &'a [[f32; 3]],
+    positions: &'a [[f32; 3]],
 }
 
 /// The goals of each wire of bodies, by frame.
 pub(super) struct Goals<'a> {
-    of: Vec<Vec<Aim<'a>>>,
+    of: Vec<Vec<GoalKey<'a>>>,
     setup: &'a SimulationSetup,
     start: f64,
 }
 
-/// Where a body is drawn at a time: a share of the way between two shapes, and how hard.
-struct Drawn<'a> {
-    /// None is the shape at the start.
+/// The target of a body at a time: an interpolation between two shapes, and how strongly it pulls.
+struct GoalSample<'a> {
+    /// `None`: the shape at the start.
     from: Option<&'a [[f32; 3]]>,
     to: &'a [[f32; 3]],
     share: f64,
     strength: f64,
 }
 
-/// What makes motion towards a goal end there without a swing: critical damping, 1/s.
+/// Critical damping of the motion towards a goal, 1/s.
 pub(super) fn damping(strength: f64) -> f64 {
     2.0 * strength.sqrt()
 }
@@ -44,16 +44,15 @@ impl<'a> Goals<'a> {
     /// Of the geometries that came in at a frame; `start` is the simulation's first.
     ///
     /// # Errors
-    /// Where one is of no body, or of two, or lacks what Softbody_Goal writes.
+    /// Where a goal fits no body, or two, or lacks the attributes of Softbody_Goal.
     pub(super) fn of(
         inputs: &StartInputs,
         setup: &'a SimulationSetup,
-        goals: &'a [Arc<Geometry>],
+        goals: &[&'a Component],
         start: f64,
     ) -> Result<Self> {
-        let mut of: Vec<Vec<Aim<'a>>> = setup.wires.iter().map(|_| Vec::new()).collect();
-        for (index, geometry) in goals.iter().enumerate() {
-            let shape = geometry.tets().expect("the engine refuses a wire without tets");
+        let mut of: Vec<Vec<GoalKey<'a>>> = setup.wires.iter().map(|_| Vec::new()).collect();
+        for (index, shape) in goals.iter().enumerate() {
             let wire = owner(inputs, index, shape)?;
             let number = |attribute: Attr<f32>| {
                 shape.get(attribute).and_then(|rows| rows.first()).map(|x| f64::from(*x)).ok_or_else(|| {
@@ -61,23 +60,23 @@ impl<'a> Goals<'a> {
                         .hint("make goals of shapes by Softbody_Goal")
                 })
             };
-            let aim = Aim {
+            let key = GoalKey {
                 frame: number(GOAL_FRAME)?,
                 strength: number(GOAL_STRENGTH)?.max(0.0),
                 hold: number(GOAL_HOLD)?.max(0.0),
-                places: shape.positions(),
+                positions: shape.positions(),
             };
-            of[wire].push(aim);
+            of[wire].push(key);
         }
-        of.iter_mut().for_each(|aims| aims.sort_by(|a, b| a.frame.total_cmp(&b.frame)));
+        of.iter_mut().for_each(|keys| keys.sort_by(|a, b| a.frame.total_cmp(&b.frame)));
         Ok(Self { of, setup, start })
     }
 
-    /// Adds what pulls in a step between two frames.
+    /// Adds the goal springs of a step between two frames.
     pub(super) fn pull(&self, times: [f64; 2], on: GoalOn, out: &mut Vec<mass_spring::GoalSpring>) {
         for (wire, particles) in self.setup.wires.iter().enumerate() {
-            let Some(now) = self.drawn(wire, times[1]) else { continue };
-            let before = self.drawn(wire, times[0]);
+            let Some(now) = self.sample(wire, times[1]) else { continue };
+            let before = self.sample(wire, times[0]);
             let damping = damping(now.strength);
             for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
             {
@@ -102,40 +101,43 @@ impl<'a> Goals<'a> {
         }
     }
 
-    fn place(&self, drawn: &Drawn<'_>, particle: usize, point: usize) -> [f64; 3] {
+    fn place(&self, sample: &GoalSample<'_>, particle: usize, point: usize) -> [f64; 3] {
         let wide = |shape: &[[f32; 3]]| shape[point].map(f64::from);
-        let from = drawn.from.map_or(self.setup.rest[particle], wide);
-        let to = wide(drawn.to);
-        if drawn.share >= 1.0 { to } else { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * drawn.share) }
+        let from = sample.from.map_or(self.setup.rest[particle], wide);
+        let to = wide(sample.to);
+        if sample.share >= 1.0 { to } else { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * sample.share) }
     }
 
-    /// Where a wire's body is drawn at a frame; none before it has goals and after it is let go.
-    fn drawn(&self, wire: usize, frame: f64) -> Option<Drawn<'_>> {
-        let aims = &self.of[wire];
-        let next = aims.partition_point(|aim| aim.frame < frame);
+    /// The target of a wire's body at a frame; `None` if it has no goals, and after its release.
+    fn sample(&self, wire: usize, frame: f64) -> Option<GoalSample<'_>> {
+        let keys = &self.of[wire];
+        let next = keys.partition_point(|key| key.frame < frame);
         let share = |from: f64, to: f64| if to > from { ((frame - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-        let before = next.checked_sub(1).map(|index| &aims[index]);
-        match (before, aims.get(next)) {
+        let before = next.checked_sub(1).map(|index| &keys[index]);
+        match (before, keys.get(next)) {
             (None, None) => None,
-            (None, Some(to)) => {
-                Some(Drawn { from: None, to: to.places, share: share(self.start, to.frame), strength: to.strength })
-            }
+            (None, Some(to)) => Some(GoalSample {
+                from: None,
+                to: to.positions,
+                share: share(self.start, to.frame),
+                strength: to.strength,
+            }),
             (Some(at), None) if frame > at.frame + at.hold => None,
-            (Some(at), None) => Some(Drawn { from: None, to: at.places, share: 1.0, strength: at.strength }),
+            (Some(at), None) => Some(GoalSample { from: None, to: at.positions, share: 1.0, strength: at.strength }),
             (Some(from), Some(to)) => {
                 let share = share((from.frame + from.hold).min(to.frame), to.frame);
                 let strength = from.strength + (to.strength - from.strength) * share;
-                Some(Drawn { from: Some(from.places), to: to.places, share, strength })
+                Some(GoalSample { from: Some(from.positions), to: to.positions, share, strength })
             }
         }
     }
 
-    /// The shape that bodies are drawn to at a frame, a place for each particle, NaN where none draws it; none where none
-    /// is drawn.
+    /// The target positions of all particles at a frame, NaN for particles without a goal; `None` if there are no
+    /// goals.
     pub(super) fn shape(&self, frame: f64) -> Option<Vec<[f64; 3]>> {
         let mut shape = None;
         for (wire, particles) in self.setup.wires.iter().enumerate() {
-            let Some(now) = self.drawn(wire, frame) else { continue };
+            let Some(now) = self.sample(wire, frame) else { continue };
             let shape = shape.get_or_insert_with(|| vec![[f64::NAN; 3]; self.setup.rest.len()]);
             for (point, particle) in particles.clone().enumerate() {
                 shape[particle] = self.place(&now, particle, point);
@@ -144,41 +146,44 @@ impl<'a> Goals<'a> {
         shape
     }
 
-    /// The share of the way from the shape at rest to each goal's that is gone after the step to `frame`; in the caller's
-    /// hands is a shape of all particles, NaN where none is meant. `whole` is how far it goes in `frames`.
+    /// Calls `reset` for each goal towards which the rest shape changes in the step to `frame`, with the goal's
+    /// positions (NaN for other particles) and the share of the remaining change. In `frames` steps the rest shape
+    /// changes by `whole`, 0..1.
     pub(super) fn resets(&self, frame: f64, whole: f64, frames: f64, mut reset: impl FnMut(&[[f64; 3]], f64)) {
-        for (wire, aim, step) in self.passed(frame) {
+        for (wire, key, step) in self.passed(frame) {
             let Some(share) = share_of_step(step, whole, frames) else { continue };
             let mut shape = vec![[f64::NAN; 3]; self.setup.rest.len()];
-            for (place, at) in shape[self.setup.wires[wire].clone()].iter_mut().zip(aim.places) {
+            for (place, at) in shape[self.setup.wires[wire].clone()].iter_mut().zip(key.positions) {
                 *place = at.map(f64::from);
             }
             reset(&shape, share);
         }
     }
 
-    /// Whether the shape at rest was changed by the step to `frame`.
+    /// Whether the rest shape changes in the step to `frame`.
     pub(super) fn reset_at(&self, frame: f64, whole: f64, frames: f64) -> bool {
         self.passed(frame).any(|(_, _, step)| share_of_step(step, whole, frames).is_some())
     }
 
-    /// Goals that are passed at a frame, with how many steps ended since, the one that passed it included.
-    fn passed(&self, frame: f64) -> impl Iterator<Item = (usize, &Aim<'_>, f64)> {
-        let all = self.of.iter().enumerate().flat_map(|(wire, aims)| aims.iter().map(move |aim| (wire, aim)));
-        all.map(move |(wire, aim)| (wire, aim, frame - aim.frame.ceil().max(self.start + 1.0) + 1.0))
+    /// Goals passed by `frame`, with the number of steps since, the step that passed them included.
+    fn passed(&self, frame: f64) -> impl Iterator<Item = (usize, &GoalKey<'_>, f64)> {
+        let all = self.of.iter().enumerate().flat_map(|(wire, keys)| keys.iter().map(move |key| (wire, key)));
+        all.map(move |(wire, key)| (wire, key, frame - key.frame.ceil().max(self.start + 1.0) + 1.0))
             .filter(|(_, _, step)| *step >= 1.0)
     }
 
-    /// Mean distance of particles to where they are drawn at a frame, metres; none where none is.
-    pub(super) fn distance(&self, frame: f64, on: GoalOn, places: &[[f64; 3]]) -> Option<f64> {
+    /// Mean distance of pulled particles from their targets at a frame, metres; `None` if none is pulled.
+    pub(super) fn distance(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0.0);
         for (wire, particles) in self.setup.wires.iter().enumerate() {
-            let Some(now) = self.drawn(wire, frame) else { continue };
+            let Some(now) = self.sample(wire, frame) else { continue };
             for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
             {
                 let to = self.place(&now, particle, point);
-                sum +=
-                    (0..3).map(|k| (to[k] - places[particle][k]) * (to[k] - places[particle][k])).sum::<f64>().sqrt();
+                sum += (0..3)
+                    .map(|k| (to[k] - positions[particle][k]) * (to[k] - positions[particle][k]))
+                    .sum::<f64>()
+                    .sqrt();
                 count += 1.0;
             }
         }
@@ -186,7 +191,8 @@ impl<'a> Goals<'a> {
     }
 }
 
-/// What a step brings of a way that is gone to `whole` in `frames` equal steps, as a share of what is left; none after that.
+/// The share of the remaining change that a step makes, if `frames` equal steps make `whole` of the change; `None`
+/// after them.
 fn share_of_step(step: f64, whole: f64, frames: f64) -> Option<f64> {
     let frames = frames.max(1.0);
     if whole <= 0.0 || step > frames {
@@ -212,11 +218,11 @@ fn owner(inputs: &StartInputs, index: usize, shape: &Component) -> Result<usize>
             let count = |part: &Component| format!("{} tets of {} points", part.element_count(), part.point_count());
             let has: Vec<String> = bodies.iter().filter_map(|body| body.tets().map(count)).collect();
             let fact = format!("`goals` {index} has {}, and no body has the same: {}", count(shape), has.join(", "));
-            Err(Error::refused(fact).hint("make goals of the very tets that are simulated, by Softbody_Goal"))
+            Err(Error::refused(fact).hint("make goals from the tets that are simulated, by Softbody_Goal"))
         }
         [a, b, ..] => {
             let fact = format!("`goals` {index} has the tets of both `bodies` {a} and {b}");
-            Err(Error::refused(fact).hint("simulate equal bodies in a node each"))
+            Err(Error::refused(fact).hint("simulate identical bodies in separate nodes"))
         }
     }
 }
@@ -226,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reset_over_frames_goes_equal_parts_of_the_whole_way() {
+    fn the_rest_shape_changes_by_equal_parts() {
         let mut length = 1.0;
         for step in 1..=4 {
             let share = share_of_step(f64::from(step), 0.8, 4.0).unwrap();

@@ -1,20 +1,20 @@
-//! Springs between bodies that lie against each other: the yolk in the white.
+//! Coupling springs between bodies that touch: the yolk in the white.
 //!
-//! R1 joins "the interior surface particles of the egg white" with "the exterior surface particles of the yolk". Which are
-//! those is seen by where surfaces face: a particle is joined with the nearest particles of other bodies within the radius
-//! that it sees outside of its own surface and that see it outside of theirs, or both inside where surfaces overlap.
+//! R1 joins "the interior surface particles of the egg white" with "the exterior surface particles of the yolk". They
+//! are recognised by the orientation of the surfaces: a particle is joined to the nearest particles of other bodies
+//! within the radius such that each lies outside the other's surface, or, where surfaces overlap, each inside.
 
 use bodies::mass_spring::BodySpring;
 
-/// Springs that a particle asks for, at most.
+/// The most springs that start from one particle.
 const MOST: usize = 4;
 
-/// Who may be joined.
+/// The particles that may be joined.
 pub(super) struct Couple<'a> {
     pub(super) points: &'a [[f64; 3]],
     /// Surfaces, outwards.
     pub(super) triangles: &'a [[u32; 3]],
-    /// Which body each particle is of.
+    /// The body of each particle.
     pub(super) parts: &'a [u32],
     /// Metres; 0 joins nothing.
     pub(super) radius: f64,
@@ -24,14 +24,14 @@ pub(super) struct Couple<'a> {
     pub(super) damping: f64,
 }
 
-/// Springs as long as their particles are apart, by their particles.
+/// Springs with the particles' distance as rest length, ordered by their particles.
 pub(super) fn couple(with: &Couple<'_>) -> Vec<BodySpring> {
     if with.radius <= 0.0 || with.points.as_flattened().iter().any(|x| !x.is_finite()) {
         return Vec::new();
     }
     let normals = normals(with);
     let at = |particle: u32| with.points[particle as usize];
-    // In rising x, so that what is near in x is near in the list.
+    // Sorted by x, so that particles close in x are close in the list.
     let mut row: Vec<u32> = with.triangles.as_flattened().to_vec();
     row.sort_unstable();
     row.dedup();

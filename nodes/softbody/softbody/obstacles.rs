@@ -1,14 +1,14 @@
-//! Colliders on their way through a step.
+//! Colliders in motion over a time step.
 
 use std::sync::Arc;
 
 use bodies::collision::{Obstacle, ObstaclePose};
 use engine::prelude::*;
 
-/// What bodies cannot pass in a step of `seconds` whose `samples` are the wires at rising times.
+/// The colliders of a step of `seconds`; `samples` are the wires at increasing times within it.
 ///
 /// # Errors
-/// Where a collider changes its points within the step, or one is not finite.
+/// Where a collider changes its topology within the step, or a point is not finite.
 pub(super) fn obstacles(
     samples: &[(Frame, Vec<Arc<Geometry>>)],
     seconds: f64,

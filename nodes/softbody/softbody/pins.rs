@@ -1,4 +1,4 @@
-//! What pins hold: particles near them at the start, where their points go.
+//! Pins: the particles bound to them at the start, and the springs and constraints of a step.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use engine::prelude::*;
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
 
-/// A particle and the pin that has it.
-pub(super) struct Hold {
+/// A particle bound to a pin.
+pub(super) struct PinBinding {
     particle: u32,
     wire: usize,
     point: usize,
@@ -16,28 +16,28 @@ pub(super) struct Hold {
     offset: [f64; 3],
 }
 
-/// What pins hold at the start: each particle goes to the nearest whose radius it is within.
-pub(super) fn holds(wires: &[Arc<Geometry>], rest: &[[f64; 3]]) -> Result<Vec<Hold>> {
-    let mut nearest: Vec<Option<(f64, Hold)>> = rest.iter().map(|_| None).collect();
+/// Binds each particle to the nearest pin within whose radius it lies at the start.
+pub(super) fn bind_pins(wires: &[Arc<Geometry>], rest: &[[f64; 3]]) -> Result<Vec<PinBinding>> {
+    let mut nearest: Vec<Option<(f64, PinBinding)>> = rest.iter().map(|_| None).collect();
     for (wire, geometry) in wires.iter().enumerate() {
-        let pins = points(geometry);
+        let pins = geometry.require(Kind::Points)?;
         let radii = needed(pins, wire, PIN_RADIUS)?;
         for (point, (place, radius)) in pins.positions().iter().zip(radii).enumerate() {
             for (particle, at) in rest.iter().enumerate() {
                 let offset: [f64; 3] = std::array::from_fn(|k| at[k] - f64::from(place[k]));
                 let far = offset.iter().map(|x| x * x).sum::<f64>().sqrt();
                 if far <= f64::from(*radius) && nearest[particle].as_ref().is_none_or(|(least, _)| far < *least) {
-                    nearest[particle] = Some((far, Hold { particle: particle as u32, wire, point, offset }));
+                    nearest[particle] = Some((far, PinBinding { particle: particle as u32, wire, point, offset }));
                 }
             }
         }
     }
-    Ok(nearest.into_iter().flatten().map(|(_, hold)| hold).collect())
+    Ok(nearest.into_iter().flatten().map(|(_, binding)| binding).collect())
 }
 
-/// Adds what the pins do in a step from the frame `before` to `now`.
+/// Adds the constraints and springs of a step from the frame `before` to `now`.
 pub(super) fn pull(
-    held: &[Hold],
+    bindings: &[PinBinding],
     [before, now]: [&[Arc<Geometry>]; 2],
     frame: Frame,
     pins: &mut Vec<Pin>,
@@ -45,39 +45,35 @@ pub(super) fn pull(
 ) -> Result<()> {
     let of = |wires: &[Arc<Geometry>]| -> Result<Vec<[Vec<f32>; 2]>> {
         let each = wires.iter().enumerate().map(|(wire, geometry)| {
-            let points = points(geometry);
+            let points = geometry.require(Kind::Points)?;
             Ok([needed(points, wire, PIN_STRENGTH)?.to_vec(), needed(points, wire, PIN_RELEASE)?.to_vec()])
         });
         each.collect()
     };
-    let said = of(now)?;
-    for hold in held {
+    let settings = of(now)?;
+    for binding in bindings {
         let place = |wires: &[Arc<Geometry>]| -> Result<[f64; 3]> {
-            let at =
-                wires.get(hold.wire).and_then(|wire| points(wire).positions().get(hold.point)).ok_or_else(|| {
-                    Error::refused(format!("`pins` {} no longer has the point {}", hold.wire, hold.point))
-                        .hint("pins need as many points, in the same order, at every frame")
-                })?;
-            Ok(std::array::from_fn(|k| f64::from(at[k]) + hold.offset[k]))
+            let points = wires.get(binding.wire).and_then(|wire| wire.points());
+            let at = points.and_then(|points| points.positions().get(binding.point)).ok_or_else(|| {
+                Error::refused(format!("`pins` {} no longer has the point {}", binding.wire, binding.point))
+                    .hint("pins need as many points, in the same order, at every frame")
+            })?;
+            Ok(std::array::from_fn(|k| f64::from(at[k]) + binding.offset[k]))
         };
         let between = [place(before)?, place(now)?];
-        let [strengths, releases] = &said[hold.wire];
-        if frame.number() >= f64::from(releases[hold.point]) {
+        let [strengths, releases] = &settings[binding.wire];
+        if frame.number() >= f64::from(releases[binding.point]) {
             continue;
         }
-        let strength = f64::from(strengths[hold.point]);
+        let strength = f64::from(strengths[binding.point]);
         if strength > 0.0 {
             let damping = super::goals::damping(strength);
-            goals.push(GoalSpring { particle: hold.particle, between, strength, damping });
+            goals.push(GoalSpring { particle: binding.particle, between, strength, damping });
         } else {
-            pins.push(Pin { particle: hold.particle, between });
+            pins.push(Pin { particle: binding.particle, between });
         }
     }
     Ok(())
-}
-
-fn points(geometry: &Geometry) -> &Component {
-    geometry.points().expect("the engine refuses a wire without points")
 }
 
 fn needed(points: &Component, wire: usize, attribute: Attr<f32>) -> Result<&[f32]> {

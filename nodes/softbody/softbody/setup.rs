@@ -1,4 +1,5 @@
-//! What is computed from the inputs at the start, once: particles, surfaces, joints, pins, and the components that come out.
+//! What is computed once from the inputs at the start: particles, surfaces, coupling springs, pins and the output
+//! components.
 
 use bodies::collision::BodySkin;
 use bodies::embedding::{EmbeddedPoint, embed};
@@ -8,13 +9,13 @@ use engine::prelude::*;
 use numerics::masked::Masked;
 
 use super::joints::{Couple, couple};
-use super::pins::{Hold, holds};
+use super::pins::{PinBinding, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What came in at the start. A chain sees it once, so it is part of what checkpoints keep.
+/// The inputs at the start. A chain reads them once, so checkpoints contain them.
 #[derive(Serialize, Deserialize)]
 pub(super) struct StartInputs {
     pub(super) bodies: Vec<Arc<Geometry>>,
@@ -27,7 +28,7 @@ impl StartInputs {
     }
 }
 
-/// All bodies as one: their particles in the order of the wires.
+/// All bodies together, their particles in the order of the wires.
 pub(super) struct SimulationSetup {
     /// Particles at the start, metres.
     pub(super) rest: Vec<[f64; 3]>,
@@ -41,15 +42,15 @@ pub(super) struct SimulationSetup {
     pub(super) outer: Vec<bool>,
     /// The surface of each connected body, for contacts.
     pub(super) skins: Vec<BodySkin>,
-    pub(super) holds: Vec<Hold>,
-    /// What comes out, but for places.
+    pub(super) pins: Vec<PinBinding>,
+    /// The output components, but for their positions.
     pub(super) surface: Component,
     pub(super) body: Component,
-    /// What each point of the surface hangs on.
+    /// The embedding of each point of the surface in the tets.
     pub(super) carriers: Vec<EmbeddedPoint>,
 }
 
-/// One wire's surface: triangles of its particles, and the mesh that comes out of it with what carries its points.
+/// One wire's surface: triangles of its particles, and its output mesh with the embedding of its points.
 struct Surface {
     triangles: Vec<[u32; 3]>,
     missing: Vec<[u32; 2]>,
@@ -96,7 +97,7 @@ impl MaterialFields {
         Ok(Self { density: of(DENSITY)?, stiffness: of(STIFFNESS)?, damping: of(DAMPING)? })
     }
 
-    /// The numbers without their masks, which stand still.
+    /// The numbers without their masks, which do not change.
     pub(super) fn values(&self) -> [f32; 3] {
         [self.density.value, self.stiffness.value, self.damping.value]
     }
@@ -148,7 +149,7 @@ impl SimulationSetup {
         let mut setup = Self {
             outer,
             skins: Vec::new(),
-            holds: holds(&inputs.pins, &rest)?,
+            pins: bind_pins(&inputs.pins, &rest)?,
             surface: surface.map_or_else(|| Component::mesh(Vec::new(), Vec::new(), Vec::new()), Ok)?,
             body: body.map_or_else(|| Component::tets(Vec::new(), Vec::new()), Ok)?,
             carriers,
@@ -164,13 +165,13 @@ impl SimulationSetup {
         Ok(setup)
     }
 
-    /// The body that is solved for.
+    /// The body that the solver works on.
     pub(super) fn body(&self, material: &MaterialFields) -> Result<SoftBody> {
         let mesh = Mesh { points: &self.rest, tets: &self.tets, slivers: &self.slivers, missing: &self.missing };
         SoftBody::new(&mesh, &material.material(), &self.joints).map_err(refusal)
     }
 
-    /// Edges of the skins that colliders let go with particles at `x`.
+    /// Number of edges of the skins that colliders release with particles at `x`.
     pub(super) fn let_go(&self, x: &[[f64; 3]]) -> usize {
         self.skins.iter().map(|skin| skin.released_edges(x)).sum()
     }
@@ -181,10 +182,10 @@ impl SimulationSetup {
     }
 }
 
-/// What the solver does not take.
+/// Why the solver refuses a body.
 pub(super) fn refusal(error: BodyError) -> Error {
     let hint = match error {
-        BodyError::Point(_) => "points of `bodies` need finite places",
+        BodyError::Point(_) => "points of `bodies` need finite positions",
         BodyError::NoMass => "give `density` a value above 0 where the bodies have tets with a volume",
         BodyError::Particles { .. } => "a tet needs four different points",
         BodyError::Number { .. } => "`density`, `stiffness`, `damping` and their masks need finite numbers",
@@ -207,7 +208,7 @@ impl Surface {
         }
     }
 
-    /// The mesh whose points are the tets' own.
+    /// A surface mesh whose points are points of the tets.
     fn own(tets: &Component, mesh: &Component, rows: &[u32]) -> Self {
         let particles = |corners: &[u32; 3]| corners.map(|corner| rows[corner as usize]);
         let faces = mesh.faces().expect("a mesh has faces");
@@ -221,7 +222,7 @@ impl Surface {
         }
     }
 
-    /// The tets' own outside; a mesh beside them is carried.
+    /// The boundary of the tets; a mesh that comes with them is embedded.
     fn around(wire: usize, tets: &Component, mesh: Option<&Component>) -> Result<Self> {
         let (points, corners) = (tets.positions(), tets.tet_corners());
         let triangles: Vec<[u32; 3]> = boundary(corners, points).iter().map(|face| face.corners).collect();
@@ -251,7 +252,7 @@ impl Surface {
     }
 }
 
-/// The tets' point of each of the mesh's points, where they say so and each has one.
+/// The tets' point for each point of the mesh, if `surface_point` gives one for all.
 fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
     let mut rows = vec![u32::MAX; mesh.point_count()];
     for (point, row) in tets.get(SURFACE_POINT)?.iter().enumerate().filter(|(_, row)| **row >= 0) {
@@ -260,7 +261,7 @@ fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
     (!rows.is_empty() && !rows.contains(&u32::MAX)).then_some(rows)
 }
 
-/// The lowest particle that each one hangs together with.
+/// For each particle, the lowest particle of its connected body.
 fn parts(count: usize, tets: &[[u32; 4]]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..count as u32).collect();
     fn root(parent: &mut [u32], mut at: u32) -> u32 {

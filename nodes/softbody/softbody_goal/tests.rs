@@ -100,7 +100,7 @@ fn a_shape_of_another_surface_is_refused_with_both() {
     let own = format!("{} faces and {} points", ball().element_count(), ball().point_count());
     let (faces, points) = (other.element_count(), other.point_count());
     let fact = format!(
-        "`shape` has {faces} faces and {points} points, the surface of `body` {own}, or they are joined otherwise"
+        "`shape` has {faces} faces and {points} points, the surface of `body` {own}, or their topology differs"
     );
     assert_eq!(refused(body(), other.clone()), fact);
     let mut alone = body();
@@ -116,7 +116,7 @@ fn a_shape_of_another_surface_is_refused_with_both() {
         .unwrap();
     assert_eq!(
         refused(body(), flipped),
-        format!("`shape` has {own}, the surface of `body` {own}, or they are joined otherwise")
+        format!("`shape` has {own}, the surface of `body` {own}, or their topology differs")
     );
 }
 

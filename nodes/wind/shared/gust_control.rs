@@ -1,10 +1,10 @@
-//! How a Gust_Control travels along a wire: as points that draw it, and attributes that say what it does.
+//! How a Gust_Control is passed along a wire: as its outline's points, with attributes for everything else.
 //!
 //! A control is a run of points. Its first four are its centre and the ends of its own x, y and z axis, so whatever
-//! moves the points moves the control: a Transform turns, stretches and shears it, a Merge puts several on one wire. On
-//! each point of a run stand `gust_points` (points of the run), `gust_shape` (0 sphere, 1 cubes), `gust_outer` (outer ÷
-//! inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one a point from the run's first on: x, y, and what
-//! joins them (0 linear, 1 smooth, 2 constant). Once the keys are through, points repeat the last.
+//! moves the points moves the control: a Transform rotates, stretches and shears it, a Merge puts several on one wire.
+//! Each point of a run has `gust_points` (number of points in the run), `gust_shape` (0 sphere, 1 cubes), `gust_outer`
+//! (outer ÷ inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one per point from the run's first: x, y,
+//! and the interpolation (0 linear, 1 smooth, 2 constant). Points beyond the last key repeat it.
 
 use curves::gusts::{AXIS_ROWS, Control, ControlShape};
 use engine::prelude::*;
@@ -19,7 +19,7 @@ pub(crate) const RAMP: Attr<[f32; 3]> = Attr::point("gust_ramp");
 const SHAPES: [ControlShape; 2] = [ControlShape::Sphere, ControlShape::Cubes];
 const INTERPOLATIONS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant];
 
-/// The points of one control: its outline, at least as many as the ramp has keys, and what it does.
+/// The points of one control: its outline, with at least one point per key of the ramp, and its attributes.
 ///
 /// # Errors
 /// Where there are more points than an i32 counts.
@@ -48,11 +48,11 @@ pub(crate) fn component(
     Ok(points)
 }
 
-/// The controls among the points of the wire at `place`, in order.
+/// The controls among the points of wire `wire`, in order.
 ///
 /// # Errors
 /// Where any of the points belongs to no control.
-pub(crate) fn controls(points: &Component, place: usize) -> Result<Vec<Control>> {
+pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> {
     let foreign =
         |fact: String| Error::refused(fact).hint("wire the output of a Gust_Control, moved or merged as you like");
     let columns = (points.get(POINTS), points.get(SHAPE), points.get(OUTER), points.get(STRENGTH), points.get(RAMP));
@@ -61,8 +61,8 @@ pub(crate) fn controls(points: &Component, place: usize) -> Result<Vec<Control>>
             .into_iter()
             .find(|name| points.table(Owner::Point).column(name).is_none());
         let fact = match lacks {
-            Some(name) => format!("wire {place} of `controls` is no Gust_Control: its points have no `{name}`"),
-            None => format!("wire {place} of `controls` is no Gust_Control: its `gust_…` attributes have other types"),
+            Some(name) => format!("wire {wire} of `controls` is no Gust_Control: its points have no `{name}`"),
+            None => format!("wire {wire} of `controls` is no Gust_Control: its `gust_…` attributes have other types"),
         };
         return Err(foreign(fact));
     };
@@ -76,18 +76,18 @@ pub(crate) fn controls(points: &Component, place: usize) -> Result<Vec<Control>>
             || runs[first..first + count].iter().any(|run| *run != runs[first])
         {
             return Err(foreign(format!(
-                "point {first} of wire {place} of `controls` belongs to no whole Gust_Control"
+                "point {first} of wire {wire} of `controls` belongs to no whole Gust_Control"
             )));
         }
         let shape = usize::try_from(shapes[first]).ok().and_then(|shape| SHAPES.get(shape).copied());
         let shape = shape.ok_or_else(|| {
             foreign(format!(
-                "`gust_shape` of point {first} of wire {place} of `controls` is {}, expected 0 or 1",
+                "`gust_shape` of point {first} of wire {wire} of `controls` is {}, expected 0 or 1",
                 shapes[first]
             ))
         })?;
         let ramp = ramp(&keys[first..first + count]).map_err(|error| {
-            foreign(format!("`gust_ramp` from point {first} of wire {place} of `controls` is no ramp: {error}"))
+            foreign(format!("`gust_ramp` from point {first} of wire {wire} of `controls` is no ramp: {error}"))
         })?;
         let centre = at[first].map(f64::from);
         let axes = [1, 2, 3].map(|axis| {
@@ -100,7 +100,7 @@ pub(crate) fn controls(points: &Component, place: usize) -> Result<Vec<Control>>
     Ok(controls)
 }
 
-/// The ramp whose keys stand on a run of points.
+/// The ramp whose keys are on a run of points.
 fn ramp(rows: &[[f32; 3]]) -> std::result::Result<Ramp, numerics::ramp::RampError> {
     let padding = rows.windows(2).position(|pair| pair[0] == pair[1]).map_or(rows.len(), |row| row + 1);
     let joined = INTERPOLATIONS.get(rows[0][2] as usize).copied().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What several nodes of the family need, and none of them is.
+//! Helpers shared by the family's nodes.
 
 pub(crate) mod direction;
 pub(crate) mod gust_control;

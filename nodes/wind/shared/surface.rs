@@ -1,4 +1,4 @@
-//! A mesh as something to meet: its triangles in a tree, its normals. Computed once for a still mesh.
+//! A mesh as a collider: a tree of its triangles, and its normals; computed once while it does not move.
 
 use std::sync::Arc;
 

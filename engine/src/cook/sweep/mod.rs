@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::call::{Call, Returned};
 use super::history::Integrals;
 use super::store::Cooked;
+use super::warnings;
 use super::{CookError, Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, deliver};
 use crate::clock::Stopwatch;
 use crate::geometry::Geometry;
@@ -198,6 +199,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         }
         self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()).cloned());
         self.note_unseen();
+        for (node, report) in self.plan.graph.nodes.iter().zip(&self.report.nodes) {
+            let declared = node.node().map_or(&[][..], |declared| declared.metrics);
+            let notes = warnings::notes(&node.id, report.type_name, declared, &report.metrics);
+            self.report.notes.extend(notes);
+        }
         self.report.wall = watch.wall();
         self.report.cpu = watch.cpu();
         Ok(self.report)
@@ -439,8 +445,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             Body::Node { node, .. } => *node,
         };
         match declared.cook {
-            Cook::Pure(cook) => self.cook_frames(node, declared, &need, |cx| cook(cx)),
-            Cook::Frame { cook, .. } => self.cook_frames(node, declared, &need, cook),
+            Cook::Pure(_) | Cook::Frame { .. } => {
+                self.cook_frames(node, declared, &need, |cx| declared.cook_frame(cx));
+            }
             Cook::Window(chain, _) => self.move_chain(node, declared, chain, None, advance),
             Cook::Solver(chain, solver) => self.move_chain(node, declared, chain, Some(solver), advance),
         }

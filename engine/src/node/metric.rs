@@ -1,0 +1,100 @@
+//! Metrics: numbers that a node publishes once a frame, with the value beyond which an artist is told.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::Cx;
+use crate::param::Unit;
+
+/// A number that a node publishes once a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Metric {
+    /// Name in reports.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: Unit,
+    /// What it measures.
+    pub help: &'static str,
+    /// Its value at frames where the node is neutral.
+    pub neutral: f64,
+    /// When an artist is told about it.
+    pub warning: Option<Warning>,
+}
+
+/// A value that should not be exceeded, and what to tell an artist when it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Warning {
+    /// The greatest value that is not worth a note.
+    pub above: f64,
+    /// What it means and what to do about it; whole sentences.
+    pub text: &'static str,
+}
+
+impl Metric {
+    /// A metric, 0 where the node is neutral.
+    pub const fn new(name: &'static str, unit: Unit, help: &'static str) -> Self {
+        Self { name, unit, help, neutral: 0.0, warning: None }
+    }
+
+    /// The largest change of a segment's length, as a share of its curve's length: what every node that must not
+    /// stretch curves publishes.
+    pub const fn length_error() -> Self {
+        Self::new(
+            "length_error",
+            Unit::None,
+            "The largest change of a segment's length, as a share of the curve's length.",
+        )
+    }
+
+    /// Its value where the node is neutral.
+    #[must_use]
+    pub const fn neutral(mut self, value: f64) -> Self {
+        self.neutral = value;
+        self
+    }
+
+    /// The cook's notes say `text` when the metric exceeds `above` at any frame.
+    #[must_use]
+    pub const fn warn_above(mut self, above: f64, text: &'static str) -> Self {
+        self.warning = Some(Warning { above, text });
+        self
+    }
+}
+
+/// Values of metrics by name, as a solver keeps them in its state: what a step measured is published with the output,
+/// also where a checkpoint was read back.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MetricValues(BTreeMap<String, f64>);
+
+impl MetricValues {
+    /// Sets a metric's value.
+    pub fn set(&mut self, metric: Metric, value: impl Into<f64>) {
+        self.0.insert(metric.name.to_owned(), value.into());
+    }
+}
+
+impl Cx<'_> {
+    /// Publishes all of them.
+    ///
+    /// # Panics
+    /// As [`Cx::publish`], where the node does not declare one of them.
+    pub fn publish_all(&self, values: &MetricValues) {
+        for (name, value) in &values.0 {
+            let declared = self.node.metrics.iter().find(|metric| metric.name == name);
+            let declared = declared.unwrap_or_else(|| panic!("it publishes `{name}`, which it does not declare"));
+            self.publish(**declared, *value);
+        }
+    }
+}
+
+/// Declares a node's metrics: each becomes a constant, and the list contains them all.
+///
+/// `metrics! { METRICS: FOLDED = Metric::new("folded", Unit::None, "…"); … }`
+#[macro_export]
+macro_rules! metrics {
+    ($list:ident: $($(#[$meta:meta])* $name:ident = $value:expr;)*) => {
+        $($(#[$meta])* const $name: $crate::node::Metric = $value;)*
+        const $list: &[&$crate::node::Metric] = &[$(&$name),*];
+    };
+}

@@ -1,0 +1,162 @@
+//! The text of a new node: a start that passes conformance, uses all cores and shows where things go.
+
+/// What a new node has besides its curves.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Options {
+    /// Whether its result depends on the frame's time.
+    pub(crate) reads_clock: bool,
+    /// Name of the param that a point attribute may mask.
+    pub(crate) mask: Option<String>,
+    /// Name of a ramp along the curve.
+    pub(crate) ramp: Option<String>,
+    /// Whether it has random numbers.
+    pub(crate) seed: bool,
+}
+
+/// The node's file.
+pub(crate) fn render(name: &str, options: &Options) -> String {
+    let keep = |line: &&str| match line.split_once("//?") {
+        None => true,
+        Some((_, tag)) => match tag.trim() {
+            "frame" => options.reads_clock,
+            "pure" => !options.reads_clock,
+            "mask" => options.mask.is_some(),
+            "no mask" => options.mask.is_none(),
+            "ramp" => options.ramp.is_some(),
+            "seed" => options.seed,
+            "no seed" => !options.seed,
+            tag => unreachable!("the template has an unknown tag `{tag}`"),
+        },
+    };
+    let amount = options.mask.as_deref().unwrap_or("amount");
+    let ramp = options.ramp.as_deref().unwrap_or_default();
+    let factors = [
+        Some(if options.mask.is_some() { "amount.at(cv.row)" } else { "amount" }),
+        options.ramp.as_ref().map(|_| "ramp.eval(cv.u)"),
+        options.seed.then_some("own"),
+        options.reads_clock.then_some("swing"),
+    ];
+    let factors: Vec<&str> = factors.into_iter().flatten().collect();
+    let lines = TEMPLATE.lines().filter(keep).map(|line| line.split("//?").next().unwrap_or(line).trim_end());
+    let text: String = lines.map(|line| format!("{line}\n")).collect();
+    text.replace("NODE_NAME", name)
+        .replace("AMOUNT_VALUE", if options.mask.is_some() { "params.get(AMOUNT).value" } else { "params.get(AMOUNT)" })
+        .replace("AMOUNT_SET", if options.mask.is_some() { "Maskable { value: 0.5, attribute: None }" } else { "0.5" })
+        .replace("AMOUNT_PARAM", amount)
+        .replace("RAMP_PARAM", ramp)
+        .replace("FACTORS", &factors.join(" * "))
+}
+
+/// Lines that end in `//? tag` are there with that option alone.
+const TEMPLATE: &str = r#"//! NODE_NAME: moves CVs across their curve.
+//!
+//! Say here which paper and section it implements, and where and why it departs from it.
+
+use engine::prelude::*;
+use numerics::ramp::Ramp; //? ramp
+use numerics::trig::sin; //? frame
+use std::f32::consts::TAU; //? frame
+use std::sync::Arc; //? ramp
+
+inputs! { INPUTS:
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first.");
+}
+
+params! { PARAMS:
+    AMOUNT: Param<Maskable> = Param::maskable("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? mask
+    AMOUNT: Param<f32> = Param::float("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? no mask
+        .unit(Unit::Metres).soft(0.0, 1.0);
+    RAMP: Param<Arc<Ramp>> = Param::ramp("RAMP_PARAM", &[[0.0, 0.0], [1.0, 1.0]], //? ramp
+        "Scales the movement along the curve, from root (0) to tip (1)."); //? ramp
+    SEED: Param<Seed> = Param::seed("Selects another share of the movement for each curve."); //? seed
+}
+
+const OUT: Output = Output::like("curves", &CURVES, "The moved curves. Their segments keep their lengths.");
+
+metrics! { METRICS:
+    LENGTH_ERROR = Metric::length_error();
+}
+
+pub(crate) static NODE: Node = Node::new(
+    "NODE_NAME",
+    1,
+    "Moves the CVs of curves across their direction. Lengths are kept.",
+    Cook::Pure(cook), //? pure
+    Cook::Frame { cook, reads_clock: |params| AMOUNT_VALUE != 0.0 }, //? frame
+)
+.inputs(INPUTS)
+.params(PARAMS)
+.outputs(&[&OUT])
+.reads(&[&P]) //? no seed
+.reads(&[&P, &CURVE_ID]) //? seed
+.writes(&[&P])
+.metrics(METRICS)
+.neutral(|params, _| (AMOUNT_VALUE == 0.0).then_some("`AMOUNT_PARAM` is 0"));
+
+fn cook(cx: &Cx) -> Result<Outputs> { //? pure
+fn cook(cx: &FrameCx) -> Result<Outputs> { //? frame
+    let mut curves = cx.edit(CURVES);
+    let amount = cx.mask(AMOUNT, &curves)?; //? mask
+    let amount = cx.get(AMOUNT); //? no mask
+    let ramp = cx.get(RAMP); //? ramp
+    // Seconds are reduced in f64: late frames keep their precision. //? frame
+    let swing = sin(TAU * cx.seconds().fract() as f32 + 1.0); //? frame
+    let moved = CurveLoop::over(&curves).keeping_lengths().map(|curve, out| { //? no seed
+    let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).keeping_lengths().map(|curve, out| { //? seed
+        let own = curve.random(0); //? seed
+        for cv in curve.cvs() {
+            let offset = FACTORS;
+            out[cv.index] = std::array::from_fn(|k| cv.point[k] + offset * cv.normal[k]);
+        }
+    });
+    cx.publish(LENGTH_ERROR, moved.length_error);
+    curves.set(P, moved.points)?;
+    Ok(OUT.with(curves))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use conformance::{bench, conforms};
+
+    #[test]
+    fn conforms_to_its_declaration() {
+        conforms(&NODE);
+    }
+
+    #[test]
+    fn curves_move_and_keep_their_lengths() {
+        let points: Vec<[f32; 3]> = (0..9).map(|k| [0.0, 0.125 * k as f32, 0.0]).collect();
+        let curve = Component::curves(vec![9], points.clone()).unwrap();
+        let out = bench(&NODE).input(CURVES, curve).set(AMOUNT, AMOUNT_SET).cook();
+        assert!(out.curves().positions() != points && out.metrics["length_error"] < 1e-5);
+    }
+}
+"#;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// The same texts are compiled, and conform, in the repository's own tests.
+    #[test]
+    fn rendered_nodes_are_those_that_the_tests_compile() {
+        let full = Options { reads_clock: true, mask: Some("bend".into()), ramp: Some("falloff".into()), seed: true };
+        for (name, options, file) in
+            [("Curve_Plain", Options::default(), "curve_plain.rs"), ("Curve_Full", full, "curve_full.rs")]
+        {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/new_nodes").join(file);
+            let text = render(name, &options);
+            if std::env::var_os("BLESS").is_some() {
+                std::fs::write(&path, &text).unwrap();
+            }
+            assert_eq!(
+                std::fs::read_to_string(&path).unwrap(),
+                text,
+                "{}: `cargo xtask bless` writes it",
+                path.display()
+            );
+        }
+    }
+}
