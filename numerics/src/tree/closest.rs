@@ -27,15 +27,6 @@ const ROUNDING: f32 = 1e-6;
 const TASK: usize = 64;
 
 kernel! {
-    fn closest_point(tree: &TriangleTree, p: Vec3, reach: f32) -> Option<Closest> = point;
-}
-
-#[inline(always)]
-fn point(tree: &TriangleTree, p: Vec3, reach: f32) -> Option<Closest> {
-    tree.closest(p, reach)
-}
-
-kernel! {
     fn closest_chunk(tree: &TriangleTree, from: &[Vec3], reach: f32, out: &mut [Option<Closest>]) = chunk;
 }
 
@@ -58,11 +49,6 @@ impl TriangleTree {
         let chunks = out.par_chunks_mut(TASK).zip(from.par_chunks(TASK));
         chunks.for_each(|(out, from)| closest_chunk(path, self, from, reach, out));
         out
-    }
-
-    /// [`TriangleTree::closest`] on a given SIMD path.
-    pub fn closest_on(&self, path: Path, p: Vec3, reach: f32) -> Option<Closest> {
-        closest_point(path, self, p, reach)
     }
 
     /// The nearest point of the surface within `reach` metres of `p`, accurate to a few ulp of the distance and of the

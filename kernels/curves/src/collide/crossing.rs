@@ -2,7 +2,6 @@
 
 use super::triangle_filter::may_cross;
 use numerics::lanes::get;
-use numerics::simd::kernel;
 use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f64};
 
@@ -46,18 +45,9 @@ pub(super) fn crossing(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> Option<C
     })
 }
 
-kernel! {
-    /// The first crossing along the segment from `a` to `b` with triangles of `blocks`.
-    pub(super) fn first_crossing(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Option<Crossing> = first_of_blocks;
-}
-
-kernel! {
-    /// As [`first_crossing`] with all triangles of trees.
-    pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -> Option<Crossing> = first_of_trees;
-}
-
+/// The first crossing along the segment from `a` to `b` with triangles of `blocks`.
 #[inline(always)]
-fn first_of_blocks(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Option<Crossing> {
+pub(super) fn first_crossing(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Option<Crossing> {
     let mut first: Option<Crossing> = None;
     for (block, lanes) in blocks {
         add_crossings(block, *lanes, a, b, &mut first);
@@ -65,8 +55,9 @@ fn first_of_blocks(blocks: &[(&Block, u16)], a: Vec3, b: Vec3) -> Option<Crossin
     first
 }
 
+/// As [`first_crossing`] with all triangles of trees.
 #[inline(always)]
-fn first_of_trees(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -> Option<Crossing> {
+pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -> Option<Crossing> {
     let mut first = None;
     let low = [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])];
     let high = [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];

@@ -4,7 +4,6 @@ use super::crossing::{first_crossing, first_crossing_in};
 use super::segment_turn::{Nearby, Segment};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
-use numerics::simd::Path;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
 /// Length of the first segment, in gaps, that is not tested where the root may lie on the skin.
@@ -12,7 +11,6 @@ const SKIPPED_GAPS: f64 = 5.0;
 
 /// An incoming curve, and where it is written.
 pub(super) struct Hair<'a> {
-    pub(super) path: Path,
     /// Index of its root among all CVs.
     pub(super) first: usize,
     /// Its displacement for `offset_root`.
@@ -41,6 +39,7 @@ struct Carried {
 
 impl Hair<'_> {
     /// Writes the curve after its collisions.
+    #[inline(always)]
     pub(super) fn collide<'t>(&mut self, how: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
         let mut reached = Reached::default();
         self.out.copy_from_slice(self.goal);
@@ -81,6 +80,7 @@ impl Hair<'_> {
     }
 
     /// The segment from CV k, about to turn towards the unit vector `wanted`.
+    #[inline(always)]
     fn segment(
         &self,
         how: &Collide<'_>,
@@ -94,7 +94,7 @@ impl Hair<'_> {
         carried.axis = perpendicular(&from, &carried.axis);
         let axis = carried.axis;
         let pivot = to_f64(self.out[k]);
-        let (from, to) = match how.ground(self.path, &pivot, length) {
+        let (from, to) = match how.ground(&pivot, length) {
             None => (from, *wanted),
             Some(ground) => {
                 let led_out =
@@ -117,6 +117,7 @@ impl Hair<'_> {
     }
 
     /// Turns the segment from CV k and writes its end; returns its direction.
+    #[inline(always)]
     fn turn<'t>(
         &mut self,
         how: &Collide<'t>,
@@ -126,15 +127,15 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let mut turned = segment.turn(self.path, how.method, how.obstacles, nearby);
+        let mut turned = segment.turn(how.method, how.obstacles, nearby);
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
         }
-        if !turned.clear && first_crossing(self.path, nearby, segment.start(&turned.direction), end).is_some() {
-            turned = segment.turn_wary(self.path, how.method, how.obstacles, nearby);
+        if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
+            turned = segment.turn_wary(how.method, how.obstacles, nearby);
             end = segment.end(&turned.direction);
-            if let Some(crossing) = first_crossing(self.path, nearby, segment.start(&turned.direction), end) {
+            if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
                 reached.unfreed_segments += 1;
                 reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
             }
@@ -145,10 +146,11 @@ impl Hair<'_> {
     }
 
     /// Segments that cross something as they are written.
+    #[inline(always)]
     fn crossings(&self, how: &Collide<'_>) -> u64 {
         let mut count = 0;
         for k in 1..self.out.len() {
-            count += u64::from(first_crossing_in(self.path, how.obstacles, self.out[k - 1], self.out[k]).is_some());
+            count += u64::from(first_crossing_in(how.obstacles, self.out[k - 1], self.out[k]).is_some());
         }
         count
     }
@@ -170,6 +172,7 @@ impl Hair<'_> {
     }
 
     /// The CVs' goals: as they come in, or kept off the skin by `offset_scale` of their rest distance.
+    #[inline(always)]
     fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
         let (Some(scale), Some(skin)) = (how.offset_scale, &how.skin) else {
@@ -180,7 +183,7 @@ impl Hair<'_> {
         goals.push(before + shift);
         for k in 1..self.goal.len() {
             let (from, to) = (to_f64(self.goal[k - 1]), to_f64(self.goal[k]));
-            let raised = skin.raised(self.path, self.rest[k], &to, scale);
+            let raised = skin.raised(self.rest[k], &to, scale);
             // Lengths are restored root to tip: only the direction to the raised CV counts.
             let along = raised - before;
             let length = (to - from).norm();

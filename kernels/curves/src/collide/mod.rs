@@ -22,7 +22,7 @@ mod triangle_filter;
 use coherence::Ground;
 use hair::{Hair, Scratch};
 use numerics::masked::Masked;
-use numerics::simd::Path;
+use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -67,8 +67,9 @@ pub struct Collide<'a> {
 
 impl Collide<'_> {
     /// The skin that a segment is to be redirected out of, if any.
-    fn ground(&self, path: Path, pivot: &DVec3, length: f64) -> Option<Ground> {
-        self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(path, pivot, length)
+    #[inline(always)]
+    fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
+        self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
     }
 }
 
@@ -161,8 +162,19 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
     Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
 }
 
-fn collide_task(
-    path: Path,
+kernel! {
+    fn collide_task(
+        curves: Range<usize>,
+        starts: &[u32],
+        positions: [&[Vec3]; 2],
+        how: &Collide<'_>,
+        at_rest: &AtRest,
+        out: &mut [Vec3],
+    ) -> Reached = task;
+}
+
+#[inline(always)]
+fn task(
     curves: Range<usize>,
     starts: &[u32],
     [rest, goal]: [&[Vec3]; 2],
@@ -176,7 +188,6 @@ fn collide_task(
     for curve in curves {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let mut hair = Hair {
-            path,
             first: cvs.start,
             shift: at_rest.shift(curve),
             rest: &rest[cvs.clone()],

@@ -3,7 +3,7 @@
 use super::Collide;
 use super::crossing::first_crossing;
 use super::segment_turn::{Nearby, gather};
-use numerics::simd::Path;
+use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use rayon::prelude::*;
 
@@ -46,7 +46,12 @@ pub(super) fn at_rest_on(path: Path, starts: &[u32], rest: &[Vec3], how: &Collid
     AtRest { curves }
 }
 
-fn grow(path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) {
+kernel! {
+    fn grow(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) = grow_task;
+}
+
+#[inline(always)]
+fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) {
     let mut nearby = Nearby::default();
     for (ends, grown) in starts.windows(2).zip(grown) {
         let cvs = &rest[ends[0] as usize..ends[1] as usize];
@@ -54,14 +59,15 @@ fn grow(path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mu
             continue;
         }
         if let Some(skin) = &how.skin {
-            grown.shift = skin.lift(path, cvs[0], how.offset_root);
+            grown.shift = skin.lift(cvs[0], how.offset_root);
         }
-        grown.inside = crosses_any(path, cvs, &grown.shift, how, &mut nearby);
+        grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
     }
 }
 
 /// Whether a displaced curve crosses something.
-fn crosses_any<'t>(path: Path, cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
+#[inline(always)]
+fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut Nearby<'t>) -> bool {
     let at = |k: usize| to_f32(to_f64(cvs[k]) + shift);
     for first in (0..cvs.len() - 1).step_by(GATHERED_SEGMENTS) {
         let last = (first + GATHERED_SEGMENTS).min(cvs.len() - 1);
@@ -72,9 +78,9 @@ fn crosses_any<'t>(path: Path, cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, n
             low = [low[0].min(cv[0]), low[1].min(cv[1]), low[2].min(cv[2])];
             high = [high[0].max(cv[0]), high[1].max(cv[1]), high[2].max(cv[2])];
         }
-        gather(path, how.obstacles, low, high, nearby);
+        gather(how.obstacles, low, high, nearby);
         for k in first..last {
-            if first_crossing(path, nearby, at(k), at(k + 1)).is_some() {
+            if first_crossing(nearby, at(k), at(k + 1)).is_some() {
                 return true;
             }
         }

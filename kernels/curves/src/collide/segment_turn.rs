@@ -4,7 +4,6 @@ use super::crossing::{Crossing, corners, first_crossing};
 use super::sector::{Blocked, Sector};
 use super::triangle_filter::Wedge;
 use super::{ContactMethod, perpendicular};
-use numerics::simd::{Path, kernel};
 use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
@@ -51,18 +50,18 @@ pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
 
 impl Segment {
     /// Turns by `method`. Afterwards `nearby` holds everything that the segment may cross in its new direction.
+    #[inline(always)]
     pub(super) fn turn<'t>(
         &self,
-        path: Path,
         method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
-        match self.sweep(path, method, obstacles, nearby) {
+        match self.sweep(method, obstacles, nearby) {
             Sweep::Free(turned) => turned,
-            Sweep::Stuck => match self.turn_out(path, method, obstacles, nearby) {
+            Sweep::Stuck => match self.turn_out(method, obstacles, nearby) {
                 None => Turned { direction: self.from, met: true, clear: false },
-                Some(direction) => match (Self { from: direction, ..*self }).sweep(path, method, obstacles, nearby) {
+                Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
                     Sweep::Free(turned) => Turned { met: true, ..turned },
                     Sweep::Stuck => Turned { direction, met: true, clear: false },
                 },
@@ -71,15 +70,15 @@ impl Segment {
     }
 
     /// As [`Segment::turn`], after that ended in a crossing: obstacles are thickened by the rounding error.
+    #[inline(always)]
     pub(super) fn turn_wary<'t>(
         &self,
-        path: Path,
         method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
         Self { half: self.half + 8.0 * self.rounding, gap: self.gap + 8.0 * self.rounding, ..*self }
-            .turn(path, method, obstacles, nearby)
+            .turn(method, obstacles, nearby)
     }
 
     fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
@@ -98,22 +97,17 @@ impl Segment {
         }
     }
 
-    fn sweep<'t>(
-        &self,
-        path: Path,
-        method: ContactMethod,
-        obstacles: &'t [&'t TriangleTree],
-        nearby: &mut Nearby<'t>,
-    ) -> Sweep {
+    #[inline(always)]
+    fn sweep<'t>(&self, method: ContactMethod, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
         let sector = self.sector(self.from, self.to);
         let (low, high) = sector.bounds(&self.to);
-        gather(path, obstacles, low, high, nearby);
+        gather(obstacles, low, high, nearby);
         if nearby.is_empty() {
             return Sweep::Free(Turned { direction: self.to, met: false, clear: true });
         }
         let stop = match method {
-            ContactMethod::Exact => first_stop(path, &sector, &self.to, nearby),
-            ContactMethod::Steps(steps) => self.last_free_step(path, &sector, steps, nearby),
+            ContactMethod::Exact => first_stop(&sector, &self.to, nearby),
+            ContactMethod::Steps(steps) => self.last_free_step(&sector, steps, nearby),
         };
         match stop {
             Stop::Stuck => Sweep::Stuck,
@@ -133,20 +127,21 @@ impl Segment {
         to_f32(self.pivot + direction * self.inner)
     }
 
-    fn crosses(&self, path: Path, direction: &DVec3, nearby: &Nearby<'_>) -> Option<Crossing> {
-        first_crossing(path, nearby, self.start(direction), self.end(direction))
+    fn crosses(&self, direction: &DVec3, nearby: &Nearby<'_>) -> Option<Crossing> {
+        first_crossing(nearby, self.start(direction), self.end(direction))
     }
 
     /// The paper's method: small steps until one crosses.
-    fn last_free_step(&self, path: Path, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
+    #[inline(always)]
+    fn last_free_step(&self, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
         let angle = sector.angle_of(&self.to);
         let at = |step: u32| angle * f64::from(step) / f64::from(steps);
-        if self.crosses(path, &sector.u, nearby).is_some() {
+        if self.crosses(&sector.u, nearby).is_some() {
             return Stop::Stuck;
         }
         for step in 1..=steps {
             let direction = if step == steps { self.to } else { sector.direction(at(step)) };
-            if self.crosses(path, &direction, nearby).is_some() {
+            if self.crosses(&direction, nearby).is_some() {
                 return Stop::At(at(step - 1));
             }
         }
@@ -155,24 +150,24 @@ impl Segment {
 
     /// The nearest free direction on the great circle away from what the segment crosses; `None` where there is none
     /// within half a turn.
+    #[inline(always)]
     fn turn_out<'t>(
         &self,
-        path: Path,
         method: ContactMethod,
         obstacles: &'t [&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Option<DVec3> {
-        let crossed = self.crosses(path, &self.from, nearby);
+        let crossed = self.crosses(&self.from, nearby);
         // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is taken.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
         let sector = self.sector(self.from, outwards);
         let (low, high) = sector.bounds(&-sector.u);
-        gather(path, obstacles, low, high, nearby);
+        gather(obstacles, low, high, nearby);
         let angle = match method {
-            ContactMethod::Exact => first_gap(path, &sector, nearby),
+            ContactMethod::Exact => first_gap(&sector, nearby),
             ContactMethod::Steps(steps) => {
                 let at = |step: u32| PI * f64::from(step) / f64::from(steps);
-                (1..=steps).map(at).find(|angle| self.crosses(path, &sector.direction(*angle), nearby).is_none())
+                (1..=steps).map(at).find(|angle| self.crosses(&sector.direction(*angle), nearby).is_none())
             }
         };
         angle.map(|angle| sector.direction(angle))
@@ -186,18 +181,9 @@ enum Sweep {
     Stuck,
 }
 
-kernel! {
-    /// Gathers all blocks of the trees that a box meets.
-    pub(super) fn gather<'t>(
-        obstacles: &[&'t TriangleTree],
-        low: Vec3,
-        high: Vec3,
-        nearby: &mut Nearby<'t>,
-    ) = gather_body;
-}
-
+/// Gathers all blocks of the trees that a box meets.
 #[inline(always)]
-fn gather_body<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
+pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
     nearby.clear();
     for tree in obstacles {
         tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
@@ -215,13 +201,9 @@ enum Stop {
     Stuck,
 }
 
-kernel! {
-    /// How far the sector may turn towards the unit vector `to` in its plane.
-    fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop = stop_body;
-}
-
+/// How far the sector may turn towards the unit vector `to` in its plane.
 #[inline(always)]
-fn stop_body(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
+fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
     let mut wedge = Wedge::new(sector, until);
     let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
@@ -258,13 +240,9 @@ fn stop_body(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     }
 }
 
-kernel! {
-    /// The first angle up to π at which nothing is within the arc kept from contacts.
-    fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> = gap_body;
-}
-
+/// The first angle up to π at which nothing is within the arc kept from contacts.
 #[inline(always)]
-fn gap_body(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
+fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
     let wedge = Wedge::new(sector, [-1.0, 0.0]);
     let mut taken: Vec<[f64; 2]> = Vec::new();
     for (block, lanes) in nearby {

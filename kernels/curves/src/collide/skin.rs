@@ -1,7 +1,6 @@
 //! The surface that curves grow on: its outward normal, and heights above it.
 
 use super::coherence::Ground;
-use numerics::simd::Path;
 use numerics::tree::{Closest, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
@@ -47,8 +46,9 @@ impl SkinSurface<'_> {
     }
 
     /// Height of a point above the surface, negative inside, and the normal there.
-    fn height(&self, path: Path, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
-        let closest = self.tree.closest_on(path, to_f32(*p), reach)?;
+    #[inline(always)]
+    fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
+        let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
         let away = p - to_f64(closest.point);
         // Near an edge the interpolated normal is not along the distance: it only decides the sign.
@@ -57,34 +57,37 @@ impl SkinSurface<'_> {
     }
 
     /// The skin below a segment at `pivot`, if within its reach.
-    pub(super) fn ground(&self, path: Path, pivot: &DVec3, length: f64) -> Option<Ground> {
-        let (height, normal) = self.height(path, pivot, length as f32)?;
+    #[inline(always)]
+    pub(super) fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
+        let (height, normal) = self.height(pivot, length as f32)?;
         Some(Ground { normal, height: height.max(0.0) })
     }
 
     /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged where it is that high.
-    pub(super) fn raised(&self, path: Path, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
+    #[inline(always)]
+    pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
         let rest = to_f64(rest);
-        let Some((height, _)) = self.height(path, &rest, f32::INFINITY) else { return *goal };
+        let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
         // It cannot have come nearer by more than its displacement.
         let moved = (goal - rest).norm();
         if height - moved >= scale * height {
             return *goal;
         }
-        match self.height(path, goal, 2.0 * ((moved + height.abs()) as f32)) {
+        match self.height(goal, 2.0 * ((moved + height.abs()) as f32)) {
             Some((now, normal)) if now < scale * height => goal + normal * (scale * height - now),
             _ => *goal,
         }
     }
 
     /// The displacement that lifts a root to `offset` above the skin: zero where it is that high.
-    pub(super) fn lift(&self, path: Path, root: Vec3, offset: f64) -> DVec3 {
+    #[inline(always)]
+    pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
         let mut shift = DVec3::zeros();
         if offset <= 0.0 {
             return shift;
         }
         for _ in 0..LIFTS {
-            let Some((height, normal)) = self.height(path, &(to_f64(root) + shift), f32::INFINITY) else { break };
+            let Some((height, normal)) = self.height(&(to_f64(root) + shift), f32::INFINITY) else { break };
             if height >= offset * 0.999 {
                 break;
             }
