@@ -109,7 +109,7 @@ mod tests {
     const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
 
     #[test]
-    fn a_point_hangs_on_the_tet_it_is_in() {
+    fn a_point_is_bound_to_the_tet_that_contains_it() {
         let found = embed(&POINTS, &TETS, &[[0.1, 0.2, 0.3], [0.75, 0.75, 0.75], [0.0, 1.0, 0.0]]).unwrap();
         assert_eq!(found[0].particles, TETS[0]);
         for (share, expected) in found[0].weights.iter().zip([0.4, 0.1, 0.2, 0.3]) {
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn affine_motion_carries_points_within_and_without_alike() {
+    fn embedded_points_follow_affine_motion_inside_and_outside_the_tets() {
         let carried = [[0.2, 0.3, 0.1], [0.6, 0.6, 0.7], [-0.5, 0.2, 0.1], [3.0, 3.0, 3.0]];
         let found = embed(&POINTS, &TETS, &carried).unwrap();
         let affine = |p: Vec3| {
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_tets_carry_nothing() {
+    fn nothing_can_be_embedded_in_flat_tets() {
         assert_eq!(embed(&[[0.0; 3]; 4], &[[0, 1, 2, 3]], &[[0.0; 3]]), None);
         assert_eq!(embed(&[], &[], &[]), None);
     }

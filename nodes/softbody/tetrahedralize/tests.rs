@@ -131,7 +131,7 @@ fn what_cannot_be_repaired_or_must_not_be_is_refused_with_its_place() {
     let fact = |bench: Bench| bench.try_cook().unwrap_err().to_string();
     assert_eq!(
         fact(filling(untidy()).set(REPAIR, Repair::None)),
-        "faces 0 and 6 have the same points; `repair` \"safe\" takes them out"
+        "faces 0 and 6 have the same points; `repair` \"safe\" removes them"
     );
     let sheet = mesh(&shapes::grid([1.0; 2], 1));
     assert_eq!(

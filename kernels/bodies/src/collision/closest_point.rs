@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn nearest_points_beat_a_thousand_others() {
+    fn closest_points_are_closer_than_random_ones() {
         for case in 0..300 {
             let corners = [0, 1, 2].map(|k| random(1, 4 * case + k));
             let p = random(1, 4 * case + 3) * 3.0 - DVec3::repeat(1.0);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_of_no_area_or_length_is_divided_by() {
+    fn degenerate_triangles_and_segments_give_finite_results() {
         let p = DVec3::new(1.0, 2.0, 3.0);
         for corners in [
             [DVec3::zeros(); 3],

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_product_of_three_changes_its_sign_at_each() {
+    fn a_product_of_three_linear_factors_changes_sign_at_each_root() {
         let found = product([0.2, 0.5, 0.9]);
         assert_eq!(found.len(), 3);
         for ((t, above), (want, side)) in found.into_iter().zip([(0.2, false), (0.5, true), (0.9, false)]) {

@@ -53,7 +53,7 @@ pub enum CollisionError {
     #[error("an obstacle has no pose; expected one at least")]
     NoPose,
     /// A pose with another number of points than the first.
-    #[error("pose {index} has {count} points; expected {expected}, as the first")]
+    #[error("pose {index} has {count} points; expected {expected}, like the first")]
     Points {
         /// Index of the pose.
         index: usize,
@@ -74,7 +74,7 @@ pub enum CollisionError {
     #[error("point {0} is not finite")]
     Point(usize),
     /// A triangle has an index out of range.
-    #[error("triangle {index} has corners {corners:?}; expected points of {count}")]
+    #[error("triangle {index} has corners {corners:?}; expected indices below {count}")]
     Triangle {
         /// Index of the triangle.
         index: usize,
@@ -84,7 +84,7 @@ pub enum CollisionError {
         count: usize,
     },
     /// A link has an index out of range.
-    #[error("link {index} joins {ends:?}; expected particles of {count}")]
+    #[error("link {index} joins {ends:?}; expected indices below {count}")]
     Link {
         /// Index of the link.
         index: usize,

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_corner_of_a_cube_is_joined_by_a_sixth_to_each_side_and_those_not_to_each_other() {
+    fn weights_of_a_corner_tet_are_a_sixth_to_its_neighbours_and_zero_between_them() {
         // Gradients of the hat functions: (−1, −1, −1), x, y, z; volume 1/6. Size 2 doubles it.
         let corners = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
         let weights = weights(&corners);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_tet_has_finite_weights_that_add_up_to_nothing() {
+    fn weights_of_a_flat_tet_are_finite_and_sum_to_zero() {
         for z in [0.0, 1e-9, 1e-3] {
             let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.7, 0.7, z]];
             for row in weights(&corners) {

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_are_numbered_by_their_first_points_whatever_the_order_of_tets() {
+    fn components_are_numbered_by_their_lowest_points_in_any_order_of_tets() {
         for tets in [[[9, 3, 5, 7], [0, 8, 2, 4], [7, 1, 3, 5]], [[7, 1, 3, 5], [4, 2, 8, 0], [5, 9, 7, 3]]] {
             let pieces = ConnectedPieces::of(10, &tets);
             assert_eq!((pieces.count, pieces.of_point), (3, vec![0, 1, 0, 1, 0, 1, 2, 1, 0, 1]));

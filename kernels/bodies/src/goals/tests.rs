@@ -76,7 +76,7 @@ fn sheared([x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn the_middle_of_an_octahedron_is_the_mean_of_its_corners() {
+fn the_centre_of_an_octahedron_moves_to_the_mean_of_its_corners() {
     let body = Body::octahedron();
     let mut shape = body.shape(|p| p);
     shape[0] = [7.0, 0.0, 0.0];
@@ -89,7 +89,7 @@ fn the_middle_of_an_octahedron_is_the_mean_of_its_corners() {
 }
 
 #[test]
-fn a_corner_pushed_through_the_middle_turns_its_tets_inside_out() {
+fn a_corner_pushed_through_the_centre_inverts_its_tets() {
     let body = Body::octahedron();
     let mut shape = body.shape(|p| p);
     shape[0] = [-3.0, 0.0, 0.0];
@@ -98,7 +98,7 @@ fn a_corner_pushed_through_the_middle_turns_its_tets_inside_out() {
 }
 
 #[test]
-fn affine_maps_take_the_inside_along_without_a_step_that_counts() {
+fn affine_maps_are_reproduced_exactly() {
     let body = Body::ball(6);
     for map in [sheared, |[x, y, z]: [f64; 3]| [-x, y, z], |[x, y, z]: [f64; 3]| [1e-3 * x, 40.0 * y, z + 9.0]] {
         let out = body.goal(&body.shape(map));
@@ -111,7 +111,7 @@ fn affine_maps_take_the_inside_along_without_a_step_that_counts() {
 }
 
 #[test]
-fn the_equations_alone_have_linear_precision() {
+fn the_finite_elements_reproduce_linear_functions() {
     for body in [Body::ball(6), Body::filled(&shapes::block([1.0, 0.2, 0.6], [5, 1, 3]), 0.11)] {
         let at = |point: usize| DVec3::from(sheared(body.points[point].map(f64::from)));
         let held: Vec<_> = (0..body.points.len()).map(|point| (body.rows[point] >= 0).then(|| at(point))).collect();
@@ -126,7 +126,7 @@ fn the_equations_alone_have_linear_precision() {
 }
 
 #[test]
-fn harmonic_maps_come_out_the_better_the_finer_the_body() {
+fn harmonic_maps_converge_under_refinement() {
     // Each coordinate solves Laplace's equation, so the map is its own interior.
     let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * (x * x - y * y), y + 0.7 * x * z, z + 0.4 * (y * z - x * y)];
     let error = |n: usize| {
@@ -146,7 +146,7 @@ fn a_surface_at_rest_keeps_every_bit() {
 }
 
 #[test]
-fn pieces_do_not_feel_each_other() {
+fn separate_pieces_are_independent() {
     let (one, two) = (Body::ball(4), Body::ball(5));
     let bent = |[x, y, z]: [f64; 3]| [x + 0.2 * y * y, y, z - 0.3 * x * y];
     let shift = one.points.len() as u32;
@@ -168,7 +168,7 @@ fn pieces_do_not_feel_each_other() {
 }
 
 #[test]
-fn what_is_held_nowhere_stays_and_is_counted() {
+fn points_without_constraints_stay_and_are_counted() {
     let mut body = Body::octahedron();
     body.points.extend([[5.0, 5.0, 5.0], [6.0, 5.0, 5.0], [5.0, 6.0, 5.0], [5.0, 5.0, 6.0], [9.0; 3]]);
     body.tets.push([7, 8, 9, 10]);
@@ -181,7 +181,7 @@ fn what_is_held_nowhere_stays_and_is_counted() {
 }
 
 #[test]
-fn spent_steps_are_said() {
+fn running_out_of_iterations_is_reported() {
     let body = Body::ball(6);
     let shape = body.shape(|[x, y, z]| [x + y * y, y, z]);
     let short = body.within(&shape, GoalLimits { relative: 1e-10, steps: 2 });
@@ -192,7 +192,7 @@ fn spent_steps_are_said() {
 }
 
 #[test]
-fn broken_bodies_give_finite_goals() {
+fn degenerate_bodies_give_finite_goals() {
     let body = Body::ball(4);
     let noise = |row: usize| [0, 1, 2].map(|k| Key::new(2).of(row as u64).of(k).between([-1.0, 1.0]));
     let shapes = [body.shape(|[x, y, z]| [x + y * y, y, z]), vec![[0.5; 3]; body.skin()]];

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spring_hangs_once_inside_a_cluster_and_twice_between_two() {
+    fn a_spring_is_listed_once_within_a_cluster_and_twice_between_clusters() {
         let clusters = Partition::new(vec![0, 3, 5]);
         let adjacency = Adjacency::new(&clusters, &[[1, 0], [3, 1], [1, 2], [4, 3], [0, 4]]);
         let others = |particle| {

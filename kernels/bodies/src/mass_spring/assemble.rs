@@ -83,8 +83,8 @@ impl StageSolver {
         self.update_transient_forces(context, stage, x, &v);
         let mut r = std::mem::take(&mut self.r);
         if linear {
-            self.expect(stage);
-            self.set_rows(context, stage);
+            self.linearise_contacts(stage);
+            self.set_rank_one_terms(context, stage);
             let mut system = std::mem::take(&mut self.system);
             let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
             let partition = (
@@ -155,13 +155,13 @@ impl StageSolver {
     }
 
     /// Linearises contact forces around the predicted load instead of the current one, where that is lower.
-    fn expect(&mut self, stage: &Stage<'_>) {
+    fn linearise_contacts(&mut self, stage: &Stage<'_>) {
         self.linearisation_offsets.clear();
         for (index, ((contact, state), push)) in
             stage.contacts.iter().zip(&mut self.contact_states).zip(&self.predicted_loads).enumerate()
         {
             let before = state.normal_force;
-            contact.expect(state, *push);
+            contact.linearise_at(state, *push);
             if state.normal_force != before {
                 self.linearisation_offsets.push((index, state.normal_force - before));
             }
@@ -180,10 +180,10 @@ impl StageSolver {
     }
 
     /// Sets up the rank-one terms of volumes, thin tetrahedra and contacts.
-    fn set_rows(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>) {
+    fn set_rank_one_terms(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>) {
         let (body, a) = (context.body, stage.a);
         let clusters = &body.order.clusters;
-        if !self.volumes.is_off() {
+        if !self.volumes.is_disabled() {
             let weights = self.volumes.weights(a);
             self.system.regions.set(&weights, &self.volumes.gradients, clusters);
         }
@@ -196,8 +196,8 @@ impl StageSolver {
             starts.push(particles.len() as u32);
         }
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals);
-        for ((contact, state), drag) in known.filter(|known| known.0.1.mode != ContactMode::Open) {
-            let resisted = contact.stiffness_directions(state, a, drag);
+        for ((contact, state), dual) in known.filter(|known| known.0.1.mode != ContactMode::Open) {
+            let resisted = contact.stiffness_directions(state, a, dual);
             if let Some((particle, weight)) = contact.single_particle() {
                 if self.system.blocks.is_empty() {
                     self.system.blocks.resize(body.len(), [0.0; 6]);

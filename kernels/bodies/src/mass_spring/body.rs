@@ -79,7 +79,7 @@ pub enum BodyError {
     #[error("point {0} is not finite")]
     Point(usize),
     /// A tetrahedron or spring has a particle index out of range, or the same one twice.
-    #[error("{what} {index} joins particles {particles:?}; expected different ones of {count}")]
+    #[error("{what} {index} joins particles {particles:?}; expected distinct indices below {count}")]
     Particles {
         /// `tetrahedron` or `spring`.
         what: &'static str,
@@ -155,7 +155,7 @@ impl SoftBody {
     ///
     /// # Errors If a number is not finite, an index is out of range, or the total mass is zero.
     pub fn new(mesh: &Mesh<'_>, material: &Material<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
-        let mut body = Self::shaped(mesh, joints)?;
+        let mut body = Self::from_mesh(mesh, joints)?;
         body.set_material(material)?;
         Ok(body)
     }
@@ -164,7 +164,7 @@ impl SoftBody {
     ///
     /// # Errors As [`SoftBody::new`].
     pub fn of_springs(points: &[[f64; 3]], masses: &[f64], springs: &[BodySpring]) -> Result<Self, BodyError> {
-        let mut body = Self::shaped(&Mesh { points, ..Mesh::default() }, springs)?;
+        let mut body = Self::from_mesh(&Mesh { points, ..Mesh::default() }, springs)?;
         let masses: Vec<f64> = masses.iter().copied().chain(std::iter::repeat(0.0)).take(points.len()).collect();
         body.set_masses(&masses)?;
         Ok(body)
@@ -282,7 +282,7 @@ impl SoftBody {
     }
 
     /// Everything but masses and the stiffnesses of mesh springs.
-    fn shaped(mesh: &Mesh<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
+    fn from_mesh(mesh: &Mesh<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let count = mesh.points.len();
         let points: Vec<DVec3> = mesh.points.iter().map(|p| DVec3::from(*p)).collect();
         if let Some(index) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {

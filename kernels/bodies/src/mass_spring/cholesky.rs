@@ -16,7 +16,7 @@ const BLOCK: usize = 48;
 /// Smallest number of rows for a thread.
 const ROWS: usize = 32;
 /// A pivot below this fraction of its diagonal entry is rounding noise.
-const NOTHING: f64 = 1e-11;
+const NEGLIGIBLE: f64 = 1e-11;
 
 /// The lower triangle of a symmetric matrix, or its factor, row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -79,7 +79,7 @@ impl Lower {
                 let (own, from) = (i - first(starts, i), first(starts, i));
                 finish(path, (starts, above), &mut mine[..own], from, begin);
                 let pivot = mine[own] - inner_product(path, &mine[..own], &mine[..own]);
-                let counts = pivot > NOTHING * mine[own].abs().max(f64::MIN_POSITIVE);
+                let counts = pivot > NEGLIGIBLE * mine[own].abs().max(f64::MIN_POSITIVE);
                 mine[own] = if counts { 1.0 / pivot.sqrt() } else { 0.0 };
             }
             let (done, starts) = (&*done, &*starts);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_solve_undoes_the_product() {
+    fn solving_inverts_the_matrix_product() {
         for (n, first) in
             [1, 7, 48, 131, 200].into_iter().flat_map(|n| [(n, (|_| 0) as fn(usize) -> usize), (n, ragged)])
         {
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_matrix_does_not_resist_stays_where_it_is() {
+    fn null_space_components_of_the_solution_are_zero() {
         // diag(4, 0, 9): the middle row and column are zero.
         let mut lower = Lower::zeros([0, 0, 0].into_iter());
         lower.add(0, 0, 4.0);

@@ -30,13 +30,13 @@ impl Anchors {
     /// Of a linear system; isolated particles (without springs) take no part in cluster motions.
     pub(super) fn new(system: &System) -> Self {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
-        const LITTLE: f64 = 0.1;
+        const NEGLIGIBLE: f64 = 0.1;
         let mut anchors = Self::default();
-        if system.blocks.is_empty() && system.transient.is_empty() && system.alone.is_empty() {
+        if system.blocks.is_empty() && system.transient.is_empty() && system.isolated.is_empty() {
             return anchors;
         }
         for particle in 0..system.inertia.len() {
-            if system.alone.get(particle) == Some(&true) {
+            if system.isolated.get(particle) == Some(&true) {
                 anchors.hold(particle, system.inertia.len(), [[0.0; 3]; 3]);
                 continue;
             }
@@ -50,7 +50,7 @@ impl Anchors {
             let smoother = &system.smoother[particle];
             let gap_fraction = [DVec3::x(), DVec3::y(), DVec3::z()]
                 .map(|axis| solve_lower_transpose(smoother, solve_lower(smoother, times(&block, axis))));
-            if gap_fraction.iter().all(|column| column.amax() < LITTLE) {
+            if gap_fraction.iter().all(|column| column.amax() < NEGLIGIBLE) {
                 continue;
             }
             let way = std::array::from_fn(|k| {

@@ -14,22 +14,22 @@ use numerics::vector::DVec3;
 
 /// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
 /// gap better in one iteration, smaller ones converge faster.
-const FIRM: f64 = 30.0;
+const PENALTY_RATIO: f64 = 30.0;
 /// Upper bound on the friction coefficient of a slip rate: slip of one frame is resisted by at most this times κ.
 /// Limits friction coefficients like 1e6, which would only add noise.
-const HOLD: f64 = 1e4;
+const STICK_RATIO: f64 = 1e4;
 /// Fraction of the gap beyond which the contact force continues linearly; its slope there is 1/(1 − this)² of the
 /// initial one.
-const STRAIGHT: f64 = 0.95;
+const LINEAR_FROM: f64 = 0.95;
 /// Fraction of the gap beyond which a contact is too deep to accept.
-const DEEP: f64 = 0.96;
+const TOO_DEEP: f64 = 0.96;
 /// Largest increase of depth in a trial step, as a fraction of the gap, and the depth to stop at instead: for a
 /// contact that was open, and for one that was closed.
-const CLOSED: [f64; 2] = [0.05, 0.02];
-const PRESSED: [f64; 2] = [0.3, 0.1];
+const OPEN_LIMIT: [f64; 2] = [0.05, 0.02];
+const CLOSED_LIMIT: [f64; 2] = [0.3, 0.1];
 /// Factor on the friction dual of a predicted slip, which keeps it away from the boundary, where the slip direction
 /// could flip.
-const SURE: f64 = 0.98;
+const DUAL_SHRINK: f64 = 0.98;
 /// Two unit vectors with a sum shorter than this are opposite.
 const OPPOSITE: f64 = 1e-9;
 /// Slip, in body lengths a second, above which friction is μN; proportional below.
@@ -86,12 +86,12 @@ pub(super) struct ContactConstraint {
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
     /// Largest resistance of friction to a slip rate, N·s/m.
-    hold: f64,
+    stick_limit: f64,
     /// Normal load that friction is computed from, newtons.
     pub(super) load: f64,
     /// Depth at which the penalty force starts, metres: above 0 while surfaces that penetrated each other are
     /// separated gradually.
-    slack: f64,
+    allowed_depth: f64,
     /// State that the contact keeps throughout a step, if it is frozen.
     frozen: Option<ContactState>,
 }
@@ -146,9 +146,9 @@ impl ContactConstraint {
             velocity: DVec3::from(contact.velocity),
             friction: contact.friction.max(0.0),
             penalty_stiffness: 0.0,
-            hold: 0.0,
+            stick_limit: 0.0,
             load: 0.0,
-            slack: 0.0,
+            allowed_depth: 0.0,
             frozen: None,
         };
         let mut yielding = 0.0;
@@ -161,8 +161,8 @@ impl ContactConstraint {
                 yielding += contact.weights[k] * contact.weights[k] / stiff;
             }
         }
-        constraint.penalty_stiffness = FIRM / yielding;
-        constraint.hold = HOLD * constraint.penalty_stiffness * seconds;
+        constraint.penalty_stiffness = PENALTY_RATIO / yielding;
+        constraint.stick_limit = STICK_RATIO * constraint.penalty_stiffness * seconds;
         (yielding > 0.0 && constraint.penalty_stiffness.is_finite()).then_some(constraint)
     }
 
@@ -180,20 +180,20 @@ impl ContactConstraint {
     /// Whether the contact is too deep to be accepted at `x`.
     pub(super) fn is_too_deep(&self, x: &[DVec3]) -> bool {
         let depth = self.depth(x, 0.0);
-        depth > 0.0 && self.gap_fraction(depth) > DEEP
+        depth > 0.0 && self.gap_fraction(depth) > TOO_DEEP
     }
 
     /// Whether the surfaces penetrate each other at the start `x` of a step of `seconds`: the force then separates
     /// them instead of acting as a spring.
     pub(super) fn is_penetrating(&self, x: &[DVec3], seconds: f64) -> bool {
-        self.gap_fraction(self.depth(x, seconds)) >= STRAIGHT
+        self.gap_fraction(self.depth(x, seconds)) >= LINEAR_FROM
     }
 
     /// How much deeper than allowed a contact would get by a motion from `x` to `to`, metres; `None` if it stays
     /// within the limits. Limiting the motion lets the next iteration see the contact force.
     pub(super) fn overshoot(&self, x: &[DVec3], to: &[DVec3]) -> Option<f64> {
         let (before, after) = (self.depth(x, 0.0), self.depth(to, 0.0));
-        let [most, stop] = if before > 0.0 { PRESSED } else { CLOSED };
+        let [most, stop] = if before > 0.0 { CLOSED_LIMIT } else { OPEN_LIMIT };
         let left = before.max(stop * self.gap);
         (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
     }
@@ -217,14 +217,14 @@ impl ContactConstraint {
 
     /// Depth at which the penalty acts, likewise.
     fn depth(&self, x: &[DVec3], seconds: f64) -> f64 {
-        -self.clearance(x, seconds) - self.slack
+        -self.clearance(x, seconds) - self.allowed_depth
     }
 
     /// For surfaces that penetrate each other at the start `x` of a step of `seconds`, limits the separation in that
     /// step to `way` metres. Resolved at once within a short step, they would fly apart.
     pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, way: f64) -> Self {
         let through = -self.clearance(x, seconds) - self.gap;
-        Self { slack: (through - way).max(0.0), ..self }
+        Self { allowed_depth: (through - way).max(0.0), ..self }
     }
 
     /// Freezes the state at `x` and `v`, `seconds` before the detection time: open or closed, sticking or sliding,
@@ -239,7 +239,7 @@ impl ContactConstraint {
         let depth = self.depth(x, 0.0);
         let push = then.normal_force + then.slope * (depth - then.depth);
         let slip = self.slip(v);
-        let stays = depth > 0.0 && self.gap_fraction(depth) < STRAIGHT;
+        let stays = depth > 0.0 && self.gap_fraction(depth) < LINEAR_FROM;
         match then.mode {
             ContactMode::Open => depth <= 0.0,
             ContactMode::Frictionless => stays,
@@ -259,12 +259,12 @@ impl ContactConstraint {
         let depth = self.depth(x, seconds);
         if let Some(then) = self.frozen {
             let push = then.normal_force + then.slope * (depth - then.depth);
-            let drag = match then.mode {
+            let dual = match then.mode {
                 ContactMode::Open | ContactMode::Frictionless => DVec3::zeros(),
                 ContactMode::Sticking => self.slip(v) * then.grip,
                 ContactMode::Sliding => then.slip * (self.friction * self.load),
             };
-            let force = if then.mode == ContactMode::Open { DVec3::zeros() } else { self.normal * push - drag };
+            let force = if then.mode == ContactMode::Open { DVec3::zeros() } else { self.normal * push - dual };
             // Sliding friction does not depend on the slip, so it has no stiffness across it either.
             let grip = if then.mode == ContactMode::Sliding { 0.0 } else { then.grip };
             return ContactState { depth, normal_force: push, force, grip, ..then };
@@ -281,14 +281,14 @@ impl ContactConstraint {
         };
         if depth > 0.0 {
             state.mode = ContactMode::Frictionless;
-            (state.normal_force, state.slope, state.energy) = self.spring(depth);
+            (state.normal_force, state.slope, state.energy) = self.penalty(depth);
             state.force = self.normal * state.normal_force;
         }
         // The load is constant within a step; otherwise friction would start and stop with a jump.
         let most = self.friction * self.load;
         if most > 0.0 {
             let slip = self.slip(v);
-            let (speed, creep) = (slip.norm(), creep(size).max(most / self.hold));
+            let (speed, creep) = (slip.norm(), creep(size).max(most / self.stick_limit));
             state.mode = if speed <= creep { ContactMode::Sticking } else { ContactMode::Sliding };
             state.grip = most / speed.max(creep);
             state.slip = slip / speed.max(creep);
@@ -324,14 +324,14 @@ impl ContactConstraint {
         if depth <= 0.0 || self.gap_fraction(depth) > 1.0 {
             return 0.0;
         }
-        let deepest = if self.gap > 0.0 { STRAIGHT * self.gap } else { f64::INFINITY };
-        self.spring(depth.min(deepest)).0
+        let deepest = if self.gap > 0.0 { LINEAR_FROM * self.gap } else { f64::INFINITY };
+        self.penalty(depth.min(deepest)).0
     }
 
     /// Normal force at a depth > 0, its derivative, and the stored energy.
-    fn spring(&self, depth: f64) -> (f64, f64, f64) {
+    fn penalty(&self, depth: f64) -> (f64, f64, f64) {
         let (k, gap) = (self.penalty_stiffness, self.gap);
-        let edge = STRAIGHT * gap;
+        let edge = LINEAR_FROM * gap;
         if gap <= 0.0 {
             return (k * depth, k, 0.5 * k * depth * depth);
         }
@@ -349,7 +349,7 @@ impl ContactConstraint {
 
     /// Linearises the normal force at a predicted value instead of the current one, if that is smaller. Far into the
     /// steep part of the penalty, Newton's method would only halve the excess in each iteration.
-    pub(super) fn expect(&self, state: &mut ContactState, expected: f64) {
+    pub(super) fn linearise_at(&self, state: &mut ContactState, expected: f64) {
         if self.frozen.is_some() || state.depth <= 0.0 || self.gap <= 0.0 || expected >= state.normal_force {
             return;
         }
@@ -360,7 +360,7 @@ impl ContactConstraint {
     }
 
     /// Normal force predicted by the linearisation after a fraction `share` of the step `dx`.
-    pub(super) fn expected(&self, state: &ContactState, dx: &[DVec3], share: f64) -> f64 {
+    pub(super) fn predicted_force(&self, state: &ContactState, dx: &[DVec3], share: f64) -> f64 {
         if state.depth <= 0.0 {
             return 0.0;
         }
@@ -370,7 +370,7 @@ impl ContactConstraint {
     /// Friction potential of the stage in which `v` = (x − z)/a.
     pub(super) fn friction_energy(&self, v: &[DVec3], a: f64, size: f64) -> f64 {
         let most = self.friction * self.load;
-        let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.hold));
+        let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.stick_limit));
         let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
         a * most * held
     }
@@ -381,7 +381,7 @@ impl ContactConstraint {
     /// The derivative of sliding friction vanishes along the slip, so plain Newton iterations would oscillate. The
     /// linearisation is the primal-dual one of Chan, Golub & Mulet (1999): with a dual of 0 it is that of slower
     /// surfaces, which never overshoots; with the dual that matches the slip it is exact.
-    pub(super) fn stiffness_directions(&self, state: &ContactState, a: f64, drag: &DVec3) -> ([DVec3; 3], usize) {
+    pub(super) fn stiffness_directions(&self, state: &ContactState, a: f64, dual: &DVec3) -> ([DVec3; 3], usize) {
         let n = self.normal;
         let mut out = [n * (a * a * state.slope).max(0.0).sqrt(), DVec3::zeros(), DVec3::zeros()];
         let (along, [least, most]) = match state.mode {
@@ -389,8 +389,8 @@ impl ContactConstraint {
             ContactMode::Frictionless => return (out, 1),
             ContactMode::Sticking => (DVec3::zeros(), [1.0, 1.0]),
             ContactMode::Sliding => {
-                let (length, common) = (drag.norm(), drag.dot(&state.slip));
-                let middle = if length > 0.0 { drag / length + state.slip } else { state.slip };
+                let (length, common) = (dual.norm(), dual.dot(&state.slip));
+                let middle = if length > 0.0 { dual / length + state.slip } else { state.slip };
                 (middle, [1.0 - 0.5 * (common + length), 1.0 - 0.5 * (common - length)])
             }
         };
@@ -403,7 +403,7 @@ impl ContactConstraint {
 
     /// The friction dual, of length 1 at most, after a fraction `share` of the step `dx` in a stage of `a`, as
     /// linearised with the current `dual`. Zero where the step was cut because it would have reversed the slip.
-    pub(super) fn drag(&self, state: &ContactState, drag: &DVec3, dx: &[DVec3], share: f64, a: f64) -> DVec3 {
+    pub(super) fn next_dual(&self, state: &ContactState, dual: &DVec3, dx: &[DVec3], share: f64, a: f64) -> DVec3 {
         let most = self.friction * self.load;
         if most <= 0.0 || state.mode == ContactMode::Open {
             return DVec3::zeros();
@@ -414,9 +414,9 @@ impl ContactConstraint {
         if slides && share < 1.0 && state.slip.dot(&(state.slip + more)) < 0.0 {
             return DVec3::zeros();
         }
-        let turned = if slides { more - drag * state.slip.dot(&more) } else { more };
-        let next = drag.lerp(&(state.slip + turned), share);
-        next * (SURE / next.norm().max(1.0))
+        let turned = if slides { more - dual * state.slip.dot(&more) } else { more };
+        let next = dual.lerp(&(state.slip + turned), share);
+        next * (DUAL_SHRINK / next.norm().max(1.0))
     }
 
     /// Adds the stiffness of a single-particle contact to that particle's block.

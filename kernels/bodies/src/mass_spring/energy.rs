@@ -35,10 +35,10 @@ pub(super) fn measure(
     solver: &mut StageSolver,
     context: &FrameContext<'_>,
     time: f64,
-    moving: &Kinematics,
+    motion: &Kinematics,
     looked: bool,
 ) -> Energies {
-    let (body, x, v) = (context.body, &moving.x, &moving.v);
+    let (body, x, v) = (context.body, &motion.x, &motion.v);
     if !looked {
         solver.volumes.measure(body, x);
     }

@@ -14,9 +14,9 @@ use numerics::vector::DVec3;
 use std::cell::OnceCell;
 
 /// Rounds of contact detection in a step.
-const ROUNDS: u32 = 4;
+const MOST_ROUNDS: u32 = 4;
 /// Largest initial displacement of a particle onto a surface, as a fraction of the mean spring length.
-const NUDGE: f64 = 0.3;
+const MOST_NUDGE: f64 = 0.3;
 /// Residual ÷ initial residual at which implicit Euler stops.
 const EULER_SHARE: f64 = 0.05;
 
@@ -68,26 +68,26 @@ impl Stepper<'_> {
     }
 
     /// Depth of the deepest contact at `time`, metres below its gap.
-    fn depth(&self, moving: &Kinematics, time: f64) -> f64 {
-        deepest(&self.contacts(moving, &moving.x, [time; 2]), &moving.x)
+    fn depth(&self, motion: &Kinematics, time: f64) -> f64 {
+        deepest(&self.contacts(motion, &motion.x, [time; 2]), &motion.x)
     }
 
     /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts.
     pub(super) fn euler(
         &mut self,
-        moving: &mut Kinematics,
+        motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &mut Vec<ContactConstraint>,
-        off: bool,
+        damped: bool,
     ) -> (Solved, f64) {
         let h = (times[1] - times[0]) * self.seconds;
-        let mut z = moving.x.clone();
-        let y: Vec<DVec3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * h).collect();
-        let mut x = if off { moving.x.clone() } else { self.slid(&moving.x, &y, contacts, h) };
+        let mut z = motion.x.clone();
+        let y: Vec<DVec3> = motion.x.iter().zip(&motion.v).map(|(x, v)| x + v * h).collect();
+        let mut x = if damped { motion.x.clone() } else { self.slid(&motion.x, &y, contacts, h) };
         self.pin(&mut x, &mut z, times[1], h);
         let volumes = self.solver.volumes.at(self.context.body, &z);
         self.solver.set_step_start(&self.context, h, |first, second| distance(&z, first, second), volumes);
-        let scale = self.scale(&moving.x, &y, contacts, h);
+        let scale = self.scale(&motion.x, &y, contacts, h);
         let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
         let stage = Stage {
@@ -102,23 +102,23 @@ impl Stepper<'_> {
             index: 0,
         };
         let before = OnceCell::new();
-        for round in 1..=ROUNDS {
-            let again = self.solver.descend(&self.context, &stage, contacts, enough, self.warm, &mut x);
+        for round in 1..=MOST_ROUNDS {
+            let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             (enough.square, enough.first) = (solved.enough, solved.first);
             let changed = reload(contacts, &x, &self.solver.v, h, self.context.body.size).is_some();
-            let (mut found, missed) = self.find_missed(contacts, moving, &x, times);
+            let (mut found, missed) = self.find_missed(contacts, motion, &x, times);
             let thinned = self.watch_thin(&x);
             // Contacts that were deep before are being separated. A contact plane at the end of a step may report
             // depth that was none before, as surfaces turn.
             let sank = |c: &&ContactConstraint| {
                 let now = -c.clearance(&x, 0.0);
                 c.is_too_deep(&x)
-                    && (now > -c.clearance(&moving.x, h) || now > *before.get_or_init(|| self.depth(moving, times[0])))
+                    && (now > -c.clearance(&motion.x, h) || now > *before.get_or_init(|| self.depth(motion, times[0])))
             };
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
-            if round == ROUNDS || !(missed || changed || thinned) {
+            if round == MOST_ROUNDS || !(missed || changed || thinned) {
                 break;
             }
             if missed {
@@ -128,8 +128,8 @@ impl Stepper<'_> {
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
         // First-order estimate: the change of velocity acts a whole step late.
-        let estimate = v.iter().zip(&moving.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
-        (moving.x, moving.v) = (x, v);
+        let estimate = v.iter().zip(&motion.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
+        (motion.x, motion.v) = (x, v);
         (solved, estimate)
     }
 
@@ -155,7 +155,7 @@ impl Stepper<'_> {
             let Some((particle, weight)) = contact.single_particle() else { continue };
             let before = contact.clearance(x, h);
             let missing = before.min(0.0) - contact.clearance(&out, 0.0);
-            if (missing > 0.0 || before < 0.0) && missing.abs() < NUDGE * self.context.body.spacing {
+            if (missing > 0.0 || before < 0.0) && missing.abs() < MOST_NUDGE * self.context.body.spacing {
                 out[particle] += contact.normal * (missing / weight);
             }
         }

@@ -147,7 +147,7 @@ impl BodySolver {
         let lengths = state.rest_lengths();
         let rest = RestLengths { lengths: &lengths, torn: &state.torn };
         self.solver.volumes = Volumes::new(body, frame.volume, &state.volumes);
-        self.solver.system.regions.idle = self.solver.volumes.is_off();
+        self.solver.system.regions.idle = self.solver.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
         self.solver.system.set_isolated(&self.solver.particle_stiffness);
         let context = FrameContext { body, external: &external, rest, volumes: &state.volumes };
@@ -159,52 +159,52 @@ impl BodySolver {
         for (particle, load) in body.order.index_of.iter().zip(&state.loads) {
             loads[*particle as usize] = *load;
         }
-        let mut moving = Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
+        let mut motion = Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
         let mut report = FrameReport::default();
-        self.solver.inventory = Inventory::new(body, &moving.x, &state.volumes);
-        let mut energies = measure(&mut self.solver, &context, 0.0, &moving, false);
+        self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
+        let mut energies = measure(&mut self.solver, &context, 0.0, &motion, false);
         if seconds > 0.0 && !body.is_empty() {
             let mut stepper = Stepper {
                 solver: &mut self.solver,
                 context,
                 frame,
                 seconds,
-                warm: &mut state.warm,
+                cached: &mut state.cached,
                 euler_steps_left: &mut state.euler_steps_left,
                 energy_budget: &mut state.energy_budget,
             };
-            run(&mut stepper, &mut moving, &mut energies, &mut report);
+            run(&mut stepper, &mut motion, &mut energies, &mut report);
         }
         (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
-        describe(&mut report, &context, &energies, &moving);
+        describe(&mut report, &context, &energies, &motion);
         state.trend.resize(body.len(), [0.0; 3]);
         state.loads.resize(body.len(), 0.0);
         for (caller, particle) in body.order.index_of.iter().enumerate() {
-            state.positions[caller] = moving.x[*particle as usize].into();
-            state.velocities[caller] = moving.v[*particle as usize].into();
-            state.trend[caller] = moving.trend[*particle as usize].into();
-            state.loads[caller] = moving.loads[*particle as usize];
+            state.positions[caller] = motion.x[*particle as usize].into();
+            state.velocities[caller] = motion.v[*particle as usize].into();
+            state.trend[caller] = motion.trend[*particle as usize].into();
+            state.loads[caller] = motion.loads[*particle as usize];
         }
         report
     }
 }
 
 /// Takes the steps of a frame.
-fn run(stepper: &mut Stepper<'_>, moving: &mut Kinematics, energies: &mut Energies, report: &mut FrameReport) {
+fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energies, report: &mut FrameReport) {
     let accurate = match stepper.frame.integrator {
         Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.context.body.size),
         Integrator::Default | Integrator::Euler => None,
     };
     if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
-        return adapt(stepper, moving, energies, report, tolerance);
+        return adapt(stepper, motion, energies, report, tolerance);
     }
     if stepper.frame.substeps == 0 {
-        return halve(stepper, moving, energies, report, [0.0, 1.0], f64::INFINITY);
+        return halve(stepper, motion, energies, report, [0.0, 1.0], f64::INFINITY);
     }
     let steps = stepper.frame.substeps.min(MOST_STEPS);
     for step in 0..steps {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(moving, times, energies, accurate, false);
+        let stepped = stepper.step(motion, times, energies, accurate, false);
         *energies = stepped.after;
         add(report, &stepped);
     }
@@ -214,7 +214,7 @@ fn run(stepper: &mut Stepper<'_>, moving: &mut Kinematics, energies: &mut Energi
 /// if that reduces the depth below `deepest`, metres.
 fn halve(
     stepper: &mut Stepper<'_>,
-    moving: &mut Kinematics,
+    motion: &mut Kinematics,
     energies: &mut Energies,
     report: &mut FrameReport,
     times: [f64; 2],
@@ -226,8 +226,8 @@ fn halve(
     const SHORT: f64 = 1.0 / 16.0;
     /// Newton iterations of a frame after which remaining depths are accepted, so that the frame ends.
     const MOST_NEWTON: u32 = 400;
-    let (start, energy_budget, euler_steps_left) = (moving.clone(), *stepper.energy_budget, *stepper.euler_steps_left);
-    let stepped = stepper.step(moving, times, energies, None, false);
+    let (start, energy_budget, euler_steps_left) = (motion.clone(), *stepper.energy_budget, *stepper.euler_steps_left);
+    let stepped = stepper.step(motion, times, energies, None, false);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
@@ -238,19 +238,19 @@ fn halve(
         return;
     }
     add_work(report, &stepped);
-    *moving = start;
+    *motion = start;
     (*stepper.energy_budget, *stepper.euler_steps_left) = (energy_budget, euler_steps_left);
-    stepper.refresh_inventory(moving);
+    stepper.refresh_inventory(motion);
     let middle = 0.5 * (times[0] + times[1]);
     for half in [[times[0], middle], [middle, times[1]]] {
-        halve(stepper, moving, energies, report, half, stepped.solved.unmet);
+        halve(stepper, motion, energies, report, half, stepped.solved.unmet);
     }
 }
 
 /// Takes steps whose estimated error stays below `tolerance` metres a frame.
 fn adapt(
     stepper: &mut Stepper<'_>,
-    moving: &mut Kinematics,
+    motion: &mut Kinematics,
     energies: &mut Energies,
     report: &mut FrameReport,
     tolerance: f64,
@@ -261,14 +261,14 @@ fn adapt(
     /// Newton iterations of a frame after which steps are accepted, damped and counted as caps, so that the frame
     /// ends.
     const MOST_NEWTON: u32 = 4000;
-    let (mut time, mut share, mut calm) = (0.0, 1.0_f64, false);
+    let (mut time, mut share, mut damp) = (0.0, 1.0_f64, false);
     while time < 1.0 {
         // Equal steps to the end, which avoids a tiny last one.
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let (before, energy_budget) = (moving.clone(), *stepper.energy_budget);
-        let stepped = stepper.step(moving, [time, end], energies, Some(tolerance), calm);
+        let (before, energy_budget) = (motion.clone(), *stepper.energy_budget);
+        let stepped = stepper.step(motion, [time, end], energies, Some(tolerance), damp);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
         // Steps that start out of balance are damped, so their error estimate only tells the size of the jump; at
@@ -286,7 +286,7 @@ fn adapt(
             share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
         }
         // The smallest step is still inaccurate: take it damped.
-        calm = !fits && smallest;
+        damp = !fits && smallest;
         if fits {
             add(report, &stepped);
             report.caps_hit += u32::from(stepped.euler && !stepped.damped && stepped.estimate > allowed);
@@ -294,9 +294,9 @@ fn adapt(
             time = end;
         } else {
             add_work(report, &stepped);
-            *moving = before;
+            *motion = before;
             *stepper.energy_budget = energy_budget;
-            stepper.refresh_inventory(moving);
+            stepper.refresh_inventory(motion);
         }
     }
 }
@@ -319,8 +319,8 @@ fn add(report: &mut FrameReport, stepped: &Stepped) {
     (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
 }
 
-fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, moving: &Kinematics) {
+fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, motion: &Kinematics) {
     (report.kinetic, report.elastic) = (energies.kinetic, energies.springs);
     (report.volume_energy, report.goal_energy) = (energies.volumes, energies.goals);
-    report.worst_stretch = super::energy::worst_stretch(context, &moving.x);
+    report.worst_stretch = super::energy::worst_stretch(context, &motion.x);
 }

@@ -36,8 +36,8 @@ impl Galerkin<'_> {
         bands.for_each(matrix.values_mut(), |cluster, out: &mut [f64]| {
             write(&self.band(first[cluster] as usize, cluster), out);
         });
-        self.add_rows(&system.regions, &mut matrix);
-        self.add_rows(&system.transient, &mut matrix);
+        self.add_rank_one_terms(&system.regions, &mut matrix);
+        self.add_rank_one_terms(&system.transient, &mut matrix);
         matrix.factor();
         matrix
     }
@@ -114,16 +114,16 @@ impl Galerkin<'_> {
     }
 
     /// Adds rank-one terms; coupling between different pieces is left out.
-    fn add_rows(&self, rows: &RankOneTerms, matrix: &mut Lower) {
+    fn add_rank_one_terms(&self, rows: &RankOneTerms, matrix: &mut Lower) {
         let Some(partition) = rows.partition() else { return };
         let of_part =
-            |part, ()| -> Vec<Vec<Push>> { partition.range(part).map(|row| self.predicted_loads(rows, row)).collect() };
+            |part, ()| -> Vec<Vec<Coupling>> { partition.range(part).map(|row| self.couplings(rows, row)).collect() };
         let each = partition.map((), of_part);
-        let piece = |push: &Push| self.layout.piece[push.cluster];
-        for predicted_loads in each.iter().flatten() {
-            for near in predicted_loads {
-                let to = |far: &&Push| far.cluster <= near.cluster && piece(far) == piece(near);
-                for far in predicted_loads.iter().filter(to) {
+        let piece = |push: &Coupling| self.layout.piece[push.cluster];
+        for couplings in each.iter().flatten() {
+            for near in couplings {
+                let to = |far: &&Coupling| far.cluster <= near.cluster && piece(far) == piece(near);
+                for far in couplings.iter().filter(to) {
                     for (i, push) in near.along.iter().enumerate() {
                         let count = if far.cluster == near.cluster { i + 1 } else { MODES };
                         for (j, other) in far.along[..count].iter().enumerate() {
@@ -137,9 +137,9 @@ impl Galerkin<'_> {
 
     /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
-    fn predicted_loads(&self, rows: &RankOneTerms, row: usize) -> Vec<Push> {
+    fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
         let Self { layout, system, anchors, .. } = self;
-        let mut predicted_loads: Vec<Push> = Vec::new();
+        let mut couplings: Vec<Coupling> = Vec::new();
         let home = |particle: usize| layout.cluster[particle] as usize;
         let particles = rows.particles(row);
         let free = |particle: usize| !system.held[particle] && anchors.at(particle).is_none();
@@ -147,22 +147,22 @@ impl Galerkin<'_> {
             .iter()
             .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
         {
-            return predicted_loads;
+            return couplings;
         }
         for (particle, g) in rows.entries(row).filter(|(particle, _)| !system.held[*particle]) {
             let cluster = home(particle);
-            let at = predicted_loads.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
-                predicted_loads.push(Push { cluster, along: [0.0; MODES] });
-                predicted_loads.len() - 1
+            let at = couplings.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
+                couplings.push(Coupling { cluster, along: [0.0; MODES] });
+                couplings.len() - 1
             });
-            predicted_loads[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
+            couplings[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
         }
-        predicted_loads
+        couplings
     }
 }
 
 /// Change of a rank-one term by the rigid motions of one cluster.
-struct Push {
+struct Coupling {
     cluster: usize,
     along: [f64; MODES],
 }
@@ -269,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_short_for_free_particles_is_their_product() {
+    fn shortcuts_for_unfiltered_particles_equal_the_full_product() {
         let [p, q, w] = [[0.3, -0.8, 0.5], [-0.9, 0.1, 0.7], [1.2, 0.4, -2.0]].map(DVec3::from);
         let (mut short, mut long) = (Block::default(), Block::default());
         short.add_alike(1.7, p, q);

@@ -9,7 +9,7 @@ use super::stage::{FrameContext, Stage, StageSolver};
 use numerics::vector::{DMat3, DVec3};
 
 /// A contact is with an obstacle if the sum of its weights exceeds this: it is 1 there and 0 between bodies.
-const HELD: f64 = 0.5;
+const IS_OBSTACLE: f64 = 0.5;
 
 /// Total residual and translational stiffness of each group.
 pub(super) struct MomentumTarget {
@@ -46,7 +46,7 @@ impl StageSolver {
         let piece_of = |particle: usize| self.layout.piece[self.layout.cluster[particle] as usize];
         self.system.held.clone_from(&context.external.held);
         let (mut bound, mut touched) = (vec![false; pieces_in_all], vec![false; pieces_in_all]);
-        let alone = &self.system.alone;
+        let alone = &self.system.isolated;
         for particle in (0..context.body.len())
             .filter(|particle| context.external.held[*particle] || alone.get(*particle) == Some(&true))
         {
@@ -87,15 +87,15 @@ impl StageSolver {
     fn obstacle_contacts(&self, stage: &Stage<'_>) -> Vec<ObstacleContact> {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
-            |(index, ((contact, state), drag))| {
+            |(index, ((contact, state), dual))| {
                 let weight: f64 = contact.weights.iter().sum();
                 let piece = self.layout.piece[self.layout.cluster[contact.particles[0] as usize] as usize];
-                let group = self.groups[piece as usize].filter(|_| weight.abs() > HELD)? as usize;
+                let group = self.groups[piece as usize].filter(|_| weight.abs() > IS_OBSTACLE)? as usize;
                 Some(ObstacleContact {
                     group,
                     contact: index,
                     weight,
-                    ways: contact.stiffness_directions(state, stage.a, drag),
+                    ways: contact.stiffness_directions(state, stage.a, dual),
                 })
             },
         );
@@ -150,7 +150,7 @@ impl StageSolver {
     /// accounted for. Returns whether anything was rotated.
     pub(super) fn correct_angular_momentum(&self, body: &SoftBody, stage: &Stage<'_>, x: &mut [DVec3]) -> bool {
         /// Moments of inertia below this fraction of the trace are treated as zero.
-        const NOTHING: f64 = 1e-9;
+        const NEGLIGIBLE: f64 = 1e-9;
         let inertia = &self.system.inertia;
         let members = || {
             let grouped = body.order.pieces.iter().zip(&self.groups);
@@ -171,7 +171,7 @@ impl StageSolver {
             *torque += offset.cross(&self.r[particle]);
             *tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * inertia[particle];
         }
-        turned.iter_mut().for_each(|(_, tensor)| *tensor += DMat3::identity() * (NOTHING * tensor.trace()));
+        turned.iter_mut().for_each(|(_, tensor)| *tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace()));
         for hold in self.obstacle_contacts(stage) {
             let sides = stage.contacts[hold.contact].sides();
             let offset = sides

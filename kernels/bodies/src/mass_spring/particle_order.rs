@@ -50,7 +50,7 @@ impl Order {
             ranges.push(before..starts.len() - 1);
             first += count;
         }
-        let (caller_of, starts) = lined_up(&caller_of, &starts, &ranges, springs);
+        let (caller_of, starts) = reordered(&caller_of, &starts, &ranges, springs);
         let mut index_of = vec![0; points.len()];
         for (index, caller) in caller_of.iter().enumerate() {
             index_of[*caller as usize] = index as u32;
@@ -61,7 +61,7 @@ impl Order {
 
 /// Reorders the clusters of each piece by reverse Cuthill–McKee (1969), so that coupled ones have near indices.
 /// `caller_of` lists the particles cluster by cluster, and clusters begin at `starts`.
-fn lined_up(
+fn reordered(
     caller_of: &[u32],
     starts: &[usize],
     pieces: &[Range<usize>],
@@ -86,9 +86,9 @@ fn lined_up(
     let (mut ordered, mut ends) = (Vec::with_capacity(caller_of.len()), vec![0]);
     let mut met = vec![false; joined.len()];
     for piece in pieces {
-        let line = outwards(&joined, piece.start, &mut met);
+        let line = breadth_first(&joined, piece.start, &mut met);
         // The last cluster reached is a peripheral one, or nearly so.
-        let line = outwards(&joined, line[line.len() - 1], &mut met);
+        let line = breadth_first(&joined, line[line.len() - 1], &mut met);
         for cluster in line.into_iter().rev() {
             ordered.extend_from_slice(&caller_of[starts[cluster]..starts[cluster + 1]]);
             ends.push(ordered.len());
@@ -99,7 +99,7 @@ fn lined_up(
 
 /// All clusters connected with `first` in breadth-first order, those with few neighbours first; `met` must be all
 /// false, and is again on return.
-fn outwards(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<usize> {
+fn breadth_first(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<usize> {
     let (mut line, mut next) = (vec![first], 0);
     met[first] = true;
     while next < line.len() {
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_share_no_cluster_and_places_undo_the_order() {
+    fn pieces_share_no_cluster_and_both_index_maps_are_inverse() {
         let points = grid(6);
         // Even particles are all connected, odd ones in pairs.
         let even = (2..216).step_by(2).map(|i| [i - 2, i]);
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn joined_clusters_are_few_steps_apart() {
+    fn coupled_clusters_have_near_indices() {
         let points: Vec<DVec3> =
             (0..16 * 400).map(|i| DVec3::new(f64::from(i / 16), f64::from(i % 4), f64::from(i / 4 % 4))).collect();
         let springs = (0..points.len() as u32).flat_map(|i| [[i, i + 1], [i, i + 4], [i, i + 16]]);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn no_particle_is_no_cluster() {
+    fn an_empty_body_has_no_clusters() {
         let order = Order::new(&[], std::iter::empty());
         assert_eq!((order.clusters.len(), order.pieces.len()), (0, 0));
     }

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_part_gets_its_own_share_and_sums_run_in_order() {
+    fn every_range_gets_its_part_of_the_data_and_sums_run_in_order() {
         for size in [1, 7, 2000] {
             let partition = Partition::even(2000, size, 1);
             let mut data = vec![0usize; 2000];

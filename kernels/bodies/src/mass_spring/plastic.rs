@@ -10,7 +10,7 @@ use super::state::State;
 use numerics::vector::DVec3;
 
 /// Bounds on the plastic factor of a spring.
-const DENTS: [f64; 2] = [0.1, 10.0];
+const DENT_RANGE: [f64; 2] = [0.1, 10.0];
 
 /// Parameters of plastic flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +55,7 @@ pub fn flow(
             let above = (strain.abs() - plasticity.yield_strain).max(0.0).copysign(strain);
             let dent = dent * (1.0 + share * above).max(0.0);
             if dent.is_finite() {
-                state.dents[spring] = dent.clamp(DENTS[0], DENTS[1]);
+                state.dents[spring] = dent.clamp(DENT_RANGE[0], DENT_RANGE[1]);
             }
         }
     }

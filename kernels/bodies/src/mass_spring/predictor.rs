@@ -9,7 +9,7 @@ use numerics::vector::{DMat3, DVec3};
 use std::ops::Range;
 
 /// Moments of inertia below this fraction of the trace are treated as zero.
-const NOTHING: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// Rigid motion of a piece.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl RigidMotion {
             turning += offset.cross(&(v[particle] - pace)) * m;
             tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * m;
         }
-        tensor += DMat3::identity() * (NOTHING * tensor.trace());
+        tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace());
         match tensor.try_inverse().map(|inverse| inverse * turning) {
             Some(spin) if spin.iter().chain(&middle).chain(&pace).all(|x| x.is_finite()) => {
                 Self { particles, middle, pace, spin, trend, energy: 0.5 * spin.dot(&turning) }
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turn_keeps_lengths_and_is_undone() {
+    fn a_rotation_preserves_length_and_has_an_inverse() {
         let turn = CayleyRotation::by(DVec3::new(0.3, -2.0, 1.0));
         let v = DVec3::new(1.0, 2.0, -3.0);
         assert!((turn.apply(v).norm() - v.norm()).abs() < 1e-14);

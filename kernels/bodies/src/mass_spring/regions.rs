@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cubes_volume_grows_by_a_third_of_the_faces_area_at_each_corner() {
+    fn the_volume_gradient_at_a_corner_is_a_third_of_its_area() {
         let (points, tets) = cube();
         let mut regions = Regions::new(&points, &tets);
         assert_eq!(regions.len(), 1);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_triangles_around_a_region_enclose_its_volume() {
+    fn the_boundary_of_a_region_encloses_its_volume() {
         let (points, tets) = cube();
         let regions = Regions::new(&points, &tets);
         let enclosed = |[a, b, c]: [u32; 3]| {
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_regions_volume_is_the_sum_of_its_tetrahedra_where_they_overlap_too() {
+    fn a_regions_volume_is_the_sum_of_its_tetrahedra_even_where_they_overlap() {
         // Both are on the same side of the face 0 1 2: 1 × ½ ÷ 3 and 2 × ½ ÷ 3.
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, 2.0]];
         let mut points = corners.map(DVec3::from);

@@ -5,7 +5,7 @@ use super::assemble::velocities;
 use super::contact::ContactConstraint;
 use super::springs;
 use super::stage::{FrameContext, Solved, Stage, StageSolver};
-use super::state::CachedFactor;
+use super::state::CachedCoarseFactor;
 use numerics::vector::DVec3;
 
 /// Largest number of step halvings in a line search.
@@ -14,9 +14,9 @@ const HALVINGS: usize = 16;
 const LONG: f64 = 0.2;
 /// Newton iterations of a stage without contacts, and with contacts.
 const MOST: u32 = 4;
-const MOST_TOUCHING: u32 = 20;
+const MOST_IN_CONTACT: u32 = 20;
 /// Iterations after which friction loads stay fixed, so that the descent terminates.
-const RELOADS: u32 = 8;
+const MOST_RELOADS: u32 = 8;
 /// Relative change of friction loads that requires an update.
 const CHANGED: f64 = 0.3;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
@@ -69,11 +69,11 @@ impl StageSolver {
         stage: &Stage<'_>,
         contacts: &mut [ContactConstraint],
         enough: StopCriteria,
-        warm: &mut CachedFactor,
+        cached: &mut CachedCoarseFactor,
         x: &mut [DVec3],
     ) -> Solved {
         self.begin(context, contacts);
-        let most = if contacts.is_empty() { MOST } else { MOST_TOUCHING };
+        let most = if contacts.is_empty() { MOST } else { MOST_IN_CONTACT };
         let mut solved = Solved::default();
         let (mut base, mut slow, mut stuck) = (ObjectiveParts::default(), false, false);
         loop {
@@ -90,12 +90,12 @@ impl StageSolver {
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
             let wanted = (now > solved.enough && !slow) || deep;
             if !wanted || stuck || solved.newton >= most {
-                solved.caps += u32::from(wanted && !stuck && most == MOST_TOUCHING);
+                solved.caps += u32::from(wanted && !stuck && most == MOST_IN_CONTACT);
                 break;
             }
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
-            if !self.direction(context, stage, warm, x, &mut solved) {
+            if !self.direction(context, stage, cached, x, &mut solved) {
                 break;
             }
             let LineSearch { share, lower, stopped } = self.search(context, stage, x, base);
@@ -104,7 +104,7 @@ impl StageSolver {
             let all = share > LONG && !stopped;
             (slow, stuck) = (all && base.sum() - lower.sum() <= solved.enough, share == 0.0);
             base = lower;
-            let loads_may_change = share == 1.0 && !deep && solved.newton <= RELOADS;
+            let loads_may_change = share == 1.0 && !deep && solved.newton <= MOST_RELOADS;
             if loads_may_change && let Some(more) = reload(contacts, x, &self.v, stage.a, context.body.size) {
                 base.contacts += more;
                 slow = false;

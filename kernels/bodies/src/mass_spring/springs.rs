@@ -14,7 +14,7 @@ use numerics::random::Key;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Largest a²k of a record: products with displacements stay well within the range of f32.
-const STIFFEST: f64 = 1e24;
+const MOST_STIFFNESS: f64 = 1e24;
 
 /// Stiffness of a spring, H·d = αd + w(w·d), with d the displacement of this end relative to the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -172,7 +172,7 @@ impl Link {
     fn linearise(&self, x: &[DVec3], a: f64, particle: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
         let seen = Seen::from(self, particle, x);
         let force = seen.way * seen.tension(self);
-        let k = (a * a * f64::from(self.k)).min(STIFFEST);
+        let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
         let alpha = if seen.length > 0.0 {
             k * (1.0 - self.rest * seen.inverse).max(0.0)
         } else if self.rest > 0.0 {

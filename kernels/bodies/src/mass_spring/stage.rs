@@ -12,7 +12,7 @@ use super::contact::{ContactConstraint, ContactState};
 use super::external::ExternalForces;
 use super::galerkin::Galerkin;
 use super::springs::{self, Link, Record, RestLengths};
-use super::state::CachedFactor;
+use super::state::CachedCoarseFactor;
 use super::system::System;
 use super::volume::{Inventory, ThinTet, Volumes};
 use numerics::vector::{DVec3, Vec3};
@@ -20,9 +20,9 @@ use numerics::vector::{DVec3, Vec3};
 /// Tolerance of linear solves, relative to the residual.
 const CG_SHARE: f64 = 0.1;
 /// That with contacts and a line search, where more Newton iterations follow anyway.
-const CG_SHARE_SEARCHING: f64 = 0.2;
+const CG_SHARE_LINE_SEARCH: f64 = 0.2;
 /// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
-const CG_SHARE_TOUCHING: f64 = 0.02;
+const CG_SHARE_FROZEN: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
 /// would slow them down.
 const NOISE: f64 = 1e-8;
@@ -33,9 +33,9 @@ const STALE: f64 = 1.5;
 /// It is also renewed after this many iterations, since it may have been poor from the start.
 const OLD: u32 = 500;
 /// It is also renewed after this change of the contact filter, which is worth about ten iterations.
-const MOVED: f64 = 0.3;
+const CONTACTS_CHANGED: f64 = 0.3;
 /// Deviation of the force from its linearisation, relative to the initial residual, that requires another iteration.
-const UNFORESEEN: f64 = 0.35;
+const NONLINEAR: f64 = 0.35;
 /// Largest growth of the squared residual in an iteration without line search.
 const RISE: f64 = 100.0;
 
@@ -195,11 +195,11 @@ impl StageSolver {
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
         newton: Newton,
-        warm: &mut CachedFactor,
+        cached: &mut CachedCoarseFactor,
         x: &mut [DVec3],
     ) -> Solved {
         self.begin(context, stage.contacts);
-        let mut solved = self.iterate(context, stage, newton, warm, x);
+        let mut solved = self.iterate(context, stage, newton, cached, x);
         if self.correct_angular_momentum(context.body, stage, x) && !solved.failed {
             self.measure_residual(context, stage, x, &mut solved);
         }
@@ -223,7 +223,7 @@ impl StageSolver {
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
         newton: Newton,
-        warm: &mut CachedFactor,
+        cached: &mut CachedCoarseFactor,
         x: &mut [DVec3],
     ) -> Solved {
         let clusters = &context.body.order.clusters;
@@ -234,7 +234,7 @@ impl StageSolver {
             if solved.newton == 0 {
                 solved.first = before;
             }
-            if !self.direction(context, stage, warm, x, &mut solved) {
+            if !self.direction(context, stage, cached, x, &mut solved) {
                 return solved;
             }
             let predicted = std::mem::take(&mut self.r);
@@ -247,7 +247,7 @@ impl StageSolver {
             let wanted = if newton.tolerance > 0.0 {
                 self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max) > newton.tolerance
             } else {
-                self.distance(clusters, &predicted) > UNFORESEEN * UNFORESEEN * before
+                self.distance(clusters, &predicted) > NONLINEAR * NONLINEAR * before
             };
             if solved.failed || !wanted || solved.newton >= newton.most {
                 return solved;
@@ -263,17 +263,20 @@ impl StageSolver {
             .zip(&self.contact_states)
             .zip(&mut self.friction_duals)
             .zip(&mut self.predicted_loads);
-        for (((contact, state), drag), push) in known {
-            *drag = contact.drag(state, drag, &self.dx, share, stage.a);
-            *push = contact.expected(state, &self.dx, share);
+        for (((contact, state), dual), push) in known {
+            *dual = contact.next_dual(state, dual, &self.dx, share, stage.a);
+            *push = contact.predicted_force(state, &self.dx, share);
         }
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
     }
 
     /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
-    pub(super) fn smooth(&self, body: &SoftBody, warm: &CachedFactor, r: &mut [DVec3]) {
-        let coarse =
-            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
+    pub(super) fn smooth(&self, body: &SoftBody, cached: &CachedCoarseFactor, r: &mut [DVec3]) {
+        let coarse = Coarse {
+            factor: &cached.factor,
+            offset_from_centroid: &self.offset_from_centroid,
+            anchors: &cached.anchors,
+        };
         conjugate_gradients::precondition(&self.system, body, coarse, r);
     }
 
@@ -281,11 +284,14 @@ impl StageSolver {
     pub(super) fn filter(
         &mut self,
         body: &SoftBody,
-        warm: &CachedFactor,
+        cached: &CachedCoarseFactor,
         r: &mut Vec<DVec3>,
     ) -> conjugate_gradients::Reached {
-        let coarse =
-            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
+        let coarse = Coarse {
+            factor: &cached.factor,
+            offset_from_centroid: &self.offset_from_centroid,
+            anchors: &cached.anchors,
+        };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![DVec3::zeros(); r.len()];
         let reached =
@@ -306,7 +312,7 @@ impl StageSolver {
         &mut self,
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
-        warm: &mut CachedFactor,
+        cached: &mut CachedCoarseFactor,
         x: &[DVec3],
         solved: &mut Solved,
     ) -> bool {
@@ -317,12 +323,13 @@ impl StageSolver {
         self.correct_linear_momentum(body, stage, &whole);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
         let anchors = Anchors::new(&self.system);
-        let old = warm.factor.len() != self.layout.rows() || warm.spent > OLD;
-        if old || anchors.change(&warm.anchors) > MOVED {
-            self.renew(body, warm, anchors);
+        let old = cached.factor.len() != self.layout.rows() || cached.iterations_since > OLD;
+        if old || anchors.change(&cached.anchors) > CONTACTS_CHANGED {
+            self.renew(body, cached, anchors);
         }
-        let fresh = &mut warm.fresh[stage.index];
-        let bound = if *fresh == 0 { CG_CAP } else { (3 * *fresh).max(*fresh + 10) };
+        let initial_iterations = &mut cached.initial_iterations[stage.index];
+        let bound =
+            if *initial_iterations == 0 { CG_CAP } else { (3 * *initial_iterations).max(*initial_iterations + 10) };
         let free = stage.spinning.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
         let spinning: f64 = free.map(|piece| piece.0).sum();
         let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
@@ -330,21 +337,21 @@ impl StageSolver {
         let asked = linear_tolerance(in_contact, stage.line_search);
         let searching = in_contact && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
-        let mut reached = self.gradients(body, warm, limits);
+        let mut reached = self.gradients(body, cached, limits);
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // The factor is too old to be useful: continue with a new one.
-            self.renew(body, warm, Anchors::new(&self.system));
+            self.renew(body, cached, Anchors::new(&self.system));
             let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
-            reached = self.gradients(body, warm, limits);
+            reached = self.gradients(body, cached, limits);
             solved.cg += reached.iterations;
         }
-        warm.spent += reached.iterations;
-        let fresh = &mut warm.fresh[stage.index];
-        if *fresh == 0 {
-            *fresh = reached.iterations.max(1);
-        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*fresh) + 1.0 {
-            *warm = CachedFactor::default();
+        cached.iterations_since += reached.iterations;
+        let initial_iterations = &mut cached.initial_iterations[stage.index];
+        if *initial_iterations == 0 {
+            *initial_iterations = reached.iterations.max(1);
+        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*initial_iterations) + 1.0 {
+            *cached = CachedCoarseFactor::default();
         }
         solved.caps += u32::from(!reached.met);
         // The linear solve left part of the residual; momentum has to be exact.
@@ -354,16 +361,24 @@ impl StageSolver {
         !solved.failed
     }
 
-    fn gradients(&mut self, body: &SoftBody, warm: &CachedFactor, limits: Limits) -> conjugate_gradients::Reached {
-        let coarse =
-            Coarse { factor: &warm.factor, offset_from_centroid: &self.offset_from_centroid, anchors: &warm.anchors };
+    fn gradients(
+        &mut self,
+        body: &SoftBody,
+        cached: &CachedCoarseFactor,
+        limits: Limits,
+    ) -> conjugate_gradients::Reached {
+        let coarse = Coarse {
+            factor: &cached.factor,
+            offset_from_centroid: &self.offset_from_centroid,
+            anchors: &cached.anchors,
+        };
         conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 
-    fn renew(&mut self, body: &SoftBody, warm: &mut CachedFactor, anchors: Anchors) {
+    fn renew(&mut self, body: &SoftBody, cached: &mut CachedCoarseFactor, anchors: Anchors) {
         let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
-        warm.factor = Galerkin { layout, body, system, offset_from_centroid, anchors: &anchors }.factor();
-        (warm.anchors, warm.fresh, warm.spent) = (anchors, [0; 2], 0);
+        cached.factor = Galerkin { layout, body, system, offset_from_centroid, anchors: &anchors }.factor();
+        (cached.anchors, cached.initial_iterations, cached.iterations_since) = (anchors, [0; 2], 0);
     }
 }
 
@@ -371,8 +386,8 @@ impl StageSolver {
 fn linear_tolerance(in_contact: bool, line_search: bool) -> f64 {
     match (in_contact, line_search) {
         (false, _) => CG_SHARE,
-        (true, true) => CG_SHARE_SEARCHING,
-        (true, false) => CG_SHARE_TOUCHING,
+        (true, true) => CG_SHARE_LINE_SEARCH,
+        (true, false) => CG_SHARE_FROZEN,
     }
 }
 
@@ -385,9 +400,9 @@ mod tests {
 
     #[test]
     fn only_stages_with_a_line_search_solve_contacts_loosely() {
-        assert_eq!(linear_tolerance(true, true), CG_SHARE_SEARCHING);
-        assert_eq!(linear_tolerance(true, false), CG_SHARE_TOUCHING);
-        assert!(CG_SHARE_TOUCHING < CG_SHARE && CG_SHARE < CG_SHARE_SEARCHING);
+        assert_eq!(linear_tolerance(true, true), CG_SHARE_LINE_SEARCH);
+        assert_eq!(linear_tolerance(true, false), CG_SHARE_FROZEN);
+        assert!(CG_SHARE_FROZEN < CG_SHARE && CG_SHARE < CG_SHARE_LINE_SEARCH);
         for line_search in [false, true] {
             assert_eq!(linear_tolerance(false, line_search), CG_SHARE);
         }
@@ -414,7 +429,7 @@ mod tests {
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
             let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
             let stage = Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, spinning: &[], line_search, index: 0 };
-            let (mut cached, mut x) = (CachedFactor::default(), inertial.clone());
+            let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
             let solved = if line_search {
                 let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };
                 solver.descend(&context, &stage, &mut [], enough, &mut cached, &mut x)

@@ -31,18 +31,18 @@ pub struct State {
     pub(super) euler_steps_left: u32,
     /// Energy that steps without external driving have dissipated so far, joules.
     pub(super) energy_budget: f64,
-    pub(super) warm: CachedFactor,
+    pub(super) cached: CachedCoarseFactor,
 }
 
 /// The factored coarse matrix, kept while it is good enough; iteration counts depend on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct CachedFactor {
+pub(super) struct CachedCoarseFactor {
     pub(super) factor: Lower,
     pub(super) anchors: Anchors,
     /// Iterations of a solve when it was new, for each stage of a step; 0 before the first.
-    pub(super) fresh: [u32; 2],
+    pub(super) initial_iterations: [u32; 2],
     /// Iterations since then.
-    pub(super) spent: u32,
+    pub(super) iterations_since: u32,
 }
 
 impl State {
@@ -60,7 +60,7 @@ impl State {
             loads: Vec::new(),
             euler_steps_left: 0,
             energy_budget: 0.0,
-            warm: CachedFactor::default(),
+            cached: CachedCoarseFactor::default(),
         }
     }
 

@@ -17,7 +17,7 @@ use super::frame::{Integrator, SolverFrame};
 use super::predictor::{Predictor, RigidMotion};
 use super::springs::{distance, drift};
 use super::stage::{FrameContext, Newton, Solved, Stage, StageSolver};
-use super::state::CachedFactor;
+use super::state::CachedCoarseFactor;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
 
@@ -68,7 +68,7 @@ pub(super) struct Stepper<'a> {
     pub(super) frame: &'a SolverFrame<'a>,
     /// Length of the frame, seconds.
     pub(super) seconds: f64,
-    pub(super) warm: &'a mut CachedFactor,
+    pub(super) cached: &'a mut CachedCoarseFactor,
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: &'a mut u32,
     /// Energy that steps have dissipated so far, and that rounding in later ones may return, joules.
@@ -80,15 +80,15 @@ impl Stepper<'_> {
     /// `before` are the energies at the start; `calm` asks for a damped step.
     pub(super) fn step(
         &mut self,
-        moving: &mut Kinematics,
+        motion: &mut Kinematics,
         times: [f64; 2],
         before: &Energies,
         tolerance: Option<f64>,
-        calm: bool,
+        damp: bool,
     ) -> Stepped {
         let h = (times[1] - times[0]) * self.seconds;
         let body = self.context.body;
-        let start = moving.clone();
+        let start = motion.clone();
         let mut stepped = Stepped::default();
 
         let mut full = match self.frame.contacts {
@@ -102,56 +102,56 @@ impl Stepper<'_> {
         // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
         let force_implicit_euler =
-            calm || *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
+            damp || *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
         *self.euler_steps_left = self.euler_steps_left.saturating_sub(1);
         let mut after = None;
         if force_implicit_euler || self.frame.integrator == Integrator::Euler {
-            let off = calm || self.frame.force_implicit_euler || turned;
-            (stepped.solved, stepped.estimate) = self.euler(moving, times, &mut full, off);
-            (stepped.euler, stepped.damped) = (true, off);
+            let damped = damp || self.frame.force_implicit_euler || turned;
+            (stepped.solved, stepped.estimate) = self.euler(motion, times, &mut full, damped);
+            (stepped.euler, stepped.damped) = (true, damped);
         } else {
             let size = body.size;
             let frozen: Vec<ContactConstraint> = full.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
-            (stepped.solved, stepped.estimate) = self.tr_bdf2(moving, times, &frozen, tolerance);
-            let energies = measure(self.solver, &self.context, times[1], moving, true);
+            (stepped.solved, stepped.estimate) = self.tr_bdf2(motion, times, &frozen, tolerance);
+            let energies = measure(self.solver, &self.context, times[1], motion, true);
             let gain = energies.sum() - before.sum();
             let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
             after = Some(energies);
             let mut active_set_unchanged =
-                frozen.iter().all(|contact| contact.active_set_unchanged(&moving.x, &moving.v));
+                frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
             if active_set_unchanged {
-                let (found, missed) = self.find_missed(&full, &start, &moving.x, times);
-                stepped.solved.deepest = deepest(&found, &moving.x);
+                let (found, missed) = self.find_missed(&full, &start, &motion.x, times);
+                stepped.solved.deepest = deepest(&found, &motion.x);
                 active_set_unchanged = !missed;
             }
-            let thinned = active_set_unchanged && self.watch_thin(&moving.x);
+            let thinned = active_set_unchanged && self.watch_thin(&motion.x);
             if stepped.solved.failed || gained || !active_set_unchanged || thinned || !energies.sum().is_finite() {
-                moving.clone_from(&start);
-                let off = stepped.solved.failed || gained;
-                let (again, estimate) = self.euler(moving, times, &mut full, off);
+                motion.clone_from(&start);
+                let damped = stepped.solved.failed || gained;
+                let (again, estimate) = self.euler(motion, times, &mut full, damped);
                 let solved = Solved { failed: again.failed, residual: again.residual, ..sum(stepped.solved, again) };
-                stepped = Stepped { solved, estimate, euler: true, damped: off, ..Stepped::default() };
+                stepped = Stepped { solved, estimate, euler: true, damped: damped, ..Stepped::default() };
                 after = None;
                 *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
             }
         }
-        if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&moving.x, 0.0) < 0.0)) {
+        if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
             *self.euler_steps_left = (*self.euler_steps_left).max(1);
         }
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
         let contact_states = stepped.euler || stepped.contacts > 0;
         let trend = |(v, before): (&DVec3, &DVec3)| if contact_states { DVec3::zeros() } else { (v - before) / h };
-        moving.trend = moving.v.iter().zip(&start.v).map(trend).collect();
-        moving.loads = self.loads(&full, &moving.x);
-        self.keep_finite(&start, moving, &mut stepped);
-        self.refresh_inventory(moving);
+        motion.trend = motion.v.iter().zip(&start.v).map(trend).collect();
+        motion.loads = self.loads(&full, &motion.x);
+        self.keep_finite(&start, motion, &mut stepped);
+        self.refresh_inventory(motion);
         stepped.after = match after.filter(|_| stepped.stopped == 0) {
             Some(energies) => energies,
-            None => measure(self.solver, &self.context, times[1], moving, false),
+            None => measure(self.solver, &self.context, times[1], motion, false),
         };
         if self.undriven() {
-            self.remove_energy_gain(before, moving, &mut stepped);
+            self.remove_energy_gain(before, motion, &mut stepped);
         } else {
             *self.energy_budget = 0.0;
         }
@@ -159,15 +159,15 @@ impl Stepper<'_> {
     }
 
     /// Takes stock of the tetrahedra at the current positions, for the next step.
-    pub(super) fn refresh_inventory(&mut self, moving: &Kinematics) {
+    pub(super) fn refresh_inventory(&mut self, motion: &Kinematics) {
         let seen = self.solver.latest_inventory.take();
         self.solver.inventory =
-            seen.unwrap_or_else(|| Inventory::new(self.context.body, &moving.x, self.context.volumes));
+            seen.unwrap_or_else(|| Inventory::new(self.context.body, &motion.x, self.context.volumes));
     }
 
     /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
     pub(super) fn watch_thin(&mut self, x: &[DVec3]) -> bool {
-        if self.solver.volumes.is_off() {
+        if self.solver.volumes.is_disabled() {
             return false;
         }
         let (body, volumes) = (self.context.body, self.context.volumes);
@@ -192,7 +192,7 @@ impl Stepper<'_> {
 
     fn tr_bdf2(
         &mut self,
-        moving: &mut Kinematics,
+        motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &[ContactConstraint],
         tolerance: Option<f64>,
@@ -203,7 +203,7 @@ impl Stepper<'_> {
         let middle = times[0] + GAMMA * (times[1] - times[0]);
         let newton = self.newton(tolerance);
 
-        let start = moving.clone();
+        let start = motion.clone();
         let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.trend, h);
         let mut x = predictor.at(2.0 * a);
         let spinning = predictor.spinning();
@@ -218,26 +218,26 @@ impl Stepper<'_> {
             line_search: false,
             index: 0,
         };
-        let volumes = self.solver.volumes.drift(body, &moving.x, &moving.v);
+        let volumes = self.solver.volumes.drift(body, &motion.x, &motion.v);
         // Lengths and volumes follow the same rules as positions.
         let on_from_start = |solver: &mut StageSolver, seconds: f64| {
             let length = |first, second| {
-                let [length, pace] = drift(&moving.x, &moving.v, first, second);
+                let [length, pace] = drift(&motion.x, &motion.v, first, second);
                 length + pace * seconds
             };
             let volumes = volumes.iter().map(|[volume, pace]| volume + pace * seconds).collect();
             solver.set_step_start(&self.context, a, length, volumes);
         };
         on_from_start(self.solver, -a);
-        let force = self.solver.forces(&self.context, &stage, &moving.x, &moving.v);
+        let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
         on_from_start(self.solver, a);
-        let mut z: Vec<DVec3> = moving.x.iter().zip(&moving.v).map(|(x, v)| x + v * a).collect();
+        let mut z: Vec<DVec3> = motion.x.iter().zip(&motion.v).map(|(x, v)| x + v * a).collect();
         let y: Vec<DVec3> = (0..x.len())
-            .map(|particle| z[particle] + moving.v[particle] * a + force[particle] * (a * a / body.mass[particle]))
+            .map(|particle| z[particle] + motion.v[particle] * a + force[particle] * (a * a / body.mass[particle]))
             .collect();
         self.pin(&mut x, &mut z, middle, a);
         (stage.y, stage.z, stage.time, stage.early) = (&y, &z, middle, (1.0 - GAMMA) * h);
-        let first = self.solver.solve(&self.context, &stage, newton, self.warm, &mut x);
+        let first = self.solver.solve(&self.context, &stage, newton, self.cached, &mut x);
         let v_middle: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
         let x_middle = x;
 
@@ -250,10 +250,10 @@ impl Stepper<'_> {
         let swollen = self.solver.volumes.at(body, &x_middle);
         let swollen = swollen.iter().zip(&volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
         let length = |first, second| {
-            distance(&x_middle, first, second) * weight - distance(&moving.x, first, second) * start_weight
+            distance(&x_middle, first, second) * weight - distance(&motion.x, first, second) * start_weight
         };
         self.solver.set_step_start(&self.context, a, length, swollen);
-        let (mut z, z_pace) = (mix(&x_middle, &moving.x), mix(&v_middle, &moving.v));
+        let (mut z, z_pace) = (mix(&x_middle, &motion.x), mix(&v_middle, &motion.v));
         let y: Vec<DVec3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
         let mut x = predictor.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
@@ -268,31 +268,31 @@ impl Stepper<'_> {
             line_search: false,
             index: 1,
         };
-        let second = self.solver.solve(&self.context, &stage, newton, self.warm, &mut x);
+        let second = self.solver.solve(&self.context, &stage, newton, self.cached, &mut x);
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
 
         let scale = 2.0 * h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
         let raw = |particle: usize| {
             let bent =
-                moving.v[particle] / GAMMA - v_middle[particle] / (GAMMA * (1.0 - GAMMA)) + v[particle] / (1.0 - GAMMA);
+                motion.v[particle] / GAMMA - v_middle[particle] / (GAMMA * (1.0 - GAMMA)) + v[particle] / (1.0 - GAMMA);
             if self.context.external.held[particle] { DVec3::zeros() } else { bent * (scale * body.mass[particle]) }
         };
         let mut error: Vec<DVec3> = (0..x.len()).map(raw).collect();
         let mut solved = sum(first, second);
         if tolerance.is_some() {
-            let reached = self.solver.filter(body, self.warm, &mut error);
+            let reached = self.solver.filter(body, self.cached, &mut error);
             solved.cg += reached.iterations;
         } else {
-            self.solver.smooth(body, self.warm, &mut error);
+            self.solver.smooth(body, self.cached, &mut error);
         }
         let estimate = error.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
-        (moving.x, moving.v) = (x, v);
+        (motion.x, motion.v) = (x, v);
         (solved, estimate)
     }
 
     /// Particles that do not move with their piece: pinned and isolated ones.
     fn loose(&self) -> Vec<bool> {
-        let (held, alone) = (&self.context.external.held, &self.solver.system.alone);
+        let (held, alone) = (&self.context.external.held, &self.solver.system.isolated);
         (0..held.len()).map(|particle| held[particle] || alone.get(particle) == Some(&true)).collect()
     }
 
@@ -302,11 +302,11 @@ impl Stepper<'_> {
     }
 
     /// Stops particles whose result is not finite where they were.
-    fn keep_finite(&mut self, start: &Kinematics, moving: &mut Kinematics, stepped: &mut Stepped) {
-        for particle in 0..moving.x.len() {
-            if !moving.x[particle].iter().chain(moving.v[particle].iter()).all(|x| x.is_finite()) {
-                (moving.x[particle], moving.v[particle]) = (start.x[particle], DVec3::zeros());
-                moving.trend[particle] = DVec3::zeros();
+    fn keep_finite(&mut self, start: &Kinematics, motion: &mut Kinematics, stepped: &mut Stepped) {
+        for particle in 0..motion.x.len() {
+            if !motion.x[particle].iter().chain(motion.v[particle].iter()).all(|x| x.is_finite()) {
+                (motion.x[particle], motion.v[particle]) = (start.x[particle], DVec3::zeros());
+                motion.trend[particle] = DVec3::zeros();
                 stepped.stopped += 1;
                 self.solver.latest_inventory = None;
             }
@@ -314,14 +314,14 @@ impl Stepper<'_> {
     }
 
     /// Slows particles relative to their mean motion if the step gained energy.
-    fn remove_energy_gain(&mut self, before: &Energies, moving: &mut Kinematics, stepped: &mut Stepped) {
+    fn remove_energy_gain(&mut self, before: &Energies, motion: &mut Kinematics, stepped: &mut Stepped) {
         /// Fraction of the energy that is rounding.
         const ROUNDING: f64 = 1e-9;
         /// Largest budget of previously dissipated energy, as a fraction of the energy.
-        const LENT: f64 = 2e-3;
+        const MOST_BUDGET: f64 = 2e-3;
         let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
-        *self.energy_budget = (*self.energy_budget - gained).min(LENT * after.scale());
+        *self.energy_budget = (*self.energy_budget - gained).min(MOST_BUDGET * after.scale());
         if *self.energy_budget >= -ROUNDING * before.scale().max(after.scale()) {
             return;
         }
@@ -330,26 +330,26 @@ impl Stepper<'_> {
         // Takes energy from the deformation first, then from all motion but translation: momentum is conserved.
         for turning in [true, false] {
             let gained = -*self.energy_budget;
-            let mut moved = moving.v.clone();
+            let mut moved = motion.v.clone();
             for piece in &body.order.pieces {
-                let rigid = RigidMotion::new(body, held, piece, &moving.x, &moving.v, &moving.trend);
+                let rigid = RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.trend);
                 let rigid = if turning { rigid } else { rigid.shift() };
                 for particle in rigid.particles.clone() {
-                    moved[particle] = rigid.velocity(moving.x[particle]);
+                    moved[particle] = rigid.velocity(motion.x[particle]);
                 }
             }
             let own = |v: &[DVec3], particle: usize| v[particle] - moved[particle];
             let inner: f64 = (0..body.len())
-                .map(|particle| 0.5 * body.mass[particle] * own(&moving.v, particle).norm_squared())
+                .map(|particle| 0.5 * body.mass[particle] * own(&motion.v, particle).norm_squared())
                 .sum();
             if !(gained > 0.0 && inner > 0.0) {
                 continue;
             }
             let keep = ((inner - gained) / inner).max(0.0).sqrt();
             for particle in (0..body.len()).filter(|particle| !held[*particle]) {
-                moving.v[particle] = moved[particle] + own(&moving.v, particle) * keep;
+                motion.v[particle] = moved[particle] + own(&motion.v, particle) * keep;
             }
-            let kinetic = kinetic(body, &moving.v);
+            let kinetic = kinetic(body, &motion.v);
             *self.energy_budget += after.kinetic - kinetic;
             stepped.energy_removed += after.kinetic - kinetic;
             after.kinetic = kinetic;

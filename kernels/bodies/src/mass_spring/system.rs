@@ -23,7 +23,7 @@ pub(super) struct System {
     /// Pinned particles.
     pub(super) held: Vec<bool>,
     /// Particles without intact springs; empty if there are none.
-    pub(super) alone: Vec<bool>,
+    pub(super) isolated: Vec<bool>,
     /// Terms of regions.
     pub(super) regions: RankOneTerms,
     /// Terms of thin tetrahedra and of contacts between bodies.
@@ -79,9 +79,9 @@ impl System {
 
     /// Marks particles whose springs have no stiffness as isolated.
     pub(super) fn set_isolated(&mut self, particle_stiffness: &[f64]) {
-        self.alone.clear();
+        self.isolated.clear();
         if particle_stiffness.contains(&0.0) {
-            self.alone.extend(particle_stiffness.iter().map(|k| *k == 0.0));
+            self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
         }
     }
 }
@@ -97,9 +97,9 @@ pub(super) fn times([xx, xy, xz, yy, yz, zz]: &[f64; 6], v: DVec3) -> DVec3 {
 #[inline(always)]
 pub(super) fn smoother(block: &[f64; 6]) -> [f32; 6] {
     /// A pivot below this fraction of its diagonal entry is rounding noise.
-    const NOTHING: f64 = 1e-13;
+    const NEGLIGIBLE: f64 = 1e-13;
     let [xx, xy, xz, yy, yz, zz] = *block;
-    let pivot = |left: f64, whole: f64| 1.0 / left.max(NOTHING * whole).sqrt();
+    let pivot = |left: f64, whole: f64| 1.0 / left.max(NEGLIGIBLE * whole).sqrt();
     let a = pivot(xx, xx);
     let (ba, ca) = (xy * a, xz * a);
     let b = pivot(yy - ba * ba, yy);

@@ -14,10 +14,10 @@ use numerics::vector::DVec3;
 const SPRINGS: f64 = 2.0 / 3.0;
 /// Fraction of the volume change of bare springs that remains at full strength, for small changes: conjugate
 /// gradients then converge almost as fast as without.
-const LEFT: f64 = 0.1;
+const REMAINING: f64 = 0.1;
 /// Relative volume change at which resistance has doubled, and at which it stops growing (114 times).
-const SLIGHT: f64 = 0.0065;
-const MUCH: f64 = 0.04;
+const STIFFENING: f64 = 0.0065;
+const STIFFENING_END: f64 = 0.04;
 /// Volume ÷ rest volume below which the barrier acts on a tetrahedron.
 const THIN: f64 = 0.3;
 /// Volume ÷ rest volume below which a tetrahedron is watched during a step. One that becomes thin within a step has
@@ -74,7 +74,7 @@ impl Volumes {
         }
         let partition = regions.partition();
         let rest_sums = regions.sums(|tet| rest[tet]);
-        let factor = SPRINGS * share / (1.0 - share + LEFT * share);
+        let factor = SPRINGS * share / (1.0 - share + REMAINING * share);
         let stiffness = regions.energy.iter().zip(&rest_sums).map(|(energy, volume)| {
             let k = factor * energy / (volume * volume);
             if k.is_finite() { k } else { 0.0 }
@@ -95,7 +95,7 @@ impl Volumes {
     }
 
     /// Whether volume is not preserved.
-    pub(super) fn is_off(&self) -> bool {
+    pub(super) fn is_disabled(&self) -> bool {
         self.partition.is_none()
     }
 
@@ -159,7 +159,7 @@ impl Volumes {
 
     /// The thin ones among the `watched` tetrahedra.
     pub(super) fn thin_tets(&self, body: &SoftBody, x: &[DVec3], rest: &[f64], watched: &[u32]) -> Vec<ThinTet> {
-        if self.is_off() {
+        if self.is_disabled() {
             return Vec::new();
         }
         let of = |tet: &u32| {
@@ -179,12 +179,12 @@ impl Volumes {
 /// Resistance to a change of volume, relative to κ/V₀: linear near rest, increasing from [`SLIGHT`] on, linear again
 /// from [`MUCH`] on. Returns the value, its derivative and its integral.
 fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
-    let soft = 1.0 / (SLIGHT * rest * SLIGHT * rest);
+    let soft = 1.0 / (STIFFENING * rest * STIFFENING * rest);
     let curved = |lost: f64| {
         let square = lost * lost * soft;
         (lost * (1.0 + square), 1.0 + 3.0 * square, lost * lost * (0.5 + 0.25 * square))
     };
-    let edge = MUCH * rest;
+    let edge = STIFFENING_END * rest;
     if rest <= 0.0 {
         return (0.0, 0.0, 0.0);
     }

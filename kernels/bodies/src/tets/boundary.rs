@@ -1,12 +1,12 @@
-//! The faces that tets have to the outside.
+//! Boundary faces of tets.
 
 use numerics::vector::{Vec3, cross, dot, sub};
 
-/// Corners of the four faces of a tet: the face across from corner 0, from corner 1, and so on. Counter-clockwise seen from
-/// outside where the tet is positive, (b − a)×(c − a)·(d − a) > 0.
+/// Corners of the four faces of a tet, opposite to corner 0, 1, 2 and 3. Counter-clockwise seen from outside if the
+/// tet is positive, (b − a)×(c − a)·(d − a) > 0.
 pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// The faces of a tet by its points, in the order of [`FACES`].
+/// The faces of a tet as points, in the order of [`FACES`].
 pub(crate) fn faces_of(tet: &[u32; 4]) -> [[u32; 3]; 4] {
     FACES.map(|face| face.map(|corner| tet[corner]))
 }
@@ -17,17 +17,17 @@ pub(crate) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-/// A face of one tet alone.
+/// A face of a single tet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundaryFace {
-    /// Its points, counter-clockwise from outside.
+    /// Its points, counter-clockwise seen from outside.
     pub corners: [u32; 3],
-    /// The tet it is of.
+    /// Its tet.
     pub tet: u32,
 }
 
-/// Faces that belong to an odd number of tets, in the order of their tets and turned away from them where `points` (metres)
-/// are; a flat tet's are turned as if its corners ran counter-clockwise.
+/// Faces that belong to an odd number of tets, in the order of their tets, facing away from them for the positions
+/// `points`. Faces of a flat tet are oriented as if it were positive.
 pub fn boundary(tets: &[[u32; 4]], points: &[Vec3]) -> Vec<BoundaryFace> {
     let mut faces: Vec<([u32; 3], BoundaryFace)> = Vec::with_capacity(4 * tets.len());
     for (tet, corners) in (0..).zip(tets) {
@@ -45,9 +45,9 @@ pub fn boundary(tets: &[[u32; 4]], points: &[Vec3]) -> Vec<BoundaryFace> {
     alone
 }
 
-/// The closed surface that encloses the sum of the signed volumes of `tets`, sorted: each face as often as tets on one side of it
-/// outnumber those on the other. Unlike [`boundary`] it is closed even where tets overlap or are inverted, so that volumes and
-/// their gradients can be summed over it.
+/// The closed surface that encloses the sum of the signed volumes of `tets`, sorted: each face as often as tets on
+/// one side of it outnumber those on the other. Unlike [`boundary`] it is closed even where tets overlap or are
+/// inverted, so that volumes and their gradients can be summed over it.
 pub(crate) fn oriented_boundary(tets: impl Iterator<Item = [u32; 4]>) -> Vec<[u32; 3]> {
     let mut faces: Vec<([u32; 3], bool)> = tets.flat_map(|tet| faces_of(&tet)).map(ascending).collect();
     faces.sort_unstable();
@@ -61,7 +61,7 @@ pub(crate) fn oriented_boundary(tets: impl Iterator<Item = [u32; 4]>) -> Vec<[u3
     faces.chunk_by(|a, b| a.0 == b.0).flat_map(remaining).collect()
 }
 
-/// A face's corners in ascending order, and whether that is an even permutation of the face.
+/// A face's corners in ascending order, and whether that is an even permutation.
 fn ascending(face: [u32; 3]) -> ([u32; 3], bool) {
     let sorted = sorted(face);
     let first = face.iter().position(|corner| *corner == sorted[0]).unwrap_or(0);
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_tets_have_six_faces_to_the_outside_whichever_way_they_turn() {
+    fn two_tets_have_six_boundary_faces_in_either_orientation() {
         let points =
             [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]].map(|p: Vec3| p);
         for tets in [[[0, 1, 2, 3], [1, 2, 3, 4]], [[1, 0, 2, 3], [2, 1, 3, 4]]] {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_boundary() {
+    fn no_tets_have_no_boundary() {
         assert_eq!(boundary(&[], &[]), []);
     }
 

@@ -1,4 +1,4 @@
-//! A surface that is known to be closed, in order, and around a volume.
+//! A surface that has been verified: closed, consistently oriented, not self-intersecting.
 
 use numerics::vector::to_f64;
 use rayon::prelude::*;
@@ -11,22 +11,22 @@ use super::shells::{Shells, pieces, turned};
 use super::surface_fault::SurfaceFault;
 use numerics::tree::TriangleTree;
 
-/// A closed surface around one or several bodies, repaired where that was asked for.
+/// A closed surface around one or several bodies, repaired if that was requested.
 #[derive(Clone, Debug)]
 pub struct ClosedSurface {
-    /// The point that came in as each, rising.
+    /// For each point, its index in the input, ascending.
     pub source_points: Vec<u32>,
-    /// The face that came in as each, rising.
+    /// For each face, its index in the input, ascending.
     pub source_faces: Vec<u32>,
     /// First corner of each face, and the number of corners at the end.
     pub starts: Vec<u32>,
-    /// Point of each corner, counter-clockwise from outside the bodies.
+    /// Point of each corner, counter-clockwise seen from outside the bodies.
     pub corners: Vec<u32>,
     /// Positions, metres.
     pub points: Vec<[f32; 3]>,
-    /// What was changed.
+    /// Repairs that were made.
     pub changes: RepairCounts,
-    /// Bodies it bounds.
+    /// Number of bodies.
     pub bodies: usize,
     pub(super) grid: SnapGrid,
     pub(super) grid_points: Vec<GridPoint>,
@@ -37,17 +37,15 @@ pub struct ClosedSurface {
 }
 
 impl ClosedSurface {
-    /// The surface, if it is closed, in order and nowhere crosses itself; else, where `repair` says so and it is safe,
-    /// put in order: points at one place joined where the surface hangs together there, points without a face and faces
-    /// without three points or on another's points dropped, faces turned to look away from the bodies. Closed shells
-    /// within another wall off cavities, however they look, and shells within those are bodies again. A surface without a
-    /// face, or with faces that all are one point, is closed around nothing.
+    /// Verifies a surface: closed, consistently oriented, without self-intersections. With `repair`, safe repairs are
+    /// made first: duplicate points are merged where the surface is open or already connected, points without a face,
+    /// faces with fewer than three points and duplicate faces are dropped, and faces are flipped to face away from
+    /// the bodies. Closed shells within another one bound cavities, whatever their orientation, and shells within
+    /// those are bodies again. A surface without faces, or with only degenerate ones, is closed around nothing.
     ///
-    /// # Errors
-    /// The first thing found that is wrong and cannot, or must not, be repaired.
+    /// # Errors The first fault that cannot, or may not, be repaired.
     ///
-    /// # Panics
-    /// Where a corner is out of range, or there are 2³² corners.
+    /// # Panics If a corner is out of range, or there are 2³² corners.
     pub fn of(surface: &PolygonSurface, repair: bool) -> Result<Self, SurfaceFault> {
         if let Some(point) = surface.points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
             return Err(SurfaceFault::NotFinite { point: point as u32 });
@@ -94,19 +92,19 @@ impl ClosedSurface {
         &self.corners[self.starts[face] as usize..self.starts[face + 1] as usize]
     }
 
-    /// Every edge once, its lower point first, sorted.
+    /// Each edge once, lower point first, sorted.
     pub fn edges(&self) -> Vec<[u32; 2]> {
         edges(&self.starts, &self.corners)
     }
 
-    /// Mean length of the edges, metres; 0 without one.
+    /// Mean length of the edges, metres; 0 without edges.
     pub fn mean_edge(&self) -> f64 {
         let edges = self.edges();
         let length = |[a, b]: &[u32; 2]| (to_f64(self.points[*a as usize]) - to_f64(self.points[*b as usize])).norm();
         edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64
     }
 
-    /// Longest side of a triangle, steps of the lattice.
+    /// Longest side of a triangle, in grid steps.
     pub(super) fn longest_side(&self, triangle: u32) -> f64 {
         let corners = self.shells.triangles[triangle as usize].map(|corner| self.grid_points[corner as usize]);
         let square = |k: usize| {
@@ -116,7 +114,7 @@ impl ClosedSurface {
         square(0).max(square(1)).max(square(2)).sqrt()
     }
 
-    /// Volume between the faces, m³.
+    /// Enclosed volume, m³.
     pub fn volume(&self) -> f64 {
         let Some(origin) = self.points.first().map(|point| to_f64(*point)) else { return 0.0 };
         let from_origin = |corner: u32| to_f64(self.points[corner as usize]) - origin;
@@ -128,7 +126,7 @@ impl ClosedSurface {
     }
 }
 
-/// The points that polygons have, and the number of each among those.
+/// The points used by polygons, and their new indices.
 fn kept(polygons: &Polygons, points: usize) -> (Vec<u32>, Vec<u32>) {
     let mut name = vec![u32::MAX; points];
     polygons.corners.iter().for_each(|corner| name[*corner as usize] = 0);
@@ -137,7 +135,7 @@ fn kept(polygons: &Polygons, points: usize) -> (Vec<u32>, Vec<u32>) {
     (kept, name)
 }
 
-/// Corners by their points' new names, turned where they are to be; the first corner stays the first.
+/// Corners with new point indices, reversed for flipped polygons; the first corner stays first.
 fn corners(polygons: &Polygons, pieces: &[(u32, bool)], name: &[u32]) -> Vec<u32> {
     let mut corners: Vec<u32> = polygons.corners.iter().map(|corner| name[*corner as usize]).collect();
     for (run, _) in polygons.starts.windows(2).zip(pieces).filter(|(_, (_, turned))| *turned) {

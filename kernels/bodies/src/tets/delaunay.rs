@@ -1,39 +1,40 @@
-//! Delaunay tets of places on the lattice: incremental insertion (Bowyer 1981, Watson 1981).
+//! Delaunay tetrahedralisation of grid points by incremental insertion (Bowyer 1981, Watson 1981).
 //!
-//! Promise: every tet is positive, and no place lies strictly inside the sphere around one, by exact predicates; the tets
-//! fill the convex hull. The same places in the same order give the same tets. Where more than four places lie on one
-//! sphere and none in it, the order of insertion, which is fixed, picks one of the ways to cut them. Limit: one thread;
+//! With exact predicates every tet is positive, no point lies strictly inside the circumsphere of a tet, and the tets
+//! fill the convex hull. The same points in the same order give the same tets; where more than four points are
+//! cospherical, the fixed insertion order selects one of the possible tetrahedralisations. Limits: single-threaded;
 //! fewer than 2³⁰ tets.
 //!
-//! The outside is tets too: each hull face has one whose fourth corner is [`GHOST`]. A new place takes out all tets whose
-//! sphere it is strictly inside of (of a ghost: whose face it is strictly beyond, or on whose plane and in whose circle);
-//! they are one piece, and its boundary sees the place and, spheres being open, lies with no face on a plane with it, so
-//! joined to it makes positive tets.
+//! The exterior is covered by ghost tets: one for each hull face, with [`GHOST`] as its fourth corner. A new point
+//! removes all tets with the point strictly inside their circumsphere (for a ghost: strictly beyond its face, or
+//! coplanar with it and inside its circumcircle). They form a connected cavity, whose boundary is visible from the
+//! point; as spheres are open, no boundary face is coplanar with it, so connecting them to the point gives positive
+//! tets.
 
 use super::boundary::FACES;
 use super::grid::GridPoint;
 use super::insertion_order::insertion_order;
 use super::predicates::{At, in_sphere, orient};
 
-/// What [`delaunay`] returns.
+/// Result of [`delaunay`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delaunay {
-    /// Indices of the places of each tet: (b−a)×(c−a)·(d−a) > 0. None where all places lie on a plane.
+    /// Point indices of each tet, with (b−a)×(c−a)·(d−a) > 0. Empty if all points are coplanar.
     pub tets: Vec<[u32; 4]>,
-    /// The tet across from each corner of each tet; [`NONE`] beyond the hull.
+    /// The neighbour opposite to each corner of each tet; [`NONE`] beyond the hull.
     pub across: Vec<[u32; 4]>,
-    /// Places that are on an earlier one: theirs and its index. No tet has them.
+    /// Duplicate points: the index of each and of the earlier point at the same position. No tet uses them.
     pub doubled: Vec<[u32; 2]>,
 }
 
 /// No tet.
 pub const NONE: u32 = u32::MAX;
 
-/// The Delaunay tets of `places`, whose coordinates lie from 0 to [`super::lattice::SIDE`].
+/// Tetrahedralises `points`, with coordinates from 0 to [`super::grid::SIDE`].
 pub fn delaunay(points: &[GridPoint]) -> Delaunay {
     let mut order = insertion_order(points);
     let Some(first) = first_tet(points, &order) else { return Delaunay::default() };
-    // The first tet's corners are inserted before all else.
+    // The corners of the first tet are inserted before everything else.
     for (k, point) in first.into_iter().enumerate() {
         let found = order.iter().position(|index| *index == point).expect("the corners are places");
         order[k..=found].rotate_right(1);
@@ -48,13 +49,13 @@ pub fn delaunay(points: &[GridPoint]) -> Delaunay {
     complex.finish(&order, doubled)
 }
 
-/// Four places that are the corners of a positive tet, the earliest that are in `order`.
+/// The first four points in `order` that form a tet, positively oriented.
 fn first_tet(points: &[GridPoint], order: &[u32]) -> Option<[u32; 4]> {
     let at = |index: &u32| At::from(points[*index as usize].map(f64::from));
     let mut rest = order.iter();
     let a = rest.next()?;
     let b = rest.find(|b| at(b) != at(a))?;
-    // On a line with a and b: below all three planes through it along an axis, so all minors are exactly 0.
+    // Collinear with a and b: all 2 × 2 minors are exactly 0.
     let on_line = |c: &u32| {
         let (u, v) = (at(b) - at(a), at(c) - at(a));
         [(0, 1), (1, 2), (2, 0)].iter().all(|(i, j)| u[*i] * v[*j] == u[*j] * v[*i])
@@ -65,19 +66,19 @@ fn first_tet(points: &[GridPoint], order: &[u32]) -> Option<[u32; 4]> {
     Some(if positive { [*a, *b, *c, *d] } else { [*a, *c, *b, *d] })
 }
 
-/// The vertex at infinity; places are vertices from 1 on, in the order of insertion.
+/// The vertex at infinity; points are vertices from 1 on, in insertion order.
 const GHOST: u32 = 0;
 
-/// The corner of a dead tet.
+/// Corner of a removed tet.
 const DEAD: u32 = u32::MAX;
 
-/// A face of a tet: four times the tet, plus the corner it is across from.
+/// A face of a tet: four times the tet, plus the opposite corner.
 type Face = u32;
 
-/// A cavity with more vertices than this is joined by sorting its edges.
+/// The new tets of a cavity with more vertices than this are linked by sorting its edges.
 const MOST_LOCAL: usize = 64;
 
-/// A face of the cavity: the tet that the new place makes of it, the place's corner there, and the face beyond.
+/// A boundary face of the cavity: the new tet on it, the new point's corner there, and the face on the other side.
 struct Rim {
     corners: [u32; 4],
     corner: u32,
@@ -88,24 +89,25 @@ struct Complex {
     at: Vec<At>,
     corners: Vec<[u32; 4]>,
     across: Vec<[Face; 4]>,
-    /// Of each tet: `stamp` where the place being inserted takes it out, `stamp` + 1 where it does not, less before.
+    /// For each tet `stamp` if the current point removes it, `stamp` + 1 if it does not, a smaller number if that is
+    /// not known yet.
     seen: Vec<u32>,
     stamp: u32,
-    /// Places of dead tets, to be used again.
+    /// Slots of removed tets, for reuse.
     free: Vec<u32>,
-    /// Where the next walk starts: a tet that was made last.
+    /// Start of the next walk: a recently created tet.
     last: u32,
     cavity: Vec<u32>,
     rim: Vec<Rim>,
-    /// Of each vertex: for which place it was numbered among the rim's vertices, and how.
+    /// For each vertex the last cavity in which it got a local number, and that number.
     local: Vec<[u32; 2]>,
-    /// At local vertices u and v: the face of a new tet that has the rim's edge from u to v.
+    /// For local vertices u and v, the face of a new tet at the cavity's boundary edge from u to v.
     table: Vec<Face>,
     edges: Vec<(u64, Face)>,
 }
 
 impl Complex {
-    /// The tet of the first four places, and its four ghosts.
+    /// The tet of the first four points, and its four ghosts.
     fn of(points: &[GridPoint], order: &[u32]) -> Self {
         let mut at = vec![At::zeros()];
         at.extend(order.iter().map(|index| At::from(points[*index as usize].map(f64::from))));
@@ -126,7 +128,7 @@ impl Complex {
         };
         let first = [1, 2, 3, 4];
         complex.push(first);
-        // Ghost k lies across from corner k: its corner there is the ghost, and two others trade places.
+        // Ghost k is opposite to corner k: the corner becomes the ghost vertex, and two others are swapped.
         for k in 0..4 {
             let mut ghost = first;
             ghost[k] = GHOST;
@@ -165,7 +167,7 @@ impl Complex {
         [a, b, c, d].map(|vertex| &self.at[vertex as usize])
     }
 
-    /// Whether the place `p` takes a tet out.
+    /// Whether the point `p` removes a tet.
     #[inline(always)]
     fn conflicts(&self, tet: u32, p: &At) -> bool {
         let corners = self.corners[tet as usize];
@@ -177,14 +179,15 @@ impl Complex {
         if beyond != 0.0 {
             return beyond > 0.0;
         }
-        // On the face's plane, the sphere of the tet behind it cuts the face's circle out.
+        // In the plane of the face, the circumsphere of the tet behind it intersects in the circumcircle.
         let behind = self.corners[(self.across[tet as usize][ghost] / 4) as usize];
         let [a, b, c, d] = self.of_vertices(behind);
         in_sphere(a, b, c, d, p) > 0.0
     }
 
-    /// The tet that has `p` in it or on its boundary, or a ghost whose face it is strictly beyond. Towards `p`, through
-    /// faces that it is beyond: in Delaunay tets no such walk returns (Edelsbrunner 1990).
+    /// The tet that contains `p` in its interior or boundary, or a ghost whose face `p` is strictly beyond. Walks
+    /// through faces that separate the tet from `p`, which terminates in a Delaunay tetrahedralisation (Edelsbrunner
+    /// 1990).
     fn locate(&self, p: &At) -> u32 {
         let mut tet = self.last;
         if let Some(ghost) = self.corners[tet as usize].iter().position(|vertex| *vertex == GHOST) {
@@ -204,7 +207,7 @@ impl Complex {
         }
     }
 
-    /// Inserts the place of a vertex, or says which vertex is on it already.
+    /// Inserts a vertex, or returns the vertex that is already at its position.
     fn insert(&mut self, vertex: u32) -> Option<u32> {
         let p = self.at[vertex as usize];
         let start = self.locate(&p);
@@ -217,7 +220,7 @@ impl Complex {
         None
     }
 
-    /// Finds all tets that `vertex` at `p` takes out, and the rim around them.
+    /// Finds the cavity of `vertex` at `p`, and its boundary.
     fn dig(&mut self, start: u32, vertex: u32, p: &At) {
         self.stamp += 2;
         self.cavity.clear();
@@ -246,7 +249,7 @@ impl Complex {
         }
     }
 
-    /// Puts a tet on each face of the rim, in the places of those taken out.
+    /// Connects the cavity's boundary to the new point, reusing removed slots.
     fn fill(&mut self) {
         let rim = std::mem::take(&mut self.rim);
         let before = self.free.len();
@@ -278,7 +281,7 @@ impl Complex {
         for (Rim { corners, corner, .. }, tet) in rim.iter().zip(&self.cavity) {
             for [from, to, across] in edges(*corner as usize) {
                 let [from, to] = [from, to].map(|corner| self.local[corners[corner] as usize][1] as usize);
-                // The rim is a closed surface: its other face at this edge runs along it from `to` to `from`.
+                // The cavity's boundary is closed: the other face at this edge runs from `to` to `from`.
                 self.across[*tet as usize][across] = if small {
                     self.table[to * MOST_LOCAL + from]
                 } else {
@@ -294,7 +297,7 @@ impl Complex {
         self.rim = rim;
     }
 
-    /// Numbers the vertices of the rim; whether they are few.
+    /// Numbers the vertices of the cavity's boundary; returns whether they are few.
     fn number(&mut self, rim: &[Rim]) -> bool {
         let mut count = 0;
         for Rim { corners, corner, .. } in rim {
@@ -309,7 +312,7 @@ impl Complex {
         count as usize <= MOST_LOCAL
     }
 
-    /// The tets that are no ghosts, by the places' own indices.
+    /// The tets without ghosts, with the indices of the input points.
     fn finish(self, order: &[u32], doubled: Vec<[u32; 2]>) -> Delaunay {
         let lives = |corners: &[u32; 4]| corners[0] != DEAD && !corners.contains(&GHOST);
         let mut named = vec![NONE; self.corners.len()];
@@ -328,15 +331,15 @@ impl Complex {
     }
 }
 
-/// The orientation of a tet with `p` at one of its corners.
+/// Orientation of a tet with one corner replaced by `p`.
 #[inline(always)]
 fn side<'a>(mut tet: [&'a At; 4], corner: usize, p: &'a At) -> f64 {
     tet[corner] = p;
     orient(tet[0], tet[1], tet[2], tet[3])
 }
 
-/// The edges of the face across from a corner: from, to, and the third corner, which the new tets' faces at the edge are
-/// across from.
+/// The edges of the face opposite to a corner: both ends and the third corner, which is opposite to the new tets'
+/// faces at the edge.
 #[inline(always)]
 fn edges(corner: usize) -> [[usize; 3]; 3] {
     let [a, b, c] = FACES[corner];

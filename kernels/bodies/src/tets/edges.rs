@@ -1,12 +1,13 @@
-//! Edges of a surface, and which of them tets lack.
+//! Edges of a surface, and which of them are not edges of tets.
 //!
-//! The Delaunay tets of a surface's points have most of its edges, not all. Nothing keeps a list of the others: whoever
-//! needs them (a soft body makes springs of them) has the surface and its tets, and asks [`missing_edges`].
+//! The Delaunay tets of a surface's points have most of its edges, but not all. The missing ones are not stored:
+//! users that need them (soft bodies turn them into springs) have the surface and the tets and call
+//! [`missing_edges`].
 
 use rayon::prelude::*;
 
-/// Every edge of polygons once, its lower point first, sorted. `starts` are the first corner of each polygon and the
-/// number of corners, `corners` the points.
+/// Each edge of polygons once, lower point first, sorted. `starts` are the first corner of each polygon and the
+/// number of corners, `corners` their points.
 pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
     let sides = |run: &[u32]| {
         let corners = &corners[run[0] as usize..run[1] as usize];
@@ -21,14 +22,14 @@ pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
     edges
 }
 
-/// Those of `edges` that are no edge of a tet, in their order.
+/// Those of `edges` that no tet has, in the same order.
 pub fn missing_edges(edges: &[[u32; 2]], tets: &[[u32; 4]]) -> Vec<[u32; 2]> {
     let points = edges.as_flattened().iter().max().map_or(0, |highest| *highest as usize + 1);
     let around = TetsAround::new(points, tets);
     edges.par_iter().filter(|edge| !around.has(*edge)).copied().collect()
 }
 
-/// The tets around each of the first points.
+/// Tets incident to each of the first points.
 pub(super) struct TetsAround<'a> {
     tets: &'a [[u32; 4]],
     /// First entry in `members` of each point, and their number at the end.
@@ -55,12 +56,12 @@ impl<'a> TetsAround<'a> {
         Self { tets, starts, members }
     }
 
-    /// The tets that have a point.
+    /// The tets incident to a point.
     pub(super) fn of(&self, point: u32) -> &[u32] {
         &self.members[self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize]
     }
 
-    /// Whether a tet has all these points.
+    /// Whether some tet has all these points.
     pub(super) fn has(&self, points: &[u32]) -> bool {
         let mut tets = self.of(points[0]).iter().map(|tet| self.tets[*tet as usize]);
         tets.any(|tet| points.iter().all(|point| tet.contains(point)))
@@ -72,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quads_diagonals_are_no_edges_and_what_no_tet_has_is_missing() {
+    fn diagonals_of_quads_are_not_edges_and_edges_of_no_tet_are_missing() {
         let edges = edges(&[0, 4, 7], &[0, 1, 2, 3, 1, 4, 2]);
         assert_eq!(edges, [[0, 1], [0, 3], [1, 2], [1, 4], [2, 3], [2, 4]]);
         assert_eq!(missing_edges(&edges, &[[0, 1, 2, 9]]), [[0, 3], [1, 4], [2, 3], [2, 4]]);

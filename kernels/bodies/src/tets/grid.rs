@@ -1,26 +1,26 @@
-//! The lattice that points are brought to, so that predicates are exact.
+//! The integer grid to which points are snapped, so that predicates are exact.
 //!
-//! Promise: the step is a power of two and the lattice's planes pass through the world's origin, so a coordinate that is
-//! a multiple of the step stays what it is, and scaling by a power of two changes no place. Limit: any other point moves
-//! by up to half a step, between 2⁻²⁵ and 2⁻²⁴ of the longest side of all bounds.
+//! The step is a power of two and grid planes pass through the world origin. Coordinates that are multiples of the
+//! step are therefore exact, and scaling by a power of two changes nothing. Limit: other points move by up to half a
+//! step, between 2⁻²⁵ and 2⁻²⁴ of the longest side of the bounding box.
 
-/// A place on the lattice: three numbers from 0 to [`SIDE`].
+/// Grid coordinates, from 0 to [`SIDE`].
 pub type GridPoint = [i32; 3];
 
-/// The largest coordinate of a place.
+/// The largest grid coordinate.
 pub const SIDE: i32 = 1 << 24;
 
-/// Where places lie in the world.
+/// Position and step of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SnapGrid {
-    /// Lowest place, in steps from the world's origin.
+    /// Origin of the grid, in steps from the world origin.
     low: [f64; 3],
-    /// Metres.
+    /// Step, metres.
     step: f64,
 }
 
 impl SnapGrid {
-    /// The finest lattice that holds all points. `None` where one is not finite, or none is there.
+    /// The finest grid that covers all points. `None` without points, or if one is not finite.
     pub fn around(points: &[[f32; 3]]) -> Option<Self> {
         let (first, rest) = points.split_first()?;
         let wide = |p: &[f32; 3]| p.map(f64::from);
@@ -45,7 +45,7 @@ impl SnapGrid {
         Some(if fits(&fine) { fine } else { at(exponent - 23) })
     }
 
-    /// The lattice of nothing.
+    /// A grid for no points.
     pub(super) fn unit() -> Self {
         Self { low: [0.0; 3], step: 1.0 }
     }
@@ -55,28 +55,28 @@ impl SnapGrid {
         self
     }
 
-    /// Steps from the lowest place, rounded.
+    /// Grid coordinates before clamping.
     fn steps(&self, p: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| (p[axis] / self.step).round_ties_even() - self.low[axis])
     }
 
-    /// The place nearest to a point; one of the sides where the point is beyond.
+    /// The nearest grid point, clamped to the grid.
     pub fn grid_point(&self, point: [f64; 3]) -> GridPoint {
         self.steps(point).map(|steps| steps.clamp(0.0, f64::from(SIDE)) as i32)
     }
 
-    /// Where a place is, metres.
+    /// World position of grid coordinates, metres.
     pub fn point(&self, grid_point: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| (self.low[axis] + grid_point[axis]) * self.step)
     }
 
-    /// Metres from a place to the next.
+    /// Step of the grid, metres.
     pub fn step(&self) -> f64 {
         self.step
     }
 }
 
-/// 2 to the `exponent`, a normal number: points are f32, so it lies between −180 and 130.
+/// 2 to the `exponent`, which lies between −180 and 130 as points are f32.
 fn power_of_two(exponent: i64) -> f64 {
     f64::from_bits(((exponent + 1023) as u64) << 52)
 }
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_box_of_a_power_of_two_has_all_24_bits_and_exact_places() {
+    fn a_power_of_two_box_uses_all_24_bits_exactly() {
         let grid = SnapGrid::around(&[[0.0; 3], [1.0; 3]]).unwrap();
         assert_eq!(grid.step(), 1.0 / f64::from(SIDE));
         assert_eq!(grid.grid_point([1.0, 0.5, 0.0]), [SIDE, SIDE / 2, 0]);
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn places_fit_and_are_within_half_a_step_whatever_the_scale() {
+    fn snapping_moves_points_by_at_most_half_a_step_at_any_scale() {
         for scale in [1e-44_f32, 1e-38, 1e-6, 1.0, 1e6, 3e38] {
             let points = [[-0.3 * scale, 0.1 * scale, 0.7 * scale], [0.9 * scale, 0.11 * scale, 0.0]];
             let grid = SnapGrid::around(&points).unwrap();
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn one_point_or_a_heap_has_a_lattice_and_no_point_or_a_nan_has_none() {
+    fn coinciding_points_have_a_grid_and_no_points_or_nan_have_none() {
         assert_eq!(SnapGrid::around(&[[5.0, 0.0, -1.0]; 3]).unwrap().grid_point([5.0, 0.0, -1.0]), [0; 3]);
         assert_eq!(SnapGrid::around(&[]), None);
         assert_eq!(SnapGrid::around(&[[0.0; 3], [0.0, f32::NAN, 0.0]]), None);

@@ -1,18 +1,17 @@
-//! In which order points are inserted: rounds, each twice as large as the one before and drawn from all points at random
-//! (Amenta, Choi & Rote 2003), within a round along Morton's curve. So a walk to the next point is short, and no input is
-//! slow.
+//! Biased randomised insertion order (Amenta, Choi & Rote 2003): rounds of doubling size drawn at random, each sorted
+//! along the Morton curve. Walks to the next point are short, and no input is slow.
 
 use super::grid::{GridPoint, SIDE};
 use numerics::random::Key;
 
-/// Any fixed number.
+/// An arbitrary constant.
 const SEED: u64 = 0x7e75;
 
-/// The indices of all places, in the order of insertion: the same for the same places, whatever the machine.
+/// Indices of all points in insertion order, which depends only on the points.
 pub(super) fn insertion_order(points: &[GridPoint]) -> Vec<u32> {
     let rounds = u64::from(usize::BITS - points.len().leading_zeros());
     let key = |(index, point): (usize, &GridPoint)| {
-        // Half of all points go last, a quarter before them, and so on.
+        // Half of all points come in the last round, a quarter in the one before, and so on.
         let later = u64::from(Key::new(SEED).of(index as u64).u64().trailing_zeros()).min(rounds);
         u128::from(rounds - later) << 96 | u128::from(morton(*point)) << 32 | index as u128
     };
@@ -21,7 +20,7 @@ pub(super) fn insertion_order(points: &[GridPoint]) -> Vec<u32> {
     keys.into_iter().map(|key| key as u32).collect()
 }
 
-/// The 21 highest bits of three coordinates in turns.
+/// Morton code of the 21 highest bits of each coordinate.
 fn morton(point: GridPoint) -> u64 {
     let [x, y, z] = point.map(|x| spread(x.min(SIDE - 1) as u64 >> 3));
     x | y << 1 | z << 2
@@ -41,14 +40,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bits_take_turns() {
+    fn morton_codes_interleave_bits() {
         assert_eq!(morton([8, 0, 0]), 0b001);
         assert_eq!(morton([8, 16, 24]), 0b110_101);
         assert_eq!(morton([SIDE; 3]), (1 << 63) - 1);
     }
 
     #[test]
-    fn every_place_comes_once_and_most_come_late() {
+    fn every_point_comes_once_and_half_in_the_last_round() {
         let points: Vec<GridPoint> = (0..1000).map(|k| [k, 0, 0]).collect();
         let order = insertion_order(&points);
         let mut sorted = order.clone();

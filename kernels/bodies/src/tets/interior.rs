@@ -1,8 +1,8 @@
-//! Points inside of bodies: a body-centred cubic lattice, each moved a little, all well away from the surface.
+//! Interior points: a jittered body-centred cubic lattice, at some distance from the surface.
 //!
-//! Such a lattice is its own Delaunay complex of equal tets, each with edges of two nearly equal lengths, and no five of
-//! its points are on an empty sphere, so a small move changes no tet. The moves take away the lattice's planes: springs
-//! in a dozen directions only would show.
+//! This lattice is its own Delaunay tetrahedralisation, with congruent tets of two nearly equal edge lengths. No
+//! empty sphere passes through five of its points, so a small jitter does not change the tets. It hides the lattice
+//! planes: springs in a dozen directions only would be visible.
 
 use rayon::prelude::*;
 
@@ -11,35 +11,35 @@ use super::grid::{GridPoint, SIDE};
 use super::winding::Winding;
 use numerics::random::Key;
 
-/// Side of a lattice's cube by mean length of its edges: 8 of √3⁄2 sides and 6 of one side meet in a point.
+/// Side of the lattice's cube ÷ mean edge length: at each point 8 edges of √3⁄2 sides and 6 of one side meet.
 pub(super) const SIDE_BY_EDGE: f64 = 14.0 / (4.0 * 1.732_050_807_568_877_2 + 6.0);
 
-/// Points a cube.
+/// Lattice points in a cube.
 pub(super) const POINTS_A_CUBE: f64 = 2.0;
 
-/// How far points stay from the surface, by the mean length of their edges or the longest side of the nearest triangle:
-/// nearer, tets at the surface become flat and the triangle may no longer be a face of theirs; farther, they become long.
+/// Clearance from the surface, relative to the mean edge length or the longest side of the nearest triangle. With
+/// less, tets at the surface become flat and may miss the triangle as a face; with more, they become elongated.
 const CLEAR: f64 = 0.5;
 
-/// Triangles longer than this many mean edges count as this long: what has few faces is filled too.
+/// Triangles count as at most this many mean edges long, so that coarse surfaces get interior points too.
 const LONGEST: f64 = 2.0;
 
-/// How far a point is moved along each axis at most, by the side of a cube.
+/// Largest jitter along each axis, relative to the side of a cube.
 const MOVE: f64 = 0.05;
 
-/// Any fixed number.
+/// An arbitrary constant.
 const SEED: u64 = 0xbcc;
 
-/// A point inside of a body.
+/// An interior point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InteriorPoint {
     pub(super) grid_point: GridPoint,
-    /// No surface is nearer than this, in steps of the lattice.
+    /// Distance from the surface, in grid steps; possibly larger.
     pub(super) clear: f32,
     pub(super) body: u32,
 }
 
-/// All points of the lattice with edges `spacing` (steps) long on average that are inside of a body.
+/// All interior lattice points for a mean edge length of `spacing` grid steps.
 pub(super) fn interior(closed: &ClosedSurface, winding: &Winding, spacing: f64) -> Vec<InteriorPoint> {
     if closed.grid_points.is_empty() {
         return Vec::new();
@@ -49,7 +49,7 @@ pub(super) fn interior(closed: &ClosedSurface, winding: &Winding, spacing: f64) 
         closed.grid_points.iter().fold(([SIDE; 3], [0; 3]), |(low, high): (GridPoint, GridPoint), grid_point| {
             ([0, 1, 2].map(|k| low[k].min(grid_point[k])), [0, 1, 2].map(|k| high[k].max(grid_point[k])))
         });
-    // Cubes to either side of the bounds' middle, so that what is symmetric is cut so.
+    // The lattice is centred on the bounds, so that symmetric bodies are filled symmetrically.
     let reach = [0, 1, 2].map(|k| (0.5 * f64::from(high[k] - low[k]) / side).ceil() as i64);
     let middle = [0, 1, 2].map(|k| 0.5 * f64::from(high[k] + low[k]));
     let layer = |z: i64| {
@@ -79,7 +79,7 @@ pub(super) fn interior(closed: &ClosedSurface, winding: &Winding, spacing: f64) 
     (-reach[2]..reach[2] + 1).into_par_iter().flat_map_iter(layer).collect()
 }
 
-/// Distance of a place from the surface, as far as it matters, and how much it should be. Steps.
+/// Distance from the surface, as far as it matters, and the required clearance, in grid steps.
 fn clearance(closed: &ClosedSurface, grid_point: GridPoint, spacing: f64) -> (f64, f64) {
     let reach = SIDE_BY_EDGE.max(CLEAR * LONGEST) * spacing;
     match closed.tree.closest(grid_point.map(|x| x as f32), reach as f32) {

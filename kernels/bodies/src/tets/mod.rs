@@ -1,17 +1,17 @@
-//! Tets that fill closed surfaces: springs all through a body, not on its skin alone.
+//! Filling closed surfaces with tets, so that springs run throughout a body, not only along its surface.
 //!
-//! A surface's polygons are brought into order ([`Closed::of`]): joined, turned outwards, cavities told from bodies, and
-//! refused, with the place, where they have no inside. Then each body is filled ([`Closed::fill`]): points on a regular
-//! lattice inside, the Delaunay tets of those and of the surface's points ([`delaunay()`]), and of these the ones whose
-//! middle the surface winds around.
+//! First the polygons are verified ([`ClosedSurface::of`]): points merged, faces oriented, cavities distinguished
+//! from bodies, and surfaces without an inside refused with the location of the fault. Then each body is filled
+//! ([`ClosedSurface::fill`]): interior points on a regular lattice, the Delaunay tets of these and the surface points
+//! ([`delaunay()`]), and of those the tets whose centroid is inside by winding number.
 //!
-//! Promise: points are brought to a lattice of 24 bits for every decision, which is then exact; so it is the same on any
-//! CPU and for any number of threads, and no input makes it loop or fail. The surface's points keep their bits and their
-//! order. No tet reaches from one body to another.
+//! Decisions are made on points snapped to a 24-bit integer grid and are exact; results do not depend on CPU or
+//! number of threads, and no input can cause an endless loop or a failure. The surface points keep their bits and
+//! order. No tet connects different bodies.
 //!
-//! Limit: tets are Delaunay, so where the surface is not (long thin faces, sheets nearer to each other than their faces
-//! are wide) they lack some of its faces and edges: [`Measured`] says how many, what volume it costs, and
-//! [`missing_edges`] which. Details below 2⁻²⁴ of the bounds are lost.
+//! Limit: the tets are Delaunay, so where the surface is not (long thin faces, sheets closer together than their
+//! faces are wide) some of its faces and edges are missing. [`FillQuality`] counts them and gives the volume error,
+//! [`missing_edges`] lists the edges. Details below 2⁻²⁴ of the bounding box are lost.
 
 mod boundary;
 mod closed;

@@ -1,25 +1,26 @@
-//! On which side of a plane, in or out of a sphere: exact on the lattice.
+//! Exact geometric predicates on grid points.
 //!
-//! Promise: the sign of what is returned is exact for places as f64 (whole numbers from 0 to 2²⁴); its magnitude is
-//! approximate. Differences of places have 24 bits, 2 × 2 minors 49 and squared distances 50, all exact in f64; what is
-//! rounded after them is bounded, and where the bound decides nothing, whole numbers of 128 bits do.
+//! The sign of the result is exact for grid coordinates as f64 (integers from 0 to 2²⁴), its magnitude approximate.
+//! Differences have 24 bits, 2 × 2 minors 49 and squared distances 50, all exact in f64. The rounding of later
+//! operations is bounded, and where the bound is not decisive, 128-bit integers are used.
 
 use numerics::vector::DVec3;
 
-/// A place as f64.
+/// A grid point as f64.
 pub(crate) type At = DVec3;
 
-/// Above the rounding of [`orient`]: three products below 2⁷³ and two sums below 2⁷⁵, each off by 2⁻⁵³ of itself.
+/// Above the rounding of [`orient`]: three products below 2⁷³ and two sums below 2⁷⁵, each with a relative error of
+/// 2⁻⁵³.
 const ORIENT_ROUNDING: f64 = (1_u64 << 24) as f64;
 
-/// Above the rounding of [`in_sphere`] for differences of up to 2²⁴: minors off by 2²⁴ times squares below 2⁵⁰, and
-/// products and sums below 2¹²⁷ off by 2⁻⁵³ of themselves.
+/// Above the rounding of [`in_sphere`] for differences up to 2²⁴: minors with errors of 2²⁴ times squares below 2⁵⁰,
+/// and products and sums below 2¹²⁷ with a relative error of 2⁻⁵³.
 const SPHERE_ROUNDING: f64 = (1_u128 << 77) as f64;
 
-/// The same for differences of up to m, as a share of m⁵: the determinant is of degree 5.
+/// The same for differences up to m, relative to m⁵: the determinant is of degree 5.
 const SPHERE_SHARE: f64 = SPHERE_ROUNDING / (1_u128 << 120) as f64;
 
-/// (b−a)×(c−a)·(d−a): six times the volume of a tet, positive where `d` sees `abc` clockwise.
+/// (b−a)×(c−a)·(d−a), six times the volume of a tet; positive if `abc` runs clockwise seen from `d`.
 #[inline(always)]
 pub(crate) fn orient(a: &At, b: &At, c: &At, d: &At) -> f64 {
     let (b, c, d) = (b - a, c - a, d - a);
@@ -35,7 +36,7 @@ fn orient_exactly(b: At, c: At, d: At) -> f64 {
     (term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)) as f64
 }
 
-/// Positive where `e` is inside the sphere around the positive tet `abcd`, 0 on it.
+/// Positive if `e` is inside the circumsphere of the positive tet `abcd`, 0 if it is on it.
 #[inline(always)]
 pub(crate) fn in_sphere(a: &At, b: &At, c: &At, d: &At, e: &At) -> f64 {
     let rows = [a - e, b - e, c - e, d - e];
@@ -50,7 +51,7 @@ pub(crate) fn in_sphere(a: &At, b: &At, c: &At, d: &At, e: &At) -> f64 {
     if det.abs() > SPHERE_ROUNDING { det } else { in_small_sphere(&rows, det) }
 }
 
-/// A bound that fits the size of the differences; else the exact sum.
+/// Decides by a bound for the actual size of the differences, else exactly.
 #[inline(never)]
 fn in_small_sphere(rows: &[At; 4], det: f64) -> f64 {
     let m = rows.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));

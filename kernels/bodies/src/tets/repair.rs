@@ -1,58 +1,58 @@
-//! A surface's polygons brought into order: points at one place joined, faces that bound nothing dropped.
+//! Safe repairs of a polygon surface: merging duplicate points, dropping faces that bound nothing.
 //!
-//! What is safe: a step here never opens a closed surface, and moves no point. So a face without area stays as long as
-//! its corners are different points: its neighbours hang on it. Points at one place are joined where an edge is open
-//! there, as seams of textures leave them, and within what hangs together already; two bodies that touch stay two.
+//! A safe repair never opens a closed surface and moves no point. A face without area is therefore kept as long as
+//! its corners are different points, since its neighbours need it. Points at the same position are merged where an
+//! edge is open, as along texture seams, and within connected parts; two bodies that touch stay separate.
 
 use std::collections::BTreeMap;
 
 use super::grid::GridPoint;
 use super::surface_fault::SurfaceFault;
 
-/// A mesh's polygons.
+/// A polygon mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct PolygonSurface<'a> {
     /// First corner of each face, and the number of corners at the end.
     pub starts: &'a [u32],
-    /// Point of each corner, counter-clockwise from outside.
+    /// Point of each corner, counter-clockwise seen from outside.
     pub corners: &'a [u32],
     /// Positions, metres.
     pub points: &'a [[f32; 3]],
 }
 
-/// What was changed to bring a surface into order.
+/// Number of repairs of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RepairCounts {
-    /// Points joined with another at their place.
+    /// Points merged with another at the same position.
     pub joined_points: usize,
-    /// Points that had no face, or lost it.
+    /// Points dropped because they had no face, or lost it.
     pub loose_points: usize,
-    /// Faces dropped: of fewer than three points, or on the points of another.
+    /// Faces dropped: with fewer than three points, or duplicates.
     pub dropped_faces: usize,
-    /// Faces that lost a corner and stay.
+    /// Faces that lost a corner and were kept.
     pub trimmed_faces: usize,
-    /// Faces turned over.
+    /// Faces flipped.
     pub turned_faces: usize,
 }
 
 impl RepairCounts {
-    /// Whether nothing was changed.
+    /// Whether there were no repairs.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// All of them together.
+    /// Total number of repairs.
     pub fn count(&self) -> usize {
         self.joined_points + self.loose_points + self.dropped_faces + self.trimmed_faces + self.turned_faces
     }
 }
 
-/// Polygons on the way to a closed surface, with the points that came in.
+/// Polygons under repair, over the points of the input.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polygons {
     pub(super) starts: Vec<u32>,
     pub(super) corners: Vec<u32>,
-    /// The face that each was.
+    /// Input face of each polygon.
     pub(super) faces: Vec<u32>,
 }
 
@@ -75,7 +75,7 @@ impl Polygons {
         Self { starts: vec![0], ..Self::default() }
     }
 
-    /// Every side of every polygon: its ends, the lower first; the polygon; whether it runs from the lower. Sorted.
+    /// All sides of all polygons, sorted.
     pub(super) fn sides(&self) -> Vec<PolygonSide> {
         let mut sides = Vec::with_capacity(self.corners.len());
         for polygon in 0..self.len() {
@@ -94,7 +94,7 @@ impl Polygons {
     }
 }
 
-/// A side of a polygon.
+/// A side of a polygon: its ends, lower first, and whether it runs from the lower one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct PolygonSide {
     pub(super) ends: [u32; 2],
@@ -102,7 +102,7 @@ pub(super) struct PolygonSide {
     pub(super) rises: bool,
 }
 
-/// The surface in order, or the first thing that is not where `safe` repairs are not asked for.
+/// The repaired polygons, or the first fault unless `safe` repairs are allowed.
 pub(super) fn repaired_polygons(
     surface: &PolygonSurface,
     grid_points: &[GridPoint],
@@ -133,7 +133,7 @@ pub(super) fn repaired_polygons(
     Ok((polygons, changes))
 }
 
-/// Polygons of three points or more, none on another's points.
+/// Removes degenerate and duplicate polygons.
 fn tidied(polygons: Polygons, safe: bool, changes: &mut RepairCounts) -> Result<Polygons, SurfaceFault> {
     let before = polygons.len();
     let (polygons, trimmed) = trimmed(polygons);
@@ -149,7 +149,7 @@ fn tidied(polygons: Polygons, safe: bool, changes: &mut RepairCounts) -> Result<
     Ok(polygons)
 }
 
-/// Which point each is joined to; `None` where no two are at one place.
+/// For each point the one it is merged with; `None` if no two points coincide.
 fn joins(polygons: &Polygons, grid_points: &[GridPoint]) -> Option<Vec<u32>> {
     let mut order: Vec<u32> = (0..grid_points.len() as u32).collect();
     order.sort_unstable_by_key(|point| (grid_points[*point as usize], *point));
@@ -163,7 +163,7 @@ fn joins(polygons: &Polygons, grid_points: &[GridPoint]) -> Option<Vec<u32>> {
     for sides in polygons.sides().chunk_by(|a, b| a.ends == b.ends).filter(|sides| sides.len() != 2) {
         sides[0].ends.iter().for_each(|end| open[*end as usize] = true);
     }
-    // Which points hang together once the open ones are joined.
+    // Connected components after merging points at open edges.
     let mut pieces = SignedUnionFind::new(grid_points.len());
     for heap in &heaps {
         heap.iter().filter(|point| open[**point as usize]).fold(None, |first: Option<u32>, point| {
@@ -184,7 +184,7 @@ fn joins(polygons: &Polygons, grid_points: &[GridPoint]) -> Option<Vec<u32>> {
     Some(onto)
 }
 
-/// Polygons without what goes to a point and straight back, and the faces that had such a thing.
+/// Polygons without degenerate corners, and the faces that had any.
 fn trimmed(polygons: Polygons) -> (Polygons, Vec<u32>) {
     let mut left: Vec<u32> = Vec::new();
     let mut trim = |polygon: usize| {
@@ -221,8 +221,8 @@ fn trimmed(polygons: Polygons) -> (Polygons, Vec<u32>) {
     (kept, touched)
 }
 
-/// The first of all polygons that have the same corners in the same or the opposite order; and each pair of the first
-/// and another.
+/// The polygons without duplicates, which have the same corners in the same or opposite order; and the pairs of
+/// duplicates.
 fn once_each(polygons: Polygons) -> (Polygons, Vec<[u32; 2]>) {
     let sorted = |polygon: u32| {
         let mut corners = polygons.get(polygon as usize).to_vec();
@@ -260,9 +260,9 @@ fn once_each(polygons: Polygons) -> (Polygons, Vec<[u32; 2]>) {
     (kept, pairs)
 }
 
-/// Things that hang together, and which of them are turned against the others.
+/// Union-find with a sign: which elements are connected, and which of them are oriented oppositely.
 pub(super) struct SignedUnionFind {
-    /// Another of the same piece, lower or itself; whether this one is turned against it.
+    /// A lower element of the same set, or the element itself; and whether this one is oriented oppositely.
     towards: Vec<(u32, bool)>,
 }
 
@@ -271,7 +271,7 @@ impl SignedUnionFind {
         Self { towards: (0..count as u32).map(|k| (k, false)).collect() }
     }
 
-    /// The lowest of its piece, and whether it is turned against that.
+    /// The lowest element of the set, and whether this one is oriented oppositely.
     pub(super) fn root(&mut self, of: u32) -> (u32, bool) {
         let (mut at, mut turned) = (of, false);
         while self.towards[at as usize].0 != at {
@@ -284,10 +284,9 @@ impl SignedUnionFind {
         (at, turned)
     }
 
-    /// Joins two, turned against each other or not.
+    /// Connects two elements, with the same or opposite orientation.
     ///
-    /// # Errors
-    /// Where they are joined the other way already.
+    /// # Errors If they are already connected with the other orientation.
     pub(super) fn join(&mut self, a: u32, b: u32, turned: bool) -> Result<(), ()> {
         let ((a, a_turned), (b, b_turned)) = (self.root(a), self.root(b));
         let turned = turned ^ a_turned ^ b_turned;

@@ -1,7 +1,8 @@
-//! Whether faces of a surface pass through each other.
+//! Detection of self-intersections.
 //!
-//! Exact on the lattice: two triangles cross where a side of one passes through the inside of the other. What only
-//! touches, or lies in one plane, does not; shells that overlap so are found by what is inside of both.
+//! Exact on the grid: two triangles intersect if a side of one passes through the interior of the other. Triangles
+//! that only touch or are coplanar do not count; shells that overlap in this way are found later by their winding
+//! numbers.
 
 use rayon::prelude::*;
 
@@ -9,7 +10,7 @@ use super::grid::GridPoint;
 use super::predicates::{At, orient};
 use numerics::tree::TriangleTree;
 
-/// The first pair of triangles that cross, by index, and how many pairs do.
+/// The first pair of intersecting triangles, and the number of pairs.
 pub(super) fn crossing(
     grid_points: &[GridPoint],
     triangles: &[[u32; 3]],
@@ -24,7 +25,7 @@ pub(super) fn crossing(
         let (mut least, mut count) = (u32::MAX, 0);
         tree.visit_box(bound(i32::min), bound(i32::max), |block, lanes| {
             for (lane, other) in block.triangle.iter().enumerate() {
-                // Each pair once; what shares an edge meets there and, unless flat on each other, nowhere else.
+                // Each pair once; triangles with a common edge intersect only there, unless they are coplanar.
                 if lanes >> lane & 1 == 0 || *other as usize <= first {
                     continue;
                 }
@@ -50,13 +51,14 @@ fn triangles_cross(grid_points: &[GridPoint], a: [u32; 3], b: [u32; 3]) -> bool 
     pierces(&at_a, a_sides, &at_b) || pierces(&at_b, b_sides, &at_a)
 }
 
-/// On which side of a triangle's plane each corner of another lies; `None` where it does not reach both.
+/// Orientation of the corners of a triangle relative to the plane of another; `None` unless they are on both sides.
 fn sides(plane: &[At; 3], of: &[At; 3]) -> Option<[f64; 3]> {
     let sides = [0, 1, 2].map(|k| orient(&plane[0], &plane[1], &plane[2], &of[k]));
     (sides.iter().any(|side| *side > 0.0) && sides.iter().any(|side| *side < 0.0)).then_some(sides)
 }
 
-/// Whether a side of a triangle passes through the inside of another, given on which side of its plane the corners lie.
+/// Whether a side of a triangle passes through the interior of another, given the sides of its plane on which the
+/// corners lie.
 fn pierces(triangle: &[At; 3], sides: [f64; 3], through: &[At; 3]) -> bool {
     (0..3).any(|k| {
         let (from, to) = (k, (k + 1) % 3);

@@ -1,4 +1,4 @@
-//! The shells of a surface: closed, each looking outwards or into the cavity it walls off, and the bodies they bound.
+//! Shells: the closed components of a surface, their orientation and nesting, and the bodies they bound.
 
 use rayon::prelude::*;
 
@@ -8,16 +8,16 @@ use super::surface_fault::SurfaceFault;
 use super::winding::Winding;
 use numerics::triangulate::triangulate;
 
-/// A closed piece of the surface.
+/// A closed component of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Shell {
-    /// How many others it lies in. Even: the outside of a body; odd: the wall of a cavity.
+    /// Number of shells that contain it. Even: outer boundary of a body; odd: wall of a cavity.
     pub(super) depth: u32,
     /// The body it bounds, numbered by first faces.
     pub(super) body: u32,
 }
 
-/// The surface as triangles that all look away from the bodies.
+/// The surface as triangles that face away from the bodies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shells {
     pub(super) triangles: Vec<[u32; 3]>,
@@ -29,10 +29,10 @@ pub(super) struct Shells {
     pub(super) bodies: usize,
 }
 
-/// The shell of each polygon, from 0 in the order of their first faces, and whether it is turned against that face.
+/// The shell of each polygon, numbered by first faces, and whether the polygon is oriented opposite to the shell's
+/// first.
 ///
-/// # Errors
-/// Where an edge has not two faces, or a shell has one side only.
+/// # Errors If an edge does not have two faces, or a shell is not orientable.
 pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>, SurfaceFault> {
     let sides = polygons.sides();
     let edges = || sides.chunk_by(|a, b| a.ends == b.ends);
@@ -71,10 +71,9 @@ pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>
 }
 
 impl Shells {
-    /// Triangles of polygons whose shells and turns are known, each shell looking away from the space in it.
+    /// Triangulates the polygons and orients each shell away from its interior.
     ///
-    /// # Errors
-    /// Where a shell has no volume.
+    /// # Errors If a shell has no volume.
     pub(super) fn outward(
         polygons: &Polygons,
         pieces: &mut [(u32, bool)],
@@ -112,7 +111,7 @@ impl Shells {
         polygons.faces[self.polygons[first] as usize]
     }
 
-    /// Turns the triangles of polygons that are turned.
+    /// Flips the triangles of flipped polygons.
     fn turn(&mut self, pieces: &[(u32, bool)]) {
         for (triangle, polygon) in self.triangles.iter_mut().zip(&self.polygons) {
             if pieces[*polygon as usize].1 {
@@ -121,7 +120,7 @@ impl Shells {
         }
     }
 
-    /// Turns whole shells, and notes it in `pieces`.
+    /// Flips whole shells, and notes that in `pieces`.
     fn turn_whole(&mut self, pieces: &mut [(u32, bool)], which: impl Fn(u32) -> bool) {
         for (triangle, shell) in self.triangles.iter_mut().zip(&self.shell_of) {
             if which(*shell) {
@@ -131,14 +130,14 @@ impl Shells {
         pieces.iter_mut().filter(|(shell, _)| which(*shell)).for_each(|(_, turned)| *turned = !*turned);
     }
 
-    /// Finds which shells lie in which and turns the walls of cavities, so that each looks away from the body it bounds.
+    /// Determines the nesting of shells and flips the walls of cavities to face away from the body they bound.
     pub(super) fn nest(&mut self, pieces: &mut [(u32, bool)], grid_points: &[GridPoint]) {
         let within = self.within(grid_points);
         for (shell, others) in self.all.iter_mut().zip(&within) {
             shell.depth = others.len() as u32;
         }
-        // The wall of a cavity bounds the body of the deepest shell around it; shells of one depth that share a point,
-        // theirs together.
+        // The wall of a cavity bounds the body of the deepest shell around it; shells of equal depth that share a
+        // point bound the same body.
         let mut bodies = SignedUnionFind::new(self.all.len());
         let depth = |shell: u32| within[shell as usize].len();
         for (shell, others) in within.iter().enumerate().filter(|(_, others)| others.len() % 2 == 1) {
@@ -166,7 +165,7 @@ impl Shells {
         self.turn_whole(pieces, |shell| depth(shell) % 2 == 1);
     }
 
-    /// The shells that each shell lies in: where most of some of its triangles' middles are.
+    /// The shells that contain each shell: those that contain most of a sample of its triangles' centroids.
     fn within(&self, grid_points: &[GridPoint]) -> Vec<Vec<u32>> {
         const SAMPLES: usize = 31;
         if self.all.len() < 2 {
@@ -196,7 +195,7 @@ impl Shells {
         of_shell.par_iter().enumerate().map(within).collect()
     }
 
-    /// The shell of each point; `u32::MAX` for one without a triangle.
+    /// The shell of each point; `u32::MAX` for points without a triangle.
     pub(super) fn of_points(&self, points: usize) -> Vec<u32> {
         let mut of = vec![u32::MAX; points];
         for (triangle, shell) in self.triangles.iter().zip(&self.shell_of) {
@@ -206,14 +205,14 @@ impl Shells {
     }
 }
 
-/// Six times the volume between a triangle and the lattice's lowest place.
+/// Six times the volume between a triangle and the grid's origin.
 fn wedge(corners: [GridPoint; 3]) -> i128 {
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let term = |i: usize, j: usize, k: usize| i128::from(a[i]) * i128::from(b[j] * c[k] - b[k] * c[j]);
     term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)
 }
 
-/// How many faces were turned; or, where none may be, the first shell that would have to be.
+/// Counts flipped faces; if flipping is not allowed, returns the first shell that needs it as a fault.
 pub(super) fn turned(
     polygons: &Polygons,
     pieces: &[(u32, bool)],

@@ -1,4 +1,4 @@
-//! Tets of what is inside of a closed surface.
+//! Filling the inside of a closed surface with tets.
 
 use numerics::vector::{DVec3, to_f64};
 use std::ops::Range;
@@ -14,77 +14,75 @@ use super::quality::{Measure, measure};
 use super::surface_fault::SurfaceFault;
 use super::winding::{Winding, WindingCounts};
 
-/// How to fill a surface.
+/// Parameters of filling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FillSettings {
-    /// Mean length of edges between interior points, metres; 0 for the surface's own.
+    /// Mean edge length between interior points, metres; 0: that of the surface.
     pub spacing: f64,
-    /// Whether there are interior points.
+    /// Whether to add interior points.
     pub interior: bool,
 }
 
-/// On which kind of shell a point is.
+/// Kind of shell that a point is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShellSide {
-    /// None: inside a body.
+    /// None: an interior point.
     Interior,
-    /// The outside of a body.
+    /// The outer boundary of a body.
     Outer,
     /// The wall of a cavity.
     Inner,
 }
 
-/// Bodies of tets.
+/// Bodies filled with tets.
 #[derive(Clone, Debug)]
 pub struct TetMesh {
-    /// The surface's points, in their order, then the interior ones. Metres.
+    /// The surface's points in their order, then interior ones, metres.
     pub points: Vec<[f32; 3]>,
-    /// Where each point is.
+    /// Kind of shell of each point.
     pub sides: Vec<ShellSide>,
-    /// Points of each tet, so that its face across from a corner, seen from outside, runs the way its neighbour's does
-    /// not: (b−a)×(c−a)·(d−a) > 0, but for slivers, which rounding to f32 may have turned over.
+    /// Points of each tet, with (b−a)×(c−a)·(d−a) > 0 except for slivers that rounding to f32 inverted.
     pub tets: Vec<[u32; 4]>,
     /// Body of each tet.
     pub bodies: Vec<u32>,
-    /// Whether each tet is too flat to say anything of volume: quality below [`SLIVER`].
+    /// Whether each tet is too flat for its volume to be meaningful: quality below [`SLIVER`].
     pub slivers: Vec<bool>,
-    /// What was measured.
+    /// Quality measures.
     pub measured: FillQuality,
 }
 
-/// What was measured of a solid.
+/// Quality measures of a filled surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FillQuality {
-    /// Smallest angle between two faces of a tet that is no sliver, radians; 0 without tets.
+    /// Smallest dihedral angle of a tet that is not a sliver, radians; 0 without tets.
     pub min_dihedral: f64,
-    /// Median quality of all tets: 3 × inner radius ÷ outer radius, 1 for regular ones; 0 without tets.
+    /// Median quality of all tets, 3 × inradius ÷ circumradius: 1 for regular ones; 0 without tets.
     pub quality_median: f64,
-    /// How much the tets' volume differs from the surface's, as a share of the latter.
+    /// Difference of the tets' volume from that of the surface, relative to the latter.
     pub volume_error: f64,
     /// Faces of the surface that are not faces of tets.
     pub missing_faces: usize,
-    /// Edges of the surface that are no edge of a tet.
+    /// Edges of the surface that are not edges of tets.
     pub missing_edges: usize,
-    /// Points of the surface that no tet has.
+    /// Points of the surface in no tet.
     pub bare_points: usize,
-    /// Tets that are slivers.
+    /// Number of slivers.
     pub slivers: usize,
 }
 
 /// Tets of lower quality are slivers.
 pub const SLIVER: f64 = 0.02;
 
-/// Interior points there may be: some 25 million tets, 2 gigabytes while they are made.
+/// Largest number of interior points: about 25 million tets, which take 2 gigabytes to build.
 const MOST_POINTS: f64 = (1 << 22) as f64;
 
-/// Lattice points that may be looked at for it.
+/// Largest number of lattice points to test.
 const MOST_TRIED: f64 = (1 << 27) as f64;
 
 impl ClosedSurface {
-    /// The surface's inside as tets, Delaunay in its points and, where asked for, points inside.
+    /// Fills the inside with Delaunay tets of the surface's points and, if requested, interior points.
     ///
-    /// # Errors
-    /// Where the spacing would make more points than memory is for, or two shells overlap.
+    /// # Errors If the spacing would make too many points, or shells overlap.
     pub fn fill(&self, fill: &FillSettings) -> Result<TetMesh, SurfaceFault> {
         let winding = Winding::new(&self.grid_points, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
@@ -99,7 +97,7 @@ impl ClosedSurface {
         Ok(self.solid(&inner, bodies.concat(), of.collect()))
     }
 
-    /// The spacing in steps of the lattice.
+    /// The spacing in grid steps.
     fn spacing(&self, asked: f64) -> Result<f64, SurfaceFault> {
         let spacing = if asked > 0.0 { asked } else { self.mean_edge() };
         let side = SIDE_BY_EDGE * spacing;
@@ -116,7 +114,7 @@ impl ClosedSurface {
         }
     }
 
-    /// The body around a point, given how shells wind around it. `None` outside and in cavities.
+    /// The body at a point with these winding numbers; `None` outside and in cavities.
     pub(super) fn body(&self, tally: &WindingCounts) -> Option<u32> {
         let depth = |shell: &u32| self.shells.all[*shell as usize].depth;
         let deepest = tally.iter().map(|(shell, _)| *shell).max_by_key(depth)?;
@@ -132,7 +130,7 @@ impl ClosedSurface {
         let mut sides: Vec<ShellSide> = self.shell_of.iter().map(outward).collect();
         points.extend(inner.iter().map(|inner| self.grid.point(inner.grid_point.map(f64::from)).map(|x| x as f32)));
         sides.resize(points.len(), ShellSide::Interior);
-        // In steps, so that no square of a length is too large or too small.
+        // In grid steps, so that no squared length over- or underflows.
         let step = self.grid.step();
         let steps = |corner: &u32| to_f64(points[*corner as usize]) / step;
         let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
@@ -152,7 +150,7 @@ impl ClosedSurface {
         TetMesh { points, sides, tets, bodies, slivers, measured }
     }
 
-    /// Counts what tets lack of the surface.
+    /// Counts the surface elements that are missing in the tets.
     fn compare(&self, tets: &[[u32; 4]], measured: &mut FillQuality) {
         let around = TetsAround::new(self.points.len(), tets);
         measured.missing_edges = self.edges().par_iter().filter(|edge| !around.has(*edge)).count();
@@ -164,7 +162,7 @@ impl ClosedSurface {
         });
         let runs: Vec<Range<usize>> = runs.collect();
         let cut_as_here = |run: &Range<usize>| run.clone().all(|triangle| around.has(&self.shells.triangles[triangle]));
-        // A quad may be cut along either diagonal.
+        // A quad may be split along either diagonal.
         let cut_otherwise = |run: &Range<usize>| match *self.face(self.shells.polygons[run.start] as usize) {
             [a, b, c, d] => {
                 let both = |faces: [[u32; 3]; 2]| faces.iter().all(|face| around.has(face));
@@ -176,7 +174,7 @@ impl ClosedSurface {
     }
 }
 
-/// What carving bodies out of their convex hulls needs to know.
+/// Input for selecting the tets inside a body from its convex hull.
 struct Carving<'a> {
     closed: &'a ClosedSurface,
     winding: &'a Winding<'a>,
@@ -184,7 +182,7 @@ struct Carving<'a> {
 }
 
 impl Carving<'_> {
-    /// The points of each body, rising.
+    /// The points of each body, ascending.
     fn members(&self) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.closed.bodies];
         let on_surface = self.closed.shell_of.iter().map(|shell| self.closed.shells.all[*shell as usize].body);
@@ -194,8 +192,8 @@ impl Carving<'_> {
         members
     }
 
-    /// Tets of a body: those of its points alone, so what comes near it has no part in it. Cut out of their hull by
-    /// where the middle of each tet is.
+    /// The tets of a body: Delaunay tets of its own points only, which makes it independent of other bodies, selected
+    /// by their centroids.
     fn body(&self, body: u32, points: &[u32]) -> Result<Vec<[u32; 4]>, SurfaceFault> {
         let inner = |point: u32| (point as usize).checked_sub(self.closed.points.len()).map(|k| &self.inner[k]);
         let grid_point = |point: &u32| {
@@ -206,7 +204,7 @@ impl Carving<'_> {
         let is_inside = |tally: &mut WindingCounts, tet: &[u32; 4]| {
             let corners = tet.map(|corner| grid_points[corner as usize].map(i64::from));
             let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<i64>());
-            // No surface is between an interior point and what is nearer to it than the surface.
+            // The surface does not come between an interior point and anything closer than its clearance.
             let near = |(corner, at): (&u32, &[i64; 3])| {
                 inner(points[*corner as usize]).is_some_and(|inner| {
                     let away = DVec3::from([0, 1, 2].map(|k| (middle[k] - 4 * at[k]) as f64));
@@ -236,7 +234,7 @@ impl Carving<'_> {
     }
 }
 
-/// A clearance is rounded to f32: this share of it is sure.
+/// Safety factor for clearances rounded to f32.
 const CLEAR_FOR_SURE: f64 = 0.999;
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -1,45 +1,45 @@
-//! Why a surface cannot be filled: what, where, and what to do about it. Points and faces are those that came in.
+//! Why a surface cannot be filled: what is wrong, where, and what to do about it. Indices are those of the input.
 
-/// What is wrong with a surface. Where one thing is wrong in several places, it names the first.
+/// What is wrong with a surface; if in several places, the first of them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceFault {
-    /// A coordinate is no number, or infinite.
+    /// A coordinate is NaN or infinite.
     #[error("point {point} is not finite")]
     NotFinite {
-        /// Which.
+        /// The point.
         point: u32,
     },
-    /// Points at one place, in a surface that is to stay as it is.
-    #[error("points {} and {} are at one place{}", points[0], points[1], of(*count, "such point"))]
+    /// Points at the same position, where repairs are not allowed.
+    #[error("points {} and {} have the same position{}", points[0], points[1], of(*count, "such point"))]
     DuplicatePoint {
         /// The first two.
         points: [u32; 2],
-        /// Points that are where an earlier one is.
+        /// Number of points at the position of an earlier one.
         count: usize,
     },
-    /// A face that has a point twice, in a surface that is to stay as it is.
-    #[error("face {face} has a corner twice{}", of(*count, "such face"))]
+    /// A face that uses a point twice, where repairs are not allowed.
+    #[error("face {face} uses a point twice{}", of(*count, "such face"))]
     Degenerate {
-        /// The first.
+        /// The first face.
         face: u32,
-        /// How many.
+        /// Number of such faces.
         count: usize,
     },
-    /// Two faces on the same points, in a surface that is to stay as it is.
+    /// Two faces with the same points, where repairs are not allowed.
     #[error("faces {} and {} have the same points{}", faces[0], faces[1], of(*count, "such pair"))]
     DuplicateFace {
         /// The first two.
         faces: [u32; 2],
-        /// Faces that are on an earlier one.
+        /// Number of faces that duplicate an earlier one.
         count: usize,
     },
-    /// A point without a face, in a surface that is to stay as it is.
+    /// A point without a face, where repairs are not allowed.
     #[error("point {point} has no face{}", of(*count, "such point"))]
     UnusedPoint {
-        /// The first.
+        /// The first point.
         point: u32,
-        /// How many.
+        /// Number of such points.
         count: usize,
     },
     /// A hole.
@@ -48,11 +48,11 @@ pub enum SurfaceFault {
         points[1], of(*count, "such edge")
     )]
     OpenEdge {
-        /// The first edge's ends.
+        /// Ends of the first open edge.
         points: [u32; 2],
         /// Its face.
         face: u32,
-        /// Edges with one face.
+        /// Number of edges with one face.
         count: usize,
     },
     /// An edge with more than two faces.
@@ -61,36 +61,36 @@ pub enum SurfaceFault {
         of(*count, "such edge")
     )]
     NonManifoldEdge {
-        /// The first edge's ends.
+        /// Ends of the first such edge.
         points: [u32; 2],
-        /// Its faces.
+        /// Number of its faces.
         faces: usize,
-        /// Edges with more than two faces.
+        /// Number of edges with more than two faces.
         count: usize,
     },
-    /// Neighbours that look opposite ways, in a surface that is to stay as it is.
-    #[error("faces {} and {} look opposite ways{}", faces[0], faces[1], of(*count, "such pair"))]
+    /// Neighbouring faces with opposite orientation, where repairs are not allowed.
+    #[error("faces {} and {} have opposite orientations{}", faces[0], faces[1], of(*count, "such pair"))]
     InconsistentOrientation {
         /// The first two.
         faces: [u32; 2],
-        /// Edges between such faces.
+        /// Number of edges between such faces.
         count: usize,
     },
-    /// A surface like Klein's bottle.
-    #[error("the shell with face {face} has one side only, so it has no inside")]
+    /// A non-orientable surface, such as a Klein bottle.
+    #[error("the shell with face {face} is not orientable, so it has no inside")]
     NonOrientable {
-        /// A face of it.
+        /// One of its faces.
         face: u32,
     },
-    /// A shell without an inside.
+    /// A shell that encloses no volume.
     #[error("the shell with face {face} encloses no volume")]
     NoVolume {
         /// Its first face.
         face: u32,
     },
-    /// A shell that looks the wrong way, in a surface that is to stay as it is.
+    /// A shell with the wrong orientation, where repairs are not allowed.
     #[error(
-        "the shell with face {face} looks {}{}", if *cavity { "away from the cavity in it" } else { "inwards" },
+        "the shell with face {face} faces {}{}", if *cavity { "away from the cavity it bounds" } else { "inwards" },
         of(*count, "such shell")
     )]
     InsideOut {
@@ -98,38 +98,38 @@ pub enum SurfaceFault {
         face: u32,
         /// Whether it is the wall of a cavity.
         cavity: bool,
-        /// How many.
+        /// Number of such shells.
         count: usize,
     },
-    /// Faces that pass through each other.
-    #[error("faces {} and {} cross near {at:?}{}", faces[0], faces[1], of(*count, "such pair"))]
+    /// Faces that intersect.
+    #[error("faces {} and {} intersect near {at:?}{}", faces[0], faces[1], of(*count, "such pair"))]
     SelfIntersection {
         /// The first two.
         faces: [u32; 2],
-        /// A point of one of them near the crossing, metres.
+        /// A point of one of them near the intersection, metres.
         at: [f32; 3],
-        /// Pairs of triangles that cross.
+        /// Number of intersecting pairs of triangles.
         count: usize,
     },
-    /// A part of space that the surface is around more than once, where its faces cross in edges alone.
+    /// Shells that overlap without intersecting faces, so that some space is enclosed more than once.
     #[error("the surface overlaps itself near {at:?}")]
     SelfOverlap {
-        /// A point of that part, metres.
+        /// A point in the overlap, metres.
         at: [f32; 3],
     },
-    /// More interior points than memory is for.
+    /// Too many interior points.
     #[error("a spacing of {spacing} m would make about {points:.2e} points, expected at most {most:.2e}")]
     TooManyPoints {
-        /// Metres.
+        /// The requested spacing, metres.
         spacing: f64,
-        /// How many it would make.
+        /// Number of points it would give.
         points: f64,
-        /// How many may be.
+        /// Largest allowed number.
         most: f64,
     },
 }
 
-/// How many in all, where there is more than one.
+/// The total count, if it is more than one.
 fn of(count: usize, what: &str) -> String {
     if count > 1 { format!(" ({count} {what}s in all)") } else { String::new() }
 }
@@ -138,12 +138,12 @@ impl SurfaceFault {
     /// What to do about it.
     pub fn hint(&self) -> &'static str {
         match self {
-            Self::NotFinite { .. } => "look at what made it",
+            Self::NotFinite { .. } => "check what made the surface",
             Self::DuplicatePoint { .. }
             | Self::Degenerate { .. }
             | Self::DuplicateFace { .. }
-            | Self::UnusedPoint { .. } => "`repair` \"safe\" takes them out",
-            Self::InconsistentOrientation { .. } | Self::InsideOut { .. } => "`repair` \"safe\" turns them",
+            | Self::UnusedPoint { .. } => "`repair` \"safe\" removes them",
+            Self::InconsistentOrientation { .. } | Self::InsideOut { .. } => "`repair` \"safe\" flips them",
             Self::OpenEdge { .. } => {
                 "only closed surfaces can be filled: close the hole, or give a thin wall a thickness"
             }
@@ -151,7 +151,9 @@ impl SurfaceFault {
                 "take the faces inside the body out, or part the bodies that share the edge"
             }
             Self::NonOrientable { .. } | Self::NoVolume { .. } => "only a surface around a volume can be filled",
-            Self::SelfIntersection { .. } | Self::SelfOverlap { .. } => "part them, or make them one surface first",
+            Self::SelfIntersection { .. } | Self::SelfOverlap { .. } => {
+                "separate them, or merge them into one surface first"
+            }
             Self::TooManyPoints { .. } => "make `spacing` larger",
         }
     }

@@ -1,34 +1,34 @@
-//! How often shells wind around a point: once around what is inside.
+//! Winding numbers of shells around a point: 1 for points inside a shell.
 //!
-//! Promise: exact for closed shells on the lattice and for points at fractions of it; a point on a shell is counted as
-//! one beside it. Along the ray from the point towards +z, each triangle passed counts one, up or down as it looks. All
-//! sums are of whole numbers; a ray through an edge passes one of its two triangles, as if it stood a little to the +x
-//! and still less to the +y.
+//! Exact for closed shells on the grid and for points at fractions of it; a point on a shell is treated as one beside
+//! it. Each triangle crossed by the ray from the point towards +z counts as +1 or −1 by its orientation. All sums are
+//! integers; a ray through an edge crosses exactly one of its two triangles, as if it were displaced slightly towards
+//! +x and even less towards +y.
 
 use super::grid::{GridPoint, SIDE};
 
-/// Triangles by the squares in x and y that they cover.
+/// Triangles by the squares they cover in x and y.
 pub(super) struct Winding<'a> {
     grid_points: &'a [GridPoint],
     triangles: &'a [[u32; 3]],
     /// Shell of each triangle.
     shells: &'a [u32],
-    /// A square is 2^shift wide.
+    /// Squares are 2^shift wide.
     shift: u32,
     /// First entry in `members` of each square, row by row, and their number at the end.
     starts: Vec<u32>,
     members: Vec<u32>,
 }
 
-/// The shells that wind around a point, and how often.
+/// The shells with a non-zero winding number around a point, and that number.
 pub(super) type WindingCounts = Vec<(u32, i32)>;
 
-/// Squares may hold this many entries a triangle in all.
+/// Largest mean number of squares that a triangle may be listed in.
 const MOST_ENTRIES: usize = 8;
 
 impl<'a> Winding<'a> {
     pub(super) fn new(grid_points: &'a [GridPoint], triangles: &'a [[u32; 3]], shells: &'a [u32]) -> Self {
-        // About a square a triangle, wider where triangles are many squares wide.
+        // About as many squares as triangles, fewer if triangles cover many of them.
         let mut bits = (usize::BITS - triangles.len().leading_zeros()) / 2;
         let mut new = Self { grid_points, triangles, shells, shift: 0, starts: Vec::new(), members: Vec::new() };
         loop {
@@ -56,12 +56,12 @@ impl<'a> Winding<'a> {
         new
     }
 
-    /// Squares in a row.
+    /// Number of squares in a row.
     fn across(&self) -> usize {
         (SIDE >> self.shift) as usize + 1
     }
 
-    /// The squares of a triangle's bounds; none of one that is upright, which no ray towards z passes.
+    /// The squares that a triangle's bounds cover; none for a vertical triangle, which no ray crosses.
     fn squares(&self, triangle: [u32; 3]) -> impl Iterator<Item = usize> + use<> {
         let [a, b, c] = triangle.map(|corner| self.grid_points[corner as usize].map(i64::from));
         let upright = (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
@@ -72,7 +72,7 @@ impl<'a> Winding<'a> {
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
 
-    /// How often each shell winds around the point `sum` ÷ `parts`, a sum of up to 4 places.
+    /// Winding numbers of all shells around the point `sum` ÷ `parts`, where `sum` adds up to 4 grid points.
     pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut WindingCounts) {
         tally.clear();
         let square = |axis: usize| ((sum[axis] / parts) >> self.shift) as usize;
@@ -92,14 +92,14 @@ impl<'a> Winding<'a> {
     }
 }
 
-/// 1 where the ray from `sum` ÷ `parts` towards +z passes the triangle from behind, −1 from before, 0 past it.
+/// 1 if the ray from `sum` ÷ `parts` towards +z crosses the triangle from behind, −1 from the front, 0 if it misses.
 fn passed(corners: [GridPoint; 3], sum: [i64; 3], parts: i64) -> i32 {
     // From each corner to the point, times `parts`.
     let to = corners.map(|corner| [0, 1, 2].map(|axis| sum[axis] - parts * i64::from(corner[axis])));
     let mut turn = 0;
     for k in 0..3 {
         let (from, next) = (to[k], to[(k + 1) % 3]);
-        // Both ends are up to the point's height or above it: the side does not cross that height.
+        // Both ends are on the same side of the point in y, so the side does not cross that line.
         if (from[1] >= 0) == (next[1] >= 0) {
             continue;
         }

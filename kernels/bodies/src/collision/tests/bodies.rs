@@ -1,4 +1,4 @@
-//! Bodies under the solver: what rests, and what is rolled over.
+//! Contacts together with the solver: bodies at rest, pressed and rolled over.
 
 use super::*;
 use crate::mass_spring::{BodySolver, Material, Mesh, SoftBody, SolverFrame, State};
@@ -9,7 +9,7 @@ const FRAME: f64 = 1.0 / 24.0;
 
 type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
 
-/// A block of so many cubes of `side`, its lowest corner at `at`: particles, tets, and the surface facing outwards.
+/// A block of cubes of `side` with its lowest corner at `at`: particles, tets, and outward surface triangles.
 fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
     let (points, tets) = cubes(cells, at, cells.map(|n| side * n as f64));
     let narrow: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
@@ -26,7 +26,7 @@ fn body(points: &[[f64; 3]], tets: &[[u32; 4]], stiffness: f64) -> SoftBody {
 #[test]
 fn a_block_on_a_mesh_plate_comes_to_rest_and_does_not_sink() {
     let thickness = 2e-3;
-    // Of 8 × 8 squares, askew to the block's own.
+    // 8 × 8 squares, not aligned with those of the block.
     let mut plate = Vec::new();
     for z in 0..9 {
         plate.extend((0..9).map(|x| [0.113 * f64::from(x) - 0.3, 0.0, 0.107 * f64::from(z) - 0.3]));
@@ -59,7 +59,7 @@ fn fastest(state: &State) -> f64 {
 
 const THICKNESS: f64 = 1e-3;
 
-/// A pin that rolls on by ten thicknesses a frame, 1 cm into the block of [`rolled_over`].
+/// A pin that rolls ten thicknesses a frame, 1 cm deep in the block of [`rolled_over`].
 fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let (points, triangles) = cylinder(8, 0.05, 0.3);
     let way = frame * 10.0 * THICKNESS;
@@ -68,7 +68,7 @@ fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     (points.iter().map(put).collect(), triangles)
 }
 
-/// The deepest that any of `points` is in the pin.
+/// Depth of the deepest of `points` in the pin.
 fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
     let side = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|corner| DVec3::from(pin[corner as usize]));
@@ -80,7 +80,7 @@ fn deepest(points: &[[f64; 3]], pin: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
     points.iter().map(depth).fold(0.0, f64::max)
 }
 
-/// Frames of a block under the pin, moved on by `step` through each; gives the deepest in any.
+/// Frames of a block under the pin, each advanced by `step`; returns the largest depth in any.
 fn rolled_over(frames: u32, mut step: impl FnMut(&CollisionScene<'_>) -> Vec<[f64; 3]>, skins: &[BodySkin]) -> f64 {
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: -THICKNESS, thickness: THICKNESS, friction: 0.8 });
     let mut worst = 0.0_f64;
@@ -94,11 +94,11 @@ fn rolled_over(frames: u32, mut step: impl FnMut(&CollisionScene<'_>) -> Vec<[f6
 }
 
 #[test]
-fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
+fn projecting_onto_contacts_keeps_vertices_outside_a_rolling_pin() {
     let (points, _, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
     let skins = [BodySkin::new(&points, &faces, &[]).unwrap()];
     let mut now = points.clone();
-    // Vertices that go where their contacts put them and nothing else moves.
+    // Vertices that are moved only by projection onto their contacts.
     let put = |scene: &CollisionScene<'_>| {
         let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
         contacts.retain(|contact| contact.weights[1] == 0.0);
@@ -117,9 +117,9 @@ fn contacts_of_a_rolling_pin_keep_every_vertex_outside_of_it() {
 }
 
 #[test]
-fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
+fn no_vertex_sinks_deeper_into_a_rolling_pin_than_its_thickness() {
     let (points, tets, faces) = block([12, 3, 6], 0.02, [0.0; 3]);
-    // Steps in which the pin moves ten times its thickness, and such in which it moves less than that.
+    // With steps in which the pin moves ten thicknesses, and steps in which it moves less than one.
     for (stiffness, substeps) in [(2e4, 0), (5e3, 0), (2e4, 16)] {
         let body = body(&points, &tets, stiffness);
         let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
@@ -138,7 +138,8 @@ fn no_vertex_of_a_body_is_deeper_in_a_rolling_pin_than_its_thickness() {
     }
 }
 
-/// A block of dough under a box whose lower side is `height` above the ground at each frame; gives the state after each.
+/// A block of dough under a box whose lower side is `height` above the ground; passes the state after each frame to
+/// `each`.
 fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &State)) {
     let (points, tets, faces) = block([6, 4, 6], 0.02, [0.0, THICKNESS, 0.0]);
     let body = body(&points, &tets, 5e3);
@@ -169,7 +170,7 @@ fn pressed(frames: u32, height: impl Fn(f64) -> f64, mut each: impl FnMut(u32, &
 }
 
 #[test]
-fn dough_pressed_to_three_fifths_of_its_height_comes_back() {
+fn dough_pressed_to_three_fifths_of_its_height_recovers() {
     let height = |frame: f64| {
         let down = if frame < 24.0 { frame / 24.0 } else { (36.0 - frame) / 12.0 };
         0.08 + 2.0 * THICKNESS - 0.4 * 0.08 * down
@@ -212,10 +213,10 @@ fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume(
     assert!(one == whole(3, false) && one == whole(2, true));
 }
 
-/// A corner beyond a plate hangs on it, on the side it came to; where that draws it out over eight times the length of its
-/// edges it is let go and comes home.
+/// A corner that ended up beyond a plate stays there, on the side it came to. Once it stretches edges to over eight
+/// times their length they are released, and it returns.
 #[test]
-fn a_corner_beyond_a_plate_hangs_on_it_unless_that_draws_it_out_too_far() {
+fn a_corner_snagged_on_a_plate_is_released_when_overstretched() {
     let (side, thick) = (0.1, 0.02);
     let (points, tets, faces) = block([3, 3, 3], side, [0.0; 3]);
     let body = body(&points, &tets, 1e4);

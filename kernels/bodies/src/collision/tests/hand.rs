@@ -1,18 +1,18 @@
-//! What can be worked out by hand.
+//! Contacts with results worked out by hand.
 
 use super::*;
 
-/// A square of two triangles at height 0, open, its normal up.
+/// An open square of two triangles at height 0, facing up.
 const SQUARE: [[f64; 3]; 4] = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
 const TWO: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
-/// One triangle of three particles around a point, tiny: its first particle is what tests look at.
+/// A tiny triangle of three particles at a point; tests look at the first.
 fn speck(at: [f64; 3]) -> [[f64; 3]; 3] {
     [at, [at[0] + 1e-3, at[1] + 10.0, at[2]], [at[0], at[1] + 10.0, at[2] + 1e-3]]
 }
 
 #[test]
-fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
+fn a_vertex_falling_through_a_square_gives_one_contact_above_it() {
     let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE)], 1.0, 0.01, 0.5).unwrap();
     let (from, to) = (speck([0.0, 0.5, 0.0]), speck([0.0, -0.5, 0.0]));
     let skin = BodySkin::new(&from, &[[0, 1, 2]], &[]).unwrap();
@@ -25,7 +25,7 @@ fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
     assert_eq!((contact.particles, contact.weights), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
     assert_eq!((contact.normal, contact.offset, contact.gap), ([0.0, 1.0, 0.0], 0.0, 0.01));
     assert_eq!((contact.velocity, contact.friction), ([0.0; 3], 0.25));
-    // From below it is held below.
+    // From below it is kept below.
     let (contacts, _) =
         find(&scene, &to.map(|p| [p[0], p[1] - 20.0, p[2]]), &from.map(|p| [p[0], p[1] - 9.0, p[2]]), [0.0, 1.0]);
     let held: Vec<_> =
@@ -34,7 +34,7 @@ fn a_vertex_that_falls_through_a_square_is_told_once_and_held_above() {
 }
 
 #[test]
-fn a_plate_that_comes_up_brings_its_height_and_velocity() {
+fn a_rising_plate_gives_its_height_and_velocity() {
     let up = SQUARE.map(|[x, _, z]| [x, 0.4, z]);
     let plate = Obstacle::new(&TWO, &[pose(0.0, &SQUARE), pose(1.0, &up)], 0.5, 0.01, 0.5).unwrap();
     let still = speck([0.3, 0.1, 0.2]);
@@ -47,8 +47,8 @@ fn a_plate_that_comes_up_brings_its_height_and_velocity() {
 }
 
 #[test]
-fn edges_that_cross_push_where_they_cross() {
-    // A tent with its ridge along x at height 0, and a triangle whose lower side, along z, comes down on it.
+fn crossing_edges_make_contact_at_their_crossing() {
+    // A tent with its ridge along x at height 0, and a triangle with a lower side along z that comes down on it.
     let tent = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.4], [0.0, -1.0, -0.4]];
     let ridge = Obstacle::new(&[[0, 2, 1], [0, 1, 3]], &[pose(0.0, &tent)], 1.0, 0.01, 0.5).unwrap();
     let from = [[0.5, 0.2, -0.1], [0.5, 0.2, 0.3], [0.5, 1.0, 0.0]];
@@ -68,7 +68,7 @@ fn edges_that_cross_push_where_they_cross() {
 }
 
 #[test]
-fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
+fn a_spike_rising_into_a_triangle_pushes_it_up() {
     let spike = [[0.0, 0.0, 0.0], [0.1, -1.0, 0.0], [-0.1, -1.0, 0.1], [-0.1, -1.0, -0.1]];
     let risen = spike.map(|[x, y, z]| [x, y + 0.3, z]);
     let faces = [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]];
@@ -90,7 +90,7 @@ fn a_spike_that_rises_into_a_triangle_pushes_it_up() {
 }
 
 #[test]
-fn points_of_a_spinning_cylinder_keep_their_radius_and_meet_their_poses() {
+fn points_of_a_spinning_cylinder_keep_their_radius_and_match_its_poses() {
     let (points, faces) = cylinder(8, 0.05, 0.4);
     let turned = |angle: f64, way: f64| -> Vec<[f64; 3]> {
         let (sine, cosine) = libm::sincos(angle);
@@ -107,7 +107,7 @@ fn points_of_a_spinning_cylinder_keep_their_radius_and_meet_their_poses() {
             let radius = |x: f64, y: f64| (x * x + y * y).sqrt();
             assert!((radius(x - middle, y) - radius(*x0, *y0)).abs() < 1e-9);
         }
-        // The velocity is what positions change by.
+        // The velocity is the derivative of the positions.
         let step = 1e-6;
         let side = faces.len() / 2;
         let corner = faces[side][0] as usize;
@@ -121,7 +121,7 @@ fn points_of_a_spinning_cylinder_keep_their_radius_and_meet_their_poses() {
 }
 
 #[test]
-fn what_starts_inside_is_pushed_out_by_the_nearest_side_not_at_once() {
+fn a_vertex_that_starts_inside_is_pushed_out_gradually_through_the_nearest_side() {
     let (points, faces) = cuboid([1.0; 3]);
     let cube = Obstacle::new(&faces, &[pose(0.0, &points)], 1.0, 0.01, 0.5).unwrap();
     let within = |depth: f64| [[0.1, 0.5 - depth, 0.2], [0.1, 9.0, 0.2], [0.1, 9.0, 0.3]];
@@ -138,9 +138,9 @@ fn what_starts_inside_is_pushed_out_by_the_nearest_side_not_at_once() {
 }
 
 #[test]
-fn ground_comes_first_and_nothing_pushes_below_it() {
+fn ground_contacts_come_first_and_nothing_pushes_below_the_ground() {
     let (points, faces) = cuboid([1.0; 3]);
-    // A cube that comes down on a vertex that is on the ground, tilted so that it pushes down and sideways.
+    // A cube that comes down on a vertex on the ground, tilted so that it pushes down and sideways.
     let (sine, cosine) = libm::sincos(0.5);
     let tilted = |height: f64| -> Vec<[f64; 3]> {
         points.iter().map(|[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y + height, *z]).collect()
@@ -160,8 +160,8 @@ fn ground_comes_first_and_nothing_pushes_below_it() {
 }
 
 #[test]
-fn two_sheets_touch_and_neighbours_do_not() {
-    // A strip folded over: its ends face each other, its middle is itself.
+fn facing_sheets_touch_but_neighbouring_elements_do_not() {
+    // A folded strip: its ends face each other.
     let mut points: Vec<[f64; 3]> = Vec::new();
     let mut triangles = Vec::new();
     for k in 0..=12u32 {
@@ -177,7 +177,7 @@ fn two_sheets_touch_and_neighbours_do_not() {
     let skins = [skin];
     let scene = CollisionScene { skins: &skins, self_contact, ..CollisionScene::default() };
     assert_eq!(find(&scene, &points, &points, [0.0, 1.0]).1, ContactSummary::default());
-    // Its first end is carried through the last.
+    // The first end is moved through the last.
     let mut to = points.clone();
     to[..2].iter_mut().for_each(|p| p[0] -= 2.2);
     to[..2].iter_mut().for_each(|p| p[1] += 0.15);
@@ -195,10 +195,11 @@ fn two_sheets_touch_and_neighbours_do_not() {
     }
 }
 
-/// A spike rises a millimetre below a sheet of two triangles whose far corner is drawn out: over eight times its edges' length
-/// at rest the sheet is let go, and its corner, which hangs on nothing else, too; what is left of it is not.
+/// A spike rises to a millimetre below a sheet of two triangles with one corner pulled away. Stretched to over eight
+/// times its rest length, that triangle is released, and so is the corner, which no other edge holds; the rest of the
+/// sheet is not.
 #[test]
-fn skin_that_is_drawn_out_is_let_go() {
+fn overstretched_skin_is_released() {
     let rest = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
     let skin = [BodySkin::new(&rest, &[[0, 2, 1], [1, 2, 3]], &[]).unwrap()];
     let (points, triangles) = cuboid([0.2, 0.2, 0.2]);
@@ -217,7 +218,7 @@ fn skin_that_is_drawn_out_is_let_go() {
             !find(&scene, &x, &x, [0.0, 1.0]).0.is_empty()
         });
         assert_eq!(touched, [true, held, held], "drawn out to {corner}");
-        // Both edges that end at the corner.
+        // Both edges at that corner.
         assert_eq!(skin[0].released_edges(&x), if held { 0 } else { 2 });
     }
 }

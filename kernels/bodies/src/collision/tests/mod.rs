@@ -1,4 +1,4 @@
-//! Contacts worked by hand, then against all pairs, then bodies that rest and are rolled on.
+//! Contacts worked out by hand, then compared with brute force, then bodies at rest and under a rolling pin.
 
 use super::*;
 use numerics::random::Key;
@@ -28,13 +28,13 @@ fn random(seed: u64, index: u64) -> DVec3 {
     DVec3::new(key.of(0).f64() - 0.5, key.of(1).f64() - 0.5, key.of(2).f64() - 0.5)
 }
 
-/// A box about the origin with these sides, facing outwards.
+/// A box centred on the origin, facing outwards.
 fn cuboid(size: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let shape = shapes::block(size, [1; 3]);
     (shape.points.clone(), shape.triangles())
 }
 
-/// A cylinder along z with `n` sides a quarter, facing outwards.
+/// A cylinder along z with `n` sides a quadrant, facing outwards.
 fn cylinder(n: usize, radius: f64, length: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let shape = shapes::cylinder([2.0 * radius, length, 2.0 * radius], n);
     (shape.points.iter().map(|[x, y, z]| [*x, -z, *y]).collect(), shape.triangles())

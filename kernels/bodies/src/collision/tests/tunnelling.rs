@@ -1,9 +1,9 @@
-//! Nothing goes through unseen: fast vertices and edges against all pairs, judged in another way.
+//! No tunnelling: fast vertices and edges, compared with brute force by another method.
 
 use super::*;
 use nalgebra::Matrix3;
 
-/// Whether the straight way from `p` goes through a triangle (Möller & Trumbore), and from above.
+/// Whether the segment from `p` crosses a triangle (Möller & Trumbore), and whether from above.
 fn goes_through(p: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<bool> {
     let system = Matrix3::from_columns(&[-way, b - a, c - a]);
     let x = system.try_inverse()? * (p - a);
@@ -11,7 +11,7 @@ fn goes_through(p: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<bool> {
     inside.then(|| (b - a).cross(&(c - a)).dot(&way) < 0.0)
 }
 
-/// Specks of three vertices each, and where they go.
+/// Small triangles, and their positions after the motion.
 fn specks(count: u64, size: f64, start: impl Fn(u64) -> DVec3, way: impl Fn(u64) -> DVec3) -> [Vec<[f64; 3]>; 2] {
     let from = (0..count).flat_map(|k| [0, 1, 2].map(|corner| (start(k) + random(77, 3 * k + corner) * size).into()));
     let from: Vec<[f64; 3]> = from.collect();
@@ -24,7 +24,7 @@ fn triples(count: u64) -> Vec<[u32; 3]> {
 }
 
 #[test]
-fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
+fn no_fast_vertex_tunnels_through_a_plate_or_a_blade() {
     const COUNT: u64 = 33_334;
     for (size, thickness) in [([1.0, 1e-3, 1.0], 1e-3), ([0.5, 1e-5, 0.05], 1e-3)] {
         let (points, faces) = cuboid(size);
@@ -57,7 +57,7 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
                     n.dot(&(p + way)) - contact.offset > -1e-12
                         && n.dot(&DVec3::from(to[vertex])) - contact.offset < 0.0
                 };
-                // It may have come round a corner; then it is inside or past, and held at one side at least.
+                // It may also have come around a corner; then at least one side has to hold it.
                 assert!(of[vertex].iter().any(holds), "{vertex} went through: {:?}", of[vertex]);
             } else if vertex % 50 == 0 {
                 let distance = |t: f64| {
@@ -75,7 +75,7 @@ fn no_fast_vertex_goes_through_a_plate_or_a_blade_unseen() {
 }
 
 #[test]
-fn no_fast_edge_goes_through_a_ridge_unseen() {
+fn no_fast_edge_tunnels_through_a_ridge() {
     const COUNT: u64 = 20_000;
     let tent = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.4], [0.0, -1.0, -0.4]];
     let up = DVec3::new(0.03, 0.1, 0.02);
@@ -106,7 +106,7 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
         let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(DVec3::from);
         let [a, b] = [DVec3::from(tent[0]), DVec3::from(tent[1])];
         let way = end - p - up;
-        // p + s(q − p) + t·way = a + u(b − a).
+        // p + s(q − p) + t·displacement = a + u(b − a).
         let Some(inverse) = Matrix3::from_columns(&[q - p, way, a - b]).try_inverse() else { continue };
         let x = inverse * (a - p);
         if x.iter().all(|x| (0.0..=1.0).contains(x)) {
@@ -125,7 +125,7 @@ fn no_fast_edge_goes_through_a_ridge_unseen() {
     assert!(through > 2000, "{through}");
 }
 
-/// A spinning pin among specks, three of which in a row are a triangle, at a scale.
+/// A spinning pin among triangles, at some scale.
 fn spin(scale: f64) -> Vec<Contact> {
     const COUNT: u64 = 2000;
     let (points, faces) = cylinder(4, 0.1 * scale, 0.4 * scale);
@@ -149,7 +149,7 @@ fn spin(scale: f64) -> Vec<Contact> {
 }
 
 #[test]
-fn any_number_of_threads_finds_the_same_bits() {
+fn any_number_of_threads_gives_the_same_contacts() {
     let with = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| spin(1.0));
     let alone = with(1);
     assert!(alone.len() > 1000, "{}", alone.len());
@@ -177,7 +177,7 @@ fn a_scene_a_thousand_times_larger_or_smaller_has_the_same_contacts() {
 }
 
 #[test]
-fn what_is_no_number_or_has_no_area_is_passed_over() {
+fn non_finite_points_and_degenerate_triangles_are_ignored() {
     let (points, mut faces) = cuboid([1.0; 3]);
     faces.extend([[0, 0, 1], [0, 1, 1], [3, 3, 3]]);
     let cube = Obstacle::new(&faces, &[pose(0.0, &points)], 0.0, 0.0, 0.5).unwrap();

@@ -1,11 +1,11 @@
-//! Contact and friction against ground, plates, a rolling pin and another body.
+//! Contact and friction with ground, plates, a rolling pin and another body.
 
 use super::*;
 use numerics::masked::Masked;
 
 const THICKNESS: f64 = 1e-3;
 
-/// Half spaces that move: (normal, height of the surface along it at the frame's start and end, friction).
+/// Moving half-spaces: normal, height of the surface along it at the start and end of the frame, friction.
 struct Planes(Vec<([f64; 3], [f64; 2], f64)>, f64);
 
 impl ContactFinder for Planes {
@@ -37,7 +37,7 @@ fn ground(friction: f64) -> Planes {
     Planes(vec![([0.0, 1.0, 0.0], [0.0, 0.0], friction)], 1.0 / 24.0)
 }
 
-/// A cylinder along z that rolls: axis at the frame's start and end, radius, radians a second.
+/// A rolling cylinder along z: axis at the start and end of the frame, radius, angular velocity.
 struct RollingPin {
     axis: [[f64; 2]; 2],
     radius: f64,
@@ -55,7 +55,7 @@ impl ContactFinder for RollingPin {
             let near = |p: &[f64; 3]| DVec3::new(p[0] - axis[0], p[1] - axis[1], 0.0);
             let (d, d_from) = (near(to), near(&from));
             if d.norm().min(d_from.norm()) < self.radius + 2.0 * THICKNESS {
-                // The side it comes from, where it would pass through.
+                // The side it comes from, if it would pass through.
                 let n = if d.dot(&d_from) > 0.0 { d.normalize() } else { d_from.normalize() };
                 let middle = DVec3::new(axis[0], axis[1], 0.0);
                 let pace = DVec3::new(
@@ -114,20 +114,20 @@ fn a_block_dropped_on_the_ground_comes_to_rest_there() {
             let report = solver.step(&body, &mut state, &frame);
             newton += report.newton;
             assert!(lowest(&state) > 0.0, "E {stiffness}, frame {number}: {} {report:?}", lowest(&state));
-            // It may not bounce higher than it fell from.
+            // It must not bounce higher than it fell from.
             assert!(centre(&body, &state).y < 0.41, "frame {number}");
         }
         assert!(lowest(&state) < THICKNESS);
         assert!(fastest(&state) < 1e-4 * 9.81 / 24.0, "E {stiffness}, volume {volume}: {}", fastest(&state));
         assert!(newton < 240 * 6, "{newton} iterations");
-        // Half its own weight presses a cube of height h by ½ρgh²/E, more or less its sides.
+        // Its weight compresses a cube of height h by ½ρgh²/E, give or take its sides.
         let sag = 0.2 - centre(&body, &state).y;
         assert!(sag < 0.4 * 1000.0 * 9.81 * 0.16 / stiffness + THICKNESS, "{sag}");
     }
 }
 
 #[test]
-fn on_a_slope_it_sticks_below_the_friction_angle_and_slides_above() {
+fn a_block_on_a_slope_sticks_below_the_friction_angle_and_slides_above() {
     let angle = 30.0_f64.to_radians();
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
     let gravity = [9.81 * sine, -9.81 * cosine, 0.0];
@@ -158,7 +158,7 @@ fn on_a_slope_it_sticks_below_the_friction_angle_and_slides_above() {
 }
 
 #[test]
-fn contact_holds_under_pins_that_press_ten_thicknesses_a_frame() {
+fn contacts_hold_under_pins_that_press_ten_thicknesses_a_frame() {
     let ground = ground(0.5);
     for integrator in [Integrator::Default, Integrator::Euler] {
         let body = block_body([4, 4, 4], 0.1, &material(1000.0, 1e5, 0.01));
@@ -183,7 +183,7 @@ fn contact_holds_under_pins_that_press_ten_thicknesses_a_frame() {
 }
 
 #[test]
-fn pressed_to_half_its_height_a_block_keeps_its_volume_and_bulges_evenly() {
+fn a_block_pressed_to_half_its_height_keeps_its_volume_and_bulges_evenly() {
     let body = block_body([6, 6, 6], 0.1, &material(1000.0, 1e5, 0.02));
     let mut state = State::at_rest(&body);
     state.positions.iter_mut().for_each(|x| x[1] += THICKNESS);
@@ -243,7 +243,7 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
     }
 }
 
-/// Particles of one block against the top of another: a grid of squares, each two triangles.
+/// Particles of one block against the top of another: a grid of squares of two triangles.
 struct Stack {
     lower: u32,
     side: f64,
@@ -284,7 +284,7 @@ impl ContactFinder for Stack {
 }
 
 #[test]
-fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
+fn colliding_blocks_conserve_momentum_and_rest_on_each_other() {
     let (mut points, mut tets) = block([3, 3, 3], 0.1);
     let lower = points.len() as u32;
     let (above, more) = block([3, 3, 3], 0.1);
@@ -325,7 +325,7 @@ fn two_blocks_that_meet_keep_their_momentum_and_rest_on_each_other() {
 }
 
 #[test]
-fn frictions_and_obstacles_beyond_reason() {
+fn extreme_friction_and_obstacles_stay_finite() {
     for friction in [0.0, 1.0, 1e6] {
         for (heights, bound) in [([0.0, 5.0], 200.0), ([0.0, -5.0], 20.0), ([1.0, 1.0], 20.0)] {
             let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e5, 0.01));
@@ -345,7 +345,7 @@ fn frictions_and_obstacles_beyond_reason() {
 }
 
 #[test]
-fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
+fn bodies_with_extreme_stiffness_mass_or_start_come_to_rest_on_the_ground() {
     let ground = ground(0.5);
     let from = |index: usize, turned: bool| {
         let out = random(7, index) * 0.2;
@@ -377,10 +377,11 @@ fn stiffness_masses_and_starts_beyond_reason_rest_on_the_ground_too() {
     }
 }
 
-/// Dough that hits the ground far too fast for a frame is flattened and turned inside out within one step; what that takes is
-/// its own motion, and no step ends with more energy than the one before, but for the few thousandths that contacts give back.
+/// Dough that hits the ground much too fast for the frame is flattened and inverted within one step. That may only
+/// take energy from its motion: no step ends with more energy than the one before, except for a few thousandths that
+/// contacts return.
 #[test]
-fn dough_that_is_smashed_within_a_step_gains_no_energy() {
+fn dough_smashed_within_one_step_gains_no_energy() {
     for speed in [2.0, 3.0, 5.0, 8.0, 15.0, 30.0, 50.0, 100.0] {
         let (points, tets) = block([6, 6, 6], 0.02);
         let body =
@@ -401,10 +402,10 @@ fn dough_that_is_smashed_within_a_step_gains_no_energy() {
     }
 }
 
-/// What begins a metre inside of the ground comes out by about a spring length a frame, and straight: deep contacts have no
-/// friction, so nothing may push it aside, whatever linear solves leave.
+/// A body that starts a metre inside the ground leaves it by about a spring length a frame, and vertically: deep
+/// contacts have no friction, and residuals of linear solves must not push it sideways.
 #[test]
-fn what_is_through_a_surface_comes_out_at_a_pace() {
+fn a_penetrating_body_separates_gradually() {
     let side = 0.1;
     let body = block_body([4, 4, 4], side, &material(1000.0, 1e5, 0.01));
     for substeps in [0, 1, 2, 4, 8, 16, 32, 64] {

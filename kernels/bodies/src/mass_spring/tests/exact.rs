@@ -1,4 +1,4 @@
-//! Closed forms beside those of the table of laws (tests/softbody/accuracy): a hanging chain, a spring that turns.
+//! Closed forms in addition to those in tests/softbody/accuracy: a hanging chain, a rotating spring.
 
 use super::*;
 
@@ -19,11 +19,11 @@ fn a_hanging_chain_stretches_by_the_weight_below() {
     }
 }
 
-/// Two masses that turn about each other stretch their spring by mω²r/k, 8e-4 of its length, and no more lengthen it: whatever
-/// its dashpot, a turn is no pace of its length. By 9.5° a frame; counted from the ends' velocities along the spring, a turn
-/// looks like lengthening by 1 − cos 9.5° of it a frame.
+/// Two masses rotating about each other stretch their spring by mω²r/k, 8e-4 of its length. A dashpot must not add to
+/// that, since rotation does not change the length. At 9.5° a frame the velocity of the ends along the spring at the
+/// end of a step would look like a change of length by 1 − cos 9.5°.
 #[test]
-fn a_dashpot_leaves_a_spring_alone_that_turns() {
+fn a_dashpot_does_not_damp_rotation() {
     let points = [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]];
     for integrator in [Integrator::Default, Integrator::Euler] {
         for damping in [0.0, 1e2, 1e4, 1e6] {

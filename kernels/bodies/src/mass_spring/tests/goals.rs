@@ -1,20 +1,20 @@
-//! Goals, resets of the shape at rest, dents and tears.
+//! Goals, resets of the rest shape, plastic flow and tearing.
 
 use super::*;
 
-/// Where a particle of the 3 × 3 × 3 block of 0.1 m cells is inside.
+/// Whether a particle of the 3 × 3 × 3 block of 0.1 m cells is an interior one.
 fn is_inside(x: &[f64; 3]) -> bool {
     x.iter().all(|x| (0.05..0.25).contains(x))
 }
 
-/// The block half as high and wider by as much.
+/// Half as high, and wider to keep the volume.
 fn flat(x: [f64; 3]) -> [f64; 3] {
     let wider = std::f64::consts::SQRT_2;
     [x[0] * wider, x[1] * 0.5, x[2] * wider]
 }
 
 #[test]
-fn a_goal_draws_its_particle_as_a_damped_spring_does() {
+fn a_goal_pulls_like_a_damped_spring() {
     let body = SoftBody::of_springs(&[[0.0; 3]], &[3.0], &[]).unwrap();
     let mut state = State::at_rest(&body);
     let goal = GoalSpring { particle: 0, between: [[1.0, 0.0, 0.0]; 2], strength: 4.0, damping: 4.0 };
@@ -25,7 +25,7 @@ fn a_goal_draws_its_particle_as_a_damped_spring_does() {
     let exact = 1.0 - 3.0 * libm::exp(-2.0);
     assert!((state.positions[0][0] - exact).abs() < 1e-5);
     assert!((report.goal_energy - 0.5 * 3.0 * 4.0 * (1.0 - exact) * (1.0 - exact)).abs() < 1e-4);
-    // Two goals of one particle add up to one of both strengths.
+    // Two goals of one particle act like one of their total strength.
     let half = GoalSpring { strength: 2.0, damping: 2.0, ..goal };
     let mut again = State::at_rest(&body);
     let _ = steps(&body, &mut again, &SolverFrame { seconds: 0.01, goals: &[half, half], ..BARE }, 100);
@@ -33,7 +33,7 @@ fn a_goal_draws_its_particle_as_a_damped_spring_does() {
 }
 
 #[test]
-fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
+fn a_body_stays_in_a_goal_that_became_its_rest_shape() {
     let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.2));
     let mut state = State::at_rest(&body);
     let shape: Vec<[f64; 3]> = state.positions.iter().map(|x| flat(*x)).collect();
@@ -46,7 +46,7 @@ fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
     let mut solver = BodySolver::new(&body);
     for number in 0..240 {
         if (24..28).contains(&number) {
-            // A quarter, a third, a half, all of what is left.
+            // A quarter, a third, a half, then all of what is left.
             let _ = reset(&body, &mut state, &shape, 1.0 / f64::from(28 - number), 1.0);
         }
         let force_implicit_euler = (24..28).contains(&number);
@@ -60,7 +60,7 @@ fn a_body_that_reached_its_goal_stays_there_once_it_is_its_shape_at_rest() {
 }
 
 #[test]
-fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
+fn a_reset_keeps_dents_and_returns_the_energy_it_adds() {
     let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e4, 0.02));
     let mut state = State::at_rest(&body);
     state.dents.iter_mut().for_each(|dent| *dent = 0.9);
@@ -93,7 +93,7 @@ fn a_reset_keeps_dents_and_says_what_energy_it_brings() {
 }
 
 #[test]
-fn springs_flow_above_the_yield_strain_alone() {
+fn springs_flow_only_above_the_yield_strain() {
     let spring = BodySpring { ends: [0, 1], stiffness: 100.0, damping: 0.0, length: 1.0 };
     let body = SoftBody::of_springs(&[[0.0; 3], [1.0, 0.0, 0.0]], &[1.0; 2], &[spring]).unwrap();
     let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
@@ -105,7 +105,7 @@ fn springs_flow_above_the_yield_strain_alone() {
     };
     assert_eq!(at(0.09), (1.0, 0.0));
     assert_eq!(at(-0.1 + 1e-12).0, 1.0);
-    // 1 − e^(−1) of the 0.2 above 0.1.
+    // 1 − e^(−1) of the 0.2 above the yield strain of 0.1.
     let share = 1.0 - libm::exp(-1.0);
     let (dent, freed) = at(0.3);
     assert!((dent - (1.0 + 0.2 * share)).abs() < 1e-12);
@@ -118,7 +118,7 @@ fn springs_flow_above_the_yield_strain_alone() {
 }
 
 #[test]
-fn what_flow_returns_is_what_the_next_report_lacks() {
+fn the_energy_returned_by_flow_is_missing_from_the_next_report() {
     let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e4, 0.02));
     let mut state = State::at_rest(&body);
     state.positions.iter_mut().for_each(|x| x[1] *= 0.7);
@@ -131,7 +131,7 @@ fn what_flow_returns_is_what_the_next_report_lacks() {
 }
 
 #[test]
-fn on_the_way_to_a_goal_nothing_is_dented() {
+fn deformation_towards_a_goal_is_not_plastic() {
     let body = block_body([1, 1, 1], 1.0, &material(1000.0, 1e4, 0.02));
     let plasticity = Plasticity { yield_strain: 0.1, creep: 2.0 };
     let rest = State::at_rest(&body).positions;
@@ -145,7 +145,7 @@ fn on_the_way_to_a_goal_nothing_is_dented() {
     };
     let share = 1.0 - libm::exp(-1.0);
     let (past, short) = (1.0 + share * (1.4 - 0.1), 1.0 + share * (0.1 - 0.3));
-    // Past the goal, short of the shape at rest: strain is that from the nearer of both.
+    // Beyond the goal, and short of the rest shape: strain is relative to the nearer of both.
     for (by, dent) in [(1.0, 1.0), (1.5, 1.0), (2.0, 1.0), (2.19, 1.0), (4.8, past), (0.91, 1.0), (0.7, short)] {
         assert!(dents(by, &goal).iter().all(|own| (own - dent).abs() < 1e-9), "{by}: {dent}");
     }
@@ -154,7 +154,7 @@ fn on_the_way_to_a_goal_nothing_is_dented() {
 }
 
 #[test]
-fn a_joint_tears_and_then_neither_pulls_nor_counts() {
+fn a_torn_joint_neither_pulls_nor_counts() {
     let spring = |a: u32| BodySpring { ends: [a, a + 1], stiffness: 100.0, damping: 1.0, length: 1.0 };
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
     let body = SoftBody::of_springs(&points, &[1.0; 3], &[spring(0), spring(1)]).unwrap();
@@ -169,7 +169,7 @@ fn a_joint_tears_and_then_neither_pulls_nor_counts() {
 }
 
 #[test]
-fn a_goal_far_away_and_goals_in_every_frame() {
+fn distant_alternating_goals_stay_bounded() {
     for integrator in [Integrator::Default, Integrator::Euler] {
         let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e4, 0.02));
         let mut state = State::at_rest(&body);

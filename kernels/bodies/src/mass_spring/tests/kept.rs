@@ -1,9 +1,9 @@
-//! What has to be kept beside momentum and energy (tests/softbody/accuracy): rest, bits.
+//! Invariants besides momentum and energy (those are in tests/softbody/accuracy): rest, bits.
 
 use super::*;
 
 #[test]
-fn a_rigid_turn_and_shift_meets_no_force() {
+fn a_rigid_motion_meets_no_force() {
     let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e9, 0.01));
     let mut state = State::at_rest(&body);
     let turn = nalgebra::Rotation3::from_scaled_axis(DVec3::new(0.3, -1.2, 0.7));
@@ -50,7 +50,7 @@ fn bits_are_the_same_for_any_number_of_threads_and_after_a_resume() {
 }
 
 #[test]
-fn nothing_to_do_costs_nothing_and_changes_no_bit() {
+fn an_empty_frame_changes_no_bit() {
     let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e5, 0.01));
     let mut state = State::at_rest(&body);
     let before = state.clone();

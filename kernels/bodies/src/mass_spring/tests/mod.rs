@@ -1,4 +1,4 @@
-//! Bodies against closed forms, then against what would break them.
+//! The solver against closed forms, then at extremes.
 
 use super::*;
 use crate::tets::cubes;
@@ -12,7 +12,7 @@ mod goals;
 mod hostile;
 mod kept;
 
-/// No gravity, no volume: springs alone.
+/// No gravity, no volume preservation: only springs.
 const BARE: SolverFrame<'static> = SolverFrame {
     seconds: 1.0 / 24.0,
     gravity: [0.0; 3],
@@ -34,7 +34,7 @@ fn material(density: f64, stiffness: f64, damping: f64) -> Material<'static> {
     Material { density: plain(density), stiffness: plain(stiffness), damping: plain(damping) }
 }
 
-/// Boxes of `cells` cubes of `side`, each cut into six tetrahedra.
+/// A block of cubes of `side`, each cut into six tetrahedra.
 fn block(cells: [u32; 3], side: f64) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     cubes(cells.map(|n| n as usize), [0.0; 3], cells.map(|n| f64::from(n) * side))
 }
@@ -44,7 +44,7 @@ fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> SoftBody {
     SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, material, &[]).unwrap()
 }
 
-/// Steps `frames` frames and gives the last report.
+/// Steps a number of frames and returns the last report.
 fn steps(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, frames: usize) -> FrameReport {
     let mut solver = BodySolver::new(body);
     let mut report = FrameReport::default();
@@ -65,8 +65,8 @@ fn momentum(body: &SoftBody, state: &State) -> DVec3 {
 
 /// About the origin.
 fn angular_momentum(body: &SoftBody, state: &State) -> DVec3 {
-    let moving = state.positions.iter().zip(&state.velocities).zip(body.masses());
-    moving.map(|((x, v), mass)| DVec3::from(*x).cross(&DVec3::from(*v)) * mass).sum()
+    let motion = state.positions.iter().zip(&state.velocities).zip(body.masses());
+    motion.map(|((x, v), mass)| DVec3::from(*x).cross(&DVec3::from(*v)) * mass).sum()
 }
 
 fn random(seed: u64, index: usize) -> DVec3 {

@@ -1,4 +1,4 @@
-//! Delaunay complexes: by hand, then random, regular and degenerate.
+//! Delaunay tetrahedralisations: by hand, random, regular and degenerate.
 
 use super::super::grid::{GridPoint, SIDE};
 use super::super::{Delaunay, NONE, delaunay};
@@ -6,7 +6,7 @@ use super::{check, random, volume};
 use numerics::random::Key;
 
 #[test]
-fn four_places_make_one_positive_tet() {
+fn four_points_make_one_positive_tet() {
     for grid_points in [[[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], [[0, 9, 0], [9, 0, 0], [0, 0, 0], [0, 0, 9]]] {
         let made = delaunay(&grid_points);
         assert_eq!(made.tets.len(), 1);
@@ -16,7 +16,7 @@ fn four_places_make_one_positive_tet() {
 }
 
 #[test]
-fn a_place_beyond_a_face_adds_the_tet_on_it() {
+fn a_point_beyond_a_face_adds_a_tet_on_it() {
     let grid_points = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9], [20, 20, 20]];
     let made = delaunay(&grid_points);
     check(&grid_points, &made);
@@ -24,7 +24,7 @@ fn a_place_beyond_a_face_adds_the_tet_on_it() {
 }
 
 #[test]
-fn a_place_within_a_tet_cuts_it_in_four() {
+fn a_point_inside_a_tet_splits_it_in_four() {
     let grid_points = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9], [2, 2, 2]];
     let made = delaunay(&grid_points);
     check(&grid_points, &made);
@@ -32,7 +32,7 @@ fn a_place_within_a_tet_cuts_it_in_four() {
 }
 
 #[test]
-fn the_corners_of_a_cube_fill_it() {
+fn the_corners_of_a_cube_fill_the_cube() {
     let grid_points: Vec<GridPoint> = (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit * SIDE)).collect();
     let made = delaunay(&grid_points);
     check(&grid_points, &made);
@@ -41,8 +41,8 @@ fn the_corners_of_a_cube_fill_it() {
 }
 
 #[test]
-fn random_places_of_any_spread_are_delaunay() {
-    // Few bits make many places that are doubled, on planes and on spheres together.
+fn random_points_are_delaunay_at_any_spread() {
+    // Few bits give many points that are duplicate, coplanar and cospherical at once.
     for (count, side) in [(5, SIDE), (50, 4), (500, 8), (3000, 1 << 10), (3000, SIDE)] {
         for seed in 0..4 {
             let grid_points = random(count, side, seed);
@@ -52,7 +52,7 @@ fn random_places_of_any_spread_are_delaunay() {
 }
 
 #[test]
-fn a_grid_fills_its_hull_exactly() {
+fn a_regular_grid_fills_its_hull_exactly() {
     for (n, pitch) in [(3, 1), (9, 1), (9, 1_048_573)] {
         let grid_points: Vec<GridPoint> =
             (0..n * n * n).map(|k| [k % n, k / n % n, k / n / n].map(|x| x * pitch)).collect();
@@ -63,8 +63,8 @@ fn a_grid_fills_its_hull_exactly() {
 }
 
 #[test]
-fn a_sphere_with_and_without_its_middle_is_delaunay() {
-    // Whole points of x² + y² + z² = 3·35²: cospherical to the last bit, 4 and more to a face.
+fn cospherical_points_are_delaunay_with_and_without_the_centre() {
+    // Integer points with x² + y² + z² = 3·35²: exactly cospherical, four and more to a face.
     let radius = 3 * 35 * 35;
     let mut grid_points: Vec<GridPoint> = Vec::new();
     for x in -61..=61 {
@@ -78,13 +78,13 @@ fn a_sphere_with_and_without_its_middle_is_delaunay() {
     }
     assert!(grid_points.len() > 100);
     check(&grid_points, &delaunay(&grid_points));
-    // The middle takes out all tets at once: a rim of hundreds of vertices.
+    // The centre removes all tets at once: a cavity with hundreds of boundary vertices.
     grid_points.push([61; 3]);
     check(&grid_points, &delaunay(&grid_points));
 }
 
 #[test]
-fn flat_and_lined_up_and_heaped_places_have_no_tet() {
+fn coplanar_collinear_and_coinciding_points_have_no_tets() {
     let line: Vec<GridPoint> = (0..50).map(|k| [3 * k, 2 * k, k]).collect();
     let plane: Vec<GridPoint> = (0..50).map(|k| [k % 7, k / 7, k % 7 + 2 * (k / 7)]).collect();
     for grid_points in [vec![], vec![[1; 3]], vec![[1; 3]; 9], line, plane] {
@@ -93,7 +93,7 @@ fn flat_and_lined_up_and_heaped_places_have_no_tet() {
 }
 
 #[test]
-fn the_first_places_may_lie_on_a_plane_and_the_last_doubled() {
+fn leading_points_may_be_coplanar_and_later_ones_duplicate() {
     let mut grid_points: Vec<GridPoint> = (0..49).map(|k| [k % 7, k / 7, 0]).collect();
     grid_points.push([3, 3, 5]);
     grid_points.push([0, 0, 0]);
@@ -104,9 +104,9 @@ fn the_first_places_may_lie_on_a_plane_and_the_last_doubled() {
 }
 
 #[test]
-fn places_far_apart_and_close_together_are_delaunay() {
+fn clustered_and_collinear_points_are_delaunay() {
     let key = Key::new(3);
-    // Clusters of a few steps at random places, and a needle of thousands of places on a line.
+    // Clusters a few steps wide at random positions, and a needle of thousands of collinear points.
     let mut grid_points: Vec<GridPoint> = random(40, SIDE - 8, 1)
         .into_iter()
         .flat_map(|p| (0..20).map(move |k| p.map(|x| x + (key.of(k).of(x as u64).u64() % 8) as i32)))
@@ -116,11 +116,11 @@ fn places_far_apart_and_close_together_are_delaunay() {
 }
 
 #[test]
-fn the_same_places_give_the_same_tets_and_all_orders_the_same_complex() {
+fn the_same_points_give_the_same_tets_in_any_order() {
     let grid_points = random(800, SIDE, 9);
     let made = delaunay(&grid_points);
     assert_eq!(made, delaunay(&grid_points));
-    // No five of these are cospherical, so any order of the same places has the same tets.
+    // No five of these are cospherical, so any order gives the same tets.
     let reversed: Vec<GridPoint> = grid_points.iter().rev().copied().collect();
     let named = |tets: &[[u32; 4]], name: &dyn Fn(u32) -> u32| {
         let sorted = |tet: &[u32; 4]| {

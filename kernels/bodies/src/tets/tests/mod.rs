@@ -1,4 +1,4 @@
-//! Tests of the tets, by what they are about; and the exact checks that several share.
+//! Tests of tetrahedralisation, and the exact checks they share.
 
 mod complex;
 mod predicates;
@@ -16,7 +16,7 @@ fn at(grid_point: GridPoint) -> DVec3 {
     DVec3::from(grid_point.map(f64::from))
 }
 
-/// Random places, each coordinate below `side`.
+/// Random points with coordinates below `side`.
 fn random(count: u64, side: i32, seed: u64) -> Vec<GridPoint> {
     let key = Key::new(seed);
     (0..count).map(|k| [0, 1, 2].map(|axis| (key.of(k).of(axis).u64() % side as u64) as i32)).collect()
@@ -33,8 +33,8 @@ fn volume(grid_points: &[GridPoint], tets: &[[u32; 4]]) -> i128 {
     tets.iter().map(six).sum()
 }
 
-/// Fails unless every tet is positive, knows its neighbours, and has no neighbour's far corner in its sphere: what a
-/// Delaunay complex is, by Delaunay's lemma.
+/// Panics unless every tet is positive, neighbours match, and no neighbour's opposite corner is inside a tet's
+/// circumsphere: by Delaunay's lemma that makes a Delaunay tetrahedralisation.
 fn check(grid_points: &[GridPoint], Delaunay { tets, across, doubled }: &Delaunay) {
     let of = |tet: &[u32; 4]| tet.map(|corner| at(grid_points[corner as usize]));
     for (index, (tet, others)) in tets.iter().zip(across).enumerate() {
@@ -42,7 +42,7 @@ fn check(grid_points: &[GridPoint], Delaunay { tets, across, doubled }: &Delauna
         assert!(orient(&a, &b, &c, &d) > 0.0, "tet {index} is flat or inverted");
         for (corner, other) in others.iter().enumerate() {
             if *other == NONE {
-                // A face of the hull: all places on one side.
+                // A hull face: all points are on one side.
                 continue;
             }
             let back = across[*other as usize].iter().position(|tet| *tet == index as u32).unwrap();
@@ -81,7 +81,7 @@ impl Mesh {
         Self { counts: shape.counts, corners: shape.corners, points }
     }
 
-    /// Each face cut from its first corner.
+    /// Fan triangulation of each face.
     fn of_triangles(mesh: &Self) -> Self {
         let mut cut = Self { points: mesh.points.clone(), ..Self::default() };
         for run in mesh.starts().windows(2) {
@@ -104,7 +104,7 @@ impl Mesh {
         self.corners.extend_from_slice(corners);
     }
 
-    /// Ends of each side, the lower first, and its face.
+    /// Ends of each side, lower first, and its face.
     fn sides(&self) -> Vec<([u32; 2], usize)> {
         let starts = self.starts();
         let of_face = |face: usize| {
@@ -129,13 +129,13 @@ impl Mesh {
     }
 }
 
-/// A box of six quads from its lowest corner.
+/// A box of six quads.
 fn block(size: [f32; 3], low: [f32; 3]) -> Mesh {
     let middle = [0, 1, 2].map(|k| low[k] + 0.5 * size[k]);
     Mesh::of(shapes::block(size.map(f64::from), [1; 3])).moved(middle)
 }
 
-/// A box of n × n quads a side, turned about no axis of the lattice.
+/// A box of n × n quads a side, not aligned with the grid.
 fn turned_block(n: usize) -> Mesh {
     let mut mesh = Mesh::of(shapes::block([1.0, 0.7, 0.4], [n; 3]));
     for p in &mut mesh.points {
@@ -147,7 +147,7 @@ fn turned_block(n: usize) -> Mesh {
     mesh
 }
 
-/// A ball of quads around the origin, n to a quarter turn.
+/// A ball of quads around the origin, n to a quadrant.
 fn ball(n: usize, radius: f64) -> Mesh {
     Mesh::of(shapes::sphere([2.0 * radius; 3], n))
 }

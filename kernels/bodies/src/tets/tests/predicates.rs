@@ -1,4 +1,4 @@
-//! Predicates against whole numbers of any size.
+//! Predicates against arbitrary-precision integers.
 
 use super::super::grid::{GridPoint, SIDE};
 use super::super::predicates::{in_sphere, orient};
@@ -6,7 +6,7 @@ use super::{at, random};
 use numerics::random::Key;
 use numerics::vector::DVec3;
 
-/// A whole number of any size: negative or not, and digits of 32 bits, lowest first.
+/// An arbitrary-precision integer: sign, and digits of 32 bits, lowest first.
 #[derive(Clone, Debug, PartialEq)]
 struct Big(bool, Vec<u32>);
 
@@ -45,7 +45,7 @@ impl Big {
     fn plus(&self, other: &Self) -> Self {
         let digit = |number: &Self, k: usize| i64::from(number.1.get(k).copied().unwrap_or(0));
         let sign = |number: &Self| if number.0 { -1 } else { 1 };
-        // In digits that may be negative, then carried; the other way round where that comes out negative.
+        // Adds signed digits, then carries; negates first if the result is negative.
         let carried = |turn: i64| {
             let (mut carry, mut digits) = (0_i64, Vec::new());
             for k in 0..=self.1.len().max(other.1.len()) {
@@ -61,7 +61,7 @@ impl Big {
         }
     }
 
-    /// The determinant of a square of numbers, along its first row.
+    /// Determinant of a square matrix, expanded along the first row.
     fn determinant(rows: &[Vec<Self>]) -> Self {
         let Some((first, rest)) = rows.split_first() else { return Self::of(1) };
         let mut sum = Self::of(0);
@@ -74,13 +74,13 @@ impl Big {
     }
 }
 
-/// Sign of the determinant with a row (x, y, z, 1) a place, turned to be positive for positive tets.
+/// Sign of the determinant with rows (x, y, z, 1), positive for positive tets.
 fn true_side(grid_points: &[GridPoint; 4]) -> i32 {
     let row = |p: &GridPoint| [p[0], p[1], p[2], 1].map(|x| Big::of(i64::from(x))).to_vec();
     -Big::determinant(&grid_points.iter().map(row).collect::<Vec<_>>()).sign()
 }
 
-/// Sign of the determinant with a row (x, y, z, x² + y² + z², 1) a place.
+/// Sign of the determinant with rows (x, y, z, x² + y² + z², 1).
 fn true_sphere(grid_points: &[GridPoint; 5]) -> i32 {
     let row = |p: &GridPoint| {
         let [x, y, z] = p.map(i64::from);
@@ -101,7 +101,7 @@ fn agree(grid_points: [GridPoint; 5]) {
 }
 
 #[test]
-fn the_oracle_counts() {
+fn the_oracle_computes_correctly() {
     let big = Big::of(i64::MAX).times(&Big::of(i64::MIN)).plus(&Big::of(7));
     let small = i128::from(i64::MAX) * i128::from(i64::MIN) + 7;
     let digits = (0..4).map(|k| (small.unsigned_abs() >> (32 * k)) as u32).collect();
@@ -113,7 +113,7 @@ fn the_oracle_counts() {
 }
 
 #[test]
-fn a_corner_tet_is_positive_and_its_sphere_passes_through_the_cube() {
+fn a_corner_tet_is_positive_and_its_circumsphere_passes_through_the_cube() {
     let [o, x, y, z] = [DVec3::zeros(), DVec3::x() * 2.0, DVec3::y() * 2.0, DVec3::z() * 2.0];
     assert_eq!(orient(&o, &x, &y, &z), 8.0);
     assert!(in_sphere(&o, &x, &y, &z, &DVec3::repeat(1.0)) > 0.0);
@@ -122,7 +122,7 @@ fn a_corner_tet_is_positive_and_its_sphere_passes_through_the_cube() {
 }
 
 #[test]
-fn random_places_of_all_sizes_agree() {
+fn random_points_of_all_sizes_agree_with_the_oracle() {
     for bits in [2, 4, 8, 13, 18, 22, 24] {
         for grid_points in random(5 * 400, 1 << bits, bits).chunks_exact(5) {
             agree(grid_points.try_into().unwrap());
@@ -131,8 +131,9 @@ fn random_places_of_all_sizes_agree() {
 }
 
 #[test]
-fn nearly_flat_and_nearly_cospherical_places_agree() {
-    // Points on a plane or on a sphere, rounded, and moved by at most one step: what the bounds on rounding are for.
+fn nearly_coplanar_and_cospherical_points_agree_with_the_oracle() {
+    // Points on a plane or a sphere, rounded and moved by at most one step: the cases that the rounding bounds are
+    // for.
     let key = Key::new(5);
     for k in 0..3000 {
         let draw = |n: u64| key.of(k).of(n).f64();
@@ -152,7 +153,7 @@ fn nearly_flat_and_nearly_cospherical_places_agree() {
 }
 
 #[test]
-fn the_largest_places_do_not_overflow() {
+fn the_largest_coordinates_do_not_overflow() {
     let corners: Vec<GridPoint> = (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit * SIDE)).collect();
     for k in 0..8_usize.pow(5) {
         agree(std::array::from_fn(|n| corners[k / 8_usize.pow(n as u32) % 8]));

@@ -1,4 +1,4 @@
-//! Filled surfaces: by hand, then what holds for all.
+//! Filled surfaces: by hand, then general properties.
 
 use super::super::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use super::{Mesh, ball, block, joined, turned_block};
@@ -22,7 +22,7 @@ fn volume(solid: &TetMesh, tet: &[u32; 4]) -> f64 {
     (b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0])) / 6.0
 }
 
-/// What holds for every solid.
+/// Properties of every filled surface.
 fn sound(closed: &ClosedSurface, solid: &TetMesh) {
     let n = closed.points.len();
     assert_eq!(solid.points[..n], closed.points, "the surface's points come first, as they are");
@@ -32,7 +32,7 @@ fn sound(closed: &ClosedSurface, solid: &TetMesh) {
     for (tet, sliver) in solid.tets.iter().zip(&solid.slivers) {
         assert!(*sliver || volume(solid, tet) > 0.0, "no tet but a sliver is inverted");
     }
-    // A face belongs to at most two tets, and runs opposite ways in them.
+    // A face belongs to at most two tets, with opposite orientation.
     let mut faces: Vec<([u32; 3], bool)> = Vec::new();
     for [a, b, c, d] in &solid.tets {
         for face in [[b, d, c], [a, c, d], [a, d, b], [a, b, c]] {
@@ -50,7 +50,7 @@ fn sound(closed: &ClosedSurface, solid: &TetMesh) {
         let whole = same.len() == 2 || on_surface || solid.measured.missing_faces > 0;
         assert!(whole, "a face of one tet has all its points on the surface");
     }
-    // Every edge of the surface is one of a tet, or counted as missing.
+    // Every edge of the surface is an edge of a tet, or counted as missing.
     let has = |a: u32, b: u32| solid.tets.iter().any(|tet| tet.contains(&a) && tet.contains(&b));
     if n < 300 {
         let missing = closed.edges().iter().filter(|[a, b]| !has(*a, *b)).count();
@@ -66,7 +66,7 @@ fn sound(closed: &ClosedSurface, solid: &TetMesh) {
 }
 
 #[test]
-fn one_tet_is_one_tet_at_any_scale() {
+fn a_tet_shaped_surface_is_one_tet_at_any_scale() {
     for scale in [1e-40, 1e-3, 1.0, 1e3, 1e37] {
         let mut tet =
             Mesh { points: vec![[0.0; 3], [scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, 0.0, scale]], ..Mesh::default() };
@@ -90,7 +90,7 @@ fn a_regular_tet_has_quality_one() {
 }
 
 #[test]
-fn two_tets_on_a_face_are_two_tets() {
+fn a_double_pyramid_is_two_tets() {
     let mut two = Mesh {
         points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, -1.0]],
         ..Mesh::default()
@@ -105,8 +105,8 @@ fn a_cube_has_its_volume_and_points_at_the_spacing() {
     let (_, solid) = fill(&block([1.0; 3], [0.0; 3]), 0.1, true);
     assert_eq!(solid.measured.missing_faces, 0);
     assert!(solid.measured.volume_error < 1e-7);
-    // 2 points in each of the (0.8 ÷ 0.1083)³ = 403 cubes that are a tenth away from the faces: their long sides count as
-    // two spacings.
+    // 2 points in each of the (0.8 ÷ 0.1083)³ = 403 cubes that are a tenth away from the faces, whose long sides
+    // count as two spacings.
     let inside = (solid.points.len() - 8) as f64;
     assert!((0.8..1.2).contains(&(inside / (2.0 * 403.0))), "{inside}");
     let edges = solid
@@ -125,7 +125,7 @@ fn a_cube_has_its_volume_and_points_at_the_spacing() {
 }
 
 #[test]
-fn without_interior_points_there_are_none() {
+fn interior_points_can_be_disabled() {
     let ball = ball(6, 1.0);
     let (closed, solid) = fill(&ball, 0.0, false);
     assert_eq!(solid.points.len(), closed.points.len());
@@ -146,7 +146,7 @@ fn a_ball_in_a_ball_is_a_cavity_exact_to_its_facets() {
     let n = outer.points.len();
     assert!(solid.sides[..n].iter().all(|side| *side == ShellSide::Outer));
     assert!(solid.sides[n..closed.points.len()].iter().all(|side| *side == ShellSide::Inner));
-    // No tet reaches through the cavity.
+    // No tet crosses the cavity.
     assert!(solid.tets.iter().all(|tet| {
         let middle = [0, 1, 2].map(|k| tet.iter().map(|c| f64::from(solid.points[*c as usize][k])).sum::<f64>() / 4.0);
         middle.iter().map(|x| x * x).sum::<f64>().sqrt() > 0.57
@@ -158,8 +158,8 @@ fn closed_volume(mesh: &Mesh) -> f64 {
 }
 
 #[test]
-fn a_yolk_in_its_white_is_a_body_of_its_own() {
-    // Three balls: the white's outside, its hollow, and a yolk in the hollow.
+fn a_yolk_inside_the_white_is_a_separate_body() {
+    // Three balls: outer surface of the white, its cavity, and the yolk inside.
     let egg = joined(&[ball(8, 1.0), ball(6, 0.6), ball(5, 0.5)]);
     let (closed, solid) = fill(&egg, 0.15, true);
     assert_eq!(closed.bodies, 2);
@@ -172,7 +172,7 @@ fn a_yolk_in_its_white_is_a_body_of_its_own() {
 }
 
 #[test]
-fn bodies_that_touch_share_no_point() {
+fn touching_bodies_share_no_points() {
     let two = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [1.0, 0.0, 0.0]), block([1.0; 3], [0.0, 1.0, 0.0])]);
     let (closed, solid) = fill(&two, 0.25, true);
     assert_eq!(closed.bodies, 3);
@@ -187,21 +187,21 @@ fn bodies_that_touch_share_no_point() {
 }
 
 #[test]
-fn a_turned_block_of_many_quads_is_exact_to_rounding() {
-    // Its sides are planes only up to rounding: slivers lie on them, inside and out.
+fn a_rotated_block_of_many_quads_is_exact_to_rounding() {
+    // Its sides are planar only up to rounding: slivers lie on them, inside and out.
     let (_, solid) = fill(&turned_block(6), 0.0, true);
     assert!(solid.measured.volume_error < 1e-6, "{:?}", solid.measured);
     assert_eq!((solid.measured.missing_edges, solid.measured.bare_points), (0, 0));
 }
 
 #[test]
-fn scaled_by_a_thousand_or_far_away_it_is_the_same() {
+fn scaling_and_translation_do_not_change_the_result() {
     let ball = ball(6, 1.0);
     let (_, solid) = fill(&ball, 0.2, true);
     for scale in [1.0 / 1024.0, 1024.0, 1e-3, 1e3] {
         let (_, scaled) = fill(&ball.scaled(scale), 0.2 * f64::from(scale), true);
-        // A power of two changes no bit. Else the points of a ball, which lie on a sphere all, are rounded anew, and
-        // its quads' slivers with them.
+        // Powers of two change no bit. Other factors round the cospherical points of a ball anew, and with them its
+        // slivers.
         if scale == 1024.0 || scale == 1.0 / 1024.0 {
             assert_eq!(scaled.tets, solid.tets);
         }
@@ -227,20 +227,20 @@ fn any_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn too_fine_a_spacing_is_refused_with_what_it_would_make() {
+fn too_fine_a_spacing_is_refused_with_the_number_of_points() {
     let closed = closed(&block([1.0; 3], [0.0; 3]));
     let fault = closed.fill(&FillSettings { spacing: 1e-4, interior: true }).unwrap_err();
     assert!(
         matches!(fault, SurfaceFault::TooManyPoints { points, .. } if (1.4e12..1.8e12).contains(&points)),
         "{fault}"
     );
-    // A spacing wider than the body leaves no room, which is no fault.
+    // A spacing wider than the body leaves no room for points, which is not a fault.
     let solid = closed.fill(&FillSettings { spacing: 5.0, interior: true }).unwrap();
     assert_eq!(solid.points.len(), 8);
 }
 
 #[test]
-fn nothing_is_filled_with_nothing() {
+fn an_empty_surface_has_no_tets() {
     let solid = closed(&Mesh::default()).fill(&FillSettings { spacing: 0.0, interior: true }).unwrap();
     assert!(solid.tets.is_empty() && solid.points.is_empty());
     assert_eq!(solid.measured, super::super::FillQuality::default());
@@ -264,21 +264,21 @@ fn asset(text: &str) -> Mesh {
 }
 
 #[test]
-fn a_lump_of_dough_is_whole_and_of_good_tets() {
+fn a_lump_of_dough_is_filled_completely_with_good_tets() {
     let lump = asset(include_str!("../../../../../graphs/assets/blobby_4k_watertight.obj"));
     let (_, solid) = fill(&lump, 0.0, true);
     let measured = solid.measured;
     assert!(measured.quality_median > 0.9 && measured.volume_error < 1e-12, "{measured:?}");
     assert_eq!((measured.missing_faces, measured.missing_edges, measured.bare_points), (0, 0, 0));
     assert!(measured.slivers < 10, "{measured:?}");
-    // TetGen, made to keep every face and to add no point, makes as many tets.
+    // TetGen, told to keep all faces and add no points, makes as many tets.
     let (_, solid) = fill(&lump, 0.0, false);
     assert_eq!((solid.tets.len(), solid.measured.missing_faces), (6371, 0));
     assert!((0.1..0.15).contains(&solid.measured.quality_median));
 }
 
 #[test]
-fn nothing_done_to_a_ball_makes_it_panic() {
+fn no_damage_to_a_ball_causes_a_panic() {
     let ball = Mesh::of_triangles(&ball(3, 1.0));
     let (mut filled, mut refused) = (0, 0);
     for trial in 0..400 {

@@ -1,4 +1,4 @@
-//! What is repaired and what is refused.
+//! Repairs and faults.
 
 use super::super::{ClosedSurface, PolygonSurface, RepairCounts, SurfaceFault};
 use super::{Mesh, ball, block, joined};
@@ -8,19 +8,19 @@ fn close(mesh: &Mesh, repair: bool) -> Result<ClosedSurface, SurfaceFault> {
     ClosedSurface::of(&PolygonSurface { starts: &starts, corners: &mesh.corners, points: &mesh.points }, repair)
 }
 
-/// Refused either way, as the text says.
+/// The fault with this text, with and without repairs.
 fn refused(mesh: &Mesh, text: &str) {
     for repair in [false, true] {
         assert_eq!(close(mesh, repair).unwrap_err().to_string(), text);
     }
 }
 
-/// Refused as the text says, unless repairs are asked for.
+/// The fault with this text unless repairs are allowed.
 fn repaired(mesh: &Mesh, text: &str) -> ClosedSurface {
     assert_eq!(close(mesh, false).unwrap_err().to_string(), text);
     let closed = close(mesh, true).unwrap();
     assert!(!closed.changes.is_none());
-    // What was repaired needs no repair.
+    // A repaired surface needs no further repair.
     let counts = closed.starts.windows(2).map(|run| run[1] - run[0]).collect();
     let again = Mesh { counts, corners: closed.corners.clone(), points: closed.points.clone() };
     let again = close(&again, false).unwrap();
@@ -29,7 +29,7 @@ fn repaired(mesh: &Mesh, text: &str) -> ClosedSurface {
 }
 
 #[test]
-fn a_cube_is_in_order_and_stays_as_it_is() {
+fn a_valid_cube_is_unchanged() {
     let cube = block([1.0; 3], [0.0; 3]);
     let closed = close(&cube, false).unwrap();
     assert_eq!((closed.changes, closed.bodies), (RepairCounts::default(), 1));
@@ -38,41 +38,41 @@ fn a_cube_is_in_order_and_stays_as_it_is() {
 }
 
 #[test]
-fn nothing_is_closed_around_nothing() {
+fn an_empty_surface_is_closed() {
     let closed = close(&Mesh::default(), false).unwrap();
     assert_eq!((closed.volume(), closed.mean_edge(), closed.bodies), (0.0, 0.0, 0));
 }
 
 #[test]
-fn points_at_one_place_are_joined_where_they_leave_a_seam() {
-    // Each face of the cube with points of its own.
+fn duplicate_points_along_seams_are_merged() {
+    // Each face of the cube has its own points.
     let cube = block([1.0; 3], [0.0; 3]);
     let points = cube.corners.iter().map(|corner| cube.points[*corner as usize]).collect();
     let cut = Mesh { corners: (0..24).collect(), points, counts: cube.counts.clone() };
-    let closed = repaired(&cut, "points 1 and 4 are at one place (16 such points in all)");
+    let closed = repaired(&cut, "points 1 and 4 have the same position (16 such points in all)");
     assert_eq!((closed.points.len(), closed.changes.joined_points), (8, 16));
     assert_eq!(closed.volume(), 1.0);
     assert!(closed.source_points.windows(2).all(|pair| pair[0] < pair[1]));
 }
 
 #[test]
-fn bodies_that_touch_keep_their_points() {
+fn touching_bodies_keep_separate_points() {
     let two = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [1.0, 0.0, 0.0])]);
     let closed = close(&two, false).unwrap();
     assert_eq!((closed.points.len(), closed.bodies), (16, 2));
 }
 
 #[test]
-fn faces_of_two_points_are_dropped() {
+fn faces_with_two_points_are_dropped() {
     let mut cube = block([1.0; 3], [0.0; 3]);
     cube.face(&[0, 1, 0]);
     cube.face(&[2, 2, 3]);
-    let closed = repaired(&cube, "face 6 has a corner twice (2 such faces in all)");
+    let closed = repaired(&cube, "face 6 uses a point twice (2 such faces in all)");
     assert_eq!((closed.changes.dropped_faces, closed.source_faces), (2, vec![0, 1, 2, 3, 4, 5]));
 }
 
 #[test]
-fn a_face_twice_is_dropped_once() {
+fn a_duplicate_face_is_dropped() {
     let mut cube = block([1.0; 3], [0.0; 3]);
     let mut again = cube.corners[4..8].to_vec();
     again.rotate_left(1);
@@ -84,7 +84,7 @@ fn a_face_twice_is_dropped_once() {
 }
 
 #[test]
-fn a_point_without_a_face_is_dropped() {
+fn an_unused_point_is_dropped() {
     let mut cube = block([1.0; 3], [0.0; 3]);
     cube.points.insert(0, [9.0; 3]);
     cube.corners.iter_mut().for_each(|corner| *corner += 1);
@@ -93,31 +93,31 @@ fn a_point_without_a_face_is_dropped() {
 }
 
 #[test]
-fn faces_and_shells_that_look_the_wrong_way_are_turned() {
+fn faces_and_shells_with_wrong_orientation_are_flipped() {
     let mut cube = block([1.0; 3], [0.0; 3]);
     cube.corners[4..8].reverse();
-    let closed = repaired(&cube, "faces 1 and 4 look opposite ways (4 such pairs in all)");
+    let closed = repaired(&cube, "faces 1 and 4 have opposite orientations (4 such pairs in all)");
     assert_eq!((closed.changes.turned_faces, closed.volume()), (1, 1.0));
     let mut cube = block([1.0; 3], [0.0; 3]);
     cube.corners.reverse();
-    let closed = repaired(&cube, "the shell with face 0 looks inwards");
+    let closed = repaired(&cube, "the shell with face 0 faces inwards");
     assert_eq!((closed.changes.turned_faces, closed.volume()), (6, 1.0));
     assert_eq!(closed.face(2)[0], cube.corners[8], "the first corner stays the first");
 }
 
 #[test]
-fn shells_in_shells_are_cavities_and_bodies_in_turns() {
-    // Four boxes in each other, all looking outwards: a wall, a hollow, a wall, a hollow.
+fn nested_shells_alternate_between_bodies_and_cavities() {
+    // Four nested boxes, all facing outwards: wall, cavity, wall, cavity.
     let nested = |k: usize| block([4.0 - k as f32; 3], [0.5 * k as f32; 3]);
     let all = joined(&[nested(2), nested(0), nested(3), nested(1)]);
-    let closed = repaired(&all, "the shell with face 12 looks away from the cavity in it (2 such shells in all)");
+    let closed = repaired(&all, "the shell with face 12 faces away from the cavity it bounds (2 such shells in all)");
     assert_eq!(closed.volume(), 64.0 - 27.0 + 8.0 - 1.0);
     assert_eq!(closed.bodies, 2);
     assert_eq!(closed.changes.turned_faces, 12);
 }
 
 #[test]
-fn holes_and_crowded_edges_are_refused() {
+fn holes_and_non_manifold_edges_are_refused() {
     let mut open = block([1.0; 3], [0.0; 3]);
     open.counts.pop();
     open.corners.truncate(20);
@@ -141,12 +141,12 @@ fn open_edge(mesh: &Mesh) -> ([u32; 2], usize) {
 }
 
 #[test]
-fn what_has_no_inside_is_refused() {
+fn surfaces_without_an_inside_are_refused() {
     let mut flat =
         Mesh { points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.2, 0.0]], ..Mesh::default() };
     [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]].iter().for_each(|face| flat.face(face));
     refused(&flat, "the shell with face 0 encloses no volume");
-    // A grid of n × n quads whose ends are joined, one pair of them turned: Klein's bottle.
+    // A grid of n × n quads with joined ends, one pair of them reversed: a Klein bottle.
     let n = 5;
     let points = (0..n * n).map(|k| [k as f32, (k * k % 17) as f32, (k * k * k % 23) as f32]).collect();
     let mut bottle = Mesh { points, ..Mesh::default() };
@@ -158,7 +158,7 @@ fn what_has_no_inside_is_refused() {
         (0..n).for_each(|j| bottle.face(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     }
     assert!(matches!(close(&bottle, true), Err(SurfaceFault::NonOrientable { .. })));
-    // Unless they may be turned, faces that look opposite ways come first.
+    // Without repairs, inconsistent orientation is reported first.
     assert!(matches!(
         close(&bottle, false),
         Err(SurfaceFault::InconsistentOrientation { .. } | SurfaceFault::NonOrientable { .. })
@@ -166,12 +166,12 @@ fn what_has_no_inside_is_refused() {
 }
 
 #[test]
-fn surfaces_that_cross_are_refused() {
+fn self_intersecting_surfaces_are_refused() {
     let crossed = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [0.5, 0.3, 0.2])]);
     let fault = close(&crossed, true).unwrap_err();
     let SurfaceFault::SelfIntersection { faces, count, .. } = fault else { panic!("{fault}") };
     assert!(faces[0] < 6 && (6..12).contains(&faces[1]) && count > 1, "{faces:?} {count}");
-    // A spike of a ball pulled through its other side.
+    // A spike of a ball pulled through the opposite side.
     let mut ball = ball(4, 1.0);
     let top = (0..ball.points.len()).max_by(|a, b| ball.points[*a][1].total_cmp(&ball.points[*b][1])).unwrap();
     ball.points[top] = [0.1, -1.7, 0.05];
@@ -179,8 +179,8 @@ fn surfaces_that_cross_are_refused() {
 }
 
 #[test]
-fn shells_that_overlap_with_no_face_through_another_are_refused_when_filled() {
-    // Two boxes of one height and depth: every crossing runs through edges.
+fn overlapping_shells_without_face_intersections_are_refused_when_filled() {
+    // Two boxes of the same height and depth: their faces intersect only in edges.
     let overlapping = joined(&[block([1.0; 3], [0.0; 3]), block([1.0; 3], [0.5, 0.0, 0.0])]);
     let closed = close(&overlapping, true).unwrap();
     let fault = closed.fill(&super::super::FillSettings { spacing: 0.2, interior: true }).unwrap_err();
@@ -188,7 +188,7 @@ fn shells_that_overlap_with_no_face_through_another_are_refused_when_filled() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused() {
+fn non_finite_points_are_refused() {
     let mut cube = block([1.0; 3], [0.0; 3]);
     cube.points[3][1] = f32::NAN;
     refused(&cube, "point 3 is not finite");
