@@ -1,10 +1,11 @@
-//! What soft bodies cost, and how wrong they are: `cargo bench --bench softbody`, or `-- 2k` for that size alone.
+//! Cost and error of soft bodies: `cargo bench --bench softbody`, or `-- 2k` for that size only.
 //!
-//! Softbody on a block of dough that hangs by one end, rests on the ground, does so a thousand times as stiff, and is
-//! rolled over by a pin that goes on ten thicknesses a frame; and on the beam that other solvers were measured on, alone and
-//! with such a pin. With and without volumes. The first frames in order, without what the start costs; no cache, nothing written, no
-//! self-collision. Errors are against sixteen accurate steps a frame: few frames, since soft dough that hangs by one end
-//! folds, and after a dozen frames thirty-two steps no longer agree with sixteen. Memory is that of a process of its own.
+//! The Softbody node on a block of dough that hangs by one end, rests on the ground, does so at a thousand times the
+//! stiffness, or is rolled over by a pin that moves ten thicknesses a frame; and on the beam that other solvers were
+//! measured on, alone and with such a pin. With and without volume preservation. The first frames in order, without
+//! the cost of the start; no cache, no files, no self-collision. Errors are relative to sixteen accurate steps a
+//! frame, over few frames only: soft dough hanging by one end folds, and after a dozen frames thirty-two steps no
+//! longer agree with sixteen. Memory is that of a separate process.
 
 use std::collections::BTreeSet;
 use std::convert::Infallible;
@@ -24,27 +25,27 @@ use timing::Figures;
 
 mod timing;
 
-/// The program's own.
+/// The program's allocator.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Runs of a case at most, and the time after which it is not run again.
+/// Largest number of runs of a case, and the total time after which it is not repeated.
 const ROUNDS: usize = 5;
 const ENOUGH: Duration = Duration::from_secs(5);
 
-/// Metres; what Softbody has where nothing is said.
+/// Metres; the default of Softbody.
 const THICKNESS: f64 = 1e-3;
 
-/// How finely bodies are cut.
+/// A resolution.
 struct Size {
     name: &'static str,
     dough: [usize; 3],
     beam: [usize; 3],
-    /// Frames that are looked at.
+    /// Number of frames to measure.
     frames: i64,
-    /// Whether one thread is measured too.
+    /// Whether to measure a single thread too.
     alone: bool,
-    /// What sixteen steps a frame are affordable for.
+    /// Scenes for which sixteen steps a frame are affordable.
     exact: &'static [Scene],
 }
 
@@ -61,12 +62,12 @@ const SIZES: [Size; 3] = [
     Size { name: "100k", dough: [92, 23, 46], beam: [96, 24, 24], frames: 3, alone: false, exact: &[] },
 ];
 
-/// What bodies are in.
+/// A scene.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Scene {
-    /// 2 m of something firm, held by one end.
+    /// A firm beam of 2 m, held by one end.
     Beam,
-    /// That, with a pin that rolls over it.
+    /// The beam with a pin that rolls over it.
     RolledBeam,
     /// Dough held by one end.
     Free,
@@ -89,7 +90,7 @@ impl Scene {
         }
     }
 
-    /// Sides of the body, metres.
+    /// Size of the body, metres.
     fn sides(self) -> [f64; 3] {
         match self {
             Self::Beam | Self::RolledBeam => [2.0, 0.5, 0.5],
@@ -98,7 +99,7 @@ impl Scene {
     }
 }
 
-/// One line of the figures.
+/// One line of the results.
 struct Case {
     name: String,
     scene: Scene,
@@ -106,11 +107,11 @@ struct Case {
     threads: usize,
     graph: Graph,
     spent: Duration,
-    /// The least that it took to come to its first frame, and to its last.
+    /// Least time until the first frame, and until the last.
     least: [Duration; 2],
-    /// What the last run published, and where it left particles frame by frame.
+    /// Metrics of the last run, and positions of particles frame by frame.
     report: Report,
-    places: Vec<[f32; 3]>,
+    positions: Vec<[f32; 3]>,
 }
 
 impl Case {
@@ -125,7 +126,7 @@ impl Case {
             spent: Duration::ZERO,
             least: [Duration::MAX; 2],
             report: Report::default(),
-            places: Vec::new(),
+            positions: Vec::new(),
         }
     }
 
@@ -135,14 +136,14 @@ impl Case {
         frames.values().sum::<f64>() / frames.len() as f64
     }
 
-    /// Root mean square distance from where particles are after sixteen steps a frame, by the body's longest side.
+    /// Root mean square distance from the result of sixteen steps a frame, relative to the body's longest side.
     fn error(&self, engine: &Engine, size: &Size) -> f64 {
         let params = format!(r#""volume": {}, "integrator": "accurate", "substeps": 16"#, self.volume);
         let (_, exact) = cook(engine, &graph(size, self.scene, &params), 2..=size.frames + 1);
         let square = |(a, b): (&[f32; 3], &[f32; 3])| {
             (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|x| x * x).sum::<f64>()
         };
-        let squares: f64 = self.places.iter().zip(&exact).map(square).sum();
+        let squares: f64 = self.positions.iter().zip(&exact).map(square).sum();
         (squares / exact.len() as f64).sqrt() / self.scene.sides()[0]
     }
 }
@@ -156,7 +157,7 @@ fn main() {
     }
     let asked: BTreeSet<&str> = words.iter().map(String::as_str).collect();
     if let Some(other) = asked.iter().find(|word| SIZES.iter().all(|size| size.name != **word)) {
-        eprintln!("no size is `{other}`; expected 2k, 20k or 100k");
+        eprintln!("unknown size `{other}`; expected 2k, 20k or 100k");
         std::process::exit(2);
     }
     let engines = [1, 2].map(|threads| Engine::new(&Settings { threads, ..Settings::default() }).expect("threads"));
@@ -170,7 +171,7 @@ fn main() {
     }
 }
 
-/// Runs all cases of a size, one after the other, several times.
+/// Runs all cases of a size in turn, several times.
 fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Case> {
     let case = |scene| {
         let alone = size.alone.then(|| Case::new(size, scene, 1, 1));
@@ -182,11 +183,11 @@ fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Cas
         for case in cases.iter_mut().filter(|case| case.spent < ENOUGH) {
             let engine = &engines[case.threads - 1];
             let (start, _) = cook(engine, &case.graph, 1..=1);
-            let (report, places) = cook(engine, &case.graph, 2..=size.frames + 1);
+            let (report, positions) = cook(engine, &case.graph, 2..=size.frames + 1);
             let took = [start.cooking, report.cooking];
             case.least = std::array::from_fn(|end| case.least[end].min(took[end]));
             case.spent += took[0] + took[1];
-            (case.report, case.places) = (report, places);
+            (case.report, case.positions) = (report, positions);
         }
     }
     for case in &cases {
@@ -195,7 +196,7 @@ fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Cas
     cases
 }
 
-/// What the cases of a size took a frame, how wrong they are, and the memory they need.
+/// Prints cost, error and memory of the cases of a size.
 fn describe(size: &Size, cases: &[Case], engine: &Engine, figures: &Figures) {
     println!(
         "\n{:<22} {:>9} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9} {:>8}",
@@ -218,7 +219,7 @@ fn describe(size: &Size, cases: &[Case], engine: &Engine, figures: &Figures) {
     }
 }
 
-/// What contacts and volumes cost, of the same body.
+/// Prints the relative cost of contacts and of volume preservation.
 fn compare(cases: &[Case], figures: &Figures) {
     let of = |scene: Scene, volume: u8| {
         let case = cases.iter().find(|case| (case.scene, case.volume, case.threads) == (scene, volume, 2));
@@ -226,17 +227,17 @@ fn compare(cases: &[Case], figures: &Figures) {
     };
     let of_free = |scene| of(scene, 1) / of(Scene::Free, 1);
     let [rolled, rolled_kept] = [0, 1].map(|volume| of(Scene::RolledBeam, volume) / of(Scene::Beam, volume));
-    println!("\nrolled beam ÷ beam {rolled:.2} without volumes, {rolled_kept:.2} with, at most 2.5 are asked for");
-    println!("rolling ÷ free {:.2}, at most 2.5 are asked for", of_free(Scene::Rolling));
+    println!("\nrolled beam ÷ beam {rolled:.2} without volumes, {rolled_kept:.2} with, target: at most 2.5");
+    println!("rolling ÷ free {:.2}, target: at most 2.5", of_free(Scene::Rolling));
     println!("resting ÷ free {:.2}, stiff ÷ free {:.2}", of_free(Scene::Resting), of_free(Scene::Stiff));
     let volumes = Scene::ALL.map(|scene| format!("{} {:.2}", scene.name(), of(scene, 1) / of(scene, 0)));
-    println!("volume 1 ÷ volume 0: {}, at most 1.5 are asked for\n", volumes.join(", "));
+    println!("volume 1 ÷ volume 0: {}, target: at most 1.5\n", volumes.join(", "));
 }
 
-/// The word before a size and a scene that makes this program a child of [`peak`].
+/// The argument before a size and a scene that makes this program a child process of [`peak`].
 const PEAK: &str = "peak";
 
-/// Most memory of a process that cooks two frames of a scene, bytes; `None` where the system does not tell.
+/// Peak memory of a process that cooks two frames of a scene, bytes; `None` if the system does not tell.
 fn peak(size: &Size, scene: Scene) -> Option<f64> {
     let program = std::env::current_exe().expect("this program");
     let child = Command::new(program).args([PEAK, size.name, scene.name()]).output().expect("a process");
@@ -244,7 +245,7 @@ fn peak(size: &Size, scene: Scene) -> Option<f64> {
     String::from_utf8_lossy(&child.stdout).trim().parse::<f64>().ok().map(|kilobytes| kilobytes * 1024.0)
 }
 
-/// The child: cooks, and prints the most memory it had, kB.
+/// The child process: cooks, and prints its peak memory, kB.
 fn cook_for_peak(size: &str, scene: &str) {
     let size = SIZES.iter().find(|known| known.name == size).expect("a size");
     let scene = Scene::ALL.into_iter().find(|known| known.name() == scene).expect("a scene");
@@ -255,22 +256,22 @@ fn cook_for_peak(size: &str, scene: &str) {
     println!("{}", peak.unwrap_or_default());
 }
 
-/// Where particles are, frame after frame.
+/// Positions of particles, frame after frame.
 fn cook(engine: &Engine, graph: &Graph, frames: std::ops::RangeInclusive<i64>) -> (Report, Vec<[f32; 3]>) {
     let request = Request { outputs: vec![0], frames: frames.map(Frame::whole).collect() };
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
         for one in finished {
-            places.extend_from_slice(one.geometry.tets().expect("tets").positions());
+            positions.extend_from_slice(one.geometry.tets().expect("tets").positions());
         }
         Ok(())
     };
     let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut sink).expect("it cooks");
     assert!(report.errors.is_empty(), "{}", report.errors[0].1);
-    (report, places)
+    (report, positions)
 }
 
-/// Softbody on a body in a scene, with more params.
+/// A Softbody node in a scene, with further params.
 fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
     let sides = scene.sides();
     let (cells, low) = match scene {
@@ -320,7 +321,7 @@ fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
     graph
 }
 
-/// Pins that hold the end at x = 0 where it is.
+/// Pins that hold the end at x = 0.
 fn held(points: &[[f32; 3]]) -> String {
     let end: Vec<[f32; 3]> = points.iter().copied().filter(|p| p[0] == 0.0).collect();
     format!(
@@ -329,12 +330,12 @@ fn held(points: &[[f32; 3]]) -> String {
     )
 }
 
-/// A rolling pin that goes on ten thicknesses a frame. Metres.
+/// A rolling pin that moves ten thicknesses a frame. Metres.
 struct Pin {
     radius: f64,
-    /// Where its middle is at the first frame, from the end of the body.
+    /// Position of its axis at the first frame, from the end of the body.
     start: f64,
-    /// How deep it is pressed in then, and how much deeper with each frame.
+    /// Depth in the first frame, and its increase with each frame.
     deep: f64,
     sinks: f64,
 }
@@ -347,15 +348,15 @@ const BEAM_PIN: Pin = Pin { radius: 0.25, start: 0.3, deep: 0.0, sinks: 0.01 };
 impl Pin {
     fn rolls(&self, last: i64, [_, height, depth]: [f64; 3]) -> String {
         let Self { radius, start, deep, sinks } = self;
-        let (mut places, mut turns) = (Vec::new(), Vec::new());
+        let (mut positions, mut turns) = (Vec::new(), Vec::new());
         for frame in 1..=last {
             let passed = (frame - 1) as f64;
-            let way = 10.0 * THICKNESS * passed;
+            let advance = 10.0 * THICKNESS * passed;
             let low = height - deep - sinks * passed;
-            places.push(format!("[{frame}, [{}, {}, {}]]", start + way, low + radius, 0.5 * depth));
-            turns.push(format!("[{frame}, [90, 0, {}]]", -(way / radius).to_degrees()));
+            positions.push(format!("[{frame}, [{}, {}, {}]]", start + advance, low + radius, 0.5 * depth));
+            turns.push(format!("[{frame}, [90, 0, {}]]", -(advance / radius).to_degrees()));
         }
-        let (places, turns) = (places.join(", "), turns.join(", "));
+        let (positions, turns) = (positions.join(", "), turns.join(", "));
         let (across, long) = (2.0 * radius, depth + 0.2);
         format!(
             r#""wood": {{
@@ -366,7 +367,7 @@ impl Pin {
                "type": "Transform",
                "inputs": {{ "geometry": "wood" }},
                "params": {{
-                   "translate": {{ "keyframes": [{places}] }},
+                   "translate": {{ "keyframes": [{positions}] }},
                    "rotate": {{ "keyframes": [{turns}] }}
                }}
            }},"#

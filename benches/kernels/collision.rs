@@ -1,6 +1,7 @@
-//! How long finding contacts takes: `RAYON_NUM_THREADS=1 cargo bench --bench collision`.
+//! Cost of contact detection: `RAYON_NUM_THREADS=1 cargo bench --bench collision`.
 //!
-//! `-- 200 pin` is 200 rounds of one case. A pin of 2,048 triangles rolls over a slab of dough whose surface has some 2,200 vertices, and the dough over itself.
+//! `-- 200 pin` runs 200 rounds of one case. A pin of 2,048 triangles rolls over a slab of dough with about 2,200
+//! surface vertices, and the dough is tested against itself.
 
 use bodies::collision::{BodySkin, CollisionScene, ContactParams, ContactSummary, Ground, Obstacle, ObstaclePose};
 use bodies::mass_spring::ContactQuery;
@@ -25,7 +26,7 @@ fn least(mut run: impl FnMut() -> ContactSummary) -> (Duration, ContactSummary) 
 fn main() {
     let (points, triangles) = slab(32);
     let skin = BodySkin::new(&points, &triangles, &[]).expect("the slab is sound");
-    // It sinks in by 5 mm, turns by 10° and goes on by 9 mm within the frame.
+    // Within the frame it sinks 5 mm, rotates by 10° and advances 9 mm.
     let (pin, faces) = pin(32, 31);
     let poses = [(0.0, 0.0, 0.009), (1.0, 0.175, -0.005)].map(|(share, turn, sink)| {
         let (sine, cosine) = libm::sincos(turn);

@@ -1,5 +1,5 @@
-//! Prints how long tets take: the minimum of several runs, CPU time of one thread for Delaunay and of the whole program,
-//! beside the time that passed, for surfaces; and what was measured of those.
+//! Cost of tetrahedralisation, the minimum of several runs: CPU time of one thread for Delaunay, CPU and wall time of
+//! the whole program for surfaces, and quality measures of those.
 //!
 //! `cargo bench --bench tets`; threads by `RAYON_NUM_THREADS`.
 
@@ -21,10 +21,10 @@ fn grid(n: i32) -> Vec<GridPoint> {
     (0..n * n * n).map(|k| [k % n, k / n % n, k / n / n].map(|x| x * 1000)).collect()
 }
 
-/// Random places near a sphere.
+/// Random points near a sphere.
 fn sphere(n: u64) -> Vec<GridPoint> {
     let on_sphere = |k: u64| {
-        // A sum of twelve uniform numbers is nearly normal, so its direction is nearly uniform.
+        // A sum of twelve uniform numbers is nearly normal, so the direction is nearly uniform.
         let sum = |axis: u64| (0..12).map(|j| Key::new(2).of(k).of(axis).of(j).f64()).sum::<f64>() - 6.0;
         let p = [0, 1, 2].map(sum);
         let length = p.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -38,7 +38,7 @@ type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// The triangles of an obj file of the example graphs.
 fn load(name: &str) -> Mesh {
-    let path = format!("{}/../graphs/assets/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/graphs/assets/{name}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("the asset is there");
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for line in text.lines() {
@@ -54,7 +54,7 @@ fn load(name: &str) -> Mesh {
     (points, triangles)
 }
 
-/// Each triangle cut in four at its sides' middles.
+/// Each triangle split in four.
 fn subdivided((mut points, triangles): Mesh) -> Mesh {
     let mut middles = std::collections::BTreeMap::new();
     let mut middle = |a: u32, b: u32| {
@@ -82,12 +82,12 @@ fn main() {
         ("sphere 5k", sphere(5_000)),
         ("sphere 20k", sphere(20_000)),
     ];
-    for (name, places) in cases {
+    for (name, points) in cases {
         let mut best = f64::INFINITY;
         let mut tets = 0;
         for _ in 0..ROUNDS {
             let start = ThreadTime::now();
-            tets = delaunay(&places).tets.len();
+            tets = delaunay(&points).tets.len();
             best = best.min(start.elapsed().as_secs_f64());
         }
         println!("{name:12} {:8.1} ms {tets:8} tets", best * 1e3);

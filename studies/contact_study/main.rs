@@ -1,11 +1,12 @@
-//! How deep soft bodies are pressed in under hard contact, and which frames are slow: dough of 5 kPa that rests, is rolled
-//! over, pressed and hit. What a frame costs, of more sizes, is `cargo bench --bench softbody`'s to say.
+//! Depth of penetration under hard contact, and cost of individual frames: dough of 5 kPa at rest, rolled over,
+//! pressed and hit. The cost of a frame at more sizes is measured by `cargo bench --bench softbody`.
 //!
-//! `cargo run --release -p studies --bin contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N] [pascal=N] [volume=N] [quiet]`;
-//! threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh), roll (a pin that rolls on by ten
-//! thicknesses a frame, 1 cm into the dough), press (a plate down to 60 % of the height and up again), fist (a sphere a
-//! third of the way in, ten thicknesses a frame), knead (a pin at twice the pace, half the way in), slap (a plate that
-//! comes to half the height within a frame). A line a frame, then a line a case.
+//! `cargo run --release -p studies --bin contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N]
+//! [pascal=N] [volume=N] [quiet]`; threads by `RAYON_NUM_THREADS`. Cases: rest (on the ground), plate (on a mesh),
+//! roll (a pin that rolls ten thicknesses a frame, 1 cm deep in the dough), press (a plate that goes down to 60 % of
+//! the height and up again), fist (a sphere, a third of the height deep, ten thicknesses a frame), knead (a pin at
+//! twice the speed, half the height deep), slap (a plate that moves to half the height within a frame). Prints a line
+//! for each frame, then one for each case.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
@@ -19,25 +20,25 @@ use std::time::Instant;
 
 const FRAME: f64 = 1.0 / 24.0;
 const THICKNESS: f64 = 1e-3;
-/// Of the dough.
+/// Size of the dough, metres.
 const SIZE: [f64; 3] = [0.24, 0.06, 0.12];
 
 type Points = Vec<[f64; 3]>;
-/// Where a tool is at a frame: a turn about z, then a shift.
-type Place = fn(f64) -> (f64, [f64; 3]);
+/// Pose of a tool at a frame: rotation about z, then translation.
+type ToolPose = fn(f64) -> (f64, [f64; 3]);
 
-/// A cylinder that lies along z.
+/// A cylinder along z.
 fn rolling_pin() -> Polygons {
     let mut pin = cylinder([0.1, 0.3, 0.1], 12);
     pin.points.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*z, *y));
     pin
 }
 
-/// What does something to the dough: its mesh about the origin, and where it is.
+/// A tool that acts on the dough: its mesh about the origin, and its motion.
 struct Tool {
     points: Points,
     triangles: Vec<[u32; 3]>,
-    at: Place,
+    at: ToolPose,
     ground: bool,
     frames: u32,
 }
@@ -47,13 +48,13 @@ impl Tool {
         let middle = [0.5 * SIZE[0], 0.5 * SIZE[2]];
         assert!(middle == [0.12, 0.06], "the tools are made for this dough");
         let slab = |size| block(size, [1; 3]);
-        let (shape, at, ground, frames): (_, Place, _, _) = match case {
+        let (shape, at, ground, frames): (_, ToolPose, _, _) = match case {
             "rest" => (slab([0.1, 0.1, 0.1]), |_| (0.0, [9.0, 9.0, 9.0]), true, 240),
             "plate" => (slab([1.03, 0.1, 1.01]), |_| (0.0, [0.12, -0.05, 0.06]), false, 240),
             "roll" => {
                 let at = |frame: f64| {
-                    let way = frame * 10.0 * THICKNESS;
-                    (-way / 0.05, [-0.08 + way, 0.1, 0.06])
+                    let advance = frame * 10.0 * THICKNESS;
+                    (-advance / 0.05, [-0.08 + advance, 0.1, 0.06])
                 };
                 (rolling_pin(), at, true, 42)
             }
@@ -73,8 +74,8 @@ impl Tool {
             }
             "knead" => {
                 let at = |frame: f64| {
-                    let way = frame * 20.0 * THICKNESS;
-                    (-way / 0.05, [-0.08 + way, 0.075, 0.06])
+                    let advance = frame * 20.0 * THICKNESS;
+                    (-advance / 0.05, [-0.08 + advance, 0.075, 0.06])
                 };
                 (rolling_pin(), at, true, 24)
             }
@@ -96,7 +97,7 @@ impl Tool {
         self.points.iter().map(|[x, y, z]| [c * x - s * y + shift[0], s * x + c * y + shift[1], z + shift[2]]).collect()
     }
 
-    /// How deep the deepest of `points` is inside of it at `frame`; it is convex.
+    /// Depth of the deepest of `points` in the tool at `frame`; the tool is convex.
     fn deepest(&self, points: &Points, frame: f64) -> f64 {
         let pose = self.at(frame);
         let planes: Vec<(DVec3, DVec3)> = self

@@ -1,17 +1,18 @@
-//! Work and precision of one TR-BDF2 step a frame against XPBD in small steps and vertex block descent, with and without
-//! contact: the same springs, dashpots, pressures, masses and contacts, one thread for all.
+//! Work-precision comparison of one TR-BDF2 step a frame with XPBD in small steps and with vertex block descent
+//! (VBD), with and without contact: the same springs, dashpots, pressures, masses and contacts, one thread for all.
 //!
-//! `cargo run --release -p studies --bin peers_study [free] [drop] [roll] [stiff] [only=NAME] [quick] [PATH.svg]`; only: the
-//! methods whose name has that in it; quick: one round and coarser references. A line a setting on stdout, and a picture
-//! where a path is given; about ten minutes for all four on a core of its own. Settings: ours by steps a frame (auto: one,
-//! or halves where contacts stay unmet) or tolerance, peers by steps × iterations.
+//! `cargo run --release -p studies --bin peers_study [free] [drop] [roll] [stiff] [only=NAME] [quick] [PATH.svg]`.
+//! `only` selects methods whose name contains it; `quick` does one round and uses coarser references. Prints a line
+//! for each setting, and writes a plot if a path is given; all four scenes take about ten minutes on an idle core.
+//! Settings: ours by steps a frame (auto: one, halved where contacts stay too deep) or tolerance, the peers' by steps
+//! × iterations.
 //!
-//! Error: root mean square over frames and particles of the distance to ours in 128 steps a frame ÷ the body's size; at
-//! end: that of the last frame alone; `own`: to the same method in very short steps (for ours VBD's), so that what methods
-//! make of contacts is told apart from error of time. Overlap: of the deepest particle, in gaps. Lost and least: volume of
-//! the body, and what is left of the worst tetrahedron's. `passes`: how often a frame looks at all springs, whatever the
-//! machine; one of ours is an iteration of conjugate gradients or a look at forces, one of XPBD's an iteration, one of
-//! VBD's a sweep.
+//! Error: root mean square over frames and particles of the distance to our solution with 128 steps a frame, ÷ the
+//! body's size; `at end`: in the last frame only; `own`: to the same method in very short steps (for ours, VBD's),
+//! which separates the treatment of contact from the error in time. Overlap: depth of the deepest particle, in gaps.
+//! Lost and least: volume of the body, and of the worst tetrahedron. `passes`: evaluations of all springs a frame,
+//! which do not depend on the machine: an iteration of conjugate gradients or a force evaluation of ours, an
+//! iteration of XPBD, a sweep of VBD.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
@@ -27,13 +28,13 @@ use plot::{Line, Panel};
 use run::{Method, Run};
 use scene::Scene;
 
-/// Rounds of which the fastest counts, of settings that take less than [`QUICK_MS`] a frame.
+/// Rounds, of which the fastest counts, for settings that take less than [`QUICK_MS`] a frame.
 const ROUNDS: usize = 3;
 const QUICK_MS: f64 = 70.0;
-/// Chebyshev's ρ: higher ones do not come to rest on the ground.
+/// Chebyshev's ρ; with larger values the body does not come to rest on the ground.
 const RADIUS: f64 = 0.87;
 
-/// A method with some of its settings, named as in the picture.
+/// A method with several settings, named as in the plot.
 struct Family {
     name: &'static str,
     settings: Vec<(String, Method)>,
@@ -86,7 +87,7 @@ impl Limits {
         }
     }
 
-    /// The method's own; ours is what all are held against already, so VBD's, which knows nothing of ours.
+    /// The reference of a method itself. As everything is compared with ours already, ours is compared with VBD's.
     fn of(&self, method: Method) -> &Run {
         match method {
             Method::Ours { .. } | Method::Vbd { .. } => &self.vbd,
@@ -95,7 +96,7 @@ impl Limits {
     }
 }
 
-/// Runs a scene with all methods, prints them, and gives what a picture shows.
+/// Runs a scene with all methods, prints the results and returns what the plot shows.
 fn study(scene: &Scene, quick: bool, only: &str) -> Panel {
     let size = scene.body.size();
     let springs = scene.body.springs().len();
@@ -147,7 +148,7 @@ fn study(scene: &Scene, quick: bool, only: &str) -> Panel {
     Panel { title: scene.title, floor: apart(&limits.xpbd).min(apart(&limits.vbd)), lines }
 }
 
-/// A number of which only its size counts where it is large.
+/// Formats a number of which only the magnitude matters if it is large.
 fn short(value: f64) -> String {
     if value.abs() < 100.0 { format!("{value:.2}") } else { format!("{value:.0e}") }
 }
@@ -155,7 +156,7 @@ fn short(value: f64) -> String {
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let is_asked = |name: &str| words.iter().any(|word| word == name);
-    // All on one thread; where the pool is there already it is what the caller wants.
+    // Everything on one thread; an existing pool is what the caller wants.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(1).build_global();
     let names = ["free", "drop", "roll", "stiff"];
     let any = names.iter().any(|name| is_asked(name));

@@ -1,69 +1,69 @@
-//! The equations of motion of a scene as the peers read them: the same springs, dashpots, pressures and contacts as
-//! `bodies::mass_spring` has, so that all methods tend to one motion as their steps get short.
+//! The equations of motion of a scene for the peers: the same springs, dashpots, pressures and contacts as in
+//! `bodies::mass_spring`, so that all methods converge to the same motion in short steps.
 //!
-//! The constants of pressures and contacts are those of `mass_spring::volume` and `mass_spring::contact`; where one is changed there and
-//! not here, the fine limits in the table part. What is not here: the push against tetrahedra that turn over.
+//! The constants of pressures and contacts are those of `mass_spring::volume` and `mass_spring::contact`. If they
+//! differ, the references in the table disagree. Not included: the barrier against inversion of tetrahedra.
 
 use crate::scene::{FRAME, FRICTION, GAP, Scene, Surface, Tools};
 use numerics::vector::DVec3;
 
-/// κ ÷ what a particle puts up against being moved.
-const FIRM: f64 = 30.0;
-/// Share of the gap from where on a push grows straight on.
-const STRAIGHT: f64 = 0.95;
-/// Body lengths a second at which friction is all of μN.
+/// κ ÷ effective stiffness of a particle.
+const PENALTY_RATIO: f64 = 30.0;
+/// Fraction of the gap beyond which the contact force continues linearly.
+const LINEAR_FROM: f64 = 0.95;
+/// Slip, in body lengths a second, above which friction is μN.
 const CREEP: f64 = 2e-5;
-/// Bulk modulus of a region ÷ E, all lost volume fought.
+/// Bulk modulus of a region ÷ E, at full strength.
 const BULK: f64 = 2.0 / 3.0 / 0.1;
-/// Shares of a region's volume that are fought twice as hard as small ones, and where hardness grows no more.
-const SLIGHT: f64 = 0.012;
-const MUCH: f64 = 0.04;
+/// Relative volume change at which resistance has doubled, and at which it stops growing.
+const STIFFENING: f64 = 0.012;
+const STIFFENING_END: f64 = 0.04;
 
-/// A spring and the dashpot beside it.
+/// A spring with its dashpot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spring {
     pub(crate) ends: [u32; 2],
-    /// N/m and N·s/m.
+    /// Stiffness, N/m, and damping, N·s/m.
     pub(crate) k: f64,
     pub(crate) c: f64,
-    /// Length at rest, metres.
+    /// Rest length, metres.
     pub(crate) rest: f64,
 }
 
-/// A region whose volume is kept.
+/// A region whose volume is preserved.
 #[derive(Clone, Debug)]
 pub(crate) struct Region {
-    /// On its boundary, rising.
+    /// Particles on its boundary, ascending.
     pub(crate) particles: Vec<u32>,
-    /// Outwards, corners among `particles`.
+    /// Boundary faces, outwards, as indices into `particles`.
     faces: Vec<[u16; 3]>,
-    /// Volume at rest, m³.
+    /// Rest volume, m³.
     pub(crate) rest: f64,
-    /// κ ÷ that, and the dashpot, Pa/m³ and Pa·s/m³.
+    /// κ ÷ rest volume, Pa/m³, and its damping, Pa·s/m³.
     k: f64,
     pub(crate) c: f64,
 }
 
-/// A force and how it grows with what it fights.
+/// A force and its derivative.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Law {
     pub(crate) force: f64,
     pub(crate) slope: f64,
 }
 
-/// Everything that a step reads.
+/// All parameters of a step.
 pub(crate) struct Model {
-    /// Kilograms.
+    /// Masses, kilograms.
     pub(crate) mass: Vec<f64>,
-    /// 1 ÷ mass; 0 where held.
+    /// 1 ÷ mass; 0 for pinned particles.
     pub(crate) inverse: Vec<f64>,
     pub(crate) springs: Vec<Spring>,
     pub(crate) regions: Vec<Region>,
     pub(crate) skin: Vec<u32>,
-    /// κ of each particle's contacts, N/m.
-    pub(crate) firm: Vec<f64>,
+    /// Penalty stiffness κ of each particle's contacts, N/m.
+    pub(crate) penalty_stiffness: Vec<f64>,
     pub(crate) tools: Tools,
-    /// Slip at which friction is all of μN, m/s.
+    /// Slip velocity above which friction is μN, m/s.
     pub(crate) creep: f64,
 }
 
@@ -76,31 +76,31 @@ impl Model {
         let known = body.springs().into_iter().zip(body.stiffnesses()).zip(body.lengths());
         let springs: Vec<Spring> =
             known.map(|((ends, k), rest)| Spring { ends, k: *k, c: scene.damping * k, rest: *rest }).collect();
-        let mut firm: Vec<f64> = mass.iter().map(|mass| 4.0 * mass / (FRAME * FRAME)).collect();
+        let mut penalty_stiffness: Vec<f64> = mass.iter().map(|mass| 4.0 * mass / (FRAME * FRAME)).collect();
         for spring in &springs {
-            spring.ends.iter().for_each(|end| firm[*end as usize] += spring.k / 3.0);
+            spring.ends.iter().for_each(|end| penalty_stiffness[*end as usize] += spring.k / 3.0);
         }
-        firm.iter_mut().for_each(|firm| *firm *= FIRM);
+        penalty_stiffness.iter_mut().for_each(|penalty_stiffness| *penalty_stiffness *= PENALTY_RATIO);
         let regions = body.regions().iter().map(|faces| Region::new(scene, faces)).collect();
         let creep = CREEP * body.size();
-        Self { mass, inverse, springs, regions, skin: scene.skin.clone(), firm, tools: scene.tools, creep }
+        Self { mass, inverse, springs, regions, skin: scene.skin.clone(), penalty_stiffness, tools: scene.tools, creep }
     }
 
-    /// The push of a surface on a particle, newtons, along its normal.
+    /// Normal force of a surface on a particle, newtons.
     #[inline(always)]
     pub(crate) fn push(&self, particle: usize, surface: &Surface) -> Law {
         let depth = GAP - surface.distance;
         if depth <= 0.0 {
             return Law { force: 0.0, slope: 0.0 };
         }
-        let firm = self.firm[particle];
-        let edge = depth.min(STRAIGHT * GAP);
+        let penalty_stiffness = self.penalty_stiffness[particle];
+        let edge = depth.min(LINEAR_FROM * GAP);
         let left = 1.0 - edge / GAP;
-        let slope = firm / (left * left);
-        Law { force: firm * edge / left + slope * (depth - edge), slope }
+        let slope = penalty_stiffness / (left * left);
+        Law { force: penalty_stiffness * edge / left + slope * (depth - edge), slope }
     }
 
-    /// Coulomb's bound on what sticks.
+    /// Largest friction force.
     #[inline(always)]
     pub(crate) fn friction(push: f64) -> f64 {
         FRICTION * push
@@ -121,12 +121,12 @@ impl Region {
         region
     }
 
-    /// Its triangles, by particle.
+    /// Its boundary triangles, by particle.
     pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
         self.faces.iter().map(|face| face.map(|corner| self.particles[usize::from(corner)]))
     }
 
-    /// m³.
+    /// Volume, m³.
     pub(crate) fn volume(&self, x: &[DVec3]) -> f64 {
         let origin = x[self.particles[0] as usize];
         let six = |face: [u32; 3]| {
@@ -136,7 +136,7 @@ impl Region {
         self.triangles().map(six).sum::<f64>() / 6.0
     }
 
-    /// That, and how it changes with each of its particles, m².
+    /// Volume and its gradient with respect to each particle, m².
     #[inline(always)]
     pub(crate) fn measure(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         gradient.fill(DVec3::zeros());
@@ -154,12 +154,12 @@ impl Region {
         six / 6.0
     }
 
-    /// Its pressure at a volume, Pa, inwards, without the dashpot's.
+    /// Pressure at a volume, Pa, inwards, without damping.
     #[inline(always)]
     pub(crate) fn pressure(&self, volume: f64) -> Law {
         let lost = volume - self.rest;
-        let soft = 1.0 / (SLIGHT * self.rest * SLIGHT * self.rest);
-        let edge = lost.clamp(-MUCH * self.rest, MUCH * self.rest);
+        let soft = 1.0 / (STIFFENING * self.rest * STIFFENING * self.rest);
+        let edge = lost.clamp(-STIFFENING_END * self.rest, STIFFENING_END * self.rest);
         let slope = 1.0 + 3.0 * edge * edge * soft;
         let force = edge * (1.0 + edge * edge * soft) + slope * (lost - edge);
         Law { force: self.k * force, slope: self.k * slope }

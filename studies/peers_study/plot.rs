@@ -1,8 +1,8 @@
-//! A picture of work against precision: a panel a scene, a line a method, both axes logarithmic. Plain SVG.
+//! A work-precision plot as plain SVG: a panel for each scene, a line for each method, both axes logarithmic.
 
 use std::fmt::Write as _;
 
-/// A method's settings: each its name, milliseconds a frame, error.
+/// The settings of a method: name, milliseconds a frame, error.
 pub(crate) struct Line {
     pub(crate) name: &'static str,
     pub(crate) points: Vec<(String, f64, f64)>,
@@ -11,22 +11,22 @@ pub(crate) struct Line {
 /// A scene.
 pub(crate) struct Panel {
     pub(crate) title: &'static str,
-    /// How far our fine limit is from the nearest peer's: below it, an error says little.
+    /// Distance of our reference from the nearest peer's: errors below it say little.
     pub(crate) floor: f64,
     pub(crate) lines: Vec<Line>,
 }
 
-/// Of a panel with its margins, and of what is inside of them, pixels.
+/// Size of a panel with its margins, and of the plot area inside, pixels.
 const PANEL: [f64; 2] = [520.0, 400.0];
 const INSIDE: [f64; 4] = [64.0, 34.0, 440.0, 310.0];
-/// Of the legend, pixels.
+/// Height of the legend, pixels.
 const LEGEND: f64 = 68.0;
-/// Errors above are all alike: the body is nowhere near.
+/// Errors above this are all alike: the result is useless.
 const WORST: f64 = 1.0;
 const BEST: f64 = 1e-6;
-/// Of letters of labels, pixels.
+/// Size of a letter in labels, pixels.
 const LETTER: [f64; 2] = [6.0, 11.0];
-/// A colour a line, and whether it is dashed; the same in every panel.
+/// Colour of each line and whether it is dashed; the same in every panel.
 const STYLES: [(&str, bool); 8] = [
     ("#c1121f", false),
     ("#f77f00", false),
@@ -38,10 +38,10 @@ const STYLES: [(&str, bool); 8] = [
     ("#7b2cbf", true),
 ];
 
-/// Where something is drawn: left, top, right, bottom.
+/// A rectangle: left, top, right, bottom.
 type Area = [f64; 4];
 
-/// The whole picture.
+/// The whole plot.
 pub(crate) fn svg(panels: &[Panel]) -> String {
     let columns = panels.len().clamp(1, 2);
     let (width, height) = (PANEL[0] * columns as f64, LEGEND + PANEL[1] * panels.len().div_ceil(columns).max(1) as f64);
@@ -98,7 +98,7 @@ fn mark(out: &mut String, [x, y]: [f64; 2], (colour, dashed): (&str, bool)) {
     );
 }
 
-/// Whole powers of ten around values.
+/// Powers of ten that enclose the values.
 fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let logs = values.filter(|value| *value > 0.0).map(libm::log10);
     let [low, high] = logs.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], log| [low.min(log), high.max(log)]);
@@ -111,7 +111,7 @@ fn draw(out: &mut String, panel: &Panel) {
     let across = decades(points().map(|point| point.1));
     let up = decades(points().map(|point| bounded(point.2)));
     let [left, top, wide, high] = INSIDE;
-    let place = |ms: f64, error: f64| {
+    let to_pixels = |ms: f64, error: f64| {
         let x = (libm::log10(ms) - across[0]) / (across[1] - across[0]);
         let y = (libm::log10(bounded(error)) - up[0]) / (up[1] - up[0]);
         [left + wide * x, top + high * (1.0 - y)]
@@ -119,7 +119,7 @@ fn draw(out: &mut String, panel: &Panel) {
     let _ = writeln!(out, "<text x=\"{left}\" y=\"{}\" font-size=\"14\">{}</text>", top - 12.0, panel.title);
     axes(out, across, up);
     if panel.floor > libm::pow(10.0, up[0]) && panel.floor < WORST {
-        let y = place(1.0, panel.floor)[1];
+        let y = to_pixels(1.0, panel.floor)[1];
         let _ = writeln!(
             out,
             "<path d=\"M{left} {y:.1}h{wide}\" stroke=\"#888\" stroke-dasharray=\"2 3\"/>\
@@ -130,8 +130,8 @@ fn draw(out: &mut String, panel: &Panel) {
     }
     let mut taken: Vec<Area> = Vec::new();
     for (line, style) in panel.lines.iter().zip(STYLES) {
-        let at: Vec<[f64; 2]> = line.points.iter().map(|point| place(point.1, point.2)).collect();
-        // A line begins anew where time falls: with other iterations.
+        let at: Vec<[f64; 2]> = line.points.iter().map(|point| to_pixels(point.1, point.2)).collect();
+        // A line is interrupted where the time falls, that is, where the number of iterations changes.
         at.chunk_by(|a, b| b[0] > a[0]).for_each(|run| stroke(out, run, style));
         for [x, y] in at {
             mark(out, [x, y], style);
@@ -140,8 +140,8 @@ fn draw(out: &mut String, panel: &Panel) {
     }
     for (line, (colour, _)) in panel.lines.iter().zip(STYLES) {
         for (name, ms, error) in &line.points {
-            let Some([x, y]) = room(&mut taken, place(*ms, *error), name.len()) else { continue };
-            // Once wide in the colour of the ground, so that lines below do not cross it.
+            let Some([x, y]) = room(&mut taken, to_pixels(*ms, *error), name.len()) else { continue };
+            // First with a wide outline in the background colour, which covers lines below.
             for around in ["stroke=\"#fcfcfa\" stroke-width=\"3\"", ""] {
                 let _ = writeln!(
                     out,
@@ -186,9 +186,9 @@ fn axes(out: &mut String, across: [f64; 2], up: [f64; 2]) {
     );
 }
 
-/// Where a label of so many letters goes beside a point: to where nothing is yet, or nowhere.
+/// A free position for a label beside a point, if there is one.
 fn room(taken: &mut Vec<Area>, [x, y]: [f64; 2], letters: usize) -> Option<[f64; 2]> {
-    /// Times as far as beside the point that a label may be.
+    /// Factor on the distance of labels from the point, for a second attempt.
     const FAR: f64 = 1.3;
     let [left, top, inner_wide, inner_high] = INSIDE;
     let (wide, high) = (LETTER[0] * letters as f64, LETTER[1]);

@@ -1,14 +1,14 @@
-//! One method on one scene: what it takes, and where it leaves the body frame after frame.
+//! Runs one method on one scene and measures it.
 
 use crate::model::Model;
-use crate::scene::{FRAME, GRAVITY, Scene, Touched};
+use crate::scene::{FRAME, GRAVITY, Scene, SceneContacts};
 use crate::vbd::Vbd;
 use crate::xpbd::Xpbd;
 use bodies::mass_spring::{BodySolver, Integrator, SolverFrame, State};
 use cpu_time::ProcessTime;
 use numerics::vector::DVec3;
 
-/// How time is stepped through.
+/// A method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Method {
     Ours {
@@ -27,17 +27,17 @@ pub(crate) enum Method {
     },
 }
 
-/// What came of it.
+/// Results of a run.
 pub(crate) struct Run {
     /// Processor time a frame, milliseconds.
     pub(crate) ms: f64,
-    /// How often a frame looks at all springs.
+    /// Evaluations of all springs a frame.
     pub(crate) passes: f64,
-    /// Of all particles, at the end of each frame.
+    /// Positions of all particles at the end of each frame.
     pub(crate) trace: Vec<Vec<DVec3>>,
-    /// Of all frames: how far below its gap the deepest particle is, as a share of it.
+    /// Over all frames: largest depth below the gap, relative to the gap.
     pub(crate) overlap: f64,
-    /// Of all frames: the largest share of its volume that the body lacks; the least a tetrahedron has.
+    /// Over all frames: largest relative loss of volume; smallest relative volume of a tetrahedron.
     pub(crate) lost: f64,
     pub(crate) least: f64,
 }
@@ -67,14 +67,15 @@ impl Run {
     }
 
     fn ours(scene: &Scene, integrator: Integrator, substeps: u32) -> Self {
-        /// Looks at all springs: to linearise and to look at the outcome, and as much for the line search.
+        /// Evaluations of all springs in a Newton iteration: linearisation and residual, and as many for the line
+        /// search.
         const NEWTON: u32 = 4;
-        /// For the first force and the energies.
+        /// Evaluations in a step: initial force and energies.
         const STEP: u32 = 2;
         let mut state = State::at_rest(&scene.body);
         let mut solver = BodySolver::new(&scene.body);
         Self::frames(scene, |frame, x| {
-            let touched = Touched { scene, frame };
+            let touched = SceneContacts { scene, frame };
             let touches = scene.tools.ground || scene.tools.roller.is_some();
             let asked = SolverFrame {
                 seconds: FRAME,
@@ -108,8 +109,8 @@ impl Run {
         run
     }
 
-    /// How far it is from another of the same scene ÷ the body's size: root mean square over particles and frames, and over
-    /// particles at the end.
+    /// Root mean square distance from another run of the same scene ÷ the body's size: over particles and frames, and
+    /// over particles at the end.
     pub(crate) fn error(&self, other: &Self, size: f64) -> (f64, f64) {
         let square = |(a, b): (&Vec<DVec3>, &Vec<DVec3>)| {
             a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len().max(1) as f64

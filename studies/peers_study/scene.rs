@@ -1,7 +1,7 @@
-//! What is simulated: a body, what holds it, what it touches.
+//! Scenes: a body, what holds it, what it touches.
 //!
-//! Ground and pin are exact shapes rather than meshes, and the same for every method: a search costs none of them anything,
-//! and no facet tells one from the other.
+//! Ground and pin are analytic shapes instead of meshes, and the same for every method, so that contact detection
+//! costs nothing and facets play no role.
 
 use bodies::mass_spring::{Contact, ContactFinder, ContactQuery, Material, Mesh, Pin, SoftBody};
 use bodies::tets::{boundary, cubes};
@@ -10,9 +10,9 @@ use numerics::vector::DVec3;
 
 pub(crate) const FRAME: f64 = 1.0 / 24.0;
 pub(crate) const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
-/// Distance kept from ground and pin, metres.
+/// Distance to keep from ground and pin, metres.
 pub(crate) const GAP: f64 = 1e-3;
-/// Coulomb's μ of both.
+/// Coulomb's friction coefficient of both.
 pub(crate) const FRICTION: f64 = 0.5;
 
 /// A body and its surroundings.
@@ -21,10 +21,10 @@ pub(crate) struct Scene {
     pub(crate) frames: u32,
     pub(crate) points: Vec<DVec3>,
     pub(crate) tets: Vec<[u32; 4]>,
-    /// Particles of the surface, rising.
+    /// Surface particles, ascending.
     pub(crate) skin: Vec<u32>,
     pub(crate) body: SoftBody,
-    /// E, Pa.
+    /// Young's modulus E, Pa.
     pub(crate) modulus: f64,
     /// β = c ÷ k, seconds.
     pub(crate) damping: f64,
@@ -32,37 +32,37 @@ pub(crate) struct Scene {
     pub(crate) tools: Tools,
 }
 
-/// What can be touched.
+/// Surfaces that can be touched.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tools {
-    /// The half space below y = 0.
+    /// The half-space below y = 0.
     pub(crate) ground: bool,
     pub(crate) roller: Option<Roller>,
 }
 
-/// A pin along z, as long as need be, that rolls along x.
+/// An infinitely long pin along z that rolls along x.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Roller {
     /// Its axis at the start, metres.
     start: DVec3,
-    /// m/s.
-    pace: DVec3,
+    /// Velocity of the axis, m/s.
+    velocity_of_axis: DVec3,
     radius: f64,
 }
 
-/// A surface as a point sees it.
+/// A surface as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
-    /// Unit, to the free side.
+    /// Unit normal towards the free side.
     pub(crate) normal: DVec3,
-    /// How far the point is from it, metres.
+    /// Distance of the point, metres.
     pub(crate) distance: f64,
-    /// Its velocity where it is nearest, m/s.
+    /// Velocity of the surface at the closest point, m/s.
     pub(crate) velocity: DVec3,
 }
 
 impl Tools {
-    /// Surfaces there can be.
+    /// Largest number of surfaces.
     pub(crate) const MOST: usize = 2;
 
     /// The surfaces as seen from `x`, at a time in seconds.
@@ -74,24 +74,24 @@ impl Tools {
             velocity: DVec3::zeros(),
         });
         let roller = self.roller.map(|roller| {
-            let arm = x - (roller.start + roller.pace * time);
+            let arm = x - (roller.start + roller.velocity_of_axis * time);
             let reach = (arm.x * arm.x + arm.y * arm.y).sqrt();
             let normal = DVec3::new(arm.x / reach, arm.y / reach, 0.0);
-            // It turns by −pace ÷ radius about z, so where it meets a floor it stands still.
-            let turn = DVec3::new(normal.y, -normal.x, 0.0) * roller.pace.x;
-            Surface { normal, distance: reach - roller.radius, velocity: roller.pace + turn }
+            // It rotates by −pace ÷ radius about z, so it rests where it touches a floor.
+            let turn = DVec3::new(normal.y, -normal.x, 0.0) * roller.velocity_of_axis.x;
+            Surface { normal, distance: reach - roller.radius, velocity: roller.velocity_of_axis + turn }
         });
         [ground, roller]
     }
 }
 
-/// The tools in one frame, as ours asks for them.
-pub(crate) struct Touched<'a> {
+/// The tools in one frame, as our solver asks for them.
+pub(crate) struct SceneContacts<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) frame: u32,
 }
 
-impl ContactFinder for Touched<'_> {
+impl ContactFinder for SceneContacts<'_> {
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let times = query.times.map(|share| (f64::from(self.frame) + share) * FRAME);
         for particle in &self.scene.skin {
@@ -100,7 +100,7 @@ impl ContactFinder for Touched<'_> {
             let after = self.scene.tools.around(to, times[1]);
             for (before, after) in before.into_iter().zip(after).filter_map(|(before, after)| before.zip(after)) {
                 if before.distance.min(after.distance) < 2.0 * GAP {
-                    // The side it comes from, where it would go through the axis.
+                    // The side it comes from, if it would pass through the axis.
                     let passed = before.normal.dot(&after.normal) <= 0.0;
                     let normal = if passed { before.normal } else { after.normal };
                     let offset = normal.dot(&(to - after.normal * after.distance));
@@ -120,15 +120,15 @@ impl ContactFinder for Touched<'_> {
 }
 
 impl Scene {
-    /// The scene of that name: `free`, `drop`, `roll` or `stiff`.
+    /// The scene with the name `free`, `drop`, `roll` or `stiff`.
     pub(crate) fn new(name: &'static str) -> Self {
         const DOUGH: [f64; 3] = [0.24, 0.06, 0.12];
         const CELLS: [u32; 3] = [26, 7, 12];
         let ground = Tools { ground: true, roller: None };
-        // Ten thicknesses a frame, 1 cm into the dough.
+        // Ten thicknesses a frame, 1 cm deep in the dough.
         let roller = Roller {
             start: DVec3::new(-0.08, 0.1, 0.06),
-            pace: DVec3::new(10.0 * GAP / FRAME, 0.0, 0.0),
+            velocity_of_axis: DVec3::new(10.0 * GAP / FRAME, 0.0, 0.0),
             radius: 0.05,
         };
         let above = |height: f64| [0.0, GAP + height, 0.0];
@@ -152,7 +152,7 @@ impl Scene {
         }
     }
 
-    /// Cells of six tetrahedra, the lowest corner at `at`.
+    /// A block of cells of six tetrahedra, its lowest corner at `at`.
     fn block(
         title: &'static str,
         frames: u32,
@@ -174,19 +174,19 @@ impl Scene {
         Self { title, frames, points, tets, skin, body, modulus, damping, pins: Vec::new(), tools }
     }
 
-    /// Pins of all particles at x = 0.
+    /// Pins for all particles at x = 0.
     fn clamped(&self) -> Vec<Pin> {
         let held = (0u32..).zip(&self.points).filter(|(_, p)| p.x == 0.0);
         held.map(|(particle, p)| Pin { particle, between: [(*p).into(); 2] }).collect()
     }
 
-    /// How far below its gap the deepest particle is at a time in seconds, as a share of it: 1 touches, more is inside.
+    /// Largest depth below the gap at a time in seconds, relative to the gap: 1 touches, more is inside.
     pub(crate) fn overlap(&self, x: &[DVec3], time: f64) -> f64 {
         let distances = self.skin.iter().flat_map(|particle| self.tools.around(x[*particle as usize], time));
         distances.flatten().map(|surface| 1.0 - surface.distance / GAP).fold(0.0, f64::max)
     }
 
-    /// Volume ÷ volume at rest, and the least of a tetrahedron.
+    /// Volume ÷ rest volume, and the smallest such ratio of a tetrahedron.
     pub(crate) fn volume(&self, x: &[DVec3]) -> (f64, f64) {
         let six = |x: &[DVec3], tet: &[u32; 4]| {
             let [a, b, c, d] = tet.map(|corner| x[corner as usize]);

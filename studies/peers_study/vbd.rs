@@ -1,16 +1,16 @@
-//! Vertex block descent (Chen et al. 2024): implicit Euler's objective, lowered particle by particle, a 3×3 block each,
-//! colour after colour.
+//! Vertex block descent (Chen et al. 2024): minimises the objective of implicit Euler one particle at a time, with a
+//! 3×3 block each, colour by colour.
 //!
-//! Springs are made positive semi-definite as ours are, regions by their gradient alone; friction is made linear as
-//! resistance at the present slip. Regions join particles of one colour; on one thread that costs nothing, and each sees
-//! the region's volume as it is by then. The first guess is the paper's adaptive one; acceleration is Chebyshev's, left
-//! out where a surface pushes.
+//! Springs are made positive semi-definite as in our solver, regions are linearised by their gradient only, friction
+//! as resistance at the current slip. Particles of one colour may share a region; on a single thread that does not
+//! matter, and each sees the region's current volume. The initial guess is the adaptive one of the paper; Chebyshev
+//! acceleration is disabled for particles in contact.
 
 use crate::model::{Model, Region, Spring};
 use crate::scene::{FRAME, GRAVITY};
 use numerics::vector::{DMat3, DVec3};
 
-/// A spring as one end sees it.
+/// A spring as seen from one end.
 #[derive(Clone, Copy)]
 struct Link {
     other: u32,
@@ -25,22 +25,22 @@ struct Fan {
     sides: std::ops::Range<usize>,
 }
 
-/// What each particle hangs on: where its own begin.
-struct Around {
+/// Incident elements of each particle, and where they start.
+struct IncidentElements {
     link_starts: Vec<usize>,
     links: Vec<Link>,
     fan_starts: Vec<usize>,
     fans: Vec<Fan>,
     sides: Vec<[u32; 2]>,
     is_skin: Vec<bool>,
-    /// Colour after colour.
+    /// Particles by colour.
     order: Vec<u32>,
 }
 
-/// A body on its way, with all memory that its steps need.
+/// A simulated body with all buffers.
 pub(crate) struct Vbd {
     model: Model,
-    around: Around,
+    around: IncidentElements,
     substeps: u32,
     iterations: u32,
     /// Chebyshev's ρ; 0: no acceleration.
@@ -49,14 +49,14 @@ pub(crate) struct Vbd {
     v: Vec<DVec3>,
     before: Vec<DVec3>,
     inertial: Vec<DVec3>,
-    /// How velocities changed in the step before, m/s².
+    /// Acceleration in the last step, m/s².
     trend: Vec<DVec3>,
-    /// Two sweeps ago, and one.
+    /// Positions two sweeps ago and one sweep ago.
     earlier: [Vec<DVec3>; 2],
     touched: Vec<bool>,
-    /// How the regions around the particle at hand change with it, m².
+    /// Gradients of the regions around the current particle, m².
     gradients: Vec<DVec3>,
-    /// Of regions now, and where the step began, m³.
+    /// Current volumes of regions, and those at the start of the step, m³.
     volumes: Vec<f64>,
     volumes_before: Vec<f64>,
 }
@@ -64,7 +64,7 @@ pub(crate) struct Vbd {
 impl Vbd {
     pub(crate) fn new(model: Model, points: &[DVec3], substeps: u32, iterations: u32, radius: f64) -> Self {
         let still = || vec![DVec3::zeros(); points.len()];
-        let around = Around::new(&model);
+        let around = IncidentElements::new(&model);
         let most = around.fan_starts.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0);
         Self {
             around,
@@ -89,7 +89,7 @@ impl Vbd {
         &self.x
     }
 
-    /// Goes through a frame; returns how often all springs were looked at.
+    /// Steps through a frame; returns the number of evaluations of all springs.
     pub(crate) fn frame(&mut self, frame: u32) -> f64 {
         let h = FRAME / f64::from(self.substeps);
         for step in 0..self.substeps {
@@ -118,7 +118,7 @@ impl Vbd {
         f64::from(self.substeps * self.iterations)
     }
 
-    /// Where inertia and gravity lead, and a guess: gravity counts as far as it did in the step before.
+    /// Inertial positions, and the initial guess: gravity counts as far as it acted in the last step.
     fn begin(&mut self, h: f64) {
         self.before.copy_from_slice(&self.x);
         measure(&self.model.regions, &self.x, &mut self.volumes_before);
@@ -133,7 +133,7 @@ impl Vbd {
         measure(&self.model.regions, &self.x, &mut self.volumes);
     }
 
-    /// Moves one particle to where its own block says.
+    /// Minimises over one particle.
     #[inline(always)]
     fn descend(&mut self, particle: usize, h: f64, time: f64) {
         if self.model.inverse[particle] == 0.0 {
@@ -146,14 +146,14 @@ impl Vbd {
         let mut block = DMat3::from_diagonal_element(inertia);
         for link in &around.links[around.link_starts[particle]..around.link_starts[particle + 1]] {
             let other = link.other as usize;
-            let way = mine - self.x[other];
-            let length = way.norm();
+            let offset = mine - self.x[other];
+            let length = offset.norm();
             if length < 1e-12 {
                 continue;
             }
-            let normal = way / length;
-            let pace = normal.dot(&(moved - self.x[other] + self.before[other])) / h;
-            force -= normal * (link.k * (length - link.rest) + link.c * pace);
+            let normal = offset / length;
+            let rate = normal.dot(&(moved - self.x[other] + self.before[other])) / h;
+            force -= normal * (link.k * (length - link.rest) + link.c * rate);
             let alpha = link.k * (1.0 - link.rest / length).max(0.0);
             add_square(&mut block, normal, link.k + link.c / h - alpha);
             block.m11 += alpha;
@@ -166,8 +166,8 @@ impl Vbd {
             *kept = gradient;
             let volume = self.volumes[fan.region as usize];
             let own = region.pressure(volume);
-            let pace = (volume - self.volumes_before[fan.region as usize]) / h;
-            force -= gradient * (own.force + region.c * pace);
+            let rate = (volume - self.volumes_before[fan.region as usize]) / h;
+            force -= gradient * (own.force + region.c * rate);
             add_square(&mut block, gradient, own.slope + region.c / h);
         }
         let mut touched = false;
@@ -190,7 +190,7 @@ impl Vbd {
         let Some(step) = block.cholesky().map(|root| root.solve(&force)) else { return };
         self.x[particle] = mine + step;
         for (fan, gradient) in around.fans[fans].iter().zip(&self.gradients) {
-            // A volume is linear in one particle, whose own place its gradient does not hang on.
+            // A volume is linear in a single particle, so its gradient does not depend on that particle's position.
             self.volumes[fan.region as usize] += gradient.dot(&step);
         }
     }
@@ -210,7 +210,7 @@ impl Vbd {
     }
 }
 
-impl Around {
+impl IncidentElements {
     fn new(model: &Model) -> Self {
         let count = model.mass.len();
         let mut links: Vec<Vec<Link>> = vec![Vec::new(); count];
@@ -246,7 +246,7 @@ impl Around {
         Self { link_starts, links: flat, fan_starts, fans, sides, is_skin, order }
     }
 
-    /// How a region's volume changes with a particle that is at `mine`, m².
+    /// Gradient of a region's volume with respect to a particle at `mine`, m².
     #[inline(always)]
     fn gradient(&self, fan: &Fan, mine: DVec3, x: &[DVec3]) -> DVec3 {
         let side = |[b, c]: &[u32; 2]| (x[*b as usize] - mine).cross(&(x[*c as usize] - mine));
@@ -254,7 +254,7 @@ impl Around {
     }
 }
 
-/// Particles by colour, none next to its like: each takes the first colour that no neighbour before it has.
+/// Particles by colour, so that no neighbours have the same: greedy colouring in order.
 fn colours(links: &[Vec<Link>]) -> Vec<u32> {
     let mut colour: Vec<u32> = vec![u32::MAX; links.len()];
     for particle in 0..links.len() {
@@ -271,14 +271,14 @@ fn measure(regions: &[Region], x: &[DVec3], volumes: &mut [f64]) {
 }
 
 #[inline(always)]
-fn add_square(block: &mut DMat3, way: DVec3, weight: f64) {
-    let scaled = way * weight;
-    block.m11 += scaled.x * way.x;
-    block.m21 += scaled.y * way.x;
-    block.m31 += scaled.z * way.x;
-    block.m22 += scaled.y * way.y;
-    block.m32 += scaled.z * way.y;
-    block.m33 += scaled.z * way.z;
+fn add_square(block: &mut DMat3, offset: DVec3, weight: f64) {
+    let scaled = offset * weight;
+    block.m11 += scaled.x * offset.x;
+    block.m21 += scaled.y * offset.x;
+    block.m31 += scaled.z * offset.x;
+    block.m22 += scaled.y * offset.y;
+    block.m32 += scaled.z * offset.y;
+    block.m33 += scaled.z * offset.z;
     block.m12 = block.m21;
     block.m13 = block.m31;
     block.m23 = block.m32;

@@ -1,15 +1,15 @@
-//! XPBD (Macklin et al. 2016) in small steps (Macklin et al. 2019): Gauss–Seidel over springs, then regions, then contacts,
-//! in a fixed order.
+//! XPBD (Macklin et al. 2016) in small steps (Macklin et al. 2019): Gauss–Seidel over springs, then regions, then
+//! contacts, in a fixed order.
 //!
-//! A constraint's impulse is λ = −h²·F(C, Ċ) of its force law F, made linear where the constraint is: for a spring that is
-//! XPBD's compliance and damping to the letter, and laws that stiffen fit in. Friction is a constraint on the slip of a
-//! step, bounded by μ times the contact's own impulse (Müller et al. 2020).
+//! The impulse of a constraint is λ = −h²·F(C, Ċ) with its force law F, linearised at the current state. For springs
+//! that is exactly the compliance and damping of XPBD, and it extends to stiffening laws. Friction constrains the
+//! slip of a step, bounded by μ times the normal impulse (Müller et al. 2020).
 
 use crate::model::{Law, Model, Spring};
 use crate::scene::{FRAME, GRAVITY, Tools};
 use numerics::vector::DVec3;
 
-/// A body on its way, with all memory that its steps need.
+/// A simulated body with all buffers.
 pub(crate) struct Xpbd {
     model: Model,
     substeps: u32,
@@ -17,7 +17,7 @@ pub(crate) struct Xpbd {
     x: Vec<DVec3>,
     v: Vec<DVec3>,
     before: Vec<DVec3>,
-    /// Impulses × h of springs, regions, and of each surface on each particle of the skin: along its normal, and across.
+    /// Impulses × h of springs, of regions, and of each surface on each surface particle: normal and tangential.
     of_springs: Vec<f64>,
     of_regions: Vec<f64>,
     of_surfaces: Vec<[(f64, DVec3); Tools::MOST]>,
@@ -45,7 +45,7 @@ impl Xpbd {
         &self.x
     }
 
-    /// Goes through a frame; returns how often all springs were looked at.
+    /// Steps through a frame; returns the number of evaluations of all springs.
     pub(crate) fn frame(&mut self, frame: u32) -> f64 {
         let h = FRAME / f64::from(self.substeps);
         for step in 0..self.substeps {
@@ -76,13 +76,13 @@ impl Xpbd {
         let inverse = &self.model.inverse;
         for (Spring { ends, k, c, rest }, lambda) in self.model.springs.iter().zip(&mut self.of_springs) {
             let [a, b] = ends.map(|end| end as usize);
-            let way = self.x[a] - self.x[b];
-            let length = way.norm();
+            let offset = self.x[a] - self.x[b];
+            let length = offset.norm();
             let weight = inverse[a] + inverse[b];
             if length < 1e-12 || weight == 0.0 {
                 continue;
             }
-            let normal = way / length;
+            let normal = offset / length;
             let moved = normal.dot(&(self.x[a] - self.before[a] - self.x[b] + self.before[b]));
             let law = Law { force: k * (length - rest) + c * moved / h, slope: k + c / h };
             let change = impulse(law, h, weight, lambda);
@@ -118,7 +118,7 @@ impl Xpbd {
             for (which, (along, across)) in impulses.iter_mut().enumerate() {
                 let Some(surface) = self.model.tools.around(self.x[particle], time)[which] else { continue };
                 let push = self.model.push(particle, &surface);
-                // A push lessens the depth that it fights, as a spring's pull lessens its length.
+                // A normal force reduces the depth, as the tension of a spring reduces its length.
                 let mut pull = -*along;
                 self.x[particle] -= surface.normal * (impulse(push, h, weight, &mut pull) * weight);
                 *along = (-pull).max(0.0);
@@ -136,8 +136,8 @@ impl Xpbd {
     }
 }
 
-/// What the impulse `lambda` of a constraint changes by so that it is −h² of its law, where the constraint's particles move
-/// by `weight` an impulse.
+/// Change of the impulse `lambda` of a constraint towards −h² of its law, if a unit impulse moves its particles by
+/// `weight`.
 #[inline(always)]
 fn impulse(law: Law, h: f64, weight: f64, lambda: &mut f64) -> f64 {
     let change = (-h * h * law.force - *lambda) / (1.0 + weight * h * h * law.slope);

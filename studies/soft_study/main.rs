@@ -1,9 +1,9 @@
-//! Prints how the integrators trade work for error: a cantilever of 2 × 0.5 × 0.5 m that falls from rest, also ten thousand
-//! times as stiff.
+//! Work and error of the integrators: a cantilever of 2 × 0.5 × 0.5 m falling from rest, at two stiffnesses a factor
+//! of ten thousand apart.
 //!
-//! `cargo run --release -p studies --bin soft_study [small|large|huge]…`; threads by `RAYON_NUM_THREADS`. Error: root mean
-//! square over the frames of how far the tip's mean is from a fine reference's, ÷ 2 m. What the default integrator costs
-//! and misses by, through the node, is `cargo bench --bench softbody`'s to say.
+//! `cargo run --release -p studies --bin soft_study [small|large|huge]…`; threads by `RAYON_NUM_THREADS`. Error: root
+//! mean square over the frames of the distance of the tip's centroid from that of a fine reference, ÷ 2 m. Cost and
+//! error of the default integrator in the node are measured by `cargo bench --bench softbody`.
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
@@ -21,7 +21,7 @@ struct Beam {
     tip: Vec<usize>,
 }
 
-/// Clamped at x = 0; at ×1 the springs along the sides of the small beam's cells have 1.9e5 N/m.
+/// Clamped at x = 0. At a factor of 1 the axis-aligned springs of the small beam have 1.9e5 N/m.
 fn beam(cells: [usize; 3], times: f64, beta: f64) -> Beam {
     let (points, tets) = cubes(cells, [0.0; 3], SIZE);
     let at = |x: f64| points.iter().zip(0..).filter(move |(p, _)| p[0] == x);

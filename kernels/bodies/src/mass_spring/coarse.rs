@@ -19,25 +19,25 @@ pub(super) const MODES: usize = 6;
 /// including particles that are free to move. One smoothing step with the contact stiffness, F = 1 − D⁻¹C, avoids
 /// that: F is near 0 in the directions a contact resists and 1 elsewhere.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Anchors {
+pub(super) struct ContactFilters {
     /// Index in `ways` for each particle; empty if no particle is filtered.
     of: Vec<u32>,
     /// F, column by column.
-    ways: Vec<[[f64; 3]; 3]>,
+    filters: Vec<[[f64; 3]; 3]>,
 }
 
-impl Anchors {
+impl ContactFilters {
     /// Of a linear system; isolated particles (without springs) take no part in cluster motions.
     pub(super) fn new(system: &System) -> Self {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const NEGLIGIBLE: f64 = 0.1;
-        let mut anchors = Self::default();
+        let mut filters = Self::default();
         if system.blocks.is_empty() && system.transient.is_empty() && system.isolated.is_empty() {
-            return anchors;
+            return filters;
         }
         for particle in 0..system.inertia.len() {
             if system.isolated.get(particle) == Some(&true) {
-                anchors.hold(particle, system.inertia.len(), [[0.0; 3]; 3]);
+                filters.insert(particle, system.inertia.len(), [[0.0; 3]; 3]);
                 continue;
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
@@ -53,37 +53,37 @@ impl Anchors {
             if gap_fraction.iter().all(|column| column.amax() < NEGLIGIBLE) {
                 continue;
             }
-            let way = std::array::from_fn(|k| {
+            let filter = std::array::from_fn(|k| {
                 let mut column = -gap_fraction[k];
                 column[k] += 1.0;
                 column.into()
             });
-            anchors.hold(particle, system.inertia.len(), way);
+            filters.insert(particle, system.inertia.len(), filter);
         }
-        anchors
+        filters
     }
 
-    fn hold(&mut self, particle: usize, count: usize, way: [[f64; 3]; 3]) {
+    fn insert(&mut self, particle: usize, count: usize, filter: [[f64; 3]; 3]) {
         self.of.resize(count, FREE);
-        self.of[particle] = self.ways.len() as u32;
-        self.ways.push(way);
+        self.of[particle] = self.filters.len() as u32;
+        self.filters.push(filter);
     }
 
     /// Mean difference from `others`: 1 if, for example, all contacts have opened.
     pub(super) fn change(&self, others: &Self) -> f64 {
-        let most = self.ways.len().max(others.ways.len());
-        let way = |anchors: &Self, particle: usize| anchors.at(particle).unwrap_or_else(DMat3::identity);
-        let held = |particle: &usize| [self, others].iter().any(|anchors| anchors.at(*particle).is_some());
+        let most = self.filters.len().max(others.filters.len());
+        let filter = |filters: &Self, particle: usize| filters.at(particle).unwrap_or_else(DMat3::identity);
+        let held = |particle: &usize| [self, others].iter().any(|filters| filters.at(*particle).is_some());
         let particles = (0..self.of.len().max(others.of.len())).filter(held);
-        let sum: f64 = particles.map(|particle| (way(self, particle) - way(others, particle)).norm()).sum();
+        let sum: f64 = particles.map(|particle| (filter(self, particle) - filter(others, particle)).norm()).sum();
         if most > 0 { sum / most as f64 } else { 0.0 }
     }
 
     /// F of a filtered particle.
     #[inline(always)]
     pub(super) fn at(&self, particle: usize) -> Option<DMat3> {
-        let way = self.ways.get(*self.of.get(particle)? as usize)?;
-        Some(DMat3::from_columns(&way.map(DVec3::from)))
+        let filter = self.filters.get(*self.of.get(particle)? as usize)?;
+        Some(DMat3::from_columns(&filter.map(DVec3::from)))
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
-use super::coarse::{Anchors, moved};
+use super::coarse::{ContactFilters, moved};
 use super::system::{System, solve_lower, solve_lower_transpose};
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
@@ -48,7 +48,7 @@ pub(super) struct Scratch {
 pub(super) struct Coarse<'a> {
     pub(super) factor: &'a Lower,
     pub(super) offset_from_centroid: &'a [Vec3],
-    pub(super) anchors: &'a Anchors,
+    pub(super) filters: &'a ContactFilters,
 }
 
 impl Coarse<'_> {
@@ -70,14 +70,14 @@ impl Coarse<'_> {
             DVec3::zeros()
         } else {
             let free = moved(&modes[6 * cluster..6 * cluster + 6], to_f64(self.offset_from_centroid[particle]));
-            self.anchors.at(particle).map_or(free, |way| way * free)
+            self.filters.at(particle).map_or(free, |filter| filter * free)
         }
     }
 
     /// Adds a particle's contribution to the force and torque on its cluster to `sums`.
     #[inline(always)]
     fn restrict(&self, particle: usize, r: DVec3, sums: &mut [f64; 6]) {
-        let r = self.anchors.at(particle).map_or(r, |way| way.tr_mul(&r));
+        let r = self.filters.at(particle).map_or(r, |filter| filter.tr_mul(&r));
         let torque = to_f64(self.offset_from_centroid[particle]).cross(&r);
         for axis in 0..3 {
             sums[axis] += r[axis];

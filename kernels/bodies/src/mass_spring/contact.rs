@@ -222,9 +222,9 @@ impl ContactConstraint {
 
     /// For surfaces that penetrate each other at the start `x` of a step of `seconds`, limits the separation in that
     /// step to `way` metres. Resolved at once within a short step, they would fly apart.
-    pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, way: f64) -> Self {
+    pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, separation: f64) -> Self {
         let through = -self.clearance(x, seconds) - self.gap;
-        Self { allowed_depth: (through - way).max(0.0), ..self }
+        Self { allowed_depth: (through - separation).max(0.0), ..self }
     }
 
     /// Freezes the state at `x` and `v`, `seconds` before the detection time: open or closed, sticking or sliding,
@@ -250,8 +250,8 @@ impl ContactConstraint {
 
     /// Slip velocity of the surfaces.
     fn slip(&self, v: &[DVec3]) -> DVec3 {
-        let pace = self.weighted_sum(v) - self.velocity;
-        pace - self.normal * self.normal.dot(&pace)
+        let relative = self.weighted_sum(v) - self.velocity;
+        relative - self.normal * self.normal.dot(&relative)
     }
 
     /// The forces at `x` and `v`, `seconds` before the detection time, for a body of the given `size`.
@@ -408,8 +408,8 @@ impl ContactConstraint {
         if most <= 0.0 || state.mode == ContactMode::Open {
             return DVec3::zeros();
         }
-        let way = self.weighted_sum(dx);
-        let more = (way - self.normal * self.normal.dot(&way)) * (state.grip / (a * most));
+        let separation = self.weighted_sum(dx);
+        let more = (separation - self.normal * self.normal.dot(&separation)) * (state.grip / (a * most));
         let slides = state.mode == ContactMode::Sliding;
         if slides && share < 1.0 && state.slip.dot(&(state.slip + more)) < 0.0 {
             return DVec3::zeros();
@@ -421,7 +421,7 @@ impl ContactConstraint {
 
     /// Adds the stiffness of a single-particle contact to that particle's block.
     pub(super) fn add_block(&self, resisted: &([DVec3; 3], usize), weight: f64, block: &mut [f64; 6]) {
-        resisted.0[..resisted.1].iter().for_each(|way| add_square(block, *way, weight * weight));
+        resisted.0[..resisted.1].iter().for_each(|separation| add_square(block, *separation, weight * weight));
     }
 }
 

@@ -34,8 +34,8 @@ impl Stepper<'_> {
         let known = found
             .iter()
             .filter_map(|contact| ContactConstraint::new(body, contact, self.seconds, &self.solver.particle_stiffness));
-        let way = body.spacing * h / self.seconds;
-        known.map(|c| c.depenetrating(&start.x, h, way).with_load(&start.x, &start.loads, h)).collect()
+        let displacement = body.spacing * h / self.seconds;
+        known.map(|c| c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h)).collect()
     }
 
     /// The largest normal force of a contact on each particle at `x`.
@@ -97,7 +97,7 @@ impl Stepper<'_> {
             time: times[1],
             contacts: &[],
             early: 0.0,
-            spinning: &[],
+            rotational_energy: &[],
             line_search: true,
             index: 0,
         };
@@ -140,8 +140,8 @@ impl Stepper<'_> {
         let own: f64 =
             (0..x.len()).map(|particle| mass[particle] * (falls + (y[particle] - x[particle]).norm_squared())).sum();
         let given = contacts.iter().flat_map(|contact| {
-            let way = (contact.velocity * h).norm_squared();
-            contact.sides().map(move |(particle, weight)| mass[particle] * weight * weight * way)
+            let displacement = (contact.velocity * h).norm_squared();
+            contact.sides().map(move |(particle, weight)| mass[particle] * weight * weight * displacement)
         });
         let scale = own + given.sum::<f64>();
         if scale > 0.0 { scale } else { f64::INFINITY }

@@ -153,13 +153,17 @@ impl BodySolver {
         let context = FrameContext { body, external: &external, rest, volumes: &state.volumes };
         let vectors =
             |values: &[[f64; 3]]| body.to_solver_order(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
-        let trend =
-            if state.trend.len() == body.len() { vectors(&state.trend) } else { vec![DVec3::zeros(); body.len()] };
+        let acceleration = if state.acceleration.len() == body.len() {
+            vectors(&state.acceleration)
+        } else {
+            vec![DVec3::zeros(); body.len()]
+        };
         let mut loads = vec![0.0; body.len()];
         for (particle, load) in body.order.index_of.iter().zip(&state.loads) {
             loads[*particle as usize] = *load;
         }
-        let mut motion = Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), trend, loads };
+        let mut motion =
+            Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), acceleration, loads };
         let mut report = FrameReport::default();
         self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
         let mut energies = measure(&mut self.solver, &context, 0.0, &motion, false);
@@ -177,12 +181,12 @@ impl BodySolver {
         }
         (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
         describe(&mut report, &context, &energies, &motion);
-        state.trend.resize(body.len(), [0.0; 3]);
+        state.acceleration.resize(body.len(), [0.0; 3]);
         state.loads.resize(body.len(), 0.0);
         for (caller, particle) in body.order.index_of.iter().enumerate() {
             state.positions[caller] = motion.x[*particle as usize].into();
             state.velocities[caller] = motion.v[*particle as usize].into();
-            state.trend[caller] = motion.trend[*particle as usize].into();
+            state.acceleration[caller] = motion.acceleration[*particle as usize].into();
             state.loads[caller] = motion.loads[*particle as usize];
         }
         report

@@ -2,7 +2,7 @@
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
-use super::coarse::{Anchors, Layout, MODES};
+use super::coarse::{ContactFilters, Layout, MODES};
 use super::partition::Partition;
 use super::rank_one::{RankOneTerms, add_square};
 use super::springs::Record;
@@ -17,7 +17,7 @@ pub(super) struct Galerkin<'a> {
     pub(super) system: &'a System,
     pub(super) offset_from_centroid: &'a [Vec3],
     /// Filters of the rigid motions at particles in contact.
-    pub(super) anchors: &'a Anchors,
+    pub(super) filters: &'a ContactFilters,
 }
 
 impl Galerkin<'_> {
@@ -44,7 +44,7 @@ impl Galerkin<'_> {
 
     /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
-        let Self { layout, body, system, offset_from_centroid, anchors } = self;
+        let Self { layout, body, system, offset_from_centroid, filters } = self;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
         for particle in body.order.clusters.range(cluster) {
@@ -54,7 +54,7 @@ impl Galerkin<'_> {
                 continue;
             }
             let mine = to_f64(offset_from_centroid[particle]);
-            let anchor = anchors.at(particle);
+            let filter = filters.at(particle);
             // Stiffness and inertia of the particle itself.
             let mut own = system.blocks.get(particle).copied().unwrap_or_default();
             let mut alike = system.inertia[particle];
@@ -65,22 +65,22 @@ impl Galerkin<'_> {
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
                     let (block, far) = (&mut blocks[home - first], to_f64(offset_from_centroid[other]));
-                    if anchor.is_none() && anchors.at(other).is_none() {
+                    if filter.is_none() && filters.at(other).is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
                     } else {
-                        for (scale, way) in ways(record) {
-                            block.add(-scale, &self.along(particle, way), &self.along(other, way));
+                        for (scale, direction) in directions(record) {
+                            block.add(-scale, &self.along(particle, direction), &self.along(other, direction));
                         }
                     }
                 }
             }
-            if own == [0.0; 6] && anchor.is_none() {
+            if own == [0.0; 6] && filter.is_none() {
                 blocks[last].add_alike(alike, mine, mine);
             } else {
                 let [xx, xy, xz, yy, yz, zz] = own;
                 let h = DMat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) + DMat3::from_diagonal_element(alike);
-                let motion = motion(anchor, mine);
+                let motion = motion(filter, mine);
                 blocks[last].add_product(motion, &h, motion);
             }
         }
@@ -91,15 +91,16 @@ impl Galerkin<'_> {
     #[inline(always)]
     fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
         let ends = [particle, record.other as usize];
-        let anchors = ends.map(|end| self.anchors.at(end));
+        let filters = ends.map(|end| self.filters.at(end));
         let held = ends.map(|end| self.system.held[end]);
-        if held == [false; 2] && anchors == [None; 2] {
+        if held == [false; 2] && filters == [None; 2] {
             let [here, there] = ends.map(|end| to_f64(self.offset_from_centroid[end]));
             block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
-        for (scale, way) in ways(record) {
-            let [here, there] = ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, way) });
+        for (scale, direction) in directions(record) {
+            let [here, there] =
+                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, direction) });
             let apart = std::array::from_fn(|mode| here[mode] - there[mode]);
             block.add(scale, &apart, &apart);
         }
@@ -107,10 +108,10 @@ impl Galerkin<'_> {
 
     /// Displacement of a particle along `way` by each rigid motion of its cluster.
     #[inline(always)]
-    fn along(&self, particle: usize, way: DVec3) -> [f64; MODES] {
-        let way = self.anchors.at(particle).map_or(way, |follows| follows.tr_mul(&way));
-        let turned = to_f64(self.offset_from_centroid[particle]).cross(&way);
-        [way.x, way.y, way.z, turned.x, turned.y, turned.z]
+    fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
+        let direction = self.filters.at(particle).map_or(direction, |follows| follows.tr_mul(&direction));
+        let turned = to_f64(self.offset_from_centroid[particle]).cross(&direction);
+        [direction.x, direction.y, direction.z, turned.x, turned.y, turned.z]
     }
 
     /// Adds rank-one terms; coupling between different pieces is left out.
@@ -138,11 +139,11 @@ impl Galerkin<'_> {
     /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
     fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
-        let Self { layout, system, anchors, .. } = self;
+        let Self { layout, system, filters, .. } = self;
         let mut couplings: Vec<Coupling> = Vec::new();
         let home = |particle: usize| layout.cluster[particle] as usize;
         let particles = rows.particles(row);
-        let free = |particle: usize| !system.held[particle] && anchors.at(particle).is_none();
+        let free = |particle: usize| !system.held[particle] && filters.at(particle).is_none();
         if particles
             .iter()
             .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
@@ -169,7 +170,7 @@ struct Coupling {
 
 /// The directions in which a spring has stiffness, each with that stiffness.
 #[inline(always)]
-fn ways(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
+fn directions(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
     let alpha = f64::from(record.alpha);
     let alike = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| (alpha, axis));
     std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
@@ -193,8 +194,8 @@ fn turn(r: DVec3) -> DMat3 {
 
 /// Displacement at `offset` for translations and rotations, filtered.
 #[inline(always)]
-fn motion(anchor: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
-    let shift = anchor.unwrap_or_else(DMat3::identity);
+fn motion(filter: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
+    let shift = filter.unwrap_or_else(DMat3::identity);
     [shift, shift * turn(offset)]
 }
 

@@ -14,9 +14,9 @@ const IS_OBSTACLE: f64 = 0.5;
 /// Total residual and translational stiffness of each group.
 pub(super) struct MomentumTarget {
     /// Sum of residuals over each group.
-    wanted: Vec<DVec3>,
+    residual: Vec<DVec3>,
     /// Stiffness of each group against translation: inertia and contacts with obstacles.
-    resisted: Vec<DMat3>,
+    stiffness: Vec<DMat3>,
     obstacle_contacts: Vec<ObstacleContact>,
 }
 
@@ -28,13 +28,13 @@ struct ObstacleContact {
     /// Sum of its weights.
     weight: f64,
     /// As in [`ContactConstraint::stiffness_directions`].
-    ways: ([DVec3; 3], usize),
+    directions: ([DVec3; 3], usize),
 }
 
 impl ObstacleContact {
     /// Directions in which it has stiffness, scaled by the square root of that.
-    fn ways(&self) -> impl Iterator<Item = &DVec3> {
-        self.ways.0[..self.ways.1].iter()
+    fn directions(&self) -> impl Iterator<Item = &DVec3> {
+        self.directions.0[..self.directions.1].iter()
     }
 }
 
@@ -73,14 +73,14 @@ impl StageSolver {
     pub(super) fn momentum_target(&self, body: &SoftBody, stage: &Stage<'_>) -> MomentumTarget {
         let inertia = &self.system.inertia;
         let sums = self.sums(body, |particle| (self.r[particle], inertia[particle]));
-        let (wanted, mut resisted): (Vec<DVec3>, Vec<DMat3>) =
-            sums.into_iter().map(|(wanted, inertia)| (wanted, DMat3::identity() * inertia)).unzip();
+        let (residual, mut stiffness): (Vec<DVec3>, Vec<DMat3>) =
+            sums.into_iter().map(|(residual, inertia)| (residual, DMat3::identity() * inertia)).unzip();
         let obstacle_contacts = self.obstacle_contacts(stage);
-        for hold in &obstacle_contacts {
-            let shift = |way: &DVec3| way * way.transpose() * (hold.weight * hold.weight);
-            hold.ways().for_each(|way| resisted[hold.group] += shift(way));
+        for obstacle in &obstacle_contacts {
+            let shift = |direction: &DVec3| direction * direction.transpose() * (obstacle.weight * obstacle.weight);
+            obstacle.directions().for_each(|direction| stiffness[obstacle.group] += shift(direction));
         }
-        MomentumTarget { wanted, resisted, obstacle_contacts }
+        MomentumTarget { residual, stiffness, obstacle_contacts }
     }
 
     /// Contacts between groups and obstacles.
@@ -95,7 +95,7 @@ impl StageSolver {
                     group,
                     contact: index,
                     weight,
-                    ways: contact.stiffness_directions(state, stage.a, dual),
+                    directions: contact.stiffness_directions(state, stage.a, dual),
                 })
             },
         );
@@ -118,18 +118,21 @@ impl StageSolver {
 
     /// Translates each group as a whole so that `dx` accounts for its entire residual, and updates `r`. Springs and
     /// volumes are not affected.
-    pub(super) fn correct_linear_momentum(&mut self, body: &SoftBody, stage: &Stage<'_>, whole: &MomentumTarget) {
+    pub(super) fn correct_linear_momentum(&mut self, body: &SoftBody, stage: &Stage<'_>, target: &MomentumTarget) {
         let given = self.sums(body, |particle| (self.dx[particle] * self.system.inertia[particle], 0.0));
-        let mut left: Vec<DVec3> = whole.wanted.iter().zip(&given).map(|(wanted, (given, _))| wanted - given).collect();
-        for hold in &whole.obstacle_contacts {
-            let way_of = stage.contacts[hold.contact].weighted_sum(&self.dx);
-            hold.ways().for_each(|way| left[hold.group] -= way * (hold.weight * way.dot(&way_of)));
+        let mut left: Vec<DVec3> =
+            target.residual.iter().zip(&given).map(|(residual, (given, _))| residual - given).collect();
+        for obstacle in &target.obstacle_contacts {
+            let displacement = stage.contacts[obstacle.contact].weighted_sum(&self.dx);
+            obstacle.directions().for_each(|direction| {
+                left[obstacle.group] -= direction * (obstacle.weight * direction.dot(&displacement))
+            });
         }
-        let by = |(left, resisted): (&DVec3, &DMat3)| {
-            let by = resisted.cholesky().map(|factor| factor.solve(left)).unwrap_or_default();
+        let by = |(left, stiffness): (&DVec3, &DMat3)| {
+            let by = stiffness.cholesky().map(|factor| factor.solve(left)).unwrap_or_default();
             if by.iter().all(|by| by.is_finite()) { by } else { DVec3::zeros() }
         };
-        let by: Vec<DVec3> = left.iter().zip(&whole.resisted).map(by).collect();
+        let by: Vec<DVec3> = left.iter().zip(&target.stiffness).map(by).collect();
         for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
             let Some(group) = *group else { continue };
             for particle in body.particles(piece) {
@@ -137,10 +140,12 @@ impl StageSolver {
                 self.r[particle] -= by[group as usize] * self.system.inertia[particle];
             }
         }
-        for hold in &whole.obstacle_contacts {
-            for (particle, weight) in stage.contacts[hold.contact].sides() {
-                let push = |sum: DVec3, way: &DVec3| sum + way * (weight * hold.weight * way.dot(&by[hold.group]));
-                self.r[particle] -= hold.ways().fold(DVec3::zeros(), push);
+        for obstacle in &target.obstacle_contacts {
+            for (particle, weight) in stage.contacts[obstacle.contact].sides() {
+                let push = |sum: DVec3, direction: &DVec3| {
+                    sum + direction * (weight * obstacle.weight * direction.dot(&by[obstacle.group]))
+                };
+                self.r[particle] -= obstacle.directions().fold(DVec3::zeros(), push);
             }
         }
     }
@@ -172,13 +177,13 @@ impl StageSolver {
             *tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * inertia[particle];
         }
         turned.iter_mut().for_each(|(_, tensor)| *tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace()));
-        for hold in self.obstacle_contacts(stage) {
-            let sides = stage.contacts[hold.contact].sides();
+        for obstacle in self.obstacle_contacts(stage) {
+            let sides = stage.contacts[obstacle.contact].sides();
             let offset = sides
-                .fold(DVec3::zeros(), |sum, (particle, weight)| sum + (x[particle] - middles[hold.group]) * weight);
-            for way in hold.ways() {
-                let torque_arm = offset.cross(way);
-                turned[hold.group].1 += torque_arm * torque_arm.transpose();
+                .fold(DVec3::zeros(), |sum, (particle, weight)| sum + (x[particle] - middles[obstacle.group]) * weight);
+            for direction in obstacle.directions() {
+                let torque_arm = offset.cross(direction);
+                turned[obstacle.group].1 += torque_arm * torque_arm.transpose();
             }
         }
         let turn = |(torque, tensor): &(DVec3, DMat3)| {

@@ -15,12 +15,12 @@ const NEGLIGIBLE: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct RigidMotion {
     pub(super) particles: Range<usize>,
-    middle: DVec3,
-    pace: DVec3,
+    centroid: DVec3,
+    linear_velocity: DVec3,
     /// Angular velocity, radians a second.
-    spin: DVec3,
+    angular_velocity: DVec3,
     /// Acceleration, m/s².
-    trend: DVec3,
+    acceleration: DVec3,
     /// Kinetic energy of rotation, joules.
     energy: f64,
 }
@@ -33,11 +33,18 @@ impl RigidMotion {
         piece: &Range<usize>,
         x: &[DVec3],
         v: &[DVec3],
-        trend: &[DVec3],
+        acceleration: &[DVec3],
     ) -> Self {
         let particles = body.particles(piece);
-        let [middle, pace, spin] = [DVec3::zeros(); 3];
-        let still = Self { particles: particles.clone(), middle, pace, spin, trend: DVec3::zeros(), energy: 0.0 };
+        let [centroid, linear_velocity, angular_velocity] = [DVec3::zeros(); 3];
+        let still = Self {
+            particles: particles.clone(),
+            centroid,
+            linear_velocity,
+            angular_velocity,
+            acceleration: DVec3::zeros(),
+            energy: 0.0,
+        };
         if held[particles.clone()].contains(&true) {
             return still;
         }
@@ -46,17 +53,26 @@ impl RigidMotion {
             let each = particles.clone().zip(&values[particles.clone()]);
             each.map(|(particle, value)| value * body.mass[particle]).sum::<DVec3>() / mass
         };
-        let [middle, pace, trend] = [mean(x), mean(v), mean(trend)];
+        let [centroid, linear_velocity, acceleration] = [mean(x), mean(v), mean(acceleration)];
         let (mut turning, mut tensor) = (DVec3::zeros(), DMat3::zeros());
         for particle in particles.clone() {
-            let (offset, m) = (x[particle] - middle, body.mass[particle]);
-            turning += offset.cross(&(v[particle] - pace)) * m;
+            let (offset, m) = (x[particle] - centroid, body.mass[particle]);
+            turning += offset.cross(&(v[particle] - linear_velocity)) * m;
             tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * m;
         }
         tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace());
         match tensor.try_inverse().map(|inverse| inverse * turning) {
-            Some(spin) if spin.iter().chain(&middle).chain(&pace).all(|x| x.is_finite()) => {
-                Self { particles, middle, pace, spin, trend, energy: 0.5 * spin.dot(&turning) }
+            Some(angular_velocity)
+                if angular_velocity.iter().chain(&centroid).chain(&linear_velocity).all(|x| x.is_finite()) =>
+            {
+                Self {
+                    particles,
+                    centroid,
+                    linear_velocity,
+                    angular_velocity,
+                    acceleration,
+                    energy: 0.5 * angular_velocity.dot(&turning),
+                }
             }
             _ => still,
         }
@@ -70,12 +86,12 @@ impl RigidMotion {
 
     /// The same without rotation.
     pub(super) fn shift(self) -> Self {
-        Self { spin: DVec3::zeros(), ..self }
+        Self { angular_velocity: DVec3::zeros(), ..self }
     }
 
     /// Velocity at position `x`.
     pub(super) fn velocity(&self, x: DVec3) -> DVec3 {
-        self.pace + self.spin.cross(&(x - self.middle))
+        self.linear_velocity + self.angular_velocity.cross(&(x - self.centroid))
     }
 }
 
@@ -86,7 +102,7 @@ pub(super) struct Predictor<'a> {
     pieces: Vec<RigidMotion>,
     x: &'a [DVec3],
     v: &'a [DVec3],
-    trend: &'a [DVec3],
+    acceleration: &'a [DVec3],
     /// Length of the step over which `trend` was measured, seconds.
     before: f64,
 }
@@ -99,15 +115,15 @@ impl<'a> Predictor<'a> {
         loose: &[bool],
         x: &'a [DVec3],
         v: &'a [DVec3],
-        trend: &'a [DVec3],
+        acceleration: &'a [DVec3],
         before: f64,
     ) -> Self {
-        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, x, v, trend);
-        Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, trend, before }
+        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, x, v, acceleration);
+        Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, acceleration, before }
     }
 
     /// Kinetic energy of rotation of each piece, joules.
-    pub(super) fn spinning(&self) -> Vec<f64> {
+    pub(super) fn rotational_energy(&self) -> Vec<f64> {
         self.pieces.iter().map(|piece| piece.energy).collect()
     }
 
@@ -116,16 +132,23 @@ impl<'a> Predictor<'a> {
         let each: Vec<[CayleyRotation; 2]> = self
             .pieces
             .iter()
-            .map(|p| [CayleyRotation::by(p.spin * (-0.5 * self.before)), CayleyRotation::by(p.spin * seconds)])
+            .map(|p| {
+                [
+                    CayleyRotation::by(p.angular_velocity * (-0.5 * self.before)),
+                    CayleyRotation::by(p.angular_velocity * seconds),
+                ]
+            })
             .collect();
         self.map(|index, particle| {
             let (piece, [back, turn]) = (&self.pieces[index], &each[index]);
-            let offset = self.x[particle] - piece.middle;
+            let offset = self.x[particle] - piece.centroid;
             let drift = self.v[particle] - piece.velocity(self.x[particle]);
             // Acceleration of the deformation half a step earlier: without the centripetal part.
-            let bent = self.trend[particle] - piece.trend - piece.spin.cross(&piece.spin.cross(&back.apply(offset)));
+            let bent = self.acceleration[particle]
+                - piece.acceleration
+                - piece.angular_velocity.cross(&piece.angular_velocity.cross(&back.apply(offset)));
             let own = offset + (drift + back.undo(bent) * (0.5 * seconds)) * seconds;
-            piece.middle + (piece.pace + piece.trend * (0.5 * seconds)) * seconds + turn.apply(own)
+            piece.centroid + (piece.linear_velocity + piece.acceleration * (0.5 * seconds)) * seconds + turn.apply(own)
         })
     }
 
@@ -133,18 +156,22 @@ impl<'a> Predictor<'a> {
     pub(super) fn past(&self, seconds: f64, share: f64, middle: &[DVec3]) -> Vec<DVec3> {
         let early = share * seconds;
         // Parabola through both positions with the initial velocity, used for the centre and for the deformation.
-        let on = |start: DVec3, pace: DVec3, at: DVec3| {
-            start + pace * seconds + (at - start - pace * early) / (share * share)
+        let on = |start: DVec3, velocity: DVec3, at: DVec3| {
+            start + velocity * seconds + (at - start - velocity * early) / (share * share)
         };
         let whole = |piece: &RigidMotion| {
-            let centre = if piece.spin == DVec3::zeros() { piece.middle } else { piece.centre(self.body, middle) };
-            let turns = [CayleyRotation::by(piece.spin * early), CayleyRotation::by(piece.spin * seconds)];
-            (centre, on(piece.middle, piece.pace, centre), turns)
+            let centre =
+                if piece.angular_velocity == DVec3::zeros() { piece.centroid } else { piece.centre(self.body, middle) };
+            let turns = [
+                CayleyRotation::by(piece.angular_velocity * early),
+                CayleyRotation::by(piece.angular_velocity * seconds),
+            ];
+            (centre, on(piece.centroid, piece.linear_velocity, centre), turns)
         };
         let each: Vec<(DVec3, DVec3, [CayleyRotation; 2])> = self.pieces.iter().map(whole).collect();
         self.map(|index, particle| {
             let (piece, (centre, whole, [solve_lower, turn])) = (&self.pieces[index], &each[index]);
-            let offset = self.x[particle] - piece.middle;
+            let offset = self.x[particle] - piece.centroid;
             let drift = self.v[particle] - piece.velocity(self.x[particle]);
             whole + turn.apply(on(offset, drift, solve_lower.undo(middle[particle] - centre)))
         })

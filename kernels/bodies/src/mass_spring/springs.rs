@@ -122,13 +122,13 @@ pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &
 
 /// A spring seen from one end: unit vector from the other end, length, and 1 ÷ length.
 #[derive(Clone, Copy)]
-struct Seen {
-    way: DVec3,
+struct SpringView {
+    direction: DVec3,
     length: f64,
     inverse: f64,
 }
 
-impl Seen {
+impl SpringView {
     #[inline(always)]
     fn from(link: &Link, particle: usize, x: &[DVec3]) -> Self {
         let d = x[particle] - x[link.other as usize];
@@ -137,10 +137,10 @@ impl Seen {
         if squared > 1e-280 && squared < 1e280 {
             let length = squared.sqrt();
             let inverse = 1.0 / length;
-            Self { way: d * inverse, length, inverse }
+            Self { direction: d * inverse, length, inverse }
         } else {
-            let (way, length) = unusual(d, link.spring, particle < link.other as usize);
-            Self { way, length, inverse: 1.0 / length }
+            let (direction, length) = degenerate_direction(d, link.spring, particle < link.other as usize);
+            Self { direction, length, inverse: 1.0 / length }
         }
     }
 
@@ -154,7 +154,7 @@ impl Seen {
 /// Direction and length where the squared distance under- or overflows. For coinciding ends the direction is
 /// pseudo-random for each spring, so that duplicate particles separate.
 #[cold]
-fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
+fn degenerate_direction(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
     if d != DVec3::zeros() {
         let size = d.amax();
         let scaled = d / size;
@@ -162,25 +162,25 @@ fn unusual(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
     }
     let key = Key::new(u64::from(spring));
     let component = |axis: u64| 2.0 * key.of(axis).f64() - 1.0;
-    let way = DVec3::new(component(0), component(1), component(2)).try_normalize(1e-3).unwrap_or_else(DVec3::x);
-    (if first { way } else { -way }, 0.0)
+    let direction = DVec3::new(component(0), component(1), component(2)).try_normalize(1e-3).unwrap_or_else(DVec3::x);
+    (if first { direction } else { -direction }, 0.0)
 }
 
 impl Link {
     /// Force on `particle` along the spring, newtons, and H for a stage of `a`, in full and as a record.
     #[inline(always)]
     fn linearise(&self, x: &[DVec3], a: f64, particle: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
-        let seen = Seen::from(self, particle, x);
-        let force = seen.way * seen.tension(self);
+        let view = SpringView::from(self, particle, x);
+        let force = view.direction * view.tension(self);
         let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
-        let alpha = if seen.length > 0.0 {
-            k * (1.0 - self.rest * seen.inverse).max(0.0)
+        let alpha = if view.length > 0.0 {
+            k * (1.0 - self.rest * view.inverse).max(0.0)
         } else if self.rest > 0.0 {
             0.0
         } else {
             k
         };
-        let w = seen.way * (k - alpha).max(0.0).sqrt();
+        let w = view.direction * (k - alpha).max(0.0).sqrt();
         *record = Record { other: self.other, alpha: alpha as f32, w: to_f32(w) };
         let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
         (force, h)
@@ -192,8 +192,8 @@ impl Link {
 #[inline(always)]
 pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
     let force = |link: &Link| {
-        let seen = Seen::from(link, particle, x);
-        seen.way * seen.tension(link)
+        let view = SpringView::from(link, particle, x);
+        view.direction * view.tension(link)
     };
     let mut sum = forces[particle - first];
     for link in inside {
@@ -263,15 +263,15 @@ pub(super) fn spring_length(body: &SoftBody, x: &[DVec3], at: usize) -> f64 {
 pub(super) fn distance(x: &[DVec3], a: usize, b: usize) -> f64 {
     let d = x[a] - x[b];
     let squared = d.norm_squared();
-    if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { unusual(d, 0, true).1 }
+    if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { degenerate_direction(d, 0, true).1 }
 }
 
 /// Distance between two particles, metres, and its rate of change, m/s.
 #[inline(always)]
 pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
     let length = distance(x, a, b);
-    let pace = if length > 0.0 { (x[a] - x[b]).dot(&(v[a] - v[b])) / length } else { 0.0 };
-    [length, pace]
+    let rate = if length > 0.0 { (x[a] - x[b]).dot(&(v[a] - v[b])) / length } else { 0.0 };
+    [length, rate]
 }
 
 /// Potential within a stage of the springs listed at `particle`, each counted once, and of their dashpots, joules.

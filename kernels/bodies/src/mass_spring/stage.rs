@@ -6,7 +6,7 @@
 //! converge.
 
 use super::body::SoftBody;
-use super::coarse::{self, Anchors, Layout};
+use super::coarse::{self, ContactFilters, Layout};
 use super::conjugate_gradients::{self, Coarse, Limits};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::ExternalForces;
@@ -52,7 +52,7 @@ pub(super) struct Stage<'a> {
     /// Seconds from that time to the one that contacts were detected for.
     pub(super) early: f64,
     /// Kinetic energy of rotation of each piece, joules; may be empty: no bound on the noise.
-    pub(super) spinning: &'a [f64],
+    pub(super) rotational_energy: &'a [f64],
     /// Whether Newton's method runs with a line search and the set of active contacts may change: implicit Euler.
     pub(super) line_search: bool,
     /// Index of the stage in its step, for the iteration counts.
@@ -275,7 +275,7 @@ impl StageSolver {
         let coarse = Coarse {
             factor: &cached.factor,
             offset_from_centroid: &self.offset_from_centroid,
-            anchors: &cached.anchors,
+            filters: &cached.filters,
         };
         conjugate_gradients::precondition(&self.system, body, coarse, r);
     }
@@ -290,7 +290,7 @@ impl StageSolver {
         let coarse = Coarse {
             factor: &cached.factor,
             offset_from_centroid: &self.offset_from_centroid,
-            anchors: &cached.anchors,
+            filters: &cached.filters,
         };
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![DVec3::zeros(); r.len()];
@@ -319,20 +319,21 @@ impl StageSolver {
         let body = context.body;
         self.dx.clear();
         self.dx.resize(x.len(), DVec3::zeros());
-        let whole = self.momentum_target(body, stage);
-        self.correct_linear_momentum(body, stage, &whole);
+        let target = self.momentum_target(body, stage);
+        self.correct_linear_momentum(body, stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
-        let anchors = Anchors::new(&self.system);
+        let filters = ContactFilters::new(&self.system);
         let old = cached.factor.len() != self.layout.rows() || cached.iterations_since > OLD;
-        if old || anchors.change(&cached.anchors) > CONTACTS_CHANGED {
-            self.renew(body, cached, anchors);
+        if old || filters.change(&cached.filters) > CONTACTS_CHANGED {
+            self.renew(body, cached, filters);
         }
         let initial_iterations = &mut cached.initial_iterations[stage.index];
         let bound =
             if *initial_iterations == 0 { CG_CAP } else { (3 * *initial_iterations).max(*initial_iterations + 10) };
-        let free = stage.spinning.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
-        let spinning: f64 = free.map(|piece| piece.0).sum();
-        let square = if spinning > 0.0 { 2.0 * stage.a * stage.a * NOISE * spinning } else { f64::INFINITY };
+        let free = stage.rotational_energy.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
+        let rotational_energy: f64 = free.map(|piece| piece.0).sum();
+        let square =
+            if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
         let in_contact = !stage.contacts.is_empty();
         let asked = linear_tolerance(in_contact, stage.line_search);
         let searching = in_contact && stage.line_search;
@@ -341,7 +342,7 @@ impl StageSolver {
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // The factor is too old to be useful: continue with a new one.
-            self.renew(body, cached, Anchors::new(&self.system));
+            self.renew(body, cached, ContactFilters::new(&self.system));
             let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
             reached = self.gradients(body, cached, limits);
             solved.cg += reached.iterations;
@@ -355,7 +356,7 @@ impl StageSolver {
         }
         solved.caps += u32::from(!reached.met);
         // The linear solve left part of the residual; momentum has to be exact.
-        self.correct_linear_momentum(body, stage, &whole);
+        self.correct_linear_momentum(body, stage, &target);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
         !solved.failed
@@ -370,15 +371,15 @@ impl StageSolver {
         let coarse = Coarse {
             factor: &cached.factor,
             offset_from_centroid: &self.offset_from_centroid,
-            anchors: &cached.anchors,
+            filters: &cached.filters,
         };
         conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 
-    fn renew(&mut self, body: &SoftBody, cached: &mut CachedCoarseFactor, anchors: Anchors) {
+    fn renew(&mut self, body: &SoftBody, cached: &mut CachedCoarseFactor, filters: ContactFilters) {
         let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
-        cached.factor = Galerkin { layout, body, system, offset_from_centroid, anchors: &anchors }.factor();
-        (cached.anchors, cached.initial_iterations, cached.iterations_since) = (anchors, [0; 2], 0);
+        cached.factor = Galerkin { layout, body, system, offset_from_centroid, filters: &filters }.factor();
+        (cached.filters, cached.initial_iterations, cached.iterations_since) = (filters, [0; 2], 0);
     }
 }
 
@@ -428,7 +429,8 @@ mod tests {
             let volumes = solver.volumes.at(&body, &start);
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
             let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
-            let stage = Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, spinning: &[], line_search, index: 0 };
+            let stage =
+                Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, rotational_energy: &[], line_search, index: 0 };
             let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
             let solved = if line_search {
                 let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };

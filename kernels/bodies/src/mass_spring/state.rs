@@ -2,7 +2,7 @@
 
 use super::body::SoftBody;
 use super::cholesky::Lower;
-use super::coarse::Anchors;
+use super::coarse::ContactFilters;
 use serde::{Deserialize, Serialize};
 
 /// Everything that later frames depend on: after saving and restoring it they have the same bits.
@@ -24,7 +24,7 @@ pub struct State {
     /// Torn springs.
     pub torn: Vec<bool>,
     /// Acceleration in the last step, m/s², for the predictor; empty at the start.
-    pub(super) trend: Vec<[f64; 3]>,
+    pub(super) acceleration: Vec<[f64; 3]>,
     /// The last normal force of contacts on each particle, newtons; empty at the start.
     pub(super) loads: Vec<f64>,
     /// Number of steps still to be taken with implicit Euler.
@@ -38,7 +38,7 @@ pub struct State {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct CachedCoarseFactor {
     pub(super) factor: Lower,
-    pub(super) anchors: Anchors,
+    pub(super) filters: ContactFilters,
     /// Iterations of a solve when it was new, for each stage of a step; 0 before the first.
     pub(super) initial_iterations: [u32; 2],
     /// Iterations since then.
@@ -56,7 +56,7 @@ impl State {
             dents: vec![1.0; body.lengths.len()],
             volumes: body.volumes.clone(),
             torn: vec![false; body.lengths.len()],
-            trend: Vec::new(),
+            acceleration: Vec::new(),
             loads: Vec::new(),
             euler_steps_left: 0,
             energy_budget: 0.0,

@@ -39,7 +39,7 @@ pub(super) struct Kinematics {
     pub(super) x: Vec<DVec3>,
     pub(super) v: Vec<DVec3>,
     /// Acceleration in the last step, m/s²; used only by the predictor.
-    pub(super) trend: Vec<DVec3>,
+    pub(super) acceleration: Vec<DVec3>,
     /// The last normal force of contacts on each particle, newtons.
     pub(super) loads: Vec<f64>,
 }
@@ -141,8 +141,9 @@ impl Stepper<'_> {
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
         let contact_states = stepped.euler || stepped.contacts > 0;
-        let trend = |(v, before): (&DVec3, &DVec3)| if contact_states { DVec3::zeros() } else { (v - before) / h };
-        motion.trend = motion.v.iter().zip(&start.v).map(trend).collect();
+        let acceleration =
+            |(v, before): (&DVec3, &DVec3)| if contact_states { DVec3::zeros() } else { (v - before) / h };
+        motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
         motion.loads = self.loads(&full, &motion.x);
         self.keep_finite(&start, motion, &mut stepped);
         self.refresh_inventory(motion);
@@ -204,9 +205,9 @@ impl Stepper<'_> {
         let newton = self.newton(tolerance);
 
         let start = motion.clone();
-        let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.trend, h);
+        let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.acceleration, h);
         let mut x = predictor.at(2.0 * a);
-        let spinning = predictor.spinning();
+        let rotational_energy = predictor.rotational_energy();
         let mut stage = Stage {
             y: &[],
             z: &[],
@@ -214,7 +215,7 @@ impl Stepper<'_> {
             time: times[0],
             contacts,
             early: h,
-            spinning: &spinning,
+            rotational_energy: &rotational_energy,
             line_search: false,
             index: 0,
         };
@@ -222,10 +223,10 @@ impl Stepper<'_> {
         // Lengths and volumes follow the same rules as positions.
         let on_from_start = |solver: &mut StageSolver, seconds: f64| {
             let length = |first, second| {
-                let [length, pace] = drift(&motion.x, &motion.v, first, second);
-                length + pace * seconds
+                let [length, rate] = drift(&motion.x, &motion.v, first, second);
+                length + rate * seconds
             };
-            let volumes = volumes.iter().map(|[volume, pace]| volume + pace * seconds).collect();
+            let volumes = volumes.iter().map(|[volume, rate]| volume + rate * seconds).collect();
             solver.set_step_start(&self.context, a, length, volumes);
         };
         on_from_start(self.solver, -a);
@@ -247,14 +248,15 @@ impl Stepper<'_> {
         let mix = |middle: &[DVec3], start: &[DVec3]| -> Vec<DVec3> {
             middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
         };
-        let swollen = self.solver.volumes.at(body, &x_middle);
-        let swollen = swollen.iter().zip(&volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
+        let combined = self.solver.volumes.at(body, &x_middle);
+        let combined =
+            combined.iter().zip(&volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
         let length = |first, second| {
             distance(&x_middle, first, second) * weight - distance(&motion.x, first, second) * start_weight
         };
-        self.solver.set_step_start(&self.context, a, length, swollen);
-        let (mut z, z_pace) = (mix(&x_middle, &motion.x), mix(&v_middle, &motion.v));
-        let y: Vec<DVec3> = z.iter().zip(&z_pace).map(|(z, pace)| z + pace * a).collect();
+        self.solver.set_step_start(&self.context, a, length, combined);
+        let (mut z, z_rate) = (mix(&x_middle, &motion.x), mix(&v_middle, &motion.v));
+        let y: Vec<DVec3> = z.iter().zip(&z_rate).map(|(z, rate)| z + rate * a).collect();
         let mut x = predictor.past(h, GAMMA, &x_middle);
         self.pin(&mut x, &mut z, times[1], a);
         let stage = Stage {
@@ -264,7 +266,7 @@ impl Stepper<'_> {
             time: times[1],
             contacts,
             early: 0.0,
-            spinning: &spinning,
+            rotational_energy: &rotational_energy,
             line_search: false,
             index: 1,
         };
@@ -306,7 +308,7 @@ impl Stepper<'_> {
         for particle in 0..motion.x.len() {
             if !motion.x[particle].iter().chain(motion.v[particle].iter()).all(|x| x.is_finite()) {
                 (motion.x[particle], motion.v[particle]) = (start.x[particle], DVec3::zeros());
-                motion.trend[particle] = DVec3::zeros();
+                motion.acceleration[particle] = DVec3::zeros();
                 stepped.stopped += 1;
                 self.solver.latest_inventory = None;
             }
@@ -332,7 +334,7 @@ impl Stepper<'_> {
             let gained = -*self.energy_budget;
             let mut moved = motion.v.clone();
             for piece in &body.order.pieces {
-                let rigid = RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.trend);
+                let rigid = RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.acceleration);
                 let rigid = if turning { rigid } else { rigid.shift() };
                 for particle in rigid.particles.clone() {
                     moved[particle] = rigid.velocity(motion.x[particle]);

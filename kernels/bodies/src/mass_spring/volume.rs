@@ -115,8 +115,8 @@ impl Volumes {
                     let particles = regions.of(region);
                     gradient.resize(particles.len(), DVec3::zeros());
                     let volume = regions.measure(region, x, &mut gradient);
-                    let pace = |(g, particle): (&DVec3, &u32)| v.get(*particle as usize).map_or(0.0, |v| g.dot(v));
-                    *out = [volume, gradient.iter().zip(particles).map(pace).sum()];
+                    let rate = |(g, particle): (&DVec3, &u32)| v.get(*particle as usize).map_or(0.0, |v| g.dot(v));
+                    *out = [volume, gradient.iter().zip(particles).map(rate).sum()];
                 }
             });
         }

@@ -41,7 +41,7 @@ fn ground(friction: f64) -> Planes {
 struct RollingPin {
     axis: [[f64; 2]; 2],
     radius: f64,
-    spin: f64,
+    angular_velocity: f64,
     friction: f64,
     seconds: f64,
 }
@@ -69,7 +69,7 @@ impl ContactFinder for RollingPin {
                     normal: n.into(),
                     offset: n.dot(&middle) + self.radius,
                     gap: THICKNESS,
-                    velocity: (pace + DVec3::z().cross(&n) * (self.spin * self.radius)).into(),
+                    velocity: (pace + DVec3::z().cross(&n) * (self.angular_velocity * self.radius)).into(),
                     friction: self.friction,
                 });
             }
@@ -222,7 +222,7 @@ fn a_rolling_pin_drags_dough_along_and_does_not_sink_in() {
         let pin = RollingPin {
             axis: [along(number), along(number + 1)],
             radius: 0.1,
-            spin: -2.0,
+            angular_velocity: -2.0,
             friction: 0.8,
             seconds: 1.0 / 24.0,
         };
