@@ -186,7 +186,7 @@ fn write(blocks: &[Block], out: &mut [f64]) {
     }
 }
 
-/// The matrix −[r]×, which maps a rotation vector to the displacement at `r`.
+/// The cross product matrix −r×, which maps a rotation vector to the displacement at `r`.
 #[inline(always)]
 fn turn(r: DVec3) -> DMat3 {
     DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)

@@ -4,7 +4,7 @@
 //! contacts act on particles. By default a frame is one step of TR-BDF2 with one Newton iteration for each of its two
 //! stages. The linear systems are solved matrix-free by conjugate gradients with a two-level preconditioner.
 //!
-//! Inside the solver a *particle* is an index in the solver's own order ([`particle_order`]); indices as the caller
+//! Inside the solver a *particle* is an index in the solver's own order (see `particle_order`); indices as the caller
 //! gave them are called the caller's. A *piece* is a connected component of the spring graph, a *cluster* a compact
 //! part of a piece.
 //!
@@ -41,6 +41,7 @@ mod state;
 mod step;
 mod system;
 mod tet_springs;
+mod tr_bdf2;
 mod volume;
 
 pub use body::{BodyError, BodySpring, LIGHTEST, Material, Mesh, SHORTEST, SoftBody};

@@ -14,20 +14,12 @@ use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
 use super::frame::{Integrator, SolverFrame};
-use super::predictor::{Predictor, RigidMotion};
-use super::springs::{distance, drift};
-use super::stage::{FrameContext, Newton, Solved, Stage, StageSolver};
+use super::predictor::RigidMotion;
+use super::stage::{FrameContext, Solved, StageSolver};
 use super::state::CachedCoarseFactor;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
 
-const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
-/// Newton iterations of a stage by default.
-const MOST: u32 = 4;
-/// Newton iterations of a stage in accurate mode.
-const MOST_ACCURATE: u32 = 12;
-/// Tolerance of Newton's method in accurate mode, as a fraction of that of the frame.
-const NEWTON_SHARE: f64 = 0.1;
 /// Energy gain of a step, relative to its energy, above which it is repeated with implicit Euler.
 const GAIN: f64 = 0.005;
 /// Steps of implicit Euler after one in which the set of active contacts changed.
@@ -87,10 +79,7 @@ impl Stepper<'_> {
         damp: bool,
     ) -> Stepped {
         let h = (times[1] - times[0]) * self.seconds;
-        let body = self.context.body;
         let start = motion.clone();
-        let mut stepped = Stepped::default();
-
         let mut full = match self.frame.contacts {
             Some(_) => {
                 let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
@@ -104,45 +93,21 @@ impl Stepper<'_> {
         let force_implicit_euler =
             damp || *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
         *self.euler_steps_left = self.euler_steps_left.saturating_sub(1);
-        let mut after = None;
-        if force_implicit_euler || self.frame.integrator == Integrator::Euler {
+        let (mut stepped, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
             let damped = damp || self.frame.force_implicit_euler || turned;
-            (stepped.solved, stepped.estimate) = self.euler(motion, times, &mut full, damped);
-            (stepped.euler, stepped.damped) = (true, damped);
+            let (solved, estimate) = self.euler(motion, times, &mut full, damped);
+            (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
         } else {
-            let size = body.size;
-            let frozen: Vec<ContactConstraint> = full.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
-            (stepped.solved, stepped.estimate) = self.tr_bdf2(motion, times, &frozen, tolerance);
-            let energies = measure(self.solver, &self.context, times[1], motion, true);
-            let gain = energies.sum() - before.sum();
-            let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
-            after = Some(energies);
-            let mut active_set_unchanged =
-                frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
-            if active_set_unchanged {
-                let (found, missed) = self.find_missed(&full, &start, &motion.x, times);
-                stepped.solved.deepest = deepest(&found, &motion.x);
-                active_set_unchanged = !missed;
-            }
-            let thinned = active_set_unchanged && self.watch_thin(&motion.x);
-            if stepped.solved.failed || gained || !active_set_unchanged || thinned || !energies.sum().is_finite() {
-                motion.clone_from(&start);
-                let damped = stepped.solved.failed || gained;
-                let (again, estimate) = self.euler(motion, times, &mut full, damped);
-                let solved = Solved { failed: again.failed, residual: again.residual, ..sum(stepped.solved, again) };
-                stepped = Stepped { solved, estimate, euler: true, damped: damped, ..Stepped::default() };
-                after = None;
-                *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
-            }
-        }
+            self.tr_bdf2_or_euler(motion, times, before, tolerance, &mut full)
+        };
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
             *self.euler_steps_left = (*self.euler_steps_left).max(1);
         }
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
-        let contact_states = stepped.euler || stepped.contacts > 0;
+        let discontinuous = stepped.euler || stepped.contacts > 0;
         let acceleration =
-            |(v, before): (&DVec3, &DVec3)| if contact_states { DVec3::zeros() } else { (v - before) / h };
+            |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
         motion.loads = self.loads(&full, &motion.x);
         self.keep_finite(&start, motion, &mut stepped);
@@ -157,6 +122,42 @@ impl Stepper<'_> {
             *self.energy_budget = 0.0;
         }
         stepped
+    }
+
+    /// A step of TR-BDF2 with frozen contacts, repeated with implicit Euler where that fails, gains energy, or the set of
+    /// active contacts or of thin tetrahedra changes. Returns the energies at the end too, if they are known.
+    fn tr_bdf2_or_euler(
+        &mut self,
+        motion: &mut Kinematics,
+        times: [f64; 2],
+        before: &Energies,
+        tolerance: Option<f64>,
+        contacts: &mut Vec<ContactConstraint>,
+    ) -> (Stepped, Option<Energies>) {
+        let (h, size) = ((times[1] - times[0]) * self.seconds, self.context.body.size);
+        let start = motion.clone();
+        let frozen: Vec<ContactConstraint> = contacts.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
+        let (mut solved, estimate) = self.tr_bdf2(motion, times, &frozen, tolerance);
+        let energies = measure(self.solver, &self.context, times[1], motion, true);
+        let gain = energies.sum() - before.sum();
+        let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+        let mut active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
+        if active_set_unchanged {
+            let (found, missed) = self.find_missed(contacts, &start, &motion.x, times);
+            solved.deepest = deepest(&found, &motion.x);
+            active_set_unchanged = !missed;
+        }
+        let thinned = active_set_unchanged && self.watch_thin(&motion.x);
+        let repeat = solved.failed || gained || !active_set_unchanged || thinned || !energies.sum().is_finite();
+        if !repeat {
+            return (Stepped { solved, estimate, ..Stepped::default() }, Some(energies));
+        }
+        motion.clone_from(&start);
+        let damped = solved.failed || gained;
+        let (again, estimate) = self.euler(motion, times, contacts, damped);
+        let solved = Solved { failed: again.failed, residual: again.residual, ..sum(solved, again) };
+        *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
+        (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
     }
 
     /// Takes stock of the tetrahedra at the current positions, for the next step.
@@ -184,116 +185,8 @@ impl Stepper<'_> {
         !self.context.external.moves() && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
     }
 
-    fn newton(&self, tolerance: Option<f64>) -> Newton {
-        match tolerance {
-            Some(tolerance) => Newton { most: MOST_ACCURATE, tolerance: NEWTON_SHARE * tolerance },
-            None => Newton { most: MOST, tolerance: 0.0 },
-        }
-    }
-
-    fn tr_bdf2(
-        &mut self,
-        motion: &mut Kinematics,
-        times: [f64; 2],
-        contacts: &[ContactConstraint],
-        tolerance: Option<f64>,
-    ) -> (Solved, f64) {
-        let body = self.context.body;
-        let h = (times[1] - times[0]) * self.seconds;
-        let a = 0.5 * GAMMA * h;
-        let middle = times[0] + GAMMA * (times[1] - times[0]);
-        let newton = self.newton(tolerance);
-
-        let start = motion.clone();
-        let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.acceleration, h);
-        let mut x = predictor.at(2.0 * a);
-        let rotational_energy = predictor.rotational_energy();
-        let mut stage = Stage {
-            y: &[],
-            z: &[],
-            a,
-            time: times[0],
-            contacts,
-            early: h,
-            rotational_energy: &rotational_energy,
-            line_search: false,
-            index: 0,
-        };
-        let volumes = self.solver.volumes.drift(body, &motion.x, &motion.v);
-        // Lengths and volumes follow the same rules as positions.
-        let on_from_start = |solver: &mut StageSolver, seconds: f64| {
-            let length = |first, second| {
-                let [length, rate] = drift(&motion.x, &motion.v, first, second);
-                length + rate * seconds
-            };
-            let volumes = volumes.iter().map(|[volume, rate]| volume + rate * seconds).collect();
-            solver.set_step_start(&self.context, a, length, volumes);
-        };
-        on_from_start(self.solver, -a);
-        let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
-        on_from_start(self.solver, a);
-        let mut z: Vec<DVec3> = motion.x.iter().zip(&motion.v).map(|(x, v)| x + v * a).collect();
-        let y: Vec<DVec3> = (0..x.len())
-            .map(|particle| z[particle] + motion.v[particle] * a + force[particle] * (a * a / body.mass[particle]))
-            .collect();
-        self.pin(&mut x, &mut z, middle, a);
-        (stage.y, stage.z, stage.time, stage.early) = (&y, &z, middle, (1.0 - GAMMA) * h);
-        let first = self.solver.solve(&self.context, &stage, newton, self.cached, &mut x);
-        let v_middle: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
-        let x_middle = x;
-
-        // Weights of the middle and the start in the second backward difference formula.
-        let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
-        let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
-        let mix = |middle: &[DVec3], start: &[DVec3]| -> Vec<DVec3> {
-            middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
-        };
-        let combined = self.solver.volumes.at(body, &x_middle);
-        let combined =
-            combined.iter().zip(&volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
-        let length = |first, second| {
-            distance(&x_middle, first, second) * weight - distance(&motion.x, first, second) * start_weight
-        };
-        self.solver.set_step_start(&self.context, a, length, combined);
-        let (mut z, z_rate) = (mix(&x_middle, &motion.x), mix(&v_middle, &motion.v));
-        let y: Vec<DVec3> = z.iter().zip(&z_rate).map(|(z, rate)| z + rate * a).collect();
-        let mut x = predictor.past(h, GAMMA, &x_middle);
-        self.pin(&mut x, &mut z, times[1], a);
-        let stage = Stage {
-            y: &y,
-            z: &z,
-            a,
-            time: times[1],
-            contacts,
-            early: 0.0,
-            rotational_energy: &rotational_energy,
-            line_search: false,
-            index: 1,
-        };
-        let second = self.solver.solve(&self.context, &stage, newton, self.cached, &mut x);
-        let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
-
-        let scale = 2.0 * h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
-        let raw = |particle: usize| {
-            let bent =
-                motion.v[particle] / GAMMA - v_middle[particle] / (GAMMA * (1.0 - GAMMA)) + v[particle] / (1.0 - GAMMA);
-            if self.context.external.held[particle] { DVec3::zeros() } else { bent * (scale * body.mass[particle]) }
-        };
-        let mut error: Vec<DVec3> = (0..x.len()).map(raw).collect();
-        let mut solved = sum(first, second);
-        if tolerance.is_some() {
-            let reached = self.solver.filter(body, self.cached, &mut error);
-            solved.cg += reached.iterations;
-        } else {
-            self.solver.smooth(body, self.cached, &mut error);
-        }
-        let estimate = error.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
-        (motion.x, motion.v) = (x, v);
-        (solved, estimate)
-    }
-
     /// Particles that do not move with their piece: pinned and isolated ones.
-    fn loose(&self) -> Vec<bool> {
+    pub(super) fn loose(&self) -> Vec<bool> {
         let (held, alone) = (&self.context.external.held, &self.solver.system.isolated);
         (0..held.len()).map(|particle| held[particle] || alone.get(particle) == Some(&true)).collect()
     }

@@ -176,8 +176,8 @@ impl Volumes {
     }
 }
 
-/// Resistance to a change of volume, relative to κ/V₀: linear near rest, increasing from [`SLIGHT`] on, linear again
-/// from [`MUCH`] on. Returns the value, its derivative and its integral.
+/// Resistance to a change of volume, relative to κ/V₀: linear near rest, increasing from [`STIFFENING`] on, linear again
+/// from [`STIFFENING_END`] on. Returns the value, its derivative and its integral.
 fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
     let soft = 1.0 / (STIFFENING * rest * STIFFENING * rest);
     let curved = |lost: f64| {

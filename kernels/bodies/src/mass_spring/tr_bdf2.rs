@@ -1,0 +1,173 @@
+//! A step of TR-BDF2 (Bank et al. 1985): the trapezoidal rule to γ = 2 − √2 of the step, then the second backward
+//! difference formula; with the error estimate of Hosea & Shampine (1996).
+
+use super::contact::ContactConstraint;
+use super::predictor::Predictor;
+use super::springs::{distance, drift};
+use super::stage::{Newton, Solved, Stage, StageSolver};
+use super::step::{Kinematics, Stepper, sum};
+use numerics::vector::DVec3;
+
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+/// Newton iterations of a stage by default.
+const MOST: u32 = 4;
+/// Newton iterations of a stage in accurate mode.
+const MOST_ACCURATE: u32 = 12;
+/// Tolerance of Newton's method in accurate mode, as a fraction of that of the frame.
+const NEWTON_SHARE: f64 = 0.1;
+
+/// What both stages of a step share.
+struct Step<'a> {
+    start: &'a Kinematics,
+    contacts: &'a [ContactConstraint],
+    predictor: Predictor<'a>,
+    /// Kinetic energy of rotation of each piece, joules.
+    rotational_energy: Vec<f64>,
+    /// Volume of each region at the start, m³, and its rate of change, m³/s.
+    volumes: Vec<[f64; 2]>,
+    /// Start and end, as fractions of the frame.
+    times: [f64; 2],
+    /// Length, seconds.
+    h: f64,
+    /// Step coefficient of both stages, seconds.
+    a: f64,
+    newton: Newton,
+}
+
+/// The end of a stage.
+struct StageEnd {
+    x: Vec<DVec3>,
+    v: Vec<DVec3>,
+    solved: Solved,
+}
+
+impl<'a> Step<'a> {
+    /// The equation of one of the stages.
+    fn stage<'b>(&'b self, y: &'b [DVec3], z: &'b [DVec3], time: f64, early: f64, index: usize) -> Stage<'b> {
+        Stage {
+            y,
+            z,
+            a: self.a,
+            time,
+            contacts: self.contacts,
+            early,
+            rotational_energy: &self.rotational_energy,
+            line_search: false,
+            index,
+        }
+    }
+}
+
+impl Stepper<'_> {
+    /// Advances `motion` between two `times` with frozen `contacts`; returns the largest estimated error of a particle,
+    /// metres, too. `tolerance`, metres, makes Newton's method converge.
+    pub(super) fn tr_bdf2(
+        &mut self,
+        motion: &mut Kinematics,
+        times: [f64; 2],
+        contacts: &[ContactConstraint],
+        tolerance: Option<f64>,
+    ) -> (Solved, f64) {
+        let body = self.context.body;
+        let h = (times[1] - times[0]) * self.seconds;
+        let start = motion.clone();
+        let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.acceleration, h);
+        let step = Step {
+            start: &start,
+            contacts,
+            rotational_energy: predictor.rotational_energy(),
+            predictor,
+            volumes: self.solver.volumes.drift(body, &start.x, &start.v),
+            times,
+            h,
+            a: 0.5 * GAMMA * h,
+            newton: match tolerance {
+                Some(tolerance) => Newton { most: MOST_ACCURATE, tolerance: NEWTON_SHARE * tolerance },
+                None => Newton { most: MOST, tolerance: 0.0 },
+            },
+        };
+        let middle = self.trapezoidal_stage(&step);
+        let end = self.backward_difference_stage(&step, &middle);
+        let mut solved = sum(middle.solved, end.solved);
+        let mut error = self.unfiltered_error(&step, &middle, &end);
+        if tolerance.is_some() {
+            let reached = self.solver.filter(body, self.cached, &mut error);
+            solved.cg += reached.iterations;
+        } else {
+            self.solver.smooth(body, self.cached, &mut error);
+        }
+        let estimate = error.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
+        (motion.x, motion.v) = (end.x, end.v);
+        (solved, estimate)
+    }
+
+    /// The trapezoidal rule, from the start to γ of the step.
+    fn trapezoidal_stage(&mut self, step: &Step<'_>) -> StageEnd {
+        let Step { start, h, a, times, .. } = *step;
+        let body = self.context.body;
+        let time = times[0] + GAMMA * (times[1] - times[0]);
+        let mut x = step.predictor.at(2.0 * a);
+        // Lengths and volumes follow the same rules as positions.
+        let extrapolate = |solver: &mut StageSolver, seconds: f64| {
+            let length = |first, second| {
+                let [length, rate] = drift(&start.x, &start.v, first, second);
+                length + rate * seconds
+            };
+            let volumes = step.volumes.iter().map(|[volume, rate]| volume + rate * seconds).collect();
+            solver.set_step_start(&self.context, a, length, volumes);
+        };
+        extrapolate(self.solver, -a);
+        let force = self.solver.forces(&self.context, &step.stage(&[], &[], times[0], h, 0), &start.x, &start.v);
+        extrapolate(self.solver, a);
+        let mut z: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * a).collect();
+        let y: Vec<DVec3> = (0..x.len())
+            .map(|particle| z[particle] + start.v[particle] * a + force[particle] * (a * a / body.mass[particle]))
+            .collect();
+        self.pin(&mut x, &mut z, time, a);
+        let stage = step.stage(&y, &z, time, (1.0 - GAMMA) * h, 0);
+        let solved = self.solver.solve(&self.context, &stage, step.newton, self.cached, &mut x);
+        let v = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        StageEnd { x, v, solved }
+    }
+
+    /// The second backward difference formula, from the start and the `middle` to the end of the step.
+    fn backward_difference_stage(&mut self, step: &Step<'_>, middle: &StageEnd) -> StageEnd {
+        let Step { start, a, times, .. } = *step;
+        // Weights of the middle and the start.
+        let weight = 1.0 / (GAMMA * (2.0 - GAMMA));
+        let start_weight = weight * (1.0 - GAMMA) * (1.0 - GAMMA);
+        let mix = |middle: &[DVec3], start: &[DVec3]| -> Vec<DVec3> {
+            middle.iter().zip(start).map(|(middle, start)| middle * weight - start * start_weight).collect()
+        };
+        let volumes = self.solver.volumes.at(self.context.body, &middle.x);
+        let volumes =
+            volumes.iter().zip(&step.volumes).map(|(now, [then, _])| now * weight - then * start_weight).collect();
+        let length = |first, second| {
+            distance(&middle.x, first, second) * weight - distance(&start.x, first, second) * start_weight
+        };
+        self.solver.set_step_start(&self.context, a, length, volumes);
+        let (mut z, z_rate) = (mix(&middle.x, &start.x), mix(&middle.v, &start.v));
+        let y: Vec<DVec3> = z.iter().zip(&z_rate).map(|(z, rate)| z + rate * a).collect();
+        let mut x = step.predictor.past(step.h, GAMMA, &middle.x);
+        self.pin(&mut x, &mut z, times[1], a);
+        let stage = step.stage(&y, &z, times[1], 0.0, 1);
+        let solved = self.solver.solve(&self.context, &stage, step.newton, self.cached, &mut x);
+        let v = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
+        StageEnd { x, v, solved }
+    }
+
+    /// The error estimate, to which A⁻¹ still has to be applied.
+    fn unfiltered_error(&self, step: &Step<'_>, middle: &StageEnd, end: &StageEnd) -> Vec<DVec3> {
+        let scale = 2.0 * step.h * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA));
+        let error = |particle: usize| {
+            let second_difference = step.start.v[particle] / GAMMA - middle.v[particle] / (GAMMA * (1.0 - GAMMA))
+                + end.v[particle] / (1.0 - GAMMA);
+            if self.context.external.held[particle] {
+                DVec3::zeros()
+            } else {
+                second_difference * (scale * self.context.body.mass[particle])
+            }
+        };
+        (0..end.x.len()).map(error).collect()
+    }
+}
