@@ -310,8 +310,8 @@ impl SkinObstaclePair<'_> {
                 path_of(self.body.poses, *vertex, &mut path);
                 let start = path[0];
                 hits.clear();
-                let starts_inside = || self.starts_inside(&solid, &bounds, start);
-                vertex::hits(&path, &self.still, &faces, starts_inside, &self.rules, &mut hits);
+                let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
+                vertex::hits(&path, &self.still, &faces, closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
@@ -324,7 +324,7 @@ impl SkinObstaclePair<'_> {
 
     /// The closest triangle at the start of the motion, for a vertex within the `bounds` of the obstacle; `solid`
     /// holds its triangles at that time, built on first use.
-    fn starts_inside(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
+    fn closest_at_start(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);
         if !swept::overlap(&Cuboid { low: p, high: p }, bounds) {
             return None;

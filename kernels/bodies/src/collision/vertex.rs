@@ -61,13 +61,13 @@ pub(super) struct Hit {
     clearance: f64,
 }
 
-/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending. `sunk` finds
+/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending. `closest_at_start` finds
 /// the closest triangle at the start, for a point that may start inside and has no triangle close to it.
 pub(super) fn hits(
     path: &[DVec3],
     on: &MovingSurface<'_>,
     faces: &[u32],
-    starts_inside: impl FnOnce() -> Option<ClosestPoint>,
+    closest_at_start: impl FnOnce() -> Option<ClosestPoint>,
     rules: &ContactRules,
     out: &mut Vec<Hit>,
 ) {
@@ -97,7 +97,7 @@ pub(super) fn hits(
         let start = on.start();
         let each = near.iter().map(|face| ClosestPoint::on(*face, path[0], surface.corners(&start, *face)));
         let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
-        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(starts_inside);
+        let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(closest_at_start);
         if let Some(nearest) = nearest.filter(|nearest| is_behind(surface, &start, nearest, path[0])) {
             out.extend(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
             return;
@@ -115,22 +115,23 @@ pub(super) fn hits(
         }
     }
     if out.len() == first {
-        let passed = near.iter().filter(|face| approaches(path, on, **face, rules.reach));
-        let each = passed.map(|face| ClosestPoint::on(*face, end, surface.corners(&on.end(), *face)));
-        let near = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
-        if let Some(nearest) = near.filter(|nearest| !surface.closed || !is_behind(surface, &on.end(), nearest, end)) {
-            let normal = (end - nearest.point).try_normalize(0.0).or_else(|| surface.normal(&on.end(), nearest.face));
-            let hit = |normal| Hit {
-                face: nearest.face,
-                weights: nearest.weights,
-                normal,
-                shift: 0.0,
-                clearance: nearest.distance,
-            };
-            out.extend(normal.map(hit));
-        }
+        out.extend(passed_closely(path, on, &near, rules.reach));
     }
     merge(out, first);
+}
+
+/// The contact of a point that came close to some of the triangles `near` in between without crossing any: with the closest
+/// of them at the end of the motion.
+fn passed_closely(path: &[DVec3], on: &MovingSurface<'_>, near: &[u32], reach: f64) -> Option<Hit> {
+    let (surface, end) = (on.surface, path[path.len() - 1]);
+    let passed = near.iter().filter(|face| approaches(path, on, **face, reach));
+    let each = passed.map(|face| ClosestPoint::on(*face, end, surface.corners(&on.end(), *face)));
+    let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best })?;
+    if surface.closed && is_behind(surface, &on.end(), &nearest, end) {
+        return None;
+    }
+    let normal = (end - nearest.point).try_normalize(0.0).or_else(|| surface.normal(&on.end(), nearest.face))?;
+    Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift: 0.0, clearance: nearest.distance })
 }
 
 fn point_at(path: &[DVec3], time: f64) -> DVec3 {

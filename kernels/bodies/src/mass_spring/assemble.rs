@@ -76,82 +76,95 @@ impl StageSolver {
 
     /// Evaluates the residual at `x`, and if `linear` the linear system too.
     pub(super) fn assemble(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], linear: bool) {
-        let (body, a) = (context.body, stage.a);
-        let clusters = &body.order.clusters;
         let mut v = std::mem::take(&mut self.v);
-        velocities(clusters, x, stage, &mut v);
+        velocities(&context.body.order.clusters, x, stage, &mut v);
         self.update_transient_forces(context, stage, x, &v);
         let mut r = std::mem::take(&mut self.r);
         if linear {
             self.linearise_contacts(stage);
             self.set_rank_one_terms(context, stage);
-            let mut system = std::mem::take(&mut self.system);
-            let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
-            let partition = (
-                &mut r[..],
-                &mut system.inertia[..],
-                &mut system.smoother[..],
-                RaggedSlice::new(&body.adjacency.starts, &mut system.records),
-            );
-            // `own_force` would read the regions from `self.system`, which has been moved out.
-            let solver = &*self;
-            clusters.for_each(partition, |cluster, (r, inertia, smooth, mut records)| {
-                let particles = clusters.range(cluster);
-                let first = particles.start;
-                r.fill(DVec3::zeros());
-                let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; particles.len()] };
-                for (((particle, inertia), smooth), records) in
-                    particles.zip(inertia).zip(smooth).zip(records.iter_mut())
-                {
-                    let links = body.adjacency.of(particle, &solver.links);
-                    springs::linearise(links, records, x, a, particle, first, &mut sums);
-                    let (pull, mut block) = (sums.forces[particle - first], sums.blocks[particle - first]);
-                    let mass = body.mass[particle];
-                    let mut own = context.external.force(particle, mass, stage.time, x[particle], v[particle]);
-                    if !regions.is_empty() {
-                        own -= regions.gather(particle, &solver.volumes.pressures, &solver.volumes.gradients);
-                        regions.add_block(particle, OVERLAP, &mut block);
-                    }
-                    own += solver.transient_forces.get(particle).copied().unwrap_or_default();
-                    if !transient.is_empty() {
-                        transient.add_block(particle, 1.0, &mut block);
-                    }
-                    if let Some(transient_forces) = blocks.get(particle) {
-                        block
-                            .iter_mut()
-                            .zip(transient_forces)
-                            .for_each(|(sum, transient_forces)| *sum += transient_forces);
-                    }
-                    *inertia = mass + context.external.inertia(particle, mass, a);
-                    [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
-                    sums.forces[particle - first] = if held[particle] {
-                        DVec3::zeros()
-                    } else {
-                        (own + pull) * (a * a) - (x[particle] - stage.y[particle]) * mass
-                    };
-                    *smooth = if held[particle] { [0.0; 6] } else { smoother(&block) };
-                }
-            });
-            self.system = system;
+            self.assemble_system(context, stage, [x, &v], &mut r);
         } else {
-            let solver = &*self;
-            clusters.for_each(&mut r[..], |cluster, r: &mut [DVec3]| {
-                let particles = clusters.range(cluster);
-                r.fill(DVec3::zeros());
-                for particle in particles.clone() {
-                    springs::pull(body.adjacency.of(particle, &solver.links), x, particle, particles.start, r);
-                    let r = &mut r[particle - particles.start];
-                    *r = if solver.system.held[particle] {
-                        DVec3::zeros()
-                    } else {
-                        let force = *r + solver.own_force(context, stage.time, particle, x, &v);
-                        force * (a * a) - (x[particle] - stage.y[particle]) * body.mass[particle]
-                    };
-                }
-            });
+            self.assemble_residual(context, stage, [x, &v], &mut r);
         }
         self.r = r;
         self.v = v;
+    }
+
+    /// The residual `r` at positions `x` with velocities `v`.
+    fn assemble_residual(&self, context: &FrameContext<'_>, stage: &Stage<'_>, [x, v]: [&[DVec3]; 2], r: &mut [DVec3]) {
+        let (body, a) = (context.body, stage.a);
+        let clusters = &body.order.clusters;
+        clusters.for_each(r, |cluster, r: &mut [DVec3]| {
+            let particles = clusters.range(cluster);
+            r.fill(DVec3::zeros());
+            for particle in particles.clone() {
+                springs::pull(body.adjacency.of(particle, &self.links), x, particle, particles.start, r);
+                let r = &mut r[particle - particles.start];
+                *r = if self.system.held[particle] {
+                    DVec3::zeros()
+                } else {
+                    let force = *r + self.own_force(context, stage.time, particle, x, v);
+                    force * (a * a) - (x[particle] - stage.y[particle]) * body.mass[particle]
+                };
+            }
+        });
+    }
+
+    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms and blocks are
+    /// set already.
+    fn assemble_system(
+        &mut self,
+        context: &FrameContext<'_>,
+        stage: &Stage<'_>,
+        [x, v]: [&[DVec3]; 2],
+        r: &mut [DVec3],
+    ) {
+        let (body, a) = (context.body, stage.a);
+        let clusters = &body.order.clusters;
+        let mut system = std::mem::take(&mut self.system);
+        let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
+        let per_particle = (
+            r,
+            &mut system.inertia[..],
+            &mut system.smoother[..],
+            RaggedSlice::new(&body.adjacency.starts, &mut system.records),
+        );
+        // `own_force` would read the regions from `self.system`, which has been moved out.
+        let solver = &*self;
+        clusters.for_each(per_particle, |cluster, (r, inertia, smooth, mut records)| {
+            let particles = clusters.range(cluster);
+            let first = particles.start;
+            r.fill(DVec3::zeros());
+            let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; particles.len()] };
+            for (((particle, inertia), smooth), records) in particles.zip(inertia).zip(smooth).zip(records.iter_mut()) {
+                let links = body.adjacency.of(particle, &solver.links);
+                springs::linearise(links, records, x, a, particle, first, &mut sums);
+                let (pull, mut block) = (sums.forces[particle - first], sums.blocks[particle - first]);
+                let mass = body.mass[particle];
+                let mut own = context.external.force(particle, mass, stage.time, x[particle], v[particle]);
+                if !regions.is_empty() {
+                    own -= regions.gather(particle, &solver.volumes.pressures, &solver.volumes.gradients);
+                    regions.add_block(particle, OVERLAP, &mut block);
+                }
+                own += solver.transient_forces.get(particle).copied().unwrap_or_default();
+                if !transient.is_empty() {
+                    transient.add_block(particle, 1.0, &mut block);
+                }
+                if let Some(other) = blocks.get(particle) {
+                    block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+                }
+                *inertia = mass + context.external.inertia(particle, mass, a);
+                [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
+                sums.forces[particle - first] = if held[particle] {
+                    DVec3::zeros()
+                } else {
+                    (own + pull) * (a * a) - (x[particle] - stage.y[particle]) * mass
+                };
+                *smooth = if held[particle] { [0.0; 6] } else { smoother(&block) };
+            }
+        });
+        self.system = system;
     }
 
     /// Linearises contact forces around the predicted load instead of the current one, where that is lower.

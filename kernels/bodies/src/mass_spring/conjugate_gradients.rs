@@ -63,6 +63,13 @@ impl Coarse<'_> {
         forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
     }
 
+    /// The squared residual in the preconditioner's norm, from the squares and the forces of all clusters; sets the rigid
+    /// motions `modes`.
+    fn squared_norm(&self, of_clusters: Vec<(f64, [f64; 6])>, modes: &mut Vec<f64>) -> f64 {
+        let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = of_clusters.into_iter().unzip();
+        squares.iter().sum::<f64>() + self.solve(&forces, modes)
+    }
+
     /// Displacement of a particle by the rigid motion of its cluster.
     #[inline(always)]
     fn moved(&self, modes: &[f64], cluster: usize, particle: usize) -> DVec3 {
@@ -113,8 +120,7 @@ pub(super) fn solve(
         }
         (square, sums)
     });
-    let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = first.into_iter().unzip();
-    let start = squares.iter().sum::<f64>() + coarse.solve(&forces, modes);
+    let start = coarse.squared_norm(first, modes);
     let mut reached = Reached { iterations: 0, share: 0.0, met: true };
     if !(start > f64::MIN_POSITIVE && start.is_finite()) {
         reached.met = start.is_finite();
@@ -124,16 +130,7 @@ pub(super) fn solve(
     let asked = limits.share * limits.share * start;
     let enough = asked.min(limits.square).max(asked.min(FINEST * FINEST * start));
     loop {
-        let smoother = &system.smoother;
-        clusters.for_each(&mut p[..], |cluster, mine: &mut [DVec3]| {
-            for (particle, p) in clusters.range(cluster).zip(mine) {
-                if !system.held[particle] {
-                    let fine =
-                        solve_lower_transpose(&smoother[particle], solve_lower(&smoother[particle], r[particle]));
-                    *p = fine + coarse.moved(modes, cluster, particle) + *p * beta;
-                }
-            }
-        });
+        update_direction(system, body, coarse, modes, r, beta, p);
         let curvature = system.apply(body, clusters, p, ap);
         reached.iterations += 1;
         if !(curvature > 0.0 && curvature.is_finite()) {
@@ -152,8 +149,7 @@ pub(super) fn solve(
             }
             (square, sums)
         });
-        let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = next.into_iter().unzip();
-        let after = squares.iter().sum::<f64>() + coarse.solve(&forces, modes);
+        let after = coarse.squared_norm(next, modes);
         if !(after.is_finite() && after >= 0.0) {
             reached.met = false;
             break;
@@ -170,6 +166,27 @@ pub(super) fn solve(
     }
     reached.share = (rz / start).sqrt();
     reached
+}
+
+/// Sets the search direction `p` to the preconditioned residual plus `beta` times the last direction.
+fn update_direction(
+    system: &System,
+    body: &SoftBody,
+    coarse: Coarse<'_>,
+    modes: &[f64],
+    r: &[DVec3],
+    beta: f64,
+    p: &mut [DVec3],
+) {
+    let (clusters, smoother) = (&body.order.clusters, &system.smoother);
+    clusters.for_each(p, |cluster, mine: &mut [DVec3]| {
+        for (particle, p) in clusters.range(cluster).zip(mine) {
+            if !system.held[particle] {
+                let fine = solve_lower_transpose(&smoother[particle], solve_lower(&smoother[particle], r[particle]));
+                *p = fine + coarse.moved(modes, cluster, particle) + *p * beta;
+            }
+        }
+    });
 }
 
 /// Replaces `r` by the preconditioner applied to it, an approximation of A⁻¹r.
