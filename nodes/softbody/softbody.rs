@@ -189,7 +189,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    2,
+    1,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble and collide with friction against colliders, the \
      ground, each other and themselves. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. Stiffness is independent of mesh resolution, and the solver is stable for any stiffness, mass and \

@@ -112,7 +112,7 @@ impl StageSolver {
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
         if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {
-            self.measure_residual(context, stage, x, &mut solved);
+            solved.set_residual(self.square(&context.body.order.clusters));
         }
         solved
     }
@@ -126,16 +126,15 @@ impl StageSolver {
         base: ObjectiveParts,
         x: &mut [DVec3],
     ) -> bool {
-        let mut turned = x.to_vec();
-        self.correct_angular_momentum(context.body, stage, &mut turned);
-        if turned == x {
+        let Some((turned, r)) = self.corrected_angular_momentum(context, stage, x).filter(|new| new.0 != x) else {
             return false;
-        }
+        };
         let contacts = self.contact_objective(context, stage, &turned);
         let level = ObjectiveParts { contacts, others: self.other_objective(context, stage, &turned) };
         self.measured = level.sum() <= base.sum() + ROUNDING * base.sum().abs();
         if self.measured {
             x.copy_from_slice(&turned);
+            self.r = r;
         } else {
             velocities(&context.body.order.clusters, x, stage, &mut self.v);
         }
