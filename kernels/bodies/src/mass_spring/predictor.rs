@@ -85,7 +85,7 @@ impl RigidMotion {
     }
 
     /// The same without rotation.
-    pub(super) fn shift(self) -> Self {
+    pub(super) fn without_rotation(self) -> Self {
         Self { angular_velocity: DVec3::zeros(), ..self }
     }
 
@@ -103,12 +103,12 @@ pub(super) struct Predictor<'a> {
     x: &'a [DVec3],
     v: &'a [DVec3],
     acceleration: &'a [DVec3],
-    /// Length of the step over which `trend` was measured, seconds.
+    /// Length of the step over which `acceleration` was measured, seconds.
     before: f64,
 }
 
 impl<'a> Predictor<'a> {
-    /// From `x`, `v` and the acceleration `trend` measured over the last step of `before` seconds. Pieces with
+    /// From `x`, `v` and the `acceleration` measured over the last step of `before` seconds. Pieces with
     /// `loose` particles are not treated as rigid.
     pub(super) fn new(
         body: &'a SoftBody,

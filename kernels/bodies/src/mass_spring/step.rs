@@ -69,7 +69,7 @@ pub(super) struct Stepper<'a> {
 
 impl Stepper<'_> {
     /// Steps between two `times`, as fractions of the frame. `tolerance`, metres, makes Newton's method converge.
-    /// `before` are the energies at the start; `calm` asks for a damped step.
+    /// `before` are the energies at the start; `damp` asks for a damped step.
     pub(super) fn step(
         &mut self,
         motion: &mut Kinematics,
@@ -228,7 +228,7 @@ impl Stepper<'_> {
             let mut moved = motion.v.clone();
             for piece in &body.order.pieces {
                 let rigid = RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.acceleration);
-                let rigid = if turning { rigid } else { rigid.shift() };
+                let rigid = if turning { rigid } else { rigid.without_rotation() };
                 for particle in rigid.particles.clone() {
                     moved[particle] = rigid.velocity(motion.x[particle]);
                 }
