@@ -345,12 +345,14 @@ fn hash_geometry(key: &mut Hasher, geometry: &Geometry, ignore: &dyn Fn(&str) ->
         }
     }
     if let Some(volume) = geometry.volume() {
-        let grid = volume.grid();
-        hash_words(key, &grid.size);
-        let fields = std::iter::once(volume.level_set()).chain(volume.velocity());
-        let floats = grid.origin.iter().chain([&grid.cell]).chain(fields.flat_map(|field| field.iter()));
-        for x in floats {
-            key.bytes(&x.to_le_bytes());
+        for grid in [volume.level_grid(), volume.velocity_grid()] {
+            hash_words(key, &grid.size);
+            grid.origin.iter().chain([&grid.cell]).for_each(|x| _ = key.bytes(&x.to_le_bytes()));
+        }
+        for (_, field) in volume.fields() {
+            key.bytes(&field.background().to_le_bytes());
+            field.blocks().for_each(|(block, _)| hash_words(key, &block));
+            field.values().iter().for_each(|x| _ = key.bytes(&x.to_le_bytes()));
         }
         for (name, column) in volume.once().iter().filter(|(name, _)| !ignore(name)) {
             key.text(name).bytes(&column.to_bytes());

@@ -79,11 +79,22 @@ fn all_finite(geometry: &Geometry) -> Result<(), FormatError> {
     }
     if let Some(volume) = geometry.volume() {
         let once = volume.once().iter().map(|(name, column)| (name.clone(), column.first_not_finite()));
-        let grid = volume.grid();
-        let numbers: [(&str, &[f32]); 2] = [("origin", &grid.origin), ("cell", &[grid.cell])];
-        let fields = numbers.into_iter().chain(json::volume_fields(volume));
-        let fields = fields.map(|(name, field)| (name.into(), field.iter().position(|x| !x.is_finite())));
-        if let Some((name, Some(row))) = fields.chain(once).find(|(_, row)| row.is_some()) {
+        let (level, velocity) = (volume.level_grid(), volume.velocity_grid());
+        let finite = |numbers: &[f32]| numbers.iter().position(|x| !x.is_finite());
+        let numbers: [(&str, &[f32]); 5] = [
+            ("origin", &level.origin),
+            ("cell", &[level.cell]),
+            ("background", &[volume.level_set().background()]),
+            ("velocity_origin", &velocity.origin),
+            ("velocity_cell", &[velocity.cell]),
+        ];
+        let numbers = numbers.map(|(name, numbers)| (name.into(), finite(numbers)));
+        let fields = volume.fields().map(|(name, field)| {
+            let row =
+                if finite(field.values()).is_none() { None } else { field.iter_dense().position(|x| !x.is_finite()) };
+            (name.into(), row)
+        });
+        if let Some((name, Some(row))) = numbers.into_iter().chain(fields).chain(once).find(|(_, row)| row.is_some()) {
             return Err(FormatError::NotFinite { kind: Kind::Volume, name, row });
         }
     }

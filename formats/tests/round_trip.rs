@@ -107,14 +107,21 @@ fn tets() -> impl Strategy<Value = Component> {
         .prop_flat_map(with_attributes)
 }
 
+/// A grid of its own for the level set and for the velocity, and any background.
 fn volume() -> impl Strategy<Value = Volume> {
-    let grid = (proptest::array::uniform3(number()), 1e-6..1e6_f32, proptest::array::uniform3(0..4_u32));
-    grid.prop_flat_map(|(origin, cell, size)| {
-        let grid = Grid { origin, cell, size };
-        let velocity = [0, 1, 2].map(|axis| vec(number(), grid.faces(axis)));
-        (Just(grid), vec(number(), grid.cells()), velocity)
+    let grid = || {
+        (proptest::array::uniform3(number()), 1e-6..1e6_f32, proptest::array::uniform3(0..4_u32))
+            .prop_map(|(origin, cell, size)| Grid { origin, cell, size })
+    };
+    (grid(), option::of(grid()), 1e-6..1e6_f32).prop_flat_map(|(level, velocity, background)| {
+        let velocity = velocity.unwrap_or(level);
+        let faces = [0, 1, 2].map(|axis| vec(number(), velocity.faces(axis)));
+        let made = (vec(number(), level.cells()), faces);
+        made.prop_map(move |(level_set, faces)| {
+            let faces = faces.each_ref().map(Vec::as_slice);
+            Volume::from_dense(level, &level_set, background, velocity, faces).unwrap()
+        })
     })
-    .prop_map(|(grid, level_set, velocity)| Volume::new(grid, level_set, velocity).unwrap())
 }
 
 /// Up to three components, at least one.

@@ -10,7 +10,7 @@
 //! Transform is not added to `v`. A volume's grid is aligned with the axes: it can be translated and scaled uniformly;
 //! anything else is refused.
 
-use engine::geometry::{Grid, Table};
+use engine::geometry::{Grid, SparseField, Table};
 use engine::prelude::*;
 use numerics::affine::Affine;
 use std::sync::Arc;
@@ -136,17 +136,25 @@ fn moved_volume(volume: &Volume, affine: &Affine, cx: &Cx) -> Result<Volume> {
         return Err(Error::refused(format!("a volume cannot be {refused}: its grid is aligned with the axes"))
             .hint("transform the geometry that it is made from, or its surface"));
     }
-    let grid = volume.grid();
-    let mut origin = [grid.origin];
-    affine.points(&mut origin);
-    let scaled = |field: &[f32]| {
-        let mut field = field.to_vec();
-        affine.lengths(&mut field);
+    let moved = |grid: Grid| {
+        let mut origin = [grid.origin];
+        affine.points(&mut origin);
+        Grid { origin: origin[0], cell: (f64::from(grid.cell) * affine.size()) as f32, size: grid.size }
+    };
+    let scaled = |field: &SparseField| {
+        let mut field = field.clone();
+        if affine.size() != 1.0 {
+            field.edit(|x| {
+                let mut x = [x];
+                affine.lengths(&mut x);
+                x[0]
+            });
+        }
         field
     };
-    let moved = Grid { origin: origin[0], cell: (f64::from(grid.cell) * affine.size()) as f32, size: grid.size };
-    let velocity = volume.velocity().each_ref().map(|field| scaled(field));
-    let mut result = Volume::new(moved, scaled(volume.level_set()), velocity)?;
+    let velocity = volume.velocity().each_ref().map(scaled);
+    let (level_grid, velocity_grid) = (moved(volume.level_grid()), moved(volume.velocity_grid()));
+    let mut result = Volume::from_fields(level_grid, scaled(volume.level_set()), velocity_grid, velocity)?;
     *result.once_mut() = volume.once().clone();
     Ok(result)
 }
@@ -276,9 +284,17 @@ mod tests {
     fn a_volume_moves_and_grows_with_its_distances_and_speeds() {
         let out = bench(&NODE).input(GEOMETRY, volume()).set(SCALE, [2.0; 3]).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
         let moved = out.geometry.volume().unwrap();
-        assert_eq!(moved.grid(), Grid { origin: [2.0, 1.0, 0.0], cell: 1.0, size: [1, 1, 1] });
-        assert_eq!(moved.level_set()[..], [-0.5]);
-        assert_eq!(moved.velocity()[1][..], [4.0; 2]);
+        assert_eq!(moved.level_grid(), Grid { origin: [2.0, 1.0, 0.0], cell: 1.0, size: [1, 1, 1] });
+        assert_eq!(moved.level_set().to_dense().unwrap(), [-0.5]);
+        assert_eq!(moved.velocity()[1].to_dense().unwrap(), [4.0; 2]);
+    }
+
+    #[test]
+    fn a_volume_that_is_only_moved_shares_its_arrays() {
+        let volume = volume();
+        let out = bench(&NODE).input(GEOMETRY, volume.clone()).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
+        assert_eq!(out.geometry.volume().unwrap().velocity_grid().origin, [1.0, 1.0, 0.0]);
+        assert_eq!(out.geometry.arrays(), volume.arrays());
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub mod ramp;
 pub mod random;
 pub mod shapes;
 pub mod simd;
+pub mod sparse_field;
 pub mod tree;
 pub mod triangulate;
 pub mod trig;

@@ -7,7 +7,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::vector::{add, cross, dot, length, scale, sub, unit};
+use numerics::vector::{DVec3, direction, to_f64};
 
 /// Vertical angle of view where none is given, degrees: near what the eye takes in at a glance, so without distortion.
 const FOV: f64 = 30.0;
@@ -22,9 +22,9 @@ pub type Bounds = [[f32; 3]; 2];
 /// Where a picture is taken from. Lengths in metres, Y up, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    eye: [f64; 3],
-    target: [f64; 3],
-    up: [f64; 3],
+    eye: DVec3,
+    target: DVec3,
+    up: DVec3,
     fov: f64,
 }
 
@@ -70,17 +70,18 @@ impl Camera {
                 return Err(CameraError::Value { name, value: commas(value), expected });
             }
         }
-        if unit(up).is_none() {
+        let [eye_at, target_at, up_along] = [eye, target, up].map(DVec3::from);
+        if direction(up_along).is_none() {
             return Err(CameraError::Value { name: "up", value: commas(up), expected: "a direction like `0,1,0`" });
         }
         if !(1.0..=170.0).contains(&fov) {
             let expected = "an angle between 1 and 170 degrees";
             return Err(CameraError::Value { name: "fov", value: fov.to_string(), expected });
         }
-        if unit(sub(target, eye)).is_none() {
+        if direction(target_at - eye_at).is_none() {
             return Err(CameraError::NoDirection(eye));
         }
-        Ok(Self { eye, target, up, fov })
+        Ok(Self { eye: eye_at, target: target_at, up: up_along, fov })
     }
 
     /// The three-quarter view that holds all of `bounds` in a picture `aspect` (width ÷ height) wide.
@@ -90,10 +91,10 @@ impl Camera {
     pub fn fit(bounds: Bounds, aspect: f64) -> Self {
         let [low, high] = proper(bounds);
         let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
-        let back = unit(THREE_QUARTER).unwrap_or([0.0, 0.0, 1.0]);
-        let centre = scale(add(low, high), 0.5);
-        let up = [0.0, 1.0, 0.0];
-        let frame = axes(scale(back, -1.0), up);
+        let back = direction(THREE_QUARTER.into()).unwrap_or(DVec3::z());
+        let centre = (low + high) * 0.5;
+        let up = DVec3::y();
+        let frame = axes(-back, up);
         let tan_y = half_tangent(FOV) * (1.0 - MARGIN);
         let tan_x = tan_y * aspect;
 
@@ -101,26 +102,26 @@ impl Camera {
         // x − z·tan and −x − z·tan over the corners therefore bound the eye from both sides.
         let mut most = [f64::NEG_INFINITY; 4];
         for corner in corners([low, high]) {
-            let [x, y, z] = frame.map(|axis| dot(axis, sub(corner, centre)));
+            let [x, y, z] = frame.map(|axis| axis.dot(&(corner - centre)));
             let sides = [x - z * tan_x, -x - z * tan_x, y - z * tan_y, -y - z * tan_y];
             most = std::array::from_fn(|k| most[k].max(sides[k]));
         }
         let [right, left, top, bottom] = most;
         let z = (-(right + left) / (2.0 * tan_x)).min(-(top + bottom) / (2.0 * tan_y));
         let eye_at = [(right - left) / 2.0, (top - bottom) / 2.0, z];
-        let eye = (0..3).fold(centre, |at, k| add(at, scale(frame[k], eye_at[k])));
-        let target = add(eye, scale(frame[2], -z));
+        let eye = (0..3).fold(centre, |at, k| at + frame[k] * eye_at[k]);
+        let target = eye + frame[2] * -z;
         Self { eye, target, up, fov: FOV }
     }
 
     /// Where it stands, metres.
     pub fn eye(&self) -> [f64; 3] {
-        self.eye
+        self.eye.into()
     }
 
     /// Where it looks, metres.
     pub fn target(&self) -> [f64; 3] {
-        self.target
+        self.target.into()
     }
 
     /// Vertical angle of view, degrees.
@@ -129,8 +130,8 @@ impl Camera {
     }
 
     /// Right, up and forward, each of length 1 and square to the others.
-    pub(crate) fn axes(&self) -> [[f64; 3]; 3] {
-        axes(sub(self.target, self.eye), self.up)
+    pub(crate) fn axes(&self) -> [DVec3; 3] {
+        axes(self.target - self.eye, self.up)
     }
 
     /// Half the picture's height at distance 1.
@@ -164,20 +165,20 @@ impl FromStr for Camera {
 /// The text that reads back as this camera.
 impl fmt::Display for Camera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [eye, target, up] = [self.eye, self.target, self.up].map(commas);
+        let [eye, target, up] = [self.eye, self.target, self.up].map(|v| commas(v.into()));
         write!(f, "eye={eye} target={target} up={up} fov={}", self.fov)
     }
 }
 
 /// Right, up and forward of a view along `forward`.
-fn axes(forward: [f64; 3], up: [f64; 3]) -> [[f64; 3]; 3] {
+fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
     /// Sine of the angle below which `up` says nothing about the picture's up.
     const ALONG: f64 = 1e-6;
-    let forward = unit(forward).unwrap_or([0.0, 0.0, -1.0]);
-    let square = |up: [f64; 3]| unit(up).map(|up| cross(forward, up)).filter(|right| length(*right) > ALONG);
-    let right = square(up).or_else(|| square([0.0, 0.0, -1.0])).or_else(|| square([1.0, 0.0, 0.0]));
-    let right = right.and_then(unit).unwrap_or([1.0, 0.0, 0.0]);
-    [right, cross(right, forward), forward]
+    let forward = direction(forward).unwrap_or(-DVec3::z());
+    let square = |up: DVec3| direction(up).map(|up| forward.cross(&up)).filter(|right| right.norm() > ALONG);
+    let right = square(up).or_else(|| square(-DVec3::z())).or_else(|| square(DVec3::x()));
+    let right = right.and_then(direction).unwrap_or(DVec3::x());
+    [right, right.cross(&forward), forward]
 }
 
 fn half_tangent(degrees: f64) -> f64 {
@@ -185,20 +186,20 @@ fn half_tangent(degrees: f64) -> f64 {
 }
 
 /// `bounds` in f64, finite and with an extent.
-pub(crate) fn proper(bounds: Bounds) -> [[f64; 3]; 2] {
-    let [low, high] = bounds.map(|corner| corner.map(f64::from));
+pub(crate) fn proper(bounds: Bounds) -> [DVec3; 2] {
+    let [low, high] = bounds.map(to_f64);
     if low.iter().chain(&high).any(|x| !x.is_finite()) {
-        return [[-0.5; 3], [0.5; 3]];
+        return [-0.5, 0.5].map(DVec3::repeat);
     }
-    let size = length(sub(high, low));
+    let size = (high - low).norm();
     let far = low.iter().chain(&high).fold(0.0_f64, |most, x| most.max(x.abs()));
     // Below the spacing of f32 at that distance there is nothing to see.
     let smallest = far * f64::from(f32::EPSILON);
-    if size > smallest { [low, high] } else { [low.map(|x| x - 0.5), high.map(|x| x + 0.5)] }
+    if size > smallest { [low, high] } else { [low.add_scalar(-0.5), high.add_scalar(0.5)] }
 }
 
-fn corners([low, high]: [[f64; 3]; 2]) -> impl Iterator<Item = [f64; 3]> {
-    (0..8).map(move |bits| std::array::from_fn(|k| if bits >> k & 1 == 0 { low[k] } else { high[k] }))
+fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+    (0..8).map(move |bits| DVec3::from_fn(|k, _| if bits >> k & 1 == 0 { low[k] } else { high[k] }))
 }
 
 fn commas(v: [f64; 3]) -> String {
@@ -272,7 +273,7 @@ mod tests {
                 let tan = camera.half_tangent();
                 let mut most = 0.0_f64;
                 for corner in corners(proper(bounds)) {
-                    let [x, y, z] = frame.map(|axis| dot(axis, sub(corner, camera.eye())));
+                    let [x, y, z] = frame.map(|axis| axis.dot(&(corner - camera.eye)));
                     assert!(z > 0.0);
                     most = most.max((x / (z * tan * aspect)).abs()).max((y / (z * tan)).abs());
                 }
@@ -293,7 +294,7 @@ mod tests {
     fn a_view_from_straight_above_has_a_picture_up() {
         let camera: Camera = "eye=0,5,0 target=0,0,0".parse().unwrap();
         let [right, up, forward] = camera.axes();
-        assert_eq!(forward, [0.0, -1.0, 0.0]);
-        assert_eq!((right, up), ([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
+        assert_eq!(forward, -DVec3::y());
+        assert_eq!((right, up), (DVec3::x(), -DVec3::z()));
     }
 }

@@ -11,14 +11,15 @@ use engine::geometry::{Column, Component, Geometry, Owner};
 
 use crate::Layer;
 use crate::shape::level_set;
-use crate::vector::{V3, length, mix};
+use crate::vector::mix;
+use numerics::vector::{Vec3, length};
 
 /// Attributes that are a colour by their name, where they are three or four wide; the first there is drawn.
 const COLOR_NAMES: [&str; 3] = ["Cd", "color", "displayColor"];
 /// What shows that a value is no number: no colour map and no default has it.
-const NOT_A_NUMBER: V3 = [1.0, 0.0, 0.6];
+const NOT_A_NUMBER: Vec3 = [1.0, 0.0, 0.6];
 /// What has not the attribute that others are coloured by.
-const WITHOUT: V3 = [0.30, 0.30, 0.31];
+const WITHOUT: Vec3 = [0.30, 0.30, 0.31];
 
 /// Viridis (Nathaniel Smith and Stéfan van der Walt, CC0) at tenths, sRGB.
 const MAP: [[u8; 3]; 11] = [
@@ -40,7 +41,7 @@ pub fn color_map(share: f32) -> [u8; 3] {
     encode(mapped(share))
 }
 
-fn mapped(share: f32) -> V3 {
+fn mapped(share: f32) -> Vec3 {
     if share.is_nan() {
         return NOT_A_NUMBER;
     }
@@ -69,9 +70,9 @@ pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
             }
         }
         if let Some(volume) = layer.geometry.volume().filter(|_| name == SPEED) {
-            for (cell, _) in volume.level_set().iter().enumerate().filter(|(_, phi)| **phi <= 0.0) {
-                let [nx, ny, _] = volume.grid().size.map(|n| n as usize);
-                take(level_set::speed(volume, [cell % nx, cell / nx % ny, cell / nx / ny].map(|i| i as u32)));
+            let (mut sampler, grid) = (volume.sampler(), volume.level_grid());
+            for (cell, _) in volume.level_set().nodes().filter(|(_, phi)| *phi <= 0.0) {
+                take(level_set::speed(&mut sampler, &grid, cell));
             }
         }
     }
@@ -94,16 +95,16 @@ pub(crate) const SPEED: &str = "v";
 #[derive(Debug)]
 pub(crate) enum Paint {
     /// All the same: nothing was measured, so light may play with it.
-    Plain(V3),
+    Plain(Vec3),
     /// A row a point.
-    Points(Vec<V3>),
+    Points(Vec<Vec3>),
     /// A row an element.
-    Elements(Vec<V3>),
+    Elements(Vec<Vec3>),
 }
 
 impl Paint {
     /// What `part` is painted with: by the attribute asked for, else a colour attribute, else `plain`.
-    pub(crate) fn of(part: &Component, color_by: Option<(&str, [f32; 2])>, plain: V3) -> Self {
+    pub(crate) fn of(part: &Component, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         let painted = match color_by {
             Some((name, range)) => find(part, name).map(|(owner, column)| {
                 let rows = 0..column.len();
@@ -129,7 +130,7 @@ impl Paint {
     }
 
     /// What a volume's surface with a row a point is painted with.
-    pub(crate) fn of_speeds(speeds: Option<Vec<f32>>, color_by: Option<(&str, [f32; 2])>, plain: V3) -> Self {
+    pub(crate) fn of_speeds(speeds: Option<Vec<f32>>, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         match (speeds, color_by) {
             (Some(speeds), Some((_, range))) => {
                 Self::Points(speeds.into_iter().map(|speed| mapped(share(speed, range))).collect())
@@ -139,7 +140,7 @@ impl Paint {
         }
     }
 
-    pub(crate) fn at(&self, point: usize, element: usize) -> V3 {
+    pub(crate) fn at(&self, point: usize, element: usize) -> Vec3 {
         match self {
             Self::Plain(color) => *color,
             Self::Points(colors) => colors[point],
@@ -178,7 +179,7 @@ fn scalar(column: &Column, row: usize) -> f32 {
     }
 }
 
-fn color_row(column: &Column, row: usize) -> Option<V3> {
+fn color_row(column: &Column, row: usize) -> Option<Vec3> {
     let cut = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) };
     match column {
         Column::F3(rows) => Some(rows[row].map(cut)),
@@ -194,7 +195,7 @@ pub(crate) fn decode(value: f32) -> f32 {
 }
 
 /// sRGB bytes of linear light, cut to 0…1.
-pub(crate) fn encode(linear: V3) -> [u8; 3] {
+pub(crate) fn encode(linear: Vec3) -> [u8; 3] {
     /// Steps of linear light: the finest byte step, near black, is 1.2 of them.
     const STEPS: usize = 4096;
     static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {

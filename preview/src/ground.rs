@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::light::{DepthMap, Light};
 use crate::scene::Scene;
-use crate::vector::{V3, add, scale, sub};
 use crate::view::View;
+use numerics::vector::{Vec3, add, scale, sub};
 
 /// Half the side of the floor, stage units, and texels a side.
 const HALF: f32 = 2.6;
@@ -38,7 +38,7 @@ impl Ground {
             let heights = way.max(0.0) / CONTACT_HEIGHT;
             1.0 / (1.0 + heights * heights)
         };
-        let texels = |value: &(dyn Fn(V3) -> f32 + Sync)| -> Vec<f32> {
+        let texels = |value: &(dyn Fn(Vec3) -> f32 + Sync)| -> Vec<f32> {
             let middle = |k: usize| ((k as f32 + 0.5) / TEXELS as f32 * 2.0 - 1.0) * HALF;
             let texel = |k: usize| value([middle(k % TEXELS), height, middle(k / TEXELS)]);
             (0..TEXELS * TEXELS).into_par_iter().map(texel).collect()

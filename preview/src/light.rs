@@ -9,17 +9,18 @@ use rayon::prelude::*;
 
 use crate::raster::{self, DepthOnly, Lanes, SAMPLES, Screen, TILE};
 use crate::scene::Scene;
-use crate::vector::{V3, add, cross, dot, mix, scale, sub, times, unit};
+use crate::vector::{mix, times, unit};
 use crate::view::View;
+use numerics::vector::{Vec3, add, cross, dot, scale, sub};
 
 /// Directions to the lights, by the camera's right, the world's up and the camera's level back.
-const KEY: V3 = [-0.55, 0.95, 0.62];
-const FILL: V3 = [0.85, 0.25, 0.50];
+const KEY: Vec3 = [-0.55, 0.95, 0.62];
+const FILL: Vec3 = [0.85, 0.25, 0.50];
 /// Linear light, near white: a warm key, a cool fill, a sky a little blue over a floor that reflects.
-const KEY_LIGHT: V3 = [1.04, 1.00, 0.94];
-const FILL_LIGHT: V3 = [0.17, 0.18, 0.20];
-const SKY_LIGHT: V3 = [0.36, 0.37, 0.40];
-const FLOOR_LIGHT: V3 = [0.20, 0.19, 0.18];
+const KEY_LIGHT: Vec3 = [1.04, 1.00, 0.94];
+const FILL_LIGHT: Vec3 = [0.17, 0.18, 0.20];
+const SKY_LIGHT: Vec3 = [0.36, 0.37, 0.40];
+const FLOOR_LIGHT: Vec3 = [0.20, 0.19, 0.18];
 /// How far round a surface the key reaches: the lamp is large.
 const WRAP: f32 = 0.12;
 const GLOSS: f32 = 0.04;
@@ -36,9 +37,9 @@ const MAP_HALF: f32 = 1.05;
 
 /// Lights and their shadows.
 pub(crate) struct Light {
-    key: V3,
-    fill: V3,
-    eye: V3,
+    key: Vec3,
+    fill: Vec3,
+    eye: Vec3,
     shadow: DepthMap,
     /// Whether colours are values of an attribute.
     measured: bool,
@@ -49,7 +50,7 @@ impl Light {
     pub(crate) fn set_up(scene: &mut Scene, view: &View, measured: bool) -> Self {
         let right = view.axes()[0];
         let back = unit(cross(right, [0.0, 1.0, 0.0])).unwrap_or(scale(view.axes()[2], -1.0));
-        let direction = |by: V3| {
+        let direction = |by: Vec3| {
             let sum = add(add(scale(right, by[0]), [0.0, by[1], 0.0]), scale(back, by[2]));
             unit(sum).unwrap_or([0.0, 1.0, 0.0])
         };
@@ -65,13 +66,13 @@ impl Light {
     }
 
     /// Share of the key that reaches a point of the stage.
-    pub(crate) fn reaching(&self, at: V3) -> f32 {
+    pub(crate) fn reaching(&self, at: Vec3) -> f32 {
         // A pixel of the map: nearer things may be the point's own.
         self.shadow.clear(at, self.shadow.pixel())
     }
 
     /// A point of a surface; `normal` is on the side that is seen.
-    pub(crate) fn surface(&self, at: V3, normal: V3, color: V3) -> V3 {
+    pub(crate) fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Vec3 {
         let to_eye = unit(sub(self.eye, at)).unwrap_or(self.key);
         let normal = unit(normal).unwrap_or(to_eye);
         let off_skin = add(at, scale(normal, 1.5 * self.shadow.pixel()));
@@ -79,7 +80,7 @@ impl Light {
     }
 
     /// A point of a matt surface with a faint gloss, of which the key sees `lit`.
-    pub(crate) fn matt(&self, normal: V3, to_eye: V3, color: V3, lit: f32) -> V3 {
+    pub(crate) fn matt(&self, normal: Vec3, to_eye: Vec3, color: Vec3, lit: f32) -> Vec3 {
         let key = ((dot(normal, self.key) + WRAP) / (1.0 + WRAP)).max(0.0) * lit;
         let fill = dot(normal, self.fill).max(0.0);
         let around = mix(FLOOR_LIGHT, SKY_LIGHT, 0.5 + 0.5 * normal[1]);
@@ -93,7 +94,7 @@ impl Light {
     }
 
     /// A CV of a strand.
-    fn strand(&self, at: V3, tangent: V3, color: V3) -> V3 {
+    fn strand(&self, at: Vec3, tangent: Vec3, color: Vec3) -> Vec3 {
         let lit = self.reaching(at);
         let to_eye = unit(sub(self.eye, at)).unwrap_or(self.key);
         let (along_key, along_fill, along_eye) =
@@ -114,7 +115,7 @@ impl Light {
 }
 
 /// A measured colour in `light`: its order is kept, as full light gives the colour itself.
-fn measured(color: V3, light: V3) -> V3 {
+fn measured(color: Vec3, light: Vec3) -> Vec3 {
     times(color, mix(light.map(|x| (x / FULL).min(1.0)), [1.0; 3], MEASURED))
 }
 
@@ -133,14 +134,14 @@ pub(crate) struct DepthMap {
 
 impl DepthMap {
     /// What a lamp that shines along `direction` sees of the scene's bounds.
-    pub(crate) fn towards(scene: &Scene, direction: V3) -> Self {
+    pub(crate) fn towards(scene: &Scene, direction: Vec3) -> Self {
         let aside = if direction[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = unit(cross(direction, aside)).unwrap_or([1.0, 0.0, 0.0]);
         Self::from(scene, [0.0; 3], [right, cross(right, direction), direction])
     }
 
     /// What is seen from the plane through `eye`, along `axes[2]`.
-    pub(crate) fn from(scene: &Scene, eye: V3, axes: [V3; 3]) -> Self {
+    pub(crate) fn from(scene: &Scene, eye: Vec3, axes: [Vec3; 3]) -> Self {
         let view = View::parallel(eye, axes, MAP_HALF, MAP_PIXELS);
         let tiles = raster::draw(&Screen::of(scene, &view, [MAP_PIXELS; 2]), &DepthOnly, |tile| tile);
         let mut pixels = vec![[raster::UNCOVERED; SAMPLES]; MAP_PIXELS * MAP_PIXELS];
@@ -159,7 +160,7 @@ impl DepthMap {
     }
 
     /// Share of the way to a point that is clear, where what is less than `slack` before the point does not count.
-    pub(crate) fn clear(&self, at: V3, slack: f32) -> f32 {
+    pub(crate) fn clear(&self, at: Vec3, slack: f32) -> f32 {
         let [x, y, nearness] = self.view.project(at);
         self.blend([x, y], 1.0, |lanes| {
             let clear: u32 = lanes.iter().map(|depth| u32::from(*depth <= nearness + slack)).sum();
@@ -189,7 +190,7 @@ impl DepthMap {
     }
 
     /// Mean of `value` of the way from the map's plane to what is seen, over the samples near `at`; 0 where nothing is.
-    pub(crate) fn seen(&self, at: V3, value: impl Fn(f32) -> f32) -> f32 {
+    pub(crate) fn seen(&self, at: Vec3, value: impl Fn(f32) -> f32) -> f32 {
         let [x, y, _] = self.view.project(at);
         self.blend([x, y], 0.0, |lanes| {
             let seen = |depth: &f32| if *depth > raster::UNCOVERED { value(-*depth) } else { 0.0 };

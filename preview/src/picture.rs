@@ -7,9 +7,10 @@ use crate::image::Image;
 use crate::light::Light;
 use crate::raster::{self, SAMPLES, Screen, Shader, TILE, Tile, UNCOVERED};
 use crate::scene::{self, Scene};
-use crate::vector::{V3, add, finite, mix, scale, sub, unit};
+use crate::vector::{finite, mix, unit};
 use crate::view::{Stage, View};
 use crate::{Error, Layer, Settings, text};
+use numerics::vector::{Vec3, add, scale, sub};
 
 /// What is framed where there is nothing: a metre around the origin.
 const NOTHING: crate::Bounds = [[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]];
@@ -65,20 +66,20 @@ struct Studio<'a> {
 }
 
 impl Shader for Studio<'_> {
-    type Color = V3;
+    type Color = Vec3;
 
-    fn surface(&self, at: V3, normal: V3, color: V3) -> V3 {
+    fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Vec3 {
         self.light.surface(self.view.unproject(at), normal, color)
     }
 
-    fn strand(&self, color: V3, across: f32, radius: f32) -> V3 {
+    fn strand(&self, color: Vec3, across: f32, radius: f32) -> Vec3 {
         // Below two pixels across there is no edge to see.
         let seen = ((radius - 1.0) * 0.5).clamp(0.0, 1.0);
         let height = (1.0 - across * across).max(0.0).sqrt();
         scale(color, 1.0 - ROUND * seen * (1.0 - height))
     }
 
-    fn ball(&self, [x, y]: [f32; 2], color: V3, lit: f32) -> V3 {
+    fn ball(&self, [x, y]: [f32; 2], color: Vec3, lit: f32) -> Vec3 {
         let [right, up, forward] = self.view.axes();
         let height = (1.0 - x * x - y * y).max(0.0).sqrt();
         let normal = sub(add(scale(right, x), scale(up, y)), scale(forward, height));
@@ -89,13 +90,13 @@ impl Shader for Studio<'_> {
 
 /// What is seen where nothing is drawn.
 struct Backdrop {
-    light: V3,
+    light: Vec3,
     ground: Option<Ground>,
     size: [usize; 2],
 }
 
 impl Backdrop {
-    fn at(&self, view: &View, x: f32, y: f32) -> V3 {
+    fn at(&self, view: &View, x: f32, y: f32) -> Vec3 {
         let [u, v] = [x / self.size[0] as f32 - 0.5, y / self.size[1] as f32 - 0.55];
         let dim = 1.0 - VIGNETTE * (1.6 * (u * u + v * v)).min(1.0);
         let shadow = self.ground.as_ref().map_or(1.0, |ground| ground.light(view, x, y));
@@ -106,7 +107,7 @@ impl Backdrop {
 }
 
 /// The mean of each pixel's samples, as bytes.
-fn resolve(tile: &Tile<V3>, backdrop: &Backdrop, view: &View) -> Vec<[u8; 3]> {
+fn resolve(tile: &Tile<Vec3>, backdrop: &Backdrop, view: &View) -> Vec<[u8; 3]> {
     let pixel = |index: usize| {
         let behind =
             || backdrop.at(view, (tile.left + index % TILE) as f32 + 0.5, (tile.top + index / TILE) as f32 + 0.5);

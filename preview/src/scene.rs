@@ -9,26 +9,27 @@ use rayon::prelude::*;
 use crate::camera::Bounds;
 use crate::color::{Paint, SPEED};
 use crate::shape::{boundary, level_set, smooth};
-use crate::vector::{V3, finite, scale, sub, unit};
+use crate::vector::{finite, unit};
 use crate::view::Stage;
 use crate::{Layer, Settings};
+use numerics::vector::{Vec3, scale, sub};
 
 /// A corner of a triangle, with the normal there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corner {
-    pub(crate) at: V3,
-    pub(crate) normal: V3,
-    pub(crate) color: V3,
+    pub(crate) at: Vec3,
+    pub(crate) normal: Vec3,
+    pub(crate) color: Vec3,
 }
 
 /// A CV of a strand.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
-    pub(crate) at: V3,
+    pub(crate) at: Vec3,
     /// Unit, root to tip.
-    pub(crate) tangent: V3,
+    pub(crate) tangent: Vec3,
     pub(crate) radius: f32,
-    pub(crate) color: V3,
+    pub(crate) color: Vec3,
 }
 
 /// Consecutive knots, two or more.
@@ -41,9 +42,9 @@ pub(crate) struct Strand {
 /// A ball.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Dot {
-    pub(crate) at: V3,
+    pub(crate) at: Vec3,
     pub(crate) radius: f32,
-    pub(crate) color: V3,
+    pub(crate) color: Vec3,
     /// Share of the key light that reaches it.
     pub(crate) lit: f32,
     pub(crate) seed: u32,
@@ -60,12 +61,12 @@ pub(crate) struct Scene {
 
 /// Colours of what nothing else paints, linear light: clay, dark skin where curves may grow on it, putty, honey, brown
 /// hair, water.
-const MESH: V3 = [0.50, 0.45, 0.39];
-const SKIN: V3 = [0.21, 0.135, 0.09];
-const TETS: V3 = [0.62, 0.46, 0.28];
-const VOLUME: V3 = [0.58, 0.24, 0.035];
-const CURVES: V3 = [0.50, 0.26, 0.105];
-const POINTS: V3 = [0.12, 0.32, 0.60];
+const MESH: Vec3 = [0.50, 0.45, 0.39];
+const SKIN: Vec3 = [0.21, 0.135, 0.09];
+const TETS: Vec3 = [0.62, 0.46, 0.28];
+const VOLUME: Vec3 = [0.58, 0.24, 0.035];
+const CURVES: Vec3 = [0.50, 0.26, 0.105];
+const POINTS: Vec3 = [0.12, 0.32, 0.60];
 
 /// Width of a curve that has none, as a share of half the scene's diagonal: hair on an animal that fills the picture.
 const CURVE_WIDTH: f32 = 0.0035;
@@ -91,11 +92,10 @@ pub fn bounds(layers: &[Layer<'_>]) -> Option<Bounds> {
             bounds = points.fold(bounds, |bounds, p| union(bounds, Some([*p; 2])));
         }
         if let Some(volume) = layer.geometry.volume() {
-            let (grid, [nx, ny, _]) = (volume.grid(), volume.grid().size.map(|n| n as usize));
-            for (cell, _) in volume.level_set().iter().enumerate().filter(|(_, phi)| **phi < 0.0) {
-                let low = [cell % nx, cell / nx % ny, cell / nx / ny];
-                let at = |k: usize, i: usize| grid.origin[k] + grid.cell * i as f32;
-                let corner = |step: usize| std::array::from_fn(|k| at(k, low[k] + step));
+            let grid = volume.level_grid();
+            for (low, _) in volume.level_set().nodes().filter(|(_, phi)| *phi < 0.0) {
+                let at = |k: usize, i: u32| grid.origin[k] + grid.cell * i as f32;
+                let corner = |step: u32| std::array::from_fn(|k| at(k, low[k] + step));
                 bounds = union(bounds, Some([corner(0), corner(1)]).filter(|[a, b]| finite(*a) && finite(*b)));
             }
         }
@@ -118,7 +118,7 @@ impl Scene {
         let mut scene = Self::default();
         let mesh_color = if layers.iter().any(|layer| layer.geometry.curves().is_some()) { SKIN } else { MESH };
         for layer in layers {
-            let plain = |default: V3| layer.color.unwrap_or(default);
+            let plain = |default: Vec3| layer.color.unwrap_or(default);
             let paint = |part: &Component, default| Paint::of(part, color_by, plain(default));
             if let Some(part) = layer.geometry.mesh() {
                 scene.mesh(part, &paint(part, mesh_color), stage);
@@ -145,16 +145,19 @@ impl Scene {
         self.surface(&place(part.positions(), stage), &triangles.corners, &triangles.faces, paint);
     }
 
-    fn volume(&mut self, volume: &Volume, color_by: Option<(&str, [f32; 2])>, plain: V3, stage: &Stage) {
+    fn volume(&mut self, volume: &Volume, color_by: Option<(&str, [f32; 2])>, plain: Vec3, stage: &Stage) {
         let surface = level_set::zero_level(volume);
         let by_speed = color_by.is_some_and(|(name, _)| name == SPEED);
-        let speeds = by_speed.then(|| surface.cells.iter().map(|cell| level_set::speed(volume, *cell)).collect());
+        let speeds = by_speed.then(|| {
+            let (mut sampler, grid) = (volume.sampler(), volume.level_grid());
+            surface.cells.iter().map(|cell| level_set::speed(&mut sampler, &grid, *cell)).collect()
+        });
         let triangles: Vec<_> = surface.quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
         let paint = Paint::of_speeds(speeds, color_by, plain);
         self.surface(&place(&surface.points, stage), &triangles, &vec![0; triangles.len()], &paint);
     }
 
-    fn surface(&mut self, points: &[V3], triangles: &[[u32; 3]], elements: &[u32], paint: &Paint) {
+    fn surface(&mut self, points: &[Vec3], triangles: &[[u32; 3]], elements: &[u32], paint: &Paint) {
         let normals = smooth::corner_normals(points, triangles);
         let drawn = triangles.par_iter().zip(elements).zip(&normals).filter_map(|((corners, element), normals)| {
             let corner = |k: usize| {
@@ -209,7 +212,7 @@ impl Scene {
         }
     }
 
-    fn dot(&mut self, at: V3, radius: f32, color: V3) {
+    fn dot(&mut self, at: Vec3, radius: f32, color: Vec3) {
         if finite(at) {
             let seed = scramble(!(self.dots.len() as u32));
             self.dots.push(Dot { at, radius, color, lit: 1.0, seed });
@@ -244,7 +247,7 @@ impl<'a> Widths<'a> {
     }
 }
 
-fn place(points: &[V3], stage: &Stage) -> Vec<V3> {
+fn place(points: &[Vec3], stage: &Stage) -> Vec<Vec3> {
     points.par_iter().map(|p| stage.place(*p)).collect()
 }
 

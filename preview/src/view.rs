@@ -5,7 +5,7 @@
 //! *nearness* that is linear on the screen and greater for what is nearer: 1/z in perspective, −z in parallel.
 
 use crate::camera::{Bounds, Camera, proper};
-use crate::vector::{V3, add, dot, length, scale, sub};
+use numerics::vector::{DVec3, Vec3, add, dot, scale, sub, to_f32, to_f64};
 
 /// Nothing nearer to a perspective eye than this is drawn, stage units: a thousandth of half the scene's diagonal.
 pub(crate) const NEAR: f32 = 1e-3;
@@ -13,7 +13,7 @@ pub(crate) const NEAR: f32 = 1e-3;
 /// How the scene lies on the stage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stage {
-    centre: [f64; 3],
+    centre: DVec3,
     /// Metres a stage unit.
     size: f64,
 }
@@ -21,12 +21,16 @@ pub(crate) struct Stage {
 impl Stage {
     pub(crate) fn of(bounds: Bounds) -> Self {
         let [low, high] = proper(bounds);
-        Self { centre: scale(add(low, high), 0.5), size: length(sub(high, low)) * 0.5 }
+        Self { centre: (low + high) * 0.5, size: (high - low).norm() * 0.5 }
     }
 
     /// A position in metres, on the stage; not finite where it was not.
-    pub(crate) fn place(&self, p: V3) -> V3 {
-        scale(sub(p.map(f64::from), self.centre), 1.0 / self.size).map(|x| x as f32)
+    pub(crate) fn place(&self, p: Vec3) -> Vec3 {
+        self.place_exact(to_f64(p))
+    }
+
+    fn place_exact(&self, p: DVec3) -> Vec3 {
+        to_f32((p - self.centre) * (1.0 / self.size))
     }
 
     /// A length in metres, on the stage; 0 where it is negative or not finite.
@@ -46,9 +50,9 @@ enum Lens {
 /// Where the stage is seen from.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
-    eye: V3,
+    eye: Vec3,
     /// Right, up, forward.
-    axes: [V3; 3],
+    axes: [Vec3; 3],
     /// Pixel of the view's axis.
     middle: [f32; 2],
     /// Pixels a stage unit, at distance 1 in perspective.
@@ -60,8 +64,8 @@ impl View {
     /// What `camera` sees of the stage in a picture of `width` × `height` pixels.
     pub(crate) fn perspective(camera: &Camera, stage: &Stage, width: usize, height: usize) -> Self {
         Self {
-            eye: scale(sub(camera.eye(), stage.centre), 1.0 / stage.size).map(|x| x as f32),
-            axes: camera.axes().map(|axis| axis.map(|x| x as f32)),
+            eye: stage.place_exact(camera.eye().into()),
+            axes: camera.axes().map(to_f32),
             middle: [width as f32 / 2.0, height as f32 / 2.0],
             zoom: (height as f64 / 2.0 / camera.half_tangent()) as f32,
             lens: Lens::Perspective,
@@ -69,32 +73,32 @@ impl View {
     }
 
     /// What lies within `half` of `eye` sideways, on `size` × `size` pixels, seen along `axes[2]`.
-    pub(crate) fn parallel(eye: V3, axes: [V3; 3], half: f32, size: usize) -> Self {
+    pub(crate) fn parallel(eye: Vec3, axes: [Vec3; 3], half: f32, size: usize) -> Self {
         let middle = size as f32 / 2.0;
         Self { eye, axes, middle: [middle; 2], zoom: middle / half, lens: Lens::Parallel }
     }
 
-    pub(crate) fn eye(&self) -> V3 {
+    pub(crate) fn eye(&self) -> Vec3 {
         self.eye
     }
 
     /// Right, up, forward.
-    pub(crate) fn axes(&self) -> [V3; 3] {
+    pub(crate) fn axes(&self) -> [Vec3; 3] {
         self.axes
     }
 
     /// Along the view, stage units.
-    pub(crate) fn distance(&self, p: V3) -> f32 {
+    pub(crate) fn distance(&self, p: Vec3) -> f32 {
         dot(self.axes[2], sub(p, self.eye))
     }
 
     /// Whether a perspective eye is too near to `p`, or past it.
-    pub(crate) fn is_behind(&self, p: V3) -> bool {
+    pub(crate) fn is_behind(&self, p: Vec3) -> bool {
         self.lens == Lens::Perspective && self.distance(p) < NEAR
     }
 
     /// x, y in pixels and nearness; of no meaning where [`View::is_behind`].
-    pub(crate) fn project(&self, p: V3) -> V3 {
+    pub(crate) fn project(&self, p: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| dot(axis, sub(p, self.eye)));
         let (shrink, nearness) = match self.lens {
             Lens::Perspective => (1.0 / z, 1.0 / z),
@@ -104,7 +108,7 @@ impl View {
     }
 
     /// Where on the stage a point of the screen is: the inverse of [`View::project`].
-    pub(crate) fn unproject(&self, [x, y, nearness]: V3) -> V3 {
+    pub(crate) fn unproject(&self, [x, y, nearness]: Vec3) -> Vec3 {
         let z = match self.lens {
             Lens::Perspective => 1.0 / nearness,
             Lens::Parallel => -nearness,
@@ -118,7 +122,7 @@ impl View {
     }
 
     /// Pixels of a stage length at `p`.
-    pub(crate) fn pixels(&self, p: V3, length: f32) -> f32 {
+    pub(crate) fn pixels(&self, p: Vec3, length: f32) -> f32 {
         match self.lens {
             Lens::Perspective => length * self.zoom / self.distance(p).max(NEAR),
             Lens::Parallel => length * self.zoom,
@@ -126,7 +130,7 @@ impl View {
     }
 
     /// How much nearer than `p` a point `length` before it is.
-    pub(crate) fn nearer(&self, p: V3, length: f32) -> f32 {
+    pub(crate) fn nearer(&self, p: Vec3, length: f32) -> f32 {
         match self.lens {
             Lens::Perspective => {
                 let z = self.distance(p).max(NEAR);
@@ -139,6 +143,8 @@ impl View {
 
 #[cfg(test)]
 mod tests {
+    use numerics::vector::length;
+
     use super::*;
 
     fn head_on() -> (Stage, View) {

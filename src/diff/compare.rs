@@ -8,7 +8,9 @@
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 
-use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, Table, Topology, Volume};
+use engine::geometry::{
+    Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, SparseField, Table, Topology, Volume,
+};
 
 /// One of the two geometries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +35,8 @@ pub(super) enum What {
     Count { of: &'static str, counts: [usize; 2] },
     /// As many elements, but `differing` of them join other points.
     Topology { of: &'static str, differing: usize, elements: usize, first: usize },
-    /// The grids of two volumes.
-    Grid([Grid; 2]),
+    /// The grids of two volumes: of the level set, of the velocity, or of both.
+    Grid { of: &'static str, grids: [Grid; 2] },
     /// Only this side has the attribute.
     Attribute(Place, Side),
     /// An attribute of two types.
@@ -186,16 +188,20 @@ impl Findings {
     }
 
     fn volumes(&mut self, a: &Volume, b: &Volume) {
-        if a.grid() != b.grid() {
-            self.add(What::Grid([a.grid(), b.grid()]));
-        }
-        let names = ["level_set", "velocity_x", "velocity_y", "velocity_z"];
-        let fields = |volume: &Volume| {
-            let [x, y, z] = volume.velocity().clone();
-            [volume.level_set().clone(), x, y, z].map(Column::F1)
+        let has_one = |volume: &Volume| volume.level_grid() == volume.velocity_grid();
+        let grids = |grid: fn(&Volume) -> Grid| [grid(a), grid(b)];
+        let all = if has_one(a) && has_one(b) {
+            vec![("grid", grids(Volume::level_grid))]
+        } else {
+            vec![("level set", grids(Volume::level_grid)), ("velocity", grids(Volume::velocity_grid))]
         };
-        for (name, (a, b)) in names.into_iter().zip(fields(a).iter().zip(&fields(b))) {
-            self.columns(Place { owner: None, name: name.into() }, a, b);
+        for (of, grids) in all.into_iter().filter(|(_, [a, b])| a != b) {
+            self.add(What::Grid { of, grids });
+        }
+        // A volume that was read from a file fits dense arrays: it came from some.
+        let dense = |field: &SparseField| Column::new(field.to_dense().unwrap_or_default());
+        for ((name, a), (_, b)) in a.fields().into_iter().zip(b.fields()) {
+            self.columns(Place { owner: None, name: name.into() }, &dense(a), &dense(b));
         }
         self.tables(Owner::Once, a.once(), b.once());
     }
@@ -388,7 +394,7 @@ mod tests {
         };
         assert_eq!(compare(&volume(0.5, 1.0), &volume(0.5, 1.0), None), []);
         let found = compare(&volume(0.5, 1.0), &volume(0.25, 2.0), None);
-        assert!(matches!(found[0].what, What::Grid(_)));
+        assert!(matches!(found[0].what, What::Grid { of: "grid", .. }));
         assert!(matches!(&found[1].what, What::Values(place, _) if &*place.name == "level_set"));
     }
 }

@@ -44,7 +44,8 @@ fn finding_json(finding: &Finding) -> Value {
             put("elements", json!(elements));
             put("first", json!(first));
         }
-        What::Grid(grids) => {
+        What::Grid { of, grids } => {
+            put("of", json!(of));
             let grid = |k: usize| json!({"origin": grids[k].origin, "cell": grids[k].cell, "size": grids[k].size});
             put("grids", json!([grid(0), grid(1)]));
         }
@@ -133,12 +134,12 @@ fn line(finding: &Finding, a: &str, b: &str) -> String {
         What::Topology { of, differing, elements, first } => {
             format!("{differing} of {elements} {of} join other points; the first is {first}")
         }
-        What::Grid([a, b]) => {
+        What::Grid { of, grids: [a, b] } => {
             let grid = |grid: &engine::geometry::Grid| {
                 let [x, y, z] = grid.size;
                 format!("{x} × {y} × {z} cells of {} m from {:?}", grid.cell, grid.origin)
             };
-            format!("{} and {}", grid(a), grid(b))
+            format!("{of}: {} and {}", grid(a), grid(b))
         }
         What::Type(place, [a, b]) => format!("`{}`: {a} and {b}", place.name),
         What::Values(place, values) => values_line(finding.kind, place, values),

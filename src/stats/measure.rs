@@ -3,8 +3,9 @@
 //! Sums are f64 in the order of the rows, so the same file gives the same digits everywhere. NaN and infinity are
 //! counted and excluded from all else.
 
-use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, Table, Topology, Volume};
-
+use engine::geometry::{
+    Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, SparseField, Table, Topology, Volume,
+};
 use numerics::vector::to_f64;
 
 use super::surface::{SurfaceStats, tet_volume};
@@ -99,7 +100,9 @@ pub(super) struct PartStats {
 /// A volume.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct VolumeStats {
+    /// Of the level set, and of the velocity unless it has one of its own.
     pub(super) grid: Grid,
+    pub(super) velocity_grid: Option<Grid>,
     /// Cells whose centre is inside.
     pub(super) inside: usize,
     pub(super) fields: Vec<AttributeStats>,
@@ -158,12 +161,15 @@ fn polyline_length(cvs: &[[f32; 3]]) -> f64 {
 }
 
 fn volume(volume: &Volume) -> VolumeStats {
-    let [x, y, z] = volume.velocity();
-    let fields = [("level_set", volume.level_set()), ("velocity_x", x), ("velocity_y", y), ("velocity_z", z)];
+    // A volume that was read from a file fits dense arrays: it came from some.
+    let field = |(name, field): (&str, &SparseField)| {
+        AttributeStats::of(&name.into(), &Column::new(field.to_dense().unwrap_or_default()))
+    };
     VolumeStats {
-        grid: volume.grid(),
-        inside: volume.level_set().iter().filter(|phi| **phi < 0.0).count(),
-        fields: fields.map(|(name, field)| AttributeStats::of(&name.into(), &Column::F1(field.clone()))).into(),
+        grid: volume.level_grid(),
+        velocity_grid: Some(volume.velocity_grid()).filter(|grid| *grid != volume.level_grid()),
+        inside: volume.level_set().nodes().filter(|(_, phi)| *phi < 0.0).count(),
+        fields: volume.fields().map(field).into(),
         attributes: attributes(volume.once()),
     }
 }

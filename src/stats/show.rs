@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use engine::geometry::{Kind, Owner};
+use engine::geometry::{Grid, Kind, Owner};
 use serde_json::{Map, Value, json};
 
 use super::measure::{AttributeStats, PartStats, Shape, Spread, Stats, VolumeStats};
@@ -60,11 +60,17 @@ fn part_json(part: &PartStats) -> Value {
 
 fn volume_json(volume: &VolumeStats) -> Value {
     let grid = &volume.grid;
-    json!({
+    let mut object = json!({
         "origin": grid.origin.map(decimal), "cell": decimal(grid.cell), "size": grid.size,
         "cells": grid.cells(), "inside": volume.inside,
         "fields": attributes_json(&volume.fields), "attributes": attributes_json(&volume.attributes),
-    })
+    });
+    if let Some(grid) = &volume.velocity_grid {
+        object["velocity_origin"] = json!(grid.origin.map(decimal));
+        object["velocity_cell"] = json!(decimal(grid.cell));
+        object["velocity_size"] = json!(grid.size);
+    }
+    object
 }
 
 fn attributes_json(attributes: &[AttributeStats]) -> Value {
@@ -161,10 +167,16 @@ fn part_text(part: &PartStats, text: &mut String) {
 }
 
 fn volume_text(volume: &VolumeStats, text: &mut String) {
+    let cells = |grid: &Grid| {
+        let [x, y, z] = grid.size;
+        format!("{x} × {y} × {z} cells of {} m", decimal(grid.cell))
+    };
     let grid = &volume.grid;
-    let [x, y, z] = grid.size;
-    line(text, Kind::Volume.name(), &format!("{x} × {y} × {z} cells of {} m", decimal(grid.cell)));
+    line(text, Kind::Volume.name(), &cells(grid));
     line(text, "  origin", &list(&grid.origin.map(f64::from)));
+    if let Some(grid) = &volume.velocity_grid {
+        line(text, "  velocity", &format!("{} from {}", cells(grid), list(&grid.origin.map(f64::from))));
+    }
     line(text, "  inside", &format!("{} of {} cells", volume.inside, grid.cells()));
     attributes_text("field", &volume.fields, text);
     attributes_text(&Owner::Once.to_string(), &volume.attributes, text);

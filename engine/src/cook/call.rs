@@ -156,13 +156,19 @@ pub(super) fn check_finite(geometry: &Geometry, known: &[usize]) -> Result<()> {
         }
     }
     if let Some(volume) = geometry.volume() {
-        for (name, field) in std::iter::once(("level_set", volume.level_set()))
-            .chain(["velocity_x", "velocity_y", "velocity_z"].into_iter().zip(volume.velocity()))
-        {
-            let fresh = known.binary_search(&(Arc::as_ptr(field) as usize)).is_err();
-            if let Some(cell) = field.iter().position(|x| fresh && !x.is_finite()) {
-                return Err(Error::new(ErrorKind::NotFinite, format!("`{name}` of cell {cell} is NaN or infinite")));
+        for grid in [volume.level_grid(), volume.velocity_grid()] {
+            if !grid.origin.iter().chain([&grid.cell]).all(|x| x.is_finite()) {
+                return Err(Error::new(ErrorKind::NotFinite, "the grid of the volume is NaN or infinite"));
             }
+        }
+        for (name, field) in volume.fields() {
+            let fresh = field.arrays().iter().any(|(address, _)| known.binary_search(address).is_err());
+            if !fresh || field.values().iter().chain([&field.background()]).all(|x| x.is_finite()) {
+                continue;
+            }
+            let at = field.nodes().find(|(_, x)| !x.is_finite());
+            let at = at.map_or_else(String::new, |(node, _)| format!(" of cell {node:?}"));
+            return Err(Error::new(ErrorKind::NotFinite, format!("`{name}`{at} is NaN or infinite")));
         }
     }
     Ok(())

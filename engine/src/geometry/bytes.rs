@@ -5,6 +5,8 @@ use std::sync::Arc;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use numerics::sparse_field::{BLOCK_NODES, SparseField};
+
 use super::{Column, ColumnType, Component, Faces, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
 
 impl Geometry {
@@ -57,15 +59,15 @@ fn encode_geometry(out: &mut Vec<u8>, geometry: &Geometry) {
     }
     if let Some(volume) = geometry.volume() {
         out.push(Kind::Volume as u8);
-        let grid = volume.grid();
-        for x in grid.origin.iter().chain([&grid.cell]) {
-            out.extend(x.to_le_bytes());
+        for grid in [volume.level_grid(), volume.velocity_grid()] {
+            out.extend(grid.origin.iter().chain([&grid.cell]).flat_map(|x| x.to_le_bytes()));
+            out.extend(grid.size.iter().flat_map(|n| n.to_le_bytes()));
         }
-        for n in grid.size {
-            out.extend(n.to_le_bytes());
-        }
-        for field in std::iter::once(volume.level_set()).chain(volume.velocity()) {
-            put(out, &field.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
+        for (_, field) in volume.fields() {
+            out.extend(field.background().to_le_bytes());
+            let blocks: Vec<u32> = field.blocks().flat_map(|(block, _)| block).collect();
+            put(out, &words(&blocks));
+            put(out, &field.values().iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>());
         }
         encode_table(out, volume.once());
     }
@@ -109,8 +111,25 @@ impl<'a> Reader<'a> {
         Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
     }
 
-    fn floats(&mut self) -> Option<Vec<f32>> {
-        Some(self.words()?.into_iter().map(f32::from_bits).collect())
+    fn grid(&mut self) -> Option<Grid> {
+        let [x, y, z, cell] = [self.word()?, self.word()?, self.word()?, self.word()?].map(f32::from_bits);
+        Some(Grid { origin: [x, y, z], cell, size: [self.word()?, self.word()?, self.word()?] })
+    }
+
+    fn field(&mut self, size: [u32; 3]) -> Option<SparseField> {
+        let background = f32::from_bits(self.word()?);
+        let (blocks, values) = (self.words()?, self.words()?);
+        let (blocks, values) = (blocks.as_chunks::<3>().0, values.as_chunks::<BLOCK_NODES>().0);
+        if blocks.len() != values.len() || !blocks.is_sorted_by_key(|[x, y, z]| [*z, *y, *x]) {
+            return None;
+        }
+        let find = |[x, y, z]: [u32; 3]| blocks.binary_search_by_key(&[z, y, x], |[x, y, z]| [*z, *y, *x]);
+        let field = SparseField::from_blocks(size, background, blocks.iter().copied(), |block, out| {
+            if let Ok(at) = find(block) {
+                *out = values[at].map(f32::from_bits);
+            }
+        });
+        field.ok().filter(|field| field.block_count() == blocks.len())
     }
 
     fn runs(&mut self) -> Option<Runs> {
@@ -143,12 +162,11 @@ impl<'a> Reader<'a> {
                 k if k == Kind::Points as u8 => Topology::Points,
                 k if k == Kind::Tets as u8 => Topology::Tets(Arc::new(self.words()?.as_chunks::<4>().0.to_vec())),
                 k if k == Kind::Volume as u8 => {
-                    let floats = [self.word()?, self.word()?, self.word()?, self.word()?].map(f32::from_bits);
-                    let size = [self.word()?, self.word()?, self.word()?];
-                    let grid = Grid { origin: [floats[0], floats[1], floats[2]], cell: floats[3], size };
-                    let level_set = self.floats()?;
-                    let velocity = [self.floats()?, self.floats()?, self.floats()?];
-                    let mut volume = Volume::new(grid, level_set, velocity).ok()?;
+                    let (level_grid, velocity_grid) = (self.grid()?, self.grid()?);
+                    let level_set = self.field(level_grid.size)?;
+                    let mut face = |axis| self.field(velocity_grid.faces_size(axis));
+                    let velocity = [face(0)?, face(1)?, face(2)?];
+                    let mut volume = Volume::from_fields(level_grid, level_set, velocity_grid, velocity).ok()?;
                     *volume.once_mut() = self.table()?;
                     geometry.put_volume(volume);
                     continue;

@@ -81,8 +81,8 @@ mod tests {
         geometry.put_volume(Volume::new(grid, vec![-0.25], [(); 3].map(|()| vec![3.0; 2])).unwrap());
         geometry.scale_lengths(2.0);
         let out = geometry.volume().unwrap();
-        assert_eq!(out.grid(), Grid { origin: [2.0; 3], cell: 1.0, size: [1; 3] });
-        assert_eq!((out.level_set()[0], out.velocity()[0][0]), (-0.5, 6.0));
+        assert_eq!(out.level_grid(), Grid { origin: [2.0; 3], cell: 1.0, size: [1; 3] });
+        assert_eq!((out.level_set().to_dense().unwrap()[0], out.velocity()[0].to_dense().unwrap()[0]), (-0.5, 6.0));
     }
 
     #[test]

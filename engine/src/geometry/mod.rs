@@ -23,9 +23,10 @@ pub use attribute::{
 pub(crate) use bytes::Reader;
 pub use column::{Column, ColumnType, Item, Name, Table};
 pub use component::Component;
+pub use numerics::sparse_field::{BLOCK_EDGE, FieldCursor, SparseField, SparseFieldError, dense_len};
 pub use topology::{Faces, Runs, Topology};
 pub use triangles::Triangles;
-pub use volume::{Grid, Volume};
+pub use volume::{Grid, VOLUME_FIELDS, Volume, VolumeSampler};
 
 /// Which component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -178,8 +179,7 @@ impl Geometry {
             arrays.extend(part.columns().map(|(_, _, column)| (column.address(), column.bytes())));
         }
         if let Some(volume) = self.volume() {
-            let fields = std::iter::once(volume.level_set()).chain(volume.velocity());
-            arrays.extend(fields.map(|field| (Arc::as_ptr(field) as usize, field.len() * 4)));
+            arrays.extend(volume.fields().into_iter().flat_map(|(_, field)| field.arrays()));
         }
         arrays
     }
@@ -196,8 +196,8 @@ impl From<Component> for Geometry {
     }
 }
 
-/// Why a geometry is not one.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+/// Why a geometry is invalid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GeometryError {
     /// A column of another length than its table.
@@ -274,6 +274,40 @@ pub enum GeometryError {
     /// Tables that do not fit a topology.
     #[error("the tables' rows do not fit the topology")]
     Tables,
+    /// A grid without a usable cell or origin.
+    #[error("a grid with cells of {cell:?} m from {origin:?}, expected finite numbers and a cell above 0")]
+    Grid {
+        /// Lowest corner.
+        origin: [f32; 3],
+        /// Edge of a cell.
+        cell: f32,
+    },
+    /// A field of a volume that cannot be made.
+    #[error("`{name}`: {error}")]
+    Field {
+        /// Which field.
+        name: &'static str,
+        /// Why.
+        error: SparseFieldError,
+    },
+    /// A field of a volume that does not fit its grid.
+    #[error("`{name}` is {size:?} numbers along x, y and z, expected {expected:?}")]
+    FieldSize {
+        /// Which field.
+        name: &'static str,
+        /// Nodes it has along each axis.
+        size: [u32; 3],
+        /// Nodes its grid has.
+        expected: [u32; 3],
+    },
+    /// A field of a volume with a background that is not outside, or not still.
+    #[error("the background of `{name}` is {background:?}, expected {}", if *name == VOLUME_FIELDS[0] { "a distance above 0" } else { "0" })]
+    Background {
+        /// Which field.
+        name: &'static str,
+        /// Its value where nothing is stored.
+        background: f32,
+    },
 }
 
 #[cfg(test)]
@@ -335,13 +369,5 @@ mod tests {
         let both = tri(0.0).concat(&tri(5.0)).unwrap();
         assert_eq!(both.faces().unwrap().face(1), [3, 4, 5]);
         assert_eq!(both.positions()[3], [5.0, 0.0, 0.0]);
-    }
-
-    #[test]
-    fn a_volume_checks_its_faces() {
-        let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [2, 1, 1] };
-        assert!(Volume::new(grid, vec![0.0; 2], [vec![0.0; 3], vec![0.0; 4], vec![0.0; 4]]).is_ok());
-        let error = Volume::new(grid, vec![0.0; 2], [vec![0.0; 2], vec![0.0; 4], vec![0.0; 4]]).unwrap_err();
-        assert_eq!(error.to_string(), "`velocity_x` has 2 rows, expected 3");
     }
 }

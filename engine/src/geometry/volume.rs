@@ -1,6 +1,6 @@
-//! A volume: a level set in cell centres and velocity on MAC faces of one regular grid.
+//! A volume: a level set at cell centres and velocity on MAC faces, each on its own regular grid and stored sparsely.
 
-use std::sync::Arc;
+use numerics::sparse_field::{FieldCursor, SparseField, SparseFieldError};
 
 use super::GeometryError;
 use super::column::Table;
@@ -17,68 +17,211 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Cells in all.
+    /// Number of cells.
     pub fn cells(&self) -> usize {
-        self.size.iter().map(|n| *n as usize).product()
+        count(self.size)
     }
 
-    /// Faces whose normal is `axis` (0 x, 1 y, 2 z): one more than the cells along it.
+    /// Number of faces whose normal is `axis` (0 x, 1 y, 2 z).
     pub fn faces(&self, axis: usize) -> usize {
-        (0..3).map(|k| self.size[k] as usize + usize::from(k == axis)).product()
+        count(self.faces_size(axis))
+    }
+
+    /// Faces along x, y, z whose normal is `axis`: one more than the cells along that axis.
+    pub fn faces_size(&self, axis: usize) -> [u32; 3] {
+        [0, 1, 2].map(|k| self.size[k].saturating_add(u32::from(k == axis)))
+    }
+
+    /// A point, metres, in cells from the lowest corner.
+    fn in_cells(&self, point: [f32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k| (f64::from(point[k]) - f64::from(self.origin[k])) / f64::from(self.cell))
+    }
+
+    /// The cells `[low, high)` as a grid of their own.
+    fn cropped(&self, [low, high]: [[u32; 3]; 2]) -> Self {
+        let at = |k: usize| f64::from(self.origin[k]) + f64::from(self.cell) * f64::from(low[k]);
+        Self { origin: [0, 1, 2].map(|k| at(k) as f32), cell: self.cell, size: [0, 1, 2].map(|k| high[k] - low[k]) }
+    }
+
+    /// The numbers of the grid are finite and its cells have a size.
+    fn check(&self) -> Result<(), GeometryError> {
+        let is_sound = self.cell > 0.0 && self.cell.is_finite() && self.origin.iter().all(|x| x.is_finite());
+        is_sound.then_some(()).ok_or(GeometryError::Grid { origin: self.origin, cell: self.cell })
     }
 }
 
-/// Level set φ (m, negative inside) at cell centres, velocity (m/s) on MAC faces; x fastest, then y, then z.
+/// Nodes of a box; the greatest `usize` where they are more.
+fn count(size: [u32; 3]) -> usize {
+    size.iter().fold(1, |count: usize, n| count.saturating_mul(*n as usize))
+}
+
+/// The names of a volume's fields in files and messages.
+pub const VOLUME_FIELDS: [&str; 4] = ["level_set", "velocity_x", "velocity_y", "velocity_z"];
+
+/// Level set φ (m, negative inside) at the cell centres of one grid, velocity (m/s) on the MAC faces of another.
+///
+/// Both are sparse: where nothing is stored, φ is a distance above 0 that says no more than "outside, at least a band
+/// away", and velocity is zero. A clone shares every array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
-    grid: Grid,
-    level_set: Arc<Vec<f32>>,
-    velocity: [Arc<Vec<f32>>; 3],
+    level_grid: Grid,
+    level_set: SparseField,
+    velocity_grid: Grid,
+    velocity: [SparseField; 3],
     once: Table,
 }
 
 impl Volume {
-    /// A volume on `grid`.
+    /// A volume of dense arrays on one grid, x fastest, then y, then z. Background of the level set:
+    /// [`Volume::default_background`].
     ///
     /// # Errors
-    /// Where an array's length is not the grid's.
+    /// Where an array's length is not the grid's, the grid is too large for dense arrays (the message says what it would
+    /// take), or its cell is not above 0.
     pub fn new(grid: Grid, level_set: Vec<f32>, velocity: [Vec<f32>; 3]) -> Result<Self, GeometryError> {
-        let lengths = [("level_set", level_set.len(), grid.cells())].into_iter().chain(
-            ["velocity_x", "velocity_y", "velocity_z"]
-                .into_iter()
-                .enumerate()
-                .map(|(axis, name)| (name, velocity[axis].len(), grid.faces(axis))),
-        );
-        for (name, rows, expected) in lengths {
-            if rows != expected {
-                return Err(GeometryError::Rows { name: name.into(), rows, expected });
+        let background = Self::default_background(&grid, level_set.iter().copied());
+        Self::from_dense(grid, &level_set, background, grid, velocity.each_ref().map(Vec::as_slice))
+    }
+
+    /// A volume of dense arrays on two grids, x fastest, then y, then z; `background` is φ outside the level set's grid.
+    ///
+    /// # Errors
+    /// As for [`Volume::new`], and where `background` is not above 0.
+    pub fn from_dense(
+        level_grid: Grid,
+        level_set: &[f32],
+        background: f32,
+        velocity_grid: Grid,
+        velocity: [&[f32]; 3],
+    ) -> Result<Self, GeometryError> {
+        let field = |field: usize, size: [u32; 3], background: f32, values: &[f32]| {
+            let error = |error| match error {
+                SparseFieldError::Length { values, nodes } => {
+                    GeometryError::Rows { name: VOLUME_FIELDS[field].into(), rows: values, expected: nodes }
+                }
+                error => GeometryError::Field { name: VOLUME_FIELDS[field], error },
+            };
+            SparseField::from_dense(size, background, values).map_err(error)
+        };
+        let level_set = field(0, level_grid.size, background, level_set)?;
+        let [x, y, z] = velocity;
+        let face = |axis: usize, values: &[f32]| field(axis + 1, velocity_grid.faces_size(axis), 0.0, values);
+        let velocity = [face(0, x)?, face(1, y)?, face(2, z)?];
+        Self::from_fields(level_grid, level_set, velocity_grid, velocity)
+    }
+
+    /// A volume of fields: `level_set` a node a cell of `level_grid`, `velocity` a node a face of `velocity_grid`.
+    ///
+    /// # Errors
+    /// Where a field's size is not its grid's, the background of the level set is not above 0 or that of a velocity is
+    /// not 0, or a cell is not above 0.
+    pub fn from_fields(
+        level_grid: Grid,
+        level_set: SparseField,
+        velocity_grid: Grid,
+        velocity: [SparseField; 3],
+    ) -> Result<Self, GeometryError> {
+        level_grid.check()?;
+        velocity_grid.check()?;
+        let volume = Self { level_grid, level_set, velocity_grid, velocity, once: Table::new(1) };
+        for (k, (name, field)) in volume.fields().into_iter().enumerate() {
+            let expected = if k == 0 { level_grid.size } else { velocity_grid.faces_size(k - 1) };
+            if field.size() != expected {
+                return Err(GeometryError::FieldSize { name, size: field.size(), expected });
+            }
+            let background = field.background();
+            let fits = if k == 0 { background > 0.0 && background.is_finite() } else { background == 0.0 };
+            if !fits {
+                return Err(GeometryError::Background { name, background });
             }
         }
-        Ok(Self { grid, level_set: Arc::new(level_set), velocity: velocity.map(Arc::new), once: Table::new(1) })
+        Ok(volume)
+    }
+
+    /// The background of a level set where nothing says it: its greatest finite value, at least half a cell, so that
+    /// liquid that fills its grid ends at the grid's border.
+    pub fn default_background(grid: &Grid, level_set: impl IntoIterator<Item = f32>) -> f32 {
+        let least = (0.5 * grid.cell).max(f32::from_bits(1));
+        level_set.into_iter().filter(|x| x.is_finite()).fold(least, f32::max)
     }
 
     /// This volume with every length in it, speeds included, put through `length`.
-    pub(super) fn with_lengths(&self, length: impl Fn(f32) -> f32) -> Self {
-        let Grid { origin, cell, size } = self.grid;
-        let grid = Grid { origin: origin.map(&length), cell: length(cell), size };
-        let field = |field: &Arc<Vec<f32>>| Arc::new(field.iter().copied().map(&length).collect());
-        let velocity = self.velocity.each_ref().map(field);
-        Self { grid, level_set: field(&self.level_set), velocity, once: self.once.clone() }
+    pub(super) fn with_lengths(&self, length: impl Fn(f32) -> f32 + Sync) -> Self {
+        let mut volume = self.clone();
+        for grid in [&mut volume.level_grid, &mut volume.velocity_grid] {
+            *grid = Grid { origin: grid.origin.map(&length), cell: length(grid.cell), size: grid.size };
+        }
+        volume.level_set.edit(&length);
+        volume.velocity.iter_mut().for_each(|field| field.edit(&length));
+        volume
     }
 
-    /// The grid.
-    pub fn grid(&self) -> Grid {
-        self.grid
+    /// The grid of the level set.
+    pub fn level_grid(&self) -> Grid {
+        self.level_grid
     }
 
     /// φ at cell centres, metres, negative inside.
-    pub fn level_set(&self) -> &Arc<Vec<f32>> {
+    pub fn level_set(&self) -> &SparseField {
         &self.level_set
     }
 
+    /// The grid of the velocity.
+    pub fn velocity_grid(&self) -> Grid {
+        self.velocity_grid
+    }
+
     /// Velocity through the faces across x, y and z, m/s.
-    pub fn velocity(&self) -> &[Arc<Vec<f32>>; 3] {
+    pub fn velocity(&self) -> &[SparseField; 3] {
         &self.velocity
+    }
+
+    /// All fields by the names in [`VOLUME_FIELDS`].
+    pub fn fields(&self) -> [(&'static str, &SparseField); 4] {
+        let ([a, b, c, d], [x, y, z]) = (VOLUME_FIELDS, &self.velocity);
+        [(a, &self.level_set), (b, x), (c, y), (d, z)]
+    }
+
+    /// A reader of φ and velocity at any points.
+    pub fn sampler(&self) -> VolumeSampler<'_> {
+        let velocity = self.velocity.each_ref().map(SparseField::cursor);
+        VolumeSampler { volume: self, level_set: self.level_set.cursor(), velocity }
+    }
+
+    /// The volume on the smallest grids that hold its liquid: of the level set the cells with φ below `band`, of the
+    /// velocity those within `reach` of a liquid cell along each axis (both metres). The new origins are rounded to `f32`.
+    ///
+    /// # Errors
+    /// None for a volume whose numbers are finite.
+    pub fn cropped(&self, band: f32, reach: f32) -> Result<Self, GeometryError> {
+        let band = band.min(self.level_set.background());
+        let near = self.level_set.bounds(|phi| phi < band).unwrap_or_default();
+        let level_grid = self.level_grid.cropped(near);
+        let level_set = self.level_set.cropped(near[0], level_grid.size).map_err(in_field(VOLUME_FIELDS[0]))?;
+        let moving = self.level_set.bounds(|phi| phi < 0.0).map_or_else(Default::default, |liquid| {
+            let Grid { origin, cell, size } = self.velocity_grid;
+            // Cells of the velocity's grid that the liquid's box, grown by `reach`, overlaps.
+            [0, 1].map(|end| {
+                [0, 1, 2].map(|k| {
+                    let edge = f64::from(self.level_grid.cell) * f64::from(liquid[end][k]);
+                    let edge = f64::from(self.level_grid.origin[k]) - f64::from(origin[k]) + edge;
+                    let reach = f64::from(reach) / f64::from(cell);
+                    let at = edge / f64::from(cell);
+                    let at = if end == 0 { (at - reach).floor() } else { (at + reach).ceil() };
+                    // A float beyond the range of u32 becomes its nearest end.
+                    (at as u32).min(size[k])
+                })
+            })
+        });
+        let velocity_grid = self.velocity_grid.cropped(moving);
+        let face = |axis: usize| {
+            let part = self.velocity[axis].cropped(moving[0], velocity_grid.faces_size(axis));
+            part.map_err(in_field(VOLUME_FIELDS[axis + 1]))
+        };
+        let velocity = [face(0)?, face(1)?, face(2)?];
+        let mut volume = Self::from_fields(level_grid, level_set, velocity_grid, velocity)?;
+        volume.once = self.once.clone();
+        Ok(volume)
     }
 
     /// Attributes of the whole.
@@ -91,3 +234,31 @@ impl Volume {
         &mut self.once
     }
 }
+
+fn in_field(name: &'static str) -> impl Fn(SparseFieldError) -> GeometryError {
+    move |error| GeometryError::Field { name, error }
+}
+
+/// Reads a volume at points; fast where each point is near the one before.
+#[derive(Clone, Debug)]
+pub struct VolumeSampler<'a> {
+    volume: &'a Volume,
+    level_set: FieldCursor<'a>,
+    velocity: [FieldCursor<'a>; 3],
+}
+
+impl VolumeSampler<'_> {
+    /// φ at a point (metres), trilinear between cell centres; the background outside.
+    pub fn level_set(&mut self, point: [f32; 3]) -> f32 {
+        self.level_set.sample(self.volume.level_grid.in_cells(point).map(|x| x - 0.5))
+    }
+
+    /// Velocity at a point (metres), m/s: each component trilinear between its own faces; zero outside.
+    pub fn velocity(&mut self, point: [f32; 3]) -> [f32; 3] {
+        let at = self.volume.velocity_grid.in_cells(point);
+        [0, 1, 2].map(|axis| self.velocity[axis].sample([0, 1, 2].map(|k| if k == axis { at[k] } else { at[k] - 0.5 })))
+    }
+}
+
+#[cfg(test)]
+mod tests;

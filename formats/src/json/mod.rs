@@ -11,6 +11,11 @@
 //! shortest form and read back bit for bit. A column becomes f32 as soon as one of its numbers is, or where its name
 //! wants it (`"envelope": [1, 1]`). A column without a row does not show its type: it becomes what its name wants, else
 //! float. `frame` and `time` may be missing. Any other key is a fault, and so is a key that is there twice.
+//!
+//! A volume is written as the dense arrays of its box, x fastest, then y, then z. Where its velocity has a grid of its own,
+//! that grid is `velocity_origin`, `velocity_cell` and `velocity_size`; each of them that is missing is that of the level
+//! set. `background` is φ where nothing is stored; where it is missing it is the greatest value of `level_set`, at least
+//! half a cell. More than 2³¹ − 1 numbers in one array are refused, read or written.
 
 mod numbers;
 mod part;
@@ -19,7 +24,7 @@ mod read;
 mod tests;
 mod write;
 
-use engine::geometry::{Kind, Owner, Volume};
+use engine::geometry::{Kind, Owner};
 
 pub(crate) use read::read;
 pub(crate) use write::write;
@@ -31,11 +36,4 @@ fn table_key(kind: Kind, owner: Owner) -> Option<&'static str> {
         Owner::Element => (!matches!(kind, Kind::Points | Kind::Volume)).then_some("element_attributes"),
         Owner::Once => Some("attributes"),
     }
-}
-
-/// The arrays of a volume by the names they have in files.
-pub(crate) fn volume_fields(volume: &Volume) -> [(&'static str, &[f32]); 4] {
-    let [x, y, z] = volume.velocity();
-    let [a, b, c, d] = part::FIELDS;
-    [(a, volume.level_set()), (b, x), (c, y), (d, z)]
 }

@@ -1,15 +1,12 @@
 //! What a component's object says, and whether it fits together.
 
-use engine::geometry::{Component, Geometry, Grid, Kind, Name, Owner, P, Volume, fixed_type};
+use engine::geometry::{Component, Geometry, Grid, Kind, Name, Owner, P, VOLUME_FIELDS, Volume, fixed_type};
 
 use super::numbers::Numbers;
 use crate::text::counted;
 
 /// An attribute before its type is settled.
 pub(super) type NamedNumbers = (Name, Numbers);
-
-/// The arrays of a volume, in the order of [`Part::fields`].
-pub(super) const FIELDS: [&str; 4] = ["level_set", "velocity_x", "velocity_y", "velocity_z"];
 
 /// The values of a component's keys.
 #[derive(Default)]
@@ -20,10 +17,45 @@ pub(super) struct Part {
     pub(super) points: Option<Numbers>,
     /// In the order of [`Owner::ALL`].
     pub(super) tables: [Vec<NamedNumbers>; 3],
+    /// The grid of a volume's level set.
+    pub(super) grid: GridKeys,
+    /// The grid of its velocity, where it is another.
+    pub(super) velocity_grid: GridKeys,
+    pub(super) background: Option<f32>,
+    /// In the order of [`VOLUME_FIELDS`].
+    pub(super) fields: [Option<Numbers>; 4],
+}
+
+/// The values of a grid's keys.
+#[derive(Default)]
+pub(super) struct GridKeys {
     pub(super) origin: Option<Numbers>,
     pub(super) cell: Option<f32>,
     pub(super) size: Option<[u32; 3]>,
-    pub(super) fields: [Option<Numbers>; 4],
+}
+
+impl GridKeys {
+    /// The grid; what is missing is that of `other`.
+    ///
+    /// # Errors
+    /// Where a key is missing and there is no other grid, or a value is not allowed. `prefix` stands before each key.
+    fn grid(self, prefix: &str, other: Option<Grid>) -> Result<Grid, String> {
+        let key = |key: &str| format!("{prefix}{key}");
+        let origin = match (self.origin, other) {
+            (None, Some(other)) => other.origin,
+            (origin, _) => {
+                let origin = there(origin, &key("origin"))?.singles()?;
+                let count = counted(origin.len(), "number");
+                origin.try_into().map_err(|_| format!("`{}` has {count}, expected 3", key("origin")))?
+            }
+        };
+        let cell = there(self.cell.or(other.map(|other| other.cell)), &key("cell"))?;
+        if cell <= 0.0 {
+            return Err(format!("`{}` is {cell}, expected more than 0", key("cell")));
+        }
+        let size = there(self.size.or(other.map(|other| other.size)), &key("size"))?;
+        Ok(Grid { origin, cell, size })
+    }
 }
 
 impl Part {
@@ -61,25 +93,17 @@ impl Part {
     }
 
     fn volume(self) -> Result<Volume, String> {
-        let origin = there(self.origin, "origin")?.singles()?;
-        let origin = <[f32; 3]>::try_from(origin)
-            .map_err(|origin| format!("`origin` has {}, expected 3", counted(origin.len(), "number")))?;
-        let cell = there(self.cell, "cell")?;
-        if cell <= 0.0 {
-            return Err(format!("`cell` is {cell}, expected more than 0"));
-        }
-        let size = there(self.size, "size")?;
-        // One more than the cells along each axis is more than any array can have, long before it overflows.
-        if size.iter().try_fold(1_u64, |cells, n| cells.checked_mul(u64::from(*n) + 1)).is_none_or(|n| n > 1 << 48) {
-            return Err(format!("`size` is {size:?}, more cells than a file can hold"));
-        }
+        let grid = self.grid.grid("", None)?;
+        let velocity_grid = self.velocity_grid.grid("velocity_", Some(grid))?;
         let mut arrays = [const { Vec::new() }; 4];
-        for ((array, name), numbers) in arrays.iter_mut().zip(FIELDS).zip(self.fields) {
+        for ((array, name), numbers) in arrays.iter_mut().zip(VOLUME_FIELDS).zip(self.fields) {
             *array = there(numbers, name)?.singles().map_err(|fact| format!("`{name}`: {fact}"))?;
         }
-        let [level_set, x, y, z] = arrays;
-        let grid = Grid { origin, cell, size };
-        let mut volume = Volume::new(grid, level_set, [x, y, z]).map_err(|error| error.to_string())?;
+        let [level_set, velocity @ ..] = arrays.each_ref().map(Vec::as_slice);
+        let default = || Volume::default_background(&grid, level_set.iter().copied());
+        let background = self.background.unwrap_or_else(default);
+        let volume = Volume::from_dense(grid, level_set, background, velocity_grid, velocity);
+        let mut volume = volume.map_err(|error| error.to_string())?;
         let [.., once] = self.tables;
         for (name, numbers) in once {
             let column = numbers.column(fixed_type(&name));

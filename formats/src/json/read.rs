@@ -5,12 +5,12 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use engine::geometry::{Geometry, Kind, Owner};
+use engine::geometry::{Geometry, Kind, Owner, VOLUME_FIELDS};
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 use super::numbers::{NumbersOf, float};
-use super::part::{FIELDS, Part};
+use super::part::Part;
 use super::table_key;
 use crate::{FormatError, Place};
 
@@ -98,15 +98,18 @@ impl<'de> Visitor<'de> for PartOf {
                 ("points", Kind::Curves | Kind::Mesh | Kind::Points | Kind::Tets) => {
                     part.points = Some(map.next_value_seed(NumbersOf(&key))?);
                 }
-                ("origin", Kind::Volume) => part.origin = Some(map.next_value_seed(NumbersOf(&key))?),
-                ("size", Kind::Volume) => part.size = Some(map.next_value()?),
-                ("cell", Kind::Volume) => {
-                    let cell = float(map.next_value::<&RawValue>()?.get());
-                    part.cell = Some(cell.map_err(|fact| A::Error::custom(format!("`cell`: {fact}")))?);
+                ("origin", Kind::Volume) => part.grid.origin = Some(map.next_value_seed(NumbersOf(&key))?),
+                ("cell", Kind::Volume) => part.grid.cell = Some(one_float(&mut map, &key)?),
+                ("size", Kind::Volume) => part.grid.size = Some(map.next_value()?),
+                ("background", Kind::Volume) => part.background = Some(one_float(&mut map, &key)?),
+                ("velocity_origin", Kind::Volume) => {
+                    part.velocity_grid.origin = Some(map.next_value_seed(NumbersOf(&key))?);
                 }
+                ("velocity_cell", Kind::Volume) => part.velocity_grid.cell = Some(one_float(&mut map, &key)?),
+                ("velocity_size", Kind::Volume) => part.velocity_grid.size = Some(map.next_value()?),
                 (field, _) => {
                     let owner = Owner::ALL.into_iter().position(|owner| table_key(kind, owner) == Some(field));
-                    let array = FIELDS.iter().position(|name| kind == Kind::Volume && *name == field);
+                    let array = VOLUME_FIELDS.iter().position(|name| kind == Kind::Volume && *name == field);
                     match (owner, array) {
                         (Some(owner), _) => map.next_value_seed(TableInto(&mut part.tables[owner]))?,
                         (_, Some(k)) => part.fields[k] = Some(map.next_value_seed(NumbersOf(&key))?),
@@ -119,6 +122,11 @@ impl<'de> Visitor<'de> for PartOf {
     }
 }
 
+/// The value of a key that is one float.
+fn one_float<'de, A: MapAccess<'de>>(map: &mut A, key: &str) -> Result<f32, A::Error> {
+    float(map.next_value::<&RawValue>()?.get()).map_err(|fact| A::Error::custom(format!("`{key}`: {fact}")))
+}
+
 /// The keys of a component's object.
 fn part_keys(kind: Kind) -> impl Iterator<Item = &'static str> {
     let own: &[&str] = match kind {
@@ -126,9 +134,10 @@ fn part_keys(kind: Kind) -> impl Iterator<Item = &'static str> {
         Kind::Mesh => &["counts", "indices", "points"],
         Kind::Points => &["points"],
         Kind::Tets => &["indices", "points"],
-        Kind::Volume => &["origin", "cell", "size", "level_set", "velocity_x", "velocity_y", "velocity_z"],
+        Kind::Volume => &["origin", "cell", "size", "background", "velocity_origin", "velocity_cell", "velocity_size"],
     };
-    own.iter().copied().chain(Owner::ALL.into_iter().filter_map(move |owner| table_key(kind, owner)))
+    let fields: &[&str] = if kind == Kind::Volume { &VOLUME_FIELDS } else { &[] };
+    own.iter().chain(fields).copied().chain(Owner::ALL.into_iter().filter_map(move |owner| table_key(kind, owner)))
 }
 
 /// Reads a table's columns behind those that are there.

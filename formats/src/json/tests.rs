@@ -1,6 +1,6 @@
 //! Json by hand: what is written, odd files that load, broken ones and what is said about them.
 
-use engine::geometry::{Attr, Column, Component, ENVELOPE, Geometry, Grid, ID, Kind, Owner, Volume};
+use engine::geometry::{Attr, Column, Component, ENVELOPE, Geometry, Grid, ID, Kind, Owner, SparseField, Volume};
 
 use crate::{Format, FrameStamp};
 
@@ -220,10 +220,71 @@ fn a_broken_volume_is_named_with_what_is_wrong() {
     assert_eq!(volume("[1, 1, 1]", "0.1", "[1]"), "`volume`: `velocity_x` has 0 rows, expected 2");
     assert_eq!(volume("[1, 1, 1]", "0", "[1]"), "`volume`: `cell` is 0, expected more than 0");
     assert_eq!(volume("[1, 1, 1]", "[1]", "[1]"), "`cell`: `[1]` is not a number");
-    let huge = "[4294967295, 4294967295, 4294967295]";
-    assert_eq!(volume(huge, "0.1", "[]"), format!("`volume`: `size` is {huge}, more cells than a file can hold"));
+    let large =
+        "`volume`: `level_set`: 2048 × 1024 × 1024 numbers would take 8.0 GiB, expected at most 2147483647 numbers";
+    assert_eq!(volume("[2048, 1024, 1024]", "0.1", "[]"), large);
+    assert!(volume("[4294967295, 4294967295, 4294967295]", "0.1", "[]").contains("numbers would take"));
+    let long = "`volume`: `level_set`: 4294967295 × 0 × 0 numbers, expected at most 16777216 along an axis";
+    assert_eq!(volume("[4294967295, 0, 0]", "0.1", "[]"), long);
+    let none = r#""size": [0, 0, 0], "level_set": [], "velocity_x": [], "velocity_y": [], "velocity_z": []"#;
+    for (keys, expected) in [
+        (r#""velocity_cell": -1"#, "`volume`: `velocity_cell` is -1, expected more than 0"),
+        (r#""velocity_origin": [1]"#, "`volume`: `velocity_origin` has 1 number, expected 3"),
+        (r#""velocity_size": [1, 1, 1]"#, "`volume`: `velocity_x` has 0 rows, expected 2"),
+        (r#""background": 0"#, "`volume`: the background of `level_set` is 0.0, expected a distance above 0"),
+    ] {
+        let text = fault(format!(r#"{{"volume": {{"origin": [0, 0, 0], "cell": 0.1, {none}, {keys}}}}}"#));
+        assert_eq!(text.split_once(": ").unwrap().1, expected, "{keys}");
+    }
     let text = r#"{"volume": {"origin": [0, 0]}}"#;
     assert_eq!(fault(text), "line 1, column 30: `volume`: `origin` has 2 numbers, expected 3");
+}
+
+/// A level set of 3 × 1 × 1 cells with one stored block, velocity on one cell of its own grid.
+fn two_grids() -> Geometry {
+    let level = Grid { origin: [0.0, 0.5, 0.0], cell: 0.1, size: [3, 1, 1] };
+    let velocity = Grid { origin: [0.0, 0.5, 0.0], cell: 0.3, size: [1, 1, 1] };
+    let faces = [0, 1, 2].map(|axis| vec![axis as f32; 2]);
+    let faces = faces.each_ref().map(Vec::as_slice);
+    let mut geometry = Geometry::default();
+    geometry.put_volume(Volume::from_dense(level, &[-0.05, 0.05, 0.25], 0.25, velocity, faces).unwrap());
+    geometry
+}
+
+#[test]
+fn a_grid_of_the_velocity_and_a_background_are_written_where_they_differ() {
+    let text = written(&two_grids(), 1.0);
+    let body = text.split_once(",\n").unwrap().1;
+    let expected = r#" "volume": {"origin": [0.0, 0.5, 0.0], "cell": 0.1, "size": [3, 1, 1],
+  "velocity_origin": [0.0, 0.5, 0.0], "velocity_cell": 0.3, "velocity_size": [1, 1, 1],
+  "level_set": [-0.05, 0.05, 0.25],
+  "velocity_x": [0.0, 0.0],
+  "velocity_y": [1.0, 1.0],
+  "velocity_z": [2.0, 2.0],
+  "attributes": {}}}
+"#;
+    assert_eq!(body, expected);
+    assert_eq!(read(&text), two_grids());
+    let far = text.replace(r#""size": [3, 1, 1],"#, r#""size": [3, 1, 1], "background": 2.0,"#);
+    let volume = read(&far).volume().unwrap().clone();
+    assert_eq!(volume.level_set().background(), 2.0);
+    let mut geometry = Geometry::default();
+    geometry.put_volume(volume);
+    assert_eq!(written(&geometry, 1.0), far);
+    let same_corner = text.replace(r#""velocity_origin": [0.0, 0.5, 0.0], "#, "");
+    assert_eq!(read(&same_corner), two_grids(), "a key that is missing is the level set's");
+}
+
+#[test]
+fn a_volume_too_large_for_dense_arrays_is_refused_before_anything_is_written() {
+    let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [4096; 3] };
+    let empty = |size, background| SparseField::from_blocks(size, background, [], |_, _| {}).unwrap();
+    let faces = [0, 1, 2].map(|axis| empty(grid.faces_size(axis), 0.0));
+    let mut geometry = Geometry::default();
+    geometry.put_volume(Volume::from_fields(grid, empty(grid.size, 0.3), grid, faces).unwrap());
+    let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
+    let error = crate::write(Format::Json, &geometry, &stamp, &mut Vec::new()).unwrap_err().to_string();
+    assert!(error.contains("`level_set`: 4096 × 4096 × 4096 numbers would take 256.0 GiB"), "{error}");
 }
 
 #[test]
@@ -236,9 +297,10 @@ fn what_is_not_finite_is_refused_on_the_way_out() {
     let mask: Attr<f32> = Attr::point("mask");
     points.set(mask, vec![0.0, f32::NAN]).unwrap();
     assert_eq!(fault(&points.into(), 1.0), "`mask` of points is not finite in row 1");
-    let grid = Grid { origin: [0.0; 3], cell: f32::INFINITY, size: [0; 3] };
+    let grid = Grid { origin: [0.0; 3], cell: f32::MAX, size: [0; 3] };
     let mut geometry = Geometry::default();
     geometry.put_volume(Volume::new(grid, Vec::new(), [const { Vec::new() }; 3]).unwrap());
+    geometry.scale_lengths(2.0);
     assert_eq!(fault(&geometry, 1.0), "`cell` of volume is not finite in row 0");
     geometry.remove(Kind::Volume);
     assert_eq!(fault(&geometry, f64::NAN), "the frame is NaN and its time 0 s, expected finite numbers");

@@ -2,16 +2,18 @@
 
 use std::io::Write;
 
-use engine::geometry::{Column, Component, Geometry, Kind, Owner, P, Table, Topology, Volume};
+use engine::geometry::{
+    Column, Component, Geometry, GeometryError, Grid, Kind, Owner, P, Table, Topology, Volume, dense_len,
+};
 
-use super::{table_key, volume_fields};
+use super::table_key;
 use crate::out::Out;
 use crate::{FormatError, FrameStamp};
 
 /// Writes `geometry` as json; its numbers are finite.
 ///
 /// # Errors
-/// Where the bytes cannot be written.
+/// Where the bytes cannot be written, or a volume's box is too large for dense arrays.
 pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let mut out = Out::new(sink);
     out.text("{\"frame\": ");
@@ -21,8 +23,8 @@ pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Writ
     for part in geometry.parts() {
         component(part, &mut out)?;
     }
-    if let Some(grid) = geometry.volume() {
-        volume(grid, &mut out)?;
+    if let Some(there) = geometry.volume() {
+        volume(there, &mut out)?;
     }
     out.text("}\n");
     out.finish()?;
@@ -66,18 +68,26 @@ fn component(component: &Component, out: &mut Out) -> Result<(), FormatError> {
 }
 
 fn volume(volume: &Volume, out: &mut Out) -> Result<(), FormatError> {
-    let grid = volume.grid();
-    out.text(",\n \"volume\": {\"origin\": ");
-    row(&grid.origin, |x, out| out.float(x), out);
-    out.text(", \"cell\": ");
-    out.float(grid.cell);
-    out.text(", \"size\": ");
-    row(&grid.size, |n, out| out.whole(n), out);
-    for (name, field) in volume_fields(volume) {
+    for (name, field) in volume.fields() {
+        dense_len(field.size()).map_err(|error| GeometryError::Field { name, error })?;
+    }
+    let (level, velocity) = (volume.level_grid(), volume.velocity_grid());
+    out.text(",\n \"volume\": {");
+    grid("", level, out);
+    let values = volume.level_set();
+    if values.background() != Volume::default_background(&level, values.iter_dense()) {
+        out.text(", \"background\": ");
+        out.float(values.background());
+    }
+    if velocity != level {
+        out.text(",\n  ");
+        grid("velocity_", velocity, out);
+    }
+    for (name, field) in volume.fields() {
         out.text(",\n  \"");
         out.text(name);
         out.text("\": ");
-        list(field, |x, out| out.float(*x), out)?;
+        list(field.iter_dense(), |x, out| out.float(x), out)?;
     }
     out.text(",\n  ");
     if let Some(key) = table_key(Kind::Volume, Owner::Once) {
@@ -85,6 +95,16 @@ fn volume(volume: &Volume, out: &mut Out) -> Result<(), FormatError> {
     }
     out.text("}");
     Ok(())
+}
+
+/// The keys of a grid, each with `prefix` before it.
+fn grid(prefix: &str, grid: Grid, out: &mut Out) {
+    out.text(&format!("\"{prefix}origin\": "));
+    row(&grid.origin, |x, out| out.float(x), out);
+    out.text(&format!(", \"{prefix}cell\": "));
+    out.float(grid.cell);
+    out.text(&format!(", \"{prefix}size\": "));
+    row(&grid.size, |n, out| out.whole(n), out);
 }
 
 /// The columns of a table by name; without the positions, which have a key of their own.

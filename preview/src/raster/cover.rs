@@ -8,7 +8,8 @@
 use super::bins::PixelBox;
 use super::project::{ScreenDot, ScreenSegment, ScreenTriangle};
 use super::{Lanes, SAMPLE_X, SAMPLE_Y, SAMPLES, Shader, Tile, UNCOVERED};
-use crate::vector::{V3, add, mix, scale};
+use crate::vector::mix;
+use numerics::vector::{Vec3, add, scale};
 
 /// Order in which samples are covered as a share grows (Bayer's matrix): any first few of them lie apart.
 const RANK: [u32; SAMPLES] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
@@ -42,7 +43,7 @@ struct Plane {
 
 impl Plane {
     /// Twice the area of the triangle that p, q and (x, y) make: positive where they turn right on the screen.
-    fn edge(p: V3, q: V3) -> Self {
+    fn edge(p: Vec3, q: Vec3) -> Self {
         let flipped = (q[0], q[1]) < (p[0], p[1]);
         let (p, q) = if flipped { (q, p) } else { (p, q) };
         let [px, py, qx, qy] = [p[0], p[1], q[0], q[1]].map(f64::from);
@@ -99,12 +100,12 @@ pub(super) fn triangle<S: Shader>(tile: &mut Tile<S::Color>, triangle: &ScreenTr
             }
             tile.put([x, y], &depth, |at| {
                 // Shares on the screen times nearness are shares in space.
-                let weights: V3 = std::array::from_fn(|k| {
+                let weights: Vec3 = std::array::from_fn(|k| {
                     let share = planes[k].at(f64::from(at[0]), f64::from(at[1]));
                     (share.max(0.0) * nearness[k]) as f32
                 });
                 let total = weights[0] + weights[1] + weights[2];
-                let blend = |value: [V3; 3]| {
+                let blend = |value: [Vec3; 3]| {
                     let sum = (0..3).fold([0.0; 3], |sum, k| add(sum, scale(value[k], weights[k])));
                     scale(sum, 1.0 / total)
                 };

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use bins::{Bins, PixelBox};
 pub(crate) use project::Screen;
 
-use crate::vector::V3;
+use numerics::vector::Vec3;
 
 /// Pixels a side of a tile: its samples fit a core's second cache.
 pub(crate) const TILE: usize = 16;
@@ -46,11 +46,11 @@ pub(crate) trait Shader: Sync {
     /// Of a sample.
     type Color: Copy + Default + Send;
     /// A point of a triangle; `normal` is on the side that is seen.
-    fn surface(&self, at: V3, normal: V3, color: V3) -> Self::Color;
+    fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Self::Color;
     /// A point of a strand, lit already, `across` of its radius from its axis and `radius` pixels wide to each side.
-    fn strand(&self, color: V3, across: f32, radius: f32) -> Self::Color;
+    fn strand(&self, color: Vec3, across: f32, radius: f32) -> Self::Color;
     /// A point of a ball, `across` of its radius right and up of its middle; `lit` by that share of the key light.
-    fn ball(&self, across: [f32; 2], color: V3, lit: f32) -> Self::Color;
+    fn ball(&self, across: [f32; 2], color: Vec3, lit: f32) -> Self::Color;
 }
 
 /// Draws nothing but how near things are, as a light sees them.
@@ -58,9 +58,9 @@ pub(crate) struct DepthOnly;
 
 impl Shader for DepthOnly {
     type Color = ();
-    fn surface(&self, _: V3, _: V3, _: V3) {}
-    fn strand(&self, _: V3, _: f32, _: f32) {}
-    fn ball(&self, _: [f32; 2], _: V3, _: f32) {}
+    fn surface(&self, _: Vec3, _: Vec3, _: Vec3) {}
+    fn strand(&self, _: Vec3, _: f32, _: f32) {}
+    fn ball(&self, _: [f32; 2], _: Vec3, _: f32) {}
 }
 
 /// A drawn tile, row by row; at the right and lower border of a picture it may reach beyond.
@@ -89,7 +89,7 @@ impl<C: Copy + Default> Tile<C> {
 
     /// Draws `depth` (uncovered samples are [`UNCOVERED`]) into pixel x, y of the picture where it is nearer.
     #[inline(always)]
-    fn put(&mut self, [x, y]: [usize; 2], depth: &Lanes, shade: impl FnOnce(V3) -> C) {
+    fn put(&mut self, [x, y]: [usize; 2], depth: &Lanes, shade: impl FnOnce(Vec3) -> C) {
         let pixel = (y - self.top) * TILE + (x - self.left);
         let behind = &mut self.depth[pixel];
         let mut wins = 0_u32;

@@ -8,27 +8,28 @@ use rayon::prelude::*;
 
 use super::bins::PixelBox;
 use crate::scene::{Corner, Dot, Knot, Scene, Strand};
-use crate::vector::{V3, finite, mix};
+use crate::vector::{finite, mix};
 use crate::view::{NEAR, View};
+use numerics::vector::Vec3;
 
 /// Half a pixel: nothing is drawn thinner.
 const LEAST_RADIUS: f32 = 0.5;
 
 /// A triangle with x, y in pixels and nearness at its corners.
 pub(crate) struct ScreenTriangle {
-    pub(crate) at: [V3; 3],
+    pub(crate) at: [Vec3; 3],
     pub(crate) corners: [Corner; 3],
     pub(crate) pixels: PixelBox,
 }
 
 /// A piece of a strand between two knots.
 pub(crate) struct ScreenSegment {
-    pub(crate) at: [V3; 2],
+    pub(crate) at: [Vec3; 2],
     /// Pixels, at each end.
     pub(crate) radius: [f32; 2],
     /// Share of the samples within that are covered, at each end.
     pub(crate) cover: [f32; 2],
-    pub(crate) color: [V3; 2],
+    pub(crate) color: [Vec3; 2],
     /// Whether the strand ends there: flat, where a joint is round.
     pub(crate) ends: [bool; 2],
     pub(crate) seed: u32,
@@ -37,12 +38,12 @@ pub(crate) struct ScreenSegment {
 
 /// A ball.
 pub(crate) struct ScreenDot {
-    pub(crate) at: V3,
+    pub(crate) at: Vec3,
     pub(crate) radius: f32,
     pub(crate) cover: f32,
     /// How much nearer its front is than its centre.
     pub(crate) bulge: f32,
-    pub(crate) color: V3,
+    pub(crate) color: Vec3,
     pub(crate) lit: f32,
     pub(crate) seed: u32,
     pub(crate) pixels: PixelBox,
@@ -97,7 +98,7 @@ fn clip(corners: &[Corner; 3], view: &View) -> [Option<[Corner; 3]>; 2] {
 }
 
 /// Where on the way from a to b the eye's near plane is met.
-fn crossing(a: V3, b: V3, view: &View) -> f32 {
+fn crossing(a: Vec3, b: Vec3, view: &View) -> f32 {
     let (from, to) = (view.distance(a), view.distance(b));
     ((NEAR - from) / (to - from)).clamp(0.0, 1.0)
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::scene::{Corner, Dot, Knot, Scene, Strand, scramble};
-use crate::vector::length;
 use crate::view::View;
+use numerics::vector::length;
 
 /// Side of the test picture, pixels: four tiles.
 const SIDE: usize = 32;
@@ -12,7 +12,7 @@ fn view() -> View {
 }
 
 /// Where on the stage the screen's x, y is, `near` of the stage's middle.
-fn at([x, y]: [f32; 2], near: f32) -> V3 {
+fn at([x, y]: [f32; 2], near: f32) -> Vec3 {
     [x - SIDE as f32 / 2.0, SIDE as f32 / 2.0 - y, near]
 }
 
@@ -33,13 +33,13 @@ struct Flat;
 
 impl Shader for Flat {
     type Color = f32;
-    fn surface(&self, _: V3, _: V3, color: V3) -> f32 {
+    fn surface(&self, _: Vec3, _: Vec3, color: Vec3) -> f32 {
         color[0]
     }
-    fn strand(&self, color: V3, _: f32, _: f32) -> f32 {
+    fn strand(&self, color: Vec3, _: f32, _: f32) -> f32 {
         color[0]
     }
-    fn ball(&self, _: [f32; 2], color: V3, _: f32) -> f32 {
+    fn ball(&self, _: [f32; 2], color: Vec3, _: f32) -> f32 {
         color[0]
     }
 }

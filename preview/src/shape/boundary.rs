@@ -33,7 +33,7 @@ mod tests {
     fn faces_of_a_positive_tet_look_outwards() {
         let at = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0_f32]];
         for (face, _) in boundary(&[[0, 1, 2, 3]]) {
-            use crate::vector::{cross, dot, sub};
+            use numerics::vector::{cross, dot, sub};
             let [a, b, c] = face.map(|k| at[k as usize]);
             let opposite = at[6 - face.iter().sum::<u32>() as usize];
             assert!(dot(cross(sub(b, a), sub(c, a)), sub(opposite, a)) < 0.0);

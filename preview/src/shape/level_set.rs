@@ -5,7 +5,8 @@
 //! outside (φ > 0); points in the order of the grid. Limit: first order in the cell, sharp edges are rounded, and where
 //! two sheets meet in one cube they share its point. A value that is no number counts as outside.
 
-use engine::geometry::{Grid, Volume};
+use engine::geometry::{BLOCK_EDGE, FieldCursor, Grid, SparseField, Volume, VolumeSampler};
+use numerics::vector::length;
 use rayon::prelude::*;
 
 /// Points (metres), the cell each lies nearest to, and quads.
@@ -15,26 +16,31 @@ pub(crate) struct Surface {
     pub(crate) quads: Vec<[u32; 4]>,
 }
 
-/// The zero level of `volume`.
+/// The zero level of `volume`. Only cubes at stored blocks are visited: the level passes through no others.
 pub(crate) fn zero_level(volume: &Volume) -> Surface {
-    let grid = volume.grid();
-    if grid.cells() == 0 {
-        return Surface { points: Vec::new(), cells: Vec::new(), quads: Vec::new() };
-    }
-    let field = Field { grid, phi: volume.level_set() };
     // Cube (i, j, k) has cell centres i−1…i, j−1…j, k−1…k at its corners; a layer around the grid is outside.
-    let cubes = grid.size.map(|n| i64::from(n) + 1);
-    let number = |[i, j, k]: [i64; 3]| i + cubes[0] * (j + cubes[1] * k);
-    let layer = |k: i64| (0..cubes[1]).flat_map(move |j| (0..cubes[0]).map(move |i| [i, j, k]));
-
-    let crossed: Vec<([i64; 3], [f32; 3])> = (0..cubes[2])
+    let field = Field { grid: volume.level_grid(), phi: volume.level_set() };
+    let cubes = field.grid.size.map(|n| i64::from(n) + 1);
+    let mut crossed: Vec<([i64; 3], [f32; 3])> = cube_blocks(field.phi)
         .into_par_iter()
-        .flat_map_iter(|k| layer(k).filter_map(|cube| field.point(cube).map(|point| (cube, point))))
+        .flat_map_iter(|block| {
+            let mut cursor = field.phi.cursor();
+            let range = |axis: usize| {
+                let first = i64::from(block[axis] * BLOCK_EDGE);
+                first..(first + i64::from(BLOCK_EDGE)).min(cubes[axis])
+            };
+            let row = move |j, k| range(0).map(move |i| [i, j, k]);
+            let all = range(2).flat_map(move |k| range(1).flat_map(move |j| row(j, k)));
+            let found = all.filter_map(|cube| field.point(&mut cursor, cube).map(|point| (cube, point)));
+            found.collect::<Vec<_>>()
+        })
         .collect();
-    let numbers: Vec<i64> = crossed.iter().map(|(cube, _)| number(*cube)).collect();
-    let row = |cube| numbers.binary_search(&number(cube)).ok().map(|row| row as u32);
-    let quads = crossed.par_iter().flat_map_iter(|(cube, _)| field.quads(*cube, row)).collect();
-    let last = grid.size.map(|n| i64::from(n) - 1);
+    crossed.par_sort_unstable_by_key(|([i, j, k], _)| [*k, *j, *i]);
+    let order = |[i, j, k]: [i64; 3]| [k, j, i];
+    let row = |cube| crossed.binary_search_by_key(&order(cube), |(cube, _)| order(*cube)).ok().map(|row| row as u32);
+    let quads = crossed.par_iter().map_init(|| field.phi.cursor(), |cursor, (cube, _)| field.quads(cursor, *cube, row));
+    let quads = quads.flat_map_iter(|quads| quads).collect();
+    let last = field.grid.size.map(|n| i64::from(n) - 1);
     let cell = |cube: [i64; 3]| std::array::from_fn(|axis| cube[axis].min(last[axis]) as u32);
     Surface {
         points: crossed.iter().map(|(_, point)| *point).collect(),
@@ -43,47 +49,42 @@ pub(crate) fn zero_level(volume: &Volume) -> Surface {
     }
 }
 
-/// Speed in the middle of a cell, m/s.
-pub(crate) fn speed(volume: &Volume, cell: [u32; 3]) -> f32 {
-    let size = volume.grid().size.map(|n| n as usize);
-    let mut squares = 0.0;
-    for axis in 0..3 {
-        let row = |at: [usize; 3]| {
-            let faces: [usize; 3] = std::array::from_fn(|k| size[k] + usize::from(k == axis));
-            at[0] + faces[0] * (at[1] + faces[1] * at[2])
-        };
-        let low = cell.map(|i| i as usize);
-        let mut high = low;
-        high[axis] += 1;
-        let through = &volume.velocity()[axis];
-        let mean = 0.5 * (through[row(low)] + through[row(high)]);
-        squares += mean * mean;
-    }
-    squares.sqrt()
+/// Blocks of 8³ cubes that have a corner in a stored block of `field`: the block itself and its neighbours above.
+fn cube_blocks(field: &SparseField) -> Vec<[u32; 3]> {
+    let above = |[x, y, z]: [u32; 3]| (0..8).map(move |bits| [x + (bits & 1), y + (bits >> 1 & 1), z + (bits >> 2)]);
+    let mut blocks: Vec<_> = field.blocks().flat_map(|(block, _)| above(block)).collect();
+    blocks.sort_unstable();
+    blocks.dedup();
+    blocks
+}
+
+/// Speed in the middle of a cell of the level set, m/s.
+pub(crate) fn speed(sampler: &mut VolumeSampler, grid: &Grid, cell: [u32; 3]) -> f32 {
+    let middle = [0, 1, 2].map(|k| grid.origin[k] + grid.cell * (cell[k] as f32 + 0.5));
+    length(sampler.velocity(middle))
 }
 
 struct Field<'a> {
     grid: Grid,
-    phi: &'a [f32],
+    phi: &'a SparseField,
 }
 
 impl Field<'_> {
     /// φ at a cell centre; half a cell outside beyond the grid, which puts the wall of a full grid on its border.
-    fn at(&self, at: [i64; 3]) -> f32 {
+    fn at(&self, cursor: &mut FieldCursor, at: [i64; 3]) -> f32 {
         let outside = 0.5 * self.grid.cell;
-        let size = self.grid.size.map(i64::from);
-        if (0..3).any(|axis| at[axis] < 0 || at[axis] >= size[axis]) {
+        if (0..3).any(|axis| at[axis] < 0 || at[axis] >= i64::from(self.grid.size[axis])) {
             return outside;
         }
-        let value = self.phi[(at[0] + size[0] * (at[1] + size[1] * at[2])) as usize];
+        let value = cursor.get(at);
         if value.is_finite() { value } else { outside }
     }
 
     /// The point of a cube, metres; `None` where the level does not cross it.
-    fn point(&self, cube: [i64; 3]) -> Option<[f32; 3]> {
+    fn point(&self, cursor: &mut FieldCursor, cube: [i64; 3]) -> Option<[f32; 3]> {
         let corner =
             |bits: usize| -> [i64; 3] { std::array::from_fn(|axis| cube[axis] - 1 + (bits >> axis & 1) as i64) };
-        let values: [f32; 8] = std::array::from_fn(|bits| self.at(corner(bits)));
+        let values: [f32; 8] = std::array::from_fn(|bits| self.at(cursor, corner(bits)));
         if values.iter().all(|value| (*value < 0.0) == (values[0] < 0.0)) {
             return None;
         }
@@ -105,13 +106,13 @@ impl Field<'_> {
     }
 
     /// The quads across the crossed edges that begin at the lowest corner of `cube`; each is shared by four cubes.
-    fn quads(&self, cube: [i64; 3], row: impl Fn([i64; 3]) -> Option<u32>) -> impl Iterator<Item = [u32; 4]> {
+    fn quads(&self, cursor: &mut FieldCursor, cube: [i64; 3], row: impl Fn([i64; 3]) -> Option<u32>) -> Vec<[u32; 4]> {
         let corner = cube.map(|i| i - 1);
-        let inside = self.at(corner) < 0.0;
-        (0..3).filter_map(move |axis| {
+        let inside = self.at(cursor, corner) < 0.0;
+        let mut quad = |axis: usize| {
             let mut beyond = corner;
             beyond[axis] += 1;
-            if inside == (self.at(beyond) < 0.0) {
+            if inside == (self.at(cursor, beyond) < 0.0) {
                 return None;
             }
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -123,14 +124,15 @@ impl Field<'_> {
             };
             let [a, b, c, d] = [neighbour(0, 0)?, neighbour(1, 0)?, neighbour(1, 1)?, neighbour(0, 1)?];
             Some(if inside { [a, b, c, d] } else { [d, c, b, a] })
-        })
+        };
+        [quad(0), quad(1), quad(2)].into_iter().flatten().collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::{cross, dot, length, sub};
+    use numerics::vector::{cross, dot, sub};
 
     fn volume(size: u32, phi: impl Fn([f32; 3]) -> f32) -> Volume {
         let grid = Grid { origin: [-1.0; 3], cell: 2.0 / size as f32, size: [size; 3] };
@@ -163,6 +165,21 @@ mod tests {
     }
 
     #[test]
+    fn a_ball_in_a_large_sparse_grid_is_the_ball_of_a_dense_one() {
+        // 40³ cells around the same ball, of which only the blocks within the band are stored.
+        let distance = |node: [u32; 3]| length(node.map(|i| -1.0 + 0.05 * (i as f32 + 0.5))) - 0.6;
+        let grid = Grid { origin: [-1.0; 3], cell: 0.05, size: [40; 3] };
+        let all = (0..40_u32.pow(3)).map(|n| distance([n % 40, n / 40 % 40, n / 1600]).min(0.1));
+        let faces = || [0, 1, 2].map(|axis| vec![0.0; grid.faces(axis)]);
+        let dense = Volume::new(grid, all.clone().map(|phi| phi + 1e-9).collect(), faces()).unwrap();
+        let sparse = Volume::new(grid, all.collect(), faces()).unwrap();
+        assert!(sparse.level_set().block_count() < 125, "{}", sparse.level_set().block_count());
+        let (a, b) = (zero_level(&dense), zero_level(&sparse));
+        assert_closed(&b);
+        assert_eq!((a.quads, a.cells), (b.quads, b.cells));
+    }
+
+    #[test]
     fn a_full_grid_is_closed_at_its_border() {
         let surface = zero_level(&volume(2, |_| -0.5));
         assert_closed(&surface);
@@ -180,6 +197,6 @@ mod tests {
     fn speed_is_the_mean_of_a_cells_faces() {
         let grid = Grid { origin: [0.0; 3], cell: 1.0, size: [1; 3] };
         let volume = Volume::new(grid, vec![-1.0], [vec![2.0, 4.0], vec![4.0, 4.0], vec![0.0, 0.0]]).unwrap();
-        assert_eq!(speed(&volume, [0; 3]), 5.0);
+        assert_eq!(speed(&mut volume.sampler(), &grid, [0; 3]), 5.0);
     }
 }

@@ -6,7 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::vector::{V3, add, cross, dot, sub, unit};
+use crate::vector::unit;
+use numerics::vector::{Vec3, add, cross, dot, sub};
 
 /// Cosine of the angle between triangles from which their edge is drawn sharp: 40 degrees. A sphere of 9 or more
 /// segments stays smooth, an octagonal prism shows its edges.
@@ -15,16 +16,16 @@ const CREASE: f32 = 0.766;
 const MOST_AROUND: usize = 64;
 
 /// Normals at the three corners of each triangle. Rows of `triangles` are rows of `points`.
-pub(crate) fn corner_normals(points: &[V3], triangles: &[[u32; 3]]) -> Vec<[V3; 3]> {
+pub(crate) fn corner_normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[Vec3; 3]> {
     // Length: twice the triangle's area.
-    let faces: Vec<V3> = triangles
+    let faces: Vec<Vec3> = triangles
         .par_iter()
         .map(|corners| {
             let [a, b, c] = corners.map(|k| points[k as usize]);
             cross(sub(b, a), sub(c, a))
         })
         .collect();
-    let units: Vec<V3> = faces.par_iter().map(|face| unit(*face).unwrap_or([0.0; 3])).collect();
+    let units: Vec<Vec3> = faces.par_iter().map(|face| unit(*face).unwrap_or([0.0; 3])).collect();
     let around = Around::of(points.len(), triangles);
     (0..triangles.len())
         .into_par_iter()
@@ -74,10 +75,10 @@ impl Around {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::length;
+    use numerics::vector::length;
 
     /// Two triangles that share the edge 0–1, the second turned out of the first's plane.
-    fn hinge(degrees: f64) -> [V3; 2] {
+    fn hinge(degrees: f64) -> [Vec3; 2] {
         let (sin, cos) = libm::sincos(degrees.to_radians());
         let points = [[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [-cos as f32, -sin as f32, 0.0]];
         let normals = corner_normals(&points, &[[0, 1, 2], [1, 0, 3]]);

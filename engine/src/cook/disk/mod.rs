@@ -15,7 +15,7 @@ use crate::geometry::Geometry;
 use crate::key::Key;
 
 /// Changes whenever files of an older convect can no longer be used.
-const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 3");
+const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 4");
 
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
