@@ -9,7 +9,7 @@ use engine::time::Frame;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames(Vec<Frame>);
 
-/// More than this many frames are taken for a slip of the finger.
+/// More frames than this are taken for a typing error.
 const MOST_FRAMES: i64 = 10_000_000;
 
 impl Frames {
@@ -63,7 +63,7 @@ fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
     }
     let count = (last.ticks() - first.ticks()) / step.ticks() + 1;
     if count > MOST_FRAMES {
-        return Err(format!("`{part}` are {count} frames, expected at most {MOST_FRAMES}"));
+        return Err(format!("`{part}` is {count} frames, expected at most {MOST_FRAMES}"));
     }
     frames.extend((0..count).map(|k| first.plus_ticks(k * step.ticks())));
     Ok(())
@@ -105,7 +105,7 @@ impl FromStr for Setting {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
             Some((key, json)) if !key.trim().is_empty() => Ok(Self(key.trim().into(), json.into())),
-            _ => Err(format!("`{text}` sets nothing; write node.param=JSON or control=JSON")),
+            _ => Err(format!("`{text}` is not a setting; write node.param=JSON or control=JSON")),
         }
     }
 }
@@ -138,14 +138,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_range_says_what_to_write() {
+    fn an_invalid_frame_range_says_what_to_write() {
         let error = |text: &str| text.parse::<Frames>().unwrap_err();
         assert_eq!(error("5-1"), "`5-1` runs backwards; write 1-5, the frames are cooked in order");
         assert_eq!(error("1-5x0"), "the step in `1-5x0` is 0, expected more than 0");
         assert_eq!(error("5x2"), "`5x2` has a step but no range; write 1-48x2");
         assert_eq!(error("a"), "`a` is not a frame number; write 1-48, 1-48x2 or 10.5");
         assert_eq!(error(""), "`` is not a frame number; write 1-48, 1-48x2 or 10.5");
-        assert_eq!(error("1-900000000"), "`1-900000000` are 900000000 frames, expected at most 10000000");
+        assert_eq!(error("1-900000000"), "`1-900000000` is 900000000 frames, expected at most 10000000");
     }
 
     #[test]

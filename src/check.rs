@@ -1,4 +1,4 @@
-//! `convect check`: finds all that is wrong with a graph without cooking it.
+//! `convect check`: reports every fault of a graph without cooking it.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -13,13 +13,13 @@ use crate::load;
 
 /// What `check` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CheckArgs {
     /// The graph file
     graph: PathBuf,
-    /// Set a param or control anew: node.param=JSON or control=JSON
+    /// Override a param or control: node.param=JSON or control=JSON; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
-    /// Also hold the outputs against this format: usdc, usda, obj, ply, json
+    /// Also check that this format can hold the outputs: usdc, usda, obj, ply, json
     #[arg(long, value_name = "FORMAT", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
     format: Option<String>,
     /// Print the faults as JSON
@@ -31,7 +31,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where there is a fault.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let engine = load::engine(0, 1 << 30)?;
     let format: Option<Format> = args.format.as_deref().and_then(|name| name.parse().ok());
     let found = load::sound_graph(&args.graph, &args.set, &engine, format)?;
@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     match faults.is_empty() {
         true => Ok(()),
-        false if args.json => Err(Failure::told(exit_of_faults(&faults))),
+        false if args.json => Err(Failure::reported(exit_of_faults(&faults))),
         false => Err(load::faulty(&args.graph, &faults)),
     }
 }

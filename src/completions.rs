@@ -8,7 +8,7 @@ use crate::failure::Failure;
 
 /// What `completions` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CompletionsArgs {
     /// bash, elvish, fish, powershell or zsh
     shell: Shell,
 }
@@ -17,7 +17,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where stdout cannot be written.
-pub fn run<C: clap::CommandFactory>(args: &Args) -> Result<(), Failure> {
+pub fn run<C: clap::CommandFactory>(args: &CompletionsArgs) -> Result<(), Failure> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut C::command(), "convect", &mut text);
     std::io::stdout().write_all(&text)?;

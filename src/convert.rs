@@ -17,19 +17,19 @@ use crate::output::{failed, usd_failed, write_whole};
 
 /// What `convert` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ConvertArgs {
     /// An obj, ply or json file, or a numbered sequence: fur.####.json
     from: PathBuf,
-    /// The file to write; its ending says the format. A sequence becomes one usdc or usda file, or a file a frame:
-    /// fur.####.ply
+    /// The file to write; its extension sets the format. A sequence becomes one usdc or usda file, or one file per
+    /// frame: fur.####.ply
     to: PathBuf,
-    /// Multiply lengths and velocities: 0.01 for a file in centimetres
+    /// Factor for lengths and velocities: 0.01 for a file in centimetres
     #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
     scale: f64,
-    /// Frames a second, for the time in usdc, usda and json files
+    /// Frames per second, for the time in usdc, usda and json files
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = positive)]
     fps: f64,
-    /// Say only what went wrong
+    /// Print errors only
     #[arg(short, long)]
     quiet: bool,
 }
@@ -43,7 +43,7 @@ fn positive(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// Where a file cannot be read or written, or the format cannot hold what is in it.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let command_line = |line: String| Failure::new(Exit::CommandLine, line);
     let format =
         Format::of_path(&args.to).map_err(|error| command_line(format!("`{}`: {error}", args.to.display())))?;
@@ -67,13 +67,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         None => conversion.file_a_frame(&files, |_| args.to.clone(), "")?,
     };
     if !args.quiet {
-        tell(&written);
+        print_summary(&written);
     }
     Ok(())
 }
 
 /// What was written, on stderr.
-fn tell(written: &Written) {
+fn print_summary(written: &Written) {
     let files = match written.files.as_slice() {
         [] => return,
         [one] => one.display().to_string(),
@@ -158,20 +158,20 @@ impl Conversion {
     /// Reads a file as it will be written, unless someone pressed Ctrl-C.
     fn read(&self, path: &Path) -> Result<Geometry, Failure> {
         if self.cancel.load(Ordering::Relaxed) {
-            return Err(Failure::new(Exit::Interrupted, "interrupted; what is there is whole"));
+            return Err(Failure::new(Exit::Interrupted, "interrupted; the files written so far are complete"));
         }
         let mut geometry = read(path)?.geometry;
         if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {
             return Err(refused(path, &FormatError::CannotHold { format: self.format, kind }));
         }
         geometry.scale_lengths(self.scale);
-        let grown = geometry.parts().find_map(|part| {
+        let overflowing = geometry.parts().find_map(|part| {
             let found = part.columns().find(|(.., column)| column.first_not_finite().is_some());
             found.map(|(_, name, _)| format!("`{name}` of {}", part.kind()))
         });
-        match grown {
+        match overflowing {
             Some(what) => {
-                let fact = format!("{what} times {:?} is more than an f32 holds", self.scale);
+                let fact = format!("{what} times {:?} is out of the range of f32", self.scale);
                 Err(Failure::file(format!("`{}`: {fact}", path.display())))
             }
             None => Ok(geometry),

@@ -21,55 +21,55 @@ use crate::{load, report};
 
 /// What `cook` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CookArgs {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5, or several of these: 1-4,10,20-24; all of the scene's by default
+    /// Frames: 1-48, 1-48x2, 10, 10.5, or a list of these: 1-4,10,20-24 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
-    /// Cook only this output; may be given several times
+    /// Cook only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// Folder to write to, made where it is missing
+    /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// usdc and usda: one file with all frames; obj, ply and json: a file a frame
+    /// usdc and usda: one file with all frames; obj, ply and json: one file per frame
     #[arg(long, value_name = "FORMAT", default_value = "usdc", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
     format: String,
-    /// Set a param or control anew: node.param=JSON or control=JSON; may be given several times
+    /// Override a param or control: node.param=JSON or control=JSON; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
-    /// Threads; as many as the machine has by default
+    /// Number of threads [default: the machine's]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Memory for results; half of the machine's by default. It never changes a result
+    /// Memory for results; never changes them [default: half of the machine's]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
-    /// Keep finished frames and solvers' checkpoints here; a killed cook resumes from them
+    /// Keep finished frames and solver checkpoints in this folder; a killed cook resumes from them
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Bytes the cache may take; the oldest go first
+    /// Limit of the cache's size; the oldest files are deleted first
     #[arg(long, value_name = "SIZE", requires = "cache")]
     cache_limit: Option<Size>,
-    /// Write what each node cost and published, as JSON
+    /// Write a report as JSON: time, memory and metrics of each node
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Say more
+    /// Print the time of each node and what it left out
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
-    /// Say only what went wrong
+    /// Print errors only
     #[arg(short, long)]
     quiet: bool,
     // Last: its heading would go on over what follows.
     #[command(flatten)]
-    pictures: pictures::Args,
+    pictures: pictures::PictureArgs,
 }
 
 /// Cooks.
 ///
 /// # Errors
 /// Where the graph is wrong, a file cannot be written, a node cannot cook, or someone interrupted it.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
     let engine = load::engine(usize::from(args.threads), usize::try_from(memory).unwrap_or(usize::MAX))?;
@@ -79,14 +79,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
     };
     let mut faults = engine.verify(&graph, Some(&request));
-    faults.extend(load::misfits(&graph, &request.outputs, format));
+    faults.extend(load::format_faults(&graph, &request.outputs, format));
     if !faults.is_empty() {
         return Err(load::faulty(&args.graph, &faults));
     }
     if let Some(report) = &args.report
         && report.canonicalize().is_ok_and(|report| args.graph.canonicalize().is_ok_and(|graph| graph == report))
     {
-        let line = format!("--report would be written over the graph `{}`; choose another name", args.graph.display());
+        let line = format!("--report would overwrite the graph `{}`; choose another name", args.graph.display());
         return Err(Failure::new(Exit::CommandLine, line));
     }
     let pictures = Pictures::new(&args.pictures, &graph, &request, &args.out)?;
@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn cook(
-    args: &Args,
+    args: &CookArgs,
     engine: &Engine,
     graph: &Graph,
     request: &Request,
@@ -114,7 +114,7 @@ fn cook(
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
     let mut inputs = graph.files(&request.frames);
     inputs.push(args.graph.clone());
-    writers.spare(&inputs, &request.frames)?;
+    writers.refuse_to_overwrite(&inputs, &request.frames)?;
     // Before the cook, so that a path that cannot be written costs no cooking.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let cancel = cancelled_by_signal();
@@ -156,9 +156,9 @@ fn cook(
     }
     if !args.quiet {
         report.notes.iter().for_each(|note| crate::say!("note: {note}"));
-        tell(&report, &written, &drawn, args.verbose);
+        print_summary(&report, &written, &drawn, args.verbose);
     }
-    ended(graph, &report, &written)
+    outcome(graph, &report, &written)
 }
 
 /// A note for each output of which the format could not hold everything.
@@ -166,13 +166,13 @@ fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<
     let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
     let note = |(output, written): &(usize, Written)| {
         let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
-        format!("output `{name}` is without {lost}: {format} cannot hold it; usdc and json can")
+        format!("output `{name}` was written without {lost}: {format} cannot hold it; usdc and json can")
     };
     lossy.map(note).collect()
 }
 
 /// What was written and how fast, on stderr.
-fn tell(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbose: bool) {
+fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbose: bool) {
     for (_, written) in written {
         if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
             let files = match written.files.len() {
@@ -205,33 +205,33 @@ fn tell(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbos
 }
 
 /// The errors of nodes, and the exit code they mean.
-fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
+fn outcome(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let mut exit = None;
-    let mut told: Vec<String> = Vec::new();
+    let mut reported: Vec<String> = Vec::new();
     for (output, error, frames) in &report.errors {
         let text = error.to_string();
-        if !told.contains(&text) {
+        if !reported.contains(&text) {
             let more = match frames - 1 {
                 0 => String::new(),
                 1 => " (and at 1 more frame)".into(),
                 more => format!(" (and at {more} more frames)"),
             };
             lines.push(format!("{text}{more}"));
-            told.push(text);
+            reported.push(text);
         }
         let code = exit_of_error(error);
         exit = Some(exit.map_or(code, |exit: Exit| exit.min(code)));
-        let kept = written.iter().any(|(place, written)| place == output && !written.files.is_empty());
+        let kept = written.iter().any(|(index, written)| index == output && !written.files.is_empty());
         let name = &graph.outputs[*output].name;
         lines.push(match kept {
-            true => format!("output `{name}` is without the frames that failed"),
+            true => format!("output `{name}` lacks the frames that failed"),
             false => format!("output `{name}` was not written"),
         });
     }
     if report.cancelled {
         let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
-        let frames = if frames == 1 { "1 whole frame was".into() } else { format!("{frames} whole frames were") };
+        let frames = if frames == 1 { "1 complete frame was".into() } else { format!("{frames} complete frames were") };
         lines.push(format!("interrupted; {frames} written"));
         exit = Some(exit.map_or(Exit::Interrupted, |exit| exit.min(Exit::Interrupted)));
     }
@@ -241,7 +241,7 @@ fn ended(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result
     }
 }
 
-fn progress(args: &Args, request: &Request) -> ProgressBar {
+fn progress(args: &CookArgs, request: &Request) -> ProgressBar {
     let steps = (request.frames.len() * request.outputs.len()) as u64;
     let target = if args.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let bar = ProgressBar::with_draw_target(Some(steps), target);

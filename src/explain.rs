@@ -15,16 +15,16 @@ use crate::report::NOT_NEEDED;
 
 /// What `explain` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ExplainArgs {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5, or several of these: 1-4,10,20-24; all of the scene's by default
+    /// Frames: 1-48, 1-48x2, 10, 10.5, or a list of these: 1-4,10,20-24 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
-    /// Only this output; may be given several times
+    /// Only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// Set a param or control anew: node.param=JSON or control=JSON
+    /// Override a param or control: node.param=JSON or control=JSON; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
     /// Print the plan as JSON
@@ -36,7 +36,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where the graph is wrong.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let engine = load::engine(0, 1 << 30)?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
@@ -52,8 +52,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             serde_json::to_string_pretty(&plan).unwrap_or_default() + "\n"
         }
         false => {
-            let mut text = format!("{} frames\n", request.frames.len());
-            report.nodes.iter().for_each(|node| describe(node, request.frames.len(), &mut text));
+            let frames = request.frames.len();
+            let mut text = format!("{frames} frame{}\n", if frames == 1 { "" } else { "s" });
+            report.nodes.iter().for_each(|node| describe(node, frames, &mut text));
             text
         }
     };
@@ -69,11 +70,11 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
         return;
     }
     let _ = match (node.varies, node.cooks) {
-        (false, 1) if frames > 1 => writeln!(text, "cooked once: it stands still"),
+        (false, 1) if frames > 1 => writeln!(text, "cooked once: the same in all frames"),
         (_, 1) => writeln!(text, "cooked once"),
         (_, n) => match node.window {
             Some(Window { frames: back, every }) => {
-                writeln!(text, "{n} steps for {frames} frames: it looks back {back}, from anchors every {every}")
+                writeln!(text, "{n} steps for {frames} frames: window of {back} frames, restarted every {every}")
             }
             None if node.time == "solver" => writeln!(text, "{n} steps"),
             None => writeln!(text, "cooked {n} times"),

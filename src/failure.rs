@@ -11,7 +11,7 @@ use engine::graph::{Fault, FaultClass};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Exit codes, as documented for scripts. Of two that fit, the lowest is taken.
+/// Exit codes, as documented for scripts. Where two apply, the lower one is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Exit {
@@ -40,7 +40,7 @@ impl From<Exit> for ExitCode {
 pub struct Failure {
     /// The exit code.
     pub exit: Exit,
-    /// What to say, a line each; nothing where it was said already.
+    /// Lines for stderr; none where the failure was already reported.
     pub lines: Vec<String>,
 }
 
@@ -50,8 +50,8 @@ impl Failure {
         Self { exit, lines: vec![line.into()] }
     }
 
-    /// A failure that was told already.
-    pub fn told(exit: Exit) -> Self {
+    /// A failure that was already reported.
+    pub fn reported(exit: Exit) -> Self {
         Self { exit, lines: Vec::new() }
     }
 
@@ -62,10 +62,10 @@ impl Failure {
 }
 
 impl From<io::Error> for Failure {
-    /// Of writing to stdout: a reader that has seen enough is no trouble.
+    /// For stdout: a reader that closed it early is not an error.
     fn from(error: io::Error) -> Self {
         match error.kind() {
-            io::ErrorKind::BrokenPipe => Self::told(Exit::Done),
+            io::ErrorKind::BrokenPipe => Self::reported(Exit::Done),
             _ => Self::file(format!("stdout could not be written: {error}")),
         }
     }

@@ -67,7 +67,7 @@ impl Numbered {
         let Some(start) = name.find('#') else { return Ok(None) };
         let after = name[start..].trim_start_matches('#');
         if after.contains('#') {
-            let line = format!("`{}` has several runs of `#`, expected one, for the frame", path.display());
+            let line = format!("`{}` has several runs of `#`, expected one for the frame number", path.display());
             return Err(Failure::new(Exit::CommandLine, line));
         }
         let digits = name.len() - start - after.len();
@@ -100,7 +100,7 @@ impl Numbered {
         }
         found.sort_unstable();
         if found.is_empty() {
-            return Err(Failure::file(format!("no file is called `{}` with a frame number", self.path.display())));
+            return Err(Failure::file(format!("no file matches `{}`", self.path.display())));
         }
         Ok(found)
     }
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(at("fur_#.obj", 1234.0), "fur_1234.obj");
         assert_eq!(Numbered::of(Path::new("a#/fur.json")).unwrap(), None, "folders are not numbered");
         let error = Numbered::of(Path::new("a.##.##.json")).unwrap_err();
-        assert_eq!(error.lines, ["`a.##.##.json` has several runs of `#`, expected one, for the frame"]);
+        assert_eq!(error.lines, ["`a.##.##.json` has several runs of `#`, expected one for the frame number"]);
     }
 
     #[test]
@@ -206,6 +206,6 @@ mod tests {
         let frames: Vec<f64> = found.iter().map(|(frame, _)| frame.number()).collect();
         assert_eq!(frames, [2.0, 2.5, 10.0]);
         let error = numbered(&folder.path().join("c.##.obj").display().to_string()).find().unwrap_err();
-        assert!(error.lines[0].ends_with("c.##.obj` with a frame number"), "{error:?}");
+        assert!(error.lines[0].ends_with("c.##.obj`"), "{error:?}");
     }
 }

@@ -1,9 +1,9 @@
 //! convect: evaluates node graphs that make geometry move, and writes geometry that any other program opens.
 //!
-//! This crate is the program: the catalogue of all nodes, and a file a verb. The engine knows no node; the nodes know no
+//! This crate is the program: the catalogue of all nodes, and one file per verb. The engine knows no node; the nodes know no
 //! file but those they read; what writes files is here and in `formats`.
 
-/// Says a line on stderr. Where nobody can hear it, that is no reason to fail.
+/// Writes a line to stderr; a closed stderr is ignored.
 #[macro_export]
 macro_rules! say {
     ($($text:tt)*) => {{

@@ -1,4 +1,4 @@
-//! Loading a graph file, and telling what is wrong with it.
+//! Loading a graph file and reporting its faults.
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::CATALOGUE;
 use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
 
-/// Larger graph files are refused: they are something else, or hold geometry that belongs into files.
+/// Larger graph files are refused: they hold something else, or geometry that belongs in files of its own.
 const LARGEST_GRAPH: u64 = 256 << 20;
 
-/// The graph at `path`, with some params and controls set anew.
+/// The graph at `path`, with some params and controls overridden.
 ///
 /// # Errors
 /// Where the file cannot be read, or its faults.
@@ -24,8 +24,8 @@ pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, 
     let file = engine::files::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
     if bytes.len() as u64 > LARGEST_GRAPH {
-        let fact = format!("the graph `{}` has more than {} MiB", path.display(), LARGEST_GRAPH >> 20);
-        return Err(Failure::file(format!("{fact}; put geometry into files of its own")));
+        let fact = format!("the graph `{}` is larger than {} MiB", path.display(), LARGEST_GRAPH >> 20);
+        return Err(Failure::file(format!("{fact}; store geometry in files of its own")));
     }
     let folder = path.parent().filter(|_| !is_handed_over(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
@@ -50,15 +50,15 @@ pub fn sound_graph(
     let mut faults = engine.verify(&graph, None);
     if let Some(format) = format {
         let outputs: Vec<usize> = (0..graph.outputs.len()).collect();
-        faults.extend(misfits(&graph, &outputs, format));
+        faults.extend(format_faults(&graph, &outputs, format));
     }
     Ok(if faults.is_empty() { Ok(graph) } else { Err(faults) })
 }
 
 /// Faults of outputs with components that `format` cannot hold.
-pub fn misfits(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fault> {
+pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for output in outputs.iter().map(|place| &graph.outputs[*place]) {
+    for output in outputs.iter().map(|index| &graph.outputs[*index]) {
         let kinds = graph.carries(output.from);
         if let Some(kind) = kinds.iter().find(|kind| !format.holds(**kind)) {
             let fact = format!("`{}` has {kind}, which {format} cannot hold", output.name);
@@ -90,7 +90,7 @@ pub fn engine(threads: usize, memory: usize) -> Result<Engine, Failure> {
     Engine::new(&Settings { threads, memory }).map_err(|error| Failure::new(Exit::Cook, error))
 }
 
-/// Places of the outputs asked by name; all of them where none is named.
+/// Indices of the outputs with these names; all of them where none is given.
 ///
 /// # Errors
 /// Where the graph has no output of a name.
@@ -99,15 +99,15 @@ pub fn outputs(graph: &Graph, names: &[String]) -> Result<Vec<usize>, Failure> {
     if names.is_empty() {
         return Ok((0..graph.outputs.len()).collect());
     }
-    let mut places = Vec::new();
+    let mut indices = Vec::new();
     for name in names {
-        let place = graph.outputs.iter().position(|output| *output.name == **name).ok_or_else(|| {
+        let index = graph.outputs.iter().position(|output| *output.name == **name).ok_or_else(|| {
             let known: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
             Failure::new(Exit::CommandLine, format!("the graph has no output `{name}`; it has {}", known.join(", ")))
         })?;
-        places.push(place);
+        indices.push(index);
     }
-    places.sort_unstable();
-    places.dedup();
-    Ok(places)
+    indices.sort_unstable();
+    indices.dedup();
+    Ok(indices)
 }

@@ -17,23 +17,23 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 #[command(version, arg_required_else_help = true, max_term_width = 100)]
 enum Verb {
     /// Cook a graph and write its outputs
-    Cook(Box<cook::Args>),
-    /// Find all that is wrong with a graph, without cooking it
-    Check(check::Args),
-    /// Show what a cook would do: which nodes, how often, and what is left out and why
-    Explain(explain::Args),
-    /// List the nodes, or show the help of one
-    Nodes(nodes::Args),
+    Cook(Box<cook::CookArgs>),
+    /// Report every fault of a graph, without cooking it
+    Check(check::CheckArgs),
+    /// Show what a cook would do: which nodes, how often, what is left out and why
+    Explain(explain::ExplainArgs),
+    /// List the nodes, or print the help of one
+    Nodes(nodes::NodesArgs),
     /// Measure a geometry file: counts, bounds, lengths, areas, volumes, attributes
-    Stats(stats::Args),
-    /// Compare two geometries: exit code 0 where they are the same, 1 where not, 2 for trouble
-    Diff(diff::Args),
+    Stats(stats::StatsArgs),
+    /// Compare two geometries: exit code 0 if they are the same, 1 if they differ, 2 on errors
+    Diff(diff::DiffArgs),
     /// Convert geometry files from one format to another
-    Convert(convert::Args),
-    /// Print a JSON Schema of graph files, for editors
+    Convert(convert::ConvertArgs),
+    /// Print the JSON Schema of graph files, for editors
     Schema,
-    /// Print completions for a shell
-    Completions(completions::Args),
+    /// Print a shell's completion script
+    Completions(completions::CompletionsArgs),
 }
 
 fn main() -> ExitCode {
@@ -41,14 +41,14 @@ fn main() -> ExitCode {
     let verb = match Verb::try_parse() {
         Ok(verb) => verb,
         Err(error) => {
-            // Help and version are answers, all else is a wrong command line.
+            // Help and version end well; all else is a wrong command line.
             let exit = if error.use_stderr() { Exit::CommandLine } else { Exit::Done };
             let _ = error.print();
             return exit.into();
         }
     };
     let result = std::panic::catch_unwind(|| run(&verb)).unwrap_or_else(|_| {
-        Err(Failure::new(Exit::Cook, "convect failed unexpectedly; this is a fault of convect, please report it"))
+        Err(Failure::new(Exit::Cook, "convect failed unexpectedly; this is a bug in convect, please report it"))
     });
     match result {
         Ok(()) => Exit::Done.into(),
@@ -73,7 +73,7 @@ fn run(verb: &Verb) -> Result<(), Failure> {
     }
 }
 
-/// A node's panic becomes an error that names node and frame; where in the code it was is told only to who asks.
+/// A node's panic becomes an error that names node and frame; where in the code is shown only if RUST_BACKTRACE is set.
 fn quiet_panics() {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|_| {}));

@@ -12,8 +12,8 @@ use crate::failure::{Exit, Failure};
 
 /// What `nodes` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
-    /// A node's name: its inputs, params, outputs and metrics
+pub struct NodesArgs {
+    /// Node type whose inputs, params, outputs and metrics to print
     name: Option<String>,
     /// Print as JSON
     #[arg(long)]
@@ -24,7 +24,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where there is no node of that name.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &NodesArgs) -> Result<(), Failure> {
     let mut stdout = std::io::stdout();
     let chosen: Vec<&Node> = match &args.name {
         None => CATALOGUE.nodes().collect(),

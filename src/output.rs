@@ -1,4 +1,4 @@
-//! Files of outputs: one USD file with all frames, or a file a frame.
+//! Files of outputs: one USD file with all frames, or one file per frame.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -62,8 +62,8 @@ impl<'g> Writers<'g> {
     /// Refuses to write over the graph or a file it reads: the next cook would read its own result.
     ///
     /// # Errors
-    /// Where one of `frames` would be written over one of `inputs`.
-    pub fn spare(&self, inputs: &[PathBuf], frames: &[Frame]) -> Result<(), Failure> {
+    /// Where one of `frames` would overwrite one of `inputs`.
+    pub fn refuse_to_overwrite(&self, inputs: &[PathBuf], frames: &[Frame]) -> Result<(), Failure> {
         let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
         for (output, target, _) in &self.outputs {
             let name = &self.graph.outputs[*output].name;
@@ -76,7 +76,7 @@ impl<'g> Writers<'g> {
             let same = paths.iter().find(|path| path.canonicalize().is_ok_and(|path| inputs.contains(&path)));
             if let Some(path) = same {
                 let line =
-                    format!("`{}` would be written over, but the graph reads it; choose another --out", path.display());
+                    format!("`{}` would be overwritten, but the graph reads it; choose another --out", path.display());
                 return Err(Failure::file(line));
             }
         }
@@ -127,7 +127,7 @@ impl<'g> Writers<'g> {
     }
 
     /// Finishes files that hold all frames, but for outputs in `spoiled`: a sequence with frames missing would be taken
-    /// for a whole one. What was written, by place of the output.
+    /// for a whole one. What was written, by index of the output.
     ///
     /// # Errors
     /// Where a file cannot be finished.
@@ -173,7 +173,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     fill(AtomicFile::create(path).map_err(|error| failed(&error))?, bytes)
 }
 
-/// Gives a file its bytes and its name.
+/// Writes the bytes of a file and renames it to its final name.
 ///
 /// # Errors
 /// Where it cannot be written.

@@ -9,7 +9,7 @@ use engine::geometry::Geometry;
 use engine::graph::Graph;
 use engine::plan::Request;
 use engine::time::Frame;
-use preview::{Camera, Image, Layer, Settings, attribute_names, attribute_range, bounds, render, union};
+use preview::{Camera, Image, Layer, PictureSettings, attribute_names, attribute_range, bounds, render, union};
 
 use crate::args::Frames;
 use crate::failure::{Exit, Failure};
@@ -20,25 +20,25 @@ use crate::output::write_whole;
 #[command(next_help_heading = "Pictures")]
 // A group would have the name of the one around it.
 #[group(skip)]
-pub struct Args {
+pub struct PictureArgs {
     /// Draw a contact sheet of six frames, DIR/preview.png
     #[arg(long)]
     preview: bool,
-    /// Draw these frames instead, a PNG each: DIR/preview.0024.png
+    /// Draw these frames instead, one PNG each: DIR/preview.0024.png
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     preview_frames: Option<Frames>,
     /// Width and height of a panel in pixels [default: 640x480]
     #[arg(long, value_name = "WxH")]
     preview_size: Option<String>,
-    /// Where to look from: eye=1,2,3 target=0,0,0 fov=35; framed automatically by default
+    /// Camera: eye=1,2,3 target=0,0,0 fov=35 [default: frames everything drawn]
     #[arg(long, value_name = "CAMERA")]
     camera: Option<String>,
-    /// Attribute drawn as colour
+    /// Attribute to show as colour
     #[arg(long, value_name = "ATTRIBUTE")]
     color_by: Option<String>,
 }
 
-impl Args {
+impl PictureArgs {
     /// Each of them does, so that none is given in vain.
     fn asks_for_pictures(&self) -> bool {
         self.preview
@@ -60,7 +60,7 @@ pub struct Pictures {
     names: Vec<(usize, String)>,
     frames: Vec<Frame>,
     sheet: bool,
-    settings: Settings,
+    settings: PictureSettings,
     folder: PathBuf,
     kept: BTreeMap<(Frame, usize), Arc<Geometry>>,
 }
@@ -70,7 +70,7 @@ impl Pictures {
     ///
     /// # Errors
     /// Where size or camera make no sense, or a frame is asked that is not cooked.
-    pub fn new(args: &Args, graph: &Graph, request: &Request, folder: &Path) -> Result<Option<Self>, Failure> {
+    pub fn new(args: &PictureArgs, graph: &Graph, request: &Request, folder: &Path) -> Result<Option<Self>, Failure> {
         if !args.asks_for_pictures() {
             return Ok(None);
         }
@@ -85,10 +85,11 @@ impl Pictures {
             Some(frames) => frames.frames(),
         };
         if let Some(frame) = frames.iter().find(|frame| !request.frames.contains(frame)) {
-            return Err(wrong(format!("frame {frame} is to be drawn, but is not among the frames to cook")));
+            return Err(wrong(format!("--preview-frames: frame {frame} is not among the frames to cook")));
         }
-        let settings = Settings { width, height, camera, color_by: args.color_by.clone(), ..Settings::default() };
-        let names = request.outputs.iter().map(|place| (*place, graph.outputs[*place].name.to_string())).collect();
+        let settings =
+            PictureSettings { width, height, camera, color_by: args.color_by.clone(), ..PictureSettings::default() };
+        let names = request.outputs.iter().map(|index| (*index, graph.outputs[*index].name.to_string())).collect();
         let sheet = args.preview_frames.is_none();
         Ok(Some(Self { names, frames, sheet, settings, folder: folder.to_owned(), kept: BTreeMap::new() }))
     }
@@ -110,7 +111,10 @@ impl Pictures {
         }
         let names = self.frame_all();
         if let (Some(name), None) = (&self.settings.color_by, self.settings.range) {
-            crate::say!("note: no output has a number `{name}` to colour by; there are {}", names.join(", "));
+            crate::say!(
+                "note: no output has a numeric attribute `{name}` to colour by; available: {}",
+                names.join(", ")
+            );
         }
         let drawn: Vec<Frame> =
             self.frames.iter().copied().filter(|frame| self.kept.keys().any(|(at, _)| at == frame)).collect();
@@ -144,10 +148,10 @@ impl Pictures {
         names
     }
 
-    fn panel(&self, frame: Frame, output: usize, name: &str) -> Result<Image, preview::Error> {
+    fn panel(&self, frame: Frame, output: usize, name: &str) -> Result<Image, preview::PreviewError> {
         let geometry = self.kept.get(&(frame, output));
         let layers: Vec<Layer<'_>> = geometry.map(|geometry| Layer::new(name, geometry)).into_iter().collect();
-        let settings = Settings { note: Some(frame.to_string()), ..self.settings.clone() };
+        let settings = PictureSettings { note: Some(frame.to_string()), ..self.settings.clone() };
         render(&layers, &settings)
     }
 }
@@ -160,8 +164,8 @@ fn size(text: &str) -> Option<(usize, usize)> {
     (1..=Image::MOST_PIXELS).contains(&pixels).then_some((width, height))
 }
 
-fn drawing(error: preview::Error) -> Failure {
-    Failure::new(Exit::CommandLine, format!("no picture: {error}"))
+fn drawing(error: preview::PreviewError) -> Failure {
+    Failure::new(Exit::CommandLine, format!("the picture could not be drawn: {error}"))
 }
 
 fn save(image: &Image, path: PathBuf) -> Result<PathBuf, Failure> {

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::output::Written;
 
-/// What stands in a report besides what the engine measured.
+/// What a report contains besides what the engine measured.
 pub struct Cooked<'a> {
     /// The graph's path.
     pub graph_path: String,
@@ -17,7 +17,7 @@ pub struct Cooked<'a> {
     pub graph: &'a Graph,
     /// Frames asked.
     pub frames: &'a [Frame],
-    /// What was written, by place of the output.
+    /// What was written, by index of the output.
     pub written: &'a [(usize, Written)],
     /// Threads that cooked.
     pub threads: usize,
@@ -32,9 +32,9 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     let outputs: Map<String, Value> = cooked
         .written
         .iter()
-        .map(|(place, written)| {
-            let output = &cooked.graph.outputs[*place];
-            let errors = report.errors.iter().filter(|(spoiled, _, _)| spoiled == place);
+        .map(|(index, written)| {
+            let output = &cooked.graph.outputs[*index];
+            let errors = report.errors.iter().filter(|(failed, _, _)| failed == index);
             let errors: Vec<Value> = errors
                 .map(|(_, error, frames)| {
                     json!({

@@ -1,9 +1,9 @@
-//! Files that appear whole or not at all.
+//! Files that appear complete or not at all.
 //!
 //! An [`AtomicFile`] is written hidden beside its final name and takes that name only once it is complete and on disk,
-//! so a killed program leaves nothing half-written that looks finished. What it does leave, [`sweep`] removes: a
-//! temporary belongs to a live process as long as that process holds its lock or has its number. The limit is the file
-//! system's: rename must replace a file in one step, as every local one does.
+//! so a killed program leaves no half-written file under a final name. Its temporaries are removed by [`sweep`]: one
+//! belongs to a live process as long as that process holds its lock or has its process number. Limit: the file system's
+//! rename must replace a file in one step, as that of every local one does.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
@@ -24,7 +24,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Starts a file that will be `path`, in a folder that is there. A file of that name stays until the commit.
+    /// Starts a file that will be `path`, in an existing folder. A file of that name stays until the commit.
     ///
     /// # Errors
     /// Where `path` is something other than a file, or its folder cannot be written to.
@@ -68,7 +68,7 @@ impl AtomicFile {
         FileError { path: self.path.clone(), action: "written", source }
     }
 
-    /// Brings the file to disk and gives it its final name.
+    /// Syncs the file to disk and renames it to its final name.
     ///
     /// # Errors
     /// Where the last bytes cannot be written or the name cannot be taken; nothing is left behind then.
@@ -169,8 +169,8 @@ pub fn sweep(folder: &Path) -> Result<usize, FileError> {
     Ok(swept)
 }
 
-/// Whether no live process owns a temporary. Its lock tells where there are locks, also across containers; its number
-/// tells between creation and lock, and where there are none. Our own number is no proof of life: it may be that of an
+/// Whether no live process owns a temporary: by its lock, which works across containers too; by its process number
+/// between creation and locking, and on file systems without locks. Our own number proves nothing: it may be that of an
 /// earlier process.
 fn is_stale(path: &Path, owner: u32) -> bool {
     let locks = match File::open(path).map(|file| file.try_lock()) {
@@ -186,7 +186,7 @@ fn is_stale(path: &Path, owner: u32) -> bool {
     !alive && (locks || numbers)
 }
 
-/// A file or folder that something could not be done to.
+/// An operation on a file or folder that failed.
 #[derive(Debug, thiserror::Error)]
 #[error("`{}` could not be {action}: {}", path.display(), cause(source))]
 pub struct FileError {
@@ -218,7 +218,7 @@ impl FileError {
             ErrorKind::NotFound | ErrorKind::NotADirectory => Some("check the path, or make the folder first"),
             ErrorKind::IsADirectory => Some("give the path of a file"),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-                Some("choose a place you may write to, or change its permissions")
+                Some("choose a folder you may write to, or change its permissions")
             }
             _ => None,
         }

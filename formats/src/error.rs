@@ -6,9 +6,9 @@ use engine::geometry::{GeometryError, Kind, Name};
 
 use crate::Format;
 
-/// Where in a file.
+/// A position in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum FilePosition {
     /// The file as a whole.
     File,
     /// A line, counted from 1.
@@ -19,7 +19,7 @@ pub enum Place {
     Byte(usize),
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for FilePosition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::File => Ok(()),
@@ -35,16 +35,16 @@ impl std::fmt::Display for Place {
 #[non_exhaustive]
 pub enum FormatError {
     /// The file holds something that is not geometry in this format.
-    #[error("{place}{fact}")]
+    #[error("{position}{fact}")]
     Content {
         /// Where.
-        place: Place,
-        /// What is there, and what was expected.
+        position: FilePosition,
+        /// What was found, and what was expected.
         fact: String,
         /// What to do about it, as a sentence of its own.
         hint: Option<&'static str>,
     },
-    /// No format has this name or ending.
+    /// No format has this name or extension.
     #[error("`{name}` is not a geometry format, expected one of {}", names(&Format::ALL))]
     Unknown {
         /// The name or ending.
@@ -54,12 +54,12 @@ pub enum FormatError {
     #[error("convect does not read USD yet")]
     UsdIsOnlyWritten,
     /// The format keeps all frames in one file, which [`write`](crate::write) does not make.
-    #[error("{format} holds all frames in one file, expected a format with a file a frame")]
+    #[error("{format} keeps all frames in one file, expected a format with one file per frame")]
     OneFile {
         /// The format.
         format: Format,
     },
-    /// The format has no place for a component.
+    /// The format has no way to store a component.
     #[error("{format} cannot hold {kind}")]
     CannotHold {
         /// The format.
@@ -78,7 +78,7 @@ pub enum FormatError {
         row: usize,
     },
     /// Two components of a file share a table and disagree on a type.
-    #[error("`{name}` has another type on {second} than on {first}, and ply has one table for both")]
+    #[error("`{name}` has different types on {first} and {second}, and ply has one table for both")]
     TypesDiffer {
         /// The attribute.
         name: Name,
@@ -87,7 +87,7 @@ pub enum FormatError {
         /// The other.
         second: Kind,
     },
-    /// A frame or time that is no number.
+    /// A frame or time that is not finite.
     #[error("the frame is {frame} and its time {seconds} s, expected finite numbers")]
     Stamp {
         /// The frame.
@@ -101,14 +101,14 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// A fault of the content at `place`.
-    pub(crate) fn at(place: Place, fact: impl Into<String>) -> Self {
-        Self::Content { place, fact: fact.into(), hint: None }
+    /// A fault of the content at `position`.
+    pub(crate) fn at(position: FilePosition, fact: impl Into<String>) -> Self {
+        Self::Content { position, fact: fact.into(), hint: None }
     }
 
     /// The same, with what to do about it.
-    pub(crate) fn with_hint(place: Place, fact: impl Into<String>, hint: &'static str) -> Self {
-        Self::Content { place, fact: fact.into(), hint: Some(hint) }
+    pub(crate) fn with_hint(position: FilePosition, fact: impl Into<String>, hint: &'static str) -> Self {
+        Self::Content { position, fact: fact.into(), hint: Some(hint) }
     }
 
     /// What to do about it, where that is known: a sentence of its own.
@@ -131,7 +131,7 @@ impl FormatError {
 /// A geometry that does not fit together, found when the whole file is read.
 impl From<GeometryError> for FormatError {
     fn from(error: GeometryError) -> Self {
-        Self::at(Place::File, error.to_string())
+        Self::at(FilePosition::File, error.to_string())
     }
 }
 

@@ -1,4 +1,4 @@
-//! The file formats convect knows, by name and by ending, and what each can hold.
+//! The file formats convect knows, by name and by extension, and what each can hold.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -7,18 +7,18 @@ use engine::geometry::Kind;
 
 use crate::FormatError;
 
-/// A file format for geometry. Its name is also the file's ending.
+/// A file format for geometry. Its name is also the file's extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Format {
     /// USD, binary: all frames in one file; written only.
     Usdc,
     /// USD, text: all frames in one file; written only.
     Usda,
-    /// Wavefront OBJ, a file a frame.
+    /// Wavefront OBJ, one file per frame.
     Obj,
-    /// PLY, a file a frame; read in all three encodings, written binary little endian.
+    /// PLY, one file per frame; read in all three encodings, written binary little endian.
     Ply,
-    /// convect's own, a file a frame: everything a geometry can hold.
+    /// convect's own format, one file per frame: holds any geometry.
     Json,
 }
 
@@ -26,7 +26,7 @@ impl Format {
     /// All formats, in the order messages list them.
     pub const ALL: [Self; 5] = [Self::Usdc, Self::Usda, Self::Obj, Self::Ply, Self::Json];
 
-    /// The name on the command line, and the ending of its files.
+    /// The name on the command line, and the extension of its files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Usdc => "usdc",
@@ -37,10 +37,10 @@ impl Format {
         }
     }
 
-    /// The format of a file, by its ending in any case; `.usd` is taken for usdc.
+    /// The format of a file, by its extension in any case; `.usd` means usdc.
     ///
     /// # Errors
-    /// Where the ending is missing or no format's.
+    /// Where the extension is missing or unknown.
     pub fn of_path(path: &Path) -> Result<Self, FormatError> {
         let ending = path.extension().unwrap_or(path.as_os_str()).to_string_lossy().to_lowercase();
         if ending == "usd" { Ok(Self::Usdc) } else { ending.parse() }
@@ -61,7 +61,7 @@ impl Format {
         Self::ALL.into_iter().filter(|format| kinds.iter().all(|kind| format.holds(*kind))).collect()
     }
 
-    /// Whether one file holds all frames; else there is a file a frame.
+    /// Whether one file holds all frames; otherwise each frame has a file.
     pub fn is_sequence(self) -> bool {
         matches!(self, Self::Usdc | Self::Usda)
     }
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_ending_names_its_format_in_any_case() {
+    fn an_extension_names_its_format_in_any_case() {
         let of = |path: &str| Format::of_path(Path::new(path));
         assert_eq!(of("fur.0001.obj").unwrap(), Format::Obj);
         assert_eq!(of("a/FUR.PLY").unwrap(), Format::Ply);

@@ -4,7 +4,7 @@
 //! back bit for bit, as far as the format holds them (each format's module says what it drops). Readers never panic,
 //! their memory is a small multiple of the file's size, whatever counts it declares, and their time is linear in it.
 //!
-//! Readers take coordinates as they stand: none of these formats says its unit or its axes.
+//! Readers take coordinates unchanged: none of these formats declares its unit or axes.
 
 pub mod atomic;
 mod error;
@@ -21,14 +21,14 @@ use std::io::Write;
 
 use engine::geometry::{Geometry, Kind};
 
-pub use error::{FormatError, Place};
+pub use error::{FilePosition, FormatError};
 pub use format::Format;
 pub use lost::lost;
 
-/// Which frame a file shows.
+/// The frame of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameStamp {
-    /// The frame, whole or not.
+    /// The frame number, whole or not.
     pub frame: f64,
     /// Its time, seconds.
     pub seconds: f64,

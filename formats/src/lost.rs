@@ -1,14 +1,14 @@
-//! What a format drops of a geometry, by name: so that nobody looks for it in the file in vain.
+//! What a format cannot store of a geometry, by name, for a note to the user.
 //!
-//! Promise: what is named here is what the format's own reader does not find again; a test holds it to that. Limit: what
-//! other programs drop of a file is theirs.
+//! Promise: names exactly what convect's own reader of the format does not get back, as a test checks. Limit: what other
+//! programs ignore in a file is not known here.
 
 use engine::geometry::{Component, Geometry, Kind, N, Name, Owner, P, UVW};
 
 use crate::Format;
 use crate::obj::CD;
 
-/// Names of what is in `geometry` and will not be in a file of that format: `` `envelope` of curves ``, `the curves
+/// Names of what a file of that format will lack of `geometry`: `` `envelope` of curves ``, `the curves
 /// without a point`. Components that the format cannot hold at all are refused elsewhere.
 pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
     let holds: fn(&Component, Owner, &Name, [bool; 2]) -> bool = match format {
@@ -28,7 +28,7 @@ pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
             lost.push(format!("the {kind} without a point"));
             continue;
         }
-        // Of no rows nothing is lost: points have no elements.
+        // Columns without rows lose nothing: points have no elements.
         let columns = part.columns().filter(|(_, _, column)| !column.is_empty());
         let columns = columns.filter(|(owner, name, _)| !holds(part, *owner, name, in_step));
         lost.extend(columns.map(|(_, name, _)| format!("`{name}` of {kind}")));
@@ -94,9 +94,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_is_what_does_not_come_back() {
+    fn exactly_what_does_not_come_back_is_named() {
         let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
-        for (place, geometry) in samples().iter().enumerate() {
+        for (sample, geometry) in samples().iter().enumerate() {
             for format in [Format::Obj, Format::Ply, Format::Json] {
                 let mut bytes = Vec::new();
                 crate::write(format, geometry, &stamp, &mut bytes).unwrap();
@@ -111,7 +111,7 @@ mod tests {
                     let columns = columns.filter(|(_, _, column)| !column.is_empty());
                     gone.extend(columns.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
                 }
-                assert_eq!(lost(format, geometry), gone, "{format} of sample {place}");
+                assert_eq!(lost(format, geometry), gone, "{format} of sample {sample}");
             }
         }
     }

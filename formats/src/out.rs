@@ -1,7 +1,7 @@
-//! Numbers and text on their way to a file.
+//! A buffer that formats numbers and text.
 //!
-//! Floats are written in their shortest form that reads back as the same f32, always with a `.` or an `e`; whole
-//! numbers never have one. Pushing only fills a buffer; [`Out::pour`], called once a row, empties it when it is full.
+//! Floats are written in their shortest form that reads back as the same f32, always with a `.` or an `e`; integers
+//! never have one. Writes only fill a buffer; [`Out::pour`], called once per row, empties it when it is full.
 
 use std::io::{self, Write};
 
@@ -45,12 +45,12 @@ impl<'a> Out<'a> {
         self.buffer.extend_from_slice(self.whole.format(number).as_bytes());
     }
 
-    /// Hands a full buffer on.
+    /// Writes the buffer out if it is full.
     pub(crate) fn pour(&mut self) -> io::Result<()> {
         if self.buffer.len() >= Self::FULL { self.finish() } else { Ok(()) }
     }
 
-    /// Hands on what is left.
+    /// Writes out the rest.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.sink.write_all(&self.buffer)?;
         self.buffer.clear();
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn floats_are_short_and_never_look_whole() {
+    fn floats_are_short_and_never_look_like_integers() {
         let text = |x: f32| {
             let mut bytes = Vec::new();
             let mut out = Out::new(&mut bytes);

@@ -1,10 +1,10 @@
-//! What the text readers share: files that are something else, lines, fields, numbers.
+//! Shared by the text readers: detection of other file types, lines, fields, numbers.
 
 use engine::geometry::Name;
 
-use crate::{Format, FormatError, Place};
+use crate::{FilePosition, Format, FormatError};
 
-/// First bytes of files that get a wrong ending, what they are, and what to do.
+/// First bytes of files that often have a wrong extension, what they are, and what to do.
 const FOREIGN: [(&[u8], &str, &str); 17] = [
     (b"\xff\xfe", UTF_16, AS_UTF_8),
     (b"\xfe\xff", UTF_16, AS_UTF_8),
@@ -29,26 +29,26 @@ const AS_UTF_8: &str = "save it as UTF-8";
 const UNPACK: &str = "unpack it first";
 const CONVERT: &str = "convert it to obj, ply or json first";
 
-/// The bytes after a UTF-8 byte order mark, where they may be a file of `format`.
+/// The bytes of a file of `format`, without a UTF-8 byte order mark.
 ///
 /// # Errors
-/// Where there is no byte, or the first ones are those of something else.
+/// Where the file is empty or its first bytes are those of another type of file.
 pub(crate) fn opened(format: Format, bytes: &[u8]) -> Result<&[u8], FormatError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let fact = |what: &str| format!("this is {what}, expected {format}");
     if bytes.is_empty() {
         return Err(FormatError::with_hint(
-            Place::File,
+            FilePosition::File,
             "the file is empty",
             "write it again: nothing reached the disk",
         ));
     }
     if let Some((_, what, hint)) = FOREIGN.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
-        return Err(FormatError::with_hint(Place::File, fact(what), hint));
+        return Err(FormatError::with_hint(FilePosition::File, fact(what), hint));
     }
     // Without a mark, every other byte of the first characters is zero.
     if let [0, 1..=127, 0, 1..=127, ..] | [1..=127, 0, 1..=127, 0, ..] = bytes {
-        return Err(FormatError::with_hint(Place::File, fact(UTF_16), AS_UTF_8));
+        return Err(FormatError::with_hint(FilePosition::File, fact(UTF_16), AS_UTF_8));
     }
     let other = match bytes {
         [b'p', b'l', b'y', b'\n' | b'\r', ..] => Format::Ply,
@@ -57,7 +57,7 @@ pub(crate) fn opened(format: Format, bytes: &[u8]) -> Result<&[u8], FormatError>
     };
     if other != format {
         let hint = "give the file the ending of its format";
-        return Err(FormatError::with_hint(Place::File, fact(&format!("a {other} file")), hint));
+        return Err(FormatError::with_hint(FilePosition::File, fact(&format!("a {other} file")), hint));
     }
     Ok(bytes)
 }
@@ -80,7 +80,7 @@ impl<'a> Lines<'a> {
         Self { rest: text, end, number: first - 1 }
     }
 
-    /// Number of the line that came last.
+    /// Number of the last line returned.
     pub(crate) fn number(&self) -> usize {
         self.number
     }
@@ -106,7 +106,7 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The fields of a line: what stands between white space.
+/// The fields of a line, separated by white space.
 #[derive(Clone)]
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
@@ -123,7 +123,7 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// The nearest f32 of a decimal; infinite or NaN where the field says so or is too large; `None` where it is no number.
+/// The nearest f32 of a decimal; infinite or NaN where the field says so or is too large; `None` where it is not a number.
 pub(crate) fn float(field: &[u8]) -> Option<f32> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
@@ -141,7 +141,7 @@ pub(crate) fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// `name`, with underscores behind it until `taken` says it is free.
+/// `name` with as many underscores appended as it takes for `taken` to be false.
 pub(crate) fn free_name(name: &str, taken: impl Fn(&str) -> bool) -> Name {
     let mut name = name.to_owned();
     while taken(&name) {
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_stand_between_any_space() {
+    fn any_white_space_separates_fields() {
         assert_eq!(Fields(b"  v\t1  2\r").collect::<Vec<_>>(), [&b"v"[..], b"1", b"2"]);
         assert_eq!(Fields(b" \t\r").next(), None);
     }

@@ -118,7 +118,7 @@ fn a_file_of_something_else_is_named() {
 }
 
 #[test]
-fn bytes_that_are_no_text_are_refused() {
+fn bytes_that_are_not_text_are_refused() {
     for format in READ {
         for bytes in [vec![0; 64], vec![0xff; 64], (0..=255).collect::<Vec<u8>>()] {
             assert!(read(format, &bytes).is_err(), "{format}: {bytes:?}");

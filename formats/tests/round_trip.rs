@@ -253,7 +253,7 @@ fn what_a_format_cannot_hold_is_refused() {
     };
     assert_eq!(fault(Format::Obj, &tets).to_string(), "obj cannot hold tets");
     assert_eq!(fault(Format::Ply, &tets).hint().unwrap(), "formats that can: usdc, usda, json");
-    let message = "usdc holds all frames in one file, expected a format with a file a frame";
+    let message = "usdc keeps all frames in one file, expected a format with one file per frame";
     assert_eq!(fault(Format::Usdc, &Geometry::default()).to_string(), message);
     let nan: Geometry = Component::points(vec![[f32::NAN, 0.0, 0.0]]).into();
     for format in [Format::Obj, Format::Ply, Format::Json] {

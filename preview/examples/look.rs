@@ -8,12 +8,12 @@ use std::fs;
 use std::path::Path;
 
 use engine::geometry::{Column, Component, Geometry, Owner};
-use preview::{Layer, Settings, render};
+use preview::{Layer, PictureSettings, render};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let out = arguments.next().ok_or("expected a name of the picture")?;
-    let (mut settings, mut files, mut repeat) = (Settings::default(), Vec::new(), 1_usize);
+    let (mut settings, mut files, mut repeat) = (PictureSettings::default(), Vec::new(), 1_usize);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("`{argument}` needs a value"));
         match argument.as_str() {

@@ -1,4 +1,4 @@
-//! The camera: where it stands, where it looks, how wide; written and read as text, or framed around bounds.
+//! The camera: position, target and angle; written and read as text, or fitted to bounds.
 //!
 //! Promise: [`Camera::fit`] holds all of the box, touching the margin on two opposite sides, and depends on nothing
 //! but the box and the picture's shape, so a sequence that gives one box keeps one camera. Limit: no lens shift, no roll
@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use numerics::vector::{DVec3, direction, to_f64};
 
-/// Vertical angle of view where none is given, degrees: near what the eye takes in at a glance, so without distortion.
+/// Vertical angle of view where none is given, degrees: narrow enough to show little distortion.
 const FOV: f64 = 30.0;
 /// What [`Camera::fit`] leaves free around the box, as a share of half the picture.
 const MARGIN: f64 = 0.08;
@@ -17,7 +17,7 @@ const MARGIN: f64 = 0.08;
 const THREE_QUARTER: [f64; 3] = [0.52, 0.30, 0.80];
 
 /// Least and greatest coordinates, metres.
-pub type Bounds = [[f32; 3]; 2];
+pub type BoundingBox = [[f32; 3]; 2];
 
 /// Where a picture is taken from. Lengths in metres, Y up, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,20 +28,20 @@ pub struct Camera {
     fov: f64,
 }
 
-/// Why a camera is not one.
+/// Why a camera is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// A word that is not `name=value`, or of a name a camera has not.
-    #[error("`{0}` is no part of a camera, expected `eye=x,y,z`, `target=x,y,z`, `up=x,y,z` or `fov=degrees`")]
+    /// A word that is not `name=value`, or an unknown name.
+    #[error("`{0}` is not a camera setting, expected `eye=x,y,z`, `target=x,y,z`, `up=x,y,z` or `fov=degrees`")]
     Part(String),
     /// A part that is given twice.
     #[error("`{0}` is given twice, expected once")]
     Twice(&'static str),
-    /// A part that must be given and is not.
+    /// A required part that is missing.
     #[error("`{0}` is missing, expected a camera like `eye=1,2,3 target=0,0,0 fov=35`")]
     Missing(&'static str),
-    /// A value that is not what its name asks for.
+    /// An invalid value.
     #[error("`{name}` is `{value}`, expected {expected}")]
     Value {
         /// Which part.
@@ -51,7 +51,7 @@ pub enum CameraError {
         /// What it should be.
         expected: &'static str,
     },
-    /// Nowhere to look.
+    /// No viewing direction.
     #[error("`eye` and `target` are both {0:?}, which gives no direction to look in")]
     NoDirection([f64; 3]),
 }
@@ -86,9 +86,9 @@ impl Camera {
 
     /// The three-quarter view that holds all of `bounds` in a picture `aspect` (width ÷ height) wide.
     ///
-    /// Give the union over all frames and outputs, and every picture is taken from one place. Bounds without extent are
+    /// Give the union over all frames and outputs, and all pictures have one camera. A box without extent is
     /// seen from as far as a box of 1 m would be; bounds that are not finite count as the unit box.
-    pub fn fit(bounds: Bounds, aspect: f64) -> Self {
+    pub fn fit(bounds: BoundingBox, aspect: f64) -> Self {
         let [low, high] = proper(bounds);
         let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
         let back = direction(THREE_QUARTER.into()).unwrap_or(DVec3::z());
@@ -114,12 +114,12 @@ impl Camera {
         Self { eye, target, up, fov: FOV }
     }
 
-    /// Where it stands, metres.
+    /// The eye, metres.
     pub fn eye(&self) -> [f64; 3] {
         self.eye.into()
     }
 
-    /// Where it looks, metres.
+    /// The target, metres.
     pub fn target(&self) -> [f64; 3] {
         self.target.into()
     }
@@ -186,7 +186,7 @@ fn half_tangent(degrees: f64) -> f64 {
 }
 
 /// `bounds` in f64, finite and with an extent.
-pub(crate) fn proper(bounds: Bounds) -> [DVec3; 2] {
+pub(crate) fn proper(bounds: BoundingBox) -> [DVec3; 2] {
     let [low, high] = bounds.map(to_f64);
     if low.iter().chain(&high).any(|x| !x.is_finite()) {
         return [-0.5, 0.5].map(DVec3::repeat);
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(error("eye=0,0,1 eye=0,0,2 target=0,0,0"), "`eye` is given twice, expected once");
         assert_eq!(
             error("zoom=2"),
-            "`zoom=2` is no part of a camera, expected `eye=x,y,z`, `target=x,y,z`, `up=x,y,z` or `fov=degrees`"
+            "`zoom=2` is not a camera setting, expected `eye=x,y,z`, `target=x,y,z`, `up=x,y,z` or `fov=degrees`"
         );
         assert_eq!(error("eye=0,0,1 target=0,0,0 fov=0"), "`fov` is `0`, expected an angle between 1 and 170 degrees");
         assert_eq!(error("eye=0,0,1 target=0,0,0 fov=wide"), "`fov` is `wide`, expected a number");

@@ -2,7 +2,7 @@
 //!
 //! Colours are linear light with the primaries of sRGB; a picture's bytes are sRGB. Promise: the colour map's lightness
 //! rises evenly, so that a printed or colour-blind reading keeps the order of values. Limit: a colour attribute is
-//! taken as linear and cut to 0…1.
+//! taken as linear and clamped to 0…1.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -16,9 +16,9 @@ use numerics::vector::{Vec3, length};
 
 /// Attributes that are a colour by their name, where they are three or four wide; the first there is drawn.
 const COLOR_NAMES: [&str; 3] = ["Cd", "color", "displayColor"];
-/// What shows that a value is no number: no colour map and no default has it.
+/// Colour of values that are not finite: no colour map and no default has it.
 const NOT_A_NUMBER: Vec3 = [1.0, 0.0, 0.6];
-/// What has not the attribute that others are coloured by.
+/// Colour of components that lack the attribute shown.
 const WITHOUT: Vec3 = [0.30, 0.30, 0.31];
 
 /// Viridis (Nathaniel Smith and Stéfan van der Walt, CC0) at tenths, sRGB.
@@ -36,7 +36,7 @@ const MAP: [[u8; 3]; 11] = [
     [253, 231, 37],
 ];
 
-/// The colour of `share` (0…1, cut) of the range, sRGB: from dark violet over green to yellow, evenly lighter.
+/// The colour of `share` (clamped to 0…1) of the range, sRGB: dark violet over green to yellow, with lightness rising evenly.
 pub fn color_map(share: f32) -> [u8; 3] {
     encode(mapped(share))
 }
@@ -53,9 +53,9 @@ fn mapped(share: f32) -> Vec3 {
 }
 
 /// Least and greatest finite value of an attribute over all layers: of a vector its length, of `v` in a volume the
-/// speed of its liquid cells. `None` where no layer has a value, which a caller should say where it is a name's fault.
+/// speed of its liquid cells. `None` where no layer has a value.
 ///
-/// A sequence keeps one range by the union over its frames.
+/// For a sequence, take the union over its frames.
 pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
     let mut range = None::<[f32; 2]>;
     let mut take = |value: f32| {
@@ -94,11 +94,11 @@ pub(crate) const SPEED: &str = "v";
 /// The colour of each point or element.
 #[derive(Debug)]
 pub(crate) enum Paint {
-    /// All the same: nothing was measured, so light may play with it.
+    /// One colour that shows no attribute, so it is lit fully.
     Plain(Vec3),
-    /// A row a point.
+    /// One row per point.
     Points(Vec<Vec3>),
-    /// A row an element.
+    /// One row per element.
     Elements(Vec<Vec3>),
 }
 
@@ -129,7 +129,7 @@ impl Paint {
         }
     }
 
-    /// What a volume's surface with a row a point is painted with.
+    /// What a volume's surface is painted with, one row per point.
     pub(crate) fn of_speeds(speeds: Option<Vec<f32>>, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         match (speeds, color_by) {
             (Some(speeds), Some((_, range))) => {
@@ -194,7 +194,7 @@ pub(crate) fn decode(value: f32) -> f32 {
     (if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }) as f32
 }
 
-/// sRGB bytes of linear light, cut to 0…1.
+/// sRGB bytes of linear light, clamped to 0…1.
 pub(crate) fn encode(linear: Vec3) -> [u8; 3] {
     /// Steps of linear light: the finest byte step, near black, is 1.2 of them.
     const STEPS: usize = 4096;
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_over_all_layers_and_skips_what_is_no_number() {
+    fn a_range_is_over_all_layers_and_skips_what_is_not_finite() {
         let points = |values: Vec<f32>| {
             let mut part = Component::points(vec![[0.0; 3]; values.len()]);
             part.set_column(Owner::Point, "heat", Column::new(values)).unwrap();

@@ -1,4 +1,4 @@
-//! The floor the scene stands on: nothing but shadow on the backdrop, so that it has no horizon and hides nothing.
+//! The floor under the scene: only its shadow is drawn on the backdrop, so it has no horizon and hides nothing.
 //!
 //! Promise: the floor lies at the lowest point of the bounds and darkens only, softly: where the key light is blocked,
 //! and close under what nearly touches it. Limit: no shadow farther than `HALF` from the middle of the scene, none
@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::view::View;
 use numerics::vector::{Vec3, add, scale, sub};
 
-/// Half the side of the floor, stage units, and texels a side.
+/// Half the side of the floor, stage units, and texels per side.
 const HALF: f32 = 2.6;
 const TEXELS: usize = 320;
 /// Height at which something over the floor darkens it half as much as touching it, stage units.

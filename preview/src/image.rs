@@ -1,11 +1,11 @@
 //! Pictures: rows of sRGB bytes, put side by side or on a sheet, and written as PNG.
 //!
-//! Promise: the bytes of a PNG depend on the picture alone. Limit: 8 bits a channel, no alpha; at most
+//! Promise: the bytes of a PNG depend on the picture alone. Limit: 8 bits per channel, no alpha; at most
 //! [`Image::MOST_PIXELS`].
 
 use std::io::Write;
 
-use crate::Error;
+use crate::PreviewError;
 
 /// A picture of at least one pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,12 +28,12 @@ impl Image {
     ///
     /// # Errors
     /// Where it would have no pixel, or more than [`Image::MOST_PIXELS`].
-    pub fn filled(width: usize, height: usize, color: [u8; 3]) -> Result<Self, Error> {
+    pub fn filled(width: usize, height: usize, color: [u8; 3]) -> Result<Self, PreviewError> {
         match width.checked_mul(height) {
             Some(pixels) if (1..=Self::MOST_PIXELS).contains(&pixels) => {
                 Ok(Self { width, height, rows: vec![color; pixels] })
             }
-            _ => Err(Error::Size { width, height }),
+            _ => Err(PreviewError::Size { width, height }),
         }
     }
 
@@ -67,11 +67,11 @@ impl Image {
         }
     }
 
-    /// Writes the picture as PNG, 24 bits a pixel, packed as tightly as the encoder can.
+    /// Writes the picture as PNG, 24 bits per pixel, packed as tightly as the encoder can.
     ///
     /// # Errors
     /// Where `to` cannot be written.
-    pub fn write_png(&self, to: impl Write) -> Result<(), Error> {
+    pub fn write_png(&self, to: impl Write) -> Result<(), PreviewError> {
         let size = [self.width, self.height].map(|pixels| pixels as u32);
         let mut encoder = png::Encoder::new(to, size[0], size[1]);
         encoder.set_depth(png::BitDepth::Eight);
@@ -85,22 +85,21 @@ impl Image {
     }
 }
 
-/// Pictures in a row: outputs next to each other. Smaller ones hang from the top.
+/// Pictures in a row: outputs next to each other. Smaller ones are aligned at the top.
 ///
 /// # Errors
-/// Where there is none, or together they are too large.
-pub fn side_by_side(panels: &[Image]) -> Result<Image, Error> {
+/// Without pictures, or where they are too large together.
+pub fn side_by_side(panels: &[Image]) -> Result<Image, PreviewError> {
     contact_sheet(panels, panels.len())
 }
 
-/// Pictures in rows of `columns`, the last row as full as it gets: frames of a sequence. Each has the room of the
-/// largest.
+/// Pictures in rows of `columns`, for the frames of a sequence. Each gets the space of the largest.
 ///
 /// # Errors
-/// Where there is no picture or no column, or together they are too large.
-pub fn contact_sheet(panels: &[Image], columns: usize) -> Result<Image, Error> {
+/// Without pictures or columns, or where the sheet would be too large.
+pub fn contact_sheet(panels: &[Image], columns: usize) -> Result<Image, PreviewError> {
     if columns == 0 || panels.is_empty() {
-        return Err(Error::EmptySheet { panels: panels.len(), columns });
+        return Err(PreviewError::EmptySheet { panels: panels.len(), columns });
     }
     let columns = columns.min(panels.len());
     let rows = panels.len().div_ceil(columns);
@@ -164,14 +163,14 @@ mod tests {
 
     #[test]
     fn pictures_without_pixels_or_beyond_memory_are_refused() {
-        let text = |error: Result<Image, Error>| error.unwrap_err().to_string();
+        let text = |error: Result<Image, PreviewError>| error.unwrap_err().to_string();
         assert_eq!(text(Image::filled(0, 5, [0; 3])), "the picture is 0 × 5 pixels, expected 1 to 268435456 in all");
         assert!(Image::filled(usize::MAX, 2, [0; 3]).is_err());
         assert_eq!(text(side_by_side(&[])), "a sheet of 0 pictures in 0 columns, expected at least 1 of each");
     }
 
     #[test]
-    fn a_full_disk_is_an_error_and_no_panic() {
+    fn a_full_disk_is_an_error_not_a_panic() {
         struct Full;
         impl Write for Full {
             fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
@@ -181,6 +180,6 @@ mod tests {
                 Ok(())
             }
         }
-        assert!(matches!(gradient(9, 9).write_png(Full), Err(Error::Write(_))));
+        assert!(matches!(gradient(9, 9).write_png(Full), Err(PreviewError::Write(_))));
     }
 }

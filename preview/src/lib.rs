@@ -3,7 +3,7 @@
 //! Curves have width and are shaded along their tangent, meshes and the skins of tets are lit, points are balls, volumes
 //! show their zero level; an attribute can be the colour. [`render`] draws one panel; [`side_by_side`] and
 //! [`contact_sheet`] join panels; [`Image::write_png`] writes. For a sequence give every frame the same
-//! [`Settings::bounds`] (the [`union`] of [`bounds`]) and [`Settings::range`].
+//! [`PictureSettings::bounds`] (the [`union`] of [`bounds`]) and [`PictureSettings::range`].
 //!
 //! Promise: the same bits on any number of threads and any CPU; no panic and no endless work on any geometry. Limit: a
 //! preview, not a renderer: no textures, no transparency but of what is thinner than a pixel.
@@ -23,7 +23,7 @@ mod view;
 
 use engine::geometry::Geometry;
 
-pub use camera::{Bounds, Camera, CameraError};
+pub use camera::{BoundingBox, Camera, CameraError};
 pub use color::{attribute_names, attribute_range, color_map};
 pub use image::{Image, contact_sheet, side_by_side};
 pub use picture::render;
@@ -49,7 +49,7 @@ impl<'a> Layer<'a> {
 
 /// How a panel is drawn. Lengths in metres.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct PictureSettings {
     /// Pixels across.
     pub width: usize,
     /// Pixels down.
@@ -57,7 +57,7 @@ pub struct Settings {
     /// Where from; [`Camera::fit`] around the bounds else.
     pub camera: Option<Camera>,
     /// What the camera frames, the floor lies under and the light reaches; the layers' own bounds else.
-    pub bounds: Option<Bounds>,
+    pub bounds: Option<BoundingBox>,
     /// Attribute that gives the colour: a number, a vector by its length, or a colour by its name (`Cd`, `color`,
     /// `displayColor`). What has it not is grey. Without it such a colour attribute is drawn where there is one.
     pub color_by: Option<String>,
@@ -79,7 +79,7 @@ pub struct Settings {
     pub legend: bool,
 }
 
-impl Default for Settings {
+impl Default for PictureSettings {
     fn default() -> Self {
         Self {
             width: 960,
@@ -99,10 +99,10 @@ impl Default for Settings {
     }
 }
 
-/// Why there is no picture.
+/// Why a picture could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum PreviewError {
     /// No pixel, or too many.
     #[error("the picture is {width} × {height} pixels, expected 1 to {most} in all", most = Image::MOST_PIXELS)]
     Size {
@@ -124,7 +124,7 @@ pub enum Error {
     Write(#[source] std::io::Error),
 }
 
-impl From<png::EncodingError> for Error {
+impl From<png::EncodingError> for PreviewError {
     fn from(error: png::EncodingError) -> Self {
         Self::Write(error.into())
     }

@@ -2,7 +2,7 @@
 //!
 //! Surfaces are matt with a faint gloss. Strands are lit along their tangent (Kajiya and Kay, "Rendering fur with three
 //! dimensional textures", 1989): sin(T, L) of the light, and a highlight where the tangent mirrors it to the eye.
-//! Promise: values of an attribute keep their colour's order, as measured colours get less contrast and no gloss.
+//! Promise: colours that show an attribute keep their order, as they get less contrast and no gloss.
 //! Limit: one bounce; shadows have the grain of `MAP_PIXELS` pixels over the scene, and beyond its bounds there is none.
 
 use rayon::prelude::*;
@@ -21,16 +21,16 @@ const KEY_LIGHT: Vec3 = [1.04, 1.00, 0.94];
 const FILL_LIGHT: Vec3 = [0.17, 0.18, 0.20];
 const SKY_LIGHT: Vec3 = [0.36, 0.37, 0.40];
 const FLOOR_LIGHT: Vec3 = [0.20, 0.19, 0.18];
-/// How far round a surface the key reaches: the lamp is large.
+/// How far the key reaches round a surface, as from a large lamp.
 const WRAP: f32 = 0.12;
 const GLOSS: f32 = 0.04;
 const HAIR_GLOSS: f32 = 0.22;
-/// Light on a measured colour: from this in the dark to 1 in full light, so that no colour grows brighter than its own.
+/// Light on a colour that shows an attribute: from this in the dark to 1 in full light, so that none gets brighter.
 const MEASURED: f32 = 0.45;
 /// Full light: key, sky and fill on what faces them best.
 const FULL: f32 = 1.45;
 
-/// Pixels a side of a light's view, each of 16 samples.
+/// Pixels per side of a light's view, each of 16 samples.
 const MAP_PIXELS: usize = 192;
 /// Half the side of what a light's view shows, stage units: the scene's bounds lie within 1.
 const MAP_HALF: f32 = 1.05;
@@ -114,7 +114,7 @@ impl Light {
     }
 }
 
-/// A measured colour in `light`: its order is kept, as full light gives the colour itself.
+/// A colour that shows an attribute, in `light`; full light gives the colour itself.
 fn measured(color: Vec3, light: Vec3) -> Vec3 {
     times(color, mix(light.map(|x| (x / FULL).min(1.0)), [1.0; 3], MEASURED))
 }
@@ -159,7 +159,7 @@ impl DepthMap {
         2.0 * MAP_HALF / MAP_PIXELS as f32
     }
 
-    /// Share of the way to a point that is clear, where what is less than `slack` before the point does not count.
+    /// Share of the samples in which the point is not hidden; what is less than `slack` in front of it does not count.
     pub(crate) fn clear(&self, at: Vec3, slack: f32) -> f32 {
         let [x, y, nearness] = self.view.project(at);
         self.blend([x, y], 1.0, |lanes| {
@@ -189,7 +189,7 @@ impl DepthMap {
         sum
     }
 
-    /// Mean of `value` of the way from the map's plane to what is seen, over the samples near `at`; 0 where nothing is.
+    /// Mean of `value` of the distance from the map's plane to what is seen, over the samples near `at`; 0 where nothing is.
     pub(crate) fn seen(&self, at: Vec3, value: impl Fn(f32) -> f32) -> f32 {
         let [x, y, _] = self.view.project(at);
         self.blend([x, y], 0.0, |lanes| {
@@ -222,10 +222,10 @@ mod tests {
     }
 
     #[test]
-    fn the_way_to_what_is_seen_is_measured_from_the_plane() {
+    fn distance_to_what_is_seen_is_measured_from_the_plane() {
         let up = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
         let map = DepthMap::from(&roof(), [0.0, -1.0, 0.0], up);
-        assert!((map.seen([0.1, -1.0, 0.2], |way| way) - 1.5).abs() < 1e-5);
-        assert_eq!(map.seen([0.9, -1.0, 0.2], |way| way), 0.0);
+        assert!((map.seen([0.1, -1.0, 0.2], |distance| distance) - 1.5).abs() < 1e-5);
+        assert_eq!(map.seen([0.9, -1.0, 0.2], |distance| distance), 0.0);
     }
 }

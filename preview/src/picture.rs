@@ -9,21 +9,21 @@ use crate::raster::{self, SAMPLES, Screen, Shader, TILE, Tile, UNCOVERED};
 use crate::scene::{self, Scene};
 use crate::vector::{finite, mix, unit};
 use crate::view::{Stage, View};
-use crate::{Error, Layer, Settings, text};
+use crate::{Layer, PictureSettings, PreviewError, text};
 use numerics::vector::{Vec3, add, scale, sub};
 
-/// What is framed where there is nothing: a metre around the origin.
-const NOTHING: crate::Bounds = [[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]];
+/// Bounds of an empty scene: a metre around the origin.
+const NOTHING: crate::BoundingBox = [[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]];
 /// Share of the backdrop's light that the corners of the picture lose.
 const VIGNETTE: f32 = 0.30;
-/// Light that the edge of a thick strand loses: it is round.
+/// Light that a thick strand loses towards its edges, as it is round.
 const ROUND: f32 = 0.45;
 
 /// Draws the layers into one picture. Without anything to draw it is the backdrop.
 ///
 /// # Errors
 /// Where the picture would have no pixel, or too many.
-pub fn render(layers: &[Layer<'_>], settings: &Settings) -> Result<Image, Error> {
+pub fn render(layers: &[Layer<'_>], settings: &PictureSettings) -> Result<Image, PreviewError> {
     let size = [settings.width, settings.height];
     let mut image = Image::filled(size[0], size[1], settings.background)?;
     let bounds = settings.bounds.or_else(|| scene::bounds(layers)).unwrap_or(NOTHING);
@@ -88,7 +88,7 @@ impl Shader for Studio<'_> {
     }
 }
 
-/// What is seen where nothing is drawn.
+/// The background.
 struct Backdrop {
     light: Vec3,
     ground: Option<Ground>,

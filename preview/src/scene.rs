@@ -1,17 +1,17 @@
 //! What is drawn: the layers' components as triangles, strands and dots on the stage, painted but not yet lit.
 //!
 //! Promise: every component of every layer is there, in the order of the layers, then mesh, tets, volume, curves, points.
-//! Limit: what is not finite is left out, a triangle or CV alone and not its whole component.
+//! Limit: triangles and CVs that are not finite are left out, one by one.
 
 use engine::geometry::{Component, Kind, Owner, Volume, WIDTH};
 use rayon::prelude::*;
 
-use crate::camera::Bounds;
+use crate::camera::BoundingBox;
 use crate::color::{Paint, SPEED};
 use crate::shape::{boundary, level_set, smooth};
 use crate::vector::{finite, unit};
 use crate::view::Stage;
-use crate::{Layer, Settings};
+use crate::{Layer, PictureSettings};
 use numerics::vector::{Vec3, scale, sub};
 
 /// A corner of a triangle, with the normal there.
@@ -59,7 +59,7 @@ pub(crate) struct Scene {
     pub(crate) dots: Vec<Dot>,
 }
 
-/// Colours of what nothing else paints, linear light: clay, dark skin where curves may grow on it, putty, honey, brown
+/// Default colours, linear light: clay, dark skin where curves may grow on it, putty, honey, brown
 /// hair, water.
 const MESH: Vec3 = [0.50, 0.45, 0.39];
 const SKIN: Vec3 = [0.21, 0.135, 0.09];
@@ -68,24 +68,24 @@ const VOLUME: Vec3 = [0.58, 0.24, 0.035];
 const CURVES: Vec3 = [0.50, 0.26, 0.105];
 const POINTS: Vec3 = [0.12, 0.32, 0.60];
 
-/// Width of a curve that has none, as a share of half the scene's diagonal: hair on an animal that fills the picture.
+/// Default width of a curve, as a share of half the scene's diagonal: hair on an animal that fills the picture.
 const CURVE_WIDTH: f32 = 0.0035;
 /// Width of such a curve at its tip, as a share of its width at the root.
 const TIP: f32 = 0.3;
-/// Diameter of a point that has none, as a share of the distance points of that number have in half the scene's
-/// diagonal; and the least and greatest, so that one point is no moon and a million are more than dust.
+/// Default diameter of a point, as a share of the mean spacing of that many points in half the scene's diagonal, and its
+/// limits, so that single points are not too large and a million points still visible.
 const POINT_WIDTH: f32 = 1.1;
 const POINT_WIDTHS: [f32; 2] = [0.004, 0.06];
-/// Light at the root of a strand, as a share of the light at its tip: neighbours shade it there.
+/// Light at the root of a strand, as a share of that at its tip: neighbours shade the root.
 const ROOT: f32 = 0.5;
 /// How far a strand's colour may lie from the next one's.
 const STRAND_TINT: f32 = 0.22;
 
 /// Least and greatest coordinates of all that is drawn, metres; `None` where nothing is.
 ///
-/// Give the union over all frames and outputs as [`Settings::bounds`], and every picture is framed the same.
-pub fn bounds(layers: &[Layer<'_>]) -> Option<Bounds> {
-    let mut bounds = None::<Bounds>;
+/// Give the union over all frames and outputs as [`PictureSettings::bounds`], and every picture is framed the same.
+pub fn bounds(layers: &[Layer<'_>]) -> Option<BoundingBox> {
+    let mut bounds = None::<BoundingBox>;
     for layer in layers {
         for part in layer.geometry.parts() {
             let points = part.positions().iter().filter(|p| finite(**p));
@@ -104,7 +104,7 @@ pub fn bounds(layers: &[Layer<'_>]) -> Option<Bounds> {
 }
 
 /// The least box around both.
-pub fn union(a: Option<Bounds>, b: Option<Bounds>) -> Option<Bounds> {
+pub fn union(a: Option<BoundingBox>, b: Option<BoundingBox>) -> Option<BoundingBox> {
     match (a, b) {
         (Some([a, b]), Some([c, d])) => Some([[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))]),
         (one, other) => one.or(other),
@@ -113,7 +113,7 @@ pub fn union(a: Option<Bounds>, b: Option<Bounds>) -> Option<Bounds> {
 
 impl Scene {
     /// The layers' components on the stage.
-    pub(crate) fn of(layers: &[Layer<'_>], settings: &Settings, range: [f32; 2], stage: &Stage) -> Self {
+    pub(crate) fn of(layers: &[Layer<'_>], settings: &PictureSettings, range: [f32; 2], stage: &Stage) -> Self {
         let color_by = settings.color_by.as_deref().map(|name| (name, range));
         let mut scene = Self::default();
         let mesh_color = if layers.iter().any(|layer| layer.geometry.curves().is_some()) { SKIN } else { MESH };
@@ -251,7 +251,7 @@ fn place(points: &[Vec3], stage: &Stage) -> Vec<Vec3> {
     points.par_iter().map(|p| stage.place(*p)).collect()
 }
 
-/// Bits that look drawn at random (Wellons' lowbias32).
+/// A hash of the bits (Wellons' lowbias32).
 pub(crate) fn scramble(x: u32) -> u32 {
     let x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
     let x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
@@ -270,7 +270,7 @@ mod tests {
 
     fn scene(geometry: &Geometry) -> Scene {
         let stage = Stage::of([[-1.0; 3], [1.0; 3]]);
-        Scene::of(&[Layer::new("one", geometry)], &Settings::default(), [0.0, 1.0], &stage)
+        Scene::of(&[Layer::new("one", geometry)], &PictureSettings::default(), [0.0, 1.0], &stage)
     }
 
     #[test]

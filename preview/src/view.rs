@@ -4,7 +4,7 @@
 //! follows works with numbers near 1, whatever the scene's own scale. The screen is pixels, x right, y down, and a
 //! *nearness* that is linear on the screen and greater for what is nearer: 1/z in perspective, −z in parallel.
 
-use crate::camera::{Bounds, Camera, proper};
+use crate::camera::{BoundingBox, Camera, proper};
 use numerics::vector::{DVec3, Vec3, add, dot, scale, sub, to_f32, to_f64};
 
 /// Nothing nearer to a perspective eye than this is drawn, stage units: a thousandth of half the scene's diagonal.
@@ -14,12 +14,12 @@ pub(crate) const NEAR: f32 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stage {
     centre: DVec3,
-    /// Metres a stage unit.
+    /// Metres per stage unit.
     size: f64,
 }
 
 impl Stage {
-    pub(crate) fn of(bounds: Bounds) -> Self {
+    pub(crate) fn of(bounds: BoundingBox) -> Self {
         let [low, high] = proper(bounds);
         Self { centre: (low + high) * 0.5, size: (high - low).norm() * 0.5 }
     }
@@ -55,7 +55,7 @@ pub(crate) struct View {
     axes: [Vec3; 3],
     /// Pixel of the view's axis.
     middle: [f32; 2],
-    /// Pixels a stage unit, at distance 1 in perspective.
+    /// Pixels per stage unit, at distance 1 in perspective.
     zoom: f32,
     lens: Lens,
 }
@@ -97,7 +97,7 @@ impl View {
         self.lens == Lens::Perspective && self.distance(p) < NEAR
     }
 
-    /// x, y in pixels and nearness; of no meaning where [`View::is_behind`].
+    /// x, y in pixels and nearness; meaningless where [`View::is_behind`].
     pub(crate) fn project(&self, p: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| dot(axis, sub(p, self.eye)));
         let (shrink, nearness) = match self.lens {

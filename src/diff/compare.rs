@@ -1,8 +1,8 @@
-//! Two geometries, side by side: what one of them lacks, and how far apart the rest is.
+//! The differences of two geometries: what one of them lacks, and how far apart the rest is.
 //!
-//! Without a tolerance numbers are the same where their bits are. With one, floats are the same where they are no
-//! farther apart (and NaN where both are), and whole numbers where they are equal: an id is not nearly another one.
-//! Rows are compared in their order; where the numbers of rows differ, the counts are what is said. Differences are f64,
+//! Without a tolerance numbers are the same where their bits are. With one, floats are the same where they are at
+//! most that far apart (and where both are NaN), and whole numbers where they are equal: ids have no tolerance.
+//! Rows are compared in their order; where the numbers of rows differ, only the counts are reported. Differences are f64,
 //! summed in the order of the rows.
 
 use std::collections::BTreeSet;
@@ -33,21 +33,21 @@ pub(super) enum What {
     Component(Side),
     /// Numbers of points or elements.
     Count { of: &'static str, counts: [usize; 2] },
-    /// As many elements, but `differing` of them join other points.
+    /// The same number of elements, `differing` of which have other points.
     Topology { of: &'static str, differing: usize, elements: usize, first: usize },
     /// The grids of two volumes: of the level set, of the velocity, or of both.
     Grid { of: &'static str, grids: [Grid; 2] },
     /// Only this side has the attribute.
-    Attribute(Place, Side),
+    Attribute(AttributePath, Side),
     /// An attribute of two types.
-    Type(Place, [ColumnType; 2]),
+    Type(AttributePath, [ColumnType; 2]),
     /// The numbers of an attribute.
-    Values(Place, Values),
+    Values(AttributePath, Values),
 }
 
 /// Which attribute. One without an owner is a field of a volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct AttributePath {
     pub(super) owner: Option<Owner>,
     pub(super) name: Name,
 }
@@ -71,7 +71,7 @@ pub(super) struct Values {
     pub(super) first: Option<First>,
 }
 
-/// A number that is not the same: its row, its place there, and both its values.
+/// A number that is not the same: its row, its position in the row, and both values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct First {
     pub(super) row: usize,
@@ -149,7 +149,7 @@ impl Findings {
         if elements != b.len() {
             return self.count(of, elements, b.len());
         }
-        let mut differing = a.zip(b).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
+        let mut differing = a.zip(b).enumerate().filter(|(_, (a, b))| a != b).map(|(index, _)| index);
         if let Some(first) = differing.next() {
             self.add(What::Topology { of, differing: 1 + differing.count(), elements, first });
         }
@@ -158,16 +158,16 @@ impl Findings {
     fn tables(&mut self, owner: Owner, a: &Table, b: &Table) {
         let names: BTreeSet<&Name> = a.iter().chain(b.iter()).map(|(name, _)| name).collect();
         for name in names {
-            let place = Place { owner: Some(owner), name: name.clone() };
+            let attribute = AttributePath { owner: Some(owner), name: name.clone() };
             match (a.column(name), b.column(name)) {
-                (Some(a), Some(b)) => self.columns(place, a, b),
-                (Some(_), None) => self.add(What::Attribute(place, Side::A)),
-                (None, _) => self.add(What::Attribute(place, Side::B)),
+                (Some(a), Some(b)) => self.columns(attribute, a, b),
+                (Some(_), None) => self.add(What::Attribute(attribute, Side::A)),
+                (None, _) => self.add(What::Attribute(attribute, Side::B)),
             }
         }
     }
 
-    fn columns(&mut self, place: Place, a: &Column, b: &Column) {
+    fn columns(&mut self, attribute: AttributePath, a: &Column, b: &Column) {
         // Formats need not say the type of a column without rows.
         if a.len() != b.len() || a.is_empty() {
             return;
@@ -180,10 +180,10 @@ impl Findings {
             (Column::I1(a), Column::I1(b)) => values(a.as_chunks::<1>().0, b.as_chunks().0, kind, None),
             (Column::I3(a), Column::I3(b)) => values(a, b, kind, None),
             (Column::I4(a), Column::I4(b)) => values(a, b, kind, None),
-            _ => return self.add(What::Type(place, [kind, b.kind()])),
+            _ => return self.add(What::Type(attribute, [kind, b.kind()])),
         };
         if let Some(values) = values {
-            self.add(What::Values(place, values));
+            self.add(What::Values(attribute, values));
         }
     }
 
@@ -201,7 +201,7 @@ impl Findings {
         // A volume that was read from a file fits dense arrays: it came from some.
         let dense = |field: &SparseField| Column::new(field.to_dense().unwrap_or_default());
         for ((name, a), (_, b)) in a.fields().into_iter().zip(b.fields()) {
-            self.columns(Place { owner: None, name: name.into() }, &dense(a), &dense(b));
+            self.columns(AttributePath { owner: None, name: name.into() }, &dense(a), &dense(b));
         }
         self.tables(Owner::Once, a.once(), b.once());
     }
@@ -244,14 +244,14 @@ fn values<const N: usize, T: Number>(
     let mut found =
         Values { kind, numbers, differing: 0, not_finite: 0, largest: 0.0, largest_row: 0, mean: 0.0, first: None };
     let (mut unequal, mut sum) = (0, 0.0);
-    for (place, (a, b)) in a.as_flattened().iter().zip(b.as_flattened()).enumerate() {
+    for (index, (a, b)) in a.as_flattened().iter().zip(b.as_flattened()).enumerate() {
         if a.bits() == b.bits() {
             continue;
         }
         unequal += 1;
         let values = [a.value(), b.value()];
         let distance = (values[0] - values[1]).abs();
-        let (row, lane) = (place / N, place % N);
+        let (row, lane) = (index / N, index % N);
         if distance.is_finite() {
             sum += distance;
             if distance > found.largest {
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tolerance_is_met_by_what_is_as_far_apart_and_no_farther() {
+    fn a_tolerance_includes_differences_equal_to_it() {
         let (a, b) = (points(&[[0.0, 1.0, 2.0]]), points(&[[0.0, 1.25, 2.5]]));
         let differing = |tolerance| only_values(&a, &b, Some(tolerance)).differing;
         assert_eq!((differing(0.5), differing(0.499), differing(0.249)), (0, 1, 2));
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_is_near_nothing_but_nan() {
+    fn nan_equals_only_nan() {
         let (a, b) = (points(&[[f32::NAN, 1.0, 0.0]]), points(&[[1.0, 1.0, f32::INFINITY]]));
         let values = only_values(&a, &b, Some(1e9));
         assert_eq!((values.differing, values.not_finite, values.largest, values.mean), (2, 2, 0.0, 0.0));
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_know_no_tolerance() {
+    fn integers_have_no_tolerance() {
         let with_id = |id| {
             let mut points = Component::points(vec![[0.0; 3]]);
             points.set(ID, vec![id]).unwrap();
@@ -346,14 +346,14 @@ mod tests {
         let whats = |a: &Geometry, b: &Geometry| -> Vec<What> {
             compare(a, b, None).into_iter().map(|finding| finding.what).collect()
         };
-        let envelope = Place { owner: Some(Owner::Point), name: "envelope".into() };
+        let envelope = AttributePath { owner: Some(Owner::Point), name: "envelope".into() };
         assert_eq!(whats(&curves.clone().into(), &bare), [What::Attribute(envelope.clone(), Side::A)]);
         assert_eq!(whats(&bare, &curves.into()), [What::Attribute(envelope, Side::B)]);
         assert_eq!(whats(&bare, &Geometry::default()), [What::Component(Side::A)]);
     }
 
     #[test]
-    fn other_counts_are_said_and_the_numbers_left() {
+    fn different_counts_are_reported_without_values() {
         let curves = |counts: &[u32]| {
             let points = counts.iter().sum::<u32>() as usize;
             Geometry::from(Component::curves(counts.to_vec(), vec![[0.0; 3]; points]).unwrap())
@@ -380,8 +380,8 @@ mod tests {
         };
         assert_eq!(compare(&with(Column::new::<i32>(vec![]), 0), &with(Column::new::<f32>(vec![]), 0), None), []);
         let found = compare(&with(Column::new(vec![1]), 1), &with(Column::new(vec![1.0_f32]), 1), None);
-        let place = Place { owner: Some(Owner::Point), name: "mask".into() };
-        assert_eq!(found[0].what, What::Type(place, [ColumnType::I1, ColumnType::F1]));
+        let attribute = AttributePath { owner: Some(Owner::Point), name: "mask".into() };
+        assert_eq!(found[0].what, What::Type(attribute, [ColumnType::I1, ColumnType::F1]));
     }
 
     #[test]
@@ -395,6 +395,6 @@ mod tests {
         assert_eq!(compare(&volume(0.5, 1.0), &volume(0.5, 1.0), None), []);
         let found = compare(&volume(0.5, 1.0), &volume(0.25, 2.0), None);
         assert!(matches!(found[0].what, What::Grid { of: "grid", .. }));
-        assert!(matches!(&found[1].what, What::Values(place, _) if &*place.name == "level_set"));
+        assert!(matches!(&found[1].what, What::Values(attribute, _) if &*attribute.name == "level_set"));
     }
 }

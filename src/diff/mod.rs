@@ -16,13 +16,13 @@ use pairs::{Pair, pairs};
 
 /// What `diff` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
-    /// An obj, ply or json file; a folder of such; or a numbered sequence: fur.####.json
+pub struct DiffArgs {
+    /// An obj, ply or json file, a folder of them, or a numbered sequence: fur.####.json
     a: PathBuf,
     /// What to compare it with; the formats may differ
     b: PathBuf,
-    /// Floats no farther apart than this are the same: metres for `P`, an attribute's own unit else. Without it every
-    /// bit counts. Whole numbers are compared exactly
+    /// Floats that differ by at most this are the same, in the attribute's unit (metres for `P`); without it every bit
+    /// counts. Integers are always compared exactly
     #[arg(long, value_name = "T", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Print as JSON
@@ -32,7 +32,7 @@ pub struct Args {
 
 fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| format!("`{text}` is no tolerance; expected a number of at least 0"))
+    number.ok_or_else(|| format!("`{text}` is not a tolerance, expected a number of at least 0"))
 }
 
 /// Two files, and what of them is not the same.
@@ -51,7 +51,7 @@ impl Compared {
 ///
 /// # Errors
 /// With [`Exit::File`] where something differs, with [`Exit::CommandLine`] for any trouble.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let trouble = |failure: Failure| Failure { exit: Exit::CommandLine, ..failure };
     let compared = |pair: Pair| -> Result<Compared, Failure> {
         let findings = match (&pair.a, &pair.b) {
@@ -61,18 +61,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Ok(Compared { pair, findings })
     };
     let all: Vec<_> = pairs(&args.a, &args.b).map_err(trouble)?.into_par_iter().map(compared).collect();
-    // In the order of the pairs, so that of several troubles the same one is always told.
+    // In the order of the pairs, so that of several errors the same one is always reported.
     let all = all.into_iter().collect::<Result<Vec<_>, _>>().map_err(trouble)?;
     let text = match args.json {
         true => show::json(&all, args.tolerance),
         false => show::text(&all, args.tolerance),
     };
     let written = std::io::stdout().write_all(text.as_bytes());
-    // Whoever reads no further still asks for the exit code.
+    // A closed stdout does not change the exit code.
     if let Err(error) = written.as_ref().map_err(std::io::Error::kind)
         && error != ErrorKind::BrokenPipe
     {
         return written.map_err(|error| trouble(error.into()));
     }
-    if all.iter().any(Compared::differs) { Err(Failure::told(Exit::File)) } else { Ok(()) }
+    if all.iter().any(Compared::differs) { Err(Failure::reported(Exit::File)) } else { Ok(()) }
 }

@@ -1,4 +1,4 @@
-//! Which files of A are compared with which of B: two files, two folders file by file, or two numbered sequences frame
+//! Which files of A are compared with which of B: two files, two folders, file by file, or two numbered sequences frame
 //! by frame.
 
 use std::collections::BTreeMap;
@@ -24,14 +24,14 @@ pub(super) struct Pair {
 pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
     match (Numbered::of(a)?, Numbered::of(b)?) {
         (Some(a), Some(b)) => return Ok(joined(a.find()?, b.find()?)),
-        (Some(_), None) => return Err(unlike(a, b, "a numbered sequence")),
-        (None, Some(_)) => return Err(unlike(b, a, "a numbered sequence")),
+        (Some(_), None) => return Err(not_a_pair(a, b, "a numbered sequence")),
+        (None, Some(_)) => return Err(not_a_pair(b, a, "a numbered sequence")),
         (None, None) => {}
     }
     match (a.is_dir(), b.is_dir()) {
         (false, false) => return Ok(vec![Pair { a: Some(a.to_owned()), b: Some(b.to_owned()) }]),
-        (true, false) => return Err(unlike(a, b, "a folder")),
-        (false, true) => return Err(unlike(b, a, "a folder")),
+        (true, false) => return Err(not_a_pair(a, b, "a folder")),
+        (false, true) => return Err(not_a_pair(b, a, "a folder")),
         (true, true) => {}
     }
     let pairs = joined(geometry_files(a)?, geometry_files(b)?);
@@ -42,8 +42,8 @@ pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
     Ok(pairs)
 }
 
-fn unlike(one: &Path, other: &Path, what: &str) -> Failure {
-    let line = format!("`{}` is {what} and `{}` is not; give two of a kind", one.display(), other.display());
+fn not_a_pair(one: &Path, other: &Path, what: &str) -> Failure {
+    let line = format!("`{}` is {what} and `{}` is not; give two of the same kind", one.display(), other.display());
     Failure::new(Exit::CommandLine, line)
 }
 
@@ -59,7 +59,7 @@ fn joined<K: Ord>(a: Vec<(K, PathBuf)>, b: Vec<(K, PathBuf)>) -> Vec<Pair> {
     pairs.into_values().collect()
 }
 
-/// The geometry files in a folder by name; hidden ones are nobody's results.
+/// The geometry files in a folder by name; hidden ones are temporary.
 fn geometry_files(folder: &Path) -> Result<Vec<(String, PathBuf)>, Failure> {
     let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
     let mut files = Vec::new();
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_are_joined_by_name_and_hold_more_than_geometry() {
+    fn folders_are_paired_by_name_and_other_files_ignored() {
         let a = folder(&["fur.0001.json", "fur.0002.json", "preview.png", ".fur.0003.json"]);
         let b = folder(&["fur.0002.json", "skin.0001.obj", "log.txt"]);
         let pairs = pairs(a.path(), b.path()).unwrap();
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn sequences_are_joined_by_frame() {
+    fn sequences_are_paired_by_frame() {
         let a = folder(&["fur.0001.json", "fur.0010.json"]);
         let b = folder(&["fur_10.ply"]);
         let pairs = pairs(&a.path().join("fur.####.json"), &b.path().join("fur_##.ply")).unwrap();
@@ -111,7 +111,7 @@ mod tests {
     fn a_folder_and_a_file_are_not_compared() {
         let a = folder(&["fur.json"]);
         let error = pairs(a.path(), &a.path().join("fur.json")).unwrap_err();
-        assert!(error.lines[0].ends_with("fur.json` is not; give two of a kind"), "{error:?}");
+        assert!(error.lines[0].ends_with("fur.json` is not; give two of the same kind"), "{error:?}");
         assert!(pairs(&folder(&[]).path().join("a.#.json"), a.path()).is_err());
         let error = pairs(folder(&["a.txt"]).path(), folder(&[]).path()).unwrap_err();
         assert!(error.lines[0].ends_with("has a geometry file"), "{error:?}");

@@ -7,7 +7,7 @@ use engine::geometry::{ColumnType, Kind, Owner};
 use serde_json::{Value, json};
 
 use super::Compared;
-use super::compare::{Finding, Place, Side, Values, What};
+use super::compare::{AttributePath, Finding, Side, Values, What};
 use crate::numbers::{decimal, short};
 
 /// JSON: `same`, and a list of pairs with what was found, differences within the tolerance included.
@@ -28,9 +28,9 @@ pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
 fn finding_json(finding: &Finding) -> Value {
     let mut object = json!({"component": finding.kind.name(), "same": !finding.differs()});
     let mut put = |key: &str, value: Value| object[key] = value;
-    if let What::Attribute(place, _) | What::Type(place, _) | What::Values(place, _) = &finding.what {
-        put("attribute", json!(*place.name));
-        put("of", json!(row_name(finding.kind, place.owner)));
+    if let What::Attribute(attribute, _) | What::Type(attribute, _) | What::Values(attribute, _) = &finding.what {
+        put("attribute", json!(*attribute.name));
+        put("of", json!(row_name(finding.kind, attribute.owner)));
     }
     match &finding.what {
         What::Component(side) | What::Attribute(_, side) => put("only_in", json!(side_name(*side))),
@@ -93,8 +93,8 @@ pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
         let named = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
         let (a, b) = (named(&one.pair.a), named(&one.pair.b));
         match (&one.pair.a, &one.pair.b) {
-            (Some(_), None) => _ = writeln!(text, "{a}: nothing to compare it with"),
-            (None, _) => _ = writeln!(text, "{b}: nothing to compare it with"),
+            (Some(_), None) => _ = writeln!(text, "{a}: no file to compare it with"),
+            (None, _) => _ = writeln!(text, "{b}: no file to compare it with"),
             _ if all.len() > 1 && one.differs() => _ = writeln!(text, "{a} and {b}:"),
             _ => {}
         }
@@ -106,7 +106,7 @@ pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
     let differing = all.iter().filter(|one| one.differs()).count();
     let _ = match (differing, tolerance) {
         (0, None) => writeln!(text, "the same"),
-        (0, Some(tolerance)) => writeln!(text, "the same within {tolerance}{}", nearest_miss(all)),
+        (0, Some(tolerance)) => writeln!(text, "the same within {tolerance}{}", largest_difference(all)),
         (_, _) if all.len() > 1 => writeln!(text, "different: {differing} of {} pairs", all.len()),
         _ => writeln!(text, "different"),
     };
@@ -114,14 +114,14 @@ pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
 }
 
 /// How far apart what counts as the same is, where it is.
-fn nearest_miss(all: &[Compared]) -> String {
+fn largest_difference(all: &[Compared]) -> String {
     let largest = all.iter().flat_map(|one| &one.findings).filter_map(|finding| match &finding.what {
-        What::Values(place, values) => Some((values.largest, place, finding.kind)),
+        What::Values(attribute, values) => Some((values.largest, attribute, finding.kind)),
         _ => None,
     });
     match largest.max_by(|(a, ..), (b, ..)| a.total_cmp(b)) {
-        Some((largest, place, kind)) => format!("; `{}` of {kind} is {} apart", place.name, short(largest)),
-        None => "; every bit is".to_owned(),
+        Some((largest, attribute, kind)) => format!("; `{}` of {kind} is {} apart", attribute.name, short(largest)),
+        None => ", bit for bit".to_owned(),
     }
 }
 
@@ -129,10 +129,10 @@ fn line(finding: &Finding, a: &str, b: &str) -> String {
     let side = |side: Side| if side == Side::A { a } else { b };
     match &finding.what {
         What::Component(there) => format!("only in {}", side(*there)),
-        What::Attribute(place, there) => format!("`{}`: only in {}", place.name, side(*there)),
+        What::Attribute(attribute, there) => format!("`{}`: only in {}", attribute.name, side(*there)),
         What::Count { of, counts: [a, b] } => format!("{a} {of} and {b}"),
         What::Topology { of, differing, elements, first } => {
-            format!("{differing} of {elements} {of} join other points; the first is {first}")
+            format!("{differing} of {elements} {of} have other points; the first is {first}")
         }
         What::Grid { of, grids: [a, b] } => {
             let grid = |grid: &engine::geometry::Grid| {
@@ -141,25 +141,25 @@ fn line(finding: &Finding, a: &str, b: &str) -> String {
             };
             format!("{of}: {} and {}", grid(a), grid(b))
         }
-        What::Type(place, [a, b]) => format!("`{}`: {a} and {b}", place.name),
-        What::Values(place, values) => values_line(finding.kind, place, values),
+        What::Type(attribute, [a, b]) => format!("`{}`: {a} and {b}", attribute.name),
+        What::Values(attribute, values) => values_line(finding.kind, attribute, values),
     }
 }
 
-fn values_line(kind: Kind, place: &Place, values: &Values) -> String {
+fn values_line(kind: Kind, attribute: &AttributePath, values: &Values) -> String {
     let Values { numbers, differing, not_finite, .. } = values;
-    let name = row_name(kind, place.owner);
-    let mut line = format!("`{}`: {differing} of {numbers} numbers differ", place.name);
+    let name = row_name(kind, attribute.owner);
+    let mut line = format!("`{}`: {differing} of {numbers} numbers differ", attribute.name);
     let _ = match values.largest > 0.0 {
         true => {
             let (largest, row, mean) = (short(values.largest), values.largest_row, short(values.mean));
             write!(line, ", by at most {largest} ({name} {row}) and {mean} on average")
         }
-        false if *not_finite == 0 => write!(line, ", but only in the sign of zero; --tolerance 0 passes over that"),
+        false if *not_finite == 0 => write!(line, ", but only in the sign of zero, which --tolerance 0 ignores"),
         false => Ok(()),
     };
     if *not_finite > 0 {
-        let _ = write!(line, ", {not_finite} of them without end");
+        let _ = write!(line, ", {not_finite} of them NaN or infinite");
     }
     if let Some(first) = values.first {
         let axis = if values.kind.width() > 1 { format!("[{}]", first.lane) } else { String::new() };

@@ -74,7 +74,7 @@ fn numbers(column: &Column) -> Vec<f64> {
 /// Measurements that only one kind of component has.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
-    /// CVs a curve, and lengths in metres.
+    /// CVs per curve, and lengths in metres.
     Curves { cvs: Option<Spread>, length: Option<Spread> },
     /// Faces.
     Mesh(SurfaceStats),

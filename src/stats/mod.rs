@@ -12,10 +12,10 @@ use crate::geometry_file::read;
 
 /// What `stats` takes.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct StatsArgs {
     /// An obj, ply or json file
     file: PathBuf,
-    /// Print as JSON, with all digits; text is rounded to six
+    /// Print as JSON, with all digits (text is rounded to six)
     #[arg(long)]
     json: bool,
 }
@@ -24,7 +24,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Where the file cannot be read or stdout cannot be written.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &StatsArgs) -> Result<(), Failure> {
     let file = read(&args.file)?;
     let stats = measure::stats(&file.geometry);
     let name = args.file.display().to_string();

@@ -122,7 +122,7 @@ pub(super) fn text(name: &str, file: &GeometryFile, stats: &Stats) -> String {
         volume_text(volume, &mut text);
     }
     if stats.parts.is_empty() && stats.volume.is_none() {
-        text += "no component\n";
+        text += "no components\n";
     }
     text
 }

@@ -70,7 +70,7 @@ fn explain_shows_how_far_back_a_window_reads_and_its_cost() {
     );
     // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors, each but the first run up from 9 earlier.
     let text = bench.done(&["explain", "g.json"]);
-    assert!(text.contains("186 steps for 96 frames: it looks back 9, from anchors every 9"), "{text}");
+    assert!(text.contains("186 steps for 96 frames: window of 9 frames, restarted every 9"), "{text}");
     let plan = bench.json(&["explain", "g.json", "--json"]);
     assert_eq!(plan["nodes"][2]["window"], json!({"frames": 9, "every": 9}));
     assert_eq!(plan["nodes"][1]["window"], Value::Null);

@@ -82,7 +82,7 @@ fn a_sequence_without_a_valid_target_or_files_is_refused() {
     let line = "4 files cannot become one ply file; write all.####.ply\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), line));
     let ran = bench.run(&["convert", "out/fur.####.json", "fur.usdc"]);
-    let line = "no file is called `out/fur.####.json` with a frame number\n";
+    let line = "no file matches `out/fur.####.json`\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
     let ran = bench.run(&["convert", "out/grass.####.json", "none/grass.####.ply"]);
     let line = "`none/grass.0001.ply` could not be created: no such file or folder; \
@@ -103,7 +103,7 @@ fn conversion_scales_lengths() {
     let expected = json!({"v": [[2.0, 0.0, 0.0]], "width": [0.1], "heat": [3.5]});
     assert_eq!((&points["points"], &points["point_attributes"]), (&json!([[1.0, 0.0, 0.5]]), &expected));
     let ran = bench.run(&["convert", "a.json", "c.usdc", "--scale", "1e37"]);
-    let line = "`a.json`: `P` of points times 1e37 is more than an f32 holds\n";
+    let line = "`a.json`: `P` of points times 1e37 is out of the range of f32\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
 }
 

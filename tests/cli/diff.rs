@@ -77,7 +77,7 @@ fn folders_are_compared_file_by_file() {
         files.iter().for_each(|file| bench.write(&format!("{folder}/{file}"), &points("[[0, 0, 0]]")));
     }
     bench.write("y/preview.png", "no geometry");
-    let lines = "x/f.0002.json: nothing to compare it with\ny/f.0003.json: nothing to compare it with\n\
+    let lines = "x/f.0002.json: no file to compare it with\ny/f.0003.json: no file to compare it with\n\
                  different: 2 of 3 pairs\n";
     assert_eq!(ran(&bench, &["x", "y"]), (Some(1), lines.into()));
     assert_eq!(ran(&bench, &["x", "x"]), (Some(0), "the same\n".into()));

@@ -178,7 +178,7 @@ fn input_files_are_never_overwritten() {
     };
     let over = run(&["cook", "h.json", "--out", ".", "--format", "obj"]);
     assert_eq!(over.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&over.stderr).contains("would be written over, but the graph reads it"));
+    assert!(String::from_utf8_lossy(&over.stderr).contains("would be overwritten, but the graph reads it"));
     let over = run(&["cook", "h.json", "--report", "h.json"]);
     assert_eq!(over.status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(bench.path("h.json")).unwrap(), graph);

@@ -53,7 +53,8 @@ fn a_requested_attribute_that_no_frame_has_is_noted() {
 #[test]
 fn what_a_format_drops_is_noted_once_per_output() {
     let bench = two_curves(r#""attributes": {"gain": [0.0, 1.0, 2.0, 3.0]}, "width": 0.1"#, r#""wind""#);
-    let expected = ["output `o` is without `gain` of curves, `width` of curves: obj cannot hold it; usdc and json can"];
+    let expected =
+        ["output `o` was written without `gain` of curves, `width` of curves: obj cannot hold it; usdc and json can"];
     assert_eq!(notes(&bench, &["--format", "obj"]), expected);
     for format in ["ply", "json", "usdc"] {
         assert_eq!(notes(&bench, &["--format", format]), [""; 0], "{format}");
@@ -61,7 +62,7 @@ fn what_a_format_drops_is_noted_once_per_output() {
     let bench = Bench::with_graph(
         r#"{"convect": 1, "nodes": {"none": {"type": "Curve_In", "params": {"points": []}}}, "outputs": {"o": "none"}}"#,
     );
-    let expected = ["output `o` is without the curves without a point: ply cannot hold it; usdc and json can"];
+    let expected = ["output `o` was written without the curves without a point: ply cannot hold it; usdc and json can"];
     assert_eq!(notes(&bench, &["--format", "ply"]), expected);
 }
 

@@ -84,7 +84,7 @@ fn tets_volumes_and_points_are_measured_too() {
 fn a_file_without_geometry_says_so() {
     let bench = Bench::new();
     bench.write("empty.json", "{}");
-    assert_eq!(bench.done(&["stats", "empty.json"]), "empty.json: json, 2 bytes\nno component\n");
+    assert_eq!(bench.done(&["stats", "empty.json"]), "empty.json: json, 2 bytes\nno components\n");
 }
 
 #[test]

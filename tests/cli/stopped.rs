@@ -49,7 +49,11 @@ fn ctrl_c_leaves_whole_frames_and_no_temporary() {
     for (place, name) in files.iter().enumerate() {
         assert_eq!(bench.read_json(&format!("out/{name}"))["frame"], place + 1);
     }
-    assert!(ran.stderr.contains(&format!("interrupted; {} whole frames were written", files.len())), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains(&format!("interrupted; {} complete frames were written", files.len())),
+        "{}",
+        ran.stderr
+    );
     assert_eq!(bench.read_json("report.json")["total"]["interrupted"], true);
 }
 
@@ -95,7 +99,7 @@ fn ctrl_c_stops_a_conversion_between_two_files() {
     wait_for(5, &bench.path("out"));
     signal("INT", &child);
     let ran = ended(child);
-    assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), "interrupted; what is there is whole\n"));
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(130), "interrupted; the files written so far are complete\n"));
     assert!(bench.names("out").iter().all(|name| name.starts_with("a.")), "no temporary is left");
 }
 

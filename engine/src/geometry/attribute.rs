@@ -41,17 +41,17 @@ pub struct Attr<T> {
 }
 
 impl<T: Item> Attr<T> {
-    /// A handle of an attribute with a row a point.
+    /// A handle of an attribute with one row per point.
     pub const fn point(name: &'static str) -> Self {
         Self { name, owner: Owner::Point, row: PhantomData }
     }
 
-    /// A handle of an attribute with a row an element.
+    /// A handle of an attribute with one row per element.
     pub const fn element(name: &'static str) -> Self {
         Self { name, owner: Owner::Element, row: PhantomData }
     }
 
-    /// A handle of an attribute with one row a component.
+    /// A handle of an attribute with one row per component.
     pub const fn once(name: &'static str) -> Self {
         Self { name, owner: Owner::Once, row: PhantomData }
     }

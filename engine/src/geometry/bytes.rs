@@ -1,4 +1,4 @@
-//! A geometry as bytes, every bit of it, and back: what the disk cache and the checkpoints of solvers keep.
+//! A geometry as bytes, every bit of it, and back: for the disk cache and solver checkpoints.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ impl Geometry {
         out
     }
 
-    /// The inverse of [`Geometry::to_bytes`]; `None` where they are anything else.
+    /// The inverse of [`Geometry::to_bytes`]; `None` for any other bytes.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         Reader(bytes).geometry()
     }
@@ -84,7 +84,7 @@ fn encode_table(out: &mut Vec<u8>, table: &Table) {
     }
 }
 
-/// What of some bytes is not read yet; each read is `None` where they end too soon.
+/// The bytes not read yet; each read is `None` where they end too early.
 pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_written_is_read_and_nothing_else() {
+    fn only_what_was_written_is_read_back() {
         let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.5; 3], [1.0; 3], [-0.0, 2.0, f32::MIN]]).unwrap();
         let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[1.0; 3]; 4]).unwrap();
         let geometry = Geometry::from(mesh).with(tets);

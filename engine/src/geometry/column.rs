@@ -1,7 +1,7 @@
 //! Columns and tables: named typed arrays, shared copy-on-write.
 //!
-//! A clone shares; a write copies only what others still hold. Pointer equality ([`Column::same`]) is therefore
-//! proof that nothing was touched, and the tests use it as such.
+//! A clone shares; a write copies only what others still hold. Equal addresses ([`Column::same`]) therefore prove that
+//! nothing was written, and the tests rely on it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,24 +11,24 @@ use super::GeometryError;
 /// A name of an attribute, cheap to clone.
 pub type Name = Arc<str>;
 
-/// One named array: f32 or i32, 1, 3 or 4 wide.
+/// One named array: f32 or i32 rows of 1, 3 or 4 numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
-    /// A number a row.
+    /// One number per row.
     F1(Arc<Vec<f32>>),
-    /// A vector a row.
+    /// One vector per row.
     F3(Arc<Vec<[f32; 3]>>),
-    /// Four numbers a row: a quaternion, a colour with alpha.
+    /// Four numbers per row: a quaternion, a colour with alpha.
     F4(Arc<Vec<[f32; 4]>>),
-    /// A whole number a row.
+    /// One integer per row.
     I1(Arc<Vec<i32>>),
-    /// Three whole numbers a row.
+    /// Three integers per row.
     I3(Arc<Vec<[i32; 3]>>),
-    /// Four whole numbers a row.
+    /// Four integers per row.
     I4(Arc<Vec<[i32; 4]>>),
 }
 
-/// What a column holds a row.
+/// The type of a column's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
     /// f32
@@ -46,7 +46,7 @@ pub enum ColumnType {
 }
 
 impl ColumnType {
-    /// Numbers a row.
+    /// Numbers per row.
     pub fn width(self) -> usize {
         match self {
             Self::F1 | Self::I1 => 1,
@@ -153,7 +153,7 @@ impl Column {
         self.kind() == other.kind() && self.address() == other.address()
     }
 
-    /// Where the array lies: equal addresses mean one shared array.
+    /// The array's address: equal addresses mean one shared array.
     pub fn address(&self) -> usize {
         each!(self, a => Arc::as_ptr(a) as usize)
     }
@@ -281,13 +281,13 @@ impl Table {
         Ok(())
     }
 
-    /// The rows of that name for writing, where they are of type `T`; copied first if anyone else holds them.
+    /// The rows of that name for writing, where they are of type `T`; copied first if shared.
     pub fn edit<T: Item>(&mut self, name: &str) -> Option<&mut [T]> {
         let column = Arc::make_mut(&mut self.columns).get_mut(name)?;
         T::array_mut(column).map(|array| Arc::make_mut(array).as_mut_slice())
     }
 
-    /// Takes a column out.
+    /// Removes a column.
     pub fn remove(&mut self, name: &str) -> Option<Column> {
         if !self.columns.contains_key(name) {
             return None;
@@ -311,8 +311,8 @@ impl Table {
         Self { rows: rows.len(), columns: Arc::new(columns) }
     }
 
-    /// This table's rows, then `other`'s. A column that one of them lacks, or holds with another type, is zero there
-    /// (the type is that of the first that has it).
+    /// This table's rows, then `other`'s. Where one of them lacks a column, or has it with another type, its
+    /// rows are zero (the type is that of the first table that has it).
     pub fn concat(&self, other: &Self) -> Self {
         let mut columns = BTreeMap::new();
         for (name, column) in self.iter() {

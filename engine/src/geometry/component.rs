@@ -1,4 +1,4 @@
-//! A component: points, how they hang together, and their attributes.
+//! A component: points, their topology and their attributes.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::derived::Derived;
 use super::topology::{Faces, Runs, Topology};
 use super::{GeometryError, Kind};
 
-/// Curves, a mesh, points or tets: a topology and three tables. Every component has positions `P`, a row a point.
+/// Curves, a mesh, points or tets: a topology and three tables. Every component has positions `P`, one row per point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
     topology: Topology,
@@ -104,12 +104,12 @@ impl Component {
         }
     }
 
-    /// How the points hang together.
+    /// The topology.
     pub fn topology(&self) -> &Topology {
         &self.topology
     }
 
-    /// CVs of each curve; no run for other components.
+    /// CVs of each curve; empty for other components.
     pub fn runs(&self) -> &Runs {
         static NONE: std::sync::LazyLock<Runs> = std::sync::LazyLock::new(|| Runs::from_counts([]).expect("no rows"));
         match &self.topology {
@@ -118,7 +118,7 @@ impl Component {
         }
     }
 
-    /// Faces of a mesh; none for other components.
+    /// Faces of a mesh; `None` for other components.
     pub fn faces(&self) -> Option<&Faces> {
         match &self.topology {
             Topology::Mesh(faces) => Some(faces),
@@ -126,7 +126,7 @@ impl Component {
         }
     }
 
-    /// Corners of each tet; none for other components.
+    /// Corners of each tet; empty for other components.
     pub fn tet_corners(&self) -> &[[u32; 4]] {
         match &self.topology {
             Topology::Tets(tets) => tets,
@@ -144,7 +144,7 @@ impl Component {
         self.elements.rows()
     }
 
-    /// Positions, metres, a row a point.
+    /// Positions, metres, one row per point.
     pub fn positions(&self) -> &[[f32; 3]] {
         self.points.get(P.name).expect("every component has `P`: its constructors and `remove` see to it")
     }
@@ -166,13 +166,13 @@ impl Component {
         }
     }
 
-    /// What the attribute of that name is, whatever its type and whoever owns a row: `one float for each curve`.
+    /// The type and owner of an attribute in words: `one float for each curve`.
     pub fn describe(&self, name: &str) -> Option<String> {
         let found = self.columns().find(|(_, known, _)| ***known == *name);
         found.map(|(owner, _, column)| self.kind().rows_text(owner, column.kind()))
     }
 
-    /// The rows of an attribute, where it is there.
+    /// The rows of an attribute; `None` where it is absent or has another type.
     pub fn get<T: Item>(&self, attr: Attr<T>) -> Option<&[T]> {
         self.table(attr.owner).get(attr.name)
     }
@@ -198,26 +198,26 @@ impl Component {
         self.table_mut(owner).set(name, column)
     }
 
-    /// An attribute's rows for writing; copied first if anyone else holds them.
+    /// An attribute's rows for writing; copied first if shared.
     pub fn edit<T: Item>(&mut self, attr: Attr<T>) -> Option<&mut [T]> {
         self.forget_derived(attr.owner, attr.name);
         self.table_mut(attr.owner).edit(attr.name)
     }
 
-    /// What `compute` makes of the topology and positions, kept with them: a still mesh has its tree made once for all
-    /// frames and nodes that ask. Two threads that ask at once may both compute it.
+    /// A value computed from topology and positions and cached with them: the tree of a still mesh is built once for all
+    /// frames and nodes. Two threads that ask at the same time may both compute it.
     pub fn derived<T: Send + Sync + 'static>(&self, compute: impl FnOnce(&Self) -> T) -> Arc<T> {
         self.derived.get_or(|| compute(self))
     }
 
-    /// Positions are about to change: what was computed from them is another component's from here on.
+    /// Positions are about to change: values derived from them no longer belong to this component.
     fn forget_derived(&mut self, owner: Owner, name: &str) {
         if owner == P.owner && name == P.name {
             self.derived = Derived::default();
         }
     }
 
-    /// Takes an attribute out. `P` stays.
+    /// Removes an attribute; `P` cannot be removed.
     pub fn remove(&mut self, owner: Owner, name: &str) -> Option<Column> {
         if owner == Owner::Point && name == P.name {
             return None;
@@ -258,7 +258,7 @@ impl Component {
             }
             _ => return Err(GeometryError::Kinds { a: self.kind(), b: other.kind() }),
         };
-        // What holds once for the whole is kept where only one side says it, or both say the same; the first wins else.
+        // Attributes of the whole: where both have one of a name, the first's is kept.
         let mut once = self.once.clone();
         for (name, column) in other.once.iter().filter(|(name, _)| self.once.column(name).is_none()) {
             once.set(name.clone(), column.clone())?;

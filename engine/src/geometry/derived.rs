@@ -1,18 +1,18 @@
-//! What is computed from a component's topology and positions and kept with them, such as a mesh's tree.
+//! Values computed from a component's topology and positions and cached with them, such as a mesh's tree.
 //!
-//! Promise: shared by all clones of a component until the positions of one change. It is no part of its value: two
-//! components that differ in it alone are equal. Limit: its memory is not counted in [`super::Geometry::bytes`].
+//! Promise: shared by all clones of a component until the positions of one change; ignored when components are
+//! compared. Limit: its memory is not counted in [`super::Geometry::bytes`].
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Values of distinct types; see the module.
+/// At most one value of each type.
 #[derive(Clone, Default)]
 pub(super) struct Derived(Arc<Mutex<Vec<Arc<dyn Any + Send + Sync>>>>);
 
 impl Derived {
-    /// The value of type `T`, computed if it is not there. Nothing is locked while it is computed: a thread that waits
-    /// for its own pool's work would else wait for itself. The first value kept is everyone's.
+    /// The value of type `T`, computed if it is absent. Nothing is locked meanwhile: a thread waiting for work of its own
+    /// pool could deadlock. The first value stored is the one everybody gets.
     pub(super) fn get_or<T: Send + Sync + 'static>(&self, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.find() {
             return value;

@@ -1,26 +1,25 @@
-//! What is computed from a component and something else, kept with the component for the next frame.
+//! Values computed from a component and a key, cached with the component for the next frame.
 //!
-//! Promise: the value is what `make` would give again; it is found as long as neither the component's positions nor the
-//! key change. Limit: of each type, the last [`KEPT`] alone are kept.
+//! Promise: the value is what `make` would return again; it is found as long as neither the component's positions nor
+//! the key change. Limit: only the [`KEPT`] values of each type that were used last are kept.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Component;
 use crate::Result;
 
-/// Several nodes may ask the same of one component, each with its own key: coats of one skin.
+/// Several nodes may use one component, each with its own key: several coats on one skin.
 const KEPT: usize = 4;
 
-/// Values by key, the last one asked for at the end.
+/// Values by key, the most recently used one last.
 struct Slots<K, T>(Mutex<Vec<(K, Arc<T>)>>);
 
 impl Component {
-    /// What `make` gives, or gave when the same was asked of this component, or of one with the same positions, before: of
-    /// it and of what `key` says. Nothing is locked while it is made: a thread that waits for its own pool's work would
-    /// else wait for itself.
+    /// The cached value for `key`, else the result of `make`, which may depend on this component's topology, its positions
+    /// and `key` only. Nothing is locked while `make` runs: a thread waiting for work of its own pool could deadlock.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// Errors of `make`.
     pub fn kept<K, T>(&self, key: K, make: impl FnOnce() -> Result<T>) -> Result<Arc<T>>
     where
         K: PartialEq + Send + Sync + 'static,
@@ -50,7 +49,7 @@ mod tests {
     use crate::geometry::P;
 
     #[test]
-    fn it_is_made_again_only_where_something_changed() {
+    fn it_is_made_again_only_when_something_changed() {
         let mut part = Component::points(vec![[0.0; 3]]);
         let made = |part: &Component, key: f32, value: u32| *part.kept(key.to_bits(), || Ok(value)).unwrap();
         assert_eq!(made(&part, 1.0, 1), 1);
@@ -62,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_are_kept_and_the_one_not_asked_for_longest_goes() {
+    fn the_least_recently_used_value_is_dropped() {
         let part = Component::points(vec![[0.0; 3]]);
         let made = |key: usize, value: usize| *part.kept(key, || Ok(value)).unwrap();
         (0..KEPT).for_each(|key| assert_eq!(made(key, key), key));

@@ -1,7 +1,7 @@
-//! A geometry in another unit of length.
+//! Conversion of a geometry to another unit of length.
 //!
-//! Every number that is a length or has one in it (a velocity) is multiplied in f64 and rounded once; all else stays,
-//! attributes that convect does not know included. Limit: a length may become more than an f32 holds.
+//! Every length and velocity is multiplied in f64 and rounded once; everything else stays, unknown attributes
+//! included. Limit: a product may leave the range of f32.
 
 use super::{Component, Geometry, Kind, P, PREF, THICKNESS, V, WIDTH};
 
@@ -9,13 +9,13 @@ fn scaled(factor: f64) -> impl Fn(f32) -> f32 {
     move |x| (f64::from(x) * factor) as f32
 }
 
-/// Whether lengths stay as they are.
+/// Whether lengths stay unchanged.
 fn is_one(factor: f64) -> bool {
     factor.to_bits() == 1.0_f64.to_bits()
 }
 
 impl Component {
-    /// Multiplies every known length by `factor`; 1 touches nothing.
+    /// Multiplies every known length by `factor`; by 1 nothing is copied.
     pub fn scale_lengths(&mut self, factor: f64) {
         if is_one(factor) {
             return;
@@ -35,7 +35,7 @@ impl Component {
 }
 
 impl Geometry {
-    /// Multiplies every known length of every component by `factor`; 1 touches nothing.
+    /// Multiplies every known length of every component by `factor`; by 1 nothing is copied.
     pub fn scale_lengths(&mut self, factor: f64) {
         if is_one(factor) {
             return;

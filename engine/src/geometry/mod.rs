@@ -1,7 +1,7 @@
 //! Geometry: what flows along a graph's wires.
 //!
-//! Five optional components. Everything is shared copy-on-write: a node that changes positions shares all else with
-//! its input, and equal addresses prove it. Positions are metres relative to the scene's origin, Y up, right-handed.
+//! Five optional components. Everything is shared copy-on-write: a node that changes positions shares everything else
+//! with its input, which tests prove by equal addresses. Positions are metres relative to the scene's origin, Y up, right-handed.
 
 mod attribute;
 mod bytes;
@@ -93,7 +93,7 @@ impl Geometry {
         self.parts.get(kind as usize)?.as_deref()
     }
 
-    /// The component of that kind, where it must be there.
+    /// The component of that kind, which must be present.
     ///
     /// # Errors
     /// Where it is absent. The engine refuses such a wire before a node sees it, so a node may pass the error on.
@@ -131,26 +131,26 @@ impl Geometry {
         self.volume.as_deref()
     }
 
-    /// Puts a component in its place, replacing what was there.
+    /// Sets a component, replacing one of the same kind.
     pub fn put(&mut self, component: impl Into<Arc<Component>>) {
         let component = component.into();
-        let place = component.kind() as usize;
-        self.parts[place] = Some(component);
+        let index = component.kind() as usize;
+        self.parts[index] = Some(component);
     }
 
-    /// Puts the volume in its place, replacing what was there.
+    /// Sets the volume, replacing the previous one.
     pub fn put_volume(&mut self, volume: impl Into<Arc<Volume>>) {
         self.volume = Some(volume.into());
     }
 
-    /// This geometry with the component in its place.
+    /// This geometry with the component set.
     #[must_use]
     pub fn with(mut self, component: impl Into<Arc<Component>>) -> Self {
         self.put(component);
         self
     }
 
-    /// Takes a component out.
+    /// Removes a component.
     pub fn remove(&mut self, kind: Kind) {
         match self.parts.get_mut(kind as usize) {
             Some(part) => *part = None,
@@ -158,12 +158,12 @@ impl Geometry {
         }
     }
 
-    /// The components that are there, without the volume.
+    /// The components that are present, without the volume.
     pub fn parts(&self) -> impl Iterator<Item = &Component> {
         self.parts.iter().filter_map(|part| part.as_deref())
     }
 
-    /// The kinds that are there, the volume included.
+    /// The kinds that are present, the volume included.
     pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
         Kind::ALL.into_iter().filter(|kind| match kind {
             Kind::Volume => self.volume.is_some(),
@@ -260,7 +260,7 @@ pub enum GeometryError {
         /// Points there are.
         points: usize,
     },
-    /// More than 2³² rows.
+    /// 2³² rows or more.
     #[error("more than 4,294,967,295 rows")]
     TooMany,
     /// Two components that cannot be joined.
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_topology_is_refused_with_its_place() {
+    fn broken_topology_is_refused_with_its_index() {
         let text = |e: GeometryError| e.to_string();
         assert_eq!(
             text(Component::curves(vec![2, 0], vec![[0.0; 3]; 2]).unwrap_err()),

@@ -1,10 +1,9 @@
-//! Well-known attributes where nobody has written them: what their absence means.
+//! Neutral values of well-known attributes: what their absence means.
 
 use super::{Column, Component, Owner, P};
 
 impl Component {
-    /// The well-known attribute of that name with the value that changes nothing, a row an `owner`; `None` where absence
-    /// means no value.
+    /// The neutral column of a well-known attribute, one row per `owner`; `None` where its absence has no such value.
     pub fn neutral(&self, owner: Owner, name: &str) -> Option<Column> {
         let rows = self.table(owner).rows();
         match name {
@@ -23,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_nobody_wrote_changes_nothing() {
+    fn absent_attributes_have_neutral_values() {
         let points = Component::points(vec![[1.0, 2.0, 3.0]]);
         let neutral = |name: &str| points.neutral(Owner::Point, name);
         assert_eq!(neutral("envelope"), Some(Column::new(vec![1.0_f32])));

@@ -90,16 +90,16 @@ impl Faces {
     }
 }
 
-/// How a component's points hang together.
+/// How a component's points are connected.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Topology {
     /// Polylines: the CVs of each curve, one after the other, root first.
     Curves(Arc<Runs>),
     /// Polygons.
     Mesh(Arc<Faces>),
-    /// Nothing joins them.
+    /// No connections.
     Points,
-    /// Four points a tet, positively oriented: (b−a)×(c−a)·(d−a) > 0.
+    /// Four points per tet, positively oriented: (b−a)×(c−a)·(d−a) > 0.
     Tets(Arc<Vec<[u32; 4]>>),
 }
 
@@ -135,7 +135,7 @@ impl Topology {
         }
     }
 
-    /// Where the arrays lie: equal addresses mean shared arrays.
+    /// The arrays' address: equal addresses mean shared arrays.
     pub fn address(&self) -> usize {
         match self {
             Self::Curves(runs) => Arc::as_ptr(runs) as usize,

@@ -110,7 +110,7 @@ impl Volume {
         Self::from_fields(level_grid, level_set, velocity_grid, velocity)
     }
 
-    /// A volume of fields: `level_set` a node a cell of `level_grid`, `velocity` a node a face of `velocity_grid`.
+    /// A volume of fields: `level_set` one node per cell of `level_grid`, `velocity` one node per face of `velocity_grid`.
     ///
     /// # Errors
     /// Where a field's size is not its grid's, the background of the level set is not above 0 or that of a velocity is

@@ -6,11 +6,11 @@
 //!   "point_attributes": {"envelope": [1.0, 1.0]}, "element_attributes": {"shielded": [0.5]}, "attributes": {}}}
 //! ```
 //!
-//! Absent components are left out. Every table is a list of rows: a number, or three or four in a list; `attributes`
+//! Absent components are omitted. Every table is a list of rows: a number, or three or four in a list; `attributes`
 //! has one row. A number with a `.` or an `e` is an f32 and any other an i32, so types survive; f32 are in their
-//! shortest form and read back bit for bit. A column becomes f32 as soon as one of its numbers is, or where its name
-//! wants it (`"envelope": [1, 1]`). A column without a row does not show its type: it becomes what its name wants, else
-//! float. `frame` and `time` may be missing. Any other key is a fault, and so is a key that is there twice.
+//! shortest form and read back bit for bit. A column is f32 if one of its numbers is, or if its name is
+//! well known as float (`"envelope": [1, 1]`). A column without rows has the type of its well-known name, else float.
+//! `frame` and `time` may be missing. Any other key is a fault, and so is a duplicate key.
 //!
 //! A volume is written as the dense arrays of its box, x fastest, then y, then z. Where its velocity has a grid of its own,
 //! that grid is `velocity_origin`, `velocity_cell` and `velocity_size`; each of them that is missing is that of the level

@@ -1,7 +1,7 @@
-//! A list of numbers, or of rows of numbers, whose type shows only as it is read.
+//! A list of numbers, or of rows of numbers, whose type is known only once it is read.
 //!
 //! Each item is taken as its raw text, which serde has checked to be json, and turned into an f32 or i32 in one step:
-//! by way of an f64 some f32 would come back one bit off.
+//! via f64 some f32 would come back one bit off.
 
 use std::fmt;
 
@@ -14,17 +14,17 @@ use crate::text::{counted, shown};
 /// The numbers of a column, row after row.
 #[derive(Default)]
 pub(super) struct Numbers {
-    /// Numbers a row; 0 as long as there is no row.
+    /// Numbers per row; 0 before the first row.
     width: usize,
-    /// All numbers as long as they are whole, none from the first float on.
+    /// All numbers while they are integers; empty from the first float on.
     wholes: Vec<i32>,
     /// All numbers from the first float on.
     floats: Option<Vec<f32>>,
 }
 
 impl Numbers {
-    /// A column of these rows; `wanted` is the type its name has, where that is fixed. Without a row the type is
-    /// `wanted` or float.
+    /// A column of these rows; `wanted` is the type of a well-known name. A column without rows has the type
+    /// `wanted`, or float.
     pub(super) fn column(self, wanted: Option<ColumnType>) -> Column {
         if self.width == 0 {
             return Column::zeros(wanted.unwrap_or(ColumnType::F1), 0);
@@ -43,7 +43,7 @@ impl Numbers {
     /// The rows of three floats.
     ///
     /// # Errors
-    /// Says the width that was found.
+    /// Where rows have another width; names it.
     pub(super) fn triples(self) -> Result<Vec<[f32; 3]>, String> {
         match self.width {
             0 | 3 => Ok(self.flat().as_chunks::<3>().0.to_vec()),
@@ -54,7 +54,7 @@ impl Numbers {
     /// Bare floats.
     ///
     /// # Errors
-    /// Says the width that was found.
+    /// Where rows have another width; names it.
     pub(super) fn singles(self) -> Result<Vec<f32>, String> {
         match self.width {
             0 | 1 => Ok(self.flat()),
@@ -118,7 +118,7 @@ fn as_floats(wholes: Vec<i32>) -> Vec<f32> {
 /// The nearest f32 of the text of a json value.
 ///
 /// # Errors
-/// Where the value is no number, or beyond what an f32 holds.
+/// Where the value is not a number, or out of the range of f32.
 pub(super) fn float(text: &str) -> Result<f32, String> {
     let number: f32 = text.parse().map_err(|_| not_a_number(text))?;
     if number.is_finite() { Ok(number) } else { Err(format!("{text} is out of range, expected at most 3.4e38")) }

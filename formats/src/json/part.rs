@@ -1,4 +1,4 @@
-//! What a component's object says, and whether it fits together.
+//! The values of a component's object, and their consistency checks.
 
 use engine::geometry::{Component, Geometry, Grid, Kind, Name, Owner, P, VOLUME_FIELDS, Volume, fixed_type};
 
@@ -59,7 +59,7 @@ impl GridKeys {
 }
 
 impl Part {
-    /// Makes these the component of that kind.
+    /// Builds the component of that kind and puts it into `geometry`.
     ///
     /// # Errors
     /// Where a key is missing or the values do not fit together.

@@ -1,6 +1,6 @@
 //! Json to geometry.
 //!
-//! The text is walked once, key by key, straight into columns: no tree of values stands between.
+//! The text is parsed in one pass, key by key, directly into columns, without a tree of values.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -12,7 +12,7 @@ use serde_json::value::RawValue;
 use super::numbers::{NumbersOf, float};
 use super::part::Part;
 use super::table_key;
-use crate::{FormatError, Place};
+use crate::{FilePosition, FormatError};
 
 /// The geometry of a json file.
 ///
@@ -21,7 +21,7 @@ use crate::{FormatError, Place};
 pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let fact = "a byte that is not UTF-8 text";
-        FormatError::with_hint(Place::Byte(error.valid_up_to()), fact, "save the file as UTF-8")
+        FormatError::with_hint(FilePosition::Byte(error.valid_up_to()), fact, "save the file as UTF-8")
     })?;
     let mut json = serde_json::Deserializer::from_str(text);
     let geometry = json_object(GeometryOf, &mut json).and_then(|geometry| json.end().map(|()| geometry));
@@ -29,7 +29,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
         let full = error.to_string();
         let fact = full.rsplit_once(" at line ").map_or(full.as_str(), |(fact, _)| fact).to_owned();
         let hint = error.is_eof().then_some("the file ends too early: write it again");
-        FormatError::Content { place: Place::Column(error.line(), error.column()), fact, hint }
+        FormatError::Content { position: FilePosition::Column(error.line(), error.column()), fact, hint }
     })
 }
 
@@ -44,7 +44,7 @@ impl<'de> Visitor<'de> for GeometryOf {
     type Value = Geometry;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an object with a key a component, such as `curves`")
+        f.write_str("an object with a key per component, such as `curves`")
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Geometry, A::Error> {
@@ -140,7 +140,7 @@ fn part_keys(kind: Kind) -> impl Iterator<Item = &'static str> {
     own.iter().chain(fields).copied().chain(Owner::ALL.into_iter().filter_map(move |owner| table_key(kind, owner)))
 }
 
-/// Reads a table's columns behind those that are there.
+/// Reads a table's columns and appends them.
 struct TableInto<'a>(&'a mut Vec<super::part::NamedNumbers>);
 
 impl<'de> DeserializeSeed<'de> for TableInto<'_> {
@@ -155,7 +155,7 @@ impl<'de> Visitor<'de> for TableInto<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an object with a list of rows an attribute")
+        f.write_str("an object with a list of rows per attribute")
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
@@ -169,13 +169,13 @@ impl<'de> Visitor<'de> for TableInto<'_> {
     }
 }
 
-/// Keys of an object so far.
+/// Keys of an object seen so far.
 #[derive(Default)]
 struct Seen(BTreeSet<String>);
 
 impl Seen {
     fn once<E: Error>(&mut self, key: &str) -> Result<(), E> {
-        if self.0.insert(key.to_owned()) { Ok(()) } else { Err(E::custom(format!("`{key}` is there twice"))) }
+        if self.0.insert(key.to_owned()) { Ok(()) } else { Err(E::custom(format!("`{key}` appears twice"))) }
     }
 }
 

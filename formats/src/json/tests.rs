@@ -128,9 +128,12 @@ fn odd_text_is_the_same_geometry() {
 fn a_broken_file_is_named_with_line_column_and_what_is_wrong() {
     let keys = "`frame`, `time`, `curves`, `mesh`, `points`, `tets`, `volume`";
     for (text, expected) in [
-        ("[]", "line 1, column 0: invalid type: sequence, expected an object with a key a component, such as `curves`"),
+        (
+            "[]",
+            "line 1, column 0: invalid type: sequence, expected an object with a key per component, such as `curves`",
+        ),
         ("{\n\"curve\": {}}", &format!("line 2, column 7: unknown key `curve`, expected one of {keys}")),
-        ("{\"points\": {\"points\": []}, \"points\": 1}", "line 1, column 35: `points` is there twice"),
+        ("{\"points\": {\"points\": []}, \"points\": 1}", "line 1, column 35: `points` appears twice"),
         ("{\"points\": {}}", "line 1, column 14: `points`: `points` is missing"),
         ("{\"points\": []}", "line 1, column 11: invalid type: sequence, expected an object for `points`"),
         (
@@ -168,7 +171,7 @@ fn a_broken_file_is_named_with_line_column_and_what_is_wrong() {
         ),
         (
             "{\"points\": {\"points\": [], \"attributes\": {\"a\": [1], \"a\": [1]}}}",
-            "line 1, column 54: `a` is there twice",
+            "line 1, column 54: `a` appears twice",
         ),
         (
             "{\"points\": {\"points\": [], \"point_attributes\": {\"P\": []}}}",

@@ -136,7 +136,7 @@ fn rows(column: &Column, out: &mut Out) -> Result<(), FormatError> {
     }
 }
 
-/// `[a, b, …]`, as long as there are items.
+/// `[a, b, …]`.
 fn list<T>(items: impl IntoIterator<Item = T>, put: impl Fn(T, &mut Out), out: &mut Out) -> Result<(), FormatError> {
     out.text("[");
     for (k, item) in items.into_iter().enumerate() {

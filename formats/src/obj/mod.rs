@@ -8,7 +8,7 @@
 //! alpha are ignored, and so are groups, materials, free-form surfaces and statements no one knows. A file of comments
 //! is an empty geometry; one of no bytes is a fault.
 //!
-//! **Written.** The same, in one object a component. What OBJ drops: all other attributes, `N` of curves and points
+//! **Written.** The same, in one object per component. What OBJ drops: all other attributes, `N` of curves and points
 //! beside another component, faceless points of a mesh beside another component, and components without a point. A
 //! mesh without a face comes back as points.
 

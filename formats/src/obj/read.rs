@@ -4,12 +4,12 @@ use engine::geometry::{Column, Component, Geometry, GeometryError, N, Owner, UVW
 
 use super::CD;
 use crate::text::{Fields, Lines, counted, float, line_end, shown};
-use crate::{FormatError, Place};
+use crate::{FilePosition, FormatError};
 
-/// A reference that is left out.
+/// An omitted reference.
 const NONE: u32 = u32::MAX;
 
-/// Statements whose lines hold no curve, face or point.
+/// Statements without curves, faces or points.
 const IGNORED: [&[u8]; 34] = [
     b"g",
     b"s",
@@ -58,7 +58,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     while let Some(line) = lines.next() {
         statements.line = lines.number();
         let line = continued(line, &mut lines, &mut joined);
-        statements.take(line).map_err(|fact| FormatError::at(Place::Line(statements.line), fact))?;
+        statements.take(line).map_err(|fact| FormatError::at(FilePosition::Line(statements.line), fact))?;
     }
     statements.geometry()
 }
@@ -81,18 +81,18 @@ fn continued<'a>(line: &'a [u8], lines: &mut Lines, joined: &'a mut Vec<u8>) -> 
     joined
 }
 
-/// What stands before the `\` at a line's end. A comment has none: Windows paths in comments end that way.
+/// The line before a `\` at its end. Not in comments: Windows paths there may end with one.
 fn open_end(line: &[u8]) -> Option<&[u8]> {
     let open = line.trim_ascii_end().strip_suffix(b"\\")?;
     (!line.trim_ascii_start().starts_with(b"#")).then_some(open)
 }
 
-/// What the lines so far say.
+/// The contents of the lines read so far.
 #[derive(Default)]
 struct Statements {
     line: usize,
     positions: Vec<[f32; 3]>,
-    /// As long as `positions`, or shorter where the last have none; NaN where one has none.
+    /// At most as long as `positions`: the last may have none; NaN for others without one.
     colours: Vec<[f32; 3]>,
     textures: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
@@ -167,9 +167,9 @@ impl Statements {
             if !number.is_finite() {
                 return Err(format!("{} is not a finite number", shown(field)));
             }
-            // One too many is counted, not kept.
-            if let Some(place) = numbers.get_mut(count) {
-                *place = number;
+            // A number too many is counted, not stored.
+            if let Some(slot) = numbers.get_mut(count) {
+                *slot = number;
             }
             count += 1;
         }
@@ -224,7 +224,7 @@ impl Statements {
             let row = match index {
                 0 => return Err(format!("{} names 0, but indices count from 1", shown(field))),
                 1.. => index - 1,
-                // Saturates at the far end of what is refused anyway.
+                // Saturates at values that are refused anyway.
                 _ => index.saturating_add(i64::try_from(counts[k]).unwrap_or(i64::MAX)),
             };
             rows[k] =
@@ -241,13 +241,13 @@ impl Statements {
         for (k, (row, line)) in self.highest.into_iter().enumerate() {
             if line > 0 && row as usize >= counts[k] {
                 let fact = out_of_range(k, i64::from(row) + 1, counts[k]);
-                return Err(FormatError::at(Place::Line(line), fact));
+                return Err(FormatError::at(FilePosition::Line(line), fact));
             }
         }
         let vertices = u32::try_from(self.positions.len()).map_err(|_| GeometryError::TooMany)?;
         if let (0, Some((line, word))) = (vertices, &self.unknown) {
-            let fact = format!("{word} is no statement of obj, and the file has no vertex");
-            return Err(FormatError::at(Place::Line(*line), fact));
+            let fact = format!("{word} is not an obj statement, and the file has no vertex");
+            return Err(FormatError::at(FilePosition::Line(*line), fact));
         }
         let kinds =
             [&self.curves, &self.faces, &self.points].into_iter().filter(|elements| !elements.is_empty()).count();
@@ -351,7 +351,7 @@ impl Statements {
     }
 }
 
-/// Files hold NaN normals of faces without an area: such an attribute is left out.
+/// Some files have NaN normals for faces without area: such an attribute is dropped.
 fn set_if_finite(component: &mut Component, name: &'static str, rows: Vec<[f32; 3]>) -> Result<(), GeometryError> {
     let column = Column::new(rows);
     if column.first_not_finite().is_none() { component.set_column(Owner::Point, name, column) } else { Ok(()) }
@@ -359,11 +359,11 @@ fn set_if_finite(component: &mut Component, name: &'static str, rows: Vec<[f32; 
 
 /// `indices` into the vertices as indices into `picked`, which holds all of them.
 fn renumbered(indices: &[u32], picked: &[u32], vertices: u32) -> Vec<u32> {
-    let mut place = vec![NONE; vertices as usize];
+    let mut new_index = vec![NONE; vertices as usize];
     for (new, old) in (0_u32..).zip(picked) {
-        place[*old as usize] = new;
+        new_index[*old as usize] = new;
     }
-    indices.iter().map(|index| place[*index as usize]).collect()
+    indices.iter().map(|index| new_index[*index as usize]).collect()
 }
 
 fn number(field: &[u8]) -> Result<f32, String> {
@@ -374,8 +374,8 @@ fn number(field: &[u8]) -> Result<f32, String> {
 fn row<'a>(fields: impl Iterator<Item = &'a [u8]>, what: &str, least: usize) -> Result<[f32; 3], String> {
     let mut row = [0.0; 3];
     let mut count = 0;
-    for (place, field) in row.iter_mut().zip(fields) {
-        *place = number(field)?;
+    for (slot, field) in row.iter_mut().zip(fields) {
+        *slot = number(field)?;
         count += 1;
     }
     if count < least {
@@ -386,6 +386,6 @@ fn row<'a>(fields: impl Iterator<Item = &'a [u8]>, what: &str, least: usize) -> 
 
 fn out_of_range(k: usize, index: i64, count: usize) -> String {
     let name = ["v", "vt", "vn"][k];
-    let range = if count == 0 { "there is none".into() } else { format!("expected 1 to {count}, or -{count} to -1") };
+    let range = if count == 0 { "there are none".into() } else { format!("expected 1 to {count}, or -{count} to -1") };
     format!("`{name}` index {index} is out of range: {range}")
 }

@@ -142,7 +142,7 @@ fn a_vertex_that_curves_share_has_texture_coordinates_in_each() {
 }
 
 #[test]
-fn comments_alone_are_an_empty_geometry_and_no_byte_is_a_fault() {
+fn comments_alone_are_empty_geometry_and_an_empty_file_is_a_fault() {
     for text in ["# nothing\n", "\n", "o a\ng b\n", "mtllib a.mtl"] {
         assert_eq!(read(text), Geometry::default());
     }
@@ -169,7 +169,7 @@ fn a_broken_line_is_named_with_what_is_wrong() {
         ("v 0 0 0\np # none\n", "line 2: 0 points, expected at least 1"),
         ("v 0 0 0\nf 1 1 2\n", "line 2: `v` index 2 is out of range: expected 1 to 1, or -1 to -1"),
         ("v 0 0 0\nl 1 -2\n", "line 2: `v` index -2 is out of range: expected 1 to 1, or -1 to -1"),
-        ("l 1\n", "line 1: `v` index 1 is out of range: there is none"),
+        ("l 1\n", "line 1: `v` index 1 is out of range: there are none"),
         ("v 0 0 0\np 0\n", "line 2: `0` names 0, but indices count from 1"),
         ("v 0 0 0\np 4294967296\n", "line 2: `v` index 4294967296 is out of range: expected 1 to 1, or -1 to -1"),
         ("v 0 0 0\np 99999999999999999999\n", "line 2: `99999999999999999999` is not a vertex index"),
@@ -177,13 +177,13 @@ fn a_broken_line_is_named_with_what_is_wrong() {
             "v 0 0 0\np -9223372036854775808\n",
             "line 2: `v` index -9223372036854775808 is out of range: expected 1 to 1, or -1 to -1",
         ),
-        ("v 0 0 0\nf 1/2 1 1\n", "line 2: `vt` index 2 is out of range: there is none"),
-        ("v 0 0 0\nf 1//1 1 1\n", "line 2: `vn` index 1 is out of range: there is none"),
+        ("v 0 0 0\nf 1/2 1 1\n", "line 2: `vt` index 2 is out of range: there are none"),
+        ("v 0 0 0\nf 1//1 1 1\n", "line 2: `vn` index 1 is out of range: there are none"),
         ("v 0 0 0\nf 1/1/1/1 1 1\n", "line 2: `1/1/1/1` has 4 parts, expected `v/vt/vn` at most"),
         ("v 0 0 0\nf /1 1 1\n", "line 2: `/1` is not a vertex index"),
         ("v 0 0 0\nf 1.5 1 1\n", "line 2: `1.5` is not a vertex index"),
         ("v 0 0 0\nv 0 0 \\\n\\\nx\n", "line 2: `x` is not a number"),
-        ("solid cube\nfacet normal 0 0 1\n", "line 1: `solid` is no statement of obj, and the file has no vertex"),
+        ("solid cube\nfacet normal 0 0 1\n", "line 1: `solid` is not an obj statement, and the file has no vertex"),
         ("v 0 0 0\n\0\0\0\0\n", "line 2: a NUL byte, expected text: the file is damaged or binary"),
         ("v 0 0 \0\n", "line 1: `\\0` is not a number"),
     ] {

@@ -1,4 +1,4 @@
-//! Properties as attributes: which make one together, what they are called, which type they get.
+//! Properties as attributes: grouping, names and types.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) const TRIPLES: [(&str, [&str; 3]); 3] =
 /// Two that make texture coordinates; the third is 0.
 const TEXTURES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
-/// The attributes that an element's properties make; one `Cells` a property.
+/// The attributes that an element's properties make; one `Cells` per property.
 pub(super) fn columns(properties: &[Property], cells: Vec<Cells>) -> Columns {
     let mut scalars = Scalars(BTreeMap::new());
     for (property, cells) in properties.iter().zip(cells) {
@@ -65,7 +65,7 @@ impl Scalars<'_> {
         names.iter().all(|name| self.0.contains_key(name))
     }
 
-    /// Takes a property out as floats; a colour's bytes and shorts become 0…1.
+    /// Removes a property and returns it as floats; a colour's bytes and shorts become 0…1.
     fn floats(&mut self, name: &str, is_colour: bool) -> Vec<f32> {
         match self.0.remove(name) {
             Some((_, Cells::Floats(values))) => values,
@@ -118,7 +118,7 @@ fn rows4<T: Copy>(a: &[T], b: &[T], c: &[T], d: &[T]) -> Vec<[T; 4]> {
     rows3(a, b, c).into_iter().zip(d).map(|([a, b, c], d)| [a, b, c, *d]).collect()
 }
 
-/// Puts a column under `name`, or under the next free one where another column or another type has that.
+/// Stores a column under `name`, or under the next free name where that is taken or has another type.
 fn insert(columns: &mut Columns, name: &str, column: Column) {
     let column = match (fixed_type(name), column) {
         (Some(ColumnType::F1), Column::I1(rows)) => Column::new(rows.iter().map(|n| *n as f32).collect()),

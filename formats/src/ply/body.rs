@@ -1,18 +1,18 @@
 //! The data of a PLY file, element by element, whatever its encoding.
 //!
-//! Before an element is read, the rows it declares are held against the bytes that are left: nothing is ever allocated
-//! for rows the file cannot hold.
+//! Before an element is read, its declared rows are checked against the remaining bytes: nothing is allocated for rows
+//! that the file cannot hold.
 
 use super::header::{Element, Encoding, Header, Property, Scalar, Shape};
 use crate::text::{Fields, Lines, counted, float, shown};
-use crate::{FormatError, Place};
+use crate::{FilePosition, FormatError};
 
 /// What to keep of a property.
 #[derive(Clone, Copy)]
 pub(super) enum Keep {
     Nothing,
     Values,
-    /// Rows of a table with this many; anything beyond is a fault.
+    /// Indices into a table of this many rows; others are a fault.
     Indices {
         rows: usize,
     },
@@ -24,7 +24,7 @@ pub(super) enum Cells {
     Nothing,
     Floats(Vec<f32>),
     Wholes(Vec<i32>),
-    /// The items of all lists, all below `rows`, and how many each list has; one where it is no list.
+    /// The items of all lists, all below `rows`, and the length of each list; 1 for a scalar.
     Indices {
         counts: Vec<u32>,
         items: Vec<u32>,
@@ -53,10 +53,10 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Reads the rows of the next element; one list of cells a property.
+    /// Reads the rows of the next element; one list of cells per property.
     ///
     /// # Errors
-    /// With line or byte: where the data ends, or a number is none, not finite or out of range.
+    /// With line or byte: where the data ends early, or a number is malformed, not finite or out of range.
     pub(super) fn element(
         &mut self,
         element: &Element,
@@ -70,7 +70,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// A number as it stands in the file.
+/// A number as stored in the file.
 #[derive(Clone, Copy)]
 enum Number {
     Whole(i64),
@@ -79,8 +79,8 @@ enum Number {
 
 /// Where numbers come from.
 trait Source {
-    fn place(&self) -> Place;
-    /// Bytes that are not read yet.
+    fn position(&self) -> FilePosition;
+    /// Remaining bytes.
     fn left(&self) -> usize;
     fn start_row(&mut self) -> Result<(), String>;
     fn number(&mut self, scalar: Scalar) -> Result<Number, String>;
@@ -108,12 +108,12 @@ fn rows<S: Source>(
             counted(source.left(), "byte"),
         );
         let hint = "the file is cut off, or its header is damaged: write it again";
-        return Err(FormatError::with_hint(Place::Line(element.line), fact, hint));
+        return Err(FormatError::with_hint(FilePosition::Line(element.line), fact, hint));
     }
     let mut cells: Vec<Cells> =
         element.properties.iter().zip(keep).map(|(property, keep)| empty(property, *keep, element.rows)).collect();
     for row in 0..element.rows {
-        let fail = |source: &S, fact| FormatError::at(source.place(), format!("`{}` {row}: {fact}", element.name));
+        let fail = |source: &S, fact| FormatError::at(source.position(), format!("`{}` {row}: {fact}", element.name));
         source.start_row().map_err(|fact| fail(source, fact))?;
         for (property, cells) in element.properties.iter().zip(&mut cells) {
             take(source, property, cells).map_err(|fact| fail(source, format!("`{}`: {fact}", property.name)))?;
@@ -123,7 +123,7 @@ fn rows<S: Source>(
     Ok(cells)
 }
 
-/// Cells with room for what is sure to come.
+/// Cells with capacity for the rows that the file can hold.
 fn empty(property: &Property, keep: Keep, rows: usize) -> Cells {
     match (keep, property.shape) {
         (Keep::Values, Shape::One(scalar)) if scalar.is_float() => Cells::Floats(Vec::with_capacity(rows)),
@@ -168,15 +168,15 @@ fn index(number: Number, rows: usize) -> Result<u32, String> {
     index.ok_or_else(|| format!("index {n} is out of range: `vertex` has {}, counted from 0", counted(rows, "row")))
 }
 
-/// A text: a line a row.
+/// A text: one line per row.
 pub(super) struct Ascii<'a> {
     lines: Lines<'a>,
     fields: Fields<'a>,
 }
 
 impl Source for Ascii<'_> {
-    fn place(&self) -> Place {
-        Place::Line(self.lines.number())
+    fn position(&self) -> FilePosition {
+        FilePosition::Line(self.lines.number())
     }
 
     fn left(&self) -> usize {
@@ -238,8 +238,8 @@ impl Binary<'_> {
 }
 
 impl Source for Binary<'_> {
-    fn place(&self) -> Place {
-        Place::Byte(self.start + self.next)
+    fn position(&self) -> FilePosition {
+        FilePosition::Byte(self.start + self.next)
     }
 
     fn left(&self) -> usize {

@@ -2,8 +2,8 @@
 
 /// The polylines that `edges` make: how many CVs each has, and their vertices one after the other.
 ///
-/// A polyline goes on through every vertex with exactly two edges and ends at any other. It stands in the order of its
-/// first edge in the list, and that edge gives its direction. A ring starts with its first edge and ends on its first
+/// A polyline continues through every vertex with exactly two edges and ends at any other. Polylines are in the order of
+/// their first edges in the list, which give their directions. A ring starts with its first edge and ends on its first
 /// vertex again. An edge from a vertex to itself has no length and is left out. Time and memory are linear.
 pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) {
     let mut degree = vec![0_u32; vertices];

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::text::{Fields, Lines, line_end, shown};
-use crate::{FormatError, Place};
+use crate::{FilePosition, FormatError};
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl Scalar {
     }
 }
 
-/// What a property holds a row.
+/// What a property holds per row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
     One(Scalar),
@@ -67,7 +67,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// The least bytes a row takes in that encoding, spaces and line end included.
+    /// The fewest bytes that a row takes in that encoding, spaces and line end included.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> usize {
         let size = |property: &Property| match (encoding, property.shape) {
             (Encoding::Ascii, _) => 2,
@@ -77,7 +77,7 @@ impl Element {
     }
 }
 
-/// What stands before the data.
+/// The parsed header.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -98,7 +98,7 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
     // Line ends are those of the first line: binary data may hold any byte.
     let start = &file[..file.len().min(5)];
     if !Fields(start).next().is_some_and(|word| word.starts_with(b"ply")) {
-        return Err(FormatError::at(Place::Line(1), "a PLY file starts with a line `ply`"));
+        return Err(FormatError::at(FilePosition::Line(1), "a PLY file starts with a line `ply`"));
     }
     let line_end = line_end(start);
     let mut lines = Lines::new(file, 1, line_end);
@@ -107,7 +107,7 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
     let mut names = BTreeSet::new();
     while let Some(line) = lines.next() {
         let number = lines.number();
-        let fail = |fact: String| Err(FormatError::at(Place::Line(number), fact));
+        let fail = |fact: String| Err(FormatError::at(FilePosition::Line(number), fact));
         let fields: Vec<&[u8]> = Fields(line).collect();
         match fields.as_slice() {
             [b"ply"] if number == 1 => {}
@@ -117,16 +117,16 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
                 Some(_) => return fail(format!("PLY version {}, expected `1.0`", shown(version))),
                 None => {
                     let expected = "expected `ascii`, `binary_little_endian` or `binary_big_endian`";
-                    return fail(format!("{} is no encoding, {expected}", shown(name)));
+                    return fail(format!("{} is not a PLY encoding, {expected}", shown(name)));
                 }
             },
             [b"element", name, rows] => {
                 let rows = std::str::from_utf8(rows).ok().and_then(|rows| rows.parse().ok()).ok_or_else(|| {
-                    FormatError::at(Place::Line(number), format!("{} is not a number of rows", shown(rows)))
+                    FormatError::at(FilePosition::Line(number), format!("{} is not a number of rows", shown(rows)))
                 })?;
                 let name = String::from_utf8_lossy(name).into_owned();
                 if is_known(&name) && elements.iter().any(|element| element.name == name) {
-                    return fail(format!("element `{name}` is there twice"));
+                    return fail(format!("element `{name}` appears twice"));
                 }
                 names.clear();
                 elements.push(Element { name, rows, properties: Vec::new(), line: number });
@@ -140,7 +140,7 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
                     Err(fact) => return fail(fact),
                 };
                 if !names.insert(property.name.clone()) {
-                    return fail(format!("property `{}` is there twice", property.name));
+                    return fail(format!("property `{}` appears twice", property.name));
                 }
                 element.properties.push(property);
             }
@@ -154,14 +154,14 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
                     line_end,
                 });
             }
-            [word, ..] => return fail(format!("{} is no line of a PLY header", shown(word))),
+            [word, ..] => return fail(format!("{} is not a PLY header line", shown(word))),
         }
     }
     let hint = "the file ends too early: write it again";
-    Err(FormatError::with_hint(Place::Line(lines.number()), "the header has no `end_header`", hint))
+    Err(FormatError::with_hint(FilePosition::Line(lines.number()), "the header has no `end_header`", hint))
 }
 
-/// Whether the reader takes anything from elements of that name; any number of others are skipped.
+/// Whether the reader uses elements of that name; all others are skipped.
 fn is_known(name: &str) -> bool {
     matches!(name, "vertex" | "face" | "edge" | "curve")
 }

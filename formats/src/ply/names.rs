@@ -35,9 +35,9 @@ pub(super) fn property(attribute: &str, part: usize, width: usize) -> String {
     if width > 1 { format!("{name}.{part}") } else { name }
 }
 
-/// The attribute `width` wide that a property, without its number, stands for; as it is where it cannot be one of ours.
+/// The attribute name of a property of that width, without its number; unchanged where convect cannot have written it.
 pub(super) fn attribute(property: &str, width: usize) -> String {
-    // Only the one way we write a name is taken back, so two properties never stand for the same.
+    // Only names as we write them are decoded, so two properties never mean the same attribute.
     decoded(property).filter(|name| encoded(name, width) == property).unwrap_or_else(|| property.to_owned())
 }
 

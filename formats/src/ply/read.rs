@@ -6,12 +6,12 @@ use super::attributes::{Columns, TRIPLES, columns};
 use super::body::{Body, Cells, Keep};
 use super::header::{self, Element, Property, Shape};
 use super::{COMPONENT, chains};
-use crate::{FormatError, Place};
+use crate::{FilePosition, FormatError};
 
 /// The geometry of a PLY file.
 ///
 /// # Errors
-/// With the line or byte: where the header is none, the data ends early, an index is out of range, or a number is not
+/// With the line or byte: where the header is invalid, the data ends early, an index is out of range, or a number is not
 /// finite.
 pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     let header = header::read(bytes)?;
@@ -28,7 +28,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
 #[derive(Default)]
 struct Elements {
     points: Columns,
-    /// Whose a vertex is, where the file says so: the number of a [`Kind`].
+    /// The component of each vertex, where the file says so: the number of a [`Kind`].
     owners: Option<Vec<i32>>,
     face_counts: Vec<u32>,
     corners: Vec<u32>,
@@ -43,7 +43,7 @@ impl Elements {
     fn take(&mut self, element: &Element, vertices: usize, body: &mut Body) -> Result<(), FormatError> {
         let lacks = |property: &str| {
             let fact = format!("element `{}` has no property `{property}`", element.name);
-            Err(FormatError::at(Place::Line(element.line), fact))
+            Err(FormatError::at(FilePosition::Line(element.line), fact))
         };
         let has = |name: &str| element.properties.iter().any(|property| property.name == name);
         let indices = Keep::Indices { rows: vertices };
@@ -114,12 +114,15 @@ impl Elements {
         }
     }
 
-    /// Components as [`super::write`] tells them apart.
+    /// Components as [`super::write`] marks them.
     fn owned(&self, owners: &[i32]) -> Result<Geometry, FormatError> {
         let mut vertices = [const { Vec::new() }; 3];
         for (vertex, owner) in (0_u32..).zip(owners) {
             let list = usize::try_from(*owner).ok().and_then(|owner| vertices.get_mut(owner)).ok_or_else(|| {
-                FormatError::at(Place::File, format!("`vertex` {vertex}: `{COMPONENT}` is {owner}, expected 0, 1 or 2"))
+                FormatError::at(
+                    FilePosition::File,
+                    format!("`vertex` {vertex}: `{COMPONENT}` is {owner}, expected 0, 1 or 2"),
+                )
             })?;
             list.push(vertex);
         }
@@ -138,7 +141,7 @@ impl Elements {
         Ok(geometry)
     }
 
-    /// Components as any program's file shows them.
+    /// Components of a file by any other program.
     fn inferred(&self, vertices: usize) -> Result<Geometry, FormatError> {
         let all = || (0_u32..).take(vertices).collect::<Vec<u32>>();
         let has_faces = !self.face_counts.is_empty();
@@ -170,13 +173,16 @@ impl Elements {
     }
 
     fn mesh(&self, picked: &[u32], vertices: usize) -> Result<Component, FormatError> {
-        let mut place = vec![u32::MAX; vertices];
+        let mut new_index = vec![u32::MAX; vertices];
         for (new, old) in (0_u32..).zip(picked) {
-            place[*old as usize] = new;
+            new_index[*old as usize] = new;
         }
-        let place = |corner: &u32| Some(place[*corner as usize]).filter(|place| *place != u32::MAX);
-        let corners = self.corners.iter().map(place).collect::<Option<Vec<u32>>>().ok_or_else(|| {
-            FormatError::at(Place::File, format!("a face has a vertex that `{COMPONENT}` gives to another component"))
+        let index = |corner: &u32| Some(new_index[*corner as usize]).filter(|index| *index != u32::MAX);
+        let corners = self.corners.iter().map(index).collect::<Option<Vec<u32>>>().ok_or_else(|| {
+            FormatError::at(
+                FilePosition::File,
+                format!("a face has a vertex that `{COMPONENT}` gives to another component"),
+            )
         })?;
         self.component(picked, &self.faces, |p| Component::mesh(self.face_counts.clone(), corners, p))
     }
@@ -201,7 +207,7 @@ impl Elements {
     }
 }
 
-/// Takes out the cells of the first such property.
+/// Removes and returns the cells of the first such property.
 fn take_cells(cells: &mut [Cells], element: &Element, is: impl Fn(&Property) -> bool) -> Option<Cells> {
     let k = element.properties.iter().position(is)?;
     cells.get_mut(k).map(|cells| std::mem::replace(cells, Cells::Nothing))

@@ -125,7 +125,7 @@ fn known_properties_make_known_attributes() {
 }
 
 #[test]
-fn other_scalars_keep_their_kind_and_step_aside_for_known_names() {
+fn other_scalars_keep_their_type_and_are_renamed_where_a_known_name_clashes() {
     let properties = "float quality,uint rgba,char c,int width,float v,float id,float w.0,float w.1,float w.2,int u";
     let geometry = read(ascii(&vertex(1, &format!("{XYZ},{properties}")), "0 0 0 0.5 4278190335 -1 2 3 1.5 4 5 6 7\n"));
     for (name, expected) in [
@@ -176,7 +176,7 @@ fn edges_are_curves_and_with_faces_each_takes_its_own() {
 }
 
 #[test]
-fn no_vertex_is_an_empty_geometry_and_no_byte_a_fault() {
+fn a_file_without_vertices_is_empty_geometry_and_an_empty_file_a_fault() {
     assert_eq!(read(ascii("", "")), Geometry::default());
     assert_eq!(read(ascii(&vertex(0, XYZ), "")), Geometry::default());
     assert_eq!(read(ascii("element vertex 0\nelement face 0\n", "")), Geometry::default());
@@ -188,23 +188,23 @@ fn no_vertex_is_an_empty_geometry_and_no_byte_a_fault() {
 #[test]
 fn a_broken_header_is_named_with_its_line() {
     for (text, expected) in [
-        ("plywood\n", "line 1: `plywood` is no line of a PLY header"),
+        ("plywood\n", "line 1: `plywood` is not a PLY header line"),
         ("PLY\n", "line 1: a PLY file starts with a line `ply`"),
         ("ply\n", "line 1: the header has no `end_header`"),
-        ("ply\nformat ascii 1.0\nelement vertex 1\npro", "line 4: `pro` is no line of a PLY header"),
+        ("ply\nformat ascii 1.0\nelement vertex 1\npro", "line 4: `pro` is not a PLY header line"),
         ("ply\nend_header\n", "line 2: a header without a `format` line"),
         (
             "ply\nformat text 1.0\n",
-            "line 2: `text` is no encoding, expected `ascii`, `binary_little_endian` or `binary_big_endian`",
+            "line 2: `text` is not a PLY encoding, expected `ascii`, `binary_little_endian` or `binary_big_endian`",
         ),
         ("ply\nformat ascii 2.0\n", "line 2: PLY version `2.0`, expected `1.0`"),
         ("ply\nelement vertex many\n", "line 2: `many` is not a number of rows"),
         ("ply\nelement vertex -1\n", "line 2: `-1` is not a number of rows"),
         ("ply\nelement vertex 99999999999999999999\n", "line 2: `99999999999999999999` is not a number of rows"),
-        ("ply\nelement vertex\n", "line 2: `element` is no line of a PLY header"),
-        ("ply\nelement vertex 1\nelement vertex 1\n", "line 3: element `vertex` is there twice"),
+        ("ply\nelement vertex\n", "line 2: `element` is not a PLY header line"),
+        ("ply\nelement vertex 1\nelement vertex 1\n", "line 3: element `vertex` appears twice"),
         ("ply\nproperty float x\n", "line 2: a property before the first element"),
-        ("ply\nelement vertex 1\nproperty float x\nproperty int x\n", "line 4: property `x` is there twice"),
+        ("ply\nelement vertex 1\nproperty float x\nproperty int x\n", "line 4: property `x` appears twice"),
         ("ply\nelement vertex 1\nproperty half x\n", "line 3: `half` is not a PLY type"),
         (
             "ply\nelement vertex 1\nproperty float\n",
@@ -228,7 +228,7 @@ fn a_header_of_many_elements_and_properties_takes_no_time() {
 }
 
 #[test]
-fn broken_data_is_named_with_its_place() {
+fn broken_data_is_reported_with_its_position() {
     let faces = format!("{}element face 1\n{FACE}", vertex(1, XYZ));
     let edges = format!("{}element edge 1\nproperty int vertex1\nproperty int vertex2\n", vertex(1, XYZ));
     for (elements, rows, expected) in [
@@ -295,9 +295,9 @@ fn broken_data_is_named_with_its_place() {
             "`vertex` 0: `convect_component` is 3, expected 0, 1 or 2",
         ),
     ] {
-        // The place is counted from the top: two lines, then the elements.
+        // The position is counted from the top: two lines, then the elements.
         let text = ascii(&elements, rows);
-        let at = expected.split_once(": ").map_or(expected, |(place, _)| place);
+        let at = expected.split_once(": ").map_or(expected, |(position, _)| position);
         assert_eq!(fault(&text), expected, "{at} of\n{text}");
     }
     let binary = |rows: usize, bytes: &[u8]| {
@@ -363,5 +363,5 @@ fn components_that_disagree_on_a_type_are_refused() {
     let geometry = Geometry::default().with(curves).with(points);
     let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
     let error = crate::write(Format::Ply, &geometry, &stamp, &mut Vec::new()).unwrap_err();
-    assert_eq!(error.to_string(), "`mask` has another type on points than on curves, and ply has one table for both");
+    assert_eq!(error.to_string(), "`mask` has different types on curves and points, and ply has one table for both");
 }

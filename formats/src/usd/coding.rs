@@ -21,7 +21,7 @@ pub(super) fn chunk(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// `values` coded: the length of the chunk that follows (u64), then a chunk of steps from each value to the next. The
-/// number of values is not part of it. Not for no values.
+/// number of values is not stored. `values` must not be empty.
 pub(super) fn ints(values: impl Iterator<Item = i32> + Clone) -> Vec<u8> {
     let chunk = chunk(&steps(values));
     let mut out = Vec::with_capacity(8 + chunk.len());

@@ -1,7 +1,7 @@
 //! `extent`: the box around a prim as USD computes it.
 //!
-//! Equal bit for bit to `ComputeExtentFromPlugins` of usd-core 26.11, without points and with NaN too. That fixes the
-//! order of comparisons and the unlike paddings: curves grow on all sides by half their greatest width, points each by
+//! Equal bit for bit to `ComputeExtentFromPlugins` of usd-core 26.11, without points and with NaN too. This fixes the
+//! order of comparisons and the different paddings: curves grow on all sides by half their greatest width, points each by
 //! half its own.
 
 use engine::geometry::Kind;
@@ -9,7 +9,7 @@ use engine::geometry::Kind;
 /// The box of no points: everything is inside out.
 pub(super) const EMPTY: [[f32; 3]; 2] = [[f32::MAX; 3], [f32::MIN; 3]];
 
-/// Least and greatest corner of `points` (metres), padded for `widths` (one a point) where `kind` has them.
+/// Least and greatest corner of `points` (metres), padded for `widths` (one per point) where `kind` has them.
 pub(super) fn extent(kind: Kind, points: &[[f32; 3]], widths: Option<&[f32]>) -> [[f32; 3]; 2] {
     match (kind, widths) {
         (Kind::Points, Some(widths)) => points.iter().zip(widths).fold(EMPTY, |bounds, (point, width)| {
@@ -27,7 +27,7 @@ pub(super) fn extent(kind: Kind, points: &[[f32; 3]], widths: Option<&[f32]>) ->
     }
 }
 
-/// `bounds` with `point` inside; a coordinate that is NaN changes nothing.
+/// `bounds` grown to hold `point`; a NaN coordinate changes nothing.
 fn grown([low, high]: [[f32; 3]; 2], point: [f32; 3]) -> [[f32; 3]; 2] {
     let least = |k: usize| if point[k] < low[k] { point[k] } else { low[k] };
     let greatest = |k: usize| if point[k] > high[k] { point[k] } else { high[k] };
@@ -53,7 +53,7 @@ mod tests {
         assert_eq!(extent(Kind::Tets, &ROW, widths), [[0.0; 3], [10.0, 0.0, 0.0]]);
     }
 
-    /// Expected values: what usd-core 26.11 answered.
+    /// Expected values: results of usd-core 26.11.
     #[test]
     fn odd_values_give_what_usd_gives() {
         let zeros = [[-0.0, 0.0, 0.0], [0.0, -0.0, 0.0]];

@@ -1,4 +1,4 @@
-//! Which prim and attribute an array of a geometry becomes: the one place both flavours get it from.
+//! Which prim and attribute each array of a geometry becomes, for both flavours.
 //!
 //! | of a component | becomes |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | `width` a point | `widths` on curves and points |
 //! | `id` a point | `ids` (int64) on points |
 //! | `id` of curves | `primvars:curve_id`: curves have no `ids`, and Blender drops a primvar called `id` there |
-//! | any other NAME | `primvars:NAME`; a row a point is `vertex`, an element `uniform`, once `constant` |
+//! | any other NAME | `primvars:NAME`; one row per point is `vertex`, an element `uniform`, once `constant` |
 //! | topology | counts and indices, of tets also their surface |
 //!
 //! Types follow what readers make of them. `uvw` is a plain `float3[]`, as Blender cuts `texCoord3f[]` to two numbers on
@@ -30,7 +30,7 @@ pub(super) enum Source {
     Attribute(Owner, Name),
 }
 
-/// Arrays that say how points hang together.
+/// Arrays of topology.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum TopologyArray {
     CurveCounts,
@@ -121,14 +121,14 @@ fn primvar_type(name: &str, rows: ColumnType) -> UsdType {
     }
 }
 
-/// Whether `source` is sampled wherever the other of these is: USD moves points along velocities only where both have
-/// the same sample times.
+/// Whether `source` shares its sample times with the other of these: USD moves points along velocities only where both
+/// have the same.
 pub(super) fn moves(source: &Source) -> bool {
     matches!(source, Source::Attribute(Owner::Point, name) if **name == *P.name || **name == *V.name)
 }
 
-/// What `source` holds in a frame without its component: no rows, or an inside-out box. `None` for what holds once:
-/// there is no such thing as no rows of it.
+/// What `source` holds in a frame without its component: no rows, or an inside-out box. `None` for attributes of the
+/// whole, which always have a row.
 pub(super) fn absent(source: &Source, rows: ColumnType) -> Option<Column> {
     match source {
         Source::Attribute(Owner::Once, _) => None,

@@ -1,6 +1,6 @@
-//! USD files, `.usda` (text) and `.usdc` (crate 0.8.0), written by our own hand.
+//! USD files, `.usda` (text) and `.usdc` (crate 0.8.0), written without Pixar's library.
 //!
-//! A [`UsdWriter`] takes one geometry a frame and keeps no more than one in memory, beside 8 bytes an attribute and
+//! A [`UsdWriter`] takes one geometry per frame and keeps no more than one in memory, beside 8 bytes per attribute and
 //! frame. An array that equals its attribute's last one, by address or else bit for bit, is stored once; what never
 //! changes becomes a default instead of time samples. Both flavours are written from one description of the stage
 //! (`layout` says which array becomes which attribute, `stage` what a flavour is told), and every f32 and i32 comes
@@ -12,12 +12,12 @@
 //!   `mesh`, `points` and `tets` under it; metres, Y up, time code = frame.
 //! * A frame without a component has one with no points and no elements; a frame without an attribute that other frames
 //!   have holds a value block. Empty arrays rather than blocks for a component, because a reader that keeps its last
-//!   value at a block would go on showing what is gone.
+//!   value at a block would keep showing what is gone.
 //! * `velocities` have samples wherever `points` have, even if they never change: USD uses them only then.
-//! * An attribute or output whose name is no ASCII identifier gets one (`names`), and its own as `displayName`.
+//! * An attribute or output whose name is not an ASCII identifier gets one (`names`), with its own as `displayName`.
 //!
-//! Blender 4.5 reads all of it without a warning, but for `int3` and `int4` attributes of curves and meshes: it has no
-//! such types, and says so.
+//! Blender 4.5 reads all of it, and warns only of `int3` and `int4` attributes of curves and meshes, types it does not
+//! have.
 
 mod coding;
 mod extent;
@@ -42,9 +42,9 @@ use stage::Encoder;
 /// Which of the two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Flavour {
-    /// Text: for reading and for tools; about ten characters a number.
+    /// Text: for reading and for tools; about ten characters per number.
     Usda,
-    /// Binary: four bytes a number, read without copying.
+    /// Binary: four bytes per number, read without copying.
     Usdc,
 }
 
@@ -61,7 +61,7 @@ pub struct Summary {
     pub shared: u64,
 }
 
-/// A USD file in the making: one geometry a frame, then [`UsdWriter::finish`]. Dropped before, it leaves nothing.
+/// A USD file being written: one geometry per frame, then [`UsdWriter::finish`]. Dropped before that, it leaves nothing.
 pub struct UsdWriter {
     path: PathBuf,
     recorder: Recorder<AtomicFile>,
@@ -70,7 +70,7 @@ pub struct UsdWriter {
 impl UsdWriter {
     /// Starts the file at `path`, which appears only when it is finished.
     ///
-    /// `name` is the output's name, `fps` the frames (and time codes) a second, `origin` the scene's in metres, to
+    /// `name` is the output's name, `fps` the frames (and time codes) per second, `origin` the scene's in metres, to
     /// which positions are relative.
     ///
     /// # Errors
@@ -100,14 +100,14 @@ impl UsdWriter {
     /// Adds a frame. Time codes are frame numbers, whole or not, each greater than the one before.
     ///
     /// # Errors
-    /// Where the file cannot be written, time does not go on, the geometry has a volume, or an attribute changed its
+    /// Where the file cannot be written, the frame does not follow the last one, the geometry has a volume, or an attribute changed its
     /// type. After a refused frame the writer is as it was before; after a failed write it only fails.
     pub fn frame(&mut self, time_code: f64, geometry: &Geometry) -> Result<(), UsdError> {
         self.recorder.frame(time_code, geometry).map_err(|fault| located(&self.path, fault))
     }
 
-    /// Writes what describes the arrays, brings the file to disk and gives it its name. No frame at all is a file too:
-    /// an empty `/NAME`.
+    /// Writes what describes the arrays, syncs the file to disk and renames it. A file without frames is valid: an
+    /// empty `/NAME`.
     ///
     /// # Errors
     /// Where the file cannot be written, or an earlier write failed; nothing is left behind then.
@@ -156,7 +156,7 @@ pub enum UsdError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UsdFault {
-    /// Frames a second that are none.
+    /// Frames per second that are none.
     #[error("`fps` is {fps}, expected a positive number")]
     Fps {
         /// What was given.
@@ -177,7 +177,7 @@ pub enum UsdFault {
         last: f64,
     },
     /// A volume.
-    #[error("frame {time} has a `volume`, which usda and usdc cannot hold here; json can")]
+    #[error("frame {time} has a `volume`, which usda and usdc cannot hold; json can")]
     Volume {
         /// The frame.
         time: f64,

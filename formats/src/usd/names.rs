@@ -17,8 +17,8 @@ pub(super) fn identifier(name: &str) -> String {
     }
 }
 
-/// One identifier for each of `names`, all different: whoever is an identifier keeps its name, the first of equals; the
-/// rest follow in their order, with `_2`, `_3` … where theirs is taken.
+/// One identifier for each of `names`, all different: a name that is an identifier is kept (of equal ones the first); the
+/// rest follow in order, with `_2`, `_3` … where theirs is taken.
 pub(super) fn distinct(names: &[&str]) -> Vec<String> {
     let mut given: Vec<Option<String>> = vec![None; names.len()];
     let mut taken = BTreeSet::new();
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_meet_are_numbered_and_the_exact_one_keeps_its_own() {
+    fn clashing_names_are_numbered_and_the_exact_one_is_kept() {
         assert_eq!(distinct(&["a-b", "a_b", "a.b"]), ["a_b_2", "a_b", "a_b_3"]);
         assert_eq!(distinct(&["mask", "mask", "mask_2"]), ["mask", "mask_3", "mask_2"]);
         assert_eq!(distinct(&["-", ".", "_"]), ["__2", "__3", "_"]);

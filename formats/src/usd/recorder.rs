@@ -1,7 +1,7 @@
 //! From frames to tracks: each attribute's values through time, stored once while they stay the same.
 //!
-//! Memory: the arrays of the last frame (shared with whoever holds them), a handle of 8 bytes an attribute and frame.
-//! A refused frame changes nothing; after a failed write every further call fails.
+//! Memory: the arrays of the last frame (shared with other holders), a handle of 8 bytes per attribute and frame.
+//! A refused frame changes nothing; after a failed write every call fails.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -13,12 +13,12 @@ use super::layout::{self, Derived, Source, Wanted};
 use super::names;
 use super::stage::{Attribute, Encoder, Handle, Prim, Stage, Values, same_bits};
 
-/// What a stage is given at the start.
+/// Settings of a stage.
 #[derive(Clone, Debug)]
 pub(super) struct Header {
     /// The output's name, not yet an identifier.
     pub(super) name: String,
-    /// Frames a second.
+    /// Frames per second.
     pub(super) fps: f64,
     /// The scene's origin, metres.
     pub(super) origin: [f64; 3],
@@ -53,14 +53,14 @@ pub(super) struct Recorder<W> {
     failed: bool,
 }
 
-/// The encoder, and how often it was asked or not.
+/// The encoder, and how often it was used or not.
 struct Store<W> {
     encoder: Box<dyn Encoder<W>>,
     stored: u64,
     shared: u64,
 }
 
-/// One attribute's values, one a frame.
+/// One attribute's values, one per frame.
 struct Track {
     rows: ColumnType,
     last: Option<(Column, Handle)>,
@@ -105,7 +105,7 @@ impl<W> Recorder<W> {
         Ok(())
     }
 
-    /// Writes the structure and hands the file back.
+    /// Writes the structure and returns the file.
     pub(super) fn finish(self) -> Result<(W, Counts), Fault> {
         self.refuse_after_failure()?;
         let Self { header, times, tracks, store, .. } = self;
@@ -236,7 +236,7 @@ fn prim(kind: Kind, tracks: Vec<(Source, Track)>) -> Prim {
     Prim { name: kind.name(), schema, tokens, attributes: tracks.into_iter().zip(names).map(attribute).collect() }
 }
 
-/// For each track the attribute's name, and its own where that is another.
+/// For each track the USD name, and the attribute's own name where it differs.
 fn attribute_names(kind: Kind, tracks: &[(Source, Track)]) -> Vec<(String, Option<String>)> {
     let wanted = || tracks.iter().map(|(source, track)| layout::declare(kind, source, track.rows).wanted);
     let primvars: Vec<&str> = wanted()

@@ -1,6 +1,6 @@
-//! What both flavours are told: arrays while frames come, and at the end the structure that refers to them.
+//! Input of both flavours: arrays while frames arrive, and at the end the structure that refers to them.
 //!
-//! An [`Encoder`] stores an array and hands out a [`Handle`]; a [`Stage`] names each handle's prim, attribute and time.
+//! An [`Encoder`] stores an array and returns a [`Handle`]; a [`Stage`] names each handle's prim, attribute and time.
 //! Nothing here knows a geometry, and nothing of a file format beyond USD's own type names.
 
 use std::io;
@@ -31,11 +31,11 @@ impl Handle {
 pub(super) struct Stage {
     /// Name of the one root prim, an identifier.
     pub(super) name: String,
-    /// The name it was made from, where that is another.
+    /// The original name, where it differs.
     pub(super) display_name: Option<String>,
-    /// Frames and time codes a second.
+    /// Frames and time codes per second.
     pub(super) fps: f64,
-    /// Where the root prim stands, metres.
+    /// Position of the root prim, metres.
     pub(super) origin: [f64; 3],
     /// Time codes, ascending.
     pub(super) times: Vec<f64>,
@@ -52,7 +52,7 @@ impl Stage {
         numbers
     }
 
-    /// Whether the root prim stands elsewhere than at 0.
+    /// Whether the root prim is moved.
     pub(super) fn is_moved(&self) -> bool {
         self.origin != [0.0; 3]
     }
@@ -76,7 +76,7 @@ pub(super) struct Prim {
 pub(super) struct Attribute {
     /// Its name, `primvars:` included.
     pub(super) name: String,
-    /// The name it was made from, where that is another.
+    /// The original name, where it differs.
     pub(super) display_name: Option<String>,
     /// Its type.
     pub(super) kind: UsdType,
@@ -86,7 +86,7 @@ pub(super) struct Attribute {
     pub(super) values: Values,
 }
 
-/// One value for all times, or one a time code.
+/// One value for all times, or one per time code.
 #[derive(Debug, PartialEq)]
 pub(super) enum Values {
     /// The same always.

@@ -1,7 +1,7 @@
 //! The sections of a crate file: a tree of specs as tables that refer to each other by number.
 //!
 //! Tokens are names, fields are (name, value) pairs, field sets are what specs have; equal ones are stored once. The tree
-//! itself is a list of paths, depth first, with jumps. The limit: one tree a file, written when it is complete.
+//! itself is a list of paths, depth first, with jumps. The limit: one tree per file, written when it is complete.
 
 use std::collections::BTreeMap;
 

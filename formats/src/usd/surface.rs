@@ -5,12 +5,12 @@ const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// Faces that belong to one tet only, in the order of the tets, counter-clockwise from outside.
 pub(super) fn surface(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
-    let face = |place: usize| FACES[place % 4].map(|corner| tets[place / 4][corner]);
+    let face = |face_index: usize| FACES[face_index % 4].map(|corner| tets[face_index / 4][corner]);
     let mut shared: Vec<([u32; 3], usize)> = (0..tets.len() * 4)
-        .map(|place| {
-            let mut corners = face(place);
+        .map(|face_index| {
+            let mut corners = face(face_index);
             corners.sort_unstable();
-            (corners, place)
+            (corners, face_index)
         })
         .collect();
     shared.sort_unstable();

@@ -99,7 +99,7 @@ fn no_frame_and_no_component_are_files_too() {
 }
 
 #[test]
-fn a_frame_costs_its_changing_arrays_and_a_handle_an_attribute() {
+fn a_frame_costs_its_changing_arrays_and_one_handle_per_attribute() {
     let points = 1000;
     let frame = |x: f32| {
         let mut part = Component::curves(vec![5; 200], vec![[x, 0.0, 0.0]; points]).unwrap();
@@ -172,9 +172,7 @@ fn errors_name_the_file() {
     let text = writer.frame(1.0, &geometry).unwrap_err().to_string();
     assert_eq!(
         text,
-        format!(
-            "`{shown}` could not be written: frame 1 has a `volume`, which usda and usdc cannot hold here; json can"
-        )
+        format!("`{shown}` could not be written: frame 1 has a `volume`, which usda and usdc cannot hold; json can")
     );
     assert_eq!(geometry.kinds().collect::<Vec<_>>(), [Kind::Volume]);
     writer.frame(1.0, &fur().into()).unwrap();

@@ -30,7 +30,7 @@ impl<W: Write, S: Write> Writer<W, S> {
 }
 
 impl<W: Write + Send, S: Read + Write + Seek + Send> Encoder<W> for Writer<W, S> {
-    /// The handle is the place in the spool: u64 length, text.
+    /// The handle is the offset in the spool: u64 length, text.
     fn store(&mut self, kind: UsdType, rows: &Column) -> io::Result<Handle> {
         self.text.clear();
         put_array(&mut self.text, kind, rows);

@@ -1,8 +1,8 @@
 //! `.usdc`: USD as a crate file, version 0.8.0.
 //!
-//! Header, values, sections, table of contents. Values are written as they come and known by 8-byte reps from then on;
-//! the sections, which make a tree of prims and attributes out of them, follow at the end, and last the header. Until
-//! then no reader takes the file. 0.8.0 is what USD itself writes and all versions read in silence.
+//! Header, values, sections, table of contents. Values are written as they arrive and referred to by 8-byte reps; the
+//! sections, which describe the tree of prims and attributes, follow at the end, and last the header. Until then no
+//! reader accepts the file. 0.8.0 is what USD itself writes and all versions read without a warning.
 
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -48,7 +48,7 @@ const CODED_FROM: usize = 16;
 /// And up to this one: a chunk holds less than 2 GB.
 const CODED_TO: usize = 1 << 28;
 
-/// A block of numbers on their way to the file, bytes.
+/// Bytes of a block of numbers converted at once.
 const BLOCK: usize = 1 << 16;
 
 /// Writes a crate file to `W`.
@@ -82,8 +82,8 @@ impl<W: Write> Writer<W> {
         let mut block = std::mem::take(&mut self.block);
         for numbers in numbers.chunks(BLOCK / N) {
             block.resize(numbers.len() * N, 0);
-            for (place, x) in block.as_chunks_mut().0.iter_mut().zip(numbers) {
-                *place = bytes(*x);
+            for (slot, x) in block.as_chunks_mut().0.iter_mut().zip(numbers) {
+                *slot = bytes(*x);
             }
             self.put(&block)?;
         }
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_rep_says_type_form_and_place() {
+    fn a_value_rep_encodes_type_form_and_offset() {
         let (rep, bytes) = stored(UsdType::Point3, Column::new(vec![[1.0, -0.0, 2.0_f32]]));
         assert_eq!(rep, 0x8018_0000_0000_0058);
         assert_eq!(bytes, [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x80, 0, 0, 0, 0x40]);

@@ -31,18 +31,18 @@ fn still_life(scale: f32) -> Geometry {
     all
 }
 
-fn small() -> Settings {
-    Settings { width: 160, height: 120, names: false, ..Settings::default() }
+fn small() -> PictureSettings {
+    PictureSettings { width: 160, height: 120, names: false, ..PictureSettings::default() }
 }
 
-fn picture(geometry: &Geometry, settings: &Settings) -> Image {
+fn picture(geometry: &Geometry, settings: &PictureSettings) -> Image {
     render(&[Layer::new("one", geometry)], settings).unwrap()
 }
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let geometry = still_life(1.0);
-    let settings = Settings { color_by: Some("heat".into()), note: Some("still life".into()), ..small() };
+    let settings = PictureSettings { color_by: Some("heat".into()), note: Some("still life".into()), ..small() };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| [picture(&geometry, &small()), picture(&geometry, &settings)])
@@ -70,14 +70,15 @@ fn nothing_is_the_backdrop_alone() {
 #[test]
 fn something_is_seen_in_the_middle_and_its_shadow_beside_it() {
     let geometry = Geometry::from(Component::points(vec![[0.0, 0.5, 0.0]]));
-    let settings = Settings { point_width: Some(1.0), bounds: Some([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]]), ..small() };
+    let settings =
+        PictureSettings { point_width: Some(1.0), bounds: Some([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]]), ..small() };
     let (empty, ball) = (render(&[], &settings).unwrap(), picture(&geometry, &settings));
     let at = |image: &Image, x: usize, y: usize| image.pixels()[y * 160 + x];
     assert!(at(&ball, 80, 60)[2] > at(&ball, 80, 60)[0]);
     assert_eq!(at(&ball, 2, 2), at(&empty, 2, 2));
     let darker = |x: usize, y: usize| at(&ball, x, y)[1] + 20 < at(&empty, x, y)[1];
     assert!((0..160).any(|x| darker(x, 95)));
-    let bare = picture(&geometry, &Settings { ground: false, ..settings });
+    let bare = picture(&geometry, &PictureSettings { ground: false, ..settings });
     assert!((120..160).all(|x| at(&bare, x, 95) == at(&empty, x, 95)));
 }
 
@@ -97,14 +98,27 @@ fn hostile_geometry_is_a_picture_too() {
     let camera = |text: &str| Some(text.parse().unwrap());
     for settings in [
         small(),
-        Settings { bounds: Some([[0.0; 3], [1.0; 3]]), ..small() },
-        Settings { bounds: Some([[f32::NAN; 3]; 2]), ..small() },
-        Settings { bounds: Some([[1.0; 3], [-1.0; 3]]), camera: camera("eye=0,0,0 target=1e-20,0,0"), ..small() },
-        Settings { bounds: Some([[0.0; 3], [1.0; 3]]), camera: camera("eye=1e300,0,0 target=-1e300,0,0"), ..small() },
-        Settings { color_by: Some("P".into()), curve_width: Some(f32::INFINITY), point_width: Some(-1.0), ..small() },
-        Settings { color_by: Some("width".into()), range: Some([f32::NAN, f32::INFINITY]), ..small() },
-        Settings { width: 1, height: 1, ..small() },
-        Settings { width: 1000, height: 1, ..small() },
+        PictureSettings { bounds: Some([[0.0; 3], [1.0; 3]]), ..small() },
+        PictureSettings { bounds: Some([[f32::NAN; 3]; 2]), ..small() },
+        PictureSettings {
+            bounds: Some([[1.0; 3], [-1.0; 3]]),
+            camera: camera("eye=0,0,0 target=1e-20,0,0"),
+            ..small()
+        },
+        PictureSettings {
+            bounds: Some([[0.0; 3], [1.0; 3]]),
+            camera: camera("eye=1e300,0,0 target=-1e300,0,0"),
+            ..small()
+        },
+        PictureSettings {
+            color_by: Some("P".into()),
+            curve_width: Some(f32::INFINITY),
+            point_width: Some(-1.0),
+            ..small()
+        },
+        PictureSettings { color_by: Some("width".into()), range: Some([f32::NAN, f32::INFINITY]), ..small() },
+        PictureSettings { width: 1, height: 1, ..small() },
+        PictureSettings { width: 1000, height: 1, ..small() },
     ] {
         picture(&geometry, &settings);
     }
@@ -114,8 +128,8 @@ fn hostile_geometry_is_a_picture_too() {
 fn names_and_a_note_are_written_and_nothing_else_changes() {
     let geometry = still_life(1.0);
     let quiet = picture(&geometry, &small());
-    let named = picture(&geometry, &Settings { names: true, ..small() });
-    let noted = picture(&geometry, &Settings { note: Some("one".into()), ..small() });
+    let named = picture(&geometry, &PictureSettings { names: true, ..small() });
+    let noted = picture(&geometry, &PictureSettings { note: Some("one".into()), ..small() });
     let changed = |image: &Image| {
         let differ = image.pixels().iter().zip(quiet.pixels()).enumerate().filter(|(_, (a, b))| a != b);
         differ.map(|(k, _)| [k % 160, k / 160]).collect::<Vec<_>>()
@@ -127,7 +141,7 @@ fn names_and_a_note_are_written_and_nothing_else_changes() {
 
 #[test]
 fn a_picture_without_pixels_is_an_error() {
-    let error = render(&[], &Settings { width: 0, ..small() }).unwrap_err();
+    let error = render(&[], &PictureSettings { width: 0, ..small() }).unwrap_err();
     assert_eq!(error.to_string(), "the picture is 0 × 120 pixels, expected 1 to 268435456 in all");
 }
 
@@ -137,19 +151,19 @@ fn a_wider_range_moves_the_colors_and_keeps_them_between_frames() {
     let layers = [Layer::new("one", &geometry)];
     let range = attribute_range(&layers, "heat");
     assert_eq!(range, Some([0.0, 59.0]));
-    let by_heat = Settings { color_by: Some("heat".into()), ..small() };
+    let by_heat = PictureSettings { color_by: Some("heat".into()), ..small() };
     let own = picture(&geometry, &by_heat);
-    assert_eq!(own, picture(&geometry, &Settings { range, ..by_heat.clone() }));
-    assert_ne!(own, picture(&geometry, &Settings { range: Some([0.0, 600.0]), ..by_heat.clone() }));
+    assert_eq!(own, picture(&geometry, &PictureSettings { range, ..by_heat.clone() }));
+    assert_ne!(own, picture(&geometry, &PictureSettings { range: Some([0.0, 600.0]), ..by_heat.clone() }));
     // The bounds that render takes by itself are those a caller would give for one frame.
-    assert_eq!(own, picture(&geometry, &Settings { bounds: bounds(&layers), ..by_heat }));
+    assert_eq!(own, picture(&geometry, &PictureSettings { bounds: bounds(&layers), ..by_heat }));
 }
 
 #[test]
-fn an_attribute_that_nobody_has_is_grey_without_a_legend() {
+fn an_unknown_attribute_is_grey_without_a_legend() {
     let geometry = still_life(1.0);
-    let image = picture(&geometry, &Settings { color_by: Some("cold".into()), ..small() });
-    let quiet = picture(&geometry, &Settings { color_by: Some("cold".into()), legend: false, ..small() });
+    let image = picture(&geometry, &PictureSettings { color_by: Some("cold".into()), ..small() });
+    let quiet = picture(&geometry, &PictureSettings { color_by: Some("cold".into()), legend: false, ..small() });
     assert_eq!(image, quiet);
     let color = |pixel: &[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap();
     assert!(image.pixels().iter().all(|pixel| color(pixel) < 30));

@@ -1,7 +1,7 @@
 //! Which primitives may touch which tile.
 //!
 //! Promise: a tile meets its primitives in one order, whatever the number of threads: those that touch more than
-//! `WIDE` tiles first, then the others, each in the order given. Limit: at most `WIDE` entries a primitive, so memory
+//! `WIDE` tiles first, then the others, each in the order given. Limit: at most `WIDE` entries per primitive, so memory
 //! stays linear; a wide one costs every tile a look at its box.
 
 use super::TILE;
@@ -55,20 +55,20 @@ pub(crate) struct Bins {
 impl Bins {
     /// Bins of a picture `columns` × `rows` tiles large, for primitives with these boxes.
     pub(crate) fn of(boxes: &[PixelBox], columns: usize, rows: usize) -> Self {
-        let narrow = || boxes.iter().enumerate().filter(|(_, place)| place.tile_count() <= WIDE);
-        let each_tile = |place: &PixelBox| {
-            let [across, down] = place.tiles();
+        let narrow = || boxes.iter().enumerate().filter(|(_, pixels)| pixels.tile_count() <= WIDE);
+        let each_tile = |pixels: &PixelBox| {
+            let [across, down] = pixels.tiles();
             down.flat_map(move |row| across.clone().map(move |column| row * columns + column))
         };
         let mut starts = vec![0; columns * rows + 1];
-        narrow().for_each(|(_, place)| each_tile(place).for_each(|tile| starts[tile + 1] += 1));
+        narrow().for_each(|(_, pixels)| each_tile(pixels).for_each(|tile| starts[tile + 1] += 1));
         for tile in 0..columns * rows {
             starts[tile + 1] += starts[tile];
         }
         let mut free = starts.clone();
         let mut filled = vec![0; starts[columns * rows]];
-        for (row, place) in narrow() {
-            for tile in each_tile(place) {
+        for (row, pixels) in narrow() {
+            for tile in each_tile(pixels) {
                 filled[free[tile]] = row as u32;
                 free[tile] += 1;
             }
@@ -93,8 +93,8 @@ mod tests {
     fn a_tile_meets_what_touches_it_in_order_wide_ones_first() {
         let edge = TILE as f32;
         let size = [TILE * 20, TILE * 20];
-        let place = |low: f32, high: f32| PixelBox::within([low; 2], [high; 2], size).unwrap();
-        let boxes = [place(1.0, 2.0), place(0.0, 1e30), place(edge - 1.0, edge + 1.0), place(edge, edge + 2.0)];
+        let pixels = |low: f32, high: f32| PixelBox::within([low; 2], [high; 2], size).unwrap();
+        let boxes = [pixels(1.0, 2.0), pixels(0.0, 1e30), pixels(edge - 1.0, edge + 1.0), pixels(edge, edge + 2.0)];
         let bins = Bins::of(&boxes, 20, 20);
         assert_eq!(bins.at(0, 0).collect::<Vec<_>>(), [1, 0, 2]);
         assert_eq!(bins.at(1, 1).collect::<Vec<_>>(), [1, 2, 3]);

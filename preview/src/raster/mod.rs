@@ -1,8 +1,8 @@
-//! The z-buffer: 16 samples a pixel, each with its own nearness and colour, tile by tile.
+//! The z-buffer: 16 samples per pixel, each with its own nearness and colour, tile by tile.
 //!
 //! Promise: the same bits on any number of threads, as a tile is one task and meets its primitives in a fixed order; of
 //! two samples equally near the first drawn stays. A primitive costs at most its pixels in the picture. Limit: a
-//! primitive is shaded once a pixel, at the middle of the samples it covers, as graphics cards do with multisampling.
+//! primitive is shaded once per pixel, at the middle of the samples it covers, as graphics cards do with multisampling.
 
 mod bins;
 mod cover;
@@ -15,11 +15,11 @@ pub(crate) use project::Screen;
 
 use numerics::vector::Vec3;
 
-/// Pixels a side of a tile: its samples fit a core's second cache.
+/// Pixels per side of a tile: its samples fit a core's second cache.
 pub(crate) const TILE: usize = 16;
-/// Samples a pixel.
+/// Samples per pixel.
 pub(crate) const SAMPLES: usize = 16;
-/// A number a sample.
+/// One number per sample.
 pub(crate) type Lanes = [f32; SAMPLES];
 /// Nearness of a sample that nothing covers.
 pub(crate) const UNCOVERED: f32 = f32::NEG_INFINITY;
@@ -135,19 +135,19 @@ pub(crate) fn draw<S: Shader, R: Send>(
         .map(|index| {
             let (column, row) = (index % columns, index / columns);
             let mut tile = Tile::new(column, row);
-            let place = tile.pixels();
+            let within = tile.pixels();
             for triangle in triangles.at(column, row).map(|row| &screen.triangles[row]) {
-                if let Some(pixels) = triangle.pixels.meet(&place) {
+                if let Some(pixels) = triangle.pixels.meet(&within) {
                     cover::triangle(&mut tile, triangle, pixels, shader);
                 }
             }
             for segment in segments.at(column, row).map(|row| &screen.segments[row]) {
-                if let Some(pixels) = segment.pixels.meet(&place) {
+                if let Some(pixels) = segment.pixels.meet(&within) {
                     cover::segment(&mut tile, segment, pixels, shader);
                 }
             }
             for dot in dots.at(column, row).map(|row| &screen.dots[row]) {
-                if let Some(pixels) = dot.pixels.meet(&place) {
+                if let Some(pixels) = dot.pixels.meet(&within) {
                     cover::dot(&mut tile, dot, pixels, shader);
                 }
             }

@@ -3,13 +3,13 @@
 //!
 //! Promise: closed for any level set, as all beyond the grid counts as outside; faces wind counter-clockwise seen from
 //! outside (φ > 0); points in the order of the grid. Limit: first order in the cell, sharp edges are rounded, and where
-//! two sheets meet in one cube they share its point. A value that is no number counts as outside.
+//! two sheets meet in one cube they share its point. A value that is not finite counts as outside.
 
 use engine::geometry::{BLOCK_EDGE, FieldCursor, Grid, SparseField, Volume, VolumeSampler};
 use numerics::vector::length;
 use rayon::prelude::*;
 
-/// Points (metres), the cell each lies nearest to, and quads.
+/// Points (metres), the cell nearest to each, and quads.
 pub(crate) struct Surface {
     pub(crate) points: Vec<[f32; 3]>,
     pub(crate) cells: Vec<[u32; 3]>,

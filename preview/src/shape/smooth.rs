@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_without_area_has_no_normal_and_harms_no_neighbour() {
+    fn a_triangle_without_area_has_no_normal_and_does_not_change_its_neighbours() {
         let points = [[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
         let normals = corner_normals(&points, &[[0, 1, 2], [0, 0, 1]]);
         assert_eq!(normals[0], [[0.0, 1.0, 0.0]; 3]);

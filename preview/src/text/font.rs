@@ -7,7 +7,7 @@
 #[cfg(test)]
 const ROWS: usize = 9;
 
-/// What stands for a character the font lacks.
+/// The glyph of a character that the font lacks.
 const MISSING: &str = "#####/#...#/#...#/#...#/#...#/#...#/#####";
 
 /// Rows from the top, apart by `/`; rows that are left out or empty are blank.

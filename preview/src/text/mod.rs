@@ -1,6 +1,6 @@
-//! What is written into a picture: the label in the upper left, the legend of the colour map in the lower left.
+//! Text in a picture: the label in the upper left, the legend of the colour map in the lower left.
 //!
-//! Promise: text is cut at the picture's border and never in the way of drawing. Limit: whole dots, one line.
+//! Promise: text is clipped at the picture's border. Limit: whole dots, one line.
 
 mod font;
 
@@ -14,7 +14,7 @@ const SPACE: usize = 1;
 const BAR: [usize; 2] = [120, 5];
 /// From the top of one line to the next, dots.
 const LINE: usize = 12;
-/// How much of the backdrop shows through the letters: black on white would shout.
+/// Share of the backdrop that shows through the letters: softer than black on white.
 const FAINT: f32 = 0.25;
 
 /// Writes `label` into the upper left.
@@ -41,7 +41,7 @@ pub(crate) fn legend(image: &mut Image, name: &str, [low, high]: [f32; 2]) {
     write(image, &high, [right, below], dot);
 }
 
-/// Pixels a dot: text keeps about one share of the picture.
+/// Pixels per dot: text keeps about one share of the picture.
 fn dot_size(image: &Image) -> usize {
     (image.height().min(image.width()) / 300).max(1)
 }
@@ -51,7 +51,7 @@ fn length(text: &str) -> usize {
     text.chars().map(|character| font::glyph(character).1 + SPACE).sum::<usize>().saturating_sub(SPACE)
 }
 
-/// Three digits that matter, short.
+/// Three significant digits, in the shortest form.
 fn number(value: f32) -> String {
     let size = value.abs();
     if value == 0.0 {

@@ -114,7 +114,7 @@ fn topology_that_changes_is_sampled() {
 }
 
 #[test]
-fn names_are_told_apart_and_kept_beside_their_identifiers() {
+fn names_become_distinct_identifiers_and_are_kept_as_display_names() {
     let mut part = curve(0.0);
     part.set(ID, vec![1, 2]).unwrap();
     part.set(N, vec![[0.0; 3]; 2]).unwrap();
@@ -142,7 +142,7 @@ fn a_refused_frame_says_why_and_changes_nothing() {
     let volume = Volume::new(grid, vec![], [vec![], vec![], vec![]]).unwrap();
     let mut with_volume = Geometry::from(curve(0.0));
     with_volume.put_volume(Arc::new(volume));
-    assert_eq!(refused(1.0, with_volume), "frame 1 has a `volume`, which usda and usdc cannot hold here; json can");
+    assert_eq!(refused(1.0, with_volume), "frame 1 has a `volume`, which usda and usdc cannot hold; json can");
     let mut part = curve(0.0);
     part.set_column(Owner::Point, "mask", Column::zeros(ColumnType::F1, 2)).unwrap();
     recorder.frame(1.0, &part.clone().into()).unwrap();
