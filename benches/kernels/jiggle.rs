@@ -4,7 +4,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use curves::jiggle::{Carry, Drag, Jiggle, Roots, Spring};
+use curves::attach::SkinBinding;
+use curves::jiggle::{Drag, Jiggle, RigidStep, Spring};
 use numerics::masked::Masked;
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
@@ -25,13 +26,12 @@ fn groom(curves: u32, cvs: u32, time: f32) -> (Vec<u32>, Vec<[f32; 3]>) {
     (starts, (0..curves).flat_map(|curve| (0..cvs).map(move |cv| point(curve, cv))).collect())
 }
 
-/// A square of `n` × `n` quads under the groom.
-fn ground(n: u32) -> (Vec<u32>, Vec<u32>, Vec<[f32; 3]>) {
+/// A square of `n` × `n` quads under the groom, as triangles.
+fn ground(n: u32) -> (Vec<[u32; 3]>, Vec<[f32; 3]>) {
     let side = 2.0 / n as f32;
     let points = (0..=n).flat_map(|z| (0..=n).map(move |x| [x as f32 * side, 0.0, z as f32 * side]));
     let cells = (0..n).flat_map(|z| (0..n).map(move |x| x + z * (n + 1)));
-    let corners = cells.flat_map(|a| [a, a + n + 1, a + n + 2, a + 1]).collect();
-    ((0..=n * n).map(|k| k * 4).collect(), corners, points.collect())
+    (cells.flat_map(|a| [[a, a + n + 1, a + n + 2], [a, a + n + 2, a + 1]]).collect(), points.collect())
 }
 
 /// The least of some runs, milliseconds.
@@ -49,7 +49,7 @@ fn main() {
     for (curves, cvs) in [(10_275, 5), (10_275, 32), (100_000, 5)] {
         let frames = [0.0, 1.0].map(|time| groom(curves, cvs, time).1);
         let starts = groom(curves, cvs, 0.0).0;
-        let (faces, corners, skin) = ground(100);
+        let (triangles, skin) = ground(100);
         let roots: Vec<[f32; 3]> = starts[..curves as usize].iter().map(|start| frames[0][*start as usize]).collect();
         for path in Path::all() {
             let spring = |frequency| Spring {
@@ -74,13 +74,13 @@ fn main() {
                 let shaped = jiggle.shape_on(path, 1.0.into());
                 assert!(shaped.max_offset.is_finite());
             });
-            let bind = least(3, || assert!(Roots::bind(&faces, &corners, &skin, &roots).is_some()));
-            let bound = Roots::bind(&faces, &corners, &skin, &roots).expect("a ground with an area");
-            let before = bound.frames(&skin);
+            let bind = least(3, || assert!(SkinBinding::to_closest(&skin, &triangles, &roots).is_some()));
+            let bound = SkinBinding::to_closest(&skin, &triangles, &roots).expect("a ground with faces");
+            let before = bound.poses(&skin);
             let moved: Vec<[f32; 3]> = skin.iter().map(|p| [p[0] + 0.01, p[1], p[2] + 0.3 * p[0]]).collect();
             let skinned = least(ROUNDS, || {
-                let carries = Carry::all_between(&before, &bound.frames(&moved), 1.0);
-                jiggle.step_on(path, &frames[next() % 2], &spring(3.0), 1.0 / 24.0, Some(&carries));
+                let steps = RigidStep::all_between(&bound, &before, &bound.poses(&moved), 1.0);
+                jiggle.step_on(path, &frames[next() % 2], &spring(3.0), 1.0 / 24.0, Some(&steps));
             });
             println!(
                 "{curves:7} × {cvs:2} {:>9}: step {step:.3} ms, with a skin {skinned:.3}, of a keyed spring {keyed:.3}, \

@@ -11,11 +11,10 @@
 //! inwards. The motion of the skin is not added to `v`. The binding is cached as long as the roots and `rest_skin` do
 //! not change, also for curves that move otherwise.
 
-use curves::attach::{Binding, Pose, carry_curves, turn_orientations, turn_vectors};
+use curves::attach::{RootPose, RootPositions, SkinBinding, attach_curves, rotate_orientations, rotate_vectors};
 use engine::prelude::*;
 
 use crate::shared::faces::{counted, same_faces};
-use crate::shared::kept::Roots;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they grew on `rest_skin`, root first.");
@@ -34,7 +33,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Attach",
-    1,
+    2,
     "Carries curves along with the skin that they grew on. Roots stay at their positions on its faces; each curve \
      rotates with the skin around its root and keeps its shape and length. A root off the skin keeps its distance.",
     Cook::Pure(cook),
@@ -59,8 +58,13 @@ fn cook(cx: &Cx) -> Result<Outputs> {
              instead",
         ));
     }
-    let roots = Roots::of(curves);
-    let binding = rest.kept(roots.clone(), || bind(&roots.0, rest))?;
+    let roots = RootPositions::of(curves.runs().starts(), curves.positions());
+    let bind = || Ok(SkinBinding::to_closest(rest.positions(), &rest.triangles().corners, roots.as_slice()));
+    let binding = rest.kept(roots.clone(), bind)?;
+    let Some(binding) = &*binding else {
+        let fact = format!("`rest_skin` has no face to attach {} curves to", curves.element_count());
+        return Err(Error::refused(fact).hint("wire the mesh that the curves grew on"));
+    };
     cx.check_cancelled()?;
 
     let mut out = cx.edit(CURVES);
@@ -68,49 +72,38 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         let rest = curves.table(Owner::Point).column(P.name).cloned().expect("every component has `P`");
         out.set_column(Owner::Point, PREF.name, rest)?;
     }
-    cx.publish(BOUND, binding.farthest());
+    cx.publish(BOUND, binding.max_distance());
     if rest.positions() == skin.positions() {
         cx.publish(UNTURNED, 0.0);
         cx.publish(LENGTH_ERROR, 0.0);
     } else {
-        let poses = binding.carry(skin.positions());
-        let carried = carry_curves(curves.runs().starts(), curves.positions(), &poses);
+        let poses = binding.poses(skin.positions());
+        let attached = attach_curves(curves.runs().starts(), curves.positions(), &poses);
         cx.publish(UNTURNED, poses.iter().filter(|pose| pose.lost).count() as f64);
-        cx.publish(LENGTH_ERROR, carried.length_error);
-        out.set(P, carried.points)?;
-        turn_attributes(&mut out, &poses);
+        cx.publish(LENGTH_ERROR, attached.length_error);
+        out.set(P, attached.points)?;
+        rotate_attributes(&mut out, &poses);
     }
     Ok(OUT.with(out))
 }
 
-/// Binds the roots.
-///
-/// # Errors
-/// Where there are roots and nothing to bind them to.
-fn bind(roots: &[[f32; 3]], rest: &Component) -> Result<Binding> {
-    Binding::nearest(rest.positions(), &rest.triangles().corners, roots).ok_or_else(|| {
-        let fact = format!("`rest_skin` has no face to attach {} curves to", roots.len());
-        Error::refused(fact).hint("wire the mesh that the curves grew on")
-    })
-}
-
 /// Rotates vectors and orientations, of CVs and of curves.
-fn turn_attributes(curves: &mut Component, poses: &[Pose]) {
+fn rotate_attributes(curves: &mut Component, poses: &[RootPose]) {
     let by_cv = curves.runs().starts().to_vec();
     let by_curve: Vec<u32> = (0..by_cv.len() as u32).collect();
     for name in [V.name, N.name] {
         if let Some(rows) = curves.edit(Attr::point(name)) {
-            turn_vectors(&by_cv, rows, poses);
+            rotate_vectors(&by_cv, rows, poses);
         }
         if let Some(rows) = curves.edit(Attr::element(name)) {
-            turn_vectors(&by_curve, rows, poses);
+            rotate_vectors(&by_curve, rows, poses);
         }
     }
     if let Some(rows) = curves.edit(ORIENT) {
-        turn_orientations(&by_cv, rows, poses);
+        rotate_orientations(&by_cv, rows, poses);
     }
     if let Some(rows) = curves.edit(Attr::element(ORIENT.name)) {
-        turn_orientations(&by_curve, rows, poses);
+        rotate_orientations(&by_curve, rows, poses);
     }
 }
 

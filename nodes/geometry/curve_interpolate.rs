@@ -11,13 +11,15 @@
 //! `orient`, are those of the guide with the largest weight. `curve_id` is the hair's index in the infinite sequence of
 //! roots, `Pref` the hair at the scene's first frame, `uvw` the skin's if it has one.
 
-use curves::attach::{Binding, Pose};
-use curves::guides::{Blend, MOST_GUIDES, Mix, Rows, Shapes, Stand, blend, mix};
-use curves::scatter::Spot;
+use curves::attach::{RootPose, RootPositions, SkinBinding};
+use curves::guides::{
+    CurveDomain, GuideWeights, HairBlend, MAX_GUIDES, OrientedPoint, ResampledGuides, blend_hairs, guide_weights,
+};
+use curves::surface::SurfacePoint;
 use engine::prelude::*;
-use numerics::vector::{to_f32, to_f64};
+use numerics::vector::{DVec3, to_f32, to_f64};
 
-use crate::shared::kept::{Array, Roots};
+use crate::shared::kept::Array;
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
 inputs! { INPUTS:
@@ -33,7 +35,7 @@ params! { PARAMS:
         .unit(Unit::PerSquareMetre).at_least(0.0).soft(0.0, 1_000_000.0);
     COUNT: Param<i64> = Param::int("guides", 3,
         "Number of nearest guides that a hair is blended from: 1 makes clumps around the guides, more make a smoother \
-         coat.").within(1.0, MOST_GUIDES as f64).soft(1.0, 8.0);
+         coat.").within(1.0, MAX_GUIDES as f64).soft(1.0, 8.0);
     CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 takes that of the guide with the most CVs.")
         .within(0.0, 10_000.0).soft(0.0, 32.0);
     SEED: Param<Seed> = Param::seed("Selects other positions.");
@@ -56,7 +58,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Interpolate",
-    1,
+    2,
     "Fills a skin with hairs between guide curves. Each hair blends the shapes and lengths of the guides nearest to \
      its root and moves with them; where guides point different ways, hairs change direction gradually and do not \
      shrink.",
@@ -77,18 +79,18 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         0 => guides.runs().counts().max().unwrap_or(2) as usize,
         cvs => cvs as usize,
     };
-    let coat = rest.kept(Asked::of(cx, first, rest, cvs), || Coat::grow(cx, first, rest, cvs))?;
+    let coat = rest.kept(CoatKey::of(cx, first, rest, cvs), || Coat::grow(cx, first, rest, cvs))?;
     cx.check_cancelled()?;
 
-    let poses = (rest.positions() != skin.positions()).then(|| coat.carried(skin));
-    let roots: Vec<[f64; 3]> = match &poses {
-        None => coat.roots.clone(),
-        Some((hairs, _)) => coat.roots.iter().zip(hairs).map(|(root, pose)| moved(root, pose)).collect(),
-    };
-    let now =
-        Blend { mix: &coat.mix, roots: &roots, poses: poses.as_ref().map(|(hairs, guides)| (&hairs[..], &guides[..])) };
-    let shapes = Shapes::new(guides.runs().starts(), guides.positions(), cvs);
-    let blended = blend(shapes.clone(), &now);
+    let poses = (rest.positions() != skin.positions()).then(|| coat.poses(skin));
+    let mut roots: Vec<DVec3> = coat.hairs.roots().collect();
+    if let Some((hairs, _)) = &poses {
+        roots.iter_mut().zip(hairs).for_each(|(root, pose)| *root += pose.translation);
+    }
+    let poses = poses.as_ref().map(|(hairs, guides)| (&hairs[..], &guides[..]));
+    let now = HairBlend { weights: &coat.weights, roots: &roots, poses };
+    let shapes = ResampledGuides::new(guides.runs().starts(), guides.positions(), cvs);
+    let blended = blend_hairs(shapes.clone(), &now);
     let mut curves = Component::curves(vec![cvs as u32; roots.len()], blended.points)?;
     curves.set(CURVE_ID, coat.ids.clone())?;
     if cx.wants(PREF) {
@@ -98,7 +100,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     }
     carry_over(cx, &mut curves, guides, &shapes, &now)?;
     if let Some(uvw) = skin.get(UVW).filter(|_| cx.wants(UVW)) {
-        curves.set(UVW, at_roots(uvw, &rest.triangles().corners, coat.spots.iter(), cvs))?;
+        curves.set(UVW, at_roots(uvw, &rest.triangles().corners, coat.roots.iter(), cvs))?;
     }
     cx.publish(GROWN, roots.len() as f64);
     cx.publish(LENGTH_ERROR, blended.length_error);
@@ -124,14 +126,10 @@ fn guides_at_start<'c>(cx: &'c Cx) -> Result<&'c Component> {
     Err(Error::refused(fact).hint("guides may move, but must keep their CVs"))
 }
 
-fn moved(root: &[f64; 3], pose: &Pose) -> [f64; 3] {
-    [0, 1, 2].map(|k| root[k] + pose.shift[k])
-}
-
 /// What a coat depends on.
 #[derive(PartialEq)]
-struct Asked {
-    guides: Roots,
+struct CoatKey {
+    guides: RootPositions,
     mask: Array,
     density: u32,
     count: i64,
@@ -139,10 +137,10 @@ struct Asked {
     seed: u32,
 }
 
-impl Asked {
+impl CoatKey {
     fn of(cx: &Cx, guides: &Component, skin: &Component, cvs: usize) -> Self {
         Self {
-            guides: Roots::of(guides),
+            guides: RootPositions::of(guides.runs().starts(), guides.positions()),
             mask: Array::of(skin, &cx.get(MASK)),
             density: cx.get(DENSITY).to_bits(),
             count: cx.get(COUNT),
@@ -155,74 +153,73 @@ impl Asked {
 /// Roots, guides and weights of the hairs: the same at every frame.
 struct Coat {
     ids: Vec<i32>,
-    spots: Vec<Spot>,
-    /// At the scene's first frame.
-    roots: Vec<[f64; 3]>,
-    mix: Mix,
-    hairs: Binding,
-    guides: Binding,
+    /// Of the hairs.
+    roots: Vec<SurfacePoint>,
+    weights: GuideWeights,
+    hairs: SkinBinding,
+    guides: SkinBinding,
 }
 
 impl Coat {
     fn grow(cx: &Cx, guides: &Component, skin: &Component, cvs: usize) -> Result<Self> {
         let mask = planting::mask(&cx.get(MASK), skin)?;
         let density = if guides.runs().is_empty() { 0.0 } else { cx.get(DENSITY) };
-        let planted = Planting { density, mask, cvs, seed: cx.get(SEED) }.spots(cx, skin)?;
-        let (ids, spots): (Vec<i32>, Vec<Spot>) = planted.into_iter().map(|(place, spot)| (place as i32, spot)).unzip();
+        let planted = Planting { density, mask, cvs, seed: cx.get(SEED) }.roots(cx, skin)?;
+        let (ids, roots): (Vec<i32>, Vec<SurfacePoint>) =
+            planted.into_iter().map(|(index, root)| (index as i32, root)).unzip();
         cx.check_cancelled()?;
 
         let (points, triangles) = (skin.positions(), &skin.triangles().corners);
-        let roots: Vec<[f64; 3]> = spots
-            .iter()
-            .map(|spot| {
-                spot.mix(triangles[spot.triangle as usize].map(|corner| points[corner as usize].map(f64::from)))
-            })
-            .collect();
-        let hairs = Binding::on(points, triangles, &spots);
-        let Roots(guide_roots) = Roots::of(guides);
+        let hairs = SkinBinding::to_surface(points, triangles, &roots);
+        let guide_roots = RootPositions::of(guides.runs().starts(), guides.positions());
         // On a skin without faces no hairs grow, so no guide needs a binding.
-        let guides = Binding::nearest(points, triangles, &guide_roots);
-        let guides = guides.unwrap_or_else(|| Binding::on(points, triangles, &[]));
-        let stands = |places: &[[f32; 3]], normals: Vec<[f64; 3]>| -> Vec<Stand> {
-            let stand = |(at, normal): (&[f32; 3], [f64; 3])| Stand { at: *at, normal: normal.map(|x| x as f32) };
-            places.iter().zip(normals).map(stand).collect()
+        let guides = SkinBinding::to_closest(points, triangles, guide_roots.as_slice());
+        let guides = guides.unwrap_or_else(|| SkinBinding::to_surface(points, triangles, &[]));
+        let oriented = |binding: &SkinBinding| -> Vec<OrientedPoint> {
+            let both = binding.roots().zip(binding.normals());
+            both.map(|(root, normal)| OrientedPoint { position: to_f32(root), normal: to_f32(normal) }).collect()
         };
-        let narrow: Vec<[f32; 3]> = roots.iter().map(|root| root.map(|x| x as f32)).collect();
-        let mix =
-            mix(&stands(&guide_roots, guides.normals()), &stands(&narrow, hairs.normals()), cx.get(COUNT) as usize);
-        Ok(Self { ids, spots, roots, mix, hairs, guides })
+        let weights = guide_weights(&oriented(&guides), &oriented(&hairs), cx.get(COUNT) as usize);
+        Ok(Self { ids, roots, weights, hairs, guides })
     }
 
     /// The motion of the skin at the roots of hairs and of guides.
-    fn carried(&self, skin: &Component) -> (Vec<Pose>, Vec<Pose>) {
-        (self.hairs.carry(skin.positions()), self.guides.carry(skin.positions()))
+    fn poses(&self, skin: &Component) -> (Vec<RootPose>, Vec<RootPose>) {
+        (self.hairs.poses(skin.positions()), self.guides.poses(skin.positions()))
     }
 
     /// The hairs at the scene's first frame.
     fn at_rest(&self, guides: &Component, cvs: usize) -> Vec<[f32; 3]> {
-        let shapes = Shapes::new(guides.runs().starts(), guides.positions(), cvs);
-        blend(shapes, &Blend { mix: &self.mix, roots: &self.roots, poses: None }).points
+        let shapes = ResampledGuides::new(guides.runs().starts(), guides.positions(), cvs);
+        let roots: Vec<DVec3> = self.hairs.roots().collect();
+        blend_hairs(shapes, &HairBlend { weights: &self.weights, roots: &roots, poses: None }).points
     }
 }
 
 /// Transfers the guides' attributes to the hairs.
-fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shapes, now: &Blend) -> Result<()> {
+fn carry_over(
+    cx: &Cx,
+    hairs: &mut Component,
+    guides: &Component,
+    shapes: &ResampledGuides,
+    now: &HairBlend,
+) -> Result<()> {
     let own = |name: &str| [P.name, PREF.name, CURVE_ID.name].contains(&name);
     for (owner, name, column) in guides.columns().filter(|(_, name, _)| !own(name)) {
-        let rows = match owner {
+        let domain = match owner {
             Owner::Once => {
                 hairs.set_column(owner, name.clone(), column.clone())?;
                 continue;
             }
-            Owner::Point => Rows::Point,
-            Owner::Element => Rows::Element,
+            Owner::Point => CurveDomain::Point,
+            Owner::Element => CurveDomain::Curve,
         };
         if hairs.element_count() == 0 || !cx.wants_named(name) {
             continue;
         }
         let table = guides.table(owner);
         let mixed = if let Some(vectors) = table.get::<[f32; 3]>(name).filter(|_| [V.name, N.name].contains(&&**name)) {
-            let mut vectors = now.vectors(shapes, vectors, rows);
+            let mut vectors = now.vectors(shapes, vectors, domain);
             if **name == *N.name {
                 vectors
                     .iter_mut()
@@ -230,16 +227,16 @@ fn carry_over(cx: &Cx, hairs: &mut Component, guides: &Component, shapes: &Shape
             }
             Column::new(vectors)
         } else if let Some(turns) = table.get::<[f32; 4]>(name).filter(|_| **name == *ORIENT.name) {
-            Column::new(now.orientations(shapes, turns, rows))
+            Column::new(now.orientations(shapes, turns, domain))
         } else if let Some(numbers) = table.get::<f32>(name) {
             let numbers: Vec<[f32; 1]> = numbers.iter().map(|number| [*number]).collect();
-            Column::new(now.numbers(shapes, &numbers, rows).into_iter().map(|[number]| number).collect::<Vec<f32>>())
+            Column::new(now.numbers(shapes, &numbers, domain).into_iter().map(|[number]| number).collect::<Vec<f32>>())
         } else if let Some(numbers) = table.get::<[f32; 3]>(name) {
-            Column::new(now.numbers(shapes, numbers, rows))
+            Column::new(now.numbers(shapes, numbers, domain))
         } else if let Some(numbers) = table.get::<[f32; 4]>(name) {
-            Column::new(now.numbers(shapes, numbers, rows))
+            Column::new(now.numbers(shapes, numbers, domain))
         } else {
-            column.gather(&now.heaviest(shapes, rows))
+            column.gather(&now.heaviest(shapes, domain))
         };
         hairs.set_column(owner, name.clone(), mixed)?;
     }

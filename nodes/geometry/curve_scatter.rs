@@ -9,9 +9,11 @@
 //! Each frame of a moving skin costs as much as the first; Curve_Attach is cheaper for curves grown on a still skin.
 //! Distances are Euclidean: nearby folds that face the same way share their density.
 
-use curves::scatter::{Blade, Spot, grow, vertex_normals};
+use curves::scatter::{Blade, grow, vertex_normals};
+use curves::surface::SurfacePoint;
 use engine::prelude::*;
 use numerics::random::Key;
+use numerics::vector::{DVec3, to_f64};
 
 use crate::shared::planting::{self, Planting, at_roots, same_rows};
 
@@ -75,16 +77,16 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let cvs = cx.get(CVS) as usize;
     let planting =
         Planting { density: cx.get(DENSITY), mask: planting::mask(&cx.get(MASK), rest)?, cvs, seed: cx.get(SEED) };
-    let spots = planting.spots(cx, rest)?;
+    let roots = planting.roots(cx, rest)?;
     cx.check_cancelled()?;
 
     // The triangulation of the first frame: if it changed on a face that bends, roots would slide.
     let triangles = &rest.triangles().corners;
     let key = Key::new(u64::from(cx.get(SEED).0));
-    let shapes: Vec<Blade> = spots.iter().map(|(place, spot)| blade(cx, *spot, key.of(*place as u64))).collect();
+    let shapes: Vec<Blade> = roots.iter().map(|(index, root)| blade(cx, *root, key.of(*index as u64))).collect();
     let grown = |mesh: &Component| grow(mesh.positions(), triangles, &normals(mesh, triangles), &shapes, cvs);
     let mut curves = Component::curves(vec![cvs as u32; shapes.len()], grown(skin))?;
-    curves.set(CURVE_ID, spots.iter().map(|(id, _)| *id as i32).collect())?;
+    curves.set(CURVE_ID, roots.iter().map(|(index, _)| *index as i32).collect())?;
     if cx.wants(PREF) {
         let still = same_rows(skin, rest, P.name) && same_rows(skin, rest, N.name);
         let column = if still { curves.table(Owner::Point).column(P.name).cloned() } else { None };
@@ -97,7 +99,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(CURVES.with(Geometry::from(curves)))
 }
 
-fn blade(cx: &Cx, root: Spot, key: Key) -> Blade {
+fn blade(cx: &Cx, root: SurfacePoint, key: Key) -> Blade {
     use std::f32::consts::{FRAC_PI_2, TAU};
     let draw = |which: u64| key.of(which).f32();
     Blade {
@@ -109,9 +111,9 @@ fn blade(cx: &Cx, root: Spot, key: Key) -> Blade {
 }
 
 /// The skin's own normals, or those computed from the faces around each point.
-fn normals(skin: &Component, triangles: &[[u32; 3]]) -> Vec<[f64; 3]> {
+fn normals(skin: &Component, triangles: &[[u32; 3]]) -> Vec<DVec3> {
     match skin.get(N) {
-        Some(normals) => normals.iter().map(|normal| normal.map(f64::from)).collect(),
+        Some(normals) => normals.iter().map(|normal| to_f64(*normal)).collect(),
         None => vertex_normals(skin.positions(), triangles),
     }
 }

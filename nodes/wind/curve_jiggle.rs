@@ -10,13 +10,13 @@
 //! * Lengths are restored on the output, root to tip, and never fed back into the springs.
 //! * Any frame cooks alone. It depends on previous frames only within a window, whose length follows from `tolerance`
 //!   and the slowest root of the equation: beyond it, less than that share of any swing remains.
-//! * Where the `skin` is wired, each curve swings in the frame of the face under its root: every step, `inherit_motion`
-//!   of that face's rigid motion carries the swing and its target along, and only the rest of the motion is lagged.
+//! * Where the `skin` is wired, each curve swings in the frame by which Curve_Attach moves it: every step, `inherit_motion`
+//!   of that frame's rigid motion carries the swing and its target along, and only the rest of the motion is lagged.
+//!   Where the skin collapses to a line or a point it carries curves without rotating them.
 //! * While `blend` is 0 or `ramp` nowhere above 0 nothing swings: when they rise, curves start from rest.
 
-use curves::jiggle::{
-    Carry, Drag, Frame as FaceFrame, Jiggle, MASK_RANGE, Roots, Spring, steps_to_forget, with_lengths_between,
-};
+use curves::attach::{RootPose, RootPositions, SkinBinding};
+use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use std::f64::consts::PI;
@@ -77,7 +77,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Jiggle",
-    1,
+    2,
     "Curves swing after whatever moves them: they lag softly behind a gust and overshoot after a stop. A damped spring \
      ties each CV to its position on the incoming curve, stiff at the root and soft at the tip. Any frame cooks \
      alone.",
@@ -99,8 +99,8 @@ pub(crate) static NODE: Node = Node::new(
 
 /// The state: springs, and the geometry that the next step needs.
 struct Swing {
-    /// Curves and skin at the scene's first frame: they say where along its curve a CV lies, and on which face a root
-    /// grew.
+    /// Curves and skin at the scene's first frame: they give the arc length of each CV and the binding of each
+    /// root.
     rest: Component,
     rest_skin: Option<Component>,
     /// Curves and skin at the state's frame.
@@ -108,11 +108,8 @@ struct Swing {
     skin: Option<Component>,
     /// None while nothing swings.
     springs: Option<Jiggle>,
-    /// The roots' positions on the skin: computed when first needed; `Some(None)` where the skin has no face with an
-    /// area.
-    roots: Option<Option<Roots>>,
-    /// The faces' frames at the state's frame, where they were needed.
-    frames: Option<Vec<FaceFrame>>,
+    /// Of the roots on the skin at that frame, if the last step computed them.
+    poses: Option<Vec<RootPose>>,
 }
 
 impl Chain for Swing {
@@ -123,8 +120,7 @@ impl Chain for Swing {
             before: cx.part(CURVES).clone(),
             skin: cx.part(SKIN).cloned(),
             springs: None,
-            roots: None,
-            frames: None,
+            poses: None,
         };
         swing.check(cx)?;
         Ok(swing)
@@ -133,7 +129,7 @@ impl Chain for Swing {
     fn step(&mut self, cx: &StepCx) -> Result<()> {
         self.check(cx)?;
         let curves = cx.part(CURVES);
-        let carries = self.carries(cx);
+        let carries = self.inherited(cx)?;
         let springs = self.springs.get_or_insert_with(|| {
             Jiggle::at_rest(curves.runs().starts(), self.rest.positions(), self.before.positions())
         });
@@ -152,7 +148,7 @@ impl Chain for Swing {
     fn step_neutral(&mut self, cx: &StepCx) -> Result<()> {
         self.check(cx)?;
         self.springs = None;
-        self.frames = None;
+        self.poses = None;
         self.advance(cx);
         Ok(())
     }
@@ -189,29 +185,24 @@ impl Swing {
         self.skin = cx.part(SKIN).cloned();
     }
 
-    /// What carries each curve over the step to this frame, where the skin does.
-    fn carries(&mut self, cx: &StepCx) -> Option<Vec<Carry>> {
+    /// The motion that each curve inherits from its skin over the step to this frame; `None` where it inherits none.
+    fn inherited(&mut self, cx: &StepCx) -> Result<Option<Vec<RigidStep>>> {
         let share = f64::from(cx.get(INHERIT_MOTION));
-        let before = self.frames.take();
-        let skin = cx.part(SKIN)?;
+        let before = self.poses.take();
+        let (Some(rest), Some(skin), Some(now)) = (&self.rest_skin, &self.skin, cx.part(SKIN)) else { return Ok(None) };
         if share == 0.0 {
-            return None;
+            return Ok(None);
         }
-        let rest_skin = self.rest_skin.as_ref()?;
-        let bind = || {
-            let roots: Vec<[f32; 3]> = self.rest.runs().ranges().map(|cvs| self.rest.positions()[cvs.start]).collect();
-            let faces = rest_skin.faces()?;
-            Roots::bind(faces.runs.starts(), &faces.corners, rest_skin.positions(), &roots)
-        };
-        let roots = self.roots.get_or_insert_with(bind).as_ref()?;
-        let from = match before {
-            Some(frames) => frames,
-            None => roots.frames(self.skin.as_ref()?.positions()),
-        };
-        let to = roots.frames(skin.positions());
-        let carries = Carry::all_between(&from, &to, share);
-        self.frames = Some(to);
-        Some(carries)
+        let roots = RootPositions::of(self.rest.runs().starts(), self.rest.positions());
+        let bind = || Ok(SkinBinding::to_closest(rest.positions(), &rest.triangles().corners, roots.as_slice()));
+        let binding = rest.kept(roots.clone(), bind)?;
+        // A skin without faces moves nothing.
+        let Some(binding) = &*binding else { return Ok(None) };
+        let from = before.unwrap_or_else(|| binding.poses(skin.positions()));
+        let to = binding.poses(now.positions());
+        let steps = RigidStep::all_between(binding, &from, &to, share);
+        self.poses = Some(to);
+        Ok(Some(steps))
     }
 }
 

@@ -14,4 +14,5 @@ pub mod jiggle;
 pub mod lattice;
 pub mod scatter;
 pub mod shield;
+pub mod surface;
 pub mod wind_bend;

@@ -51,7 +51,7 @@ fn apart(a: &[Point], b: &[Point]) -> f64 {
 }
 
 fn roots(out: &BenchResult) -> Vec<Point> {
-    Roots::of(out.curves()).0
+    RootPositions::of(out.curves().runs().starts(), out.curves().positions()).as_slice().to_vec()
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Distributing roots over a skin, for Curve_Scatter and Curve_Interpolate.
 
-use curves::scatter::{Spot, Surface};
+use curves::scatter::ScatterSurface;
+use curves::surface::SurfacePoint;
 use engine::prelude::*;
 use numerics::random::Key;
 
@@ -23,7 +24,7 @@ impl Planting<'_> {
     ///
     /// # Errors
     /// Where there would be more CVs than memory should hold.
-    pub(crate) fn spots(&self, cx: &Cx, skin: &Component) -> Result<Vec<(usize, Spot)>> {
+    pub(crate) fn roots(&self, cx: &Cx, skin: &Component) -> Result<Vec<(usize, SurfacePoint)>> {
         let whole = skin.triangles();
         let triangles = &whole.corners;
         let share = |corner: u32| self.mask.map_or(1.0, |mask| f64::from(mask[corner as usize]).max(0.0));
@@ -32,32 +33,32 @@ impl Planting<'_> {
             .filter(|triangle| triangles[*triangle as usize].iter().any(|corner| share(*corner) > 0.0))
             .collect();
         let ground: Vec<[u32; 3]> = fertile.iter().map(|triangle| triangles[*triangle as usize]).collect();
-        let surface = Surface::new(skin.positions(), &ground);
+        let surface = ScatterSurface::new(skin.positions(), &ground);
         let area = surface.area();
         let most_share = ground.as_flattened().iter().map(|corner| share(*corner)).fold(0.0, f64::max);
 
         let unmasked = f64::from(self.density) * area;
-        let places = (unmasked * most_share).round();
+        let most = (unmasked * most_share).round();
         let cvs = self.cvs as f64;
-        if places * cvs > MOST_CVS {
-            let fact = format!("{places} curves of {cvs} CVs would grow on {area} m², more than {MOST_CVS} CVs");
+        if most * cvs > MOST_CVS {
+            let fact = format!("{most} curves of {cvs} CVs would grow on {area} m², more than {MOST_CVS} CVs");
             return Err(Error::refused(fact).hint("lower `density` or `cvs`, or scale the skin to metres"));
         }
-        let spots = surface.spread(places as usize, Key::new(u64::from(self.seed.0)));
+        let roots = surface.spread(most as usize, Key::new(u64::from(self.seed.0)));
         cx.check_cancelled()?;
 
-        let grows = |place: usize, spot: &Spot| {
-            let [share] = spot.mix(ground[spot.triangle as usize].map(|corner| [share(corner)]));
-            place as f64 + 0.5 < unmasked * share
+        let grows = |index: usize, root: &SurfacePoint| {
+            let [share] = root.interpolate(ground[root.triangle as usize].map(|corner| [share(corner)]));
+            index as f64 + 0.5 < unmasked * share
         };
-        let mut spots: Vec<(usize, Spot)> = spots
+        let mut roots: Vec<(usize, SurfacePoint)> = roots
             .into_iter()
             .enumerate()
-            .filter(|(place, spot)| self.mask.is_none() || grows(*place, spot))
-            .map(|(place, spot)| (place, Spot { triangle: fertile[spot.triangle as usize], ..spot }))
+            .filter(|(index, root)| self.mask.is_none() || grows(*index, root))
+            .map(|(index, root)| (index, SurfacePoint { triangle: fertile[root.triangle as usize], ..root }))
             .collect();
-        spots.sort_unstable_by_key(|(place, spot)| (spot.triangle, *place));
-        Ok(spots)
+        roots.sort_unstable_by_key(|(index, root)| (root.triangle, *index));
+        Ok(roots)
     }
 }
 
@@ -105,12 +106,12 @@ pub(crate) fn same_rows(a: &Component, b: &Component, name: &str) -> bool {
 pub(crate) fn at_roots<'s>(
     rows: &[[f32; 3]],
     triangles: &[[u32; 3]],
-    spots: impl Iterator<Item = &'s Spot>,
+    roots: impl Iterator<Item = &'s SurfacePoint>,
     cvs: usize,
 ) -> Vec<[f32; 3]> {
-    let at = |spot: &Spot| {
-        let corners = triangles[spot.triangle as usize].map(|corner| rows[corner as usize].map(f64::from));
-        spot.mix(corners).map(|x| x as f32)
+    let at = |root: &SurfacePoint| {
+        let corners = triangles[root.triangle as usize].map(|corner| rows[corner as usize].map(f64::from));
+        root.interpolate(corners).map(|x| x as f32)
     };
-    spots.flat_map(|spot| std::iter::repeat_n(at(spot), cvs)).collect()
+    roots.flat_map(|root| std::iter::repeat_n(at(root), cvs)).collect()
 }

@@ -1,237 +1,247 @@
-//! Where points hang on a skin at rest, and how they move with it.
+//! Which point of a skin each root is bound to, and how the skin around it has moved and rotated.
 
-use super::carry::Pose;
+use super::closest::ClosestFaces;
+use super::pose::RootPose;
 use super::rotation::nearest_rotation;
-use super::vectors::{IDENTITY, Matrix, Vec3, add, cross, dot, length, mix, moved, scale, sub, unit, wide};
-use crate::scatter::Spot;
-use numerics::tree::TriangleTree;
-use numerics::vector::{largest, power_of_two_to_one};
+use crate::surface::SurfacePoint;
+use numerics::vector::{DMat3, DQuat, DVec3, direction, to_f64};
 use rayon::prelude::*;
+use std::ops::{Add, Mul};
 
 /// Rows that a task takes at least: some 20 µs of work.
 const TASK: usize = 256;
 
-/// Points bound to a skin at rest; see [`crate::attach`]. It holds what it needs of the skin: that part of it around
-/// the points alone.
+/// Roots that a task binds: some 100 µs of work.
+const BOUND_AT_ONCE: usize = 64;
+
+/// Roots bound to a skin at rest; see [`crate::attach`]. It keeps what it needs of the skin: the triangles around the
+/// roots alone.
 #[derive(Clone, Debug)]
-pub struct Binding {
-    hooks: Vec<Hook>,
-    knots: Vec<Knot>,
-    /// Rows of `faces` around each knot.
-    rings: Vec<u32>,
-    faces: Vec<Face>,
-    farthest: f64,
+pub struct SkinBinding {
+    roots: Vec<BoundRoot>,
+    /// The corners of the triangles that hold a root, in the order of the skin's points: neighbours in the mesh are
+    /// neighbours in memory.
+    vertices: Vec<BoundVertex>,
+    /// Rows of `triangles` around each vertex, one vertex after another.
+    incident: Vec<u32>,
+    triangles: Vec<RestTriangle>,
+    max_distance: f64,
 }
 
-/// Where one point hangs.
+/// Where one root is bound.
 #[derive(Clone, Copy, Debug)]
-struct Hook {
-    /// Rows of `knots`.
-    knots: [u32; 3],
-    weights: Vec3,
-    /// From the skin to the point.
-    offset: Vec3,
+struct BoundRoot {
+    /// At rest, metres.
+    position: DVec3,
+    /// From the skin to the root at rest, metres.
+    offset: DVec3,
+    /// Rows of `vertices`.
+    vertices: [u32; 3],
+    /// Barycentric.
+    weights: [f64; 3],
 }
 
-/// A point of the skin that something hangs near.
+/// A point of the skin.
 #[derive(Clone, Copy, Debug)]
-struct Knot {
+struct BoundVertex {
+    /// Which one.
     point: u32,
-    rest: Vec3,
-    /// Where its ring ends in `rings`.
-    end: u32,
-    /// 1 ÷ the area around it; 0 where there is none.
-    per_area: f64,
-    /// Unit, by area; zero where there is none.
-    normal: Vec3,
+    /// At rest, metres.
+    position: DVec3,
+    /// Where its rows of `incident` end.
+    incident_end: u32,
+    /// 1 ÷ the area of the triangles around it; 0 where they have none.
+    inverse_area: f64,
+    /// The mean normal of the triangles around it, by area, of length 1; zero where there is none.
+    normal: DVec3,
 }
 
-/// A triangle around a knot. Its area times the gradient of its deformation is linear in where its points are.
+/// A triangle around a vertex. Its area times the gradient of its deformation is linear in the positions of its corners.
 #[derive(Clone, Copy, Debug)]
-struct Face {
+struct RestTriangle {
     points: [u32; 3],
-    /// Area times the gradient of the second and third point's weight.
-    gradients: [Vec3; 2],
-    /// Unit normal times half the root of the normal's length, which is twice the area.
-    normal: Vec3,
+    /// Area times the gradients of the weights of the second and third corner.
+    gradients: [DVec3; 2],
+    /// The unit normal times √(area ÷ 2).
+    normal: DVec3,
 }
 
+/// No row.
 const NONE: u32 = u32::MAX;
 
-/// Sizes of the skin from which a point is looked for on it; one farther away is brought there first. The tree squares
-/// squares of distances.
-const FARTHEST: f32 = 1e8;
-
-impl Binding {
-    /// Binds `roots` to their nearest points of the skin; none where there are roots and no triangle to bind them to. A
-    /// root that is not finite is bound to the first triangle.
+impl SkinBinding {
+    /// Binds `roots` to the closest points of `triangles`, rows of `points`; all in metres. `None` where there are roots
+    /// and no triangle with finite corners. A root that is not finite is bound to the first triangle.
     ///
     /// # Panics
     /// Where a corner of `triangles` is out of range.
-    pub fn nearest(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[[f32; 3]]) -> Option<Self> {
+    pub fn to_closest(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[[f32; 3]]) -> Option<Self> {
         if roots.is_empty() {
-            return Some(Self::new(points, triangles, &[], &[]));
+            return Some(Self::new(points, triangles, &[], Vec::new()));
         }
-        // The tree squares squares, so it sees a skin of about 1 m around the origin, whatever its place and size.
-        let corner = points[*triangles.as_flattened().iter().min()? as usize];
-        let from_corner = |p: &[f32; 3]| numerics::vector::sub(*p, corner);
-        let all = triangles.as_flattened().iter().map(|corner| largest(from_corner(&points[*corner as usize])));
-        let (to, _) = power_of_two_to_one(all.fold(0.0, f32::max));
-        let near = |p: &[f32; 3]| {
-            let p = from_corner(p).map(|x| x * to);
-            let far = largest(p) / FARTHEST;
-            if far > 1.0 { p.map(|x| x / far) } else { p }
-        };
-        let tree = TriangleTree::build(&points.iter().map(near).collect::<Vec<_>>(), triangles);
-        if tree.is_empty() {
-            return None;
-        }
-        let from: Vec<[f32; 3]> = roots.iter().map(near).collect();
-        let spots: Vec<Spot> = tree
-            .closest_each(&from, f32::INFINITY)
-            .into_iter()
-            .map(|found| {
-                let (triangle, [_, b, c]) = found.map_or((0, [1.0, 0.0, 0.0]), |found| (found.triangle, found.weights));
-                let (b, c) = (f64::from(b), f64::from(c));
-                Spot { triangle, weights: [1.0 - b - c, b, c] }
-            })
-            .collect();
-        let offset = |(root, spot): (&[f32; 3], &Spot)| {
-            let corners = triangles[spot.triangle as usize].map(|corner| wide(points[corner as usize]));
-            sub(wide(*root), mix(spot.weights, corners))
-        };
-        let offsets: Vec<Vec3> = roots.iter().zip(&spots).map(offset).collect();
-        Some(Self::new(points, triangles, &spots, &offsets))
+        let faces = ClosestFaces::new(points, triangles)?;
+        let tasks = roots.par_chunks(BOUND_AT_ONCE);
+        let surface: Vec<SurfacePoint> = tasks.flat_map_iter(|roots| faces.find_each(roots)).collect();
+        Some(Self::new(points, triangles, &surface, roots.iter().map(|root| to_f64(*root)).collect()))
     }
 
-    /// Binds points that lie on the skin.
+    /// Binds roots that lie on the skin.
     ///
     /// # Panics
-    /// Where a corner or a spot's triangle is out of range.
-    pub fn on(points: &[[f32; 3]], triangles: &[[u32; 3]], spots: &[Spot]) -> Self {
-        Self::new(points, triangles, spots, &vec![[0.0; 3]; spots.len()])
+    /// Where a corner of `triangles`, or a root's triangle, is out of range.
+    pub fn to_surface(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[SurfacePoint]) -> Self {
+        let positions = roots.iter().map(|root| root.position(points, triangles)).collect();
+        Self::new(points, triangles, roots, positions)
     }
 
-    fn new(points: &[[f32; 3]], triangles: &[[u32; 3]], spots: &[Spot], offsets: &[Vec3]) -> Self {
-        // Knots in the order of the skin's points, so that neighbours are neighbours in memory.
-        let mut knot_of = vec![NONE; points.len()];
-        for spot in spots {
-            triangles[spot.triangle as usize].iter().for_each(|corner| knot_of[*corner as usize] = 0);
-        }
-        let mut knots = Vec::new();
-        for (point, knot) in knot_of.iter_mut().enumerate().filter(|(_, knot)| **knot != NONE) {
-            *knot = knots.len() as u32;
-            let rest = wide(points[point]);
-            knots.push(Knot { point: point as u32, rest, end: 0, per_area: 0.0, normal: [0.0; 3] });
-        }
-        let near: Vec<[u32; 3]> = triangles
-            .iter()
-            .filter(|corners| corners.iter().any(|corner| knot_of[*corner as usize] != NONE))
-            .copied()
-            .collect();
-        let faces: Vec<Face> = near.par_iter().with_min_len(TASK).map(|corners| Face::new(points, *corners)).collect();
+    /// Binds roots at `positions` to points of the surface.
+    fn new(points: &[[f32; 3]], triangles: &[[u32; 3]], surface: &[SurfacePoint], positions: Vec<DVec3>) -> Self {
+        let (mut vertices, row_of) = bound_vertices(points, triangles, surface);
+        let is_bound = |corner: &u32| row_of[*corner as usize] != NONE;
+        let around: Vec<[u32; 3]> = triangles.iter().filter(|corners| corners.iter().any(is_bound)).copied().collect();
+        let rest = around.par_iter().with_min_len(TASK).map(|corners| RestTriangle::new(points, *corners));
+        let rest: Vec<RestTriangle> = rest.collect();
 
-        let ends_at = |corners: &[u32; 3]| corners.map(|corner| knot_of[corner as usize]);
-        for knot in near.iter().flat_map(ends_at).filter(|knot| *knot != NONE) {
-            knots[knot as usize].end += 1;
+        let rows = |corners: &[u32; 3]| corners.map(|corner| row_of[corner as usize]);
+        let incident = link_incident(&mut vertices, around.iter().map(rows));
+        for row in 0..vertices.len() {
+            let normals = incident[range(&vertices, row)].iter().map(|triangle| rest[*triangle as usize].area_vector());
+            let area: f64 = normals.clone().map(|normal| normal.norm()).sum();
+            vertices[row].inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
+            vertices[row].normal = direction_or_zero(normals.fold(DVec3::zeros(), Add::add));
         }
-        let mut total = 0;
-        for knot in &mut knots {
-            (total, knot.end) = (total + knot.end, total);
-        }
-        let mut rings = vec![0; total as usize];
-        for (face, corners) in near.iter().enumerate() {
-            for knot in ends_at(corners).into_iter().filter(|knot| *knot != NONE) {
-                let knot = &mut knots[knot as usize];
-                rings[knot.end as usize] = face as u32;
-                knot.end += 1;
-            }
-        }
-        let mut start = 0;
-        for knot in &mut knots {
-            let ring = &rings[start..knot.end as usize];
-            start = knot.end as usize;
-            let normals = ring.iter().map(|face| faces[*face as usize].twice_area());
-            let twice_area: f64 = normals.clone().map(length).sum();
-            knot.per_area = if twice_area > 0.0 { 2.0 / twice_area } else { 0.0 };
-            knot.normal = unit(normals.fold([0.0; 3], add));
-        }
-        let hook = |(spot, offset): (&Spot, &Vec3)| {
-            let knots = triangles[spot.triangle as usize].map(|corner| knot_of[corner as usize]);
-            Hook { knots, weights: spot.weights, offset: *offset }
+        let root = |(on, position): (&SurfacePoint, DVec3)| {
+            let offset = position - on.position(points, triangles);
+            BoundRoot { position, offset, vertices: rows(&triangles[on.triangle as usize]), weights: on.weights }
         };
-        let hooks = spots.iter().zip(offsets).map(hook).collect();
-        let farthest = offsets.iter().map(|offset| length(*offset)).fold(0.0, f64::max);
-        Self { hooks, knots, rings, faces, farthest }
+        let roots: Vec<BoundRoot> = surface.iter().zip(positions).map(root).collect();
+        let max_distance = roots.iter().map(|root| root.offset.norm()).fold(0.0, f64::max);
+        Self { roots, vertices, incident, triangles: rest, max_distance }
     }
 
-    /// How far the farthest point is from the skin, metres.
-    pub fn farthest(&self) -> f64 {
-        self.farthest
+    /// The largest distance of a root from the skin, metres.
+    pub fn max_distance(&self) -> f64 {
+        self.max_distance
     }
 
-    /// The skin's unit normal at each point, at rest; zero where there is none.
-    pub fn normals(&self) -> Vec<[f64; 3]> {
-        let normal = |hook: &Hook| unit(mix(hook.weights, hook.knots.map(|knot| self.knots[knot as usize].normal)));
-        self.hooks.iter().map(normal).collect()
+    /// The roots at rest, metres.
+    pub fn roots(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        self.roots.iter().map(|root| root.position)
     }
 
-    /// How each point has moved and turned, where the skin's points are `now`.
+    /// The skin's unit normal at each root, at rest; zero where it has none.
+    pub fn normals(&self) -> Vec<DVec3> {
+        let normal = |vertex: u32| self.vertices[vertex as usize].normal;
+        self.roots.iter().map(|root| direction_or_zero(weighted(root.weights, root.vertices.map(normal)))).collect()
+    }
+
+    /// How each root has moved and rotated since rest, where `now` are the skin's points.
     ///
     /// # Panics
     /// Where there are fewer points than at rest.
-    pub fn carry(&self, now: &[[f32; 3]]) -> Vec<Pose> {
-        let faces: Vec<Matrix> = self.faces.par_iter().with_min_len(TASK).map(|face| face.stretched(now)).collect();
-        let knots: Vec<(Matrix, Vec3)> = self
-            .knots
-            .par_iter()
-            .enumerate()
-            .with_min_len(TASK)
-            .map(|(row, knot)| {
-                let start = row.checked_sub(1).map_or(0, |before| self.knots[before].end as usize);
-                let ring = self.rings[start..knot.end as usize].iter().map(|face| &faces[*face as usize]);
-                let mut mean = [[0.0; 3]; 3];
-                for face in ring {
-                    mean = [0, 1, 2].map(|row| add(mean[row], scale(face[row], knot.per_area)));
-                }
-                (mean, sub(wide(now[knot.point as usize]), knot.rest))
-            })
-            .collect();
-        let pose = |hook: &Hook| {
-            let corners = hook.knots.map(|knot| knots[knot as usize]);
-            let gradient = [0, 1, 2].map(|row| mix(hook.weights, corners.map(|(gradient, _)| gradient[row])));
-            let turn = nearest_rotation(&gradient);
-            let shift = mix(hook.weights, corners.map(|(_, shift)| shift));
-            let shift = add(shift, moved(turn.unwrap_or(IDENTITY), hook.offset));
-            Pose { shift, turn: turn.unwrap_or(IDENTITY), lost: turn.is_none() }
+    pub fn poses(&self, now: &[[f32; 3]]) -> Vec<RootPose> {
+        let deformed = self.triangles.par_iter().with_min_len(TASK).map(|triangle| triangle.deformation(now));
+        let deformed: Vec<DMat3> = deformed.collect();
+        let vertices = (0..self.vertices.len()).into_par_iter().with_min_len(TASK).map(|row| {
+            let vertex = &self.vertices[row];
+            let mut gradient = DMat3::zeros();
+            for triangle in &self.incident[range(&self.vertices, row)] {
+                gradient += deformed[*triangle as usize] * vertex.inverse_area;
+            }
+            (gradient, to_f64(now[vertex.point as usize]) - vertex.position)
+        });
+        let vertices: Vec<(DMat3, DVec3)> = vertices.collect();
+        let pose = |root: &BoundRoot| {
+            let corners = root.vertices.map(|vertex| vertices[vertex as usize]);
+            let rotation = nearest_rotation(&weighted(root.weights, corners.map(|(gradient, _)| gradient)));
+            let translation = weighted(root.weights, corners.map(|(_, translation)| translation));
+            let lost = rotation.is_none();
+            let rotation = rotation.unwrap_or_else(DQuat::identity);
+            let translation = translation + (rotation * root.offset - root.offset);
+            RootPose { translation, rotation, lost }
         };
-        self.hooks.par_iter().with_min_len(TASK).map(pose).collect()
+        self.roots.par_iter().with_min_len(TASK).map(pose).collect()
     }
 }
 
-impl Face {
-    fn new(at: &[[f32; 3]], points: [u32; 3]) -> Self {
-        let [a, b, c] = points.map(|point| wide(at[point as usize]));
-        let across = cross(sub(b, a), sub(c, a));
-        let normal = unit(across);
-        let gradients = [cross(normal, sub(a, c)), cross(normal, sub(b, a))].map(|side| scale(side, 0.5));
-        Self { points, gradients, normal: scale(normal, 0.5 * length(across).sqrt()) }
+/// The corners of the triangles that `surface` names, and the row of each of the skin's points among them.
+fn bound_vertices(
+    points: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    surface: &[SurfacePoint],
+) -> (Vec<BoundVertex>, Vec<u32>) {
+    let mut row_of = vec![NONE; points.len()];
+    for on in surface {
+        triangles[on.triangle as usize].iter().for_each(|corner| row_of[*corner as usize] = 0);
+    }
+    let mut vertices = Vec::new();
+    for (point, row) in row_of.iter_mut().enumerate().filter(|(_, row)| **row != NONE) {
+        *row = vertices.len() as u32;
+        let (position, normal) = (to_f64(points[point]), DVec3::zeros());
+        vertices.push(BoundVertex { point: point as u32, position, incident_end: 0, inverse_area: 0.0, normal });
+    }
+    (vertices, row_of)
+}
+
+/// The triangles around each vertex, where `corners` gives the rows of each triangle's corners; sets `incident_end`.
+fn link_incident(vertices: &mut [BoundVertex], corners: impl Iterator<Item = [u32; 3]> + Clone) -> Vec<u32> {
+    let bound = |rows: [u32; 3]| rows.into_iter().filter(|row| *row != NONE);
+    for row in corners.clone().flat_map(bound) {
+        vertices[row as usize].incident_end += 1;
+    }
+    let mut total = 0;
+    for vertex in &mut *vertices {
+        (total, vertex.incident_end) = (total + vertex.incident_end, total);
+    }
+    let mut incident = vec![0; total as usize];
+    for (triangle, rows) in corners.enumerate() {
+        for row in bound(rows) {
+            let vertex = &mut vertices[row as usize];
+            incident[vertex.incident_end as usize] = triangle as u32;
+            vertex.incident_end += 1;
+        }
+    }
+    incident
+}
+
+/// Where the triangles around a vertex are in `incident`.
+fn range(vertices: &[BoundVertex], row: usize) -> std::ops::Range<usize> {
+    let start = row.checked_sub(1).map_or(0, |before| vertices[before].incident_end);
+    start as usize..vertices[row].incident_end as usize
+}
+
+impl RestTriangle {
+    fn new(positions: &[[f32; 3]], points: [u32; 3]) -> Self {
+        let [a, b, c] = points.map(|point| to_f64(positions[point as usize]));
+        let twice_area = (b - a).cross(&(c - a));
+        let normal = direction_or_zero(twice_area);
+        let gradients = [normal.cross(&(a - c)), normal.cross(&(b - a))].map(|side| side * 0.5);
+        Self { points, gradients, normal: normal * (0.5 * twice_area.norm().sqrt()) }
     }
 
-    /// The normal, twice the area long.
-    fn twice_area(&self) -> Vec3 {
-        scale(self.normal, 4.0 * length(self.normal))
+    /// The normal, as long as the area is large.
+    fn area_vector(&self) -> DVec3 {
+        self.normal * (2.0 * self.normal.norm())
     }
 
-    /// The rest area times the gradient of the deformation: in the plane that of the points, along the normal from
-    /// normal to normal, stretched by the root of how the area has grown, so that scale changes no rotation.
-    fn stretched(&self, now: &[[f32; 3]]) -> Matrix {
-        let [a, b, c] = self.points.map(|point| wide(now[point as usize]));
-        let (ab, ac) = (sub(b, a), sub(c, a));
-        let across = cross(ab, ac);
-        let root = dot(across, across).sqrt().sqrt();
-        let out = scale(across, if root > 0.0 { 1.0 / root } else { 0.0 });
+    /// The rest area times the gradient of the deformation. In the plane it is that of the corners; along the normal it
+    /// takes normal to normal, scaled by the root of the ratio of areas, so that uniform scale changes no rotation.
+    fn deformation(&self, now: &[[f32; 3]]) -> DMat3 {
+        let [a, b, c] = self.points.map(|point| to_f64(now[point as usize]));
+        let (ab, ac) = (b - a, c - a);
+        let twice_area = ab.cross(&ac);
+        let root = twice_area.norm().sqrt();
+        let out = twice_area * if root > 0.0 { 1.0 / root } else { 0.0 };
         let [second, third] = self.gradients;
-        [0, 1, 2].map(|k| add(scale(self.normal, out[k]), add(scale(second, ab[k]), scale(third, ac[k]))))
+        DMat3::from_columns(&[0, 1, 2].map(|k| out * self.normal[k] + (ab * second[k] + ac * third[k])))
     }
+}
+
+/// The weighted sum of three.
+fn weighted<T: Mul<f64, Output = T> + Add<Output = T>>([first, second, third]: [f64; 3], [a, b, c]: [T; 3]) -> T {
+    a * first + b * second + c * third
+}
+
+fn direction_or_zero(v: DVec3) -> DVec3 {
+    direction(v).unwrap_or_else(DVec3::zeros)
 }

@@ -1,24 +1,41 @@
-//! Curves that hang on a skin and follow it: each turns and moves as one, so its lengths stay.
+//! Roots bound to a skin, and curves that follow it: each rotates and moves rigidly, so its lengths are kept.
 //!
-//! A root is bound to its nearest point of the skin at rest, and to how far it is from it. From there the skin's own
-//! motion is read off: the deformation gradient of each triangle, normals to normals, averaged by area over the
-//! triangles around each point, interpolated between the three points around a root, and the rotation nearest to it
-//! taken. Averaging matrices, not rotations, makes this robust: a triangle counts by how large it was and by how far it
-//! is stretched, so one that was nothing, or has become nothing, has no say and its neighbours speak; what the rounding
-//! of a sliver does is bounded by its longest side, as nothing is divided by an area.
+//! This is the one definition of how a root follows its skin. Curve_Attach moves whole curves by it, Curve_Interpolate
+//! mixes guides in the frames it gives, and Curve_Jiggle takes from it the motion that a curve inherits.
 //!
-//! Promise: a skin that turns and moves rigidly carries its curves exactly so, to the rounding of f32; the turn is
-//! continuous across edges and in time, wherever the mean has one nearest rotation; mirroring and scaling everything
-//! mirrors and scales the result; the same bits on any number of threads. f64 inside. Limits: across points that are
-//! doubled along a seam, nothing is averaged; a face turned inside out turns its curves inwards. Metres.
+//! A root is bound to the closest point of the skin at rest, and to its offset from there. Its frame follows the skin's own
+//! motion: the deformation gradient of each triangle (normals to normals), averaged by area over the triangles around
+//! each vertex, interpolated between the three vertices around the root, and the rotation nearest to it. Averaging
+//! matrices and not rotations makes this robust: a triangle counts by its rest area and its stretch, so one that was or
+//! has become degenerate has no say and its neighbours decide; the rounding error of a sliver is bounded by its longest
+//! side, as nothing is divided by an area.
+//!
+//! Special cases:
+//! * **Roots on edges and corners**: of the faces that meet there the one listed first is taken. The frame is the same on
+//!   all of them, as it is continuous across faces.
+//! * **Faces without area at rest** hold no roots, unless the skin has no others. Then curves move and do not rotate.
+//! * **Faces that lose their area** leave their curves to the faces around them. Where all around a root lose it, or
+//!   collapse to a line, the pose is `lost`: translated, not rotated.
+//! * **Faces that turn inside out** turn their curves inwards, as the normals say.
+//! * **Holes and borders**: vertices there average over the faces that they have. Across points that are doubled along
+//!   a seam nothing is averaged, so the frame may jump there.
+//! * **Roots and points that are not finite**: the root is bound to the first face; a face with such a point holds no root,
+//!   and curves bound near it are lost while it is so.
+//!
+//! Promise: a skin that rotates and moves rigidly carries its curves exactly so, to the rounding of f32; the rotation is
+//! continuous across faces and in time wherever the mean has one nearest rotation; mirroring and scaling everything
+//! mirrors and scales the result; the same bits on any number of threads. f64 inside. Metres.
 
 mod binding;
-mod carry;
+mod closest;
+mod pose;
+mod root_positions;
 mod rotation;
-pub(crate) mod vectors;
 
-pub use binding::Binding;
-pub use carry::{Carried, Pose, carry_curves, turn_orientations, turn_vectors};
+pub use binding::SkinBinding;
+pub(crate) use pose::rotate_orientation;
+pub use pose::{AttachedCurves, RootPose, attach_curves, rotate_orientations, rotate_vectors};
+pub use root_positions::RootPositions;
 pub use rotation::nearest_rotation;
 
 #[cfg(test)]

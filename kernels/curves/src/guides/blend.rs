@@ -1,30 +1,31 @@
-//! Mixing the shapes and the numbers of guides.
+//! Mixing the shapes and the attributes of guides.
 
-use super::near::{Mix, Share};
-use super::shape::Shapes;
-use crate::attach::Pose;
-use crate::attach::vectors::{Vec3, add, compose, inverse, length, scale, sub, turned, wide};
+use super::resample::ResampledGuides;
+use super::weights::{GuideWeight, GuideWeights};
+use crate::attach::{RootPose, rotate_orientation};
+use nalgebra::{Quaternion, Unit};
+use numerics::vector::{DQuat, DVec3, Quat, to_f32, to_f64};
 use rayon::prelude::*;
 
-/// What hairs are made of, and where they stand now.
+/// From what hairs are mixed, and where they are now.
 #[derive(Clone, Copy, Debug)]
-pub struct Blend<'a> {
-    /// Which guides, and how much of each.
-    pub mix: &'a Mix,
+pub struct HairBlend<'a> {
+    /// The guides of each hair.
+    pub weights: &'a GuideWeights,
     /// The hairs' roots now, metres.
-    pub roots: &'a [[f64; 3]],
-    /// How the hairs' roots and the guides' have moved and turned since rest; none where the skin is at rest.
-    pub poses: Option<Poses<'a>>,
+    pub roots: &'a [DVec3],
+    /// How the hairs' roots and the guides' have moved and rotated since rest; `None` where the skin is at rest.
+    pub poses: Option<HairAndGuidePoses<'a>>,
 }
 
-/// Poses of hairs, and of guides.
-pub type Poses<'a> = (&'a [Pose], &'a [Pose]);
+/// Poses of the hairs, and of the guides.
+pub type HairAndGuidePoses<'a> = (&'a [RootPose], &'a [RootPose]);
 
-/// Mixed hairs, and what was reached.
+/// Mixed hairs, and how well their lengths are kept.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blended {
-    /// The hairs' points, root first, hair by hair.
+pub struct BlendedHairs {
+    /// The hairs' points, root first, hair by hair, metres.
     pub points: Vec<[f32; 3]>,
     /// Largest difference of a hair's length, as written, from the mix of its guides' lengths, as a share of that.
     pub length_error: f64,
@@ -33,169 +34,187 @@ pub struct Blended {
 /// Hairs that a task makes at least: some 30 µs of work.
 const TASK: usize = 64;
 
-/// Below this share of the guides' own lengths the sum of their segments says nothing of a direction: it is rounding.
+/// Below this share of the guides' own lengths the sum of their segments is rounding error and has no direction.
 const CANCELLED: f64 = 1e-9;
 
-/// Hairs of the shape that `guides` have now.
+/// Hairs with the shape that `guides` have now.
 ///
 /// # Panics
 /// Where a slice is shorter than the hairs or guides.
-pub fn blend(guides: Shapes, blend: &Blend) -> Blended {
-    // Each guide as it is relative to its own root's turn: what is left is mixed at rest.
+pub fn blend_hairs(guides: ResampledGuides, blend: &HairBlend) -> BlendedHairs {
+    // Each guide with its own root's rotation undone: the shapes are mixed at rest.
     let guides = match blend.poses {
         None => guides,
-        Some((_, poses)) => guides.turned(|guide, chord| turned(inverse(poses[guide].turn), chord)),
+        Some((_, poses)) => guides.with_chords(|guide, chord| poses[guide].rotation.inverse() * chord),
     };
     let cvs = guides.segments() + 1;
     let mut points = vec![[0.0; 3]; blend.roots.len() * cvs];
     let errors = points.par_chunks_mut(cvs).enumerate().with_min_len(TASK).map(|(hair, points)| {
         let mut at = blend.roots[hair];
-        points[0] = at.map(|x| x as f32);
+        points[0] = to_f32(at);
         let (mut asked, mut written) = (0.0, 0.0);
         for segment in 0..guides.segments() {
-            let (direction, size) = mixed(&guides, blend.mix.of(hair), segment);
-            let step = match blend.poses {
+            let (direction, length) = mixed_segment(&guides, blend.weights.of(hair), segment);
+            let direction = match blend.poses {
                 None => direction,
-                Some((poses, _)) => poses[hair].turned(direction),
+                Some((poses, _)) => poses[hair].rotation * direction,
             };
-            at = add(at, scale(step, size));
-            points[segment + 1] = at.map(|x| x as f32);
-            asked += size;
-            written += length(sub(wide(points[segment + 1]), wide(points[segment])));
+            at += direction * length;
+            points[segment + 1] = to_f32(at);
+            asked += length;
+            written += (to_f64(points[segment + 1]) - to_f64(points[segment])).norm();
         }
         if asked > 0.0 { ((written - asked) / asked).abs() } else { 0.0 }
     });
     let length_error = errors.reduce(|| 0.0, f64::max);
-    Blended { points, length_error }
+    BlendedHairs { points, length_error }
 }
 
 /// Direction and length of a hair's segment in its frame at rest.
 #[inline(always)]
-fn mixed(guides: &Shapes, shares: &[Share], segment: usize) -> (Vec3, f64) {
-    let (mut sum, mut lengths, mut chords) = ([0.0; 3], 0.0, 0.0);
-    let mut heaviest = [0.0; 3];
-    for share in shares.iter().filter(|share| share.weight > 0.0) {
-        let weight = f64::from(share.weight);
-        let piece = &guides.pieces(share.guide as usize)[segment];
-        let chord = turned(share.turn.map(f64::from), piece.chord);
-        if heaviest == [0.0; 3] {
+fn mixed_segment(guides: &ResampledGuides, weights: &[GuideWeight], segment: usize) -> (DVec3, f64) {
+    let (mut sum, mut lengths, mut chords) = (DVec3::zeros(), 0.0, 0.0);
+    let mut heaviest = DVec3::zeros();
+    for guide in weights.iter().filter(|guide| guide.weight > 0.0) {
+        let weight = f64::from(guide.weight);
+        let piece = &guides.pieces(guide.guide as usize)[segment];
+        let chord = to_rotation(guide.rotation) * piece.chord;
+        if heaviest == DVec3::zeros() {
             heaviest = chord;
         }
-        sum = add(sum, scale(chord, weight));
+        sum += chord * weight;
         lengths += weight * piece.length;
-        chords += weight * length(piece.chord);
+        chords += weight * piece.chord.norm();
     }
-    let size = length(sum);
+    let size = sum.norm();
     if size > CANCELLED * chords {
-        return (scale(sum, 1.0 / size), lengths);
+        return (sum * (1.0 / size), lengths);
     }
-    let size = length(heaviest);
-    (if size > 0.0 { scale(heaviest, 1.0 / size) } else { heaviest }, lengths)
+    let size = heaviest.norm();
+    (if size > 0.0 { heaviest * (1.0 / size) } else { heaviest }, lengths)
 }
 
-/// How rows of numbers on guides become rows on hairs.
+fn to_rotation(rotation: Quat) -> DQuat {
+    let [x, y, z, w] = rotation.map(f64::from);
+    Unit::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
+/// What the rows of an attribute stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rows {
-    /// A row a CV.
+pub enum CurveDomain {
+    /// One row for each CV.
     Point,
-    /// A row a guide.
-    Element,
+    /// One row for each curve.
+    Curve,
 }
 
-impl Blend<'_> {
-    /// The mix of numbers: a row a CV of each hair, or a row a hair.
+impl HairBlend<'_> {
+    /// The mix of numbers.
     ///
     /// # Panics
-    /// As [`blend`].
-    pub fn numbers<const N: usize>(&self, guides: &Shapes, rows: &[[f32; N]], of: Rows) -> Vec<[f32; N]> {
-        self.each(guides, of, |hair, at| {
+    /// As [`blend_hairs`].
+    pub fn numbers<const N: usize>(
+        &self,
+        guides: &ResampledGuides,
+        rows: &[[f32; N]],
+        of: CurveDomain,
+    ) -> Vec<[f32; N]> {
+        self.each(guides, of, |hair, cv| {
             let mut sum = [0.0_f64; N];
-            for share in self.mix.of(hair).iter().filter(|share| share.weight > 0.0) {
-                let row = row_at(guides, rows, of, share.guide, at);
+            for guide in self.weights.of(hair).iter().filter(|guide| guide.weight > 0.0) {
+                let row = row_at(guides, rows, of, guide.guide, cv);
                 for k in 0..N {
-                    sum[k] += f64::from(share.weight) * row[k];
+                    sum[k] += f64::from(guide.weight) * row[k];
                 }
             }
             sum.map(|x| x as f32)
         })
     }
 
-    /// The mix of vectors, turned from frame to frame as segments are.
+    /// The mix of vectors, rotated from frame to frame as segments are.
     ///
     /// # Panics
-    /// As [`blend`].
-    pub fn vectors(&self, guides: &Shapes, rows: &[[f32; 3]], of: Rows) -> Vec<[f32; 3]> {
-        self.each(guides, of, |hair, at| {
-            let mut sum = [0.0; 3];
-            for share in self.mix.of(hair).iter().filter(|share| share.weight > 0.0) {
-                let row = turned(self.turn(hair, share), row_at(guides, rows, of, share.guide, at));
-                sum = add(sum, scale(row, f64::from(share.weight)));
+    /// As [`blend_hairs`].
+    pub fn vectors(&self, guides: &ResampledGuides, rows: &[[f32; 3]], of: CurveDomain) -> Vec<[f32; 3]> {
+        self.each(guides, of, |hair, cv| {
+            let mut sum = DVec3::zeros();
+            for guide in self.weights.of(hair).iter().filter(|guide| guide.weight > 0.0) {
+                let row = DVec3::from(row_at(guides, rows, of, guide.guide, cv));
+                sum += self.rotation(hair, guide) * row * f64::from(guide.weight);
             }
-            sum.map(|x| x as f32)
+            to_f32(sum)
         })
     }
 
-    /// Orientations (quaternions x, y, z, w): the heaviest guide's, turned from frame to frame.
+    /// Orientations (quaternions x, y, z, w): the heaviest guide's, rotated from frame to frame.
     ///
     /// # Panics
-    /// As [`blend`].
-    pub fn orientations(&self, guides: &Shapes, rows: &[[f32; 4]], of: Rows) -> Vec<[f32; 4]> {
+    /// As [`blend_hairs`].
+    pub fn orientations(&self, guides: &ResampledGuides, rows: &[[f32; 4]], of: CurveDomain) -> Vec<[f32; 4]> {
         let heaviest = self.heaviest(guides, of);
-        let per_hair = if of == Rows::Point { guides.segments() + 1 } else { 1 };
-        let turned = |(at, row): (usize, &u32)| {
+        let per_hair = if of == CurveDomain::Point { guides.segments() + 1 } else { 1 };
+        let rotated = |(at, row): (usize, &u32)| {
             let hair = at / per_hair;
-            let turn = self.turn(hair, &self.mix.of(hair)[0]);
-            compose(turn, rows[*row as usize].map(f64::from)).map(|x| x as f32)
+            rotate_orientation(&self.rotation(hair, &self.weights.of(hair)[0]), rows[*row as usize])
         };
-        heaviest.par_iter().enumerate().with_min_len(TASK).map(turned).collect()
+        heaviest.par_iter().enumerate().with_min_len(TASK).map(rotated).collect()
     }
 
-    /// Of what cannot be mixed, the heaviest guide's: for each row of the hairs, a row of the guides.
+    /// For what cannot be mixed: the row of the heaviest guide, for each row of the hairs.
     ///
     /// # Panics
-    /// As [`blend`].
-    pub fn heaviest(&self, guides: &Shapes, of: Rows) -> Vec<u32> {
-        self.each(guides, of, |hair, at| {
-            let guide = self.mix.of(hair)[0].guide;
+    /// As [`blend_hairs`].
+    pub fn heaviest(&self, guides: &ResampledGuides, of: CurveDomain) -> Vec<u32> {
+        self.each(guides, of, |hair, cv| {
+            let guide = self.weights.of(hair)[0].guide;
             match of {
-                Rows::Element => guide,
-                Rows::Point => {
-                    let place = guides.places(guide as usize)[at];
-                    if place.share < 0.5 { place.before } else { place.after }
+                CurveDomain::Curve => guide,
+                CurveDomain::Point => {
+                    let sample = guides.samples(guide as usize)[cv];
+                    if sample.fraction < 0.5 { sample.before } else { sample.after }
                 }
             }
         })
     }
 
     /// From a guide's frame to a hair's, both now.
-    fn turn(&self, hair: usize, share: &Share) -> [f64; 4] {
-        let rest = share.turn.map(f64::from);
+    fn rotation(&self, hair: usize, guide: &GuideWeight) -> DQuat {
+        let rest = to_rotation(guide.rotation);
         match self.poses {
             None => rest,
-            Some((hairs, guides)) => {
-                compose(hairs[hair].turn, compose(rest, inverse(guides[share.guide as usize].turn)))
-            }
+            Some((hairs, guides)) => hairs[hair].rotation * (rest * guides[guide.guide as usize].rotation.inverse()),
         }
     }
 
-    /// A row a CV of each hair, or a row a hair, from the hair's number and the CV's.
-    fn each<T: Send>(&self, guides: &Shapes, of: Rows, row: impl Fn(usize, usize) -> T + Sync) -> Vec<T> {
-        let per_hair = if of == Rows::Point { guides.segments() + 1 } else { 1 };
+    /// The rows of the hairs, each from the index of its hair and of its CV within it.
+    fn each<T: Send>(
+        &self,
+        guides: &ResampledGuides,
+        of: CurveDomain,
+        row: impl Fn(usize, usize) -> T + Sync,
+    ) -> Vec<T> {
+        let per_hair = if of == CurveDomain::Point { guides.segments() + 1 } else { 1 };
         let rows = (0..self.roots.len() * per_hair).into_par_iter().with_min_len(TASK);
         rows.map(|at| row(at / per_hair, at % per_hair)).collect()
     }
 }
 
 /// The row of a guide at a hair's CV.
-fn row_at<const N: usize>(guides: &Shapes, rows: &[[f32; N]], of: Rows, guide: u32, at: usize) -> [f64; N] {
+fn row_at<const N: usize>(
+    guides: &ResampledGuides,
+    rows: &[[f32; N]],
+    of: CurveDomain,
+    guide: u32,
+    cv: usize,
+) -> [f64; N] {
     match of {
-        Rows::Element => rows[guide as usize].map(f64::from),
-        Rows::Point => {
-            let place = guides.places(guide as usize)[at];
-            let (before, after) = (rows[place.before as usize], rows[place.after as usize]);
+        CurveDomain::Curve => rows[guide as usize].map(f64::from),
+        CurveDomain::Point => {
+            let sample = guides.samples(guide as usize)[cv];
+            let (before, after) = (rows[sample.before as usize], rows[sample.after as usize]);
             std::array::from_fn(|k| {
                 let before = f64::from(before[k]);
-                before + (f64::from(after[k]) - before) * f64::from(place.share)
+                before + (f64::from(after[k]) - before) * f64::from(sample.fraction)
             })
         }
     }

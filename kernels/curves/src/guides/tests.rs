@@ -1,22 +1,23 @@
-//! Laws of hairs between guides.
+//! Tests of hairs between guides.
 
-use super::near::{mix_on, weights_of};
+use super::weights::{guide_weights_on, weights_of};
 use super::*;
-use crate::attach::vectors::{self, IDENTITY, cross, dot, length, sub, turned, unit, wide};
-use crate::attach::{Pose, carry_curves};
+use crate::attach::{RootPose, attach_curves, rotate_vectors};
+use nalgebra::{Quaternion, Unit};
 use numerics::random::Key;
 use numerics::simd::Path;
+use numerics::vector::{DQuat, DVec3, IDENTITY, direction, to_f32, to_f64, turned};
 
 type Point = [f32; 3];
 
 const UP: Point = [0.0, 1.0, 0.0];
 
-fn on_floor(x: f32, z: f32) -> Stand {
-    Stand { at: [x, 0.0, z], normal: UP }
+fn on_floor(x: f32, z: f32) -> OrientedPoint {
+    OrientedPoint { position: [x, 0.0, z], normal: UP }
 }
 
 /// `count` places on a floor of 1 by 1.
-fn floor(count: u64, seed: u64) -> Vec<Stand> {
+fn floor(count: u64, seed: u64) -> Vec<OrientedPoint> {
     let at = |i| {
         let key = Key::new(seed).of(i);
         on_floor(key.of(0).f32(), key.of(1).f32())
@@ -25,14 +26,12 @@ fn floor(count: u64, seed: u64) -> Vec<Stand> {
 }
 
 /// `count` places on a sphere of radius 1.
-fn ball(count: u64, seed: u64) -> Vec<Stand> {
+fn ball(count: u64, seed: u64) -> Vec<OrientedPoint> {
     let at = |i| {
         let key = Key::new(seed).of(i);
-        let p = unit(std::array::from_fn(|k| {
-            key.of(k as u64).f64() + key.of(k as u64 + 3).f64() + key.of(k as u64 + 6).f64() - 1.5
-        }));
-        let p = p.map(|x| x as f32);
-        Stand { at: p, normal: p }
+        let p = [0, 1, 2].map(|k| key.of(k).f64() + key.of(k + 3).f64() + key.of(k + 6).f64() - 1.5);
+        let p = to_f32(direction(p.into()).unwrap());
+        OrientedPoint { position: p, normal: p }
     };
     (0..count).map(at).collect()
 }
@@ -44,36 +43,39 @@ fn joined(guides: &[&[Point]]) -> (Vec<u32>, Vec<Point>) {
     (starts, guides.concat())
 }
 
-/// A bent curve of `cvs` CVs on each of `stands`, about its normal.
-fn grown(stands: &[Stand], cvs: usize) -> (Vec<u32>, Vec<Point>) {
-    let guide = |(i, stand): (usize, &Stand)| -> Vec<Point> {
+/// A bent curve of `cvs` CVs on each of `rooted`, about its normal.
+fn grown(rooted: &[OrientedPoint], cvs: usize) -> (Vec<u32>, Vec<Point>) {
+    let guide = |(i, point): (usize, &OrientedPoint)| -> Vec<Point> {
         let key = Key::new(77).of(i as u64);
         let lean: Point = std::array::from_fn(|k| 0.1 * key.of(k as u64).f32() - 0.05);
         let at = |k: usize| {
             let (k, d) = (k as f32 / (cvs - 1) as f32, 0.1 + 0.05 * key.of(5).f32());
-            std::array::from_fn(|c| stand.at[c] + k * d * stand.normal[c] + k * k * lean[c])
+            std::array::from_fn(|c| point.position[c] + k * d * point.normal[c] + k * k * lean[c])
         };
         (0..cvs).map(at).collect()
     };
-    let guides: Vec<Vec<Point>> = stands.iter().enumerate().map(guide).collect();
+    let guides: Vec<Vec<Point>> = rooted.iter().enumerate().map(guide).collect();
     joined(&guides.iter().map(Vec::as_slice).collect::<Vec<_>>())
 }
 
-fn roots(stands: &[Stand]) -> Vec<[f64; 3]> {
-    stands.iter().map(|stand| wide(stand.at)).collect()
+fn roots(points: &[OrientedPoint]) -> Vec<DVec3> {
+    points.iter().map(|point| to_f64(point.position)).collect()
 }
 
 /// Hairs of `cvs` CVs from guides that stand as they did.
-fn hairs(guides: (&[u32], &[Point]), mix: &Mix, hairs: &[Stand], cvs: usize) -> Blended {
-    blend(Shapes::new(guides.0, guides.1, cvs), &Blend { mix, roots: &roots(hairs), poses: None })
+fn hairs(guides: (&[u32], &[Point]), weights: &GuideWeights, hairs: &[OrientedPoint], cvs: usize) -> BlendedHairs {
+    blend_hairs(
+        ResampledGuides::new(guides.0, guides.1, cvs),
+        &HairBlend { weights, roots: &roots(hairs), poses: None },
+    )
 }
 
 fn way(points: &[Point]) -> f64 {
-    points.windows(2).map(|pair| length(sub(wide(pair[1]), wide(pair[0])))).sum()
+    points.windows(2).map(|pair| (to_f64(pair[1]) - to_f64(pair[0])).norm()).sum()
 }
 
 fn close(a: &[Point], b: &[Point], within: f64) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| length(sub(wide(*a), wide(*b))) <= within)
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (to_f64(*a) - to_f64(*b)).norm() <= within)
 }
 
 #[test]
@@ -98,14 +100,14 @@ fn weights_are_those_of_franke_and_little() {
 }
 
 #[test]
-fn the_nearest_are_those_that_measuring_all_finds() {
+fn the_nearest_guides_are_those_of_an_exhaustive_search() {
     for (guides, asked) in [(floor(300, 1), floor(400, 2)), (ball(300, 1), ball(400, 2)), (ball(7, 3), ball(50, 4))] {
         let count = 5;
-        let mixed = mix(&guides, &asked, count);
-        for (hair, stand) in asked.iter().enumerate() {
-            let apart = |guide: &Stand| {
-                let cosine = dot(wide(guide.normal), wide(stand.normal)).clamp(-1.0, 1.0);
-                length(sub(wide(guide.at), wide(stand.at))) * (2.0 + 1e-3) / (1.0 + cosine + 1e-3)
+        let mixed = guide_weights(&guides, &asked, count);
+        for (hair, point) in asked.iter().enumerate() {
+            let apart = |guide: &OrientedPoint| {
+                let cosine = to_f64(guide.normal).dot(&to_f64(point.normal)).clamp(-1.0, 1.0);
+                (to_f64(guide.position) - to_f64(point.position)).norm() * (2.0 + 1e-3) / (1.0 + cosine + 1e-3)
             };
             let mut all: Vec<(f64, u32)> = guides.iter().map(apart).zip(0..).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -132,9 +134,10 @@ fn weights_move_no_faster_than_hairs() {
     // Along a line through 400 guides, 5 cm apart, in steps of 20 µm: every share of every guide changes little, also
     // where guides are exchanged. With one guide it jumps, from 1 to 0.
     let guides = floor(400, 5);
-    let line: Vec<Stand> = (0..40_000).map(|i| on_floor(0.1 + 2e-5 * i as f32, 0.3 + 1e-5 * i as f32)).collect();
+    let line: Vec<OrientedPoint> =
+        (0..40_000).map(|i| on_floor(0.1 + 2e-5 * i as f32, 0.3 + 1e-5 * i as f32)).collect();
     let most_step = |count: usize| {
-        let mixed = mix(&guides, &line, count);
+        let mixed = guide_weights(&guides, &line, count);
         let share = |hair: usize, guide: u32| {
             mixed.of(hair).iter().find(|share| share.guide == guide).map_or(0.0, |share| share.weight)
         };
@@ -153,18 +156,21 @@ fn weights_move_no_faster_than_hairs() {
 fn the_other_side_of_a_thin_sheet_is_far_away() {
     // Guides of both sides 1 mm apart, a hair above: those below are a thousandth as far, and have no say.
     let above = floor(50, 6);
-    let below = above.iter().map(|stand| Stand { at: [stand.at[0], -1e-3, stand.at[2]], normal: [0.0, -1.0, 0.0] });
-    let guides: Vec<Stand> = above.iter().copied().chain(below).collect();
-    let mixed = mix(&guides, &floor(200, 7), 3);
+    let below = above.iter().map(|point| OrientedPoint {
+        position: [point.position[0], -1e-3, point.position[2]],
+        normal: [0.0, -1.0, 0.0],
+    });
+    let guides: Vec<OrientedPoint> = above.iter().copied().chain(below).collect();
+    let mixed = guide_weights(&guides, &floor(200, 7), 3);
     assert!((0..200).all(|hair| mixed.of(hair).iter().all(|share| share.guide < 50 || share.weight == 0.0)));
 }
 
 #[test]
 fn a_hair_at_a_guides_root_is_the_guide() {
-    for stands in [floor(200, 8), ball(200, 8)] {
-        let (starts, points) = grown(&stands, 6);
+    for rooted in [floor(200, 8), ball(200, 8)] {
+        let (starts, points) = grown(&rooted, 6);
         for count in [1, 3, 200] {
-            let found = hairs((&starts, &points), &mix(&stands, &stands, count), &stands, 6);
+            let found = hairs((&starts, &points), &guide_weights(&rooted, &rooted, count), &rooted, 6);
             assert!(close(&found.points, &points, 2e-7));
         }
     }
@@ -173,25 +179,25 @@ fn a_hair_at_a_guides_root_is_the_guide() {
 #[test]
 fn between_two_guides_a_hair_has_their_mean_length_and_direction() {
     // 1 up and 2 along x: in the middle 1.5 along (2, 1, 0)/√5, as segments count by their length.
-    let stands = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
+    let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) = joined(&[&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]]);
     let middle = [on_floor(0.5, 0.0)];
-    let found = hairs((&starts, &points), &mix(&stands, &middle, 2), &middle, 2);
+    let found = hairs((&starts, &points), &guide_weights(&rooted, &middle, 2), &middle, 2);
     let [x, y] = [2.0, 1.0].map(|x: f64| (1.5 * x / 5.0_f64.sqrt()) as f32);
     assert!(close(&found.points, &[[0.5, 0.0, 0.0], [0.5 + x, y, 0.0]], 1e-7), "{found:?}");
     assert!(found.length_error < 1e-6);
     // A quarter of the way: 1/d² gives 0.9 and 0.1.
     let quarter = [on_floor(0.25, 0.0)];
-    let found = hairs((&starts, &points), &mix(&stands, &quarter, 2), &quarter, 2);
+    let found = hairs((&starts, &points), &guide_weights(&rooted, &quarter, 2), &quarter, 2);
     assert!((way(&found.points) - 1.1).abs() < 1e-6);
 }
 
 #[test]
 fn guides_that_cancel_leave_the_heaviest_ones_direction_and_no_length_is_lost() {
-    let stands = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
+    let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) = joined(&[&[[0.0; 3], [0.0, 0.0, 1.0]], &[[1.0, 0.0, 0.0], [1.0, 0.0, -1.0]]]);
     let middle = [on_floor(0.5, 0.0)];
-    let found = hairs((&starts, &points), &mix(&stands, &middle, 2), &middle, 2);
+    let found = hairs((&starts, &points), &guide_weights(&rooted, &middle, 2), &middle, 2);
     assert!(close(&found.points, &[[0.5, 0.0, 0.0], [0.5, 0.0, 1.0]], 1e-7), "{found:?}");
 }
 
@@ -199,7 +205,7 @@ fn guides_that_cancel_leave_the_heaviest_ones_direction_and_no_length_is_lost() 
 fn hairs_are_as_long_as_the_mix_of_their_guides() {
     let (guides, asked) = (ball(100, 9), ball(1000, 10));
     let (starts, points) = grown(&guides, 5);
-    let mixed = mix(&guides, &asked, 4);
+    let mixed = guide_weights(&guides, &asked, 4);
     for cvs in [2, 5, 9] {
         let found = hairs((&starts, &points), &mixed, &asked, cvs);
         for (hair, cvs) in found.points.chunks(cvs).enumerate() {
@@ -216,9 +222,9 @@ fn hairs_are_as_long_as_the_mix_of_their_guides() {
 fn a_guide_with_other_cvs_is_cut_evenly_along_itself() {
     // A corner at (0, 2, 0) after 2 of its 4 metres, its CVs uneven.
     let guide = [[0.0; 3], [0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [2.0, 2.0, 0.0]];
-    let stands = [on_floor(0.0, 0.0)];
-    let mixed = mix(&stands, &stands, 1);
-    let cut = |cvs| hairs((&[0, 4], &guide), &mixed, &stands, cvs).points;
+    let rooted = [on_floor(0.0, 0.0)];
+    let mixed = guide_weights(&rooted, &rooted, 1);
+    let cut = |cvs| hairs((&[0, 4], &guide), &mixed, &rooted, cvs).points;
     assert!(close(&cut(3), &[[0.0; 3], [0.0, 2.0, 0.0], [2.0, 2.0, 0.0]], 1e-6));
     assert!(close(&cut(5), &[[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 2.0, 0.0], [2.0, 2.0, 0.0]], 1e-6));
     // Its own CVs are kept, however uneven.
@@ -234,76 +240,76 @@ fn on_a_ball_hairs_stand_as_their_guides_do() {
     // Straight guides along the normal: so is every hair.
     let (guides, asked) = (ball(60, 11), ball(500, 12));
     let lists: Vec<[Point; 3]> =
-        guides.iter().map(|stand| [1.0, 1.1, 1.2].map(|r: f32| stand.at.map(|x| x * r))).collect();
+        guides.iter().map(|point| [1.0, 1.1, 1.2].map(|r: f32| point.position.map(|x| x * r))).collect();
     let (starts, points) = joined(&lists.iter().map(|guide| &guide[..]).collect::<Vec<_>>());
-    let found = hairs((&starts, &points), &mix(&guides, &asked, 4), &asked, 3);
-    for (stand, cvs) in asked.iter().zip(found.points.chunks(3)) {
-        assert!(length(cross(sub(wide(cvs[2]), wide(cvs[0])), wide(stand.normal))) < 1e-6);
+    let found = hairs((&starts, &points), &guide_weights(&guides, &asked, 4), &asked, 3);
+    for (point, cvs) in asked.iter().zip(found.points.chunks(3)) {
+        assert!((to_f64(cvs[2]) - to_f64(cvs[0])).cross(&to_f64(point.normal)).norm() < 1e-6);
     }
 }
 
-fn turn(seed: u64) -> [f64; 4] {
-    let q: [f64; 4] = std::array::from_fn(|k| Key::new(seed).of(k as u64).f64() - 0.5);
-    let size = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    q.map(|x| x / size)
+fn some_rotation(seed: u64) -> DQuat {
+    let [x, y, z, w] = std::array::from_fn(|k| Key::new(seed).of(k as u64).f64() - 0.5);
+    let q = Quaternion::new(w, x, y, z);
+    Unit::new_unchecked(q / q.norm())
 }
 
 #[test]
-fn hairs_of_carried_guides_are_hairs_mixed_at_rest_and_carried() {
-    // Every root turns in its own way, guides' and hairs'.
+fn hairs_of_attached_guides_are_hairs_mixed_at_rest_and_attached() {
+    // Every root has a rotation of its own, of guides and of hairs.
     let (guides, asked) = (ball(80, 13), ball(300, 14));
     let (starts, points) = grown(&guides, 5);
-    let mixed = mix(&guides, &asked, 4);
+    let mixed = guide_weights(&guides, &asked, 4);
     let pose = |i: usize, seed: u64| {
-        let shift = std::array::from_fn(|k| Key::new(seed).of(i as u64).of(k as u64).f64());
-        Pose { shift, turn: turn(seed + 100 + i as u64), lost: false }
+        let translation = DVec3::from([0, 1, 2].map(|k| Key::new(seed).of(i as u64).of(k).f64()));
+        RootPose { translation, rotation: some_rotation(seed + 100 + i as u64), lost: false }
     };
-    let of_guides: Vec<Pose> = (0..guides.len()).map(|i| pose(i, 1000)).collect();
-    let of_hairs: Vec<Pose> = (0..asked.len()).map(|i| pose(i, 2000)).collect();
+    let of_guides: Vec<RootPose> = (0..guides.len()).map(|i| pose(i, 1000)).collect();
+    let of_hairs: Vec<RootPose> = (0..asked.len()).map(|i| pose(i, 2000)).collect();
 
     let at_rest = hairs((&starts, &points), &mixed, &asked, 5).points;
     let ends: Vec<u32> = (0..=asked.len() as u32).map(|hair| 5 * hair).collect();
-    let expected = carry_curves(&ends, &at_rest, &of_hairs).points;
+    let expected = attach_curves(&ends, &at_rest, &of_hairs).points;
 
-    let carried = carry_curves(&starts, &points, &of_guides).points;
-    let now: Vec<[f64; 3]> =
-        roots(&asked).into_iter().zip(&of_hairs).map(|(root, pose)| vectors::add(root, pose.shift)).collect();
-    let blend_now = Blend { mix: &mixed, roots: &now, poses: Some((&of_hairs, &of_guides)) };
-    let found = blend(Shapes::new(&starts, &carried, 5), &blend_now);
+    let carried = attach_curves(&starts, &points, &of_guides).points;
+    let now: Vec<DVec3> =
+        roots(&asked).into_iter().zip(&of_hairs).map(|(root, pose)| root + pose.translation).collect();
+    let blend_now = HairBlend { weights: &mixed, roots: &now, poses: Some((&of_hairs, &of_guides)) };
+    let found = blend_hairs(ResampledGuides::new(&starts, &carried, 5), &blend_now);
     assert!(close(&found.points, &expected, 2e-6));
 
-    // Vectors turn as segments do: each guide's own, turned with it, becomes the hair's, turned with it.
-    let vectors: Vec<Point> = (0..points.len()).map(|i| pose(i, 3000).shift.map(|x| x as f32)).collect();
-    let shapes = Shapes::new(&starts, &points, 5);
-    let still = Blend { mix: &mixed, roots: &roots(&asked), poses: None };
-    let mut expected = still.vectors(&shapes, &vectors, Rows::Point);
-    crate::attach::turn_vectors(&ends, &mut expected, &of_hairs);
+    // Vectors rotate as segments do.
+    let vectors: Vec<Point> = (0..points.len()).map(|i| to_f32(pose(i, 3000).translation)).collect();
+    let shapes = ResampledGuides::new(&starts, &points, 5);
+    let still = HairBlend { weights: &mixed, roots: &roots(&asked), poses: None };
+    let mut expected = still.vectors(&shapes, &vectors, CurveDomain::Point);
+    rotate_vectors(&ends, &mut expected, &of_hairs);
     let mut moved = vectors.clone();
-    crate::attach::turn_vectors(&starts, &mut moved, &of_guides);
-    assert!(close(&blend_now.vectors(&shapes, &moved, Rows::Point), &expected, 2e-6));
+    rotate_vectors(&starts, &mut moved, &of_guides);
+    assert!(close(&blend_now.vectors(&shapes, &moved, CurveDomain::Point), &expected, 2e-6));
 }
 
 #[test]
-fn numbers_are_mixed_and_what_cannot_be_is_the_heaviest_guides() {
+fn numbers_are_mixed_and_other_values_are_those_of_the_heaviest_guide() {
     // Between two guides, a quarter of the way: 0.9 and 0.1.
-    let stands = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
+    let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) =
         joined(&[&[[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]], &[[1.0, 0.0, 0.0], [1.0, 2.0, 0.0]]]);
     let asked = [on_floor(0.25, 0.0), on_floor(0.75, 0.0)];
-    let mixed = mix(&stands, &asked, 2);
-    let blend = Blend { mix: &mixed, roots: &roots(&asked), poses: None };
-    let shapes = Shapes::new(&starts, &points, 3);
+    let mixed = guide_weights(&rooted, &asked, 2);
+    let blend = HairBlend { weights: &mixed, roots: &roots(&asked), poses: None };
+    let shapes = ResampledGuides::new(&starts, &points, 3);
     let close = |found: Vec<[f32; 1]>, expected: &[f32]| {
         found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a[0] - b).abs() < 1e-6 * b)
     };
     // The second guide's, 10 and 30 at its ends, is 20 in its middle.
     let by_cv = [[1.0], [2.0], [3.0], [10.0], [30.0]];
-    assert!(close(blend.numbers(&shapes, &by_cv, Rows::Point), &[1.9, 3.8, 5.7, 9.1, 18.2, 27.3]));
-    assert!(close(blend.numbers(&shapes, &[[1.0], [2.0]], Rows::Element), &[1.1, 1.9]));
-    assert_eq!(blend.heaviest(&shapes, Rows::Element), [0, 1]);
-    assert_eq!(blend.heaviest(&shapes, Rows::Point), [0, 1, 2, 3, 4, 4]);
-    let turns = [IDENTITY, [0.0, 1.0, 0.0, 0.0]].map(|turn| turn.map(|x| x as f32));
-    assert_eq!(blend.orientations(&shapes, &turns, Rows::Element), turns);
+    assert!(close(blend.numbers(&shapes, &by_cv, CurveDomain::Point), &[1.9, 3.8, 5.7, 9.1, 18.2, 27.3]));
+    assert!(close(blend.numbers(&shapes, &[[1.0], [2.0]], CurveDomain::Curve), &[1.1, 1.9]));
+    assert_eq!(blend.heaviest(&shapes, CurveDomain::Curve), [0, 1]);
+    assert_eq!(blend.heaviest(&shapes, CurveDomain::Point), [0, 1, 2, 3, 4, 4]);
+    let turns = [IDENTITY, [0.0, 1.0, 0.0, 0.0]];
+    assert_eq!(blend.orientations(&shapes, &turns, CurveDomain::Curve), turns);
 }
 
 #[test]
@@ -313,7 +319,7 @@ fn every_simd_path_and_number_of_threads_gives_the_same_bits() {
     let run = |threads: usize, path: Path| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mixed = mix_on(path, &guides, &asked, 5);
+            let mixed = guide_weights_on(path, &guides, &asked, 5);
             let found = hairs((&starts, &points), &mixed, &asked, 4);
             (mixed, found)
         })
@@ -330,68 +336,73 @@ fn every_simd_path_and_number_of_threads_gives_the_same_bits() {
 fn the_order_of_hairs_changes_none_of_them() {
     // How far the hair before had to look is a guess and no more.
     let (guides, asked) = (ball(300, 17), ball(500, 18));
-    let back: Vec<Stand> = asked.iter().rev().copied().collect();
-    let (there, back) = (mix(&guides, &asked, 4), mix(&guides, &back, 4));
+    let back: Vec<OrientedPoint> = asked.iter().rev().copied().collect();
+    let (there, back) = (guide_weights(&guides, &asked, 4), guide_weights(&guides, &back, 4));
     assert!((0..500).all(|hair| there.of(hair) == back.of(499 - hair)));
 }
 
 #[test]
 fn fewer_guides_than_asked_and_none() {
     let asked = floor(10, 19);
-    let two = mix(&floor(2, 20), &asked, 5);
+    let two = guide_weights(&floor(2, 20), &asked, 5);
     assert!((0..10).all(|hair| two.of(hair).len() == 2));
     assert!((0..10).all(|hair| (two.of(hair).iter().map(|share| share.weight).sum::<f32>() - 1.0).abs() < 1e-6));
-    assert_eq!(mix(&[], &asked, 3).hairs(), 0);
-    assert_eq!(mix(&floor(2, 20), &[], 3).hairs(), 0);
-    let none = Blend { mix: &mix(&[], &[], 3), roots: &[], poses: None };
-    assert!(blend(Shapes::new(&[0], &[], 4), &none).points.is_empty());
-    assert_eq!(mix(&floor(100, 21), &asked, 1000).of(9).len(), MOST_GUIDES);
+    assert_eq!(guide_weights(&[], &asked, 3).hairs(), 0);
+    assert_eq!(guide_weights(&floor(2, 20), &[], 3).hairs(), 0);
+    let none = HairBlend { weights: &guide_weights(&[], &[], 3), roots: &[], poses: None };
+    assert!(blend_hairs(ResampledGuides::new(&[0], &[], 4), &none).points.is_empty());
+    assert_eq!(guide_weights(&floor(100, 21), &asked, 1000).of(9).len(), MAX_GUIDES);
 }
 
 #[test]
-fn odd_places_give_shares_of_one_together_and_finite_hairs() {
+fn unusual_roots_give_weights_of_sum_one_and_finite_hairs() {
     let same = vec![on_floor(0.5, 0.5); 40];
-    let line: Vec<Stand> = (0..40).map(|i| on_floor(0.1 * i as f32, 0.0)).collect();
-    let huge: Vec<Stand> =
-        floor(40, 22).iter().map(|stand| Stand { at: stand.at.map(|x| 1e30 * x), ..*stand }).collect();
-    let tiny: Vec<Stand> =
-        floor(40, 23).iter().map(|stand| Stand { at: stand.at.map(|x| 1e-30 * x), ..*stand }).collect();
-    let bare: Vec<Stand> = floor(40, 24).iter().map(|stand| Stand { normal: [0.0; 3], ..*stand }).collect();
+    let line: Vec<OrientedPoint> = (0..40).map(|i| on_floor(0.1 * i as f32, 0.0)).collect();
+    let huge: Vec<OrientedPoint> = floor(40, 22)
+        .iter()
+        .map(|point| OrientedPoint { position: point.position.map(|x| 1e30 * x), ..*point })
+        .collect();
+    let tiny: Vec<OrientedPoint> = floor(40, 23)
+        .iter()
+        .map(|point| OrientedPoint { position: point.position.map(|x| 1e-30 * x), ..*point })
+        .collect();
+    let bare: Vec<OrientedPoint> =
+        floor(40, 24).iter().map(|point| OrientedPoint { normal: [0.0; 3], ..*point }).collect();
     for guides in [same, line, huge, tiny, bare] {
-        let asked: Vec<Stand> = guides.iter().chain(&floor(20, 25)).copied().collect();
+        let asked: Vec<OrientedPoint> = guides.iter().chain(&floor(20, 25)).copied().collect();
         for count in [1, 3, 40] {
-            let mixed = mix(&guides, &asked, count);
+            let mixed = guide_weights(&guides, &asked, count);
             for hair in 0..asked.len() {
                 let sum: f32 = mixed.of(hair).iter().map(|share| share.weight).sum();
                 assert!((sum - 1.0).abs() < 1e-5, "{hair}: {:?}", mixed.of(hair));
             }
         }
         let (starts, points) = grown(&guides, 3);
-        let found = hairs((&starts, &points), &mix(&guides, &asked, 3), &asked, 3);
+        let found = hairs((&starts, &points), &guide_weights(&guides, &asked, 3), &asked, 3);
         assert!(found.points.as_flattened().iter().all(|x| x.is_finite()));
     }
 }
 
 #[test]
-fn what_is_no_number_harms_its_own_hairs_alone() {
+fn non_finite_roots_affect_only_their_own_hairs() {
     let mut guides = floor(50, 26);
     let mut asked = floor(50, 27);
-    let expected = mix(&guides[1..], &asked[1..], 3);
-    guides[0].at = [f32::NAN; 3];
-    asked[0].at = [f32::INFINITY, f32::NAN, 0.0];
-    let found = mix(&guides, &asked, 3);
+    let expected = guide_weights(&guides[1..], &asked[1..], 3);
+    guides[0].position = [f32::NAN; 3];
+    asked[0].position = [f32::INFINITY, f32::NAN, 0.0];
+    let found = guide_weights(&guides, &asked, 3);
     for hair in 1..50 {
-        let same = |(a, b): (&Share, &Share)| a.guide == b.guide + 1 && (a.weight - b.weight).abs() < 1e-5;
+        let same = |(a, b): (&GuideWeight, &GuideWeight)| a.guide == b.guide + 1 && (a.weight - b.weight).abs() < 1e-5;
         assert!(found.of(hair).iter().zip(expected.of(hair - 1)).all(same), "{hair}");
     }
 }
 
 #[test]
-fn directly_opposite_normals_have_a_turn() {
+fn exactly_opposite_normals_have_a_rotation() {
     // One guide on the other side and no other: the hair is the guide, turned over.
-    let guide = Stand { at: [0.0; 3], normal: [0.0, -1.0, 0.0] };
+    let guide = OrientedPoint { position: [0.0; 3], normal: [0.0, -1.0, 0.0] };
     let hair = [on_floor(0.0, 0.0)];
-    let mixed = mix(&[guide], &hair, 3);
-    let found = turned(mixed.of(0)[0].turn.map(f64::from), [0.0, -1.0, 0.0]);
-    assert!(length(sub(found, [0.0, 1.0, 0.0])) < 1e-7);
+    let mixed = guide_weights(&[guide], &hair, 3);
+    let found = turned(mixed.of(0)[0].rotation, [0.0, -1.0, 0.0]);
+    assert!((to_f64(found) - DVec3::y()).norm() < 1e-7);
 }

@@ -1,32 +1,29 @@
-//! Jiggle: every CV of a curve hangs on a damped spring from where the curve is put (W5).
+//! Jiggle: every CV of a curve is tied by a damped spring to its position on the incoming curve, the target (W5).
 //!
-//! Between frames the target moves straight, and the spring's answer to that is exact: any stiffness, damping and step is
-//! stable. Lengths are restored on what is shown, root to tip, and never fed back into the state. Where the root's skin
-//! moves, a share of that motion carries state and target along ([`Carry`]).
+//! Between frames the target moves in a straight line, and the spring's response to that is exact: any stiffness, damping
+//! and step is stable. Lengths are restored on the output, root to tip, and never fed back into the state. Where the
+//! root's skin moves, a share of that motion carries state and target along ([`RigidStep`]).
 //!
 //! Promise: the exact response to the piecewise-linear target within 1e-9 of its size for ω·dt from 1e-6 to 1e6 and
 //! damping ratios from 1e-3 to 1e3; the root keeps its bits; segments as long as the target's within 4 ulp of the
-//! positions; what stands still keeps its bits; the same bits on every SIMD path and number of threads. State and
+//! positions; curves that stand still keep their bits; the same bits on every SIMD path and number of threads. State and
 //! coefficients are f64; lanes are curves, so a step costs what the longest of sixteen curves has. Metres, hertz, seconds.
 
-mod carry;
-mod closest;
-mod group;
+mod curve_lanes;
 mod lengths;
 mod response;
-mod roots;
+mod rigid_step;
 
-pub use carry::{Carry, Frame};
 pub use lengths::with_lengths_between;
 pub use response::{Drag, steps_to_forget};
-pub use roots::Roots;
+pub use rigid_step::RigidStep;
 
-use group::{Curves, F64x16, Responses, Slot, shape_group, step_group};
+use curve_lanes::{CurveLanes, CvState, F64x16, Responses, shape_lanes, step_lanes};
 use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, to_f64};
 use rayon::prelude::*;
 use response::Response;
 use std::f64::consts::PI;
@@ -35,14 +32,14 @@ use std::ops::Range;
 /// How far a mask may scale frequency and damping, either way.
 pub const MASK_RANGE: [f32; 2] = [0.25, 4.0];
 
-/// What each CV hangs on. Masks are one value a CV, and count within [`MASK_RANGE`].
+/// The spring of each CV. Masks have one value for each CV and are clamped to [`MASK_RANGE`].
 #[derive(Clone, Debug)]
 pub struct Spring<'a> {
-    /// Swings a second at a softness of 1, without damping.
+    /// Oscillations per second at a softness of 1, without damping.
     pub frequency: Masked<'a, f64>,
-    /// Damping ratio: 1 comes to rest soonest.
+    /// Damping ratio: 1 is critical.
     pub damping: Masked<'a, f64>,
-    /// Divides the frequency along u, the arc length ÷ curve length at rest; 0 or less follows exactly.
+    /// Divides the frequency along u, the arc length ÷ curve length at rest; 0 or less follows the target exactly.
     pub softness: &'a Ramp,
     /// What the damper resists.
     pub drag: Drag,
@@ -51,26 +48,26 @@ pub struct Spring<'a> {
 /// Curves on their springs.
 #[derive(Clone, Debug)]
 pub struct Jiggle {
-    /// Where along its curve each CV lies, 0 at the root.
+    /// Arc length from the root ÷ that of the curve, for each CV.
     along: Vec<f32>,
     starts: Vec<u32>,
-    parts: Vec<Part>,
-    tuned: Option<Tuned>,
+    batches: Vec<CurveBatch>,
+    response_key: Option<ResponseKey>,
 }
 
-/// Whole groups of curves for one thread.
+/// Curves that one task steps.
 #[derive(Clone, Debug)]
-struct Part {
+struct CurveBatch {
     points: Range<usize>,
-    groups: Vec<Curves>,
+    groups: Vec<CurveLanes>,
     /// Of all groups, one after the other.
-    slots: Vec<Slot>,
+    states: Vec<CvState>,
     responses: Vec<Responses>,
 }
 
-/// What the responses were made from.
+/// What the responses were computed from.
 #[derive(Clone, Debug, PartialEq)]
-struct Tuned {
+struct ResponseKey {
     /// Frequency, damping, dt.
     numbers: [f64; 3],
     frequency_mask: Option<Vec<f32>>,
@@ -79,21 +76,21 @@ struct Tuned {
     drag: Drag,
 }
 
-/// Where the curves are.
+/// Swinging curves.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shaped {
+pub struct JiggledCurves {
     /// One point for every CV.
     pub points: Vec<Vec3>,
     /// The largest distance of a CV from its target, metres.
     pub max_offset: f64,
 }
 
-/// CVs a part has at least: some 20 µs of work a step.
-const PART_CVS: usize = 2048;
+/// CVs that a batch has at least: some 20 µs of work per step.
+const BATCH_CVS: usize = 2048;
 
 impl Jiggle {
-    /// Curves `targets[starts[i]..starts[i + 1]]` at rest where they are. `rest` gives each CV's place along its curve.
+    /// Curves `targets[starts[i]..starts[i + 1]]` at rest on their targets. `rest` gives the arc length at which each CV lies.
     ///
     /// # Panics
     /// Where `starts` falls or does not run from 0 to the number of points, or `rest` is shorter.
@@ -103,14 +100,14 @@ impl Jiggle {
         let mut first = 0;
         while first < curves {
             let mut end = first;
-            while end < curves && ((starts[end] - starts[first]) as usize) < PART_CVS {
+            while end < curves && ((starts[end] - starts[first]) as usize) < BATCH_CVS {
                 end = curves.min(end + LANES);
             }
             ranges.push(first..end);
             first = end;
         }
-        let parts = ranges.into_par_iter().map(|range| Part::at_rest(starts, range, targets)).collect();
-        Self { along: along(starts, rest), starts: starts.to_vec(), parts, tuned: None }
+        let batches = ranges.into_par_iter().map(|range| CurveBatch::at_rest(starts, range, targets)).collect();
+        Self { along: along(starts, rest), starts: starts.to_vec(), batches, response_key: None }
     }
 
     /// Where each curve starts among the points, and where the last ends.
@@ -118,11 +115,12 @@ impl Jiggle {
         &self.starts
     }
 
-    /// A step of `dt` seconds, in which the targets move straight to `targets`; `carries` is what carries each curve.
+    /// A step of `dt` seconds, in which the targets move straight to `targets`; `carries` is the motion
+    /// that each curve inherits.
     ///
     /// # Panics
     /// Where a slice is shorter than the points or curves.
-    pub fn step(&mut self, targets: &[Vec3], spring: &Spring<'_>, dt: f64, carries: Option<&[Carry]>) {
+    pub fn step(&mut self, targets: &[Vec3], spring: &Spring<'_>, dt: f64, carries: Option<&[RigidStep]>) {
         self.step_on(Path::chosen(), targets, spring, dt, carries);
     }
 
@@ -130,15 +128,22 @@ impl Jiggle {
     ///
     /// # Panics
     /// As [`Jiggle::step`].
-    pub fn step_on(&mut self, path: Path, targets: &[Vec3], spring: &Spring<'_>, dt: f64, carries: Option<&[Carry]>) {
-        self.tune(spring, dt);
-        self.parts.par_iter_mut().for_each(|part| {
-            let (mut slots, mut responses) = (part.slots.as_mut_slice(), part.responses.as_slice());
-            for curves in &part.groups {
-                let (mine, rest) = slots.split_at_mut(curves.longest);
-                let (answers, others) = responses.split_at(curves.longest);
-                step_group(path, curves, mine, answers, targets, carries);
-                (slots, responses) = (rest, others);
+    pub fn step_on(
+        &mut self,
+        path: Path,
+        targets: &[Vec3],
+        spring: &Spring<'_>,
+        dt: f64,
+        carries: Option<&[RigidStep]>,
+    ) {
+        self.update_responses(spring, dt);
+        self.batches.par_iter_mut().for_each(|batch| {
+            let (mut states, mut responses) = (batch.states.as_mut_slice(), batch.responses.as_slice());
+            for curves in &batch.groups {
+                let (mine, rest) = states.split_at_mut(curves.longest);
+                let (own, others) = responses.split_at(curves.longest);
+                step_lanes(path, curves, mine, own, targets, carries);
+                (states, responses) = (rest, others);
             }
         });
     }
@@ -148,7 +153,7 @@ impl Jiggle {
     ///
     /// # Panics
     /// Where the mask is shorter than the points.
-    pub fn shape(&self, blend: Masked<'_, f32>) -> Shaped {
+    pub fn shape(&self, blend: Masked<'_, f32>) -> JiggledCurves {
         self.shape_on(Path::chosen(), blend)
     }
 
@@ -156,32 +161,32 @@ impl Jiggle {
     ///
     /// # Panics
     /// As [`Jiggle::shape`].
-    pub fn shape_on(&self, path: Path, blend: Masked<'_, f32>) -> Shaped {
+    pub fn shape_on(&self, path: Path, blend: Masked<'_, f32>) -> JiggledCurves {
         let mut points = vec![[0.0; 3]; self.along.len()];
         let mut left = points.as_mut_slice();
-        let parts = self.parts.iter().map(|part| {
-            let (mine, rest) = std::mem::take(&mut left).split_at_mut(part.points.len());
+        let batches = self.batches.iter().map(|batch| {
+            let (mine, rest) = std::mem::take(&mut left).split_at_mut(batch.points.len());
             left = rest;
-            (part, mine)
+            (batch, mine)
         });
-        let parts: Vec<_> = parts.collect();
-        let shape = |(part, out): (&Part, &mut [Vec3])| {
-            let mut slots = part.slots.as_slice();
+        let batches: Vec<_> = batches.collect();
+        let shape = |(batch, out): (&CurveBatch, &mut [Vec3])| {
+            let mut states = batch.states.as_slice();
             let mut farthest = 0.0_f64;
-            for curves in &part.groups {
-                let (mine, rest) = slots.split_at(curves.longest);
-                farthest = farthest.max(shape_group(path, curves, mine, blend, part.points.start, out));
-                slots = rest;
+            for curves in &batch.groups {
+                let (mine, rest) = states.split_at(curves.longest);
+                farthest = farthest.max(shape_lanes(path, curves, mine, blend, batch.points.start, out));
+                states = rest;
             }
             farthest
         };
-        let farthest = parts.into_par_iter().map(shape).reduce(|| 0.0, f64::max);
-        Shaped { points, max_offset: farthest.sqrt() }
+        let farthest = batches.into_par_iter().map(shape).reduce(|| 0.0, f64::max);
+        JiggledCurves { points, max_offset: farthest.sqrt() }
     }
 
-    /// Sees to it that the responses are those of `spring` and `dt`.
-    fn tune(&mut self, spring: &Spring<'_>, dt: f64) {
-        if self.tuned.as_ref().is_some_and(|tuned| tuned.is(spring, dt)) {
+    /// Recomputes the responses if they are not those of `spring` and `dt`.
+    fn update_responses(&mut self, spring: &Spring<'_>, dt: f64) {
+        if self.response_key.as_ref().is_some_and(|key| key.is(spring, dt)) {
             return;
         }
         let along = &self.along;
@@ -197,34 +202,37 @@ impl Jiggle {
                 Response::RIGID
             }
         };
-        self.parts.par_iter_mut().for_each(|part| {
-            let steps = part.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
-            for ((curves, step), responses) in steps.zip(&mut part.responses) {
+        self.batches.par_iter_mut().for_each(|batch| {
+            let steps = batch.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
+            for ((curves, step), responses) in steps.zip(&mut batch.responses) {
                 for (lane, cv) in curves.at(step).into_iter().enumerate() {
-                    // The root is held, whatever the ramp says there.
+                    // The root follows exactly, whatever the ramp is there.
                     responses.set(lane, if step == 0 { Response::RIGID } else { response(cv) });
                 }
             }
         });
-        self.tuned = Some(Tuned::of(spring, dt));
+        self.response_key = Some(ResponseKey::of(spring, dt));
     }
 }
 
-impl Part {
+impl CurveBatch {
     fn at_rest(starts: &[u32], range: Range<usize>, targets: &[Vec3]) -> Self {
         let points = starts[range.start] as usize..starts[range.end] as usize;
-        let groups: Vec<Curves> = range.step_by(LANES).map(|first| Curves::new(starts, first)).collect();
+        let groups: Vec<CurveLanes> = range.step_by(LANES).map(|first| CurveLanes::new(starts, first)).collect();
         let still = [F64x16::ZERO; 3];
         let steps = groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
-        let slot =
-            |(curves, step): (&Curves, usize)| Slot { offset: still, pace: still, target: curves.load(step, targets) };
-        let slots: Vec<Slot> = steps.map(slot).collect();
-        let responses = vec![Responses::NONE; slots.len()];
-        Self { points, groups, slots, responses }
+        let state = |(curves, step): (&CurveLanes, usize)| CvState {
+            offset: still,
+            velocity: still,
+            target: curves.load(step, targets),
+        };
+        let states: Vec<CvState> = steps.map(state).collect();
+        let responses = vec![Responses::NONE; states.len()];
+        Self { points, groups, states, responses }
     }
 }
 
-impl Tuned {
+impl ResponseKey {
     fn of(spring: &Spring<'_>, dt: f64) -> Self {
         Self {
             numbers: [spring.frequency.value, spring.damping.value, dt],
@@ -244,15 +252,12 @@ impl Tuned {
     }
 }
 
-/// Arc length from the root ÷ the curve's, a CV; 0 on curves of no length.
+/// Arc length from the root ÷ that of the curve, for each CV; 0 on curves without length.
 fn along(starts: &[u32], points: &[Vec3]) -> Vec<f32> {
     let mut along = vec![0.0; starts.last().map_or(0, |end| *end as usize)];
     for ends in starts.windows(2).filter(|ends| ends[0] < ends[1]) {
         let curve = ends[0] as usize..ends[1] as usize;
-        let segment = |pair: &[Vec3]| {
-            let d: [f64; 3] = std::array::from_fn(|axis| f64::from(pair[1][axis]) - f64::from(pair[0][axis]));
-            (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
-        };
+        let segment = |pair: &[Vec3]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
         let lengths = points[curve.clone()].windows(2).map(segment);
         let whole: f64 = lengths.clone().sum();
         if whole > 0.0 {

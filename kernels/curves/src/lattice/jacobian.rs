@@ -1,7 +1,6 @@
 //! Vectors, normals and orientations under a deformation of space, given its Jacobian at each row.
 
-use crate::attach::nearest_rotation;
-use nalgebra::Quaternion;
+use crate::attach::{nearest_rotation, rotate_orientation};
 use numerics::vector::{DMat3, DVec3, direction, to_f32, to_f64};
 use rayon::prelude::*;
 
@@ -37,11 +36,7 @@ pub fn map_normals(rows: &mut [[f32; 3]], jacobians: &[DMat3]) {
 /// Where there are fewer matrices than rows.
 pub fn map_orientations(rows: &mut [[f32; 4]], jacobians: &[DMat3]) {
     each(rows, jacobians, |q, jacobian| {
-        let rows = jacobian.transpose().into();
-        nearest_rotation(&rows).map_or(q, |rotation| {
-            let rotated = Quaternion::from(rotation) * Quaternion::from(q.map(f64::from));
-            rotated.coords.map(|x| x as f32).into()
-        })
+        nearest_rotation(jacobian).map_or(q, |rotation| rotate_orientation(&rotation, q))
     });
 }
 

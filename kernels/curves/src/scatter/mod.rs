@@ -1,255 +1,141 @@
-//! Points spread evenly over triangles: no two close together, and no crowd beside a void.
+//! Points spread evenly over triangles: no two close together, and no void between them.
 //!
-//! Relaxation dart throwing (McCool & Fiume 1992): candidate i, uniform over the area, is kept where no point kept
-//! before it is nearer than `SPACING · √(area ÷ i)`. Distances are straight through space; points on triangles that
-//! face apart do not see each other, so the two sides of a thin sheet fill alike.
+//! Relaxation dart throwing (McCool & Fiume 1992): candidate i, uniform over the area, is accepted where no point
+//! accepted before it is nearer than `SPACING · √(area ÷ i)`. Distances are straight through space; points on triangles
+//! that face apart ignore each other, so the two sides of a thin sheet fill alike.
 //!
-//! Promise: progressive, the points of a shorter list are the first of a longer one, each list as even as the other,
-//! so a density may vary over the surface by keeping fewer of the first; a pure function of positions, triangles and
-//! key, for any number of threads. Limit: a list is shorter than asked where the surface has no area, or where
-//! `MOST_TRIES` candidates a point were not enough (about 3 are).
+//! Promise: progressive. The points of a shorter list are the first of a longer one and each list is as even as the
+//! other, so a density may vary over the surface by keeping fewer of the first. A pure function of positions, triangles
+//! and key, for any number of threads. Limit: a list is shorter than asked for where the surface has no area, or where
+//! `MAX_CANDIDATES` per point were not enough (about 3 are).
 
 mod grow;
+mod point_grid;
 
 pub use grow::{Blade, grow, vertex_normals};
 
+use crate::surface::SurfacePoint;
 use numerics::random::Key;
+use numerics::vector::{DVec3, to_f64};
+use point_grid::PointGrid;
 use rayon::prelude::*;
 
-/// Of √(area ÷ candidates). The nearest neighbours of n points on a plane come to lie 0.48·√(area ÷ n) apart at least
-/// and 0.73 on average (random ones 0 and 0.5). At 0.6 it is 0.42 and 0.69; at 1.3 0.57 and 0.78, for twice the time.
+/// As a share of √(area ÷ candidates). The nearest neighbours of n points on a plane are then at least 0.48·√(area ÷ n)
+/// apart and 0.73 on average (random ones 0 and 0.5). At 0.6 it is 0.42 and 0.69; at 1.3 0.57 and 0.78, for twice the time.
 const SPACING: f64 = 0.8;
 
-/// Candidates a point, before the search ends.
-const MOST_TRIES: u64 = 32;
+/// Candidates per point after which the search ends.
+const MAX_CANDIDATES: u64 = 32;
 
-/// Candidates of the first round; each later one adds a quarter of all so far.
+/// Candidates of the first round; each later round adds a quarter of all so far.
 const FIRST_ROUND: u64 = 256;
 
 /// Golden ratio × 2⁶⁴: multiples of it, modulo 1, fill a line evenly however many there are.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A place on a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
-    /// Which triangle.
-    pub triangle: u32,
-    /// Share of each corner: none negative, 1 together.
-    pub weights: [f64; 3],
-}
-
-impl Spot {
-    /// The weighted sum of the corners' values.
-    pub fn mix<const N: usize>(&self, corners: [[f64; N]; 3]) -> [f64; N] {
-        let [a, b, c] = self.weights;
-        std::array::from_fn(|k| a * corners[0][k] + b * corners[1][k] + c * corners[2][k])
-    }
-}
-
 /// Triangles to spread points over.
-pub struct Surface<'a> {
+pub struct ScatterSurface<'a> {
     positions: &'a [[f32; 3]],
     triangles: &'a [[u32; 3]],
     /// Area of the triangles up to and including each, m².
-    ends: Vec<f64>,
+    cumulative_area: Vec<f64>,
     /// Of each triangle, not normalised.
-    normals: Vec<[f64; 3]>,
-    /// Least coordinates of all corners: places are kept relative to it, so that none is negative and a cast rounds down.
-    low: [f64; 3],
+    normals: Vec<DVec3>,
+    /// The least coordinates of all corners. Points are stored relative to it: none is negative, so a cast rounds down.
+    low: DVec3,
 }
 
-impl<'a> Surface<'a> {
+impl<'a> ScatterSurface<'a> {
     /// The triangles, rows of `positions` (metres).
     ///
     /// # Panics
     /// Where a corner is out of range.
     pub fn new(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> Self {
-        let normals: Vec<[f64; 3]> =
-            triangles.par_iter().map(|corners| normal(corners_of(positions, *corners))).collect();
+        let normals = triangles.par_iter().map(|corners| area_vector(corners_of(positions, *corners)));
+        let normals: Vec<DVec3> = normals.collect();
         let mut area = 0.0;
-        let ends = normals.iter().map(|normal| {
-            area += 0.5 * length(*normal);
+        let cumulative_area = normals.iter().map(|normal| {
+            area += 0.5 * normal.norm();
             area
         });
-        let ends = ends.collect();
+        let cumulative_area = cumulative_area.collect();
         // Of the triangles' corners alone: a stray point far away would cost all others their digits.
         let corners = || triangles.as_flattened().iter().map(|corner| positions[*corner as usize]);
         let least = |k: usize| corners().map(|p| f64::from(p[k])).fold(f64::INFINITY, f64::min);
-        Self { positions, triangles, ends, normals, low: [least(0), least(1), least(2)] }
+        Self { positions, triangles, cumulative_area, normals, low: DVec3::new(least(0), least(1), least(2)) }
     }
 
     /// Area of all triangles, m².
     pub fn area(&self) -> f64 {
-        self.ends.last().copied().unwrap_or(0.0)
+        self.cumulative_area.last().copied().unwrap_or(0.0)
     }
 
-    /// `count` spots, in the order in which they were found.
-    pub fn spread(&self, count: usize, key: Key) -> Vec<Spot> {
-        let mut spots = Vec::with_capacity(count);
-        let mut kept = Kept::new(self.spacing(0));
-        let last = MOST_TRIES * count as u64;
+    /// `count` points, in the order in which they were found.
+    pub fn spread(&self, count: usize, key: Key) -> Vec<SurfacePoint> {
+        let mut points = Vec::with_capacity(count);
+        let mut grid = PointGrid::new(self.spacing(0), FIRST_ROUND as usize);
+        let last = MAX_CANDIDATES * count as u64;
         let mut tried = 0;
-        while self.area() > 0.0 && spots.len() < count && tried < last {
+        while self.area() > 0.0 && points.len() < count && tried < last {
             let round = tried..(tried + FIRST_ROUND.max(tried / 4)).min(last);
-            kept.refine(self.spacing(round.start));
-            // First, on all threads, against what earlier rounds kept; then, in order, against this round's own.
-            let fit: Vec<(u64, Spot, [f64; 3])> = round
+            grid.refine(self.spacing(round.start));
+            // First, on all threads, against the points of earlier rounds; then, in order, against those of this one.
+            let fit: Vec<(u64, SurfacePoint, DVec3)> = round
                 .clone()
                 .into_par_iter()
                 .map(|i| {
-                    let spot = self.candidate(i, key);
-                    let corners = corners_of(self.positions, self.triangles[spot.triangle as usize]);
-                    (i, spot, sub(spot.mix(corners), self.low))
+                    let point = self.candidate(i, key);
+                    (i, point, point.position(self.positions, self.triangles) - self.low)
                 })
-                .filter(|(i, spot, at)| !self.is_crowded(&kept, 0, spot, *at, self.spacing(*i)))
+                .filter(|(i, point, at)| !self.is_crowded(&grid, 0, point, *at, self.spacing(*i)))
                 .collect();
-            let earlier = spots.len();
-            for (i, spot, at) in fit {
-                if spots.len() < count && !self.is_crowded(&kept, earlier, &spot, at, self.spacing(i)) {
-                    kept.add(at, spot.triangle);
-                    spots.push(spot);
+            let earlier = points.len();
+            for (i, point, at) in fit {
+                if points.len() < count && !self.is_crowded(&grid, earlier, &point, at, self.spacing(i)) {
+                    grid.add(at, point.triangle);
+                    points.push(point);
                 }
             }
             tried = round.end;
         }
-        spots
+        points
     }
 
-    /// How far candidate `i` must be from all kept before it, metres.
+    /// How far candidate `i` must be from all accepted before it, metres.
     fn spacing(&self, i: u64) -> f64 {
         SPACING * (self.area() / (i + 1) as f64).sqrt()
     }
 
-    /// Candidate `i`: along the list of triangles by multiples of the golden ratio, within its triangle's rows too, and
-    /// at random across.
-    fn candidate(&self, i: u64, key: Key) -> Spot {
+    /// Candidate `i`: by multiples of the golden ratio along the list of triangles and across the rows within each, at
+    /// random along a row.
+    fn candidate(&self, i: u64, key: Key) -> SurfacePoint {
         let along = key.u64().wrapping_add(i.wrapping_mul(GOLDEN));
         // Never rounded up to the very end, where no triangle begins.
         let target = ((along >> 11) as f64 / (1_u64 << 53) as f64 * self.area()).min(self.area().next_down());
-        let triangle = self.ends.partition_point(|end| *end <= target);
-        let start = if triangle == 0 { 0.0 } else { self.ends[triangle - 1] };
-        let share = (target - start) / (self.ends[triangle] - start);
+        let triangle = self.cumulative_area.partition_point(|end| *end <= target);
+        let start = if triangle == 0 { 0.0 } else { self.cumulative_area[triangle - 1] };
+        let share = (target - start) / (self.cumulative_area[triangle] - start);
         let (down, across) = (share.sqrt(), key.of(i).f64());
-        Spot { triangle: triangle as u32, weights: [1.0 - down, down * (1.0 - across), down * across] }
+        SurfacePoint { triangle: triangle as u32, weights: [1.0 - down, down * (1.0 - across), down * across] }
     }
 
-    /// Whether any kept point from the `first` on is too near.
-    fn is_crowded(&self, kept: &Kept, first: usize, spot: &Spot, at: [f64; 3], spacing: f64) -> bool {
-        let facing = self.normals[spot.triangle as usize];
-        kept.any_near(at, first, |point| {
-            let apart = sub(point.at, at);
-            dot(apart, apart) < spacing * spacing && dot(facing, self.normals[point.triangle as usize]) > 0.0
+    /// Whether any accepted point from row `first` on is too near.
+    fn is_crowded(&self, grid: &PointGrid, first: usize, point: &SurfacePoint, at: DVec3, spacing: f64) -> bool {
+        let facing = self.normals[point.triangle as usize];
+        grid.any_near(at, first, |other| {
+            (other.at - at).norm_squared() < spacing * spacing
+                && facing.dot(&self.normals[other.triangle as usize]) > 0.0
         })
     }
 }
 
-/// Points that are kept (none with a negative coordinate), found again by place: in cubes at least twice as wide as the
-/// spacing, so that eight of them hold all that is nearer. Cubes share chains by chance, which costs time and no answer.
-struct Kept {
-    points: Vec<Point>,
-    cubes_per_metre: f64,
-    /// Newest point of each chain.
-    heads: Vec<u32>,
+fn corners_of(positions: &[[f32; 3]], triangle: [u32; 3]) -> [DVec3; 3] {
+    triangle.map(|corner| to_f64(positions[corner as usize]))
 }
 
-struct Point {
-    at: [f64; 3],
-    triangle: u32,
-    /// The next older point of its chain.
-    older: u32,
-}
-
-/// The end of a chain.
-const NONE: u32 = u32::MAX;
-
-/// Cubes are made anew once they are this much wider than they must be: at 2 a cube holds four times as many points, at
-/// 1 they would be made anew every round.
-const TOO_WIDE: f64 = 1.3;
-
-impl Kept {
-    fn new(spacing: f64) -> Self {
-        Self { points: Vec::new(), cubes_per_metre: 0.5 / spacing, heads: vec![NONE; FIRST_ROUND as usize] }
-    }
-
-    /// Makes the cubes fit a spacing that has shrunk.
-    fn refine(&mut self, spacing: f64) {
-        let needed = 0.5 / spacing;
-        if needed <= TOO_WIDE * self.cubes_per_metre {
-            return;
-        }
-        self.cubes_per_metre = needed;
-        // Until cubes are made anew, points become about twice as many.
-        self.heads = vec![NONE; (4 * self.points.len()).max(FIRST_ROUND as usize).next_power_of_two()];
-        for place in 0..self.points.len() {
-            let chain = self.chain_of(self.points[place].at);
-            self.points[place].older = self.heads[chain];
-            self.heads[chain] = place as u32;
-        }
-    }
-
-    fn add(&mut self, at: [f64; 3], triangle: u32) {
-        let chain = self.chain_of(at);
-        self.points.push(Point { at, triangle, older: self.heads[chain] });
-        self.heads[chain] = (self.points.len() - 1) as u32;
-    }
-
-    /// Whether `holds` of any point from the `first` on that lies in the eight cubes around `at`.
-    #[inline]
-    fn any_near(&self, at: [f64; 3], first: usize, holds: impl Fn(&Point) -> bool) -> bool {
-        let cube = at.map(|x| x * self.cubes_per_metre);
-        let own = cube.map(|x| x as i64);
-        // In each direction the neighbour that is nearer; the own cube, which most likely answers, goes first.
-        let next = [0, 1, 2].map(|k| if cube[k] - (own[k] as f64) < 0.5 { -1 } else { 1 });
-        (0..8).any(|corner: i64| {
-            let cube = [0, 1, 2].map(|k| own[k].wrapping_add(next[k] * (corner >> k & 1)));
-            let mut place = self.heads[self.chain(cube)];
-            // A chain runs from its newest point to its oldest.
-            while place != NONE && place as usize >= first {
-                let point = &self.points[place as usize];
-                if holds(point) {
-                    return true;
-                }
-                place = point.older;
-            }
-            false
-        })
-    }
-
-    fn chain_of(&self, at: [f64; 3]) -> usize {
-        self.chain(at.map(|x| (x * self.cubes_per_metre) as i64))
-    }
-
-    fn chain(&self, [x, y, z]: [i64; 3]) -> usize {
-        let mixed = [(x, 0x9e37_79b9_7f4a_7c15), (y, 0xc2b2_ae3d_27d4_eb4f), (z, 0x1656_67b1_9e37_79f9)]
-            .into_iter()
-            .fold(0_u64, |sum, (cell, factor)| sum.wrapping_add((cell as u64).wrapping_mul(factor)));
-        ((mixed ^ (mixed >> 29)) as usize ^ (mixed >> 47) as usize) & (self.heads.len() - 1)
-    }
-}
-
-fn corners_of(positions: &[[f32; 3]], triangle: [u32; 3]) -> [[f64; 3]; 3] {
-    triangle.map(|corner| positions[corner as usize].map(f64::from))
-}
-
-/// Twice the area long, outward where the corners are counter-clockwise.
-fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
-    cross(sub(b, a), sub(c, a))
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
+/// The normal, outward where the corners are counter-clockwise; twice the area long.
+fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(&(c - a))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Laws of spreading and growing.
+//! Tests of spreading points and growing curves.
 
 use super::*;
 
@@ -6,34 +6,34 @@ use super::*;
 const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
 const HALVES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 
-fn places(positions: &[[f32; 3]], triangles: &[[u32; 3]], spots: &[Spot]) -> Vec<[f64; 3]> {
-    spots.iter().map(|spot| spot.mix(corners_of(positions, triangles[spot.triangle as usize]))).collect()
+fn positions_of(positions: &[[f32; 3]], triangles: &[[u32; 3]], points: &[SurfacePoint]) -> Vec<DVec3> {
+    points.iter().map(|point| point.position(positions, triangles)).collect()
 }
 
-/// Distance of each place to the nearest other, in units of √(1 ÷ places).
-fn gaps(places: &[[f64; 3]]) -> Vec<f64> {
+/// Distance of each position to the nearest other, in units of √(1 ÷ positions).
+fn gaps(positions: &[DVec3]) -> Vec<f64> {
     let nearest = |i: usize| {
-        let others = places.iter().enumerate().filter(|(j, _)| *j != i);
-        others.map(|(_, other)| length(sub(*other, places[i]))).fold(f64::INFINITY, f64::min)
+        let others = positions.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, other)| (*other - positions[i]).norm()).fold(f64::INFINITY, f64::min)
     };
-    (0..places.len()).map(|i| nearest(i) * (places.len() as f64).sqrt()).collect()
+    (0..positions.len()).map(|i| nearest(i) * (positions.len() as f64).sqrt()).collect()
 }
 
 #[test]
 fn no_two_points_are_close_and_no_hole_is_left() {
-    let square = Surface::new(&SQUARE, &HALVES);
+    let square = ScatterSurface::new(&SQUARE, &HALVES);
     for count in [30, 100, 300, 1000, 3000] {
-        let spots = square.spread(count, Key::new(3));
-        assert_eq!(spots.len(), count);
-        let places = places(&SQUARE, &HALVES, &spots);
-        let gaps = gaps(&places);
+        let points = square.spread(count, Key::new(3));
+        assert_eq!(points.len(), count);
+        let positions = positions_of(&SQUARE, &HALVES, &points);
+        let gaps = gaps(&positions);
         let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
         let mean = gaps.iter().sum::<f64>() / count as f64;
         assert!(least > 0.47 && mean > 0.71, "{count}: least {least}, mean {mean}");
         // The widest void: of a square lattice 0.71, of random points 1.6 and more.
-        let lattice = (0..1600).map(|k| [f64::from(k % 40) / 39.0, 0.0, f64::from(k / 40) / 39.0]);
+        let lattice = (0..1600).map(|k| DVec3::new(f64::from(k % 40) / 39.0, 0.0, f64::from(k / 40) / 39.0));
         let farthest = lattice
-            .map(|at| places.iter().map(|place| length(sub(*place, at))).fold(f64::INFINITY, f64::min))
+            .map(|at| positions.iter().map(|position| (*position - at).norm()).fold(f64::INFINITY, f64::min))
             .fold(0.0, f64::max);
         assert!(farthest * (count as f64).sqrt() < 1.6, "{count}: {farthest}");
     }
@@ -41,7 +41,7 @@ fn no_two_points_are_close_and_no_hole_is_left() {
 
 #[test]
 fn a_shorter_list_begins_a_longer_one() {
-    let square = Surface::new(&SQUARE, &HALVES);
+    let square = ScatterSurface::new(&SQUARE, &HALVES);
     let long = square.spread(2000, Key::new(1));
     for count in [0, 1, 7, 500, 1999] {
         assert_eq!(square.spread(count, Key::new(1)), long[..count]);
@@ -61,14 +61,14 @@ fn bands_of_a_sphere_get_points_by_their_area() {
             ends.push(triangles.len());
         }
     }
-    let whole = Surface::new(&positions, &triangles);
+    let whole = ScatterSurface::new(&positions, &triangles);
     let count = 20_000;
-    let spots = whole.spread(count, Key::new(9));
+    let points = whole.spread(count, Key::new(9));
     let mut start = 0;
     for end in ends {
-        let band = Surface::new(&positions, &triangles[start..end]);
+        let band = ScatterSurface::new(&positions, &triangles[start..end]);
         let expected = band.area() / whole.area() * count as f64;
-        let found = spots.iter().filter(|spot| (start..end).contains(&(spot.triangle as usize))).count() as f64;
+        let found = points.iter().filter(|point| (start..end).contains(&(point.triangle as usize))).count() as f64;
         // Random points would stray by √expected.
         assert!((found - expected).abs() < 1.2 * expected.sqrt(), "{found} of {expected}");
         start = end;
@@ -80,66 +80,67 @@ fn both_sides_of_a_thin_sheet_fill_alike() {
     let low = SQUARE.map(|p| [p[0], p[1] - 1e-3, p[2]]);
     let sheet = [SQUARE, low].concat();
     let triangles = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
-    let spots = Surface::new(&sheet, &triangles).spread(1000, Key::new(2));
-    let above = spots.iter().filter(|spot| spot.triangle < 2).count();
+    let points = ScatterSurface::new(&sheet, &triangles).spread(1000, Key::new(2));
+    let above = points.iter().filter(|point| point.triangle < 2).count();
     assert!(above.abs_diff(500) < 20, "{above}");
     // Sides that face the same way are one sheet: together as sparse as one.
     let doubled = [[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]];
-    let spots = Surface::new(&sheet, &doubled).spread(1000, Key::new(2));
-    let gaps = gaps(&places(&sheet, &doubled, &spots));
+    let points = ScatterSurface::new(&sheet, &doubled).spread(1000, Key::new(2));
+    let gaps = gaps(&positions_of(&sheet, &doubled, &points));
     // The area is counted twice, so the spacing is that of 500 points at least.
     assert!(gaps.iter().all(|gap| *gap > 0.42));
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_spots() {
+fn any_number_of_threads_gives_the_same_points() {
     let runs = [1, 2, 7].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Surface::new(&SQUARE, &HALVES).spread(3000, Key::new(5)))
+        pool.install(|| ScatterSurface::new(&SQUARE, &HALVES).spread(3000, Key::new(5)))
     });
     assert_eq!(runs[0], runs[1]);
     assert_eq!(runs[0], runs[2]);
 }
 
 #[test]
-fn a_scene_scaled_by_a_power_of_two_gets_the_same_spots() {
-    let spots = |scale: f32| Surface::new(&SQUARE.map(|p| p.map(|x| x * scale)), &HALVES).spread(500, Key::new(5));
-    let expected = spots(1.0);
+fn a_scene_scaled_by_a_power_of_two_gets_the_same_points() {
+    let points =
+        |scale: f32| ScatterSurface::new(&SQUARE.map(|p| p.map(|x| x * scale)), &HALVES).spread(500, Key::new(5));
+    let expected = points(1.0);
     for exponent in [-90, -10, 1, 20, 60] {
         let scale = f32::from_bits(((127 + exponent) as u32) << 23);
-        assert!(spots(scale) == expected, "2^{exponent}");
+        assert!(points(scale) == expected, "2^{exponent}");
     }
 }
 
 #[test]
 fn a_surface_without_area_gets_no_point() {
-    assert!(Surface::new(&[], &[]).spread(10, Key::new(0)).is_empty());
+    assert!(ScatterSurface::new(&[], &[]).spread(10, Key::new(0)).is_empty());
     let line = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
-    assert!(Surface::new(&line, &[[0, 1, 2]]).spread(10, Key::new(0)).is_empty());
+    assert!(ScatterSurface::new(&line, &[[0, 1, 2]]).spread(10, Key::new(0)).is_empty());
     // Beside real ones, such triangles get none.
     let triangles = [[0, 0, 1], [0, 2, 1], [1, 1, 1], [0, 3, 2], [2, 2, 0]];
-    let spots = Surface::new(&SQUARE, &triangles).spread(500, Key::new(0));
-    assert_eq!(spots.len(), 500);
-    assert!(spots.iter().all(|spot| [1, 3].contains(&spot.triangle)));
+    let points = ScatterSurface::new(&SQUARE, &triangles).spread(500, Key::new(0));
+    assert_eq!(points.len(), 500);
+    assert!(points.iter().all(|point| [1, 3].contains(&point.triangle)));
 }
 
 #[test]
 fn a_stray_point_far_away_changes_nothing() {
     let stray = [SQUARE.to_vec(), vec![[-1e30; 3]]].concat();
-    let spots = |positions: &[[f32; 3]]| Surface::new(positions, &HALVES).spread(300, Key::new(4));
-    assert_eq!(spots(&stray), spots(&SQUARE));
+    let points = |positions: &[[f32; 3]]| ScatterSurface::new(positions, &HALVES).spread(300, Key::new(4));
+    assert_eq!(points(&stray), points(&SQUARE));
 }
 
 #[test]
 fn weights_are_shares() {
-    for spot in Surface::new(&SQUARE, &HALVES).spread(1000, Key::new(8)) {
-        assert!(spot.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
-        assert!((spot.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+    for point in ScatterSurface::new(&SQUARE, &HALVES).spread(1000, Key::new(8)) {
+        assert!(point.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
+        assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
     }
 }
 
 fn blade(lean: f32, around: f32) -> Blade {
-    Blade { root: Spot { triangle: 0, weights: [0.25, 0.5, 0.25] }, length: 2.0, lean, around }
+    Blade { root: SurfacePoint { triangle: 0, weights: [0.25, 0.5, 0.25] }, length: 2.0, lean, around }
 }
 
 fn grown(positions: &[[f32; 3]], blade: Blade, cvs: usize) -> Vec<[f32; 3]> {
@@ -193,6 +194,6 @@ fn normals_of_points_are_weighted_by_area() {
     let normals = vertex_normals(&positions, &[[0, 1, 2], [0, 3, 1]]);
     let (y, x) = (2.0 / 5.0_f64.sqrt(), -1.0 / 5.0_f64.sqrt());
     assert!((normals[0][0] - x).abs() < 1e-15 && (normals[0][1] - y).abs() < 1e-15, "{normals:?}");
-    assert_eq!(normals[2], [0.0, 1.0, 0.0]);
-    assert_eq!(normals[4], [0.0; 3]);
+    assert_eq!(normals[2], DVec3::y());
+    assert_eq!(normals[4], DVec3::zeros());
 }

@@ -28,7 +28,7 @@ fn assert_kept(starts: &[u32], targets: &[Vec3], found: &[Vec3]) {
     }
 }
 
-fn swung(path: Path, most: u64, frames: u32) -> Vec<Shaped> {
+fn swung(path: Path, most: u64, frames: u32) -> Vec<JiggledCurves> {
     let ramp = rising();
     let (starts, first) = wobbling(700, most, 0.0);
     let mut jiggle = Jiggle::at_rest(&starts, &first, &first);
@@ -61,7 +61,7 @@ fn lengths_are_restored_root_to_tip_by_hand() {
     let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
     let mut jiggle = Jiggle::at_rest(&[0, 3], &points, &points);
     for cv in 1..3 {
-        jiggle.parts[0].slots[cv].offset[0].0[0] = 1.0;
+        jiggle.batches[0].states[cv].offset[0].0[0] = 1.0;
     }
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let shaped = jiggle.shape(1.0.into());
@@ -80,7 +80,7 @@ fn lengths_are_restored_root_to_tip_by_hand() {
     );
     assert_eq!(jiggle.shape(Masked { value: 1.0, mask: Some(&[0.0, -1.0, 0.0]) }).points, points);
     // Nothing was fed back.
-    assert_eq!(jiggle.parts[0].slots[1].offset[0].0[0], 1.0);
+    assert_eq!(jiggle.batches[0].states[1].offset[0].0[0], 1.0);
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn what_stands_still_keeps_its_bits() {
     let ramp = soft();
     let mut jiggle = Jiggle::at_rest(&starts, &points, &points);
     for _ in 0..50 {
-        jiggle.step(&points, &spring(0.3, 0.1, &ramp, Drag::World), 1.0, Some(&vec![Carry::NONE; 60]));
+        jiggle.step(&points, &spring(0.3, 0.1, &ramp, Drag::World), 1.0, Some(&vec![RigidStep::NONE; 60]));
     }
     let shaped = jiggle.shape(0.7.into());
     assert_eq!(bits(&shaped.points), bits(&points));
@@ -105,7 +105,7 @@ fn a_ramp_of_zero_follows_exactly_and_half_of_it_doubles_the_frequency() {
         for x in [1.0, 2.0, 1.5, -1.0] {
             jiggle.step(&points(x), &spring(phase, 0.3, ramp, Drag::World), 1.0, None);
         }
-        [1, 2].map(|cv| jiggle.parts[0].slots[cv].offset[0].0[0])
+        [1, 2].map(|cv| jiggle.batches[0].states[cv].offset[0].0[0])
     };
     assert_eq!(run(&Ramp::constant(0.0), 0.8), [0.0; 2]);
     assert_eq!(run(&Ramp::constant(-1.0), 0.8), [0.0; 2]);
@@ -166,7 +166,7 @@ fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_come_out() {
     }
     let mut none = Jiggle::at_rest(&[0], &[], &[]);
     none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
-    assert_eq!(none.shape(1.0.into()), Shaped { points: vec![], max_offset: 0.0 });
+    assert_eq!(none.shape(1.0.into()), JiggledCurves { points: vec![], max_offset: 0.0 });
     let mut none = Jiggle::at_rest(&[], &[], &[]);
     none.step(&[], &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
 }

@@ -31,8 +31,8 @@ fn at(x: f32) -> [Vec3; 2] {
 
 /// How far along x the second CV is, before lengths are restored.
 fn free(jiggle: &Jiggle) -> f64 {
-    let slot = &jiggle.parts[0].slots[1];
-    f64::from(slot.target[0].0[0]) + slot.offset[0].0[0]
+    let state = &jiggle.batches[0].states[1];
+    f64::from(state.target[0].0[0]) + state.offset[0].0[0]
 }
 
 /// Curves of 1…`most` CVs, up to 3 m from the origin, that wobble with time.

@@ -101,7 +101,7 @@ fn free_decay_by_hand() {
         let mut jiggle = Jiggle::at_rest(&ONE, &at(1.0), &at(1.0));
         jiggle.step(&at(0.0), &spring(1e-12, zeta, &ramp, Drag::World), 1.0, None);
         // A velocity is metres a step, and that step was short.
-        jiggle.parts[0].slots[1].pace = [F64x16::ZERO; 3];
+        jiggle.batches[0].states[1].velocity = [F64x16::ZERO; 3];
         for frame in 1..=frames {
             jiggle.step(&at(0.0), &spring(phase, zeta, &ramp, Drag::Target), 1.0, None);
             let t = phase * f64::from(frame);
@@ -183,8 +183,8 @@ fn a_spring_has_forgotten_its_start_by_the_end_of_its_window_and_not_long_before
                 let ramp = soft();
                 let left = |offset: f64, pace: f64, steps: u32| {
                     let mut jiggle = Jiggle::at_rest(&ONE, &at(0.0), &at(0.0));
-                    jiggle.parts[0].slots[1].offset[0].0[0] = offset;
-                    jiggle.parts[0].slots[1].pace[0].0[0] = pace * phase;
+                    jiggle.batches[0].states[1].offset[0].0[0] = offset;
+                    jiggle.batches[0].states[1].velocity[0].0[0] = pace * phase;
                     let mut most = 0.0_f64;
                     for step in 0..steps + 40 {
                         if step >= steps {

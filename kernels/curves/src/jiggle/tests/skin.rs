@@ -1,6 +1,8 @@
-//! Oscillators carried along by the face under their root.
+//! Oscillators carried along by the skin under their root.
 
 use super::*;
+use crate::attach::{RootPose, SkinBinding, attach_curves};
+use numerics::vector::{DMat3, DQuat, DVec3, rotation, to_f32, to_f64};
 
 /// A triangle, and a curve of four CVs upon it.
 const FACE: [Vec3; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [0.0, 0.125, 1.0]];
@@ -10,32 +12,31 @@ fn curve(frame: u32) -> Vec<Vec3> {
     (0..4).map(|k| k as f32 / 4.0).map(|y| [0.25 + 0.3 * sway * y, y, 0.25 - 0.1 * sway * y * y]).collect()
 }
 
-/// A rigid motion: rotation about a slanting axis and a way, in f64.
-fn moved(points: &[Vec3], angle: f64, way: [f64; 3]) -> Vec<Vec3> {
-    let (s, c) = libm::sincos(angle);
-    let n = [2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0];
-    let turned = |p: [f64; 3]| -> [f64; 3] {
-        let along = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
-        let side = closest::cross(n, p);
-        std::array::from_fn(|k| p[k] * c + side[k] * s + n[k] * along * (1.0 - c) + way[k])
-    };
-    points.iter().map(|p| turned(p.map(f64::from)).map(|x| x as f32)).collect()
+/// A rigid motion: a rotation about a slanting axis and a translation, in f64.
+fn moved(points: &[Vec3], angle: f64, by: [f64; 3]) -> Vec<Vec3> {
+    let turn = rotation(DVec3::new(2.0, -1.0, 2.0) / 3.0, angle);
+    points.iter().map(|p| to_f32(turn * to_f64(*p) + DVec3::from(by))).collect()
+}
+
+/// Roots on [`FACE`], which is at rest at `points`.
+fn bound(points: &[Vec3], roots: &[Vec3]) -> SkinBinding {
+    SkinBinding::to_closest(points, &[[0, 1, 2]], roots).unwrap()
 }
 
 /// The curves' offsets after `frames` frames, over a skin that moves as `motion` says, or none.
 fn run(frames: u32, share: f64, skinned: bool, motion: impl Fn(u32) -> (f64, [f64; 3])) -> Vec<Vec3> {
     let at = |points: &[Vec3], frame: u32| {
-        let (angle, way) = motion(frame);
-        moved(points, angle, way)
+        let (angle, by) = motion(frame);
+        moved(points, angle, by)
     };
     let ramp = rising();
-    let roots = Roots::bind(&[0, 3], &[0, 1, 2], &at(&FACE, 0), &at(&curve(0), 0)[..1]).unwrap();
-    let mut before = roots.frames(&at(&FACE, 0));
+    let roots = bound(&at(&FACE, 0), &at(&curve(0), 0)[..1]);
+    let mut before = roots.poses(&at(&FACE, 0));
     let mut jiggle = Jiggle::at_rest(&[0, 4], &at(&curve(0), 0), &at(&curve(0), 0));
     for frame in 1..=frames {
-        let now = roots.frames(&at(&FACE, frame));
-        let carry = [Carry::between(&before[0], &now[0], share)];
-        let carries = skinned.then_some(&carry[..]);
+        let now = roots.poses(&at(&FACE, frame));
+        let steps = RigidStep::all_between(&roots, &before, &now, share);
+        let carries = skinned.then_some(&steps[..]);
         jiggle.step(&at(&curve(frame), frame), &spring(0.7, 0.15, &ramp, Drag::World), 1.0, carries);
         before = now;
     }
@@ -57,8 +58,8 @@ fn tumbling(frame: u32) -> (f64, [f64; 3]) {
 fn with_all_motion_inherited_a_swing_on_a_tumbling_skin_is_the_swing_on_a_still_one_moved_along() {
     for frames in [1, 3, 10, 40] {
         let still = run(frames, 1.0, true, |_| (0.0, [0.0; 3]));
-        let (angle, way) = tumbling(frames);
-        let expected = moved(&still, angle, way);
+        let (angle, by) = tumbling(frames);
+        let expected = moved(&still, angle, by);
         let error = farthest(&run(frames, 1.0, true, tumbling), &expected);
         assert!(error < 4e-6, "frame {frames}: {error}");
     }
@@ -68,16 +69,16 @@ fn with_all_motion_inherited_a_swing_on_a_tumbling_skin_is_the_swing_on_a_still_
 fn rigid_motion_of_skin_and_curves_alone_leaves_no_swing() {
     // The curve is its own at rest, so all it does is the skin's.
     let rest = curve(0);
-    let roots = Roots::bind(&[0, 3], &[0, 1, 2], &FACE, &rest[..1]).unwrap();
+    let roots = bound(&FACE, &rest[..1]);
     let ramp = rising();
     let mut jiggle = Jiggle::at_rest(&[0, 4], &rest, &rest);
-    let mut before = roots.frames(&FACE);
+    let mut before = roots.poses(&FACE);
     for frame in 1..60 {
-        let (angle, way) = tumbling(frame);
-        let targets = moved(&rest, angle, way);
-        let now = roots.frames(&moved(&FACE, angle, way));
-        let carry = [Carry::between(&before[0], &now[0], 1.0)];
-        jiggle.step(&targets, &spring(0.7, 0.15, &ramp, Drag::World), 1.0, Some(&carry));
+        let (angle, by) = tumbling(frame);
+        let targets = moved(&rest, angle, by);
+        let now = roots.poses(&moved(&FACE, angle, by));
+        let steps = RigidStep::all_between(&roots, &before, &now, 1.0);
+        jiggle.step(&targets, &spring(0.7, 0.15, &ramp, Drag::World), 1.0, Some(&steps));
         before = now;
         let ulps = 4.0 * 2e-6;
         assert!(farthest(&jiggle.shape(1.0.into()).points, &targets) < 1e-6 + ulps, "frame {frame}");
@@ -89,56 +90,100 @@ fn with_none_inherited_it_swings_as_in_the_world_to_the_bit() {
     assert_eq!(bits(&run(20, 0.0, true, tumbling)), bits(&run(20, 1.0, false, tumbling)));
 }
 
-#[test]
-fn a_share_of_a_motion_is_that_share_of_angle_and_way() {
-    let frame = |angle: f64, origin: [f64; 3]| {
-        let (s, c) = libm::sincos(angle);
-        Frame { axes: [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]], origin }
-    };
-    for angle in [0.1, 1.0, 3.1, -2.0] {
-        let carry = Carry::between(&frame(0.3, [1.0, 0.0, 0.0]), &frame(0.3 + angle, [2.0, 4.0, 0.0]), 0.25);
-        let (s, c) = libm::sincos(0.25 * angle);
-        let expected = [[c - 1.0, -s, 0.0], [s, c - 1.0, 0.0], [0.0; 3]];
-        for (found, expected) in carry.change.iter().flatten().zip(expected.iter().flatten()) {
-            assert!((found - expected).abs() < 1e-14, "{angle}: {carry:?}");
-        }
-        assert_eq!((carry.about, carry.shift), ([1.0, 0.0, 0.0], [0.25, 1.0, 0.0]));
-    }
-    // Half a turn exactly, about each axis: half of it is a quarter, whichever way round.
-    for axis in 0..3 {
-        let turned = std::array::from_fn(|k| {
-            std::array::from_fn(|i| {
-                if i != k {
-                    0.0
-                } else if k == axis {
-                    1.0
-                } else {
-                    -1.0
-                }
-            })
-        });
-        let still = frame(0.0, [0.0; 3]);
-        let carry = Carry::between(&still, &Frame { axes: turned, origin: [0.0; 3] }, 0.5);
-        for k in 0..3 {
-            let expected = if k == axis { 0.0 } else { -1.0 };
-            assert!((carry.change[k][k] - expected).abs() < 1e-14, "{axis}: {carry:?}");
-        }
-    }
-    let here = frame(0.3, [5.0, 1e7, -3.0]);
-    assert_eq!(Carry::between(&here, &here, 1.0), Carry::NONE);
+fn pose(rotation: DQuat, translation: [f64; 3]) -> RootPose {
+    RootPose { translation: translation.into(), rotation, lost: false }
 }
 
 #[test]
-fn a_face_that_loses_its_area_keeps_its_frame_at_rest() {
-    let roots = Roots::bind(&[0, 3], &[0, 1, 2], &FACE, &[[0.25; 3]]).unwrap();
-    let flat = roots.frames(&[[1.0; 3]; 3]);
-    assert_eq!(flat[0].axes, roots.frames(&FACE)[0].axes);
-    assert!((0..3).all(|k| (flat[0].origin[k] - 1.0).abs() < 1e-12));
-    assert!(Roots::bind(&[0, 3], &[0, 0, 1], &FACE, &[[0.0; 3]]).is_none());
-    assert!(Roots::bind(&[0], &[], &[], &[[0.0; 3]]).is_none());
-    // A quad is a fan of two triangles.
-    let quad = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-    let roots = Roots::bind(&[0, 4], &[0, 1, 2, 3], &quad, &[[0.1, 0.9, 0.3]]).unwrap();
-    let found = roots.frames(&quad)[0].origin;
-    assert!((found[0] - 0.1).abs() < 1e-7 && (found[1] - 0.9).abs() < 1e-7 && found[2] == 0.0);
+fn a_share_of_a_motion_is_that_share_of_angle_and_translation() {
+    let about_z = |angle: f64| rotation(DVec3::z(), angle);
+    let root = DVec3::new(1.0, 0.0, 0.0);
+    for angle in [0.1, 1.0, 3.1, -2.0] {
+        let (from, to) = (pose(about_z(0.3), [0.0; 3]), pose(about_z(0.3 + angle), [1.0, 4.0, 0.0]));
+        let step = RigidStep::between(root, &from, &to, 0.25);
+        let (s, c) = libm::sincos(0.25 * angle);
+        let expected = DMat3::new(c - 1.0, -s, 0.0, s, c - 1.0, 0.0, 0.0, 0.0, 0.0);
+        assert!((step.change - expected).amax() < 1e-14, "{angle}: {step:?}");
+        assert_eq!((step.about, step.shift), (root, DVec3::new(0.25, 1.0, 0.0)));
+    }
+    // Half a turn exactly, about each axis: half of it is a quarter, whichever way round.
+    for axis in 0..3 {
+        let mut imaginary = [0.0; 3];
+        imaginary[axis] = 1.0;
+        let [x, y, z] = imaginary;
+        let half_turn = DQuat::new_unchecked(nalgebra::Quaternion::new(0.0, x, y, z));
+        let step = RigidStep::between(root, &pose(DQuat::identity(), [0.0; 3]), &pose(half_turn, [0.0; 3]), 0.5);
+        for k in 0..3 {
+            let expected = if k == axis { 0.0 } else { -1.0 };
+            assert!((step.change[(k, k)] - expected).abs() < 1e-14, "{axis}: {step:?}");
+        }
+    }
+    let here = pose(about_z(0.3), [5.0, 1e7, -3.0]);
+    assert_eq!(RigidStep::between(root, &here, &here, 1.0), RigidStep::NONE);
+}
+
+#[test]
+fn a_skin_that_collapses_moves_its_curves_and_rotates_none() {
+    let roots = bound(&FACE, &[[0.25; 3]]);
+    let [whole, turned, flat] =
+        [FACE.to_vec(), moved(&FACE, 1.0, [0.0; 3]), vec![[1.0; 3]; 3]].map(|skin| roots.poses(&skin)[0]);
+    assert!(flat.lost && !turned.lost);
+    let root = DVec3::repeat(0.25);
+    // Into the collapse and out of it.
+    for (from, to) in [(turned, flat), (flat, turned)] {
+        let step = RigidStep::between(root, &from, &to, 1.0);
+        assert_eq!((step.change, step.shift), (DMat3::zeros(), to.translation - from.translation));
+    }
+    assert_ne!(RigidStep::between(root, &whole, &turned, 1.0).change, DMat3::zeros());
+}
+
+/// A strip of `n` by 2 squares along x, 1 m wide and 4 long, twisted about x by `angle` a metre.
+fn twisted_strip(n: u32, angle: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let length = 4.0 / f64::from(n);
+    let point = |row: u32, column: u32| {
+        let (x, z) = (length * f64::from(row), 0.5 * (f64::from(column) - 1.0));
+        let (s, c) = libm::sincos(angle * x);
+        to_f32(DVec3::new(x, -s * z, c * z))
+    };
+    let points = (0..=n).flat_map(|row| (0..3).map(move |column| point(row, column))).collect();
+    let squares = (0..n).flat_map(|row| (0..2).map(move |column| 3 * row + column));
+    (points, squares.flat_map(|a| [[a, a + 1, a + 4], [a, a + 4, a + 3]]).collect())
+}
+
+#[test]
+fn attached_and_jiggled_curves_have_the_same_frame_on_a_twisting_skin() {
+    let (rest, triangles) = twisted_strip(9, 0.0);
+    let roots: Vec<Vec3> = (0..300).map(|k| [0.1 + 0.0125 * k as f32, 0.01, -0.4 + 0.0025 * k as f32]).collect();
+    let points: Vec<Vec3> = roots.iter().flat_map(|[x, y, z]| [[*x, *y, *z], [x + 0.02, y + 0.1, z - 0.03]]).collect();
+    let starts: Vec<u32> = (0..=300).map(|curve| 2 * curve).collect();
+    let binding = SkinBinding::to_closest(&rest, &triangles, &roots).unwrap();
+    let mut carried: Vec<DVec3> = points.iter().map(|p| to_f64(*p)).collect();
+    let mut before = binding.poses(&rest);
+    for frame in 1..=20 {
+        let now = binding.poses(&twisted_strip(9, 0.05 * f64::from(frame)).0);
+        let steps = RigidStep::all_between(&binding, &before, &now, 1.0);
+        for (k, p) in carried.iter_mut().enumerate() {
+            let RigidStep { change, about, shift } = steps[k / 2];
+            *p += change * (*p - about) + shift;
+        }
+        let attached = attach_curves(&starts, &points, &now).points;
+        let carried: Vec<Vec3> = carried.iter().map(|p| to_f32(*p)).collect();
+        assert!(farthest(&attached, &carried) < 1e-6, "frame {frame}: {}", farthest(&attached, &carried));
+        before = now;
+    }
+    assert!(before.iter().any(|pose| pose.rotation.angle() > 2.0));
+}
+
+#[test]
+fn inherited_motion_is_continuous_across_faces() {
+    // From root to root 1 mm, over 18 squares and their diagonals, while the skin twists by a quarter a metre.
+    let (rest, triangles) = twisted_strip(9, 0.0);
+    let roots: Vec<Vec3> = (0..3800).map(|k| [0.1 + 0.001 * k as f32, 0.0, -0.45 + 0.00023 * k as f32]).collect();
+    let binding = SkinBinding::to_closest(&rest, &triangles, &roots).unwrap();
+    let [from, to] = [rest, twisted_strip(9, 1.57).0].map(|skin| binding.poses(&skin));
+    let steps = RigidStep::all_between(&binding, &from, &to, 1.0);
+    let jump = steps.windows(2).map(|pair| (pair[1].change - pair[0].change).norm()).fold(0.0, f64::max);
+    // A millimetre of twist rotates by 1.6e-3 rad, which is √2 times that in the norm of the matrix. The frame of a
+    // face alone would jump by a sixth of a quarter.
+    assert!(jump < 3.0 * 1.57e-3 * 2.0_f64.sqrt(), "{jump}");
 }

@@ -1,9 +1,9 @@
-//! Sixteen curves side by side: a lane a curve, a slot a CV.
+//! Sixteen curves side by side: one lane for each curve, one state for each CV of a lane.
 //!
-//! A lane whose curve has ended repeats its last CV; nothing of it is written.
+//! A lane whose curve has ended repeats its last CV, of which nothing is written.
 
-use super::carry::Carry;
 use super::response::Response;
+use super::rigid_step::RigidStep;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::masked::Masked;
 use numerics::simd::kernel;
@@ -41,13 +41,13 @@ fn between(a: &Lanes<3>, b: &Lanes<3>) -> [F64x16; 3] {
     axes(|axis| F64x16::from_fn(|lane| f64::from(b[axis].0[lane]) - f64::from(a[axis].0[lane])))
 }
 
-/// One CV of each lane.
+/// The state of one CV of each lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slot {
+pub(super) struct CvState {
     /// From the target to where the CV is, metres.
     pub(super) offset: [F64x16; 3],
-    /// Velocity, metres a step.
-    pub(super) pace: [F64x16; 3],
+    /// Metres per step.
+    pub(super) velocity: [F64x16; 3],
     /// The target.
     pub(super) target: Lanes<3>,
 }
@@ -71,19 +71,19 @@ impl Responses {
 
 /// Up to sixteen curves.
 #[derive(Clone, Debug)]
-pub(super) struct Curves {
-    /// Which curve each lane is; of a lane without one, the last.
+pub(super) struct CurveLanes {
+    /// The curve of each lane; the last one for a lane without a curve.
     pub(super) curve: [u32; LANES],
     first: [u32; LANES],
     last: [u32; LANES],
-    /// CVs that are the lane's own: 0 where it has no curve.
+    /// CVs of each lane: 0 where it has no curve.
     count: [u32; LANES],
-    /// Most CVs of a curve.
+    /// CVs of the longest curve.
     pub(super) longest: usize,
 }
 
-impl Curves {
-    /// Of the curves from `first` on that `starts` has, at most sixteen.
+impl CurveLanes {
+    /// At most sixteen curves, from `first` on.
     pub(super) fn new(starts: &[u32], first: usize) -> Self {
         let end = (first + LANES).min(starts.len() - 1);
         let base = starts[first];
@@ -102,13 +102,13 @@ impl Curves {
         curves
     }
 
-    /// Which point is each lane's CV at `step`.
+    /// The point of each lane at CV `step`.
     #[inline(always)]
     pub(super) fn at(&self, step: usize) -> [usize; LANES] {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step as u32) as usize)
     }
 
-    /// Writes the lanes' own CVs to `out`, whose first point is `base`.
+    /// Writes the CVs that lanes have to `out`, whose first point is `base`.
     #[inline(always)]
     fn write(&self, step: usize, points: &Lanes<3>, base: usize, out: &mut [Vec3]) {
         for lane in 0..LANES {
@@ -130,90 +130,97 @@ impl Curves {
 }
 
 kernel! {
-    /// A step to `targets`, carried by what moves each curve, where something does.
-    pub(super) fn step_group(
-        curves: &Curves,
-        slots: &mut [Slot],
+    /// A step to `targets`, with the motion that each curve inherits, if any.
+    pub(super) fn step_lanes(
+        curves: &CurveLanes,
+        states: &mut [CvState],
         responses: &[Responses],
         targets: &[Vec3],
-        carries: Option<&[Carry]>,
+        carries: Option<&[RigidStep]>,
     ) -> () = step;
 }
 
 #[inline(always)]
-fn step(curves: &Curves, slots: &mut [Slot], responses: &[Responses], targets: &[Vec3], carries: Option<&[Carry]>) {
-    let carried = carries.map(|carries| Carried::of(curves, carries));
-    for (step, (slot, responses)) in slots.iter_mut().zip(responses).enumerate() {
+fn step(
+    curves: &CurveLanes,
+    states: &mut [CvState],
+    responses: &[Responses],
+    targets: &[Vec3],
+    carries: Option<&[RigidStep]>,
+) {
+    let inherited = carries.map(|carries| InheritedMotion::of(curves, carries));
+    for (step, (state, responses)) in states.iter_mut().zip(responses).enumerate() {
         let now = curves.load(step, targets);
-        let mut way = [F64x16::ZERO; 3];
+        let mut displacement = [F64x16::ZERO; 3];
         for axis in 0..3 {
             for lane in 0..LANES {
-                way[axis].0[lane] = f64::from(now[axis].0[lane]) - f64::from(slot.target[axis].0[lane]);
+                displacement[axis].0[lane] = f64::from(now[axis].0[lane]) - f64::from(state.target[axis].0[lane]);
             }
         }
-        if let Some(carried) = &carried {
-            carried.carry(slot, &mut way);
+        if let Some(inherited) = &inherited {
+            inherited.carry(state, &mut displacement);
         }
         let [a, b, c, e, k, l] = &responses.numbers;
         for axis in 0..3 {
             for lane in 0..LANES {
-                let (offset, pace) = (slot.offset[axis].0[lane], slot.pace[axis].0[lane]);
-                let way = way[axis].0[lane];
-                slot.offset[axis].0[lane] = (a.0[lane] * offset + b.0[lane] * pace) + k.0[lane] * way;
-                slot.pace[axis].0[lane] = (c.0[lane] * offset + e.0[lane] * pace) + l.0[lane] * way;
+                let (offset, velocity) = (state.offset[axis].0[lane], state.velocity[axis].0[lane]);
+                let displacement = displacement[axis].0[lane];
+                state.offset[axis].0[lane] = (a.0[lane] * offset + b.0[lane] * velocity) + k.0[lane] * displacement;
+                state.velocity[axis].0[lane] = (c.0[lane] * offset + e.0[lane] * velocity) + l.0[lane] * displacement;
             }
         }
-        slot.target = now;
+        state.target = now;
     }
 }
 
-/// What carries sixteen curves.
-struct Carried {
+/// The motion that sixteen curves inherit.
+struct InheritedMotion {
     change: [[F64x16; 3]; 3],
     about: [F64x16; 3],
     shift: [F64x16; 3],
 }
 
-impl Carried {
+impl InheritedMotion {
     #[inline(always)]
-    fn of(curves: &Curves, carries: &[Carry]) -> Self {
+    fn of(curves: &CurveLanes, carries: &[RigidStep]) -> Self {
         let zero = [F64x16::ZERO; 3];
-        let mut carried = Self { change: [zero; 3], about: zero, shift: zero };
+        let mut inherited = Self { change: [zero; 3], about: zero, shift: zero };
         for lane in 0..LANES {
             let carry = &carries[curves.curve[lane] as usize];
             for row in 0..3 {
                 for column in 0..3 {
-                    carried.change[row][column].0[lane] = carry.change[row][column];
+                    inherited.change[row][column].0[lane] = carry.change[(row, column)];
                 }
-                carried.about[row].0[lane] = carry.about[row];
-                carried.shift[row].0[lane] = carry.shift[row];
+                inherited.about[row].0[lane] = carry.about[row];
+                inherited.shift[row].0[lane] = carry.shift[row];
             }
         }
-        carried
+        inherited
     }
 
-    /// Carries the state of a CV along, and takes out of its target's way what is the carrier's.
+    /// Moves the state of a CV along, and subtracts the inherited motion from the displacement of its target.
     #[inline(always)]
-    fn carry(&self, slot: &mut Slot, way: &mut [F64x16; 3]) {
+    fn carry(&self, state: &mut CvState, displacement: &mut [F64x16; 3]) {
         let mut from = [F64x16::ZERO; 3];
         for axis in 0..3 {
             for lane in 0..LANES {
-                from[axis].0[lane] = f64::from(slot.target[axis].0[lane]) - self.about[axis].0[lane];
+                from[axis].0[lane] = f64::from(state.target[axis].0[lane]) - self.about[axis].0[lane];
             }
         }
-        let (from, offset, pace) = (self.turned(&from), self.turned(&slot.offset), self.turned(&slot.pace));
+        let (from, offset, velocity) =
+            (self.rotated(&from), self.rotated(&state.offset), self.rotated(&state.velocity));
         for axis in 0..3 {
             for lane in 0..LANES {
-                way[axis].0[lane] -= from[axis].0[lane] + self.shift[axis].0[lane];
-                slot.offset[axis].0[lane] += offset[axis].0[lane];
-                slot.pace[axis].0[lane] += pace[axis].0[lane];
+                displacement[axis].0[lane] -= from[axis].0[lane] + self.shift[axis].0[lane];
+                state.offset[axis].0[lane] += offset[axis].0[lane];
+                state.velocity[axis].0[lane] += velocity[axis].0[lane];
             }
         }
     }
 
-    /// What the turn adds to a vector.
+    /// What the rotation adds to a vector.
     #[inline(always)]
-    fn turned(&self, v: &[F64x16; 3]) -> [F64x16; 3] {
+    fn rotated(&self, v: &[F64x16; 3]) -> [F64x16; 3] {
         let mut out = [F64x16::ZERO; 3];
         for axis in 0..3 {
             let [x, y, z] = &self.change[axis];
@@ -227,7 +234,7 @@ impl Carried {
 
 /// How much of the offset is shown at a CV of each curve, 0..1.
 #[inline(always)]
-fn shown_at(blend: &Masked<'_, f32>, curves: &Curves, step: usize) -> F64x16 {
+fn shown_at(blend: &Masked<'_, f32>, curves: &CurveLanes, step: usize) -> F64x16 {
     let Some(mask) = blend.mask else { return F64x16([f64::from(blend.value); LANES]) };
     let at = curves.at(step);
     F64x16::from_fn(|lane| {
@@ -240,9 +247,9 @@ fn shown_at(blend: &Masked<'_, f32>, curves: &Curves, step: usize) -> F64x16 {
 kernel! {
     /// Writes where the curves are, their segments as long as their targets', to `out`, whose first point is `base`.
     /// Gives the largest square of a distance from the target.
-    pub(super) fn shape_group(
-        curves: &Curves,
-        slots: &[Slot],
+    pub(super) fn shape_lanes(
+        curves: &CurveLanes,
+        states: &[CvState],
         blend: Masked<'_, f32>,
         base: usize,
         out: &mut [Vec3],
@@ -250,17 +257,17 @@ kernel! {
 }
 
 #[inline(always)]
-fn shape(curves: &Curves, slots: &[Slot], blend: Masked<'_, f32>, base: usize, out: &mut [Vec3]) -> f64 {
+fn shape(curves: &CurveLanes, states: &[CvState], blend: Masked<'_, f32>, base: usize, out: &mut [Vec3]) -> f64 {
     let mut farthest = F64x16::ZERO;
     let mut moved = [F64x16::ZERO; 3];
-    let Some(root) = slots.first() else { return 0.0 };
+    let Some(root) = states.first() else { return 0.0 };
     // The root's offset is 0.
     let (mut target, mut shown) = (&root.target, [F64x16::ZERO; 3]);
     curves.write(0, target, base, out);
-    for (step, slot) in slots.iter().enumerate().skip(1) {
+    for (step, state) in states.iter().enumerate().skip(1) {
         let shares = shown_at(&blend, curves, step);
-        let next = axes(|axis| F64x16::from_fn(|lane| slot.offset[axis].0[lane] * shares.0[lane]));
-        let rest = between(target, &slot.target);
+        let next = axes(|axis| F64x16::from_fn(|lane| state.offset[axis].0[lane] * shares.0[lane]));
+        let rest = between(target, &state.target);
         let swung =
             axes(|axis| F64x16::from_fn(|lane| rest[axis].0[lane] + (next[axis].0[lane] - shown[axis].0[lane])));
         let (long, now) = (squares(&rest), squares(&swung));
@@ -282,14 +289,14 @@ fn shape(curves: &Curves, slots: &[Slot], blend: Masked<'_, f32>, base: usize, o
         });
         let written = axes(|axis| {
             F32x16::from_fn(|lane| {
-                let (target, moved) = (slot.target[axis].0[lane], moved[axis].0[lane]);
+                let (target, moved) = (state.target[axis].0[lane], moved[axis].0[lane]);
                 let to = (f64::from(target) + moved) as f32;
                 // Not the sum where nothing moved: −0 + 0 would lose its sign.
                 if moved == 0.0 { target } else { to }
             })
         });
         curves.write(step, &written, base, out);
-        (target, shown) = (&slot.target, next);
+        (target, shown) = (&state.target, next);
     }
     farthest.0.into_iter().fold(0.0, f64::max)
 }

@@ -1,0 +1,332 @@
+//! The point of a skin that is closest to a root. This file is the only one that uses parry.
+//!
+//! parry's bounding volume hierarchy is searched nearest box first, and its triangle says where on a face the closest
+//! point lies. What parry leaves open is settled here, so that the answer depends on positions and faces alone, not on the
+//! shape of the hierarchy:
+//!
+//! * Corners are passed in the order of their coordinates. Faces that share an edge, and faces that lie on each other,
+//!   then give the same bits for the same closest point, whichever way round they are listed.
+//! * parry drops boxes and faces that are exactly as far as the best so far. Here they are visited, and of equally close
+//!   faces the one listed first is taken. A closest point is moved into its face's box if rounding put it outside, so a
+//!   box is never farther than what it contains.
+//!
+//! Promise: the same bits on any number of threads; no panic for any position. Coordinates are f32, and f64 holds fourth
+//! powers of their differences. Limit: faces without area are left out unless there are no others, faces with a corner
+//! that is not finite always.
+
+use crate::surface::SurfacePoint;
+use numerics::vector::{DVec3, to_f64};
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::shape::Triangle;
+use std::cell::Cell;
+
+/// Each box is grown by this share of its face's longest side: parry splits by volume, and a flat skin has none.
+const THICKENED: f64 = 1.0 / 16.0;
+
+/// The faces of a skin, to be searched.
+pub(super) struct ClosestFaces {
+    /// In the order in which they are listed.
+    faces: Vec<SortedFace>,
+    hierarchy: Bvh,
+}
+
+/// A triangle with its corners in the order of their coordinates.
+struct SortedFace {
+    /// Index in the list of triangles.
+    triangle: u32,
+    /// Which corner of the listed triangle each is.
+    slots: [u8; 3],
+    corners: Triangle,
+}
+
+/// The closest point so far.
+#[derive(Clone, Copy)]
+struct Candidate {
+    /// Distance squared.
+    square: f64,
+    /// Row of `faces`.
+    face: u32,
+    /// Of the sorted corners.
+    weights: [f64; 3],
+}
+
+impl ClosestFaces {
+    /// The faces among `triangles`, indices of `points` (metres), that a root can be bound to; `None` where there are none.
+    ///
+    /// # Panics
+    /// Where a corner is out of range.
+    pub(super) fn new(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Self> {
+        let sorted = |(triangle, corners): (usize, &[u32; 3])| {
+            let corners = corners.map(|corner| points[corner as usize]);
+            let finite = corners.as_flattened().iter().all(|x| x.is_finite());
+            finite.then(|| SortedFace::new(triangle as u32, corners))
+        };
+        let mut faces: Vec<SortedFace> = triangles.iter().enumerate().filter_map(sorted).collect();
+        if faces.iter().any(SortedFace::has_area) {
+            faces.retain(SortedFace::has_area);
+        }
+        let boxes: Vec<Aabb> = faces.iter().map(SortedFace::thickened_box).collect();
+        let hierarchy = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+        (!faces.is_empty()).then_some(Self { faces, hierarchy })
+    }
+
+    /// The closest point to each root; the first corner of the first face for a root that is not finite.
+    pub(super) fn find_each(&self, roots: &[[f32; 3]]) -> Vec<SurfacePoint> {
+        // Roots that follow each other are mostly near each other: where the last one was bound bounds the search.
+        let mut hint = 0;
+        let find = |root: &[f32; 3]| {
+            let found = self.find(*root, hint);
+            hint = found.face;
+            self.surface_point(found)
+        };
+        roots.iter().map(find).collect()
+    }
+
+    /// The closest point to `root`. Any face as `hint` gives the same result.
+    fn find(&self, root: [f32; 3], hint: u32) -> Candidate {
+        if !root.iter().all(|x| x.is_finite()) {
+            return Candidate { square: f64::INFINITY, face: 0, weights: [1.0, 0.0, 0.0] };
+        }
+        let root = parry(to_f64(root));
+        let best = Cell::new(self.faces[hint as usize].closest(hint, root));
+        // A box or face exactly as far as the best so far is visited, as it may hold a face listed before it.
+        let box_distance = |node: &BvhNode, _| square(outside(node, root)).next_down();
+        let face_distance = |face: u32, _| {
+            let found = self.faces[face as usize].closest(face, root);
+            let so_far = best.get();
+            if found.square < so_far.square || (found.square == so_far.square && face < so_far.face) {
+                best.set(found);
+            }
+            Some(found.square)
+        };
+        self.hierarchy.find_best(best.get().square, box_distance, face_distance);
+        best.get()
+    }
+
+    /// With the weights in the order of the listed triangle's corners.
+    fn surface_point(&self, Candidate { face, weights, .. }: Candidate) -> SurfacePoint {
+        let SortedFace { triangle, slots, .. } = self.faces[face as usize];
+        let mut listed = [0.0; 3];
+        for (slot, weight) in slots.into_iter().zip(weights) {
+            listed[usize::from(slot)] = weight;
+        }
+        SurfacePoint { triangle, weights: listed }
+    }
+}
+
+impl SortedFace {
+    fn new(triangle: u32, corners: [[f32; 3]; 3]) -> Self {
+        let mut slots = [0, 1, 2];
+        let order = |slot: u8| corners[usize::from(slot)].map(|x| x + 0.0);
+        slots.sort_by(|a, b| order(*a).partial_cmp(&order(*b)).unwrap_or(std::cmp::Ordering::Equal));
+        let [a, b, c] = slots.map(|slot| parry(to_f64(corners[usize::from(slot)])));
+        Self { triangle, slots, corners: Triangle::new(a, b, c) }
+    }
+
+    fn has_area(&self) -> bool {
+        square(self.corners.scaled_normal()) > 0.0
+    }
+
+    fn thickened_box(&self) -> Aabb {
+        let exact = self.corners.local_aabb();
+        let by = THICKENED * exact.extents().max_element();
+        Aabb::new(exact.mins - by, exact.maxs + by)
+    }
+
+    /// The closest point to `root`; `face` is the row of this face.
+    fn closest(&self, face: u32, root: Vector) -> Candidate {
+        let (projected, location) = self.corners.project_local_point_and_get_location(root, true);
+        let Triangle { a, b, c } = self.corners;
+        let point = projected.point.clamp(a.min(b).min(c), a.max(b).max(c));
+        let weights = location.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
+        Candidate { square: square(point - root), face, weights: proper(weights) }
+    }
+}
+
+/// Weights that rounding has brought below 0 or above 1, brought back.
+fn proper(weights: [f64; 3]) -> [f64; 3] {
+    if weights.iter().all(|weight| (0.0..=1.0).contains(weight)) {
+        return weights;
+    }
+    let clamped = weights.map(|weight| weight.clamp(0.0, 1.0));
+    let sum = clamped[0] + clamped[1] + clamped[2];
+    if sum > 0.0 { clamped.map(|weight| weight / sum) } else { [1.0, 0.0, 0.0] }
+}
+
+/// How far `p` is outside of a node's box, axis by axis.
+fn outside(node: &BvhNode, p: Vector) -> Vector {
+    (node.mins() - p).max(p - node.maxs()).max(Vector::ZERO)
+}
+
+fn square(v: Vector) -> f64 {
+    v.x * v.x + v.y * v.y + v.z * v.z
+}
+
+fn parry(v: DVec3) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use numerics::random::Key;
+    use numerics::shapes;
+
+    type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
+    fn sphere() -> Mesh {
+        let sphere = shapes::sphere([2.0; 3], 8);
+        (sphere.points.iter().map(|p| p.map(|x| x as f32)).collect(), sphere.triangles())
+    }
+
+    /// Triangles that have nothing to do with each other.
+    fn soup(count: u32) -> Mesh {
+        let points = (0..3 * u64::from(count)).map(|k| some_point(3, k, 1.0)).collect();
+        (points, (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect())
+    }
+
+    fn some_point(seed: u64, k: u64, size: f32) -> [f32; 3] {
+        [0, 1, 2].map(|axis| Key::new(seed).of(k).of(axis).between([-size, size]))
+    }
+
+    fn some_roots(count: u64) -> Vec<[f32; 3]> {
+        (0..count).map(|k| some_point(4, k, 2.0)).collect()
+    }
+
+    fn found((points, triangles): &Mesh, roots: &[[f32; 3]]) -> Vec<SurfacePoint> {
+        ClosestFaces::new(points, triangles).unwrap().find_each(roots)
+    }
+
+    /// Distance to a triangle: the least to its sides, or to its plane where the foot is inside.
+    fn distance(root: [f32; 3], corners: [[f32; 3]; 3]) -> f64 {
+        let [a, b, c] = corners.map(|corner| to_f64(corner) - to_f64(root));
+        let side = |a: DVec3, b: DVec3| {
+            let ab = b - a;
+            (a + ab * (-a.dot(&ab) / ab.norm_squared()).clamp(0.0, 1.0)).norm()
+        };
+        let sides = side(a, b).min(side(b, c)).min(side(c, a));
+        let normal = (b - a).cross(&(c - a));
+        let inside = [(a, b), (b, c), (c, a)].iter().all(|(a, b)| normal.dot(&a.cross(b)) >= 0.0);
+        if inside { sides.min(normal.dot(&a).abs() / normal.norm()) } else { sides }
+    }
+
+    #[test]
+    fn no_face_is_closer_than_the_one_found() {
+        for mesh in [sphere(), soup(200)] {
+            let roots = some_roots(300);
+            for (root, found) in roots.iter().zip(found(&mesh, &roots)) {
+                let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.0[corner as usize]);
+                let least = mesh.1.iter().map(|face| distance(*root, corners(face))).fold(f64::INFINITY, f64::min);
+                let away = (found.position(&mesh.0, &mesh.1) - to_f64(*root)).norm();
+                assert!((away - least).abs() < 1e-12, "{away} {least}");
+                assert!((found.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn closest_points_worked_out_by_hand() {
+        let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let roots = [[0.25, 0.25, 5.0], [0.5, -3.0, 1.0], [-1.0, -1.0, 0.0], [2.0, 2.0, 0.0]];
+        let expected = [[0.5, 0.25, 0.25], [0.5, 0.5, 0.0], [1.0, 0.0, 0.0], [0.0, 0.5, 0.5]];
+        for turn in 0..3 {
+            let face = [0, 1, 2].map(|k| (k + turn) % 3);
+            for (found, expected) in found(&(points.clone(), vec![face]), &roots).iter().zip(expected) {
+                assert_eq!(found.weights, face.map(|corner| expected[corner as usize]));
+            }
+        }
+    }
+
+    #[test]
+    fn of_equally_close_faces_the_one_listed_first_is_taken() {
+        // Two faces share the edge from 0 to 1; the root is off that edge, outside of both.
+        for k in 0..500 {
+            let [a, b, root] = [0, 1, 2].map(|which| some_point(10 + which, k, 1.0));
+            let (a64, b64) = (to_f64(a), to_f64(b));
+            let share = Key::new(20).of(k).f64();
+            let on = a64 + (b64 - a64) * share;
+            let outwards = to_f64(root) - on;
+            let outwards = outwards - (b64 - a64) * (outwards.dot(&(b64 - a64)) / (b64 - a64).norm_squared());
+            let across = (b64 - a64).cross(&outwards).normalize();
+            let behind = [1.0, -1.0].map(|side| numerics::vector::to_f32(on - outwards + across * side));
+            let points = vec![a, b, behind[0], behind[1]];
+            let root = numerics::vector::to_f32(on + outwards);
+            for (first, second) in [([0, 1, 2], [1, 0, 3]), ([2, 0, 1], [0, 1, 3]), ([0, 2, 1], [3, 0, 1])] {
+                let both = [(first, second), (second, first)].map(|(first, second)| {
+                    let mesh = (points.clone(), vec![first, second, first]);
+                    let found = found(&mesh, &[root])[0];
+                    assert_eq!(found.triangle, 0, "{k}");
+                    found.position(&mesh.0, &mesh.1)
+                });
+                assert!((both[0] - both[1]).norm() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn the_hint_and_the_order_of_roots_change_nothing() {
+        let mesh = sphere();
+        let faces = ClosestFaces::new(&mesh.0, &mesh.1).unwrap();
+        // The centre is about as far from all faces.
+        let mut roots = some_roots(60);
+        roots.push([0.0; 3]);
+        for root in roots {
+            let expected = faces.find(root, 0);
+            for hint in [1, 17, 100, faces.faces.len() as u32 - 1] {
+                let found = faces.find(root, hint);
+                assert_eq!(
+                    (found.face, found.square, found.weights),
+                    (expected.face, expected.square, expected.weights)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn faces_without_area_are_used_only_where_there_are_no_others() {
+        let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0; 3]];
+        assert_eq!(found(&(points.clone(), vec![[3, 3, 0], [0, 1, 2]]), &[[4.0; 3]])[0].triangle, 1);
+        let line = found(&(points.clone(), vec![[0, 1, 1], [0, 0, 1]]), &[[0.25, 3.0, 0.0]])[0];
+        assert_eq!((line.triangle, line.position(&points, &[[0, 1, 1]])), (0, DVec3::new(0.25, 0.0, 0.0)));
+        let dot = found(&(points.clone(), vec![[3, 3, 3]]), &[[0.0; 3]])[0];
+        assert_eq!(dot.position(&points, &[[3, 3, 3]]), DVec3::repeat(5.0));
+    }
+
+    #[test]
+    fn no_position_panics() {
+        let values = [0.0, -0.0, 1.0, 1e-45, -1e-38, 1e7, -1e7, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY];
+        let pick = |seed: u64, k: u64| {
+            [0, 1, 2].map(|axis| values[(Key::new(seed).of(k).of(axis).u64() % values.len() as u64) as usize])
+        };
+        for seed in 0..200 {
+            let points: Vec<[f32; 3]> = (0..12).map(|k| pick(seed, k)).collect();
+            let corner = |k: u64| (Key::new(seed + 1000).of(k).u64() % 12) as u32;
+            let triangles: Vec<[u32; 3]> = (0..20).map(|k| [0, 1, 2].map(|c| corner(3 * k + c))).collect();
+            let roots: Vec<[f32; 3]> = (0..20).map(|k| pick(seed + 2000, k)).collect();
+            let Some(faces) = ClosestFaces::new(&points, &triangles) else { continue };
+            for found in faces.find_each(&roots) {
+                assert!(found.weights.iter().all(|weight| (0.0..=1.0).contains(weight)), "{found:?}");
+            }
+        }
+        assert!(ClosestFaces::new(&[], &[]).is_none());
+        assert!(ClosestFaces::new(&[[f32::NAN; 3]], &[[0, 0, 0]]).is_none());
+    }
+
+    #[test]
+    fn ten_thousand_kilometres_away_a_face_is_found_to_the_rounding_of_its_corners() {
+        let (points, triangles) = sphere();
+        // Whole metres there, so that adding 1e7 is exact.
+        let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| (1000.0 * x).round())).collect();
+        let far: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x + 1e7)).collect();
+        let roots: Vec<[f32; 3]> = some_roots(200).iter().map(|p| p.map(|x| (1000.0 * x).round())).collect();
+        let far_roots: Vec<[f32; 3]> = roots.iter().map(|p| p.map(|x| x + 1e7)).collect();
+        let expected = found(&(points, triangles.clone()), &roots);
+        for (found, expected) in found(&(far, triangles), &far_roots).iter().zip(expected) {
+            assert_eq!(found.triangle, expected.triangle);
+            assert!((0..3).all(|k| (found.weights[k] - expected.weights[k]).abs() < 1e-9));
+        }
+    }
+}

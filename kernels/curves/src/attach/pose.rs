@@ -1,0 +1,127 @@
+//! Curves moved by the poses of their roots.
+
+use nalgebra::Quaternion;
+use numerics::vector::{DQuat, DVec3, to_f32, to_f64};
+
+/// How a root has moved and rotated with its skin since rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RootPose {
+    /// Its position now less that at rest, metres.
+    pub translation: DVec3,
+    /// The rotation about it.
+    pub rotation: DQuat,
+    /// Whether the skin there has lost its directions (scaled to a line or a point): then `rotation` is the identity.
+    pub lost: bool,
+}
+
+/// Curves that have followed their roots, and how well their lengths are kept.
+#[must_use]
+#[derive(Clone, Debug, PartialEq)]
+pub struct AttachedCurves {
+    /// One point for every incoming one, metres.
+    pub points: Vec<[f32; 3]>,
+    /// Largest change of a segment's length ÷ its curve's length, as written.
+    pub length_error: f64,
+}
+
+/// Points that a task has at least.
+const TASK: usize = 2048;
+
+/// Rotates curves `points[starts[i]..starts[i + 1]]` about their roots (first points) and translates them, by one pose for
+/// each curve.
+///
+/// # Panics
+/// Where `starts` does not run from 0 to the number of points, or there are fewer poses than curves.
+pub fn attach_curves(starts: &[u32], points: &[[f32; 3]], poses: &[RootPose]) -> AttachedCurves {
+    let mut out = vec![[0.0; 3]; points.len()];
+    let length_error = each_curve(starts, poses, &mut out, points, &|pose, now, rest| {
+        let Some(root) = rest.first().map(|root| to_f64(*root)) else { return 0.0 };
+        for (now, rest) in now.iter_mut().zip(rest) {
+            let rest = to_f64(*rest);
+            let arm = rest - root;
+            // A sum of displacements: a skin that has not moved keeps the bits.
+            *now = to_f32(rest + (pose.translation + (pose.rotation * arm - arm)));
+        }
+        relative_stretch(now, rest)
+    });
+    AttachedCurves { points: out, length_error }
+}
+
+/// Largest change of a segment's length ÷ the length of the rest curve; 0 where that is 0.
+fn relative_stretch(now: &[[f32; 3]], rest: &[[f32; 3]]) -> f64 {
+    let segment = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
+    let (mut whole, mut largest) = (0.0, 0.0_f64);
+    for (now, rest) in now.windows(2).zip(rest.windows(2)) {
+        let length = segment(rest);
+        whole += length;
+        largest = largest.max((segment(now) - length).abs());
+    }
+    if whole > 0.0 { largest / whole } else { 0.0 }
+}
+
+/// Rotates vectors, a row for each point (`starts` as for [`attach_curves`]).
+///
+/// # Panics
+/// As [`attach_curves`].
+pub fn rotate_vectors(starts: &[u32], rows: &mut [[f32; 3]], poses: &[RootPose]) {
+    each_row(starts, poses, rows, &|rotation, row| to_f32(rotation * to_f64(*row)));
+}
+
+/// Rotates orientations (quaternions x, y, z, w), a row for each point.
+///
+/// # Panics
+/// As [`attach_curves`].
+pub fn rotate_orientations(starts: &[u32], rows: &mut [[f32; 4]], poses: &[RootPose]) {
+    each_row(starts, poses, rows, &|rotation, row| rotate_orientation(rotation, *row));
+}
+
+/// `orientation` (x, y, z, w), then `rotation`.
+pub(crate) fn rotate_orientation(rotation: &DQuat, orientation: [f32; 4]) -> [f32; 4] {
+    let [x, y, z, w] = orientation.map(f64::from);
+    (rotation.quaternion() * Quaternion::new(w, x, y, z)).coords.map(|x| x as f32).into()
+}
+
+fn each_row<T: Copy + Send + Sync>(
+    starts: &[u32],
+    poses: &[RootPose],
+    rows: &mut [T],
+    rotate: &(impl Fn(&DQuat, &T) -> T + Sync),
+) {
+    let rest = rows.to_vec();
+    each_curve(starts, poses, rows, &rest, &|pose, now, rest| {
+        now.iter_mut().zip(rest).for_each(|(now, rest)| *now = rotate(&pose.rotation, rest));
+        0.0
+    });
+}
+
+/// Calls `each` with the pose of every curve and its rows of `out` and `rest`; returns the largest result. Splits the
+/// curves in halves until a task is small.
+fn each_curve<T: Send + Sync>(
+    starts: &[u32],
+    poses: &[RootPose],
+    out: &mut [T],
+    rest: &[T],
+    each: &(impl Fn(&RootPose, &mut [T], &[T]) -> f64 + Sync),
+) -> f64 {
+    let curves = starts.len().saturating_sub(1);
+    let from = |curve: usize| (starts[curve] - starts[0]) as usize;
+    if curves < 2 || rest.len() < TASK {
+        let mut largest = 0.0_f64;
+        let mut left = out;
+        for curve in 0..curves {
+            let (mine, after) = left.split_at_mut(from(curve + 1) - from(curve));
+            largest = largest.max(each(&poses[curve], mine, &rest[from(curve)..from(curve + 1)]));
+            left = after;
+        }
+        return largest;
+    }
+    let middle = curves / 2;
+    let (out_left, out_right) = out.split_at_mut(from(middle));
+    let (rest_left, rest_right) = rest.split_at(from(middle));
+    let (poses_left, poses_right) = poses.split_at(middle);
+    let (left, right) = rayon::join(
+        || each_curve(&starts[..=middle], poses_left, out_left, rest_left, each),
+        || each_curve(&starts[middle..], poses_right, out_right, rest_right, each),
+    );
+    left.max(right)
+}

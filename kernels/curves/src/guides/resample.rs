@@ -1,0 +1,133 @@
+//! Guides cut into as many segments as a hair has.
+
+use numerics::vector::{DVec3, to_f64};
+use rayon::prelude::*;
+
+/// Guides with as many segments as a hair has. A guide with as many CVs keeps its own; any other is cut evenly along its
+/// length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResampledGuides {
+    segments: usize,
+    pieces: Vec<GuideSegment>,
+    samples: Vec<GuideSample>,
+}
+
+/// A segment of a guide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GuideSegment {
+    /// From end to end, metres.
+    pub(super) chord: DVec3,
+    /// Along the guide, metres.
+    pub(super) length: f64,
+}
+
+/// Where on a guide a hair's CV is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GuideSample {
+    /// The CV before, as a row of the guides' points.
+    pub(super) before: u32,
+    /// The CV after.
+    pub(super) after: u32,
+    /// 0 at the one before, 1 at the one after.
+    pub(super) fraction: f32,
+}
+
+impl ResampledGuides {
+    /// Cuts guides `points[starts[i]..starts[i + 1]]` to `cvs` (1 or more) CVs.
+    ///
+    /// # Panics
+    /// Where `starts` does not run from 0 to the number of points.
+    pub fn new(starts: &[u32], points: &[[f32; 3]], cvs: usize) -> Self {
+        let segments = cvs.saturating_sub(1);
+        let guides = starts.len().saturating_sub(1);
+        let mut samples = vec![GuideSample { before: 0, after: 0, fraction: 0.0 }; guides * cvs];
+        let mut pieces = vec![GuideSegment { chord: DVec3::zeros(), length: 0.0 }; guides * segments];
+        samples.par_chunks_mut(cvs).enumerate().for_each(|(guide, samples)| {
+            cut(starts[guide], &points[starts[guide] as usize..starts[guide + 1] as usize], samples);
+        });
+        if segments > 0 {
+            let both = pieces.par_chunks_mut(segments).zip(samples.par_chunks(cvs));
+            both.for_each(|(pieces, samples)| measure(points, samples, pieces));
+        }
+        Self { segments, pieces, samples }
+    }
+
+    /// Segments of a hair.
+    pub fn segments(&self) -> usize {
+        self.segments
+    }
+
+    pub(super) fn pieces(&self, guide: usize) -> &[GuideSegment] {
+        &self.pieces[guide * self.segments..(guide + 1) * self.segments]
+    }
+
+    pub(super) fn samples(&self, guide: usize) -> &[GuideSample] {
+        &self.samples[guide * (self.segments + 1)..(guide + 1) * (self.segments + 1)]
+    }
+
+    /// With the chords of each guide mapped.
+    pub(super) fn with_chords(mut self, map: impl Fn(usize, DVec3) -> DVec3 + Sync) -> Self {
+        if self.segments > 0 {
+            self.pieces.par_chunks_mut(self.segments).enumerate().for_each(|(guide, pieces)| {
+                pieces.iter_mut().for_each(|piece| piece.chord = map(guide, piece.chord));
+            });
+        }
+        self
+    }
+}
+
+/// Where the CVs of a hair are on a guide whose first CV is row `start`.
+fn cut(start: u32, points: &[[f32; 3]], samples: &mut [GuideSample]) {
+    let last = points.len() - 1;
+    if points.len() == samples.len() {
+        for (k, sample) in samples.iter_mut().enumerate() {
+            *sample = GuideSample { before: start + k as u32, after: start + k as u32, fraction: 0.0 };
+        }
+        return;
+    }
+    let segment = |k: usize| (to_f64(points[k + 1]) - to_f64(points[k])).norm();
+    let whole: f64 = (0..last).map(segment).sum();
+    let steps = (samples.len() - 1).max(1) as f64;
+    let (mut k, mut passed) = (0, 0.0);
+    let mut here = if last > 0 { segment(0) } else { 0.0 };
+    for (step, sample) in samples.iter_mut().enumerate() {
+        let target = whole * (step as f64 / steps);
+        while k + 1 < last && passed + here < target {
+            passed += here;
+            k += 1;
+            here = segment(k);
+        }
+        let fraction = if here > 0.0 { ((target - passed) / here).clamp(0.0, 1.0) } else { 0.0 };
+        let after = (k + 1).min(last) as u32;
+        *sample = GuideSample { before: start + k as u32, after: start + after, fraction: fraction as f32 };
+    }
+    // Exactly the tip, whatever rounding the sum has.
+    if let [_, .., tip] = samples {
+        *tip = GuideSample { before: start + last as u32, after: start + last as u32, fraction: 0.0 };
+    }
+}
+
+/// The segments between `samples`.
+fn measure(points: &[[f32; 3]], samples: &[GuideSample], pieces: &mut [GuideSegment]) {
+    let at = |sample: &GuideSample| {
+        let (before, after) = (to_f64(points[sample.before as usize]), to_f64(points[sample.after as usize]));
+        before + (after - before) * f64::from(sample.fraction)
+    };
+    for (piece, ends) in pieces.iter_mut().zip(samples.windows(2)) {
+        piece.chord = at(&ends[1]) - at(&ends[0]);
+        piece.length = along(points, &ends[0], &ends[1], &at);
+    }
+}
+
+/// Length along a guide from one sample to another, metres.
+fn along(points: &[[f32; 3]], from: &GuideSample, to: &GuideSample, at: &impl Fn(&GuideSample) -> DVec3) -> f64 {
+    let between = from.before + 1..=to.before;
+    let mut here = at(from);
+    let mut sum = 0.0;
+    for cv in between {
+        let next = to_f64(points[cv as usize]);
+        sum += (next - here).norm();
+        here = next;
+    }
+    sum + (at(to) - here).norm()
+}
