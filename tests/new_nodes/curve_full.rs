@@ -29,7 +29,7 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Curve_Full",
     1,
-    "Moves the CVs of curves across their direction. Lengths are kept.",
+    "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.",
     Cook::Frame { cook, reads_clock: |params| params.get(AMOUNT).value != 0.0 },
 )
 .inputs(INPUTS)

@@ -19,15 +19,19 @@ metrics! { METRICS:
     LENGTH_ERROR = Metric::length_error();
 }
 
-pub(crate) static NODE: Node =
-    Node::new("Curve_Plain", 1, "Moves the CVs of curves across their direction. Lengths are kept.", Cook::Pure(cook))
-        .inputs(INPUTS)
-        .params(PARAMS)
-        .outputs(&[&OUT])
-        .reads(&[&P])
-        .writes(&[&P])
-        .metrics(METRICS)
-        .neutral(|params, _| (params.get(AMOUNT) == 0.0).then_some("`amount` is 0"));
+pub(crate) static NODE: Node = Node::new(
+    "Curve_Plain",
+    1,
+    "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.",
+    Cook::Pure(cook),
+)
+.inputs(INPUTS)
+.params(PARAMS)
+.outputs(&[&OUT])
+.reads(&[&P])
+.writes(&[&P])
+.metrics(METRICS)
+.neutral(|params, _| (params.get(AMOUNT) == 0.0).then_some("`amount` is 0"));
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);

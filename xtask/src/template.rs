@@ -80,7 +80,7 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "NODE_NAME",
     1,
-    "Moves the CVs of curves across their direction. Lengths are kept.",
+    "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.",
     Cook::Pure(cook), //? pure
     Cook::Frame { cook, reads_clock: |params| AMOUNT_VALUE != 0.0 }, //? frame
 )

@@ -143,7 +143,7 @@ fn what_is_no_lattice_is_refused() {
     let mut volume = Geometry::default();
     let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [1, 1, 1] };
     volume.put_volume(Volume::new(grid, vec![-0.25], [vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]).unwrap());
-    assert!(refused(deform(volume).set(OFFSETS, wide())).fact.starts_with("a volume cannot be bent"));
+    assert!(refused(deform(volume).set(OFFSETS, wide())).fact.starts_with("a volume cannot be deformed"));
 }
 
 #[test]
