@@ -41,7 +41,7 @@ fn dense_and_sparse_are_the_same_values_in_boxes_of_any_size() {
 fn memory_follows_the_blocks_and_not_the_box() {
     let field = SparseField::from_blocks([1 << 24; 3], FAR, [[1 << 20; 3]], |_, out| out[511] = -1.0).unwrap();
     assert_eq!(field.arrays().map(|(_, bytes)| bytes), [8, 2048]);
-    assert_eq!(field.nodes().filter(|(_, value)| *value < 0.0).next().unwrap().0, [(1 << 23) + 7; 3]);
+    assert_eq!(field.nodes().find(|(_, value)| *value < 0.0).unwrap().0, [(1 << 23) + 7; 3]);
     let mut dense = vec![FAR; 64 * 64 * 64];
     dense[0] = 1.0;
     dense[64 * 64 * 64 - 1] = 1.0;

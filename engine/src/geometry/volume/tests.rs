@@ -1,3 +1,5 @@
+use numerics::vector::length;
+
 use super::*;
 use crate::geometry::Geometry;
 
@@ -7,7 +9,7 @@ const UNIT: Grid = Grid { origin: [0.0; 3], cell: 1.0, size: [1; 3] };
 fn drop() -> Volume {
     let level_grid = Grid { origin: [-32.0; 3], cell: 1.0, size: [64; 3] };
     let velocity_grid = Grid { origin: [-32.0; 3], cell: 2.0, size: [32; 3] };
-    let distance = |node: [u32; 3]| node.iter().map(|i| (*i as f32 - 31.5).powi(2)).sum::<f32>().sqrt() - 5.0;
+    let distance = |node: [u32; 3]| length(node.map(|i| i as f32 - 31.5)) - 5.0;
     let every = |size: [u32; 3]| {
         let blocks = size.map(|n| n.div_ceil(8));
         (0..blocks[2]).flat_map(move |z| (0..blocks[1]).flat_map(move |y| (0..blocks[0]).map(move |x| [x, y, z])))
