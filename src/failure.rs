@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use engine::cook::CookError;
+use engine::error::CookError;
 use engine::error::ErrorKind;
 use engine::graph::{Fault, FaultClass};
 use signal_hook::consts::{SIGINT, SIGTERM};

@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 use numerics::ramp::Interpolation;
 
-use engine::cook::{CookError, Delivered, Engine, Report, Settings};
-use engine::error::Error;
+use engine::cook::{Delivered, Engine, Report, Settings};
+use engine::error::{CookError, Error};
 use engine::geometry::{Component, Geometry, Kind};
 use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Places, Scene};
 use engine::node::{Input, Node};

@@ -1,6 +1,7 @@
 //! Errors of nodes: the fact alone. The engine adds node and frame, the program the rest.
 
-use crate::geometry::GeometryError;
+use crate::geometry::{GeometryError, Name};
+use crate::time::Frame;
 
 /// What kind of trouble a node met; the program's exit code follows from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +74,20 @@ impl From<GeometryError> for Error {
     fn from(error: GeometryError) -> Self {
         Self::refused(error.to_string())
     }
+}
+
+/// Why a node could not cook.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{node}` ({type_name}) at frame {frame}: {error}")]
+pub struct CookError {
+    /// Which node.
+    pub node: Name,
+    /// Its type.
+    pub type_name: &'static str,
+    /// At which frame.
+    pub frame: Frame,
+    /// What went wrong.
+    pub error: Error,
 }
 
 /// What a node returns.

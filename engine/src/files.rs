@@ -97,6 +97,21 @@ impl Files {
     }
 }
 
+/// `path` with each run of `#` in its file name replaced by the frame number, as many digits at least.
+pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut numbered = String::new();
+    let mut rest = name.as_str();
+    while let Some(at) = rest.find('#') {
+        let width = rest[at..].bytes().take_while(|byte| *byte == b'#').count();
+        let sign = if frame < 0 { "-" } else { "" };
+        numbered.push_str(&rest[..at]);
+        numbered.push_str(&format!("{sign}{:0width$}", frame.unsigned_abs()));
+        rest = &rest[at + width..];
+    }
+    path.with_file_name(numbered + rest)
+}
+
 /// Whether that is what the program was started with, such as `/dev/stdin` and `/dev/fd/3`: it is in no folder of its own.
 pub fn is_handed_over(path: &Path) -> bool {
     path == Path::new("/dev/stdin") || path.starts_with("/dev/fd")
@@ -133,6 +148,14 @@ pub fn unreadable(path: &Path, error: &std::io::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_run_of_hashes_becomes_the_frame_number() {
+        let path = |text: &str, frame| numbered_path(Path::new(text), frame).display().to_string();
+        assert_eq!(path("in/fur.####.obj", 7), "in/fur.0007.obj");
+        assert_eq!(path("fur_##.obj", 123), "fur_123.obj");
+        assert_eq!(path("fur.####.obj", -3), "fur.-0003.obj");
+    }
 
     #[test]
     fn a_file_that_changes_after_it_was_hashed_is_refused() {

@@ -13,6 +13,9 @@ pub mod param;
 pub mod plan;
 pub mod time;
 
+#[cfg(test)]
+mod structure;
+
 pub use error::{Error, ErrorKind, Result};
 
 /// What a node file needs.

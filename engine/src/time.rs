@@ -29,11 +29,6 @@ impl Frame {
         Self(frame * Self::TICKS)
     }
 
-    /// The sample `ticks` ticks after frame 0.
-    pub const fn from_ticks(ticks: i64) -> Self {
-        Self(ticks)
-    }
-
     /// Ticks since frame 0.
     pub const fn ticks(self) -> i64 {
         self.0

@@ -43,8 +43,9 @@ impl<'a> Call<'a> {
         Ok((result, Finished { cx: cx.cx }))
     }
 
-    /// The same for a step of a chain from `previous`.
-    pub(crate) fn step(self, previous: Frame, work: impl FnOnce(&StepCx<'a>) -> Result<()>) -> Result<Finished<'a>> {
+    /// The same for a step of a chain from the frame before.
+    pub(crate) fn step(self, work: impl FnOnce(&StepCx<'a>) -> Result<()>) -> Result<Finished<'a>> {
+        let previous = self.frame.plus(-1);
         let cx = StepCx { cx: self.context()?, previous };
         guarded(|| work(&cx))?;
         Ok(Finished { cx: cx.cx.cx })

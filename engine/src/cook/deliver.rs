@@ -2,28 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::{CURVE_ID, Component, Geometry, ID, Name, Owner, P, V};
-use crate::graph::{GraphOutput, Scene};
-use crate::node::Node;
-use crate::time::Frame;
+use crate::graph::GraphOutput;
 
-/// Half a frame.
-const HALF: i64 = Frame::TICKS / 2;
-
-/// The two times whose difference is an output's velocity at `frame`; one-sided at the scene's ends.
-pub(super) fn velocity_samples(scene: &Scene, frame: Frame) -> [Frame; 2] {
-    let before = if frame == scene.start() { frame } else { frame.plus_ticks(-HALF) };
-    let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(HALF) };
-    [before, after]
-}
-
-/// Whether the velocities of `output` are differences, not the node's own.
-pub(super) fn differs(output: &GraphOutput, node: Option<&Node>, has_solver: bool) -> bool {
-    let own = node.is_some_and(|node| node.writes.iter().any(|attribute| attribute.spec().0 == V.name));
-    output.v && !own && !has_solver
-}
-
-/// What an output delivers of `geometry`; `around` are the results at [`velocity_samples`], with their distance in
-/// seconds, where velocities are differences.
+/// What an output delivers of `geometry`; `around` are the results before and after with the seconds between
+/// them, where velocities are differences.
 pub(super) fn finish(
     output: &GraphOutput,
     geometry: &Geometry,

@@ -5,47 +5,32 @@
 //! there is nothing to lock or to wait for, a result is dropped once its last reader in the slice is done, and time spent
 //! between two nodes is that node's own. Windows and solvers are chains: states that move along with the sweep.
 
-mod between;
 mod call;
 mod deliver;
 mod disk;
-mod history;
+mod interpolate;
 mod report;
 mod store;
 mod sweep;
 mod verify;
 mod warnings;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use disk::DiskCache;
-pub(crate) use history::{gauss_points, history_start};
 pub use report::{NodeReport, Report};
 
-use crate::error::Error;
+use crate::error::CookError;
 use crate::files::Files;
-use crate::geometry::{Geometry, Name};
+use crate::geometry::Geometry;
 use crate::graph::Graph;
 use crate::key::Key;
 use crate::plan::{Plan, Request};
 use crate::time::Frame;
 use store::Store;
-
-/// Why a node could not cook.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{node}` ({type_name}) at frame {frame}: {error}")]
-pub struct CookError {
-    /// Which node.
-    pub node: Name,
-    /// Its type.
-    pub type_name: &'static str,
-    /// At which frame.
-    pub frame: Frame,
-    /// What went wrong.
-    pub error: Error,
-}
+use sweep::{Executor, Sweep};
 
 /// A finished frame of an output.
 #[derive(Clone, Debug)]
@@ -132,7 +117,7 @@ impl Engine {
         sink: &mut Sink<'_, E>,
     ) -> Result<Report, Stopped<E>> {
         let plan = self.plan(graph, request).map_err(Stopped::Asked)?;
-        self.pool.install(|| sweep::Sweep::new(self, &plan, disk, cancel, false).run(sink))
+        self.pool.install(|| Sweep::new(self, &plan, Executor::Cook, disk, cancel).run(sink))
     }
 
     /// Cooks a plan that the caller keeps. With `reload`, the state of every solver is serialised and read back after each
@@ -142,11 +127,8 @@ impl Engine {
     /// Where the sink refuses.
     pub fn cook_plan<E: Send>(&self, plan: &Plan, reload: bool, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
         let cancel = AtomicBool::new(false);
-        self.pool.install(|| {
-            let mut sweep = sweep::Sweep::new(self, plan, None, &cancel, false);
-            sweep.reload = reload;
-            sweep.run(sink)
-        })
+        let executor = if reload { Executor::Reload } else { Executor::Cook };
+        self.pool.install(|| Sweep::new(self, plan, executor, None, &cancel).run(sink))
     }
 
     /// What a cook would do, without cooking: how often each node would cook.
@@ -164,7 +146,7 @@ impl Engine {
             verified: Mutex::default(),
         };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
-        match sweep::Sweep::new(&fresh, &plan, None, &cancel, true).run(&mut nothing) {
+        match Sweep::new(&fresh, &plan, Executor::Rehearsal, None, &cancel).run(&mut nothing) {
             Ok(report) => Ok(report),
             Err(Stopped::Asked(error)) => Err(error),
             Err(Stopped::Sink(_)) => unreachable!("a rehearsal delivers nothing"),
@@ -192,22 +174,5 @@ impl Engine {
 
     fn store<T>(&self, work: impl FnOnce(&mut Store) -> T) -> T {
         work(&mut self.store.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-/// Names of what `frames` are, for messages: `1–48`, `3`, `1–4 and 10`.
-pub fn frames_text(frames: &BTreeSet<Frame>) -> String {
-    let mut runs: Vec<(Frame, Frame)> = Vec::new();
-    for frame in frames {
-        match runs.last_mut() {
-            Some((_, last)) if last.plus(1) == *frame => *last = *frame,
-            _ => runs.push((*frame, *frame)),
-        }
-    }
-    let text: Vec<String> = runs.iter().map(|(a, b)| if a == b { a.to_string() } else { format!("{a}–{b}") }).collect();
-    match text.as_slice() {
-        [] => "none".into(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }

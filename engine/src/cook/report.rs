@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::CookError;
+use crate::error::CookError;
 use crate::geometry::Name;
 use crate::node::LeftOut;
 use crate::plan::Window;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::sweep::Sweep;
-use super::{CookError, Delivered, Engine, Stopped};
-use crate::error::{Error, ErrorKind};
+use super::sweep::{Executor, Sweep};
+use super::{Delivered, Engine, Stopped};
+use crate::error::{CookError, Error, ErrorKind};
 use crate::files::unreadable;
 use crate::geometry::Name;
 use crate::graph::fault::code;
@@ -93,11 +93,7 @@ impl Engine {
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         let cancel = AtomicBool::new(false);
         let Ok(plan) = self.plan(&graph, &request) else { return Vec::new() };
-        let cooked = self.pool.install(|| {
-            let mut sweep = Sweep::new(self, &plan, None, &cancel, false);
-            sweep.verifying = true;
-            sweep.run(&mut nothing)
-        });
+        let cooked = self.pool.install(|| Sweep::new(self, &plan, Executor::Check, None, &cancel).run(&mut nothing));
         match cooked {
             Ok(report) => report.errors.into_iter().map(|(output, error, _)| (sources[output], error)).collect(),
             Err(Stopped::Asked(_) | Stopped::Sink(_)) => Vec::new(),

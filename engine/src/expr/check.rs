@@ -8,8 +8,7 @@ use super::ast::{Ast, COMPONENTS, Node, NodeId, Statement, Target};
 use super::code::Unary;
 use super::error::{ExprError, Place};
 use super::functions::{Does, Function};
-use super::lexer::shortened;
-use super::suggest::listed;
+use super::suggest::{listed, shortened};
 use crate::geometry::ColumnType;
 
 /// What is known of an attribute.

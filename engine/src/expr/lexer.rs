@@ -4,6 +4,7 @@
 //! Limit: names are ASCII; nothing here knows what a name means.
 
 use super::error::{ExprError, Place};
+use super::suggest::shortened;
 
 /// A piece of text with its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,16 +210,6 @@ fn name_length(text: &str) -> Option<usize> {
 /// Whether `text` is a name and nothing else.
 pub(super) fn is_name(text: &str) -> bool {
     name_length(text) == Some(text.len())
-}
-
-/// At most the first 24 characters, so that a message stays readable.
-pub(super) fn shortened(text: &str) -> String {
-    const SHOWN: usize = 24;
-    let mut shown: String = text.chars().take(SHOWN).collect();
-    if shown.len() < text.len() {
-        shown.push('…');
-    }
-    shown
 }
 
 #[cfg(test)]

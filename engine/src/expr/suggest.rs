@@ -6,7 +6,7 @@
 
 use std::cmp::Reverse;
 
-use super::lexer::shortened;
+use strsim::osa_distance;
 
 /// Longest name that is compared, in characters.
 const LONGEST: usize = 64;
@@ -18,19 +18,19 @@ const MOST: usize = 1000;
 /// neighbours are one edit.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = folded(name)?;
-    let allowed = (wanted.len() / 3).max(1);
+    let allowed = (wanted.length / 3).max(1);
     candidates
         .into_iter()
         .take(MOST)
         .filter_map(|candidate| {
             let known = folded(candidate)?;
             // One letter is within one edit of every other letter; that is no likeness.
-            let alike = wanted.len() > 1 || wanted == known;
-            if !alike || wanted.len().abs_diff(known.len()) > allowed {
+            let alike = wanted.length > 1 || wanted == known;
+            if !alike || wanted.length.abs_diff(known.length) > allowed {
                 return None;
             }
-            let edits = distance(&wanted, &known);
-            let start = wanted.iter().zip(&known).take_while(|(a, b)| a == b).count();
+            let edits = osa_distance(&wanted.text, &known.text);
+            let start = wanted.text.chars().zip(known.text.chars()).take_while(|(a, b)| a == b).count();
             (edits <= allowed).then_some((edits, Reverse(start), candidate))
         })
         .min_by_key(|(edits, start, _)| (*edits, *start))
@@ -44,29 +44,27 @@ pub(super) fn listed(names: &[&str]) -> Option<String> {
     (1..=LISTED).contains(&names.len()).then(|| format!("`{}`", names.join("`, `")))
 }
 
-fn folded(name: &str) -> Option<Vec<char>> {
-    let characters: Vec<char> = name.chars().take(LONGEST + 1).flat_map(char::to_lowercase).collect();
-    (1..=LONGEST).contains(&characters.len()).then_some(characters)
+/// A name in lower case, and its length in characters.
+#[derive(PartialEq)]
+struct Folded {
+    text: String,
+    length: usize,
 }
 
-/// Optimal string alignment: insertions, deletions, replacements and swaps of neighbours.
-fn distance(a: &[char], b: &[char]) -> usize {
-    let mut before = vec![0; b.len() + 1];
-    let mut last: Vec<usize> = (0..=b.len()).collect();
-    let mut row = before.clone();
-    for i in 1..=a.len() {
-        row[0] = i;
-        for j in 1..=b.len() {
-            let replaced = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
-            row[j] = replaced.min(last[j] + 1).min(row[j - 1] + 1);
-            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                row[j] = row[j].min(before[j - 2] + 1);
-            }
-        }
-        std::mem::swap(&mut before, &mut last);
-        std::mem::swap(&mut last, &mut row);
+fn folded(name: &str) -> Option<Folded> {
+    let text: String = name.chars().take(LONGEST + 1).flat_map(char::to_lowercase).collect();
+    let length = text.chars().count();
+    (1..=LONGEST).contains(&length).then_some(Folded { text, length })
+}
+
+/// At most the first 24 characters, so that a message stays readable.
+pub(super) fn shortened(text: &str) -> String {
+    const SHOWN: usize = 24;
+    let mut shown: String = text.chars().take(SHOWN).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
     }
-    last[b.len()]
+    shown
 }
 
 #[cfg(test)]
@@ -82,6 +80,8 @@ mod tests {
         assert_eq!(nearest("tiem", known), Some("time"));
         assert_eq!(nearest("Curve_Win", ["Curve_In", "Curve_Wind"]), Some("Curve_Wind"));
         assert_eq!(nearest("smothstp", known), Some("smoothstep"));
+        assert_eq!(nearest("kitten", ["sitting"]), None, "three edits");
+        assert_eq!(nearest("ÉCLAT", ["éclta"]), Some("éclta"), "a swap is one edit, case none");
     }
 
     #[test]
@@ -98,14 +98,5 @@ mod tests {
         let far = std::iter::repeat_n("zebra", 999);
         assert_eq!(nearest("tiem", far.clone().chain(["time"])), Some("time"));
         assert_eq!(nearest("tiem", far.chain(["zebra", "time"])), None);
-    }
-
-    #[test]
-    fn distances_worked_by_hand() {
-        let edits = |a: &str, b: &str| distance(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>());
-        assert_eq!(edits("kitten", "sitting"), 3);
-        assert_eq!(edits("ab", "ba"), 1);
-        assert_eq!(edits("", "abc"), 3);
-        assert_eq!(edits("same", "same"), 0);
     }
 }

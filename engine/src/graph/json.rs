@@ -306,7 +306,20 @@ pub(super) fn find<'e, 'a>(entries: &'e [Entry<'a>], name: &str) -> Option<&'e E
     entries.iter().find(|entry| entry.name == name)
 }
 
-/// Keeps what was read, puts away what was wrong.
+/// The index of a text among `words`; `what` says what they are in the fault of a text that is not among them.
+pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize, Fault> {
+    let listed = || words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
+    let Some(word) = json.string() else { return Err(json.unexpected(&format!("one of {}", listed()))) };
+    words.iter().position(|known| *known == word).ok_or_else(|| {
+        let fault = json.fault(code::UNKNOWN_WORD, format!("there is no {what} \"{}\"", shown(word)));
+        match nearest(word, words.iter().copied()) {
+            Some(near) => fault.hint(format!("did you mean \"{near}\"?")),
+            None => fault.hint(format!("expected one of {}", listed())),
+        }
+    })
+}
+
+/// Keeps what was read, or records its fault.
 pub(super) fn keep<T>(read: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     read.map_err(|fault| faults.push(fault)).ok()
 }

@@ -1,6 +1,7 @@
 //! Graphs: nodes of a catalogue, wired and with their params set, and what is to come out.
 
 mod catalogue;
+mod dag;
 pub mod fault;
 mod json;
 mod load;
@@ -12,13 +13,14 @@ mod text;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::files::numbered_path;
 use crate::geometry::{Geometry, Kind, Name};
 use crate::node::{Carries, Node, Output};
 use crate::param::{Clock, ParamSpec, Source};
-use crate::plan::numbered_path;
 use crate::time::Frame;
 
 pub use catalogue::Catalogue;
+pub(crate) use dag::Dag;
 pub use fault::{Fault, FaultClass};
 pub use load::{FileProbe, probe};
 pub use places::{Part, Places};

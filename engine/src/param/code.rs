@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::source::{Clock, Source, control_numbers};
 use crate::expr::{ExprError, Program, Scope};
 use crate::geometry::Name;
 use crate::key::Hasher;
@@ -21,6 +20,11 @@ impl Code {
     pub fn new(text: &str) -> Self {
         let program = Program::parse(text, &Scope::default());
         Self { text: text.into(), program: Arc::new(program), numbers: Arc::from([]) }
+    }
+
+    /// A program of `text` that was parsed with controls in scope, and their numbers.
+    pub(super) fn with_controls(text: Name, program: Arc<Result<Program, Vec<ExprError>>>, numbers: Vec<f64>) -> Self {
+        Self { text, program, numbers: numbers.into() }
     }
 
     /// The text.
@@ -69,34 +73,5 @@ impl From<&str> for Code {
 impl std::fmt::Display for Code {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:?}", self.text)
-    }
-}
-
-/// Where code comes from: its program, and the controls it may read.
-#[derive(Clone, Debug)]
-pub struct CodeSource {
-    text: Name,
-    program: Arc<Result<Program, Vec<ExprError>>>,
-    controls: Arc<Vec<Source>>,
-}
-
-impl CodeSource {
-    /// The source of a text that was parsed with `controls` in scope.
-    pub(crate) fn new(text: &str, program: Program, controls: Arc<Vec<Source>>) -> Self {
-        Self { text: text.into(), program: Arc::new(Ok(program)), controls }
-    }
-
-    fn reads(&self, control: usize) -> bool {
-        self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
-    }
-
-    /// Whether a control that it reads is animated. Use of the clock by the code itself is for the node to declare.
-    pub(super) fn is_animated(&self) -> bool {
-        self.controls.iter().enumerate().any(|(place, control)| self.reads(place) && control.is_animated())
-    }
-
-    pub(super) fn at(&self, frame: f64, clock: Clock) -> Code {
-        let numbers = control_numbers(&self.controls, frame, clock, |control| self.reads(control));
-        Code { text: self.text.clone(), program: self.program.clone(), numbers: numbers.into() }
     }
 }

@@ -16,10 +16,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use choice::{Choice, ChoiceOption};
-pub use code::{Code, CodeSource};
+pub use code::Code;
 pub use handle::{Param, ParamDecl, ParamType, RampDefault};
 pub(crate) use source::mixed_seed;
-pub use source::{Clock, Keyframe, Keyframes, Source};
+pub use source::{Clock, CodeSource, Keyframe, Keyframes, Source};
 pub use spec::{Bounds, Facts, ParamSpec, Shape, Unset};
 pub use turn::euler_to_turn;
 pub use unit::Unit;

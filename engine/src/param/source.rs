@@ -6,11 +6,11 @@ use std::sync::Arc;
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 
-use super::code::CodeSource;
+use super::code::Code;
 use super::spec::Shape;
 use super::turn::{self, euler_to_turn};
 use super::value::Value;
-use crate::expr::{Env, Expr};
+use crate::expr::{Env, Expr, ExprError, Program};
 use crate::geometry::Name;
 
 /// What expressions can read of the scene.
@@ -211,6 +211,35 @@ fn blend(a: &Value, b: &Value, share: f64) -> Value {
                 .map_or_else(|_| Value::Ramp(a.clone()), |ramp| Value::Ramp(Arc::new(ramp)))
         }
         _ => a.clone(),
+    }
+}
+
+/// Where code comes from: its program, and the controls it may read.
+#[derive(Clone, Debug)]
+pub struct CodeSource {
+    text: Name,
+    program: Arc<Result<Program, Vec<ExprError>>>,
+    controls: Arc<Vec<Source>>,
+}
+
+impl CodeSource {
+    /// The source of a text that was parsed with `controls` in scope.
+    pub(crate) fn new(text: &str, program: Program, controls: Arc<Vec<Source>>) -> Self {
+        Self { text: text.into(), program: Arc::new(Ok(program)), controls }
+    }
+
+    fn reads(&self, control: usize) -> bool {
+        self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
+    }
+
+    /// Whether a control that it reads moves. The clock that the code itself reads is the node's to declare.
+    pub(super) fn is_animated(&self) -> bool {
+        self.controls.iter().enumerate().any(|(place, control)| self.reads(place) && control.is_animated())
+    }
+
+    pub(super) fn at(&self, frame: f64, clock: Clock) -> Code {
+        let numbers = control_numbers(&self.controls, frame, clock, |control| self.reads(control));
+        Code::with_controls(self.text.clone(), self.program.clone(), numbers)
     }
 }
 

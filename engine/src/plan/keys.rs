@@ -1,210 +1,172 @@
-//! Keys of results: a hash of exactly what a node reads, at the times at which it reads it.
+//! Keys of results: a hash of exactly what a node reads, at the frames at which it reads it.
 //!
-//! A chain's key at a frame hangs on its key at the frame before, so editing anything upstream invalidates its
-//! checkpoints by itself, and editing a key frame invalidates only what comes after it.
+//! The key of a chain's state includes the key of the previous frame's state: editing anything upstream invalidates its
+//! checkpoints, and editing a key frame invalidates only what comes after it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Plan;
-use crate::cook::{CookError, gauss_points, history_start};
-use crate::error::Result;
-use crate::graph::{Body, Link};
+use super::history::{gauss_points, history_start};
+use super::segments::{Anchors, ChainSegment, LEAST_SPACING, Window, segment};
+use super::{Moment, Plan, Reads};
+use crate::error::{CookError, Result};
+use crate::graph::Body;
 use crate::key::{Hasher, Key};
-use crate::node::{Cook, Node, Past, Times};
+use crate::node::{Cook, Node};
 use crate::param::Params;
 use crate::time::Frame;
 
 /// What is known of a node at one frame before it cooks.
-pub(crate) struct Spot {
-    pub(crate) params: Option<Params>,
-    /// When each input is read.
-    pub(crate) times: Vec<Times>,
+pub(crate) struct ResolvedFrame<'g> {
+    pub(crate) reads: Reads<'g>,
     pub(crate) key: Key,
 }
 
-type Known = std::result::Result<Arc<Spot>, Arc<CookError>>;
+type Resolved<'g> = std::result::Result<Arc<ResolvedFrame<'g>>, Arc<CookError>>;
 type KeyOrError = std::result::Result<Key, Arc<CookError>>;
 
-/// Frames from an anchor to the next. At least as long as the window, so that two states at most run side by side and a
-/// frame costs two updates whatever the window's length.
-pub(crate) const LEAST_BLOCK: i64 = 8;
-
-/// One stretch of a chain: from where its state starts to the last frame it is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Stretch {
-    /// Where the state starts.
-    pub(crate) start: i64,
-    /// First frame it answers for.
-    pub(crate) from: i64,
-    /// First frame it does not answer for; `i64::MAX` for a solver.
-    pub(crate) until: i64,
+/// Keys known of one node.
+#[derive(Default)]
+struct NodeKeys<'g> {
+    /// By canonical frame.
+    frames: BTreeMap<Frame, Resolved<'g>>,
+    /// Of a chain's states: by segment, from its start on.
+    states: BTreeMap<ChainSegment, Vec<KeyOrError>>,
+    /// Of what its integrands were from frame 0 on, frame by frame.
+    history: Vec<Key>,
+    /// Of what its integrands were before frame 0.
+    before: Option<Key>,
+    anchors: Option<Anchors>,
 }
 
-/// How far back a window goes, and how often its state starts anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// Frames before an anchor at which the state starts, or would if the scene did not start later; at most, where that
-    /// changes with time.
-    pub frames: i64,
-    /// Frames from an anchor to the next.
-    pub every: i64,
-}
-
-/// Where a window's states start.
-struct Anchors {
-    window: Window,
-    /// Before this frame none starts.
-    earliest: i64,
-    /// By anchor: where its state starts.
-    starts: BTreeMap<i64, i64>,
-}
-
-/// Finds keys, and remembers those of the slice at hand.
+/// Finds keys, and remembers those of the current slice.
 pub(crate) struct Keys<'p, 'g> {
     plan: &'p Plan<'g>,
-    spots: Vec<BTreeMap<Frame, Known>>,
-    /// Keys of a chain's states: by stretch, from its start on.
-    chains: Vec<BTreeMap<Stretch, Vec<KeyOrError>>>,
-    /// Keys of what a node's integrands were: from time 0 on, frame by frame, and before it as a whole.
-    histories: Vec<Vec<Key>>,
-    before: Vec<Option<Key>>,
-    windows: Vec<Option<Anchors>>,
+    nodes: Vec<NodeKeys<'g>>,
     hasher: Hasher,
 }
 
+/// Frames that keys of segments are kept for after their end.
+const KEPT_FRAMES: i64 = 4 * LEAST_SPACING;
+
 impl<'p, 'g> Keys<'p, 'g> {
     pub(crate) fn new(plan: &'p Plan<'g>) -> Self {
-        let nodes = plan.graph.nodes.len();
-        Self {
-            plan,
-            spots: (0..nodes).map(|_| BTreeMap::new()).collect(),
-            chains: (0..nodes).map(|_| BTreeMap::new()).collect(),
-            histories: vec![Vec::new(); nodes],
-            before: vec![None; nodes],
-            windows: (0..nodes).map(|_| None).collect(),
-            hasher: Hasher::default(),
-        }
+        let nodes = plan.graph.nodes.iter().map(|_| NodeKeys::default()).collect();
+        Self { plan, nodes, hasher: Hasher::default() }
     }
 
-    /// Forgets what belongs to the slice; keys of chains and of nodes that stand still stay.
+    /// Forgets what belongs to the slice; keys of chains and of nodes that are the same at all frames stay.
     pub(crate) fn end_slice(&mut self) {
-        for (spots, planned) in self.spots.iter_mut().zip(&self.plan.nodes) {
+        for (keys, planned) in self.nodes.iter_mut().zip(&self.plan.nodes) {
             if planned.varies {
-                spots.clear();
+                keys.frames.clear();
             }
         }
     }
 
-    /// Forgets the stretches of windows that end before `frame`, which nothing asks for any more.
+    /// Forgets the segments of windows that end well before `frame`, which nothing asks for any more.
     pub(crate) fn forget_before(&mut self, frame: i64) {
-        for chains in &mut self.chains {
-            chains.retain(|stretch, _| stretch.until > frame - 4 * LEAST_BLOCK);
-        }
-        for anchors in self.windows.iter_mut().flatten() {
-            let every = anchors.window.every;
-            anchors.starts.retain(|from, _| from + every > frame - 4 * LEAST_BLOCK);
+        for keys in &mut self.nodes {
+            keys.states.retain(|segment, _| segment.until > frame - KEPT_FRAMES);
+            keys.anchors.iter_mut().for_each(|anchors| anchors.forget_before(frame - KEPT_FRAMES));
         }
     }
 
-    /// What is known of `node` at `frame` (canonical); for a chain at a whole frame, the key of its output.
-    pub(crate) fn spot(&mut self, node: usize, frame: Frame) -> Known {
-        if let Some(known) = self.spots[node].get(&frame) {
+    /// What is known of `node` at a canonical frame; for a window or solver, of its output.
+    ///
+    /// # Errors
+    /// Where a param of the node, or of anything it reads, is refused.
+    pub(crate) fn resolve(&mut self, node: usize, frame: Frame) -> Resolved<'g> {
+        if let Some(known) = self.nodes[node].frames.get(&frame) {
             return known.clone();
         }
-        let known = self.find(node, frame);
-        self.spots[node].insert(frame, known.clone());
-        known
+        let resolved = self.find(node, frame);
+        self.nodes[node].frames.insert(frame, resolved.clone());
+        resolved
     }
 
-    fn find(&mut self, node: usize, frame: Frame) -> Known {
+    fn find(&mut self, node: usize, frame: Frame) -> Resolved<'g> {
         let plan = self.plan;
-        let live = &plan.nodes[node].live;
-        let hash_live = |hasher: &mut Hasher| {
-            let names = live.as_deref().unwrap_or_default();
-            let hasher = hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
-            names.iter().fold(hasher, |hasher, name| hasher.text(name));
-        };
-        let (declared, links) = match &plan.graph.nodes[node].body {
+        let (reads, key) = match &plan.graph.nodes[node].body {
             Body::Given { moves, .. } => {
+                let reads = plan.reads(node, Moment::Frame(frame))?;
                 let hasher = self.hasher.tag(1).i64(plan.number as i64).i64(node as i64);
                 hasher.i64(if *moves { frame.ticks() } else { 0 });
-                hash_live(&mut self.hasher);
-                return Ok(Arc::new(Spot { params: None, times: Vec::new(), key: self.hasher.finish() }));
+                (reads, self.finish_with_live(node))
             }
-            Body::Node { node, inputs, .. } => (*node, inputs),
-        };
-        let fail = |error| Arc::new(plan.error(node, frame, error));
-        let params = plan.nodes[node].resolver.at(frame).map_err(fail)?;
-        let times: Vec<Times> = declared.inputs.iter().map(|input| (input.spec().times)(&params)).collect();
-        let key = if matches!(declared.cook, Cook::Pure(_) | Cook::Frame { .. }) {
-            let mut wires = Vec::new();
-            for (times, links) in times.iter().zip(links) {
-                for link in links {
-                    if times.now {
-                        wires.push((link.port, self.key_of(link.node, frame)?));
-                    }
-                    if times.start {
-                        wires.push((link.port, self.key_of(link.node, plan.graph.scene.start())?));
-                    }
+            Body::Node { node: declared, .. } if declared.cook.is_chain() => {
+                let reads = plan.reads(node, Moment::ChainOutput(frame))?;
+                // Between whole frames an output is made of its neighbours each way.
+                let mut states = Vec::new();
+                for whole in plan.output_frames(frame).all().iter().copied() {
+                    let segment = self.segment(node, whole)?;
+                    states.push(self.state_key(node, segment, whole.max(segment.start))?);
                 }
-                // Marks the end of a list, so that wires do not move from one input to the next unseen.
-                wires.push((usize::MAX, Key::default()));
+                let hasher = self.hasher.tag(3).i64(frame.ticks());
+                states.into_iter().fold(hasher, Hasher::key);
+                (reads, self.finish_with_live(node))
             }
-            let clock = match declared.cook {
-                Cook::Frame { reads_clock, .. } => {
-                    reads_clock(&params).then(|| self.clock_key(node, declared, frame)).transpose().map_err(fail)?
+            Body::Node { node: declared, .. } => {
+                let reads = plan.reads(node, Moment::Frame(frame))?;
+                let inputs = self.input_keys(&reads)?;
+                let clock = match declared.cook {
+                    Cook::Frame { reads_clock, .. } if reads_clock(&reads.params) => {
+                        Some(self.clock_key(node, declared, frame).map_err(|e| Arc::new(plan.error(node, frame, e)))?)
+                    }
+                    _ => None,
+                };
+                let hasher = self.hasher.tag(2);
+                hash_recipe(hasher, declared, &reads.params);
+                if let Some(clock) = clock {
+                    hasher.key(clock);
                 }
-                _ => None,
-            };
-            let hasher = self.hasher.tag(2);
-            hash_recipe(hasher, declared, &params);
-            if let Some(clock) = clock {
-                hasher.key(clock);
+                inputs.hash(hasher);
+                (reads, self.finish_with_live(node))
             }
-            for (port, key) in wires {
-                hasher.i64(port as i64).key(key);
-            }
-            hash_live(&mut self.hasher);
-            self.hasher.finish()
-        } else {
-            // Between frames a window's output hangs on its neighbours each way.
-            let mut states = Vec::new();
-            for near in plan.neighbours(frame) {
-                let stretch = self.stretch(node, near)?;
-                states.push(self.state_key(node, stretch, near.max(stretch.start))?);
-            }
-            let hasher = self.hasher.tag(3).i64(frame.ticks());
-            states.into_iter().fold(hasher, Hasher::key);
-            hash_live(&mut self.hasher);
-            self.hasher.finish()
         };
-        Ok(Arc::new(Spot { params: Some(params), times, key }))
+        Ok(Arc::new(ResolvedFrame { reads, key }))
     }
 
-    fn key_of(&mut self, node: usize, frame: Frame) -> KeyOrError {
-        self.spot(node, self.plan.canonical(node, frame)).map(|spot| spot.key)
+    /// Completes a key by the attributes that are used of the node's result.
+    fn finish_with_live(&mut self, node: usize) -> Key {
+        let live = &self.plan.nodes[node].live;
+        let names = live.as_deref().unwrap_or_default();
+        let hasher = self.hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
+        names.iter().fold(hasher, |hasher, name| hasher.text(name)).finish()
     }
 
-    /// The frame, the scene's clock and origin, and what the integrands have seen since time 0.
+    /// Keys of all results that are read.
+    fn input_keys(&mut self, reads: &Reads<'g>) -> std::result::Result<InputKeys, Arc<CookError>> {
+        let mut keys = Vec::new();
+        for input in &reads.inputs {
+            for read in input.results(self.plan) {
+                keys.push((read.port, self.resolve(read.node, read.frame)?.key));
+            }
+            // Marks the end of a list, so that a wire moved from one input to the next changes the key.
+            keys.push((usize::MAX, Key::default()));
+        }
+        Ok(InputKeys(keys))
+    }
+
+    /// A key of the frame, the scene's clock and origin, and the history of the node's integrands.
     fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let scene = &self.plan.graph.scene;
         let resolver = &self.plan.nodes[node].resolver;
         let animated = declared.integrands[0].is_some() && resolver.history_is_animated();
-        let seen = match animated {
+        let history = match animated {
             true => Some(self.history_key(node, declared, frame)?),
             false => None,
         };
         let hasher = self.hasher.tag(4).i64(frame.ticks()).f64(scene.fps);
         scene.origin.iter().fold(hasher, |hasher, x| hasher.f64(*x));
-        if let Some(seen) = seen {
-            self.hasher.key(seen);
+        if let Some(history) = history {
+            self.hasher.key(history);
         }
         Ok(self.hasher.finish())
     }
 
-    /// A key of the integrands' values at the Gauss points of all that [`crate::node::FrameCx::integrals`] may be asked at
-    /// `frame`: from the scene's start or time 0, whichever is earlier, to `frame`. Chained frame by frame.
+    /// A key of the integrands' values at the Gauss points of every integral that [`crate::node::FrameCx::integrals`] can
+    /// give at `frame`: from the scene's start or frame 0, whichever is earlier, to `frame`. Chained frame by frame.
     fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
         let resolver = &self.plan.nodes[node].resolver;
         let value = |at: f64| -> Result<Vec<f64>> {
@@ -217,9 +179,9 @@ impl<'p, 'g> Keys<'p, 'g> {
             }
             Ok(())
         };
-        // Of its own: an integrand that is refused midway must not leave half a recipe behind.
+        // A hasher of its own: params refused midway must not leave half a recipe in the shared one.
         let mut hasher = Hasher::default();
-        let before = match self.before[node] {
+        let before = match self.nodes[node].before {
             Some(before) => before,
             None => {
                 let since = history_start(&self.plan.graph.scene);
@@ -227,11 +189,11 @@ impl<'p, 'g> Keys<'p, 'g> {
                 for k in since..0 {
                     over(&mut hasher, (k + 1) as f64, k as f64)?;
                 }
-                *self.before[node].insert(hasher.finish())
+                *self.nodes[node].before.insert(hasher.finish())
             }
         };
         let whole = frame.floor_number().max(0) as usize;
-        let known = &mut self.histories[node];
+        let known = &mut self.nodes[node].history;
         if known.is_empty() {
             known.push(before);
         }
@@ -249,145 +211,67 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(hasher.finish())
     }
 
-    /// The stretch that answers for `frame` of a window or solver.
-    pub(crate) fn stretch(&mut self, node: usize, frame: i64) -> std::result::Result<Stretch, Arc<CookError>> {
-        let plan = self.plan;
-        let first = plan.graph.scene.first;
-        let resolver = &plan.nodes[node].resolver;
-        let at = |frame: i64| {
-            let frame = Frame::whole(frame);
-            resolver.at(frame).map_err(|error| Arc::new(plan.error(node, frame, error)))
-        };
-        match plan.graph.nodes[node].node().map(|declared| declared.cook) {
-            Some(Cook::Window(_, past)) => {
-                let clock = plan.graph.scene.clock();
-                let past = |frame: i64| at(frame).map(|params| past(&params, clock));
-                let anchors = match &mut self.windows[node] {
-                    Some(anchors) => anchors,
-                    none => {
-                        let Past { frames, preroll } = past(first)?;
-                        let frames = i64::from(frames);
-                        let window = Window { frames, every: frames.max(LEAST_BLOCK) };
-                        none.insert(Anchors { window, earliest: first - i64::from(preroll), starts: BTreeMap::new() })
-                    }
-                };
-                let every = anchors.window.every;
-                let from = first + (frame - first).max(0) / every * every;
-                let start = match anchors.starts.get(&from) {
-                    Some(start) => *start,
-                    None if !resolver.is_animated() => (from - anchors.window.frames).max(anchors.earliest),
-                    None => forgotten(from, anchors.earliest, |frame| past(frame).map(|past| past.frames))?,
-                };
-                anchors.starts.insert(from, start);
-                anchors.window.frames = anchors.window.frames.max(from - start);
-                let answers_from = if from == first { i64::MIN } else { from };
-                Ok(Stretch { start, from: answers_from, until: from + every })
-            }
-            Some(Cook::Solver(_, solver)) => {
-                let start = (solver.start_frame)(&at(first)?).unwrap_or(first);
-                Ok(Stretch { start, from: i64::MIN, until: i64::MAX })
-            }
-            _ => unreachable!("only windows and solvers have stretches"),
-        }
+    /// The segment that gives the output of a window or solver at `frame`.
+    ///
+    /// # Errors
+    /// Where a param is refused at a frame that decides where the state starts.
+    pub(crate) fn segment(&mut self, node: usize, frame: i64) -> std::result::Result<ChainSegment, Arc<CookError>> {
+        segment(self.plan, node, frame, &mut self.nodes[node].anchors)
     }
 
     /// How far back a window goes, once one of its frames was asked.
     pub(crate) fn window(&self, node: usize) -> Option<Window> {
-        self.windows[node].as_ref().map(|anchors| anchors.window)
+        self.nodes[node].anchors.as_ref().map(|anchors| anchors.window)
     }
 
-    /// The key of a chain's state at `frame`, which lies in the stretch.
-    pub(crate) fn state_key(&mut self, node: usize, stretch: Stretch, frame: i64) -> KeyOrError {
-        let index = (frame - stretch.start) as usize;
+    /// The key of a chain's state at `frame`, which lies in the segment.
+    ///
+    /// # Errors
+    /// Where a param is refused at that frame or an earlier one.
+    pub(crate) fn state_key(&mut self, node: usize, segment: ChainSegment, frame: i64) -> KeyOrError {
+        let index = (frame - segment.start) as usize;
         loop {
-            let known = self.chains[node].entry(stretch).or_default();
+            let known = self.nodes[node].states.entry(segment).or_default();
             if let Some(key) = known.get(index) {
                 return key.clone();
             }
-            let before = known.last().cloned();
-            let at = stretch.start + known.len() as i64;
-            let key = match before {
+            let at = segment.start + known.len() as i64;
+            let key = match known.last().cloned() {
                 Some(Err(error)) => Err(error),
-                Some(Ok(before)) => self.advance_key(node, at, Some(before)),
-                None => self.advance_key(node, at, None),
+                Some(Ok(before)) => self.next_state_key(node, at, Some(before)),
+                None => self.next_state_key(node, at, None),
             };
-            self.chains[node].entry(stretch).or_default().push(key);
+            self.nodes[node].states.entry(segment).or_default().push(key);
         }
     }
 
-    fn advance_key(&mut self, node: usize, frame: i64, before: Option<Key>) -> KeyOrError {
+    fn next_state_key(&mut self, node: usize, frame: i64, before: Option<Key>) -> KeyOrError {
         let plan = self.plan;
-        let at = Frame::whole(frame);
-        let Body::Node { node: declared, inputs, .. } = &plan.graph.nodes[node].body else {
-            unreachable!("given geometry is no chain")
-        };
-        let fail = |error| Arc::new(plan.error(node, at, error));
-        let params = plan.nodes[node].resolver.at(at).map_err(fail)?;
-        let mut wires = Vec::new();
-        for (input, links) in declared.inputs.iter().zip(inputs) {
-            let times = (input.spec().times)(&params);
-            for link in links {
-                if times.now {
-                    wires.push((link.port, self.key_of(link.node, at)?));
-                }
-                if times.start && before.is_none() {
-                    wires.push((link.port, self.key_of(link.node, plan.start_of(declared, at))?));
-                }
-                if times.steps > 0 {
-                    let samples = match before {
-                        Some(_) => plan.step_samples(links, times.steps, at),
-                        None => vec![at],
-                    };
-                    for sample in samples {
-                        wires.push((link.port, self.key_of(link.node, sample)?));
-                    }
-                }
-            }
-            wires.push((usize::MAX, Key::default()));
-        }
-        let clock = self.clock_key(node, declared, at).map_err(fail)?;
+        let moment = if before.is_some() { Moment::ChainStep(frame) } else { Moment::ChainStart(frame) };
+        let Some(declared) = plan.graph.nodes[node].node() else { unreachable!("given geometry has no state") };
+        let reads = plan.reads(node, moment)?;
+        let inputs = self.input_keys(&reads)?;
+        let clock = self.clock_key(node, declared, moment.frame());
+        let clock = clock.map_err(|error| Arc::new(plan.error(node, moment.frame(), error)))?;
         let hasher = self.hasher.tag(7);
         if let Some(before) = before {
             hasher.key(before);
         }
-        hash_recipe(hasher, declared, &params);
+        hash_recipe(hasher, declared, &reads.params);
         hasher.key(clock);
-        for (port, key) in wires {
-            hasher.i64(port as i64).key(key);
-        }
+        inputs.hash(hasher);
         Ok(self.hasher.finish())
     }
 }
 
-/// The latest frame not before `earliest` of which nothing is left at `from`, where the step to a frame forgets one part
-/// in `frames(frame)`.
-fn forgotten<E>(
-    from: i64,
-    earliest: i64,
-    frames: impl Fn(i64) -> std::result::Result<u32, E>,
-) -> std::result::Result<i64, E> {
-    // A sum of n parts of 1/n may miss 1 by its rounding.
-    const ALL: f64 = 1.0 - 1e-9;
-    let (mut start, mut share) = (from, 0.0);
-    while start > earliest && share < ALL {
-        let frames = frames(start)?;
-        if frames == 0 {
-            break;
-        }
-        share += 1.0 / f64::from(frames);
-        start -= 1;
-    }
-    Ok(start)
-}
+/// Keys of the results that a node reads, each with the output it comes from.
+struct InputKeys(Vec<(usize, Key)>);
 
-impl Plan<'_> {
-    /// The times at which a solver's step to `frame` samples an input, the frame before first. What a solver is part of
-    /// is known at whole frames only.
-    pub(crate) fn step_samples(&self, links: &[Link], steps: u8, frame: Frame) -> Vec<Frame> {
-        let whole = links.iter().any(|link| self.nodes[link.node].has_solver);
-        let steps = if whole { 1 } else { i64::from(steps) };
-        let before = frame.plus(-1);
-        (0..=steps).map(|k| before.plus_ticks(Frame::TICKS * k / steps)).collect()
+impl InputKeys {
+    fn hash(&self, hasher: &mut Hasher) {
+        for (port, key) in &self.0 {
+            hasher.i64(*port as i64).key(*key);
+        }
     }
 }
 

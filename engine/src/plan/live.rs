@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Planned, Request};
+use super::{PlannedNode, Request};
 use crate::geometry::{CURVE_ID, ID, Name, P, V};
 use crate::graph::{Body, Graph};
 use crate::node::AttrNames;
@@ -12,7 +12,7 @@ use crate::param::{Source, Value};
 type Taken = Option<BTreeSet<Name>>;
 
 /// Fills in `live` of every planned node, from the outputs upwards.
-pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [Planned]) {
+pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [PlannedNode]) {
     let mut taken: Vec<Taken> = vec![Some(BTreeSet::new()); graph.nodes.len()];
     for output in request.outputs.iter().map(|place| &graph.outputs[*place]) {
         let asked = output.attributes.as_ref().map(|names| {
@@ -39,7 +39,7 @@ fn add(taken: &mut Taken, more: Taken) {
 }
 
 /// What a node takes of its inputs, where `taken` is taken of its own result.
-fn reads(graph: &Graph, place: usize, planned: &Planned, taken: &Taken) -> Taken {
+fn reads(graph: &Graph, place: usize, planned: &PlannedNode, taken: &Taken) -> Taken {
     let Body::Node { node, params, .. } = &graph.nodes[place].body else { return Some(BTreeSet::new()) };
     let mut reads: BTreeSet<Name> = node.reads.iter().map(|attribute| attribute.spec().0.into()).collect();
     let mut writes: BTreeSet<Name> = node.writes.iter().map(|attribute| attribute.spec().0.into()).collect();

@@ -1,35 +1,41 @@
-//! Plans: what must be cooked for what is asked, found from declarations alone.
+//! Plans: what must be cooked for a request, found from declarations alone.
 //!
-//! A plan looks at a graph once: which nodes anything asked depends on, which of them stand still, which attributes
-//! anything downstream takes. What it finds is per node; frames are planned slice by slice while cooking, so a plan's
-//! memory does not grow with the number of frames.
+//! A plan looks at a graph once: which nodes the request depends on, which of them are the same at all frames, which
+//! attributes are used downstream. What it finds is per node; frames are planned slice by slice while cooking, so a
+//! plan's memory does not grow with the number of frames.
 
+mod history;
 mod keys;
 mod live;
+mod reads;
 mod resolve;
 mod result_keys;
+mod segments;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-pub use keys::Window;
-pub(crate) use keys::{Keys, Stretch};
-pub(crate) use resolve::{Resolver, numbered_path};
+pub(crate) use history::Integrals;
+pub(crate) use keys::{Keys, ResolvedFrame};
+pub(crate) use reads::{Moment, OutputFrames, Read, Reads};
+pub(crate) use resolve::Resolver;
 pub use result_keys::result_keys;
+pub(crate) use segments::ChainSegment;
+pub use segments::Window;
 
-use crate::cook::CookError;
-use crate::error::Error;
+use crate::error::{CookError, Error};
 use crate::files::Files;
 use crate::geometry::Name;
-use crate::graph::{Body, Graph, Link};
-use crate::node::{Cook, LeftOut, Node, Times, Wires};
+use crate::graph::{Body, Dag, Graph, GraphNode};
+use crate::node::{Cook, LeftOut, Wires};
 use crate::param::Params;
 use crate::time::Frame;
+use reads::read_spans;
 
 /// What is asked of a graph.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// Places in [`Graph::outputs`].
+    /// Indices in [`Graph::outputs`].
     pub outputs: Vec<usize>,
     /// Frames, in any order; each is cooked once.
     pub frames: Vec<Frame>,
@@ -44,22 +50,20 @@ impl Request {
 }
 
 /// What a plan knows of one node.
-pub(crate) struct Planned {
-    /// Whether anything asked depends on it.
+pub(crate) struct PlannedNode {
+    /// Whether the request depends on it.
     pub(crate) needed: bool,
     /// Whether its result may change with the frame.
     pub(crate) varies: bool,
-    /// Whether it is a solver or anything above it is: whole frames only, in order.
+    /// Whether it is a solver or depends on one: cooked at whole frames only, in order.
     pub(crate) has_solver: bool,
-    /// Whether equal keys may come again at a later frame: it varies by params and files alone.
+    /// Whether a later frame may have the same key: it varies by params and files alone.
     pub(crate) may_hold: bool,
-    /// Whether a reader asks for its result at the scene's start.
+    /// Whether a reader asks for its result at the scene's first frame.
     pub(crate) read_at_start: bool,
-    /// Attributes of its result that anything takes; `None`: all.
+    /// Attributes of its result that are used downstream; `None`: all.
     pub(crate) live: Option<Vec<Name>>,
-    /// Nodes that read it, each once.
-    pub(crate) readers: Vec<usize>,
-    /// Whether a window or solver depends on it, so that it is asked for frame after frame.
+    /// Whether a window or solver depends on it, which asks for every frame in turn.
     pub(crate) feeds_chain: bool,
     pub(crate) resolver: Resolver,
 }
@@ -68,9 +72,10 @@ pub(crate) struct Planned {
 pub struct Plan<'g> {
     pub(crate) graph: &'g Graph,
     pub(crate) request: Request,
-    pub(crate) nodes: Vec<Planned>,
+    pub(crate) nodes: Vec<PlannedNode>,
+    pub(crate) dag: Dag,
     pub(crate) files: Arc<Files>,
-    /// Tells plans of one process apart: geometry that a program gives is known by its place in one plan alone.
+    /// Distinguishes the plans of one process: given geometry has no recipe, so its key is its node in this plan.
     pub(crate) number: u64,
 }
 
@@ -78,89 +83,38 @@ impl<'g> Plan<'g> {
     /// Plans a request.
     ///
     /// # Errors
-    /// Where a sub-frame is asked of something that a solver is part of.
+    /// Where a sub-frame is asked of an output that depends on a solver.
     pub fn new(graph: &'g Graph, request: &Request, files: Arc<Files>) -> Result<Self, Arc<CookError>> {
         let mut request = request.clone();
         request.frames.sort_unstable();
         request.frames.dedup();
-        let needed = needed(graph, &request);
-        let mut nodes: Vec<Planned> = Vec::with_capacity(graph.nodes.len());
-        for (place, node) in graph.nodes.iter().enumerate() {
-            let above =
-                |test: &dyn Fn(&Planned) -> bool| node.inputs().iter().flatten().any(|link| test(&nodes[link.node]));
-            // What is not needed is not looked at: neither its params nor its files are anyone's business.
-            let resolver = match needed[place] {
-                true => Resolver::new(node, graph, &files),
-                false => Resolver::unasked(node, graph, &files),
+        let dag = Dag::of(graph);
+        let needed = dag.upstream(request.outputs.iter().map(|output| graph.outputs[*output].from.node));
+        let mut nodes: Vec<PlannedNode> = Vec::with_capacity(graph.nodes.len());
+        for (node, needed) in graph.nodes.iter().zip(&needed) {
+            // Of a node that is not needed, neither params nor files are looked at.
+            let planned = match needed {
+                true => plan_node(node, graph, &files, &mut nodes),
+                false => PlannedNode::not_needed(node, graph, &files),
             };
-            let (varies, may_hold, has_solver) = match &node.body {
-                _ if !needed[place] => (false, false, false),
-                Body::Given { moves, .. } => (*moves, false, false),
-                Body::Node { node: declared, inputs, .. } => {
-                    let solver = matches!(declared.cook, Cook::Solver(..));
-                    let start = resolver.at(graph.scene.start());
-                    // Where params are refused at the start, the error comes out when that frame is cooked.
-                    let clock = match (&declared.cook, &start) {
-                        (Cook::Pure(_) | Cook::Window(..), _) => false,
-                        (Cook::Frame { reads_clock, .. }, Ok(params)) => reads_clock(params),
-                        (Cook::Frame { .. }, Err(_)) => true,
-                        (Cook::Solver(..), _) => true,
-                    };
-                    let moving_input = declared.inputs.iter().zip(inputs).any(|(input, links)| {
-                        let times = start.as_ref().map_or(Times::NOW, |params| (input.spec().times)(params));
-                        (times.now || times.steps > 0) && links.iter().any(|link| nodes[link.node].varies)
-                    });
-                    let plain = matches!(declared.cook, Cook::Pure(_));
-                    let hold = plain && !above(&|up| up.varies && !up.may_hold);
-                    (clock || resolver.is_animated() || moving_input, hold, solver || above(&|up| up.has_solver))
-                }
-            };
-            nodes.push(Planned {
-                needed: needed[place],
-                varies,
-                has_solver,
-                may_hold,
-                read_at_start: false,
-                live: None,
-                readers: Vec::new(),
-                feeds_chain: false,
-                resolver,
-            });
+            nodes.push(planned);
         }
-        for (place, node) in graph.nodes.iter().enumerate().filter(|(place, _)| needed[*place]) {
-            for link in node.inputs().iter().flatten() {
-                let readers = &mut nodes[link.node].readers;
-                if readers.last() != Some(&place) {
-                    readers.push(place);
-                }
-            }
-        }
-        for (place, node) in graph.nodes.iter().enumerate().filter(|(place, _)| needed[*place]) {
-            let (Some(declared), Ok(params)) = (node.node(), nodes[place].resolver.at(graph.scene.start())) else {
-                continue;
-            };
-            for (input, links) in declared.inputs.iter().zip(node.inputs()) {
-                if (input.spec().times)(&params).start {
-                    links.iter().for_each(|link| nodes[link.node].read_at_start = true);
-                }
-            }
-        }
-        for place in (0..nodes.len()).rev() {
+        for index in (0..nodes.len()).rev() {
             let chain = |reader: usize| {
                 nodes[reader].feeds_chain || graph.nodes[reader].node().is_some_and(|node| node.cook.is_chain())
             };
-            nodes[place].feeds_chain = nodes[place].readers.iter().any(|reader| chain(*reader));
+            nodes[index].feeds_chain = dag.readers(index).any(|reader| needed[reader] && chain(reader));
         }
         live::find(graph, &request, &mut nodes);
         static PLANS: AtomicU64 = AtomicU64::new(0);
-        let plan = Self { graph, request, nodes, files, number: PLANS.fetch_add(1, Ordering::Relaxed) };
+        let plan = Self { graph, request, nodes, dag, files, number: PLANS.fetch_add(1, Ordering::Relaxed) };
         plan.check_sub_frames()?;
         Ok(plan)
     }
 
     fn check_sub_frames(&self) -> Result<(), Arc<CookError>> {
         let Some(frame) = self.request.frames.iter().find(|frame| !frame.is_whole()) else { return Ok(()) };
-        for output in self.request.outputs.iter().map(|place| &self.graph.outputs[*place]) {
+        for output in self.request.outputs.iter().map(|output| &self.graph.outputs[*output]) {
             if self.nodes[output.from.node].has_solver {
                 let fact = format!("output `{}` comes from a solver, which knows whole frames only", output.name);
                 let error = Error::refused(fact).hint("ask for whole frames");
@@ -183,7 +137,7 @@ impl<'g> Plan<'g> {
         CookError { node: node.id.clone(), type_name: node.type_name(), frame, error }
     }
 
-    /// Stages of `node` that are left out at every frame asked.
+    /// Stages of `node` that are left out at every frame of the request.
     pub fn left_out(&self, node: usize) -> Vec<LeftOut> {
         let resolver = &self.nodes[node].resolver;
         let at = |frame: Frame| resolver.at(frame).map(|params| self.left_out_with(node, &params)).unwrap_or_default();
@@ -201,68 +155,79 @@ impl<'g> Plan<'g> {
         stages
     }
 
-    pub(crate) fn left_out_with(&self, node: usize, params: &Params) -> Vec<LeftOut> {
+    fn left_out_with(&self, node: usize, params: &Params) -> Vec<LeftOut> {
         let Body::Node { node: declared, inputs, .. } = &self.graph.nodes[node].body else { return Vec::new() };
         let wires = |name: &str| {
-            let place = declared.inputs.iter().position(|input| input.spec().name == name);
-            place.map_or(0, |place| inputs[place].len())
+            let index = declared.inputs.iter().position(|input| input.spec().name == name);
+            index.map_or(0, |index| inputs[index].len())
         };
         declared.left_out(params, &Wires(&wires))
     }
 
-    /// The frame that stands for `frame` where `node` does not vary.
-    pub(crate) fn canonical(&self, node: usize, frame: Frame) -> Frame {
-        if self.nodes[node].varies { frame } else { self.graph.scene.start() }
-    }
-
-    /// The frame at which a chain whose state starts at `frame` reads what it reads at the start: a solver where its
-    /// state starts, a window at the scene's start, wherever its anchors are.
-    pub(crate) fn start_of(&self, declared: &Node, frame: Frame) -> Frame {
-        if matches!(declared.cook, Cook::Window(..)) { self.graph.scene.start() } else { frame }
-    }
-
-    /// The whole frames at which a window must be known for `frame`: itself, or two neighbours each way. Inside the
-    /// scene none lies past its end, where inputs may have nothing more to give.
-    pub(crate) fn neighbours(&self, frame: Frame) -> Vec<i64> {
-        let floor = frame.floor_number();
-        if frame.is_whole() {
-            return vec![floor];
-        }
-        let last = self.graph.scene.last;
-        let after = if floor < last { last.min(floor + 2) } else { floor + 2 };
-        vec![floor - 1, floor, floor + 1, after]
+    /// The needed nodes that read `node`, each once, in the order of the graph.
+    pub(crate) fn readers(&self, node: usize) -> impl Iterator<Item = usize> {
+        self.dag.readers(node).filter(|reader| self.nodes[*reader].needed)
     }
 
     /// A node and all that it depends on, in the order of the graph.
     pub(crate) fn ancestors(&self, node: usize) -> Vec<usize> {
-        let mut above = vec![false; node + 1];
-        above[node] = true;
-        for place in (0..=node).rev() {
-            if above[place] {
-                self.graph.nodes[place].inputs().iter().flatten().for_each(|link| above[link.node] = true);
-            }
-        }
-        (0..=node).filter(|place| above[*place]).collect()
-    }
-
-    /// The wires of an input.
-    pub(crate) fn links(&self, node: usize, input: usize) -> &[Link] {
-        &self.graph.nodes[node].inputs()[input]
+        let upstream = self.dag.upstream([node]);
+        (0..=node).filter(|index| upstream[*index]).collect()
     }
 }
 
-/// Which nodes anything asked depends on.
-fn needed(graph: &Graph, request: &Request) -> Vec<bool> {
-    let mut needed = vec![false; graph.nodes.len()];
-    for output in &request.outputs {
-        needed[graph.outputs[*output].from.node] = true;
-    }
-    for place in (0..graph.nodes.len()).rev() {
-        if needed[place] {
-            for link in graph.nodes[place].inputs().iter().flatten() {
-                needed[link.node] = true;
-            }
+impl PlannedNode {
+    fn not_needed(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+        Self {
+            needed: false,
+            varies: false,
+            has_solver: false,
+            may_hold: false,
+            read_at_start: false,
+            live: None,
+            feeds_chain: false,
+            resolver: Resolver::lazy(node, graph, files),
         }
     }
-    needed
+}
+
+/// Plans a needed node; `before` are the nodes before it, among them all that it reads.
+fn plan_node(node: &GraphNode, graph: &Graph, files: &Arc<Files>, before: &mut [PlannedNode]) -> PlannedNode {
+    let resolver = Resolver::new(node, graph, files);
+    let (varies, may_hold, has_solver) = match &node.body {
+        Body::Given { moves, .. } => (*moves, false, false),
+        Body::Node { node: declared, inputs, .. } => {
+            let start = resolver.at(graph.scene.start());
+            // Where params are refused at the start, the error comes out when that frame is cooked.
+            let clock = match (&declared.cook, &start) {
+                (Cook::Pure(_) | Cook::Window(..), _) => false,
+                (Cook::Frame { reads_clock, .. }, Ok(params)) => reads_clock(params),
+                (Cook::Frame { .. }, Err(_)) => true,
+                (Cook::Solver(..), _) => true,
+            };
+            let spans = read_spans(declared, start.as_ref().ok());
+            let mut moving_input = false;
+            for (span, link) in spans.iter().zip(inputs).flat_map(|(span, links)| links.iter().map(move |l| (span, l)))
+            {
+                moving_input |= span.moves && before[link.node].varies;
+                before[link.node].read_at_start |= span.start;
+            }
+            let reads =
+                |test: &dyn Fn(&PlannedNode) -> bool| inputs.iter().flatten().any(|link| test(&before[link.node]));
+            let pure = matches!(declared.cook, Cook::Pure(_));
+            let may_hold = pure && !reads(&|source| source.varies && !source.may_hold);
+            let has_solver = matches!(declared.cook, Cook::Solver(..)) || reads(&|source| source.has_solver);
+            (clock || resolver.is_animated() || moving_input, may_hold, has_solver)
+        }
+    };
+    PlannedNode {
+        varies,
+        has_solver,
+        may_hold,
+        resolver,
+        needed: true,
+        read_at_start: false,
+        live: None,
+        feeds_chain: false,
+    }
 }

@@ -1,10 +1,10 @@
 //! A node's params at any time: sources evaluated, ranges checked, files opened, what is not read put to its default.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::files::Files;
+use crate::files::{Files, numbered_path};
 use crate::graph::{Body, Graph, GraphNode};
 use crate::param::{Clock, ParamSpec, Params, ReadLog, Source, Unset, Value};
 use crate::time::Frame;
@@ -23,7 +23,7 @@ pub(crate) struct Resolver {
 
 impl Resolver {
     pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
-        let mut resolver = Self::unasked(node, graph, files);
+        let mut resolver = Self::lazy(node, graph, files);
         let start = graph.scene.start();
         // A param that is not read does not make a node move, whatever it does.
         resolver.animated = match resolver.evaluate(start.number(), false) {
@@ -37,7 +37,7 @@ impl Resolver {
     }
 
     /// The resolver of a node that nothing asked depends on: it looks at params and files only where someone asks.
-    pub(crate) fn unasked(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+    pub(crate) fn lazy(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         let (specs, sources) = match &node.body {
             Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
             Body::Given { .. } => (Arc::from([]), Vec::new()),
@@ -162,33 +162,5 @@ impl Resolver {
             Some(Value::Int(frame)) => *frame,
             _ => 0,
         }
-    }
-}
-
-/// `path` with each run of `#` in its file name replaced by the frame number, as many digits at least.
-pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut numbered = String::new();
-    let mut rest = name.as_str();
-    while let Some(at) = rest.find('#') {
-        let width = rest[at..].bytes().take_while(|byte| *byte == b'#').count();
-        let sign = if frame < 0 { "-" } else { "" };
-        numbered.push_str(&rest[..at]);
-        numbered.push_str(&format!("{sign}{:0width$}", frame.unsigned_abs()));
-        rest = &rest[at + width..];
-    }
-    path.with_file_name(numbered + rest)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_run_of_hashes_becomes_the_frame_number() {
-        let path = |text: &str, frame| numbered_path(Path::new(text), frame).display().to_string();
-        assert_eq!(path("in/fur.####.obj", 7), "in/fur.0007.obj");
-        assert_eq!(path("fur_##.obj", 123), "fur_123.obj");
-        assert_eq!(path("fur.####.obj", -3), "fur.-0003.obj");
     }
 }

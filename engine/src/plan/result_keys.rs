@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Keys, Plan, Request};
-use crate::cook::CookError;
+use crate::error::CookError;
 use crate::graph::Graph;
 use crate::key::Key;
 use crate::time::Frame;
@@ -21,5 +21,5 @@ pub fn result_keys(graph: &Graph, node: &str, frames: &[Frame]) -> Result<Vec<Ke
     let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
     let plan = Plan::new(graph, &request, Arc::default())?;
     let mut keys = Keys::new(&plan);
-    frames.iter().map(|frame| keys.spot(index, plan.canonical(index, *frame)).map(|spot| spot.key)).collect()
+    frames.iter().map(|frame| keys.resolve(index, plan.canonical(index, *frame)).map(|resolved| resolved.key)).collect()
 }

@@ -1,172 +1,141 @@
-//! Chains: states that start, step, put out and are saved along the way.
+//! Chains: states that start, step, give outputs and are saved on the way.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{Advance, Outcome, Reading, Running, Sweep};
-use crate::cook::store::Cooked;
-use crate::cook::{CookError, between};
+use super::demand::{Advance, Arrival, ChainFrame, NodeDemand};
+use super::{ChainState, Outcome, Sweep};
+use crate::error::CookError;
 use crate::node::{ChainFns, FrameCx, Node, SolverFns, StateBox};
-use crate::plan::Stretch;
+use crate::plan::{ChainSegment, OutputFrames, Reads};
 use crate::time::Frame;
 
-impl Sweep<'_, '_, '_> {
-    /// Moves a chain along its stretches, and takes its outputs on the way.
-    pub(super) fn move_chain(
+/// A window or solver that is being cooked.
+#[derive(Clone, Copy)]
+struct ChainNode {
+    index: usize,
+    declared: &'static Node,
+    chain: ChainFns,
+    /// What a solver has besides.
+    solver: Option<SolverFns>,
+}
+
+impl<'g> Sweep<'_, 'g, '_> {
+    /// Moves the states of a window or solver, and takes its outputs on the way.
+    pub(super) fn cook_chain(
         &mut self,
-        node: usize,
+        index: usize,
         declared: &'static Node,
         chain: ChainFns,
         solver: Option<SolverFns>,
-        advance: BTreeMap<Stretch, Advance>,
+        demand: NodeDemand<'g>,
     ) {
-        for (stretch, advance) in advance {
-            let mut running = self.running[node].remove(&stretch);
-            if let Some(at) = running.as_ref().map(|running| running.at).filter(|at| advance.outputs.contains(at)) {
-                self.chain_output(node, declared, chain, running.as_ref(), at);
-            }
-            let next = running.as_ref().map_or(stretch.start, |running| running.at + 1);
-            for frame in next..=advance.goal {
-                if self.cancelled() {
-                    return;
-                }
-                let state = match running.take() {
-                    None => self.chain_start(node, declared, chain, frame),
-                    Some(Running { state: Ok(state), .. }) => self.chain_step(node, declared, chain, frame, state),
-                    Some(Running { state: Err(error), .. }) => Err(error),
-                };
-                self.count(node, Frame::whole(frame), state.as_ref().err());
-                let state = match solver.filter(|_| self.reload) {
-                    None => state,
-                    Some(solver) => state.and_then(|state| self.reloaded(node, frame, solver, &state)),
-                };
-                self.save_state(node, stretch, frame, solver, state.as_ref().ok());
-                running = Some(Running { at: frame, state, moved: self.slices });
-                if advance.outputs.contains(&frame) {
-                    self.chain_output(node, declared, chain, running.as_ref(), frame);
-                }
-            }
-            if let Some(running) = running.filter(|running| running.at + 1 < stretch.until) {
-                self.running[node].insert(stretch, running);
-            }
+        let node = ChainNode { index, declared, chain, solver };
+        for (segment, advance) in demand.segments {
+            self.advance(node, segment, advance);
+        }
+        // A cancelled chain has not been at every frame.
+        if !self.cancelled() {
+            self.finish_chain(node, &demand.frames);
         }
     }
 
-    /// The state as a checkpoint would give it back.
-    fn reloaded(
-        &self,
-        node: usize,
-        frame: i64,
-        solver: SolverFns,
-        state: &StateBox,
-    ) -> Result<StateBox, Arc<CookError>> {
-        (solver.save)(state).and_then(|bytes| (solver.load)(&bytes)).ok_or_else(|| {
-            let error = crate::Error::contract("its state cannot be written and read back");
-            Arc::new(self.plan.error(node, Frame::whole(frame), error))
-        })
+    fn advance(&mut self, node: ChainNode, segment: ChainSegment, advance: Advance<'g>) {
+        let mut state = self.nodes[node.index].states.remove(&segment).map(|standing| (standing.at, standing.state));
+        for ChainFrame { frame, arrival, output } in advance.frames {
+            if self.cancelled() {
+                return;
+            }
+            if let Some(arrival) = arrival {
+                let arrived = self.arrive(node, frame, arrival, state.take().map(|(_, state)| state));
+                self.count_call(node.index, Frame::whole(frame), arrived.as_ref().err());
+                let arrived = arrived.and_then(|state| self.carry_on(node, frame, state));
+                self.save_state(node, segment, frame, arrived.as_ref().ok());
+                state = Some((frame, arrived));
+            }
+            if let (Some(reads), Some((_, state))) = (output, &state) {
+                let outcome = self.chain_output(node, frame, reads, state);
+                self.nodes[node.index].recent.insert(frame, outcome);
+            }
+        }
+        if let Some((at, state)) = state.filter(|(at, _)| at + 1 < segment.until) {
+            let moved = self.slices;
+            self.nodes[node.index].states.insert(segment, ChainState { at, state, moved });
+        }
     }
 
-    pub(super) fn save_state(
+    /// The state at a frame; `before` is that of the frame before.
+    fn arrive(
         &mut self,
-        node: usize,
-        stretch: Stretch,
+        node: ChainNode,
         frame: i64,
-        solver: Option<SolverFns>,
-        state: Option<&StateBox>,
-    ) {
-        let (Some(solver), Some(state)) = (solver, state) else { return };
+        arrival: Arrival<'g>,
+        before: Option<Result<StateBox, Arc<CookError>>>,
+    ) -> Result<StateBox, Arc<CookError>> {
+        let at = Frame::whole(frame);
+        let before = before.transpose()?;
+        let (Arrival::Start(reads) | Arrival::Step(reads)) = arrival;
+        let call = self.prepare(node.index, node.declared, at, &reads?)?;
+        let arrived = match before {
+            None => self.executor.start(call, node.chain),
+            Some(mut state) => self.executor.step(call, node.chain, &mut state).map(|metrics| (state, metrics)),
+        };
+        let (state, metrics) = arrived.map_err(|error| Arc::new(self.plan.error(node.index, at, error)))?;
+        self.publish(node.index, at, &metrics);
+        Ok(state)
+    }
+
+    fn carry_on(&self, node: ChainNode, frame: i64, state: StateBox) -> Result<StateBox, Arc<CookError>> {
+        let carried = self.executor.carried_on(state, node.solver);
+        carried.map_err(|error| Arc::new(self.plan.error(node.index, Frame::whole(frame), error)))
+    }
+
+    fn save_state(&mut self, node: ChainNode, segment: ChainSegment, frame: i64, state: Option<&StateBox>) {
+        let (Some(solver), Some(state)) = (node.solver, state) else { return };
         let Some(disk) = self.disk.as_mut() else { return };
-        let Ok(key) = self.keys.state_key(node, stretch, frame) else { return };
+        let Ok(key) = self.keys.state_key(node.index, segment, frame) else { return };
         if let Some(bytes) = (solver.save)(state) {
-            disk.save_checkpoint(&self.plan.graph.nodes[node].id, frame, key, &bytes);
+            disk.save_checkpoint(&self.plan.graph.nodes[node.index].id, frame, key, &bytes);
         }
     }
 
-    fn chain_start(
+    fn chain_output(
         &mut self,
-        node: usize,
-        declared: &'static Node,
-        chain: ChainFns,
+        node: ChainNode,
         frame: i64,
-    ) -> Result<StateBox, Arc<CookError>> {
+        reads: Result<Reads<'g>, Arc<CookError>>,
+        state: &Result<StateBox, Arc<CookError>>,
+    ) -> Outcome {
         let at = Frame::whole(frame);
-        let fail = |error| Arc::new(self.plan.error(node, at, error));
-        let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
-        if self.dry {
-            return Ok(Box::new(()));
-        }
-        let inputs = self.inputs(node, declared, at, &params, Reading::Start)?;
-        let (state, finished) =
-            self.context(node, declared, at, &params, inputs).run(|cx| (chain.start)(cx)).map_err(fail)?;
-        self.publish(node, at, &finished.metrics());
-        Ok(state)
+        let state = state.as_ref().map_err(Arc::clone)?;
+        let returned =
+            self.call(node.index, node.declared, at, &reads?, &|cx: &FrameCx| (node.chain.output)(state, cx));
+        self.record_result(node.index, at, returned)
     }
 
-    fn chain_step(
-        &mut self,
-        node: usize,
-        declared: &'static Node,
-        chain: ChainFns,
-        frame: i64,
-        mut state: StateBox,
-    ) -> Result<StateBox, Arc<CookError>> {
-        let at = Frame::whole(frame);
-        let fail = |error| Arc::new(self.plan.error(node, at, error));
-        let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
-        if self.dry {
-            return Ok(state);
-        }
-        let inputs = self.inputs(node, declared, at, &params, Reading::Step)?;
-        let call = self.context(node, declared, at, &params, inputs);
-        let stepped = call.step(at.plus(-1), |cx| (chain.step)(&mut state, cx));
-        let metrics = stepped.map_err(fail)?.metrics();
-        self.publish(node, at, &metrics);
-        Ok(state)
-    }
-
-    pub(super) fn chain_output(
-        &mut self,
-        node: usize,
-        declared: &'static Node,
-        chain: ChainFns,
-        running: Option<&Running>,
-        frame: i64,
-    ) {
-        let at = Frame::whole(frame);
-        let state = running.expect("asked where a state stands").state.as_ref().map_err(Arc::clone);
-        let returned = state.and_then(|state| {
-            let fail = |error| Arc::new(self.plan.error(node, at, error));
-            let params = self.plan.nodes[node].resolver.at(at).map_err(fail)?;
-            self.call(node, declared, at, &params, &|cx: &FrameCx| (chain.output)(state, cx))
-        });
-        let outcome = self.take(node, at, returned);
-        self.recent[node].insert(frame, outcome);
-    }
-
-    /// A chain's results at the frames that were asked, between whole frames too.
-    pub(super) fn finish_chain(&mut self, node: usize, declared: &'static Node, need: &BTreeSet<Frame>) {
-        for frame in need {
-            let whole = |frame: i64, this: &mut Self| -> Outcome {
-                let stretch = this.keys.stretch(node, frame)?;
-                this.recent[node]
-                    .get(&frame.max(stretch.start))
-                    .expect("the chain was moved over every frame asked")
-                    .clone()
+    /// A chain's results at the frames that were demanded, between whole frames too.
+    fn finish_chain(&mut self, node: ChainNode, frames: &BTreeSet<Frame>) {
+        for frame in frames {
+            let outcome = match self.plan.output_frames(*frame) {
+                OutputFrames::Whole(whole) => self.recent_output(node.index, whole),
+                OutputFrames::Between(near, share) => self.output_between(node, *frame, near, share),
             };
-            let floor = frame.floor_number();
-            let outcome = if frame.is_whole() {
-                whole(floor, self)
-            } else {
-                let near = self.plan.neighbours(*frame).into_iter();
-                let near: Result<Vec<Cooked>, _> = near.map(|frame| whole(frame, self)).collect();
-                let share = (frame.ticks() - frame.floor().ticks()) as f32 / Frame::TICKS as f32;
-                near.and_then(|near| match self.dry {
-                    true => Ok(near[1].clone()),
-                    false => between::between([&near[0], &near[1], &near[2], &near[3]], share, declared.mend_between)
-                        .map_err(|error| Arc::new(self.plan.error(node, *frame, error))),
-                })
-            };
-            self.results[node].insert(*frame, outcome);
+            self.nodes[node.index].results.insert(*frame, outcome);
         }
+    }
+
+    fn output_between(&mut self, node: ChainNode, frame: Frame, near: [i64; 4], share: f32) -> Outcome {
+        let [a, b, c, d] = near.map(|whole| self.recent_output(node.index, whole));
+        let (a, b, c, d) = (a?, b?, c?, d?);
+        let between = self.executor.interpolated([&a, &b, &c, &d], share, node.declared.mend_between);
+        between.map_err(|error| Arc::new(self.plan.error(node.index, frame, error)))
+    }
+
+    /// The output at a whole frame; before the first state, that of its start.
+    fn recent_output(&mut self, node: usize, frame: i64) -> Outcome {
+        let segment = self.keys.segment(node, frame)?;
+        let frame = frame.max(segment.start);
+        let missing = || Err(self.not_cooked(node, Frame::whole(frame)));
+        self.nodes[node].recent.get(&frame).cloned().unwrap_or_else(missing)
     }
 }

@@ -1,4 +1,4 @@
-//! Metrics: what nodes publish goes to the report, and with a finished frame to the disk and back.
+//! Metrics: what nodes publish goes into the report, and is kept on disk with each finished frame.
 
 use super::Sweep;
 use crate::cook::disk::KeptMetric;
@@ -6,16 +6,16 @@ use crate::key::Key;
 use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
-    /// Puts what a node published at a frame to the report.
+    /// Adds what a node published at a frame to the report.
     pub(super) fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
         for (name, value) in metrics {
-            self.report.nodes[node].metrics.entry(name).or_default().insert(frame, *value);
+            self.nodes[node].report.metrics.entry(name).or_default().insert(frame, *value);
         }
     }
 
     /// What a node published at a frame.
     pub(super) fn published(&self, node: usize, frame: Frame) -> Vec<(&'static str, f64)> {
-        let metrics = &self.report.nodes[node].metrics;
+        let metrics = &self.nodes[node].report.metrics;
         metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
     }
 
@@ -27,11 +27,8 @@ impl Sweep<'_, '_, '_> {
             if plan.graph.nodes[node].node().is_none_or(|declared| declared.metrics.is_empty()) {
                 continue;
             }
-            let mut frames: Vec<Frame> =
-                self.samples(output, frame).into_iter().map(|at| plan.canonical(node, at)).collect();
-            frames.dedup();
-            for at in frames {
-                found.extend(self.keys.spot(node, at).ok().map(|spot| (node, at, spot.key)));
+            for at in plan.measured_frames(node, output, frame) {
+                found.extend(self.keys.resolve(node, at).ok().map(|resolved| (node, at, resolved.key)));
             }
         }
         found

@@ -4,8 +4,8 @@ use super::super::ast::Node;
 use super::super::code::Input;
 use super::super::error::{ExprError, Place};
 use super::super::functions::{self, FOREIGN, FUNCTIONS, Function};
-use super::super::lexer::{Symbol, Token, TokenKind, is_name, shortened};
-use super::super::suggest::listed;
+use super::super::lexer::{Symbol, Token, TokenKind, is_name};
+use super::super::suggest::{listed, shortened};
 use super::{Language, Parser};
 use crate::geometry::fixed_type;
 

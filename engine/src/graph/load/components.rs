@@ -1,10 +1,10 @@
 //! Which components flow along the wires, and whether they are what the inputs need.
 
 use super::Draft;
-use super::order::Order;
 use super::wires::Wire;
 use crate::geometry::Kind;
 use crate::graph::Catalogue;
+use crate::graph::dag::Order;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::shown;
 use crate::node::{Carries, Needs};

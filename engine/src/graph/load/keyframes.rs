@@ -3,9 +3,8 @@
 use jsonc_parser::common::Ranged;
 use numerics::ramp::Interpolation;
 
-use super::param::word;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, keep};
+use crate::graph::json::{Entry, Json, keep, word};
 use crate::time::Frame;
 
 /// Keys as they stand in the file, frames strictly increasing.

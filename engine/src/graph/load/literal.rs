@@ -7,10 +7,9 @@ use std::sync::Arc;
 use jsonc_parser::ast::Value as Ast;
 use numerics::ramp::{Interpolation, Ramp, RampError};
 
-use super::param::word;
 use crate::geometry::{Column, ColumnType, Name, fixed_type};
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Json, counted, keep, shown};
+use crate::graph::json::{Json, counted, keep, shown, word};
 use crate::param::{Shape, Value};
 
 /// The value of that shape; `None` where it has a fault. Files are not literals: see [`super::param`].

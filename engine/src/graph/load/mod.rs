@@ -1,7 +1,7 @@
 //! From a graph file to a checked [`Graph`], or to all its faults at once.
 //!
 //! The text becomes JSON, JSON a document of named parts (`document`), its controls are looked through (`control`),
-//! params become sources (`param`, `literal`, `keyframes`, `expression`), wires are followed (`wires`, `order`,
+//! params become sources (`param`, `literal`, `keyframes`, `expression`), wires are followed (`wires`, `dag`,
 //! `components`) and outputs checked (`outputs`). Each step goes on after a fault with what is still sound, and says
 //! nothing of what only follows from an earlier fault.
 //!
@@ -14,7 +14,6 @@ mod document;
 mod expression;
 mod keyframes;
 mod literal;
-mod order;
 mod outputs;
 mod param;
 mod scene;
@@ -29,9 +28,9 @@ use jsonc_parser::common::Ranged;
 use self::components::Components;
 use self::control::Controls;
 use self::document::{Document, NodeText};
-use self::order::{Order, order};
 use self::param::Reader;
 use self::wires::Wire;
+use super::dag::{Dag, Order};
 use super::fault::{Fault, code};
 use super::json::{Json, did_you_mean, shown};
 use super::places::Places;
@@ -134,7 +133,7 @@ fn load(
         .collect();
     wires::connect(&mut drafts, faults);
 
-    let order = order(&wires::sources(&drafts));
+    let order = Dag::new(&wires::sources(&drafts)).order();
     wires::refuse_cycles(&drafts, &order, faults);
     let components = Components::along(&drafts, &order);
     components.refuse_misfits(&drafts, catalogue, faults);

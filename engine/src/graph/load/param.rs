@@ -53,19 +53,6 @@ enum Within {
     Key,
 }
 
-/// The place of a text among `words`, or the fault of one that is none of them; `what` names them.
-pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize, Fault> {
-    let listed = || words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
-    let Some(word) = json.string() else { return Err(json.unexpected(&format!("one of {}", listed()))) };
-    words.iter().position(|known| *known == word).ok_or_else(|| {
-        let fault = json.fault(code::UNKNOWN_WORD, format!("there is no {what} \"{}\"", shown(word)));
-        match nearest(word, words.iter().copied()) {
-            Some(near) => fault.hint(format!("did you mean \"{near}\"?")),
-            None => fault.hint(format!("expected one of {}", listed())),
-        }
-    })
-}
-
 impl<'a> Reader<'a, '_> {
     /// The sources of a node's params, in the order of its declaration.
     pub(super) fn params(&mut self, node: &Node, specs: &[ParamSpec], entries: &[Entry<'a>]) -> Vec<Source> {

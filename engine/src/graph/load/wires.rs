@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use jsonc_parser::ast::Value as Ast;
 
 use super::Draft;
-use super::order::Order;
+use crate::graph::dag::Order;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, counted, did_you_mean, find, is_misspelt, shown};
 use crate::node::{Arity, InputSpec};

@@ -14,10 +14,10 @@ use crate::node::MendBetween;
 ///
 /// # Errors
 /// Where `mend` panics.
-pub(super) fn between(near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
+pub(super) fn interpolated(near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
     let one = |port: usize| {
         let near = near.map(|cooked| &*cooked[port]);
-        let mut result = geometry_between(near, share);
+        let mut result = interpolated_geometry(near, share);
         if let Some(mend) = mend {
             guarded(|| {
                 mend([near[1], near[2]], share, &mut result);
@@ -29,7 +29,7 @@ pub(super) fn between(near: [&Cooked; 4], share: f32, mend: Option<MendBetween>)
     (0..near[1].len()).map(one).collect()
 }
 
-fn geometry_between(near: [&Geometry; 4], share: f32) -> Geometry {
+fn interpolated_geometry(near: [&Geometry; 4], share: f32) -> Geometry {
     let mut result = near[1].clone();
     let kinds: Vec<_> = near[1].parts().map(|part| part.kind()).collect();
     for kind in kinds {

@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use super::Resolver;
 use crate::graph::Scene;
 use crate::node::{History, Integrand, Node};
-use crate::plan::Resolver;
 use crate::time::Frame;
 
 /// Places and weights of 4-point Gauss quadrature on −1…1 (Abramowitz & Stegun, table 25.4): exact to degree 7.

@@ -1,0 +1,95 @@
+//! What a sweep does where a node is to be called: a cook calls it, a rehearsal only pretends.
+
+use std::sync::Arc;
+
+use crate::cook::call::{Call, Returned, check_finite};
+use crate::cook::interpolate::interpolated;
+use crate::cook::store::{Cooked, Metrics};
+use crate::error::{Error, Result};
+use crate::geometry::Geometry;
+use crate::node::{ChainFns, FrameCx, MendBetween, Outputs, SolverFns, StateBox};
+use crate::time::Frame;
+
+/// How a sweep carries out calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::cook) enum Executor {
+    /// Calls nodes.
+    Cook,
+    /// Calls nodes for a check of a graph: what each source cost is remembered for the cook that follows.
+    Check,
+    /// Calls no node: every result is empty, and nothing is delivered.
+    Rehearsal,
+    /// Calls nodes, and serialises and reads back the state of every solver after each step.
+    Reload,
+}
+
+impl Executor {
+    /// Whether finished frames come out.
+    pub(super) fn delivers(self) -> bool {
+        self != Self::Rehearsal
+    }
+
+    /// Whether costs are remembered for the cook that follows.
+    pub(super) fn remembers_costs(self) -> bool {
+        self == Self::Check
+    }
+
+    /// Geometry that the program gives, refused where it is not finite, so that no node need check.
+    pub(super) fn given(self, at: &(dyn Fn(Frame) -> Geometry + Send + Sync), frame: Frame) -> Result<Cooked> {
+        if self == Self::Rehearsal {
+            return Ok(Arc::from([Arc::default()]));
+        }
+        let geometry = at(frame);
+        check_finite(&geometry, &[])?;
+        Ok(Arc::from([Arc::new(geometry)]))
+    }
+
+    /// A node's outputs at a frame.
+    pub(super) fn call<'a>(
+        self,
+        call: Call<'a>,
+        cook: &(impl Fn(&FrameCx<'a>) -> Result<Outputs> + ?Sized),
+    ) -> Result<Returned> {
+        if self == Self::Rehearsal {
+            let cooked = call.node.outputs.iter().map(|_| Arc::new(Geometry::default())).collect();
+            return Ok(Returned { cooked, metrics: Vec::new(), new_bytes: 0, stripped: Vec::new() });
+        }
+        let (outputs, finished) = call.run(cook)?;
+        finished.check(outputs)
+    }
+
+    /// The state of a window or solver at its first frame, and what was published there.
+    pub(super) fn start(self, call: Call<'_>, chain: ChainFns) -> Result<(StateBox, Metrics)> {
+        if self == Self::Rehearsal {
+            return Ok((Box::new(()), Vec::new()));
+        }
+        let (state, finished) = call.run(|cx| (chain.start)(cx))?;
+        Ok((state, finished.metrics()))
+    }
+
+    /// Moves a state from the frame before to that of the call; returns what was published there.
+    pub(super) fn step(self, call: Call<'_>, chain: ChainFns, state: &mut StateBox) -> Result<Metrics> {
+        if self == Self::Rehearsal {
+            return Ok(Vec::new());
+        }
+        Ok(call.step(|cx| (chain.step)(state, cx))?.metrics())
+    }
+
+    /// The state that later steps go on from.
+    pub(super) fn carried_on(self, state: StateBox, solver: Option<SolverFns>) -> Result<StateBox> {
+        match solver.filter(|_| self == Self::Reload) {
+            None => Ok(state),
+            Some(solver) => (solver.save)(&state)
+                .and_then(|bytes| (solver.load)(&bytes))
+                .ok_or_else(|| Error::contract("its state cannot be written and read back")),
+        }
+    }
+
+    /// The outputs of a window `share` of the way from `near[1]` to `near[2]`.
+    pub(super) fn interpolated(self, near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
+        match self {
+            Self::Rehearsal => Ok(near[1].clone()),
+            Self::Cook | Self::Check | Self::Reload => interpolated(near, share, mend),
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Cooks what a slice demands, node by node, all frames of a node in parallel.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rayon::prelude::*;
+
+use super::demand::NodeDemand;
+use super::{Outcome, Sweep};
+use crate::clock::Stopwatch;
+use crate::cook::call::{Call, Returned};
+use crate::error::CookError;
+use crate::geometry::Geometry;
+use crate::graph::{Body, Link};
+use crate::key::Key;
+use crate::node::{Cook, FrameCx, History, InputData, Node, Outputs};
+use crate::plan::{Read, Reads, ResolvedFrame};
+use crate::time::Frame;
+
+/// Work shorter than this is not worth handing to another thread.
+const WORTH_A_THREAD: Duration = Duration::from_micros(20);
+
+impl<'g> Sweep<'_, 'g, '_> {
+    /// Cooks what a slice demands, node by node. Returns the greatest size of results held at once.
+    pub(super) fn cook_slice(&mut self, demand: Vec<NodeDemand<'g>>, targets: &[Read]) -> usize {
+        let plan = self.plan;
+        let mut readers_left: Vec<usize> = (0..demand.len()).map(|node| plan.readers(node).count()).collect();
+        for target in targets {
+            readers_left[target.node] += 1;
+        }
+        let mut peak = 0;
+        for (node, demand) in demand.into_iter().enumerate().filter(|(node, _)| plan.nodes[*node].needed) {
+            if self.cancelled() {
+                return peak;
+            }
+            if !demand.is_empty() {
+                let watch = Stopwatch::start();
+                self.cook_node(node, demand);
+                let report = &mut self.nodes[node].report;
+                report.wall += watch.wall();
+                report.cpu += watch.cpu();
+                self.note_misread(node);
+            }
+            self.keep(node);
+            peak = peak.max(self.live_bytes);
+            let held = self.live_bytes + self.engine.store(|store| store.bytes());
+            self.report.peak_bytes = self.report.peak_bytes.max(held);
+            for source in plan.dag.sources(node) {
+                readers_left[source] -= 1;
+                if readers_left[source] == 0 {
+                    self.forget(source);
+                }
+            }
+        }
+        peak
+    }
+
+    fn cook_node(&mut self, node: usize, demand: NodeDemand<'g>) {
+        let declared = match &self.plan.graph.nodes[node].body {
+            Body::Given { at, .. } => {
+                for frame in demand.frames {
+                    let given = self.executor.given(&**at, frame);
+                    let outcome = given.map_err(|error| Arc::new(self.plan.error(node, frame, error)));
+                    self.nodes[node].results.insert(frame, outcome);
+                    self.nodes[node].report.cooks += 1;
+                }
+                return;
+            }
+            Body::Node { node, .. } => *node,
+        };
+        match declared.cook {
+            Cook::Pure(_) | Cook::Frame { .. } => {
+                self.cook_frames(node, declared, &demand.frames, |cx| declared.cook_frame(cx));
+            }
+            Cook::Window(chain, _) => self.cook_chain(node, declared, chain, None, demand),
+            Cook::Solver(chain, solver) => self.cook_chain(node, declared, chain, Some(solver), demand),
+        }
+    }
+
+    /// Cooks a pure or frame node: each key once, all in parallel.
+    fn cook_frames(
+        &mut self,
+        node: usize,
+        declared: &'static Node,
+        frames: &BTreeSet<Frame>,
+        cook: impl Fn(&FrameCx) -> crate::Result<Outputs> + Sync,
+    ) {
+        let mut jobs: Vec<(Frame, Arc<ResolvedFrame<'g>>)> = Vec::new();
+        let mut keys: Vec<(Frame, Key)> = Vec::new();
+        for frame in frames {
+            let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
+            keys.push((*frame, resolved.key));
+            if !jobs.iter().any(|(_, job)| job.key == resolved.key) {
+                jobs.push((*frame, resolved));
+            }
+        }
+        let this = &*self;
+        let one = |(frame, resolved): &(Frame, Arc<ResolvedFrame<'g>>)| {
+            (resolved.key, *frame, this.call(node, declared, *frame, &resolved.reads, &cook))
+        };
+        let watch = Stopwatch::start();
+        let worth = self.nodes[node].call_time.saturating_mul(jobs.len() as u32) > WORTH_A_THREAD;
+        let cooked: Vec<_> = match jobs.len() > 1 && worth {
+            true => jobs.par_iter().map(one).collect(),
+            false => jobs.iter().map(one).collect(),
+        };
+        self.nodes[node].call_time = watch.wall() / (jobs.len().max(1) as u32);
+        let mut outcomes: Vec<(Key, Frame, Outcome)> = Vec::with_capacity(cooked.len());
+        for (key, frame, returned) in cooked {
+            self.count_call(node, frame, returned.as_ref().err());
+            outcomes.push((key, frame, self.record_result(node, frame, returned)));
+        }
+        for (frame, key) in keys {
+            let Some((_, cooked_at, outcome)) = outcomes.iter().find(|(known, _, _)| *known == key) else { continue };
+            self.nodes[node].results.insert(frame, outcome.clone());
+            if *cooked_at != frame {
+                let metrics = self.published(node, *cooked_at);
+                self.publish(node, frame, &metrics);
+            }
+        }
+    }
+
+    /// Counts a call, unless an error upstream or at an earlier frame kept it from being made.
+    pub(super) fn count_call(&mut self, node: usize, frame: Frame, error: Option<&Arc<CookError>>) {
+        let own = |error: &Arc<CookError>| error.node == self.plan.graph.nodes[node].id && error.frame == frame;
+        self.nodes[node].report.cooks += u64::from(error.is_none_or(own));
+    }
+
+    /// Records what a call returned.
+    pub(super) fn record_result(
+        &mut self,
+        node: usize,
+        frame: Frame,
+        returned: Result<Returned, Arc<CookError>>,
+    ) -> Outcome {
+        let returned = returned?;
+        let run = &mut self.nodes[node];
+        run.report.peak_bytes = run.report.peak_bytes.max(returned.new_bytes);
+        run.bytes += returned.new_bytes;
+        self.live_bytes += returned.new_bytes;
+        self.publish(node, frame, &returned.metrics);
+        self.requested.unused.extend(returned.stripped);
+        Ok(returned.cooked)
+    }
+
+    /// Calls a node for its outputs at a frame.
+    pub(super) fn call(
+        &self,
+        node: usize,
+        declared: &'static Node,
+        frame: Frame,
+        reads: &Reads<'_>,
+        cook: &(impl Fn(&FrameCx) -> crate::Result<Outputs> + Sync),
+    ) -> Result<Returned, Arc<CookError>> {
+        let call = self.prepare(node, declared, frame, reads)?;
+        let returned = self.executor.call(call, &|cx: &FrameCx<'_>| cook(cx));
+        returned.map_err(|error| Arc::new(self.plan.error(node, frame, error)))
+    }
+
+    /// A call of a node with its params and the results it reads.
+    pub(super) fn prepare<'a>(
+        &'a self,
+        node: usize,
+        declared: &'static Node,
+        frame: Frame,
+        reads: &Reads<'_>,
+    ) -> Result<Call<'a>, Arc<CookError>> {
+        let mut inputs = Vec::with_capacity(reads.inputs.len());
+        for input in &reads.inputs {
+            let at = |frame: &Frame| self.fetch(input.links, *frame);
+            let data = InputData {
+                now: input.now.as_ref().map(at).transpose()?.unwrap_or_default(),
+                start: input.start.as_ref().map(at).transpose()?.unwrap_or_default(),
+                steps: input
+                    .steps
+                    .iter()
+                    .map(|frame| at(frame).map(|wires| (*frame, wires)))
+                    .collect::<Result<_, _>>()?,
+            };
+            inputs.push((input.name, data));
+        }
+        let scene = &self.plan.graph.scene;
+        Ok(Call {
+            node: declared,
+            frame,
+            params: reads.params.clone(),
+            inputs,
+            live: self.plan.nodes[node].live.as_deref(),
+            cancel: self.cancel,
+            clock: scene.clock(),
+            origin: scene.origin,
+            history: self.nodes[node].integrals.as_ref().map(|integrals| integrals as &dyn History),
+        })
+    }
+
+    /// The results at the other ends of some wires.
+    fn fetch(&self, links: &[Link], frame: Frame) -> Result<Vec<Arc<Geometry>>, Arc<CookError>> {
+        links.iter().map(|link| self.geometry(self.plan.read(*link, frame))).collect()
+    }
+}
