@@ -6,12 +6,13 @@
 use numerics::random::Key;
 
 use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
-use engine::node::AttrDecl;
+use engine::node::{AttrDecl, Needs};
 
 /// How points lie, and how many there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
-    /// A few curves of 1 to 9 CVs, a closed mesh, a dozen points, a few tets.
+    /// A few curves of 1 to 9 CVs, some with doubled CVs or without length, a closed mesh, a dozen points, some of them
+    /// coincident, a few tets.
     Small,
     /// Another count of everything; the mesh is open.
     Other,
@@ -27,11 +28,19 @@ pub(crate) enum Form {
     Heap,
     /// Small, a long way from the origin.
     Far,
+    /// Nothing but curves without length and coincident points, and a flat face or tet among the others.
+    Degenerate,
 }
 
 impl Form {
     /// Forms that no scene should have, and any may.
-    pub(crate) const EXTREMES: [Self; 5] = [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far];
+    pub(crate) const EXTREMES: [Self; 6] =
+        [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far, Self::Degenerate];
+
+    /// Whether squares of coordinates overflow.
+    pub(crate) fn may_overflow(self) -> bool {
+        self == Self::Huge
+    }
 
     fn place(self, [x, y, z]: [f32; 3], at: Key) -> [f32; 3] {
         match self {
@@ -55,6 +64,21 @@ pub(crate) struct Dress<'a> {
     pub(crate) reads: &'a [(String, Owner, ColumnType)],
 }
 
+/// The components of a wire into an input; `any` chooses them where the input takes any.
+pub(crate) fn kinds(needs: Needs, any: usize) -> Vec<Kind> {
+    match needs {
+        Needs::Kind(kind) => vec![kind],
+        Needs::Any => match any % 6 {
+            0 => vec![Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets],
+            1 => vec![Kind::Curves],
+            2 => vec![Kind::Mesh],
+            3 => vec![Kind::Points],
+            4 => vec![Kind::Tets],
+            _ => vec![Kind::Volume, Kind::Points],
+        },
+    }
+}
+
 /// A geometry with components of `kinds`. `seed` moves points and changes nothing else.
 pub(crate) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
     let mut geometry = Geometry::default();
@@ -63,7 +87,7 @@ pub(crate) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> G
             Kind::Volume => geometry.put_volume(volume(form, seed)),
             kind => {
                 let mut part = component(*kind, form, Key::new(seed).of(*kind as u64));
-                dressed(&mut part, dress);
+                dressed(&mut part, form, dress);
                 geometry.put(part);
             }
         }
@@ -107,7 +131,7 @@ pub(crate) fn described(attributes: &[&dyn AttrDecl]) -> Vec<(String, Owner, Col
     attributes.iter().map(described).collect()
 }
 
-fn dressed(part: &mut Component, dress: Dress) {
+fn dressed(part: &mut Component, form: Form, dress: Dress) {
     let is_read = |name: &str| dress.reads.iter().any(|(read, _, _)| read == name);
     let usual = usual();
     let read = dress.reads.iter().filter_map(|attribute| Some((attribute, dress.declared?)));
@@ -119,7 +143,7 @@ fn dressed(part: &mut Component, dress: Dress) {
         }
         let rows = part.table(*owner).rows();
         let column = match name.as_str() {
-            "Pref" => rest(part, Key::new(seed)),
+            "Pref" => rest(part, form, Key::new(seed)),
             _ => column(*kind, rows, Key::new(seed).of(hash(name))),
         };
         part.set_column(*owner, name.as_str(), column).expect("as many rows as the table, of the type the name has");
@@ -131,10 +155,12 @@ fn hash(name: &str) -> u64 {
     name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(257).wrapping_add(u64::from(byte)))
 }
 
-/// Positions, moved a little.
-fn rest(part: &Component, at: Key) -> Column {
+/// A rest pose: points of another sample of that form, moved a little. It does not depend on where the points of `part`
+/// are, so that a change of one is not a change of the other.
+fn rest(part: &Component, form: Form, at: Key) -> Column {
     let moved = |(row, p): (usize, &[f32; 3])| p.map(|x| x + 0.01 * at.of(row as u64).f32());
-    Column::new(part.positions().iter().enumerate().map(moved).collect::<Vec<_>>())
+    let other = component(part.kind(), form, Key::new(5));
+    Column::new(other.positions().iter().enumerate().map(moved).collect::<Vec<_>>())
 }
 
 /// Random rows: floats from 0 to 1, whole numbers from 0 to 3; rows of four floats are rotations.
@@ -185,26 +211,59 @@ fn settled(form: Form, at: Key, mut positions: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
     positions
 }
 
-/// Fur of some 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs. Each seed leans its
-/// curves another way, some into the mesh.
+/// Which CVs of a curve lie on one spot.
+#[derive(Clone, Copy)]
+enum Doubled {
+    No,
+    Root,
+    Middle,
+    Tip,
+    All,
+}
+
+impl Doubled {
+    /// Moves CVs of one curve onto each other.
+    fn apply(self, cvs: &mut [[f32; 3]]) {
+        let last = cvs.len() - 1;
+        match self {
+            Self::No => {}
+            Self::Root => cvs[1] = cvs[0],
+            Self::Middle => cvs[last / 2] = cvs[last / 2 + 1],
+            Self::Tip => cvs[last] = cvs[last - 1],
+            Self::All => cvs.fill(cvs[0]),
+        }
+    }
+}
+
+/// Fur of some 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs, some with doubled CVs.
+/// Each seed leans its curves another way, some into the mesh.
 fn curves(form: Form, at: Key) -> Component {
-    let counts: Vec<u32> = match form {
+    use Doubled::{All, Middle, No, Root, Tip};
+    let curves: Vec<(u32, Doubled)> = match form {
         Form::Empty => Vec::new(),
-        Form::Other => vec![3, 7, 1],
-        Form::Large => (0..400).map(|k| [5, 8, 2, 5, 1, 12][k % 6]).collect(),
-        _ => vec![5, 1, 2, 9, 4, 5],
+        Form::Other => vec![(3, No), (7, No), (1, No)],
+        Form::Large => (0..400).map(|k| ([5, 8, 2, 5, 1, 12][k % 6], No)).collect(),
+        Form::Degenerate => vec![(2, All), (1, No), (4, All), (3, All)],
+        _ => vec![(5, No), (1, No), (2, No), (9, Middle), (4, All), (5, Root), (2, All), (3, Tip), (4, No), (5, No)],
     };
+    let counts: Vec<u32> = curves.iter().map(|(count, _)| *count).collect();
     let mut positions = Vec::new();
     for (curve, count) in counts.iter().enumerate() {
         let angle = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)][curve % 5];
         let root = [0.06 * angle.0, 0.09 + 0.0001 * (curve / 5) as f32, 0.06 * angle.1];
         let step = 0.05 / (*count).max(2) as f32;
         let lean: [f32; 2] = [0, 1].map(|axis| 2.0 * at.of(9).of(curve as u64).of(axis).f32() - 1.0);
-        let way = [lean[0], 0.4 - 0.5 * lean[1], 0.2 + lean[1]].map(|x| step * x);
-        positions
-            .extend((0..*count).map(|cv| std::array::from_fn::<f32, 3, _>(|axis| root[axis] + way[axis] * cv as f32)));
+        let along = [lean[0], 0.4 - 0.5 * lean[1], 0.2 + lean[1]].map(|x| step * x);
+        let cv = |cv: u32| std::array::from_fn::<f32, 3, _>(|axis| root[axis] + along[axis] * cv as f32);
+        positions.extend((0..*count).map(cv));
     }
-    let positions = settled(form, at, positions);
+    let mut positions = settled(form, at, positions);
+    let mut rest = &mut positions[..];
+    for (count, doubled) in curves {
+        let (cvs, after) = rest.split_at_mut(count as usize);
+        doubled.apply(cvs);
+        rest = after;
+    }
     Component::curves(counts, positions).expect("counts that add up")
 }
 
@@ -216,7 +275,12 @@ fn mesh(form: Form, at: Key) -> Component {
         Form::Large => ball(24, 16),
         _ => ball(8, 5),
     };
-    let positions = settled(form, at, positions);
+    let mut positions = settled(form, at, positions);
+    if form == Form::Degenerate {
+        // A triangle at the pole without area, a quad beside it with a doubled corner.
+        positions[1] = positions[0];
+        positions[2] = positions[0];
+    }
     Component::mesh(counts, corners, positions).expect("corners in range")
 }
 
@@ -280,7 +344,14 @@ fn points(form: Form, at: Key) -> Component {
     };
     let spread = Key::new(11);
     let position = |row: usize| std::array::from_fn(|k| spread.of((row * 3 + k) as u64).between([-0.08, 0.08]));
-    Component::points(settled(form, at, (0..count).map(position).collect()))
+    let mut positions = settled(form, at, (0..count).map(position).collect());
+    let first = positions.first().copied().unwrap_or_default();
+    match form {
+        Form::Degenerate => positions.fill(first),
+        Form::Small => positions[9..].fill(first),
+        _ => {}
+    }
+    Component::points(positions)
 }
 
 /// Cubes of six tets each, side by side, 5 cm wide.
@@ -306,7 +377,11 @@ fn tets(form: Form, at: Key) -> Component {
             tets.push([base, base + a, base + b, base + 7]);
         }
     }
-    Component::tets(tets, settled(form, at, positions)).expect("corners in range")
+    let mut positions = settled(form, at, positions);
+    if form == Form::Degenerate {
+        positions[1] = positions[0];
+    }
+    Component::tets(tets, positions).expect("corners in range")
 }
 
 /// A ball of liquid in a box, falling.
@@ -345,7 +420,7 @@ mod tests {
 
     #[test]
     fn samples_of_one_form_have_one_topology_whatever_their_seed() {
-        let forms = [Form::Small, Form::Other, Form::Large, Form::Empty, Form::Huge, Form::Tiny, Form::Heap, Form::Far];
+        let forms = [&[Form::Small, Form::Other, Form::Large][..], &Form::EXTREMES].concat();
         for form in forms {
             let [a, b] = [1, 2].map(|seed| geometry(&Kind::ALL, form, seed, NAKED));
             for (a, b) in a.parts().zip(b.parts()) {

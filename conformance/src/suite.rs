@@ -1,22 +1,19 @@
-//! The conformance suite: what every node is held to, derived from its declaration alone.
-//!
-//! Promise: a node that passes reads and writes what it declares and nothing else, in every setting that was tried; its
-//! params, inputs and metrics all matter; it has the same bits on any number of threads, in any order of frames, alone or
-//! among others; it answers extremes with finite numbers or an error. Limit: a search. What a node does only with more
-//! than a few hundred rows, or with two params at one rare pair of values, it may not see. What it cannot invent (files,
-//! texts in a language) a test gives it through [`Conformance::with`].
+//! The suite: trials of a node, and every promise checked on what came out of them.
 
 use std::sync::Arc;
 
 use numerics::random::Key;
 
 use crate::bench::Bench;
-use crate::promises::{bits, declaration, passes, reads};
+use crate::promises::{
+    attributes, checkpoints, declaration, determinism, errors, frames, inputs, left_out, outputs, params, pass_through,
+    ranges,
+};
 use crate::samples::Form;
 use crate::trial::{Motion, Outcome, Prepare, Subject, Trial};
 use crate::values;
 use engine::error::ErrorKind;
-use engine::node::{Arity, Node};
+use engine::node::{Arity, Needs, Node};
 use engine::param::{Source, Unset};
 
 /// Fails where a node breaks any rule, with everything that was found.
@@ -70,17 +67,33 @@ impl Conformance {
         }
         let subject = Subject::new(self.node, self.samples);
         let tried = try_all(&subject);
-        passes::check(&subject, &tried, &mut findings);
+        errors::check(&subject, &tried, &mut findings);
+        outputs::check(&subject, &tried, &mut findings);
+        pass_through::check(&subject, &tried, &mut findings);
         if !tried.iter().any(|(_, outcome)| outcome.is_whole()) {
             let first = tried.first().and_then(|(_, outcome)| outcome.errors.first());
-            if let Some((_, ErrorKind::Refused | ErrorKind::File, said)) = first {
+            if let Some((_, ErrorKind::Refused | ErrorKind::File, error)) = first {
                 let fact = "it refuses all that the suite can offer; give it samples with `with`";
-                findings.add(format!("{fact}: {said}"));
+                findings.add(format!("{fact}: {error}"));
             }
             return findings.0;
         }
-        reads::check(&subject, &tried, &mut findings);
-        bits::check(&subject, &tried, &mut findings);
+        for check in [
+            left_out::check,
+            ranges::check,
+            params::check,
+            inputs::check,
+            attributes::check,
+            determinism::check,
+            frames::check,
+            checkpoints::check,
+        ] {
+            let t = std::time::Instant::now();
+            check(&subject, &tried, &mut findings);
+            if std::env::var_os("TIMES").is_some() {
+                eprintln!("{} {:?}", self.node.name, t.elapsed());
+            }
+        }
         findings.0
     }
 }
@@ -96,6 +109,13 @@ impl Findings {
             self.0.push(finding);
         }
     }
+}
+
+/// A few trials that came out whole, defaults first.
+pub(crate) fn sound(tried: &[(Trial, Outcome)], most: usize) -> impl Iterator<Item = &(Trial, Outcome)> {
+    let whole: Vec<_> = tried.iter().filter(|(_, outcome)| outcome.is_whole()).collect();
+    let step = whole.len().div_ceil(most).max(1);
+    whole.into_iter().step_by(step)
 }
 
 /// How many mixtures of settings are tried.
@@ -129,7 +149,7 @@ fn defaults(subject: &Subject) -> Vec<Trial> {
 }
 
 fn takes_any(subject: &Subject) -> bool {
-    subject.inputs.iter().any(|input| input.needs == engine::node::Needs::Any)
+    subject.inputs.iter().any(|input| input.needs == Needs::Any)
 }
 
 /// Each param at each of its values, all else by default.

@@ -12,7 +12,7 @@ use engine::error::ErrorKind;
 use engine::geometry::{ColumnType, Geometry, Kind, Name, Owner, P, Topology};
 use engine::graph::{Graph, Scene};
 use engine::key::{Hasher, Key};
-use engine::node::{Arity, AttrNames, Cook, InputSpec, LeftOut, Needs, Node};
+use engine::node::{Arity, AttrNames, Carries, Cook, InputSpec, LeftOut, Needs, Node, Output};
 use engine::param::{ParamSpec, Params, Source, Value};
 use engine::plan::{Plan, Request};
 use engine::time::Frame;
@@ -61,6 +61,22 @@ pub(crate) struct Trial {
     pub(crate) any: usize,
     pub(crate) motion: Motion,
     pub(crate) first: i64,
+}
+
+impl Trial {
+    /// The same with another value of one param.
+    pub(crate) fn with(&self, param: usize, value: Value) -> Self {
+        let mut trial = self.clone();
+        trial.settings[param] = Source::Constant(value);
+        trial
+    }
+
+    /// The same with the points of one input elsewhere.
+    pub(crate) fn reseeded(&self, input: usize) -> Self {
+        let mut trial = self.clone();
+        trial.wires[input].iter_mut().for_each(|seed| *seed += 1_000);
+        trial
+    }
 }
 
 /// What came out.
@@ -160,7 +176,7 @@ impl Subject {
         let dress = Dress { declared: trial.declared, others: trial.others, reads: &self.reads };
         let mut given = Vec::new();
         for (place, (input, seeds)) in self.inputs.iter().zip(&trial.wires).enumerate() {
-            let kinds = kinds(input.needs, trial.any);
+            let kinds = samples::kinds(input.needs, trial.any);
             let form = if trial.empty == Some(place) { Form::Empty } else { trial.form };
             let mut wires: Vec<Geometry> =
                 seeds.iter().map(|seed| samples::geometry(&kinds, form, *seed, dress)).collect();
@@ -177,6 +193,27 @@ impl Subject {
             given.push(wires);
         }
         (bench.graph(), given)
+    }
+
+    /// What a component that passes through comes from: the input that the output is like, else the first single input that
+    /// has such a component.
+    pub(crate) fn source<'o>(&self, outcome: &'o Outcome, output: &Output, kind: Kind) -> Option<&'o Geometry> {
+        let index = match output.carries {
+            Carries::Like(name) => self.inputs.iter().position(|input| input.name == name)?,
+            Carries::Kinds(_) => self.inputs.iter().position(|input| {
+                input.arity == Arity::One && (input.needs == Needs::Kind(kind) || input.needs == Needs::Any)
+            })?,
+            Carries::Union(_) => return None,
+        };
+        outcome.given[index].first()
+    }
+
+    /// The stages that the node reports as left out in a trial, without cooking it; none where params are refused.
+    pub(crate) fn left_out(&self, trial: &Trial) -> Vec<LeftOut> {
+        let (graph, _) = self.graph(trial);
+        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: self.frames() };
+        let stages = || Some(Plan::new(&graph, &request, Arc::default()).ok()?.left_out(graph.nodes.len() - 1));
+        quietly(|| catch_unwind(AssertUnwindSafe(stages))).ok().flatten().unwrap_or_default()
     }
 
     /// The params of a trial, unless they are refused.
@@ -246,21 +283,6 @@ impl Subject {
         }
         outcome.found = found;
         outcome
-    }
-}
-
-/// Components of a wire.
-fn kinds(needs: Needs, any: usize) -> Vec<Kind> {
-    match needs {
-        Needs::Kind(kind) => vec![kind],
-        Needs::Any => match any % 6 {
-            0 => vec![Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets],
-            1 => vec![Kind::Curves],
-            2 => vec![Kind::Mesh],
-            3 => vec![Kind::Points],
-            4 => vec![Kind::Tets],
-            _ => vec![Kind::Volume, Kind::Points],
-        },
     }
 }
 

@@ -9,6 +9,39 @@ use crate::samples::MASK;
 use engine::geometry::Column;
 use engine::param::{ParamSpec, Shape, Value, euler_to_turn};
 
+/// An end of a param's hard range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RangeEnd {
+    /// The last value that is accepted.
+    pub inside: Value,
+    /// A value just beyond it.
+    pub outside: Value,
+}
+
+/// The finite ends of a param's hard range, the lower one first; none for params without numbers. A value of several
+/// numbers has all of them at the end.
+pub fn range_ends(spec: &ParamSpec) -> Vec<RangeEnd> {
+    let hard = spec.facts.hard;
+    let whole = matches!(spec.shape, Shape::Int | Shape::Int3);
+    let value = |x: f64| match spec.shape {
+        Shape::Float => Some(Value::Float(x)),
+        Shape::Masked => Some(Value::Masked(x, None)),
+        Shape::Int => Some(Value::Int(x as i64)),
+        Shape::Vec2 => Some(Value::Vec2([x; 2])),
+        Shape::Span => Some(Value::Span([x; 2])),
+        Shape::Vec3 if !spec.facts.direction => Some(Value::Vec3([x; 3])),
+        Shape::Int3 => Some(Value::Int3([x as i64; 3])),
+        _ => None,
+    };
+    let end = |(end, outwards): (f64, f64)| {
+        let step = if whole { 1.0 } else { 1e-6 * end.abs().max(1e-3) };
+        let open = hard.open && outwards < 0.0;
+        let [inside, outside] = if open { [end + step, end] } else { [end, end + outwards * step] };
+        Some(RangeEnd { inside: value(inside)?, outside: value(outside)? })
+    };
+    [(hard.low, -1.0), (hard.high, 1.0)].into_iter().filter(|(end, _)| end.is_finite()).filter_map(end).collect()
+}
+
 /// Values worth trying: both ends of the range, each option, what lies between. None is refused.
 pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     let [low, high] = ends(spec);
@@ -97,7 +130,7 @@ const MOST_COUNT: f64 = 64.0;
 
 /// The ends of what is tried: the hard range where it is finite, else the usual range, else well around the default.
 /// Whole numbers keep to the usual range where the hard one allows more than is sensible to try.
-fn ends(spec: &ParamSpec) -> [f64; 2] {
+pub(crate) fn ends(spec: &ParamSpec) -> [f64; 2] {
     let (hard, soft) = (spec.facts.hard, spec.facts.soft);
     let default = largest(&spec.default);
     let around = if default > 0.0 { 100.0 * default } else { 1.0 };
@@ -150,6 +183,26 @@ mod tests {
         assert_eq!(candidates(&count)[..2], [Value::Int(1), Value::Int(20)]);
         let count = Param::<i64>::int("n", 8, "").at_least(0.0).spec();
         assert_eq!(candidates(&count)[..2], [Value::Int(0), Value::Int(39)]);
+    }
+
+    #[test]
+    fn range_ends_are_the_last_accepted_and_the_first_refused_values() {
+        let specs = [
+            Param::<f32>::float("x", 0.5, "").within(0.0, 1.0).spec(),
+            Param::<f32>::float("x", 0.5, "").above(0.0).spec(),
+            Param::<i64>::int("n", 8, "").within(1.0, 1e6).spec(),
+            Param::<[f32; 3]>::vec3("v", [1.0; 3], "").at_least(0.5).spec(),
+        ];
+        let counts = specs.each_ref().map(|spec| {
+            let ends = range_ends(spec);
+            for RangeEnd { inside, outside } in &ends {
+                assert!(spec.refuses(inside).is_none() && spec.refuses(outside).is_some(), "{inside} {outside}");
+            }
+            ends.len()
+        });
+        assert_eq!(counts, [2, 1, 2, 1]);
+        let outside = Value::Int(1_000_001);
+        assert_eq!(range_ends(&specs[2])[1], RangeEnd { inside: Value::Int(1_000_000), outside });
     }
 
     #[test]

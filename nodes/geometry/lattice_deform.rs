@@ -83,6 +83,7 @@ pub(crate) static NODE: Node = Node::new(
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&DEFORMED])
+.reads(&[&P])
 .writes(&[&P])
 .attributes(|_| {
     // Existing attributes alone are changed, so they are read as well.

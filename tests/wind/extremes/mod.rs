@@ -49,6 +49,9 @@ impl Scene {
             ("gusts", r#""radius_range": [0.4, 0.8], "start_frame_range": [-10, 2], "base": 0.2"#),
             ("wind", r#""wind_dir": { "keyframes": [[1, [1, 0, 0]], [3, [0, 0.5, 1]]] }"#),
             ("hairs", r#""density": 20"#),
+            ("lee", ""),
+            ("swing", ""),
+            ("out", ""),
         ];
         Self {
             fur: Arc::new(|_| curves(&hairs(20, 5, 0.3))),

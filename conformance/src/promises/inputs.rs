@@ -1,0 +1,24 @@
+//! Promise: every input changes the result.
+
+use engine::node::Arity;
+
+use crate::suite::Findings;
+use crate::trial::{Outcome, Subject, Trial};
+
+pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
+    let frames = subject.frames();
+    for (index, input) in subject.inputs.iter().enumerate() {
+        let mut wired = tried.iter().filter(|(trial, _)| !trial.wires[index].is_empty());
+        let matters = wired.any(|(trial, outcome)| {
+            let before = outcome.whole();
+            let mut fewer = trial.clone();
+            fewer.wires[index].pop();
+            let many = matches!(input.arity, Arity::Many { .. }) && trial.wires[index].len() > 1;
+            subject.run(&trial.reseeded(index), &frames).whole() != before
+                || many && subject.run(&fewer, &frames).whole() != before
+        });
+        if !matters {
+            findings.add(format!("the input `{}` never changes anything", input.name));
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Promise: every param is read and changes the result, and so does every mask.
+
+use engine::param::{Shape, Unset, Value};
+use numerics::random::Key;
+
+use crate::samples::MASK;
+use crate::suite::{self, Findings};
+use crate::trial::{Outcome, Subject, Trial};
+use crate::values;
+
+pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
+    for index in 0..subject.specs.len() {
+        check_param(subject, tried, index, findings);
+    }
+}
+
+/// Most pairs of trials that are compared for one param.
+const PAIRS: usize = 60;
+
+fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, findings: &mut Findings) {
+    let spec = &subject.specs[index];
+    // The engine uses it to choose the file of a sequence.
+    if spec.facts.unset == Unset::CurrentFrame {
+        return;
+    }
+    if !tried.iter().any(|(_, outcome)| outcome.read.get(index) == Some(&true)) {
+        findings.add(format!("it never reads the param `{}`", spec.name));
+        return;
+    }
+    let values = values(subject, index);
+    if !matters(subject, tried, index, &values) {
+        findings.add(format!("the param `{}` never changes anything", spec.name));
+    }
+    if spec.shape == Shape::Masked {
+        let [low, high] = [0.35, 0.85].map(|share| between(subject, index, share));
+        let pairs = [low, high].map(|x| [Value::Masked(x, None), Value::Masked(x, Some(MASK.into()))]);
+        let masked = trials(subject, tried, index).take(PAIRS).any(|(trial, _)| {
+            let masked = Trial { others: trial.others.or(Some(5)), ..trial };
+            pairs.iter().any(|[plain, masked_by]| {
+                let frames = subject.frames();
+                let run = |value: &Value| subject.run(&masked.with(index, value.clone()), &frames).whole();
+                run(plain) != run(masked_by)
+            })
+        });
+        if !masked {
+            findings.add(format!("the mask of `{}` never changes anything", spec.name));
+        }
+    }
+}
+
+/// A number `share` of the way through what a masked param may be.
+fn between(subject: &Subject, index: usize, share: f64) -> f64 {
+    let numbers: Vec<f64> = values::candidates(&subject.specs[index]).iter().map(Value::number).collect();
+    let (low, high) = numbers.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    low + (high - low) * share
+}
+
+pub(crate) fn values(subject: &Subject, index: usize) -> Vec<Value> {
+    let spec = &subject.specs[index];
+    let random = (0..3).map(|k| values::random(spec, Key::new(77).of(k)));
+    let mut values: Vec<Value> = Vec::new();
+    for value in values::candidates(spec).into_iter().chain(random).chain([spec.default.clone()]) {
+        if !values.contains(&value) {
+            values.push(value);
+        }
+    }
+    values
+}
+
+/// How many more mixtures are searched for one in which a param is read.
+const SOUGHT: u64 = 400;
+
+/// Trials in which the param is read, as far as the declaration says: those already cooked, then more mixtures.
+pub(crate) fn trials<'t>(
+    subject: &'t Subject,
+    tried: &'t [(Trial, Outcome)],
+    index: usize,
+) -> impl Iterator<Item = (Trial, Option<&'t Outcome>)> + 't {
+    let when = subject.specs[index].facts.when;
+    let is_read = move |trial: &Trial| match when {
+        None => true,
+        Some(when) => subject.params(trial).is_some_and(|params| when(&params)),
+    };
+    let at_hand = tried.iter().map(|(trial, outcome)| (trial.clone(), Some(outcome)));
+    let sought = (0..SOUGHT).map(|k| (suite::mixture(subject, 1_000 + k), None));
+    at_hand.chain(sought).filter(move |(trial, _)| is_read(trial))
+}
+
+fn matters(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, values: &[Value]) -> bool {
+    let frames = subject.frames();
+    if (0..subject.samples.len()).any(|sample| subject.prepared(sample).contains(&index)) {
+        return prepared_matters(subject, index);
+    }
+    let mut pairs = 0;
+    for (trial, outcome) in trials(subject, tried, index) {
+        let before = match outcome {
+            Some(outcome) => outcome.whole(),
+            None => subject.run(&trial, &frames).whole(),
+        };
+        for value in values {
+            if subject.run(&trial.with(index, value.clone()), &frames).whole() != before {
+                return true;
+            }
+            pairs += 1;
+        }
+        if pairs >= PAIRS {
+            return false;
+        }
+    }
+    false
+}
+
+/// Whether a sample without that param comes out otherwise, or two samples do.
+fn prepared_matters(subject: &Subject, index: usize) -> bool {
+    let frames = subject.frames();
+    let run = |sample: usize| {
+        let trial = Trial { sample, ..subject.defaults(1) };
+        subject.run(&trial, &frames).whole()
+    };
+    let without = run(usize::MAX);
+    (0..subject.samples.len())
+        .filter(|sample| subject.prepared(*sample).contains(&index))
+        .any(|sample| run(sample) != without)
+}

@@ -1,0 +1,89 @@
+//! A stage reported as left out has no effect.
+
+use super::*;
+
+#[test]
+fn what_is_left_out_still_writes_its_attributes() {
+    const DUST: Attr<f32> = Attr::point("dust");
+    let dusty: fn(&Cx) -> Result<Outputs> = |cx| {
+        let mut curves = up(cx, cx.get(AMOUNT))?;
+        if let Some(part) = curves.part_mut(Kind::Curves).filter(|_| cx.get(TWICE)) {
+            part.set(DUST, vec![1.0; part.point_count()])?;
+        }
+        Ok(OUT.with(curves))
+    };
+    let leaves_out: fn(&Params, &Wires) -> Vec<LeftOut> =
+        |params, _| if params.get(TWICE) { Vec::new() } else { vec![LeftOut::new("dust", "`twice` is false")] };
+    let node = shift(dusty).params(&[&AMOUNT, &TWICE]).writes(&[&P, &DUST]).leaves_out(leaves_out);
+    finds_only(node, "it leaves out `dust` and then lacks `dust` on its output `curves`");
+}
+
+type LeavesOut = fn(&Params, &Wires) -> Vec<LeftOut>;
+
+#[test]
+fn a_node_left_out_as_a_whole_hands_its_input_through() {
+    let leaves_out: LeavesOut = |params, _| match params.get(AMOUNT) {
+        0.0 => vec![LeftOut::new("all", "`amount` is 0")],
+        _ => Vec::new(),
+    };
+    // The early return was lost: the work is done, and moves nothing.
+    finds_only(
+        GOOD.leaves_out(leaves_out),
+        "it leaves out `all` (`amount` is 0) and still makes a new `P` for the curves",
+    );
+    let returns_early = shift(|cx| match cx.get(AMOUNT) {
+        0.0 => Ok(OUT.with(cx.input(CURVES).clone())),
+        amount => Ok(OUT.with(up(cx, amount)?)),
+    });
+    assert_eq!(findings_of(returns_early.leaves_out(leaves_out)), [""; 0]);
+}
+
+#[test]
+fn a_stage_left_out_too_often_is_found() {
+    let leaves_out: LeavesOut = |params, _| match params.get(AMOUNT) < 0.001 {
+        true => vec![LeftOut::new("shift", "`amount` is small")],
+        false => Vec::new(),
+    };
+    finds_only(
+        GOOD.leaves_out(leaves_out),
+        "it leaves out `shift` (`amount` is small), and `amount` changes the result all the same",
+    );
+}
+
+#[test]
+fn a_stage_that_is_not_left_out_in_truth_is_found() {
+    let leaves_out: LeavesOut = |params, _| match (params.get(TWICE), params.get(SPARE)) {
+        (false, _) => vec![LeftOut::new("extra", "`twice` is false")],
+        (true, 0.0) => vec![LeftOut::new("extra", "`spare` is 0")],
+        (true, _) => Vec::new(),
+    };
+    let honest = shift(|cx| {
+        let extra = if cx.get(TWICE) { cx.get(SPARE) } else { 0.0 };
+        Ok(OUT.with(up(cx, cx.get(AMOUNT) + extra)?))
+    });
+    assert_eq!(findings_of(honest.params(&[&AMOUNT, &TWICE, &SPARE]).leaves_out(leaves_out)), [""; 0]);
+    let runs_on = shift(|cx| {
+        let extra = if cx.get(TWICE) { 2.0 } else { 1.0 } * cx.get(SPARE);
+        Ok(OUT.with(up(cx, cx.get(AMOUNT) + extra)?))
+    });
+    finds_only(
+        runs_on.params(&[&AMOUNT, &TWICE, &SPARE]).leaves_out(leaves_out),
+        "it leaves out `extra` (`twice` is false), and `spare` changes the result all the same",
+    );
+}
+
+#[test]
+fn an_input_whose_stage_is_left_out_changes_nothing() {
+    let leaves_out: LeavesOut = |params, _| match params.get(TWICE) {
+        true => Vec::new(),
+        false => vec![LeftOut::new("other", "`twice` is false")],
+    };
+    let node = shift(|cx| {
+        let twice = if cx.get(TWICE) { 2.0 } else { 1.0 };
+        Ok(OUT.with(up(cx, cx.get(AMOUNT) + twice * cx.input(OTHER).map_or(0.0, first_y))?))
+    });
+    finds_only(
+        node.inputs(&[&CURVES, &OTHER]).params(&[&AMOUNT, &TWICE]).leaves_out(leaves_out),
+        "it leaves out `other` (`twice` is false), and the input `other` changes the result all the same",
+    );
+}

@@ -1,0 +1,49 @@
+//! What holds for the sources as a whole: where nodes stand, what they may use, what README says of them, and that no two
+//! public types share a name.
+
+#![allow(clippy::unwrap_used, reason = "a test's helpers")]
+
+mod nodes;
+mod paths;
+mod readme;
+mod tokens;
+mod type_names;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// All Rust files under a folder, or the file itself, in order.
+fn sources(path: &Path) -> Vec<(PathBuf, String)> {
+    if path.is_dir() {
+        let mut entries: Vec<PathBuf> = fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect();
+        entries.sort();
+        return entries.iter().flat_map(|entry| sources(entry)).collect();
+    }
+    let rust = path.extension().is_some_and(|extension| extension == "rs");
+    rust.then(|| (path.to_owned(), fs::read_to_string(path).unwrap())).into_iter().collect()
+}
+
+/// The node of docs/writing_nodes.md.
+#[path = "../../docs/examples/curve_helix.rs"]
+mod curve_helix;
+
+/// What `cargo xtask new-node` writes; xtask's tests see to it that these are its texts.
+#[path = "../new_nodes/curve_full.rs"]
+mod curve_full;
+#[path = "../new_nodes/curve_plain.rs"]
+mod curve_plain;
+
+#[test]
+fn the_guide_for_authors_shows_the_node_that_is_compiled() {
+    let guide = fs::read_to_string(root().join("docs/writing_nodes.md")).unwrap();
+    let node = fs::read_to_string(root().join("docs/examples/curve_helix.rs")).unwrap();
+    let (production, _) = node.split_once("#[cfg(test)]").unwrap();
+    assert!(
+        guide.contains(production.trim_end()),
+        "docs/writing_nodes.md quotes another node than docs/examples/curve_helix.rs"
+    );
+}
