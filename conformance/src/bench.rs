@@ -1,4 +1,4 @@
-//! A bench: one node with given inputs and params, cooked as a graph would cook it.
+//! A bench for one node: the inputs and params of a test, cooked as a graph would cook them.
 //!
 //! ```ignore
 //! let out = bench(&NODE).input(CURVES, curves).set(SHIELD, 0.5).cook();
@@ -21,7 +21,7 @@ use engine::param::{Keyframes, Param, ParamType, Shape, Source, Unset, Value};
 use engine::plan::Request;
 use engine::time::Frame;
 
-/// Puts a node on the bench.
+/// A bench for `node`, with default params and no inputs.
 pub fn bench(node: &'static Node) -> Bench {
     let specs: Arc<[_]> = node.param_specs().into();
     let scene = Scene { last: 48, ..Scene::default() };
@@ -42,10 +42,10 @@ pub fn bench(node: &'static Node) -> Bench {
 }
 
 type Moving = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
-/// What comes of what a wire brings, and which wire of the input that is.
+/// Turns the geometry of a wire, given its index in its input, into another.
 type Change = fn(usize, Geometry) -> Geometry;
 
-/// A node with given inputs and params.
+/// One node with the inputs and params of a test.
 #[derive(Clone)]
 pub struct Bench {
     node: &'static Node,
@@ -77,7 +77,8 @@ impl Bench {
         self.wire(input.name(), Arc::new(at), true)
     }
 
-    /// Changes what every wire of an input brings, whenever it is added: for inputs that take nothing but what a certain node makes.
+    /// Changes the geometry of every wire of an input, whether added before or after: for inputs that accept only what a
+    /// certain node makes.
     ///
     /// # Panics
     /// Where the node has no such input.
@@ -110,7 +111,7 @@ impl Bench {
         self.source(param.name(), Source::Constant(T::erase(value)))
     }
 
-    /// Keys a param, straight from key to key.
+    /// Animates a param with keys at frames, linear between them.
     ///
     /// # Panics
     /// Where the node has no such param.
@@ -134,21 +135,21 @@ impl Bench {
         self
     }
 
-    /// The scene the node stands in; 48 frames at 24 frames a second unless said.
+    /// The scene of the node; by default 48 frames at 24 frames per second.
     #[must_use]
     pub fn scene(mut self, scene: Scene) -> Self {
         self.scene = scene;
         self
     }
 
-    /// The frame [`Bench::cook`] cooks; 1 unless said.
+    /// The frame that [`Bench::cook`] cooks; by default 1.
     #[must_use]
     pub fn at(mut self, frame: f64) -> Self {
         self.frame = Frame::exactly(frame).expect("a frame");
         self
     }
 
-    /// How many threads cook; 2 unless said.
+    /// The number of threads that cook; by default 2.
     #[must_use]
     pub fn threads(mut self, threads: usize) -> Self {
         self.threads = threads;
@@ -184,7 +185,7 @@ impl Bench {
     /// Cooks frames of the first output, in the order given.
     ///
     /// # Errors
-    /// Where the node refuses any of them.
+    /// Where the node refuses one of them.
     pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<BenchResult>, Arc<CookError>> {
         let graph = self.graph();
         let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
@@ -206,7 +207,7 @@ impl Bench {
         Ok(frames.iter().map(result).collect())
     }
 
-    /// The graph: the given inputs, then the node; an output for each of the node's.
+    /// The graph: the inputs, then the node, with an output for each output of the node.
     pub fn graph(&self) -> Graph {
         let mut nodes = Vec::new();
         let mut inputs = Vec::new();
@@ -257,12 +258,12 @@ pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(
     (found, report)
 }
 
-/// What a node made at one frame.
+/// The result of a node at one frame.
 #[derive(Clone, Debug)]
 pub struct BenchResult {
-    /// Its first output.
+    /// The first output.
     pub geometry: Arc<Geometry>,
-    /// What it published.
+    /// The published metrics, by name.
     pub metrics: BTreeMap<&'static str, f64>,
 }
 

@@ -1,7 +1,7 @@
-//! Panics that a test expects, without their words on the terminal.
+//! Keeps panics that a test expects off the terminal.
 //!
-//! Promise: what panics outside [`quietly`] is shown as ever. Limit: while any thread is inside, panics of threads that
-//! cook are not shown, whoever they cook for.
+//! Panics outside [`quietly`] are printed as usual. Limit: while any thread is inside, panics of cooking threads are not
+//! printed, whichever test they cook for.
 
 use std::cell::Cell;
 use std::sync::Once;
@@ -12,10 +12,10 @@ thread_local! { static HERE: Cell<bool> = const { Cell::new(false) }; }
 /// How many threads are inside [`quietly`].
 static INSIDE: AtomicUsize = AtomicUsize::new(0);
 
-/// Runs `work`; panics in it, and in the threads that cook for it, print nothing.
+/// Runs `work`; panics in it, and in the threads that cook for it, are not printed.
 ///
-/// The hook is put in once and stays, asking each time: hooks belong to the whole process, and tests that run side by
-/// side would take out each other's.
+/// The panic hook is set once and stays: it belongs to the whole process, and tests that run in parallel would remove each
+/// other's.
 pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -32,7 +32,7 @@ pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Leaves where it is dropped, so also where `work` panics.
+/// Marks a thread as inside; dropped on the way out, also when `work` panics.
 struct Inside(bool);
 
 impl Inside {

@@ -1,24 +1,24 @@
-//! Geometry to try nodes on: small components of every kind, in several shapes, with attributes a node did not ask for.
+//! Sample geometry: small components of every kind, in several forms, with attributes that a node did not ask for.
 //!
-//! All samples of one kind and shape have the same topology, whatever their seed: what a node compares point by point
-//! (a rest pose, a moving skin) fits together.
+//! All samples of one kind and form have the same topology, whatever their seed, so that what a node compares point by
+//! point (a rest pose, a moving skin) matches.
 
 use numerics::random::Key;
 
 use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
 use engine::node::{AttrDecl, Needs};
 
-/// How points lie, and how many there are.
+/// The number and the arrangement of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     /// A few curves of 1 to 9 CVs, some with doubled CVs or without length, a closed mesh, a dozen points, some of them
     /// coincident, a few tets.
     Small,
-    /// Another count of everything; the mesh is open.
+    /// Other counts; the mesh is open.
     Other,
     /// Enough for several threads.
     Large,
-    /// Components without a row.
+    /// Empty components.
     Empty,
     /// Coordinates near the largest f32.
     Huge,
@@ -33,7 +33,7 @@ pub(crate) enum Form {
 }
 
 impl Form {
-    /// Forms that no scene should have, and any may.
+    /// Forms that no scene should have, and some will.
     pub(crate) const EXTREMES: [Self; 6] =
         [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far, Self::Degenerate];
 
@@ -95,7 +95,7 @@ pub(crate) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> G
     geometry
 }
 
-/// What the samples have besides what a node reads: attributes as artists and readers leave them.
+/// The attributes of samples besides those a node reads: common ones, and some of every type.
 pub(crate) fn usual() -> Vec<(String, Owner, ColumnType)> {
     use ColumnType as T;
     use Owner as O;
@@ -119,7 +119,7 @@ pub(crate) fn usual() -> Vec<(String, Owner, ColumnType)> {
     rows.map(|(name, owner, kind)| (name.to_owned(), owner, kind)).to_vec()
 }
 
-/// The float a point that masks of the suite name.
+/// The point attribute, a float, that the suite names as mask.
 pub(crate) const MASK: &str = "sample_mask";
 
 /// Name, owner and type of declared attributes.
@@ -150,7 +150,7 @@ fn dressed(part: &mut Component, form: Form, dress: Dress) {
     }
 }
 
-/// Another number for another name.
+/// A number for a name.
 fn hash(name: &str) -> u64 {
     name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(257).wrapping_add(u64::from(byte)))
 }
@@ -198,7 +198,7 @@ fn component(kind: Kind, form: Form, at: Key) -> Component {
     }
 }
 
-/// Up to a millimetre or two either way, so that nothing is regular by accident.
+/// Up to 2 mm in each direction, so that nothing is regular by accident.
 fn jitter(at: Key, row: usize) -> [f32; 3] {
     std::array::from_fn(|k| at.of((row * 3 + k) as u64).between([-0.002, 0.002]))
 }
@@ -222,7 +222,7 @@ enum Doubled {
 }
 
 impl Doubled {
-    /// Moves CVs of one curve onto each other.
+    /// Makes CVs of one curve coincide.
     fn apply(self, cvs: &mut [[f32; 3]]) {
         let last = cvs.len() - 1;
         match self {
@@ -236,7 +236,7 @@ impl Doubled {
 }
 
 /// Fur of some 5 cm on the sample mesh: roots at its upper side, some curves of one and two CVs, some with doubled CVs.
-/// Each seed leans its curves another way, some into the mesh.
+/// Each seed leans its curves in other directions, some into the mesh.
 fn curves(form: Form, at: Key) -> Component {
     use Doubled::{All, Middle, No, Root, Tip};
     let curves: Vec<(u32, Doubled)> = match form {
@@ -369,7 +369,7 @@ fn tets(form: Form, at: Key) -> Component {
         positions.extend(
             (0..8).map(|k| [0.05 * corner(k, 0) + 0.06 * cube as f32, 0.05 * corner(k, 1), 0.05 * corner(k, 2)]),
         );
-        // From corner 0 to corner 7 along the three axes in each of their six orders; odd orders turn the other way.
+        // From corner 0 to corner 7 along the axes in each of their six orders; odd orders have the opposite orientation.
         let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
         for (place, order) in orders.iter().enumerate() {
             let [a, b] = [1 << order[0], (1 << order[0]) | (1 << order[1])];

@@ -1,4 +1,4 @@
-//! The suite: trials of a node, and every promise checked on what came out of them.
+//! The suite: cooks trials of a node and checks every promise on their outcomes.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use engine::error::ErrorKind;
 use engine::node::{Arity, Needs, Node};
 use engine::param::{Source, Unset};
 
-/// Fails where a node breaks any rule, with everything that was found.
+/// Checks all promises of a node, and fails with everything that was found.
 ///
 /// # Panics
 /// Where the node does not conform.
@@ -24,32 +24,32 @@ pub fn conforms(node: &'static Node) {
     conformance(node).run();
 }
 
-/// What is wrong with a node, a line a finding; empty where it conforms.
+/// Everything that is wrong with a node, one finding per line; empty where it conforms.
 pub fn faults(node: &'static Node) -> Vec<String> {
     conformance(node).faults()
 }
 
-/// The suite for a node that needs something the suite cannot invent.
+/// The suite for a node that needs what the suite cannot invent; see [`Conformance::with`].
 pub fn conformance(node: &'static Node) -> Conformance {
     Conformance { node, samples: Vec::new() }
 }
 
-/// A node under the suite, and how it is prepared.
+/// A node under test, and its prepared samples.
 pub struct Conformance {
     node: &'static Node,
     samples: Vec<Prepare>,
 }
 
 impl Conformance {
-    /// Tries the node with what `prepare` sets on the bench: a file, a text in a language. Several samples take turns. What
-    /// a sample sets is not varied otherwise.
+    /// Tries the node with what `prepare` sets on the bench, such as a file or a text in a language. Several samples take
+    /// turns. The params that a sample sets are not varied.
     #[must_use]
     pub fn with(mut self, prepare: impl Fn(Bench) -> Bench + Send + Sync + 'static) -> Self {
         self.samples.push(Arc::new(prepare));
         self
     }
 
-    /// Fails where the node breaks any rule, with everything that was found.
+    /// Checks all promises, and fails with everything that was found.
     ///
     /// # Panics
     /// Where the node does not conform.
@@ -59,7 +59,7 @@ impl Conformance {
         assert!(faults.is_empty(), "{name} does not conform:\n  {}", faults.join("\n  "));
     }
 
-    /// What is wrong with the node, a line a finding.
+    /// Everything that is wrong with the node, one finding per line.
     pub fn faults(self) -> Vec<String> {
         let mut findings = Findings::default();
         if !declaration::check(self.node, &mut findings) {
@@ -88,11 +88,7 @@ impl Conformance {
             frames::check,
             checkpoints::check,
         ] {
-            let t = std::time::Instant::now();
             check(&subject, &tried, &mut findings);
-            if std::env::var_os("TIMES").is_some() {
-                eprintln!("{} {:?}", self.node.name, t.elapsed());
-            }
         }
         findings.0
     }
@@ -111,24 +107,24 @@ impl Findings {
     }
 }
 
-/// A few trials that came out whole, defaults first.
+/// At most about `most` trials without errors, spread over all, defaults first.
 pub(crate) fn sound(tried: &[(Trial, Outcome)], most: usize) -> impl Iterator<Item = &(Trial, Outcome)> {
     let whole: Vec<_> = tried.iter().filter(|(_, outcome)| outcome.is_whole()).collect();
     let step = whole.len().div_ceil(most).max(1);
     whole.into_iter().step_by(step)
 }
 
-/// How many mixtures of settings are tried.
+/// Trials with random params.
 const MIXTURES: u64 = 32;
 
-/// All trials, cooked: defaults in several dresses, each param at each of its values, mixtures.
+/// All trials, cooked: defaults with several inputs, each param at each of its values, mixtures.
 fn try_all(subject: &Subject) -> Vec<(Trial, Outcome)> {
     let frames = subject.frames();
     let trials = defaults(subject).into_iter().chain(singles(subject)).chain(mixtures(subject));
     trials.map(|trial| (trial.clone(), subject.run(&trial, &frames))).collect()
 }
 
-/// Defaults: dressed and naked, with optional inputs and without, lists of 0, 1 and 2 wires, both forms.
+/// Default params: with attributes and without, with optional inputs and without, lists of 0, 1 and 2 wires, both forms.
 fn defaults(subject: &Subject) -> Vec<Trial> {
     let full = subject.defaults(2);
     let mut bare = Trial { declared: None, others: None, ..subject.defaults(0) };
@@ -152,7 +148,7 @@ fn takes_any(subject: &Subject) -> bool {
     subject.inputs.iter().any(|input| input.needs == Needs::Any)
 }
 
-/// Each param at each of its values, all else by default.
+/// Each param at each of its candidate values, all others at their defaults.
 fn singles(subject: &Subject) -> Vec<Trial> {
     let full = subject.defaults(2);
     let mut trials = Vec::new();
@@ -166,7 +162,7 @@ fn singles(subject: &Subject) -> Vec<Trial> {
     trials
 }
 
-/// Everything at random.
+/// All params random.
 fn mixtures(subject: &Subject) -> Vec<Trial> {
     (0..MIXTURES).map(|k| mixture(subject, k)).collect()
 }

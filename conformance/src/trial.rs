@@ -1,4 +1,4 @@
-//! One try of a node: settings and inputs, cooked, and what came out of it.
+//! A trial: a node cooked with certain params and inputs, and the outcome.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ use engine::time::Frame;
 /// Sets what the suite cannot invent: files, texts in a language.
 pub(crate) type Prepare = Arc<dyn Fn(Bench) -> Bench + Send + Sync>;
 
-/// The node that is tried, and what is known of it.
+/// The node under test, and its declaration.
 pub(crate) struct Subject {
     pub(crate) node: &'static Node,
     pub(crate) specs: Vec<ParamSpec>,
@@ -29,7 +29,7 @@ pub(crate) struct Subject {
     reads: Vec<(String, Owner, ColumnType)>,
 }
 
-/// How inputs go with time.
+/// How inputs change with time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motion {
     /// They stand still, and the engine knows.
@@ -40,7 +40,7 @@ pub(crate) enum Motion {
     Unknown,
 }
 
-/// Settings and inputs.
+/// The params and inputs of one trial.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
     pub(crate) settings: Vec<Source>,
@@ -53,11 +53,11 @@ pub(crate) struct Trial {
     pub(crate) declared: Option<u64>,
     /// Seed of those that it does not.
     pub(crate) others: Option<u64>,
-    /// The one of those that is taken away.
+    /// The attribute that is removed.
     pub(crate) without: Option<String>,
-    /// The input whose wires have no row.
+    /// The input whose wires are empty.
     pub(crate) empty: Option<usize>,
-    /// Which components inputs have that take any.
+    /// Chooses the components of inputs that take any; see [`samples::kinds`].
     pub(crate) any: usize,
     pub(crate) motion: Motion,
     pub(crate) first: i64,
@@ -79,25 +79,25 @@ impl Trial {
     }
 }
 
-/// What came out.
+/// What came out of a trial.
 pub(crate) struct Outcome {
     pub(crate) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
-    /// By output, the first error of each node.
+    /// The first error of each node, by output.
     pub(crate) errors: Vec<(usize, ErrorKind, String)>,
     pub(crate) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
     /// Which params were read.
     pub(crate) read: Vec<bool>,
     pub(crate) left_out: Vec<LeftOut>,
-    /// Attributes read and written as the params say.
+    /// Attributes read and written, where the params decide which.
     pub(crate) names: Option<[AttrNames; 2]>,
-    /// The first geometry of each wire, as it was given; all but `P` is what the node got.
+    /// The geometry of each wire; where inputs move, the node got other positions.
     pub(crate) given: Vec<Vec<Geometry>>,
 }
 
-/// How often a cook is tried: on one thread, or more.
+/// The engine with that number of threads.
 pub(crate) fn engine(threads: usize) -> &'static Engine {
     static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
-        // No memory: nothing may be found that an earlier trial left.
+        // Without memory, so that no trial finds results of an earlier one.
         [1, 2, 7].map(|threads| (threads, Engine::new(&Settings { threads, memory: 0 }).expect("threads")))
     });
     let found = ENGINES.iter().find(|(count, _)| *count == threads);
@@ -110,7 +110,7 @@ impl Subject {
         Self { node, specs, inputs, samples, reads }
     }
 
-    /// Frames that show how a node goes with time.
+    /// The frames that are cooked, chosen by how the node depends on time.
     pub(crate) fn frames(&self) -> Vec<Frame> {
         let frames: &[f64] = match self.node.cook {
             Cook::Pure(_) => &[1.0],
@@ -121,12 +121,12 @@ impl Subject {
         frames.iter().map(|frame| Frame::exactly(*frame).expect("a frame")).collect()
     }
 
-    /// Whether it knows of time at all.
+    /// Whether the node depends on time.
     pub(crate) fn is_timed(&self) -> bool {
         !matches!(self.node.cook, Cook::Pure(_))
     }
 
-    /// Defaults; every input wired, lists `many` times.
+    /// Default params; every input wired, lists with `many` wires.
     pub(crate) fn defaults(&self, many: usize) -> Trial {
         let wires = |(place, input): (usize, &InputSpec)| {
             let count = if let Arity::Many { least } = input.arity { many.max(least) } else { 1 };
@@ -155,7 +155,7 @@ impl Subject {
         }
     }
 
-    /// What the prepared sample sets besides: the places of those params.
+    /// The indices of the params that a prepared sample sets.
     pub(crate) fn prepared(&self, sample: usize) -> Vec<usize> {
         let Some(prepare) = self.samples.get(sample) else { return Vec::new() };
         let (before, after) = (bench(self.node), prepare(bench(self.node)));
@@ -216,7 +216,7 @@ impl Subject {
         quietly(|| catch_unwind(AssertUnwindSafe(stages))).ok().flatten().unwrap_or_default()
     }
 
-    /// The params of a trial, unless they are refused.
+    /// The params of a trial at the start of the scene; `None` where they are refused.
     pub(crate) fn params(&self, trial: &Trial) -> Option<Params> {
         let (graph, _) = self.graph(trial);
         let request = Request::everything(&graph);
@@ -293,7 +293,7 @@ fn take_away(geometry: &mut Geometry, name: &str) {
     }
 }
 
-/// The geometry at a frame: drifting along x, and growing.
+/// The geometry at a frame: it drifts along x and grows.
 fn moved(geometry: &Geometry, frame: Frame) -> Geometry {
     let mut geometry = geometry.clone();
     let (drift, growth) = (0.002 * frame.number() as f32, 1.0 + 0.003 * frame.number() as f32);
@@ -307,7 +307,7 @@ fn moved(geometry: &Geometry, frame: Frame) -> Geometry {
 }
 
 impl Outcome {
-    /// A key of all that came out, and of all that was refused; attributes that `ignore` names left out.
+    /// A hash of all results and errors, without the attributes that `ignore` names.
     pub(crate) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> Key {
         let mut key = Hasher::default();
         for ((output, frame), geometry) in &self.found {
@@ -325,12 +325,12 @@ impl Outcome {
         key.finish()
     }
 
-    /// A key of everything.
+    /// A hash of all results and errors.
     pub(crate) fn whole(&self) -> Key {
         self.digest(&|_| false)
     }
 
-    /// A key of what came out at one frame; where nothing did, of what was refused.
+    /// A hash of the results at one frame, or of the errors where there are none.
     pub(crate) fn at(&self, frame: Frame) -> Key {
         let mut key = Hasher::default();
         let mut there = false;
@@ -388,7 +388,7 @@ fn hash_words(key: &mut Hasher, words: &[u32]) {
     }
 }
 
-/// The attribute that masks a param by its settings.
+/// The attributes that mask params.
 pub(crate) fn masks(settings: &[Source]) -> impl Iterator<Item = &Name> {
     settings.iter().filter_map(|source| match source {
         Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => Some(attribute),

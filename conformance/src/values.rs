@@ -1,4 +1,4 @@
-//! Values to try params with, found from their declarations.
+//! Values to try params with, derived from their declarations.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub fn range_ends(spec: &ParamSpec) -> Vec<RangeEnd> {
     [(hard.low, -1.0), (hard.high, 1.0)].into_iter().filter(|(end, _)| end.is_finite()).filter_map(end).collect()
 }
 
-/// Values worth trying: both ends of the range, each option, what lies between. None is refused.
+/// Values worth trying: both ends of the range, its middle, each option. None is refused.
 pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     let [low, high] = ends(spec);
     let middle = 0.5 * low + 0.5 * high;
@@ -100,7 +100,7 @@ pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     values.into_iter().filter(|value| spec.refuses(value).is_none()).collect()
 }
 
-/// A value at random: often the default, often an end, else anywhere in the usual range.
+/// A random value: often the default, often a candidate, otherwise anywhere in the usual range.
 pub(crate) fn random(spec: &ParamSpec, at: Key) -> Value {
     let candidates = candidates(spec);
     let pick = at.of(1).f32();
@@ -125,11 +125,11 @@ pub(crate) fn random(spec: &ParamSpec, at: Key) -> Value {
     }
 }
 
-/// Whole numbers above this may be counts of things to make.
+/// Whole numbers above this are not tried without need: they may be counts of things to make.
 const MOST_COUNT: f64 = 64.0;
 
-/// The ends of what is tried: the hard range where it is finite, else the usual range, else well around the default.
-/// Whole numbers keep to the usual range where the hard one allows more than is sensible to try.
+/// The range of values that are tried: the hard range where it is finite, otherwise the usual range, otherwise a wide range
+/// around the default. Whole numbers keep to the usual range where the hard one is too wide.
 pub(crate) fn ends(spec: &ParamSpec) -> [f64; 2] {
     let (hard, soft) = (spec.facts.hard, spec.facts.soft);
     let default = largest(&spec.default);
@@ -152,7 +152,7 @@ pub(crate) fn ends(spec: &ParamSpec) -> [f64; 2] {
     [low, high]
 }
 
-/// The largest number of a value, without its sign.
+/// The largest magnitude among the numbers of a value.
 fn largest(value: &Value) -> f64 {
     match value {
         Value::Vec2(v) | Value::Span(v) => v.iter().fold(0.0, |most, x| x.abs().max(most)),

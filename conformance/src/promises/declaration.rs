@@ -1,4 +1,4 @@
-//! What a declaration must say, before anything is cooked.
+//! Promise: the declaration is complete and consistent. Checked before anything is cooked.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -8,7 +8,7 @@ use engine::geometry::{Name, fixed_type};
 use engine::node::{Arity, AttrDecl, Carries, Cook, InputSpec, Node};
 use engine::param::{Bounds, ParamSpec, Params, Shape, Unit, Value};
 
-/// Adds what is wrong; says whether the node can be tried at all.
+/// Adds what is wrong; returns whether the node can be tried at all.
 pub(crate) fn check(node: &'static Node, findings: &mut Findings) -> bool {
     if !is_node_name(node.name) {
         findings.add(format!("its name `{}` is not made of capitalised words joined by `_`", node.name));
@@ -64,7 +64,7 @@ fn is_snake_case(name: &str) -> bool {
     letters && name.starts_with(|c: char| c.is_ascii_lowercase()) && !name.ends_with('_') && !name.contains("__")
 }
 
-/// At least a sentence: two words, a capital first, a full stop last.
+/// At least a sentence: two words, starting with a capital, ending with a full stop.
 fn check_help(whose: &str, help: &str, findings: &mut Findings) {
     let first = help.chars().next();
     let starts = first.is_some_and(|c| !c.is_lowercase());
@@ -145,16 +145,17 @@ fn check_attributes(what: &str, attributes: &[&dyn AttrDecl], findings: &mut Fin
     }
 }
 
-/// What plans ask before anything is cooked may hang only on params that stand still, or that are kept over time.
+/// What plans ask before anything is cooked may depend only on params that are `fixed`, or that have `history`.
 fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mut Findings) {
     let fixed = |spec: &ParamSpec| spec.facts.fixed;
     if let Some(attributes) = node.attributes {
         let read = read_by(specs, |params| {
             attributes(params);
         });
-        // Of code only the controls in it move; which attributes it names does not.
+        // Controls in code may be animated; the attributes that it names stay the same.
         for spec in read.iter().filter(|spec| !fixed(spec) && spec.shape != Shape::Code) {
-            findings.add(format!("its attributes hang on `{}`, which may be animated; declare it `fixed`", spec.name));
+            findings
+                .add(format!("its attributes depend on `{}`, which may be animated; declare it `fixed`", spec.name));
         }
     }
     if let Cook::Solver(..) = node.cook {
@@ -162,7 +163,7 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
             node.start_frame(params);
         });
         for spec in read.iter().filter(|spec| !fixed(spec)) {
-            findings.add(format!("its start hangs on `{}`, which may be animated; declare it `fixed`", spec.name));
+            findings.add(format!("its start depends on `{}`, which may be animated; declare it `fixed`", spec.name));
         }
     }
     let integrated = read_by(specs, |params| {
@@ -180,7 +181,7 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
     }
 }
 
-/// Which params a function of the params reads, by default and with every choice made another way.
+/// The params that a function of the params reads: with defaults, and with each option of every choice.
 fn read_by(specs: &[ParamSpec], ask: impl Fn(&Params)) -> Vec<ParamSpec> {
     let options = specs.iter().map(|spec| match spec.shape {
         Shape::Choice(options) => options.len(),

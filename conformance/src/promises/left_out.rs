@@ -29,9 +29,6 @@ const WHOLE_NODE: &str = "all";
 const TRIALS: usize = 3;
 
 pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
-    if subject.node.leaves_out.is_none() {
-        return;
-    }
     check_written(subject, tried, findings);
     let names = names(tried);
     let mut seen: BTreeMap<(&str, &str), usize> = BTreeMap::new();

@@ -64,12 +64,12 @@ fn outputs_say_what_they_carry_and_attributes_have_their_types() {
 }
 
 #[test]
-fn what_plans_ask_hangs_on_params_that_stand_still() {
+fn what_plans_ask_depends_on_fixed_params_alone() {
     let attributes: fn(&Params) -> [AttrNames; 2] = |params| {
         params.get(AMOUNT);
         [AttrNames::These(Vec::new()), AttrNames::These(Vec::new())]
     };
-    finds_only(GOOD.attributes(attributes), "its attributes hang on `amount`, which may be animated");
+    finds_only(GOOD.attributes(attributes), "its attributes depend on `amount`, which may be animated");
     let clock =
         Cook::Frame { cook: |cx| Ok(OUT.with(up(cx, cx.integral(cx.frame())[0] as f32)?)), reads_clock: |_| true };
     let integrand: fn(&Params) -> [f64; 3] = |params| [f64::from(params.get(AMOUNT)), 0.0, 0.0];
@@ -85,6 +85,6 @@ fn what_plans_ask_hangs_on_params_that_stand_still() {
     let start: fn(&Params) -> Option<i64> = |params| Some(params.get(AMOUNT) as i64);
     finds(
         Node { cook: Cook::solver::<Fall>(start), ..falling() },
-        "its start hangs on `amount`, which may be animated",
+        "its start depends on `amount`, which may be animated",
     );
 }

@@ -41,7 +41,7 @@ fn an_integral_passes() {
 }
 
 #[test]
-fn a_frame_that_hangs_on_frames_before_it_is_found() {
+fn a_frame_that_depends_on_frames_before_it_is_found() {
     static LAST: AtomicU32 = AtomicU32::new(0);
     let cook: fn(&FrameCx) -> Result<Outputs> = |cx| {
         let last = LAST.swap(cx.frame().floor_number() as u32, Ordering::Relaxed);

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn what_a_node_does_not_own_goes_through_untouched() {
+fn what_a_node_does_not_write_passes_through() {
     let writes: fn(&Cx) -> Result<Outputs> = |cx| {
         let mut curves = up(cx, cx.get(AMOUNT))?;
         if let Some(part) = curves.part_mut(Kind::Curves) {

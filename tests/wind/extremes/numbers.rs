@@ -94,13 +94,13 @@ fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
     // The nodes whose params a scene can set.
     let ids: Vec<&'static str> = Scene::new().params.into_keys().collect();
     for (node, known) in scene.nodes.iter().filter_map(|node| Some((node, node.node()?))) {
-        let Some(id) = ids.iter().find(|id| **id == *node.id) else { continue };
+        let Some(id) = ids.iter().copied().find(|id| **id == *node.id) else { continue };
         for spec in known.param_specs() {
             for RangeEnd { inside, .. } in range_ends(&spec) {
                 let Some(text) = json(&inside) else { continue };
                 // Each step is computed, and at a blend of 0 crossings are not looked for.
                 let dear = spec.name == "rotation_steps" && inside != Value::Int(1);
-                if dear || spec.name == "blend" && *id == "out" && inside.number() == 0.0 {
+                if dear || spec.name == "blend" && id == "out" && inside.number() == 0.0 {
                     continue;
                 }
                 let at_end = Scene::new().with(id, format!(r#""{}": {text}"#, spec.name));
