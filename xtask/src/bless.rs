@@ -14,6 +14,8 @@ pub(crate) enum Expectation {
     Messages,
     /// What `cargo xtask new-node` writes: tests/new_nodes
     Nodes,
+    /// README's table of nodes
+    Readme,
     /// Tables of laws in docs/, and bits of the last frames of scenes with a solver: benches/graphs.txt
     Laws,
     /// Counts of instructions, where valgrind is installed: benches/instructions.txt
@@ -27,6 +29,7 @@ impl Expectation {
             Self::Graphs => &["test", "--test", "graphs", "every_example_has_the_stored_bits"],
             Self::Messages => &["test", "-p", "engine", "--lib", "stored_messages"],
             Self::Nodes => &["test", "-p", "xtask", "rendered_nodes"],
+            Self::Readme => &["test", "--test", "catalogue", "readme_lists_the_catalogue"],
             Self::Laws => &["bench", "--bench", "laws", "--", "--bless"],
             Self::Instructions => &["bench", "--bench", "instructions", "--", "--bless"],
         }
@@ -38,6 +41,7 @@ impl Expectation {
             Self::Graphs => &["tests/graphs.txt"],
             Self::Messages => &["engine/src/graph/tests/faults.txt"],
             Self::Nodes => &["tests/new_nodes"],
+            Self::Readme => &["README.md"],
             Self::Laws => &["docs/wind.md", "docs/softbody.md", "benches/graphs.txt"],
             Self::Instructions => &["benches/instructions.txt"],
         }
