@@ -10,16 +10,13 @@ const FOLDERS: [&str; 8] =
     ["conformance/src", "engine/src", "formats/src", "kernels", "nodes", "numerics/src", "preview/src", "src"];
 
 /// Names that several public types have, and why they may.
-const SHARED: [(&str, &str); 9] = [
+const SHARED: [(&str, &str); 6] = [
     ("Args", "each verb of the program has its own, and is named with it: `cook::Args`"),
     ("Bounds", "of a param's range; of a picture, in `preview`"),
-    ("Drag", "a node's choice is the kernel's"),
     ("Error", "of the engine; of a picture, in `preview`"),
     ("Frame", "of time; of a face that carries roots"),
     ("Key", "of a result, in `engine`; of random numbers, in `numerics`"),
-    ("Part", "of a graph file; of an attribute, in a node's choice"),
     ("Settings", "of an engine; of a picture, in `preview`"),
-    ("Shape", "of a param's JSON; of a gust, in a node's choice"),
 ];
 
 /// The public types that a source declares.
