@@ -58,7 +58,8 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 
 #[test]
 fn nan_at_degenerate_curves_alone_is_found() {
-    let bad: [(&str, fn(&Cx) -> Result<Outputs>); 4] = [
+    type BadCook = fn(&Cx) -> Result<Outputs>;
+    let bad: [(&str, BadCook); 4] = [
         ("doubled CVs", |cx| {
             by_share(cx, |cvs, cv| {
                 let length = cvs.windows(2).map(|pair| distance(pair[0], pair[1])).sum::<f32>();
