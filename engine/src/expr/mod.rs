@@ -112,7 +112,7 @@ impl Scope<'_> {
     }
 }
 
-/// What the names of a text stand for now.
+/// The values that the names in an expression currently have.
 #[derive(Clone, Copy, Debug)]
 pub struct Env<'a> {
     /// Frame number, with fraction.
