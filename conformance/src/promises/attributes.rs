@@ -24,7 +24,8 @@ fn check_declared(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut 
         let written = subject.node.writes.iter().any(|write| write.spec().0 == name);
         // An attribute that only passes through is not read: it is compared only where the node writes it.
         let ignore = |other: &str| !written && other == name;
-        let mut dressed = tried.iter().filter(|(trial, _)| trial.declared.is_some());
+        // Mixtures first: an attribute matters in more of them than of the trials with one param changed.
+        let mut dressed = tried.iter().rev().filter(|(trial, _)| trial.declared.is_some());
         let matters = dressed.any(|(trial, outcome)| {
             let without = Trial { without: Some(name.to_owned()), ..trial.clone() };
             subject.run(&without, &frames).digest(&ignore) != outcome.digest(&ignore)

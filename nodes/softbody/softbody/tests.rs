@@ -53,14 +53,17 @@ fn height(tasted: &BenchResult) -> f32 {
 }
 
 /// Where samples have points, a block with points inside, another for each wire: the suite's own bodies are all surface,
-/// and all the same.
+/// and all the same. Where samples have `surface_point`, it makes a point inside the longer block one of the surface.
 fn with_inside(wire: usize, given: Geometry) -> Geometry {
-    match given.tets() {
-        Some(tets) if tets.point_count() > 0 => {
-            block([2 + wire, 2, 2], [0.0, 0.12 * wire as f32, 0.0], [0.1; 3]).into()
-        }
-        _ => given,
+    let Some(tets) = given.tets().filter(|tets| tets.point_count() > 0) else { return given };
+    let mut block = block([2 + wire, 2, 2], [0.0, 0.12 * wire as f32, 0.0], [0.1; 3]);
+    if tets.get(SURFACE_POINT).is_some() {
+        let inside = [1, 1, 1 + wire];
+        let row = (inside[0] * 3 + inside[1]) * (3 + wire) + inside[2];
+        let marked = (0..block.point_count()).map(|point| if wire == 1 && point == row { 0 } else { -1 });
+        block.set(SURFACE_POINT, marked.collect::<Vec<i32>>()).unwrap();
     }
+    block.into()
 }
 
 /// The same, pressed flat at frame 2.
