@@ -69,19 +69,34 @@ fn eigenvector(matrix: &[[f64; 4]; 4], value: f64) -> DQuat {
         row[k] -= value;
     }
     // The adjugate is the eigenvector times itself, up to a factor: the row of its largest diagonal has most digits.
-    let diagonal = [0, 1, 2, 3].map(|k| cofactor(&less, k, k).abs());
-    let row = (0..4).fold(0, |best, k| if diagonal[k] > diagonal[best] { k } else { best });
-    let [w, x, y, z] = [0, 1, 2, 3].map(|k| cofactor(&less, row, k));
+    let rows = adjugate(&less);
+    let row = (0..4).fold(0, |best, k| if rows[k][k].abs() > rows[best][best].abs() { k } else { best });
+    let [w, x, y, z] = rows[row];
     let length = (w * w + x * x + y * y + z * z).sqrt();
     let length = if w < 0.0 { -length } else { length };
     Unit::new_unchecked(Quaternion::new(w / length, x / length, y / length, z / length))
 }
 
-fn cofactor(matrix: &[[f64; 4]; 4], row: usize, column: usize) -> f64 {
-    const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
-    let [a, b, c] = OTHERS[row].map(|row| DVec3::from(OTHERS[column].map(|column| matrix[row][column])));
-    let minor = a.dot(&b.cross(&c));
-    if (row + column).is_multiple_of(2) { minor } else { -minor }
+/// The adjugate of a symmetric matrix, by Laplace expansion along two pairs of rows: its minors of size 2 are shared.
+fn adjugate(&[[a, b, c, d], [_, e, f, g], [_, _, h, i], [_, _, _, j]]: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
+    // Of the first two rows, by columns.
+    let (s01, s02, s03) = (a * e - b * b, a * f - b * c, a * g - b * d);
+    let (s12, s13, s23) = (b * f - e * c, b * g - e * d, c * g - f * d);
+    // Of the last two rows.
+    let (t02, t03) = (c * i - d * h, c * j - d * i);
+    let (t12, t13, t23) = (f * i - g * h, f * j - g * i, h * j - i * i);
+
+    let ww = e * t23 - f * t13 + g * t12;
+    let wx = c * t13 - b * t23 - d * t12;
+    let wy = g * s23 - i * s13 + j * s12;
+    let wz = h * s13 - f * s23 - i * s12;
+    let xx = a * t23 - c * t03 + d * t02;
+    let xy = i * s03 - d * s23 - j * s02;
+    let xz = c * s23 - h * s03 + i * s02;
+    let yy = d * s13 - g * s03 + j * s01;
+    let yz = f * s03 - c * s13 - i * s01;
+    let zz = c * s12 - f * s02 + h * s01;
+    [[ww, wx, wy, wz], [wx, xx, xy, xz], [wy, xy, yy, yz], [wz, xz, yz, zz]]
 }
 
 #[cfg(test)]
@@ -103,6 +118,19 @@ mod tests {
         let [w, x, y, z] = std::array::from_fn(|k| Key::new(3).of(i).of(k as u64).f64() - 0.5);
         let q = Quaternion::new(w, x, y, z);
         Unit::new_unchecked(q / q.norm())
+    }
+
+    #[test]
+    fn a_matrix_times_its_adjugate_is_its_determinant() {
+        let matrix = [[2.0, 1.0, -1.0, 3.0], [1.0, 4.0, 2.0, 0.0], [-1.0, 2.0, 5.0, 1.0], [3.0, 0.0, 1.0, -2.0]];
+        let adjugate = adjugate(&matrix);
+        for (k, row) in matrix.iter().enumerate() {
+            for column in 0..4 {
+                let product: f64 = (0..4).map(|m| row[m] * adjugate[m][column]).sum();
+                // Worked out by hand, by expansion along the last row.
+                assert_eq!(product, if k == column { -225.0 } else { 0.0 }, "{k} {column}");
+            }
+        }
     }
 
     #[test]
