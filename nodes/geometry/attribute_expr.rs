@@ -1,4 +1,4 @@
-//! Attribute_Expr: computes attributes from attributes, by a few lines of code.
+//! Attribute_Expr: computes attributes from other attributes with a few lines of code.
 //!
 //! The language is that of [`engine::expr`]. Each row sees its own attributes, those with one row for the whole
 //! component, and, on points of curves, also those of the curve. A missing well-known attribute has its neutral value
@@ -32,15 +32,19 @@ choice! {
 
 params! { PARAMS:
     CODE: Param<Code> = Param::code("code",
-        "One assignment per line: `envelope = clamp(envelope*P.y, 0, 1)`, `P.y += 0.1*sin(time)`, `let h = P.y*2`. A \
-         new name creates an attribute, a number or a vector like its value. Names are attributes, with `.x .y .z .w`, \
-         `frame time fps seed pi`, `i` (the row, from 0), `count`, and the graph's controls; an attribute with the \
-         name of a control is `@name`. Operators are `+ - * / % ^`, comparisons, `&& || !` and `a ? b : c`; functions \
-         sin cos tan sqrt exp log pow abs floor ceil min max clamp mix smoothstep noise rand vec length dot cross \
-         normalize and others. Angles are in radians. Empty code does nothing.");
+        "One assignment per line, such as `envelope = clamp(envelope*P.y, 0, 1)` or `P.y += 0.1*sin(time)`. Assigning \
+         to a new name creates an attribute: a number or a vector, like the value. `let h = P.y*2` defines `h` for the \
+         following lines only. Expressions can use attributes (components are `.x .y .z .w`), the graph's controls, \
+         `frame`, `time` (seconds), `fps`, `seed`, `pi`, `i` (the point's or element's index, from 0) and `count`. \
+         Where an attribute has the same name as a control, write `@name` for the attribute. Operators are `+ - * / % \
+         ^`, comparisons, `&& || !` and `a ? b : c`. Functions are sin cos tan asin acos atan atan2 radians degrees \
+         sqrt exp log pow mod abs sign floor ceil round fract min max clamp mix step smoothstep fit noise rand vec \
+         length distance dot cross normalize. `rand(i)` is a random number from 0 to 1 for each row, `noise(P)` a \
+         smooth pattern. Angles are in radians. Empty code does nothing.");
     COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "The component that the code runs on.");
-    OVER: Param<Over> = Param::choice("over", Over::Points, "The rows that the code runs on.");
-    SEED: Param<Seed> = Param::seed("Selects other values of `rand` and `noise`.");
+    OVER: Param<Over> = Param::choice("over", Over::Points,
+        "Whether the code runs once per point or once per element.");
+    SEED: Param<Seed> = Param::seed("Each seed gives other values of `rand` and `noise`.");
 }
 
 const CHANGED: Output = Output::like("geometry", &GEOMETRY, "The geometry with the attributes that the code assigns.");
@@ -52,9 +56,10 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Attribute_Expr",
     1,
-    "Creates or changes attributes, positions included, by expressions evaluated for every point or element. Each sees \
-     its own attributes and those of the whole component; points of curves also see the curve's. Missing well-known \
-     attributes have their neutral value: `envelope` 1, `width` and `v` 0.",
+    "Creates or changes attributes, positions included, by expressions evaluated for every point or element. An \
+     expression can use the attributes of its point or element, those of the whole component and, for points of \
+     curves, those of the curve. Missing well-known attributes have their neutral value: `envelope` 1, `width` and `v` \
+     0.",
     Cook::Frame { cook, reads_clock },
 )
 .inputs(INPUTS)
@@ -84,7 +89,7 @@ fn program(code: &Code) -> Result<&Program> {
 /// The compiled code, if it can run on the chosen rows.
 ///
 /// # Errors
-/// Those of the code; rows that no geometry has.
+/// Errors in the code, or a component that has no such rows.
 fn checked_program<'c>(code: &'c Code, params: &Params) -> Result<&'c Program> {
     let program = program(code)?;
     let elements = params.get(OVER) == Over::Elements;
@@ -166,7 +171,8 @@ fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Resu
     program.run(env, &columns, table.rows()).map_err(|error| explained(error, part, owner))
 }
 
-/// An attribute that rows of `owner` do not have themselves: that of the whole component, of a CV's curve, or neutral.
+/// An attribute that rows of `owner` do not have themselves: taken from the whole component, from a CV's curve, or
+/// neutral.
 fn lent(part: &Component, owner: Owner, name: &str) -> Option<Column> {
     if let Some(column) = part.table(Owner::Once).column(name) {
         return Some(column.gather(&vec![0; part.table(owner).rows()]));
@@ -186,7 +192,7 @@ fn other(owner: Owner) -> Owner {
     if owner == Owner::Point { Owner::Element } else { Owner::Point }
 }
 
-/// Refuses an attribute that the other kind of row has: two with one name would diverge.
+/// Refuses to write an attribute that the other kind of row has: two attributes with one name would diverge.
 fn check_owner(part: &Component, owner: Owner, name: &str) -> Result<()> {
     let theirs = other(owner);
     if part.table(owner).column(name).is_none() && part.table(theirs).column(name).is_some() {
@@ -235,14 +241,14 @@ mod tests {
     }
 
     #[test]
-    fn the_line_of_the_manual_runs_on_raw_curves() {
+    fn the_example_in_the_help_runs_on_curves_without_attributes() {
         let out = code("envelope = clamp(envelope*P.y, 0, 1)").cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.5, 1.0, 1.0][..]));
         assert_eq!(out.metrics["rows"], 3.0);
     }
 
     #[test]
-    fn positions_may_be_written_and_all_else_is_shared() {
+    fn positions_can_be_written_and_other_arrays_are_shared() {
         let input = curves();
         let out = bench(&NODE).input(GEOMETRY, input.clone()).set(CODE, "P.y *= 2; P.x = i".into()).cook();
         assert_eq!(out.curves().positions(), [[0.0, 1.0, 0.0], [1.0, 4.0, 0.0], [2.0, 2.0, 0.0]]);
@@ -252,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_assigned_shares_everything() {
+    fn code_without_assignments_shares_every_array() {
         let input = Geometry::from(curves());
         for text in ["", "// nothing", "let a = P.x"] {
             let out = bench(&NODE).input(GEOMETRY, input.clone()).set(CODE, text.into()).cook();
@@ -261,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cv_sees_its_curve_and_the_whole() {
+    fn a_cv_can_read_attributes_of_its_curve_and_of_the_component() {
         let mut input = curves();
         input.set(Attr::<f32>::once("gain"), vec![10.0]).unwrap();
         let out = bench(&NODE).input(GEOMETRY, input).set(CODE, "a = shielded*gain".into()).cook();
@@ -269,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_well_known_attributes_change_nothing() {
+    fn missing_well_known_attributes_are_neutral() {
         let out = code("a = width + v.x + shielded*0 + orient.w + (Pref.y - P.y) + thickness").cook();
         assert_eq!(floats(&out, "a"), [1.0; 3]);
     }
@@ -292,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_changes_chance_alone() {
+    fn the_seed_changes_random_numbers_only() {
         let random = |seed| floats(&code("a = rand(i)").set(SEED, Seed(seed)).cook(), "a").to_vec();
         assert_eq!(random(1), random(1));
         assert_ne!(random(1), random(2));
@@ -313,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn every_component_has_points() {
+    fn code_runs_on_the_points_of_any_component() {
         let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[1.0; 3]; 3]).unwrap();
         let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[1.0; 3]; 4]).unwrap();
         let all = Geometry::from(curves()).with(mesh).with(tets).with(Component::points(vec![[1.0; 3]]));
@@ -345,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_the_other_kind_are_named() {
+    fn attributes_of_the_other_kind_of_row_are_refused_by_name() {
         assert_eq!(
             refused(&code("a = P.x").set(OVER, Over::Elements)),
             "line 1, column 5: there is no attribute, control or value `P`; \
@@ -363,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_geometry_could_have_is_refused_before_the_cook() {
+    fn impossible_params_are_refused_before_the_cook() {
         let loose = code("a = 1").set(COMPONENT, Part::Points).set(OVER, Over::Elements);
         assert_eq!(refused(&loose), "loose points have no elements; set `over` to \"points\"");
         let positions = code("P = P*2").set(OVER, Over::Elements);
@@ -376,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn no_rows_and_many_threads() {
+    fn empty_components_and_any_number_of_threads_work() {
         let empty = Component::curves(vec![], vec![]).unwrap();
         let out = bench(&NODE).input(GEOMETRY, empty).set(CODE, "a = P.x".into()).cook();
         assert_eq!(floats(&out, "a"), [0.0; 0]);

@@ -2,14 +2,14 @@
 //!
 //! Each root is bound to its closest point on `rest_skin`, at its distance from it, and carried to `skin`
 //! ([`curves::attach`]): the whole curve moves with that point and rotates about it by the rotation closest to the
-//! local deformation of the skin. So curves keep their lengths, and neighbours on either side of an edge rotate alike,
-//! however the skin stretches. `v`, `N` and `orient` rotate too. If the curves have no `Pref`, it is set to their
-//! positions before, so that anything sampled at rest sticks to them.
+//! local deformation of the skin. Curves therefore keep their lengths, and neighbours on either side of an edge rotate
+//! alike, however the skin stretches. `v`, `N` and `orient` rotate too. If the curves have no `Pref`, it is set to
+//! their incoming positions, so that anything sampled at rest sticks to them.
 //!
 //! Where the skin around a root is degenerate (collapsed to a point or a line), its curve moves without rotating, and
 //! is counted; if a single face collapses, its neighbours carry its curves. A face turned inside out turns its curves
 //! inwards. The motion of the skin is not added to `v`. The binding is cached as long as the roots and `rest_skin` do
-//! not change, also for curves that move otherwise.
+//! not change, even if the rest of the curves moves.
 
 use curves::attach::{RootPose, RootPositions, SkinBinding, attach_curves, rotate_orientations, rotate_vectors};
 use engine::prelude::*;
@@ -17,7 +17,7 @@ use engine::prelude::*;
 use crate::shared::faces::{counted, same_faces};
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they grew on `rest_skin`, root first.");
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they stand on `rest_skin`, root first.");
     REST_SKIN: Input = Input::one("rest_skin", Kind::Mesh, "The mesh on which the curves were grown.");
     SKIN: Input = Input::one("skin", Kind::Mesh, "The same mesh in its current pose: the same faces, other positions.");
 }
@@ -25,9 +25,10 @@ inputs! { INPUTS:
 const OUT: Output = Output::like("curves", &CURVES, "The curves, carried to `skin`. Lengths are kept.");
 
 metrics! { METRICS:
-    BOUND = Metric::new("bound", Unit::Metres, "The largest distance of a root from `rest_skin`.");
+    BOUND = Metric::new("bound", Unit::Metres, "The largest distance of a root from `rest_skin`. A large \
+        distance suggests that the curves were grown on another mesh.");
     UNTURNED = Metric::new("unturned", Unit::None,
-        "Curves that move without rotating, as the skin around them is degenerate.");
+        "Curves that move without rotating, because the skin around their roots has collapsed to a line or a point.");
     LENGTH_ERROR = Metric::length_error();
 }
 
@@ -35,7 +36,8 @@ pub(crate) static NODE: Node = Node::new(
     "Curve_Attach",
     2,
     "Carries curves along with the skin that they grew on. Roots stay at their positions on its faces; each curve \
-     rotates with the skin around its root and keeps its shape and length. A root off the skin keeps its distance.",
+     rotates with the skin around its root and keeps its shape and length. A root that does not lie on the skin keeps \
+     its distance from it.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -43,7 +45,7 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[&P, &PREF])
 .writes(&[&P, &PREF])
 .attributes(|_| {
-    // Existing attributes alone are rotated, so they are read as well.
+    // Only existing attributes are rotated, so they are read as well.
     [(); 2].map(|()| AttrNames::These([V.name, N.name, ORIENT.name].map(Name::from).to_vec()))
 })
 .metrics(METRICS);

@@ -10,18 +10,19 @@ params! { PARAMS:
         "An obj, ply or json file with curves. A run of `#` in its name stands for the frame number, as in \
          `fur.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
+        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "CVs written into the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);
     COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts",
         "Number of CVs of each curve in `points`. If empty, they all belong to one curve.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes added to the curves, one row per CV.");
+        "Attributes of CVs, written into the graph by name, one value per CV: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added to the curves, one row per curve.");
+        "Attributes of curves, written into the graph by name, one value per curve: `{\"clump\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
+        .soft(0.001, 1000.0);
     WIDTH_PARAM: Param<f32> = Param::float("width", 0.0,
         "Width of every curve. 0 keeps the widths in the file.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
 }
@@ -113,7 +114,7 @@ mod tests {
             .cook();
         assert_eq!(out.curves().positions(), [[0.01, 0.02, 0.03]]);
         assert_eq!(out.curves().get(Attr::<f32>::point("mask")), Some(&[2.0][..]));
-        assert_eq!(out.curves().get(WIDTH), Some(&[0.5][..]), "the width asked for is the width one gets");
+        assert_eq!(out.curves().get(WIDTH), Some(&[0.5][..]), "the width is not scaled");
     }
 
     #[test]
@@ -122,7 +123,7 @@ mod tests {
         let error = two.clone().set(COUNTS, Arc::new(vec![3])).try_cook().unwrap_err();
         assert_eq!(error.fact, "`counts` adds up to 3 CVs, but `points` has 2");
         let error = two.clone().set(COUNTS, Arc::new(vec![2, -1])).try_cook().unwrap_err();
-        assert_eq!(error.to_string(), "`counts` has -1 at place 1, counted from 0; expected at least 1");
+        assert_eq!(error.to_string(), "`counts` has -1 at index 1, counted from 0; expected at least 1");
         let wrong = Arc::new(vec![("mask".into(), Column::new(vec![1.0_f32]))]);
         assert_eq!(two.set(ATTRIBUTES, wrong).try_cook().unwrap_err().fact, "`mask` has 1 row, expected 2");
     }

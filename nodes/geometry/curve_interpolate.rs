@@ -36,11 +36,12 @@ params! { PARAMS:
     COUNT: Param<i64> = Param::int("guides", 3,
         "Number of nearest guides that a hair is blended from: 1 makes clumps around the guides, more make a smoother \
          coat.").within(1.0, MAX_GUIDES as f64).soft(1.0, 8.0);
-    CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 takes that of the guide with the most CVs.")
+    CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 takes the largest number that a guide has.")
         .within(0.0, 10_000.0).soft(0.0, 32.0);
-    SEED: Param<Seed> = Param::seed("Selects other positions.");
+    SEED: Param<Seed> = Param::seed("Each seed gives other root positions.");
     MASK: Param<Name> = Param::text("mask", "",
-        "A point attribute of the skin that multiplies the density. If empty, there is no mask.").fixed();
+        "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If \
+         empty, there is no mask.").fixed();
 }
 
 const CURVES: Output = Output::new(
@@ -52,7 +53,7 @@ const CURVES: Output = Output::new(
 metrics! { METRICS:
     GROWN = Metric::new("curves", Unit::None, "Number of hairs grown.");
     LENGTH_ERROR = Metric::new("length_error", Unit::None,
-        "The largest difference between a hair's length and the blended length of its guides, as a share of the \
+        "The largest difference between a hair's length and the blended length of its guides, relative to the \
          latter.");
 }
 
@@ -60,8 +61,8 @@ pub(crate) static NODE: Node = Node::new(
     "Curve_Interpolate",
     2,
     "Fills a skin with hairs between guide curves. Each hair blends the shapes and lengths of the guides nearest to \
-     its root and moves with them; where guides point different ways, hairs change direction gradually and do not \
-     shrink.",
+     its root and moves with them; where guides point in different directions, hairs change direction gradually and do \
+     not shrink.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -110,14 +111,14 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 /// The guides at the scene's first frame.
 ///
 /// # Errors
-/// Where they had other CVs.
+/// If their CVs have changed since.
 fn guides_at_start<'c>(cx: &'c Cx) -> Result<&'c Component> {
     let (first, now) = (cx.part_at_start(GUIDES), cx.part(GUIDES));
     if first.runs() == now.runs() {
         return Ok(first);
     }
     let fact = format!(
-        "`guides` has {} curves and {} CVs, at the scene's first frame {} and {}, or they are distributed differently",
+        "`guides` has {} curves and {} CVs, but {} and {} at the scene's first frame, or their distribution differs",
         now.element_count(),
         now.point_count(),
         first.element_count(),
@@ -153,7 +154,7 @@ impl CoatKey {
 /// Roots, guides and weights of the hairs: the same at every frame.
 struct Coat {
     ids: Vec<i32>,
-    /// Of the hairs.
+    /// Roots of the hairs.
     roots: Vec<SurfacePoint>,
     weights: GuideWeights,
     hairs: SkinBinding,

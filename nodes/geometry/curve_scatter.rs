@@ -26,15 +26,18 @@ inputs! { INPUTS:
 params! { PARAMS:
     DENSITY: Param<f32> = Param::float("density", 1000.0, "Number of curves per square metre, before the mask.")
         .unit(Unit::PerSquareMetre).at_least(0.0).soft(0.0, 100_000.0);
-    LENGTH: Param<Span> = Param::span("length", [0.05, 0.1], "Length of the shortest and the longest curve.")
+    LENGTH: Param<Span> = Param::span("length", [0.05, 0.1],
+        "Length of the shortest and of the longest curve. Each curve's is drawn at random in between.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0);
-    CVS: Param<i64> = Param::int("cvs", 5, "Number of CVs of each curve, evenly spaced.").within(2.0, 10_000.0).soft(2.0, 32.0);
+    CVS: Param<i64> = Param::int("cvs", 5,
+        "Number of CVs of each curve, evenly spaced.").within(2.0, 10_000.0).soft(2.0, 32.0);
     LEAN: Param<f32> = Param::float("lean", 0.2,
-        "Largest angle between a curve and the skin's normal, as a share of 90 degrees: at 0 all are upright, at 1 \
-         some lie flat. Angle and direction are random for each curve.").at_least(0.0).soft(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Selects other positions, lengths and directions.");
+        "Largest angle between a curve and the skin's normal, as a fraction of 90 degrees: at 0 all curves are \
+         upright, at 1 some lie flat. Angle and direction are random for each curve.").at_least(0.0).soft(0.0, 1.0);
+    SEED: Param<Seed> = Param::seed("Each seed gives other positions, lengths and directions.");
     MASK: Param<Name> = Param::text("mask", "",
-        "A point attribute of the skin that multiplies the density. If empty, there is no mask.").fixed();
+        "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If \
+         empty, there is no mask.").fixed();
 }
 
 const CURVES: Output = Output::new(

@@ -1,16 +1,16 @@
-//! Lattice_Deform: free-form deformation by a box of control points.
+//! Lattice_Deform: free-form deformation with a box of control points.
 //!
-//! R2 shapes liquids with "lattice deformers"; and the goal shape of a soft body (R1) must have the faces of the body's
-//! surface, which a lattice preserves, as it moves points alone. The map is Sederberg and Parry's
+//! R2 shapes liquids with "lattice deformers". The goal shape of a soft body (R1) must have the faces of the body's
+//! surface, which a lattice preserves, since it only moves points. The map is Sederberg and Parry's
 //! ([`curves::lattice`]): Bernstein polynomials over the whole box, or trilinear interpolation in its cells. Offsets,
 //! not positions, are set and keyed, so the default moves nothing.
 //!
 //! What the sources leave open:
 //! * Outside the box the map is not defined. By default points there move like the closest point of the box, so nothing
 //!   tears and nothing diverges; or the deformation is extrapolated linearly.
-//! * `v` is mapped as a vector; `N` stays perpendicular and on the side given by the faces' winding, also where space
-//!   is folded over; `orient` rotates by the rotation closest to the local deformation. Vectors of an element follow
-//!   the deformation at the mean of its points. `width`, `thickness` and all other attributes pass through.
+//! * `v` is mapped as a vector; `N` stays perpendicular and on the side given by the faces' winding, even where the
+//!   lattice folds space over; `orient` rotates by the rotation closest to the local deformation. Vectors of an element
+//!   follow the deformation at the mean of its points. `width`, `thickness` and all other attributes pass through.
 //! * The motion of keyed offsets is not added to `v`. A volume's grid is aligned with the axes: it is refused.
 
 use curves::lattice::{DeformationLattice, Deformed, Extrapolation, LatticeBasis};
@@ -23,7 +23,7 @@ use std::sync::Arc;
 choice! {
     /// Interpolation between control points.
     BasisChoice for LatticeBasis {
-        LatticeBasis::Trilinear => "trilinear": "linear: each cell is moved by its eight corners alone, and creases \
+        LatticeBasis::Trilinear => "trilinear": "linear: each cell is moved by its eight corners only, and creases \
             show where cells meet",
         LatticeBasis::Bernstein => "bernstein": "smooth: each control point moves the whole box, most strongly near \
             itself",
@@ -38,7 +38,7 @@ choice! {
     }
 }
 
-/// A quarter of a million control points: more than anybody sets by hand.
+/// 64 cells along each axis are a quarter of a million control points: more than anyone sets by hand.
 const MOST_DIVISIONS: f64 = 64.0;
 
 inputs! { INPUTS:
@@ -47,17 +47,19 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     DIVISIONS: Param<[i64; 3]> = Param::int3("divisions", [1; 3],
-        "Number of cells along x, y and z. There is one more control point than cells along each axis.")
+        "Number of cells along x, y and z. Along each axis there is one control point more than there are cells.")
         .within(1.0, MOST_DIVISIONS).soft(1.0, 8.0).fixed();
     FROM: Param<[f64; 3]> = Param::dvec3("from", [-0.5; 3],
         "The lower corner of the box.").unit(Unit::Metres).when(bends);
     TO: Param<[f64; 3]> = Param::dvec3("to", [0.5; 3],
         "The upper corner of the box.").unit(Unit::Metres).when(bends);
     OFFSETS: Param<Arc<Vec<[f32; 3]>>> = Param::vec3s("offsets",
-        "Offset of each control point, in metres: x varies fastest, then y, then z. If empty, nothing moves. Keys are \
-         interpolated linearly.");
+        "How far each control point is moved from its place in the box, in metres: a list of vectors, one per control \
+         point, ordered so that x varies fastest, then y, then z. If empty, nothing moves. Keys are interpolated \
+         linearly.");
     BASIS: Param<BasisChoice> = Param::choice("basis", LatticeBasis::Bernstein,
-        "How the deformation is interpolated between control points. With one division both are the same.").when(bends);
+        "How the deformation is interpolated between control points. With one division along each axis both are the \
+         same.").when(bends);
     OUTSIDE: Param<OutsideChoice> = Param::choice("outside", Extrapolation::Hold, "How points outside the box move.")
         .when(bends);
 }
@@ -65,17 +67,19 @@ params! { PARAMS:
 const DEFORMED: Output = Output::like("geometry", &GEOMETRY, "The deformed geometry.");
 
 metrics! { METRICS:
-    FOLDED = Metric::new("folded", Unit::None, "Points at which the lattice flattens space or turns it inside out.");
+    FOLDED = Metric::new("folded", Unit::None, "Points at which the lattice flattens the geometry or turns it inside \
+        out. 0 is a sound deformation.");
     MIN_JACOBIAN = Metric::new("min_jacobian", Unit::None,
-        "The smallest local change of volume at a point, as a factor; below 0 space is inside out.").neutral(1.0);
+        "The smallest factor by which volume changes at any point: 1 keeps it, 0 flattens, below 0 the geometry is \
+         inside out there.").neutral(1.0);
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None,
-        "Volume of the tets, or that enclosed by a closed mesh, relative to before.").neutral(1.0);
+        "Volume of the tets, or that enclosed by a closed mesh, relative to that before the deformation.").neutral(1.0);
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Lattice_Deform",
     1,
-    "Bends, bulges, squeezes and twists geometry of any kind by a box of control points around it. Points move with \
+    "Bends, bulges, squeezes and twists geometry of any kind with a box of control points around it. Points move with \
      the control points near them; velocities, normals and orientations follow. Topology does not change, so a \
      deformed surface can be the goal of a soft body.",
     Cook::Pure(cook),
@@ -86,7 +90,7 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[&P])
 .writes(&[&P])
 .attributes(|_| {
-    // Existing attributes alone are changed, so they are read as well.
+    // Only existing attributes are changed, so they are read as well.
     [(); 2].map(|()| AttrNames::These(FOLLOWING.map(Name::from).to_vec()))
 })
 .metrics(METRICS)
@@ -126,7 +130,7 @@ fn bends(params: &Params) -> bool {
 /// The lattice given by the params; `None` if it moves nothing.
 ///
 /// # Errors
-/// Where the number of offsets is not that of the control points, or the box is empty.
+/// If the number of offsets is not that of the control points, or the box is empty.
 fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<DeformationLattice<'a>>> {
     let divisions = params.get(DIVISIONS).map(|cells| cells as usize);
     let expected = control_points(divisions).unwrap_or(usize::MAX);
@@ -149,7 +153,7 @@ fn lattice<'a>(params: &Params, offsets: &'a [[f32; 3]]) -> Result<Option<Deform
         .ok_or_else(|| {
             Error::refused(format!("`from` is {from:?} and `to` {to:?}, which is not a box"))
                 .of(TO.name())
-                .hint("expected each component of `to` to be greater than that of `from`, around flat geometry too")
+                .hint("expected each component of `to` to be greater than that of `from`, even around flat geometry")
         })
 }
 

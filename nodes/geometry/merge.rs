@@ -1,7 +1,7 @@
 //! Merge: joins several geometries into one.
 //!
 //! Component by component, with points and elements in the order of the wires. Where one wire lacks an attribute, it
-//! gets the attribute's neutral value (`envelope` 1, `orient` no rotation, `Pref` the position), otherwise 0. `id`s are
+//! gets the attribute's neutral value (`envelope` 1, `orient` no rotation, `Pref` the position, otherwise 0). `id`s are
 //! not renumbered. Two volumes cannot be joined and are refused. An attribute with one row for the whole component is
 //! taken from the first wire that has it.
 
@@ -17,8 +17,9 @@ const MERGED: Output = Output::union("geometry", &GEOMETRY, "The joined geometry
 pub(crate) static NODE: Node = Node::new(
     "Merge",
     1,
-    "Joins geometries into one: curves with curves, meshes with meshes, in the order of the wires. Where one of them \
-     lacks an attribute it is 0; `envelope` is 1, `orient` no rotation, and `Pref` the position.",
+    "Joins geometries into one: curves with curves, meshes with meshes, in the order of the wires. An \
+     attribute that one of them lacks is filled in: `envelope` with 1, `orient` with no rotation, `Pref` with the \
+     position, others with 0.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -67,7 +68,7 @@ fn union(parts: &[(usize, &Component)]) -> Result<Option<Component>> {
 /// The attributes of points and elements that any part has.
 ///
 /// # Errors
-/// Where two parts have the same attribute with different types.
+/// If two parts have the same attribute with different types.
 fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result<Vec<(Owner, Name)>> {
     let mut found: Vec<(Owner, Name, ColumnType, usize)> = Vec::new();
     for (wire, part) in std::iter::once(&(first, head)).chain(tail) {
@@ -127,14 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn faces_of_the_second_mesh_keep_their_points() {
+    fn corners_of_the_second_mesh_are_renumbered() {
         let mesh = |x: f32| Component::mesh(vec![3], vec![0, 1, 2], vec![[x, 0.0, 0.0]; 3]).unwrap();
         let out = bench(&NODE).input(GEOMETRY, mesh(0.0)).input(GEOMETRY, mesh(1.0)).cook();
         assert_eq!(out.mesh().faces().unwrap().face(1), [3, 4, 5]);
     }
 
     #[test]
-    fn different_components_stay_side_by_side_and_shared() {
+    fn different_components_are_kept_and_shared() {
         let (curves, points) = (curve(0.0), Component::points(vec![[5.0; 3]]));
         let out = bench(&NODE).input(GEOMETRY, curves.clone()).input(GEOMETRY, points.clone()).cook();
         let expected = Geometry::from(curves).with(points);
@@ -142,14 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn a_single_wire_goes_through_untouched() {
+    fn a_single_wire_passes_through_unchanged() {
         let one = Geometry::from(with(curve(0.0), ENVELOPE, vec![0.5; 2]));
         let out = bench(&NODE).input(GEOMETRY, one.clone()).cook();
         assert_eq!(out.geometry.arrays(), one.arrays());
     }
 
     #[test]
-    fn what_is_missing_gets_the_value_that_changes_nothing() {
+    fn missing_attributes_get_their_neutral_value() {
         let full = with(with(curve(0.0), ENVELOPE, vec![0.25; 2]), WIDTH, vec![0.1; 2]);
         let full = with(with(full, PREF, vec![[9.0; 3]; 2]), SHIELDED, vec![0.5]);
         let full = with(with(full, Attr::<f32>::point("mask"), vec![0.3; 2]), ORIENT, vec![[1.0, 0.0, 0.0, 0.0]; 2]);
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn one_volume_goes_through_and_two_are_refused() {
+    fn one_volume_passes_through_and_two_are_refused() {
         let mut volume = Geometry::default();
         let grid = Grid { origin: [0.0; 3], cell: 1.0, size: [1, 1, 1] };
         volume.put_volume(Volume::new(grid, vec![0.0], [vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]).unwrap());

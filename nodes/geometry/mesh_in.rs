@@ -10,7 +10,7 @@ params! { PARAMS:
         "An obj, ply or json file with polygons. A run of `#` in its name stands for the frame number, as in \
          `skin.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
+        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Vertices written into the graph instead of a file.").unit(Unit::Metres);
@@ -19,11 +19,12 @@ params! { PARAMS:
     INDICES: Param<Arc<Vec<i32>>> = Param::inline("indices",
         "The vertex of each face corner, counted from 0, face after face, counter-clockwise as seen from outside.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes added to the mesh, one row per vertex.");
+        "Attributes of vertices, written into the graph by name, one value per vertex: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added to the mesh, one row per face.");
+        "Attributes of faces, written into the graph by name, one value per face: `{\"part\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
+        .soft(0.001, 1000.0);
 }
 
 const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The mesh.");
@@ -101,19 +102,19 @@ mod tests {
     }
 
     #[test]
-    fn corners_that_are_no_vertex_are_refused() {
+    fn corners_out_of_range_are_refused() {
         let error = |indices: Vec<i32>| square().set(INDICES, Arc::new(indices)).try_cook().unwrap_err().fact;
-        assert_eq!(error(vec![0, 1, 4]), "`indices` has 4 as number 2, but there are 4 `points`");
+        assert_eq!(error(vec![0, 1, 4]), "`indices` has 4 at index 2, but there are 4 `points`");
         assert_eq!(error(vec![0, 1]), "`indices` has 2 numbers, which is not a multiple of 3");
-        assert_eq!(error(vec![0, 1, -1]), "`indices` has -1 at place 2, counted from 0");
+        assert_eq!(error(vec![0, 1, -1]), "`indices` has -1 at index 2, counted from 0");
     }
 
     #[test]
-    fn counts_that_are_no_faces_are_refused() {
+    fn invalid_counts_are_refused() {
         let three = square().set(INDICES, Arc::new(vec![0, 2, 1]));
         let error = |counts: Vec<i32>| three.clone().set(COUNTS, Arc::new(counts)).try_cook().unwrap_err().fact;
-        assert_eq!(error(vec![-3]), "`counts` has -3 at place 0, counted from 0");
-        assert_eq!(error(vec![2]), "`counts` has 2 at place 0, counted from 0");
+        assert_eq!(error(vec![-3]), "`counts` has -3 at index 0, counted from 0");
+        assert_eq!(error(vec![2]), "`counts` has 2 at index 0, counted from 0");
         assert_eq!(error(vec![4]), "`counts` adds up to 4 corners, but `indices` has 3");
     }
 }

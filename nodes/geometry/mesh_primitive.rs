@@ -12,16 +12,16 @@ choice! {
         Box = "box": "a box of quads",
         Sphere = "sphere": "a sphere or ellipsoid with its poles on the y axis",
         Cylinder = "cylinder": "an upright cylinder with flat caps",
-        Capsule = "capsule": "an upright cylinder with rounded caps; its straight part is as long as the height \
-            exceeds the width",
+        Capsule = "capsule": "an upright cylinder with rounded caps; the length of its straight part is the height \
+            minus the width",
         Grid = "grid": "a flat open sheet in x and z, facing up; the height of `size` does not matter",
-        Torus = "torus": "a flat-lying ring; its tube is round as long as the height is at most a third of the width",
+        Torus = "torus": "a ring lying flat; its tube is round as long as the height is at most a third of the width",
         Bowl = "bowl": "the lower half of a hollow ellipsoid, open at the top",
         Plate = "plate": "a box with height `thickness`; the height of `size` does not matter",
     }
 }
 
-/// With this many the largest shapes have 3 million vertices and take 200 MB.
+/// With this many divisions the largest shapes have 3 million vertices and take 200 MB.
 const MOST_DIVISIONS: f64 = 512.0;
 
 params! { PARAMS:
@@ -43,7 +43,7 @@ pub(crate) static NODE: Node = Node::new(
     "Mesh_Primitive",
     1,
     "A box, sphere, cylinder, capsule, grid, torus, bowl or plate, centred on the origin. Solids are closed and face \
-     outwards, so they can collide, be filled and be divided into tets. `uvw` is the position within the shape's \
+     outwards, so they can be used as colliders or filled with tets. `uvw` is the position within the shape's \
      bounds, 0 to 1 along x, y and z.",
     Cook::Pure(cook),
 )
@@ -102,7 +102,7 @@ fn hollow(params: &Params) -> f32 {
 fn no_hollow(params: &Params) -> Error {
     let ([x, y, z], thickness, hollow) = (params.get(SIZE), params.get(THICK), hollow(params));
     Error::refused(format!("`thickness` is {thickness}, which leaves no hollow in a bowl of [{x}, {y}, {z}]"))
-        .hint(format!("expected less than {hollow} m, the least of half the width, half the depth and the height"))
+        .hint(format!("expected less than {hollow} m, the smallest of half the width, half the depth and the height"))
 }
 
 #[cfg(test)]
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bowl_holds_what_its_closed_form_says() {
+    fn the_volume_of_a_bowl_matches_its_closed_form() {
         // Half a ball of radius 1 less half a ball of radius 0.9, to the order of 1/n².
         let out =
             bench(&NODE).set(SHAPE, Solid::Bowl).set(SIZE, [2.0, 1.0, 2.0]).set(THICK, 0.1).set(DIVISIONS, 64).cook();
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn thickness_matters_to_bowls_and_plates_alone() {
+    fn thickness_affects_bowls_and_plates_only() {
         for shape in Solid::VALUES.iter().copied() {
             let cook = |thickness| bench(&NODE).set(SHAPE, shape).set(DIVISIONS, 2).set(THICK, thickness).cook();
             let differs = cook(0.1).mesh().positions() != cook(0.2).mesh().positions();
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn uvw_is_the_place_in_the_bounds() {
+    fn uvw_is_the_position_within_the_bounds() {
         for shape in SOLIDS {
             let out = bench(&NODE).set(SHAPE, shape).set(SIZE, [0.3, 0.7, 1.1]).set(DIVISIONS, 3).cook();
             let uvw = out.mesh().get(UVW).unwrap();
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shape_without_size_is_finite() {
+    fn shapes_of_size_zero_are_finite() {
         for shape in [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Grid] {
             let out = bench(&NODE).set(SHAPE, shape).set(SIZE, [0.0; 3]).set(DIVISIONS, 2).cook();
             assert!(out.mesh().positions().as_flattened().iter().all(|x| *x == 0.0), "{shape:?}");

@@ -10,14 +10,15 @@ params! { PARAMS:
         "An obj, ply or json file with points. A run of `#` in its name stands for the frame number, as in \
          `drops.####.ply`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
+        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
-    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added to the points, one row \
-        per point.");
+    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes of \
+        points, written into the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
+        .soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("points", &[Kind::Points], "The points.");

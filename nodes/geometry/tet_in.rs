@@ -9,18 +9,20 @@ params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "A json file with tets. A run of `#` in its name stands for the frame number, as in `dough.####.json`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read from a numbered sequence. Fractions are rounded down.")
+        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Points written into the graph instead of a file.").unit(Unit::Metres);
     TETS: Param<Arc<Vec<[u32; 4]>>> = Param::inline("tets",
         "Four point indices per tet, counted from 0. Seen from the fourth point, the first three run \
          counter-clockwise.");
-    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes added to the tets, one row per point.");
+    ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes of \
+        points, written into the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes added to the tets, one row per tet.");
+        "Attributes of tets, written into the graph by name, one value per tet: `{\"part\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies lengths and velocities. 0.01 converts a file in centimetres.").soft(0.001, 1000.0);
+        "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
+        .soft(0.001, 1000.0);
 }
 
 const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
@@ -28,7 +30,8 @@ const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
 pub(crate) static NODE: Node = Node::new(
     "Tet_In",
     2,
-    "Tets from a file, or written into the graph: soft bodies made elsewhere. Other geometry in the file is ignored.",
+    "Tets from a file, or written into the graph: soft bodies made in other programs. Other geometry in the file is \
+     ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -78,6 +81,6 @@ mod tests {
         let one = bench(&NODE).set(POINTS, Some(Arc::new((0..4).map(corner).collect())));
         assert_eq!(one.clone().set(TETS, Arc::new(vec![[0, 1, 2, 3]])).cook().part(Kind::Tets).element_count(), 1);
         let error = one.set(TETS, Arc::new(vec![[0, 1, 2, 4]])).try_cook().unwrap_err();
-        assert_eq!(error.fact, "`tets` has 4 as number 3, but there are 4 `points`");
+        assert_eq!(error.fact, "`tets` has 4 at index 3, but there are 4 `points`");
     }
 }

@@ -44,7 +44,7 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[&P])
 .writes(&[&P])
 .attributes(|_| {
-    // Existing attributes alone are changed, so they are read as well.
+    // Only existing attributes are changed, so they are read as well.
     [(); 2].map(|()| AttrNames::These(FOLLOWING.map(Name::from).to_vec()))
 })
 .neutral(|params, _| {
@@ -128,7 +128,7 @@ fn turned_round(part: &Component) -> Result<Component> {
 /// The volume with its grid transformed.
 ///
 /// # Errors
-/// Where the grid would no longer be aligned with the axes, or its cells would not be cubes.
+/// If the grid would no longer be aligned with the axes, or its cells would not be cubes.
 fn moved_volume(volume: &Volume, affine: &Affine, cx: &Cx) -> Result<Volume> {
     let [x, y, z] = cx.get(SCALE);
     let turned = cx.get(ROTATE).0[..3].iter().any(|x| *x != 0.0);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn scales_then_turns_then_moves() {
+    fn scales_then_rotates_then_translates() {
         let out = bench(&NODE)
             .input(GEOMETRY, triangle())
             .set(SCALE, [2.0, 1.0, 1.0])
@@ -213,14 +213,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_asked_shares_everything() {
+    fn the_identity_shares_every_array() {
         let mesh = triangle();
         let out = bench(&NODE).input(GEOMETRY, mesh.clone()).set(PIVOT, [5.0; 3]).cook();
         assert_eq!(out.geometry.arrays(), Geometry::from(mesh).arrays());
     }
 
     #[test]
-    fn moving_touches_positions_alone() {
+    fn translation_changes_positions_only() {
         let mesh = triangle();
         let out = bench(&NODE).input(GEOMETRY, mesh.clone()).set(TRANSLATE, [0.5, 0.0, 0.0]).cook();
         assert_eq!(out.mesh().positions()[0], [0.5, 0.0, 0.0]);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn rest_positions_and_free_attributes_go_through_untouched() {
+    fn rest_positions_and_custom_attributes_pass_through() {
         let mesh = triangle();
         let out = bench(&NODE).input(GEOMETRY, mesh.clone()).set(SCALE, [2.0; 3]).cook();
         for name in ["Pref", "mask"] {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_mesh_keeps_its_outside() {
+    fn a_mirrored_mesh_still_faces_outwards() {
         let out = bench(&NODE).input(GEOMETRY, triangle()).set(SCALE, [-1.0, 1.0, 1.0]).cook();
         assert_eq!(out.mesh().positions()[1], [-1.0, 0.0, 0.0]);
         assert_eq!(out.mesh().faces().unwrap().face(0), [0, 2, 1]);
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn every_component_moves_and_orientations_turn() {
+    fn every_component_moves_and_orientations_rotate() {
         let mut points = Component::points(vec![[1.0, 0.0, 0.0]]);
         points.set(ORIENT, vec![[0.0, 0.0, 0.0, 1.0]]).unwrap();
         let curves = Component::curves(vec![2], vec![[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).unwrap();
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_volume_moves_and_grows_with_its_distances_and_speeds() {
+    fn a_volume_is_translated_and_scaled_with_its_distances_and_speeds() {
         let out = bench(&NODE).input(GEOMETRY, volume()).set(SCALE, [2.0; 3]).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
         let moved = out.geometry.volume().unwrap();
         assert_eq!(moved.level_grid(), Grid { origin: [2.0, 1.0, 0.0], cell: 1.0, size: [1, 1, 1] });
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn a_volume_that_is_only_moved_shares_its_arrays() {
+    fn a_translated_volume_shares_its_arrays() {
         let volume = volume();
         let out = bench(&NODE).input(GEOMETRY, volume.clone()).set(TRANSLATE, [0.0, 1.0, 0.0]).cook();
         assert_eq!(out.geometry.volume().unwrap().velocity_grid().origin, [1.0, 1.0, 0.0]);
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_volume_is_not_turned_or_stretched() {
+    fn rotating_or_stretching_a_volume_is_refused() {
         let volume = bench(&NODE).input(GEOMETRY, volume());
         let turned = volume.clone().set(ROTATE, degrees(0.0, 90.0, 0.0)).try_cook().unwrap_err();
         assert_eq!(turned.fact, "a volume cannot be rotated: its grid is aligned with the axes");
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_turn_about_one_axis() {
+    fn keyed_rotation_is_about_one_axis() {
         let out = bench(&NODE)
             .input(GEOMETRY, Component::points(vec![[1.0, 0.0, 0.0]]))
             .keyed(TRANSLATE, &[(1.0, [0.0; 3]), (3.0, [2.0, 0.0, 0.0])])
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_and_extreme_geometry_is_moved_or_refused() {
+    fn empty_and_extreme_geometry_is_transformed_or_refused() {
         let empty = Component::curves(vec![], vec![]).unwrap();
         assert!(bench(&NODE).input(GEOMETRY, empty).set(SCALE, [-2.0; 3]).cook().curves().positions().is_empty());
         let far = Component::points(vec![[1e30, 0.0, 0.0]]);

@@ -9,7 +9,7 @@
 //! * One implicit step per frame instead of many explicit ones, whatever the stiffness; its error is estimated.
 //! * Contacts are part of the system that is solved, not a projection afterwards.
 //! * Goals act on inner particles with critical damping, so bodies come to rest in them.
-//! * Materials are read at the start: their numbers may be keyed, their masks may not change.
+//! * Masks of materials are read at the start and may not change; their numbers may be keyed.
 
 use std::sync::{Arc, OnceLock};
 
@@ -35,20 +35,20 @@ mod setup;
 choice! {
     /// The particles that goals pull.
     enum GoalOn {
-        Interior = "interior": "inner particles: the surface remains free to respond to contacts",
-        Surface = "surface": "particles on the surface",
-        All = "all": "all particles: contacts hardly dent the body",
+        Interior = "interior": "inner particles only, so that the surface responds freely to contacts",
+        Surface = "surface": "particles on the surface only",
+        All = "all": "all particles, so that contacts hardly dent the body",
     }
 }
 
 choice! {
     /// The time integrator.
     enum Stepping {
-        Default = "default": "one second-order step per frame, or as many as contacts need; damped steps where a \
-                              motion starts abruptly",
-        Accurate = "accurate": "as many steps as keep the estimated error of each frame within `tolerance`: for \
-            reference",
-        Euler = "euler": "implicit Euler: first order, damps all motion",
+        Default = "default": "one second-order step per frame, more if contacts need them; steps are damped where \
+                              a motion starts abruptly",
+        Accurate = "accurate": "as many steps as are needed to keep the estimated error of each frame within \
+            `tolerance`; slow, for reference",
+        Euler = "euler": "implicit Euler: first order, visibly damps all motion",
     }
 }
 
@@ -57,25 +57,26 @@ const COLLIDER_SAMPLES: u8 = 4;
 
 inputs! { INPUTS:
     BODIES: Input<Many> = Input::many("bodies", Kind::Tets,
-        "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets moves with \
-         them; without one, the boundary of the tets is used.").read_at(|_| Times::START);
+        "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets is carried \
+         along by them; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
     GOALS: Input<Many> = Input::many("goals", Kind::Tets,
-        "Target shapes from Softbody_Goal, which bodies reach at the goals' frames. A goal applies to the body with \
-         the same tets.");
+        "Target shapes from Softbody_Goal. A body moves from one goal to the next and reaches each at the frame set \
+         there. A goal applies to the body with the same tets.");
     PINS: Input<Many> = Input::many("pins", Kind::Points,
-        "Animated points from Softbody_Pin, which hold the particles near them at the start.")
+        "Animated points from Softbody_Pin. Each holds the particles that are near it at the start.")
         .read_at(|_| Times::START.and(Times::within_step(1)));
 }
 
 params! { PARAMS:
     START_FRAME: Param<i64> = Param::int("start_frame", 1,
         "The frame at which the simulation starts from `bodies`.").unit(Unit::Frame).default_scene_start().fixed();
-    GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "Acceleration of gravity.")
+    GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "Acceleration due to gravity.")
         .unit(Unit::MetresPerSecondSquared);
-    DENSITY: Param<Maskable> = Param::maskable("density", 1000.0, "Mass per volume.")
+    DENSITY: Param<Maskable> = Param::maskable("density", 1000.0,
+        "Mass per volume. At the same stiffness, denser bodies sag more.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
         "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
@@ -84,60 +85,68 @@ params! { PARAMS:
         "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
          wobbling.")
         .unit(Unit::Seconds).at_least(0.0).soft(0.0, 0.1);
-    DRAG: Param<f32> = Param::float("drag", 0.0, "Damping of all motion, as by thick air.")
+    DRAG: Param<f32> = Param::float("drag", 0.0,
+        "Rate at which all motion is slowed, as by thick air: at 1 a body loses 63 % of its speed in a second.")
         .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0);
     VOLUME: Param<f32> = Param::float("volume", 1.0,
-        "Strength of volume preservation, also against tets turning inside out. At 0 there are only springs, and \
-         bodies crumple.")
+        "Strength of volume preservation and of the resistance to tets turning inside out: at 1 volume stays nearly \
+         constant, at 0 there are only springs, and soft bodies crumple.")
         .within(0.0, 1.0);
     PLASTIC_YIELD: Param<f32> = Param::float("plastic_yield", 0.0,
-        "Strain beyond which deformation becomes permanent: at 0.05 most dents stay. 0 turns plasticity off.")
+        "Strain (change of length relative to the rest length) beyond which deformation becomes permanent: at 0.05 \
+         most dents stay. 0 turns plasticity off.")
         .at_least(0.0).soft(0.0, 0.5);
     PLASTIC_CREEP: Param<f32> = Param::float("plastic_creep", 0.0,
-        "How fast strain beyond `plastic_yield` becomes permanent: at 10 within a few frames, at 0 never.")
+        "Rate at which strain beyond `plastic_yield` becomes permanent: at 10 within a few frames, at 0 never.")
         .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 50.0);
     RESET_TO_GOALS: Param<f32> = Param::float("reset_to_goals", 1.0,
         "How far the body's rest shape changes to that of a goal once the goal's frame is passed: at 1 the body keeps \
-         the goal's shape when released, at 0 it springs back.").within(0.0, 1.0);
-    RESET_FRAMES: Param<i64> = Param::int("reset_frames", 4, "Number of frames over which the rest shape changes; a \
-        sudden change jolts the body.")
+         the goal's shape after it is released, at 0 it springs back.").within(0.0, 1.0);
+    RESET_FRAMES: Param<i64> = Param::int("reset_frames", 4, "Number of frames over which the rest shape changes to \
+        that of a goal. A sudden change jolts the body.")
         .unit(Unit::Frames).within(0.0, 1e4).soft(0.0, 24.0);
     KEEP_DENTS: Param<f32> = Param::float("keep_dents", 1.0,
-        "Share of plastic dents that is kept when the rest shape changes to that of a goal.").within(0.0, 1.0);
+        "How much of the plastic dents is kept when the rest shape changes to that of a goal: 1 keeps them, 0 removes \
+         them.").within(0.0, 1.0);
     GOAL_ON: Param<GoalOn> = Param::choice("goal_on", GoalOn::Interior, "The particles that goals pull.");
     COUPLING_RADIUS: Param<f64> = Param::double("coupling_radius", 0.0,
-        "Surfaces of two bodies that face each other within this distance at the start are joined by springs. 0 joins \
-         none.")
+        "Two bodies are joined by springs where their surfaces face each other within this distance at the start. 0 \
+         joins none.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1).fixed();
-    COUPLING_STIFFNESS: Param<f64> = Param::double("coupling_stiffness", 10.0, "Stiffness of each of those springs.")
+    COUPLING_STIFFNESS: Param<f64> = Param::double("coupling_stiffness", 10.0,
+        "Stiffness of each spring between bodies.")
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 1e3).fixed().when(couples);
     COUPLING_BREAK: Param<f32> = Param::float("coupling_break", 0.0,
-        "Length, relative to that at the start, at which one of those springs tears. 0 never tears.")
+        "Stretch at which a spring between bodies tears: at 1.5 it tears at one and a half times its length at the \
+         start. 0 never tears.")
         .at_least(0.0).soft(0.0, 3.0).when(couples);
     THICKNESS: Param<f32> = Param::float("thickness", 1e-3,
-        "Distance that surfaces keep from each other. A tenth of the tets' edge length is cheap; smaller values need \
+        "Distance that surfaces keep from each other. A tenth of the tets' edge length is cheap; smaller values take \
          more time steps.")
         .unit(Unit::Metres).above(0.0).soft(1e-4, 1e-2);
     FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
-        "Coefficient of friction: 0 slides freely, 1 holds on a slope of 45 degrees.")
+        "Coefficient of friction: at 0 bodies slide freely, at 1 they stick to a slope of 45 degrees.")
         .at_least(0.0).soft(0.0, 1.0);
     SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether bodies collide with themselves.");
     BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies collide with each other.");
-    GROUND: Param<bool> = Param::bool("ground", false, "Whether there is a level ground. It takes precedence over \
-        colliders.");
+    GROUND: Param<bool> = Param::bool("ground", false, "Whether there is a level ground. Colliders never push \
+        bodies below it.");
     GROUND_HEIGHT: Param<f32> = Param::float("ground_height", 0.0, "Height of the ground.")
         .unit(Unit::Metres).when(|params| params.get(GROUND));
     INTEGRATOR: Param<Stepping> = Param::choice("integrator", Stepping::Default, "The time integrator.");
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-3,
-        "Error allowed per frame, relative to the size of the bodies.").above(0.0).soft(1e-6, 1e-2)
+        "Error that the `accurate` integrator allows per frame, relative to the size of the bodies.")
+        .above(0.0).soft(1e-6, 1e-2)
         .when(|params| params.get(INTEGRATOR) == Stepping::Accurate);
-    SUBSTEPS: Param<i64> = Param::int("substeps", 0, "Number of time steps per frame. 0 takes as many as needed.")
+    SUBSTEPS: Param<i64> = Param::int("substeps", 0,
+        "Number of time steps per frame. 0 takes as many as needed, usually one.")
         .within(0.0, 256.0)
         .soft(0.0, 16.0);
-    INITIAL_VELOCITY: Param<[f32; 3]> = Param::vec3("initial_velocity", [0.0; 3], "Velocity of the bodies at the start.")
+    INITIAL_VELOCITY: Param<[f32; 3]> = Param::vec3("initial_velocity", [0.0; 3],
+        "Velocity of the bodies at the start.")
         .unit(Unit::MetresPerSecond).fixed();
-    TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0, "Speed of time: simulated seconds per second of frames. 0 \
-        stops time.")
+    TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0,
+        "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.")
         .at_least(0.0).soft(0.0, 2.0);
 }
 
@@ -152,37 +161,41 @@ const TETS: Output = Output::new("tets", &[Kind::Tets], "The tets, in their simu
 metrics! { METRICS:
     NEWTON = Metric::new("newton", Unit::None, "Newton iterations in the frame.");
     CG = Metric::new("cg", Unit::None, "Iterations of linear solves in the frame.");
-    RESIDUAL = Metric::new("residual", Unit::None, "The largest residual left by a solve, relative to its first.");
+    RESIDUAL = Metric::new("residual", Unit::None,
+        "The largest residual left by a solve, relative to the initial one.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Solves that ended before they converged, and particles whose motion had to be limited.")
+        "Solves that reached their iteration limit, and particles whose motion had to be limited. 0 is good.")
         .warn_above(0.0, "At these frames the solver reached its iteration limit, so motion may be damped or contacts \
             may be deeper than `thickness`. Set more `substeps`, or lower the stiffness or the speed of colliders.");
-    ERROR_ESTIMATE = Metric::new("error_estimate", Unit::Metres, "Estimated error in positions that the frame added.");
+    ERROR_ESTIMATE = Metric::new("error_estimate", Unit::Metres, "Estimated error that the frame added to positions.");
     KINETIC = Metric::new("kinetic", Unit::Joules, "Kinetic energy.");
     ELASTIC = Metric::new("elastic", Unit::Joules, "Elastic energy of the springs.");
     GOAL_ENERGY = Metric::new("goal_energy", Unit::Joules, "Potential energy of the goals.");
     RESET_ENERGY = Metric::new("reset_energy", Unit::Joules,
-        "Energy added when the rest shape was changed to that of a goal; negative where it was released.");
+        "Energy added when the rest shape was changed to that of a goal; negative if energy was released.");
     PLASTIC_WORK = Metric::new("plastic_work", Unit::Joules,
-        "Elastic energy that plastic flow dissipated after the frame's steps: it is missing from the next frame's \
+        "Elastic energy that plastic flow dissipates at the end of the frame; it is no longer part of the next frame's \
          `elastic`.");
     ENERGY_SHED = Metric::new("energy_shed", Unit::Joules, "Energy removed to prevent a spurious gain.");
-    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to that at rest.");
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.");
     WORST_STRETCH = Metric::new("worst_stretch", Unit::None,
-        "The largest ratio of a spring's length to its rest length, or of its rest length to its length.");
+        "The largest stretch or compression of a spring: length ÷ rest length, or rest length ÷ length.");
     INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")
         .warn_above(0.0, "Parts of a body are turned inside out: something squeezes it harder than it can resist. \
             Raise `volume` or `stiffness`, slow the colliders, or leave more room between them.");
-    CONTACTS = Metric::new("contacts", Unit::None, "Active contacts.");
+    CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
-        "How far the worst contact is closer than `thickness`.");
+        "By how much surfaces came closer than `thickness` at the worst contact. More than `thickness` means \
+         penetration.");
     LET_GO = Metric::new("let_go", Unit::None,
-        "Edges of the surface longer than 8 times their rest length, which colliders release.")
-        .warn_above(0.0, "A collider has caught the skin and stretched it to more than 8 times its length, so it is \
-            released there. Give the collider a smoother shape, lower `friction`, or raise `stiffness`.");
-    GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres, "Mean distance of pulled particles from their goals.");
+        "Edges of the surface that are stretched to more than 8 times their rest length, so that colliders let them \
+         pass.")
+        .warn_above(0.0, "A collider has caught the skin and stretched it to more than 8 times its length, so it lets \
+            the skin pass there. Give the collider a smoother shape, lower `friction`, or raise `stiffness`.");
+    GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres,
+        "Mean distance of the particles pulled by goals from their targets.");
     PINNED = Metric::new("pinned", Unit::None,
-        "Particles that pins hold or pull. If it is 0, none was within a pin's `radius` at the start.");
+        "Particles held or pulled by pins. If it is 0, no particle was within a pin's `radius` at the start.");
     TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
     SUBSTEPS_USED = Metric::new("substeps_used", Unit::None, "Number of time steps in the frame.");
 }
@@ -190,11 +203,11 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
     1,
-    "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble and collide with friction against colliders, the \
-     ground, each other and themselves. They keep their volume and, if plastic, their dents; goals direct them and \
-     pins hold them. Stiffness is independent of mesh resolution, and the solver is stable for any stiffness, mass and \
-     initial state. Inner particles do not collide: dough softer than a few hundred pascals may fall out of its \
-     skin.",
+    "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
+     other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
+     pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
+     stiffness, mass and initial state. Inner particles do not collide: bodies softer than a few hundred pascals may \
+     collapse and come out through their surface.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)
@@ -220,9 +233,9 @@ pub(crate) static NODE: Node = Node::new(
 struct Run {
     inputs: StartInputs,
     state: State,
-    /// What the last step measured; empty at the start.
+    /// Metrics of the last step; empty at the start.
     metrics: MetricValues,
-    /// Computed from `inputs` alone, so it is computed again after a checkpoint.
+    /// Computed from `inputs` only, and recomputed after a checkpoint.
     #[serde(skip)]
     setup: OnceLock<Arc<SimulationSetup>>,
     #[serde(skip)]
@@ -357,7 +370,7 @@ impl Solving {
         Ok(Self { solver: BodySolver::new(&body), body, values: material.values() })
     }
 
-    /// With the current material.
+    /// The solver with the current material.
     fn of(mut self, material: &MaterialFields) -> Result<Self> {
         if self.values != material.values() {
             self.body.set_material(&material.material()).map_err(refusal)?;

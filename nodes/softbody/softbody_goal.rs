@@ -17,7 +17,7 @@ use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, SURFACE_PO
 
 inputs! { INPUTS:
     BODY: Input = Input::one("body", Kind::Tets,
-        "The body at rest, from Tetrahedralize; its `surface_point` tells which points are on the surface.");
+        "The body at rest, from Tetrahedralize. Its `surface_point` says which points are on the surface.");
     SHAPE: Input = Input::one("shape", Kind::Mesh,
         "The target shape of the surface: the surface mesh from Tetrahedralize with other positions and the same \
          faces.");
@@ -25,15 +25,15 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     FRAME: Param<f32> = Param::float("frame", 1.0,
-        "The frame at which the body reaches the shape. Between two goals it moves from one to the next.")
+        "The frame at which the body reaches the shape. Between two goals it moves gradually from one to the next.")
         .unit(Unit::Frame).fixed();
     STRENGTH: Param<f32> = Param::float("strength", 100.0,
-        "How strongly the body is pulled to the shape: acceleration per distance. 0 does not pull; about 200 · \
-         stiffness ÷ (density · size²) brings it within 1 % of its size: 4e4 for dough of 5e3 Pa and 0.16 m, 1e3 for 1 \
-         m.")
+        "How strongly the body is pulled towards the shape: acceleration per distance. 0 does not pull. About 200 · \
+         stiffness ÷ (density · size²) brings the body to within 1 % of its size: 4e4 for dough of 5e3 Pa that is 0.16 \
+         m across, 1e3 if it is 1 m across.")
         .unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 1e5);
     HOLD: Param<f32> = Param::float("hold", 0.0,
-        "How long the body is held in the shape before it moves to the next goal, or is released.")
+        "How long the body is held in the shape before it moves on to the next goal or is released.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 48.0);
 }
 
@@ -42,13 +42,13 @@ const GOAL: Output =
 
 metrics! { METRICS:
     INVERTED = Metric::new("inverted_tets", Unit::None,
-        "Tets that are flat or inside out in the shape: its surface crosses itself, or bends too sharply.")
+        "Tets that are flat or inside out in the goal, because its surface crosses itself or bends too sharply.")
         .warn_above(0.0, "The shape cannot be reached without turning parts of the body inside out. Look for places \
             where its surface crosses itself or bends sharply, and smooth them.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, relative to its own.");
     CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
     RESIDUAL = Metric::new("residual", Unit::None,
-        "Force left on inner points, relative to that exerted by the surface.");
+        "Force left on inner points after the solve, relative to the force exerted by the surface.");
     LOOSE = Metric::new("loose_points", Unit::None,
         "Points that are not connected to the surface: they keep their positions.");
 }
@@ -56,9 +56,9 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Softbody_Goal",
     1,
-    "Turns a target shape of a body's surface into a goal: the interior follows as if it were elastic. Wire it into \
-     `goals` of Softbody, and the body reaches the shape at that frame. The body and the shape must have the same \
-     points and faces.",
+    "Turns a target shape of a body's surface into a goal for the whole body: the interior follows as if it were \
+     elastic. Wire it into `goals` of Softbody, and the body reaches the shape at the frame set here. The shape must \
+     have the points and faces of the body's surface.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -87,13 +87,13 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 /// The row of `shape` to which each point of the body belongs; below 0 inside.
 ///
 /// # Errors
-/// Where the body does not say, or `shape` is not its surface.
+/// If the body does not say, or `shape` is not its surface.
 fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component) -> Result<&'a [i32]> {
     let name = SURFACE_POINT.name;
     let Some(rows) = body.get(SURFACE_POINT) else {
         let has = body.describe(name).map_or("which it does not have".into(), |found| format!("which is {found}"));
         return Err(Error::refused(format!("`body` needs `{name}`, {has}"))
-            .hint("take the tets that come out of Tetrahedralize: they know which points are on the surface"));
+            .hint("use the tets from Tetrahedralize, whose `surface_point` says which points are on the surface"));
     };
     let held = rows.iter().max().and_then(|row| usize::try_from(*row).ok()).map_or(0, |row| row + 1);
     let counted = |mesh: &Component| format!("{} faces and {} points", mesh.element_count(), mesh.point_count());
@@ -103,7 +103,7 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
             format!("`shape` has {shape}, the surface of `body` {own}, or their topology differs")
         }
         Some(along) if held > along.point_count() => {
-            format!("`{name}` of `body` goes up to {}, and its surface has {} points", held - 1, along.point_count())
+            format!("`{name}` of `body` goes up to {}, but its surface has {} points", held - 1, along.point_count())
         }
         None if held != shape.point_count() => {
             format!("`shape` has {} points, the surface of `body` {held}", shape.point_count())
@@ -114,8 +114,8 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
         _ => return Ok(rows),
     };
     Err(Error::refused(fact).hint(
-        "move the points of the mesh that comes out of Tetrahedralize beside the tets: where the surface was repaired, \
-         it is not the one that went in, and one that was mirrored has its faces turned round",
+        "deform the surface mesh in the output of Tetrahedralize: after repairs it differs from the input, and \
+         mirroring reverses its faces",
     ))
 }
 

@@ -9,7 +9,7 @@ use engine::prelude::*;
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
 
-/// Later than any scene ends; f32 holds it exactly.
+/// Later than the end of any scene, and exact in f32.
 const NEVER: f32 = 1e9;
 
 inputs! { INPUTS:
@@ -18,13 +18,14 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     RADIUS: Param<f32> = Param::float("radius", 0.01,
-        "Distance from a point within which particles are held, measured when the simulation starts.")
+        "Particles within this distance of a point when the simulation starts are held by it.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     STRENGTH: Param<f32> = Param::float("strength", 0.0,
-        "How strongly particles are pulled to their positions: acceleration per distance. 0 holds them exactly, \
-         against any force.").unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 10_000.0);
+        "How strongly particles are pulled to their positions relative to the pin: acceleration per distance; higher \
+         values follow more closely. 0 holds them exactly, against any force.")
+        .unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 10_000.0);
     RELEASE: Param<f32> = Param::float("release", NEVER,
-        "The frame from which particles are released. The default is never reached.").unit(Unit::Frame);
+        "The frame from which on particles are free. By default they are never released.").unit(Unit::Frame);
 }
 
 const PINS: Output = Output::like("pins", &TARGETS, "The points, with the attributes of pins.");
@@ -32,8 +33,8 @@ const PINS: Output = Output::like("pins", &TARGETS, "The points, with the attrib
 pub(crate) static NODE: Node = Node::new(
     "Softbody_Pin",
     1,
-    "Turns animated points into pins: the particles near one when a simulation starts move with it. Different pins, \
-     rigid and soft ones, can be merged.",
+    "Turns animated points into pins: particles that are near a pin when the simulation starts move with it. Pins with \
+     different settings, such as rigid and soft ones, can be merged.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -56,7 +57,7 @@ mod tests {
     use conformance::{bench, conforms};
 
     #[test]
-    fn every_point_is_a_pin_and_stays_where_it_is() {
+    fn every_point_becomes_a_pin_at_its_position() {
         let points = Component::points(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
         let out = bench(&NODE).input(TARGETS, points.clone()).set(RADIUS, 0.25).set(RELEASE, 24.0).cook();
         let pins = out.part(Kind::Points);
@@ -68,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn pins_hold_exactly_and_for_ever_unless_told() {
+    fn by_default_pins_hold_exactly_and_for_ever() {
         let out = bench(&NODE).input(TARGETS, Component::points(vec![[0.0; 3]])).cook();
         let pins = out.part(Kind::Points);
         assert_eq!(pins.get(PIN_STRENGTH), Some(&[0.0][..]));
@@ -76,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_along_goes_through() {
+    fn other_components_pass_through() {
         let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).unwrap();
         let out = bench(&NODE).input(TARGETS, Geometry::from(Component::points(vec![])).with(mesh)).cook();
         assert_eq!((out.part(Kind::Points).point_count(), out.mesh().point_count()), (0, 3));

@@ -6,8 +6,8 @@
 //!
 //! What R leaves open:
 //! * R does not say where internal nodes come from. Here they are a body-centred cubic lattice with the surface's mean
-//!   edge length, slightly jittered and kept half an edge from the surface: without internal nodes all springs of a
-//!   body would run from skin to skin.
+//!   edge length, slightly jittered and kept half an edge away from the surface. Without internal nodes all springs of
+//!   a body would reach from surface to surface.
 //! * A closed shell within another is the wall of a cavity, and one within that is a body again: the white of an egg
 //!   ends where the yolk begins. The inside is where the surface has winding number 1.
 //! * Some edges of the surface may not be edges of tets. No list of them is stored: the output includes the surface,
@@ -23,33 +23,34 @@ use crate::shared::attributes::{SLIVER, SURFACE_POINT};
 choice! {
     /// The repair of an invalid surface.
     enum Repair {
-        None = "none": "no repair: any defect is refused, with its place",
+        None = "none": "no repair: any defect is refused, and its location reported",
         Safe = "safe": "repairs that neither move points nor open the surface: coincident points are merged where the \
-                surface is open or connected there, points without faces, degenerate and duplicate faces are removed, \
-                and faces are oriented outwards. Holes, intersections and edges with three faces are still refused",
+                surface is open or already connected; unused points, degenerate faces and duplicate faces are removed; \
+                faces are oriented outwards. Holes, intersections and edges with three faces are still refused",
     }
 }
 
 inputs! { INPUTS:
     SURFACE: Input = Input::one("surface", Kind::Mesh,
-        "Closed surfaces, one per body; a surface within another is the wall of a cavity. Coarse faces make a coarse \
-         body.");
+        "Closed surfaces, one per body. A surface within another one is the wall of a cavity, and one within a cavity \
+         is a body again. Coarse faces make a coarse body.");
 }
 
 params! { PARAMS:
     SPACING: Param<f64> = Param::double("spacing", 0.0,
-        "Approximate distance between inner points. 0 takes the mean edge length of the surface; half of that makes \
-         eight times as many points.")
+        "Approximate distance between inner points. 0 takes the mean edge length of the surface. Half the distance \
+         makes eight times as many points.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0).when(|params| params.get(INTERIOR));
     INTERIOR: Param<bool> = Param::bool("interior", true,
-        "Whether there are inner points. Without them all tets run from skin to skin: they are few, long and thin.");
+        "Whether to add inner points. Without them all tets reach from surface to surface and are few, long and thin.");
     REPAIR: Param<Repair> = Param::choice("repair", Repair::Safe, "How an invalid surface is repaired.");
 }
 
 const TETS: Output = Output::new(
     "tets",
     &[Kind::Tets, Kind::Mesh],
-    "The tets, with the repaired surface. The first points of the tets are those of the surface, in its order.",
+    "The tets, together with the repaired surface mesh, whose points are the first points of the tets, in the same \
+     order.",
 );
 
 /// 0 inside, 1 on the outside of a body, 2 on the wall of a cavity.
@@ -63,28 +64,29 @@ metrics! { METRICS:
     MIN_DIHEDRAL = Metric::new("min_dihedral", Unit::Radians,
         "The smallest dihedral angle of a tet, slivers excluded.");
     QUALITY_MEDIAN = Metric::new("quality_median", Unit::None,
-        "Median quality of the tets: three times the inradius ÷ the circumradius, 1 for a regular tet.");
+        "Median quality of the tets: three times the inradius ÷ the circumradius. 1 is a regular tet, 0 a flat one.");
     VOLUME_ERROR = Metric::new("volume_error", Unit::None,
-        "Relative difference between the volume of the tets and that of the surface.");
+        "Difference between the volume of the tets and that enclosed by the surface, relative to the latter.");
     MISSING_FACES = Metric::new("missing_faces", Unit::None,
         "Faces of the surface that are not faces of tets: there the tets cut a corner or bulge.");
     MISSING_EDGES = Metric::new("missing_edges", Unit::None, "Edges of the surface that are not edges of tets.");
     BARE_POINTS = Metric::new("bare_points", Unit::None, "Points of the surface that belong to no tet.")
-        .warn_above(0.0, "These points of the surface belong to no tet, so nothing but springs along the surface moves \
-            them. Look for thin spikes and doubled walls, and thicken or remove them.");
+        .warn_above(0.0,
+        "These points of the surface belong to no tet, so they are connected only by springs along the surface. Look \
+         for thin spikes and doubled walls, and thicken or remove them.");
     SLIVERS = Metric::new("slivers", Unit::None, "Tets too flat to have a meaningful volume.");
     REPAIRS = Metric::new("repairs", Unit::None,
-        "Points merged or removed, and faces removed, trimmed or reoriented.");
+        "Number of points merged or removed, and of faces removed, trimmed or reoriented.");
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Tetrahedralize",
     1,
-    "Fills closed surfaces with tets, so that they can be simulated as soft bodies. Inner points are about as far \
-     apart as those of the surface. Attributes of points: `surface_point`, the corresponding point of the surface (−1 \
-     inside), and `side`, 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. Attributes of tets: `body`, \
-     counted from 0, and `sliver`, 1 for tets too flat to have a meaningful volume. The output includes the surface \
-     mesh.",
+    "Fills closed surfaces with tets, so that they can be simulated as soft bodies. By default inner points are about \
+     as far apart as those of the surface. Points get the attributes `surface_point`, the index of the corresponding \
+     point of the surface (−1 inside), and `side`: 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. \
+     Tets get `body`, the number of their body from 0, and `sliver`, 1 if the tet is too flat to have a meaningful \
+     volume. The output includes the surface mesh.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

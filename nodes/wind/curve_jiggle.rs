@@ -1,4 +1,4 @@
-//! Curve_Jiggle: curves swing after whatever moves them.
+//! Curve_Jiggle: curves lag behind their incoming motion and swing.
 //!
 //! W5 runs "a simple curve jiggle simulation" after the wind to soften passing gusts. Here every CV is tied by a damped
 //! spring to its position on the incoming curve: x'' = −2ζω(x' − d·target') − ω²(x − target), ω = 2π·`frequency` ÷
@@ -8,12 +8,12 @@
 //! * The response to a target that moves linearly from frame to frame is exact, not time-stepped: it is stable for any
 //!   stiffness and frame rate, and slow or stiff curves cost the same.
 //! * Lengths are restored on the output, root to tip, and never fed back into the springs.
-//! * Any frame cooks alone. It depends on previous frames only within a window, whose length follows from `tolerance`
-//!   and the slowest root of the equation: beyond it, less than that share of any swing remains.
-//! * Where the `skin` is wired, each curve swings in the frame by which Curve_Attach moves it: every step, `inherit_motion`
-//!   of that frame's rigid motion carries the swing and its target along, and only the rest of the motion is lagged.
+//! * Any frame can be cooked alone. It depends on previous frames only within a window, whose length follows from
+//!   `tolerance` and the slowest root of the equation: beyond it, less than that fraction of any swing remains.
+//! * If `skin` is wired, each curve swings in the frame in which Curve_Attach would move it: in every step the fraction
+//!   `inherit_motion` of that frame's rigid motion is applied to the swing and its target, and only the rest is lagged.
 //!   Where the skin collapses to a line or a point it carries curves without rotating them.
-//! * While `blend` is 0 or `ramp` nowhere above 0 nothing swings: when they rise, curves start from rest.
+//! * While `blend` is 0, or `ramp` is nowhere above 0, nothing swings: when they rise, curves start from rest.
 
 use curves::attach::{RootPose, RootPositions, SkinBinding};
 use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
@@ -26,45 +26,45 @@ choice! {
     /// What the damper resists.
     DragChoice for Drag {
         Drag::Target => "target": "motion relative to the incoming curve: curves keep up with steady motion",
-        Drag::World => "world": "all motion, as still air does: curves trail behind anything that moves steadily",
+        Drag::World => "world": "all motion, as still air does: curves trail behind while they move",
     }
 }
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to follow, root first; the same curves at every \
-        frame.")
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to follow, root first. They may move, but must \
+        keep their CVs.")
         .read_at(|_| Times::NOW.and(Times::START));
     SKIN: Input<Opt> = Input::optional("skin", Kind::Mesh,
-        "The mesh that the curves grow on; the same faces at every frame. If it is wired, a running animal does not \
-         drag its fur behind it.")
+        "The mesh that the curves grow on. It may move, but must keep its faces. If it is wired, a running animal does \
+         not drag its fur behind it.")
         .read_at(|_| Times::NOW.and(Times::START));
 }
 
 params! { PARAMS:
     FREQUENCY: Param<Maskable> = Param::maskable("frequency", 3.0,
-        "Swings per second of a free tip: low suits long soft curves, high short stiff ones. The mask is clamped to \
-         ¼…4.").unit(Unit::Hertz).above(0.0).soft(0.5, 12.0);
+        "Swings per second of an undamped tip: low values suit long soft curves, high values short stiff ones. The \
+         mask is clamped to ¼…4.").unit(Unit::Hertz).above(0.0).soft(0.5, 12.0);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.3,
-        "Damping ratio: at 0.05 curves keep swinging for long, at 1 they come to rest without overshoot, above 1 more \
-         slowly. The mask is clamped to ¼…4.").above(0.0).soft(0.05, 2.0);
+        "Damping ratio: at 0.05 curves swing for a long time, at 1 they come to rest without overshoot, above 1 they \
+         do so more slowly. The mask is clamped to ¼…4.").above(0.0).soft(0.05, 2.0);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 0.0], [1.0, 1.0]],
-        "Softness from root (0) to tip (1), by which the frequency is divided. Where it is 0 or less, CVs follow the \
-         incoming curve exactly; the root always does.");
+        "Softness from root (0) to tip (1): divides `frequency`, so at ½ a CV swings twice as fast as at 1. Where it \
+         is 0 or less, CVs follow the incoming curve exactly; the root always does.");
     DRAG: Param<DragChoice> = Param::choice("drag", Drag::Target, "The motion that damping resists.");
     INHERIT_MOTION: Param<f32> = Param::float("inherit_motion", 1.0,
-        "Share of the skin's own motion that curves follow without lag: at 1 only motion relative to the skin, such as \
+        "How much of the skin's own motion curves follow without lag: at 1 only motion relative to the skin, such as \
          wind, makes them swing; at 0 they also lag behind the skin itself, as if no skin were wired.")
         .within(0.0, 1.0);
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-3,
-        "Share of a swing below which it is neglected. It sets the number of previous frames that the result depends \
-         on: smaller values cost more and come closer to a simulation from the scene's start.")
+        "Fraction of a swing that may be neglected. It sets how many previous frames the result depends on: smaller \
+         values cost more and come closer to a simulation from the scene's start.")
         .above(0.0).soft(1e-6, 0.1);
     PREROLL: Param<i64> = Param::int("preroll", 0,
         "Frames to simulate before the scene's first frame, if the inputs move there. With 0 the scene starts at \
          rest.").unit(Unit::Frames).within(0.0, 1e6).soft(0.0, 48.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
-        "Share of the swing that is applied: 0 gives the incoming curves, 1 the whole swing. Lengths are kept at any \
-         value. While it is 0 nothing swings; when it rises, curves start from rest.").within(0.0, 1.0);
+        "How much of the swing is applied: 0 gives the incoming curves, 1 the whole swing. Lengths are kept at any \
+         value. While it is 0 nothing swings; when it rises from 0, curves start from rest.").within(0.0, 1.0);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The swinging curves. Lengths and roots are those of `curves`.");
@@ -78,9 +78,9 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Curve_Jiggle",
     2,
-    "Curves swing after whatever moves them: they lag softly behind a gust and overshoot after a stop. A damped spring \
-     ties each CV to its position on the incoming curve, stiff at the root and soft at the tip. Any frame cooks \
-     alone.",
+    "Makes curves lag behind their incoming motion and swing: they follow a gust softly and overshoot when it stops. A \
+     damped spring ties each CV to its position on the incoming curve, stiff at the root and soft at the tip. Any \
+     frame can be cooked alone.",
     Cook::window::<Swing>(past),
 )
 .inputs(INPUTS)
@@ -106,9 +106,9 @@ struct Swing {
     /// Curves and skin at the state's frame.
     before: Component,
     skin: Option<Component>,
-    /// None while nothing swings.
+    /// `None` while nothing swings.
     springs: Option<Jiggle>,
-    /// Of the roots on the skin at that frame, if the last step computed them.
+    /// Poses of the roots on the skin at that frame, if the last step computed them.
     poses: Option<Vec<RootPose>>,
 }
 
@@ -179,7 +179,7 @@ impl Swing {
         }
     }
 
-    /// The state's frame is now the one that was stepped to.
+    /// Makes the current frame that of the state.
     fn advance(&mut self, cx: &StepCx) {
         self.before = cx.part(CURVES).clone();
         self.skin = cx.part(SKIN).cloned();
@@ -217,14 +217,14 @@ fn check_same(input: &str, now: &Component, first: &Component) -> Result<()> {
         format!("{} {elements} of {} points", part.element_count(), part.point_count())
     };
     let differ = match (count(now), count(first)) {
-        (now, first) if now == first => format!("{now}, with another topology"),
-        (now, first) => format!("{now}, then {first}"),
+        (now, first) if now == first => format!("it has {now} with another topology"),
+        (now, first) => format!("it had {first} then, and has {now} now"),
     };
-    Err(Error::refused(format!("`{input}` is not what it was at the scene's first frame: {differ}"))
-        .hint("a swing continues from frame to frame: add and remove points after this node"))
+    Err(Error::refused(format!("`{input}` has changed since the scene's first frame: {differ}"))
+        .hint("curves keep swinging from frame to frame: add or remove points after this node"))
 }
 
-/// Why nothing swings.
+/// Why nothing swings; `None` if something does.
 fn stands_still(params: &Params) -> Option<&'static str> {
     if params.get(BLEND).value == 0.0 {
         return Some("`blend` is 0");

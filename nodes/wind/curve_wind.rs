@@ -1,8 +1,8 @@
 //! Curve_Wind: wind bends curves, root to tip.
 //!
-//! W2. At each CV the rest of the curve turns about it, from the direction of its current tip towards the wind plus
-//! noise; the angle is scaled by `global_rotate`, `ramp_rotate` (along the curve) and the CV's `envelope`. Noise is
-//! sampled at the root, offset along the wind by arc length × `waviness`.
+//! W2. At each CV the rest of the curve turns about that CV, from the direction of its current tip towards the wind
+//! plus noise; the angle is scaled by `global_rotate`, `ramp_rotate` (along the curve) and the CV's `envelope`. Noise
+//! is sampled at the root, offset along the wind by arc length × `waviness`.
 //!
 //! Departures:
 //! * Noise moves **downwind** with time, by ∫ `scroll` · wind dt: W does not scroll the noise, and an offset
@@ -22,16 +22,17 @@ choice! {
     /// What varies the wind's direction.
     NoiseChoice for Option<NoiseKind> {
         None => "none": "the wind is the same everywhere",
-        Some(NoiseKind::Perlin) => "perlin": "smooth, with detail from gusts down to flutter",
-        Some(NoiseKind::Billow) => "billow": "rounded swells with creases between them",
-        Some(NoiseKind::Wavelet) => "wavelet": "each octave is limited to its own scale, so detail does not shimmer",
+        Some(NoiseKind::Perlin) => "perlin": "smooth, with detail at every scale from gusts to flutter",
+        Some(NoiseKind::Billow) => "billow": "rounded swells separated by creases",
+        Some(NoiseKind::Wavelet) => "wavelet": "each octave (layer of noise) contains detail of its own size only, so \
+            fine detail does not shimmer",
     }
 }
 
 choice! {
     /// Where noise is sampled.
     enum Space {
-        World = "world": "at the root's current position, so a moving animal runs through the pattern",
+        World = "world": "at the root's current position, so a moving animal passes through the pattern",
         Rest = "rest": "at the root's rest position, so the pattern sticks to a moving animal: `Pref` of the root if \
                 the curves have it, otherwise its position at the scene's first frame",
     }
@@ -40,9 +41,10 @@ choice! {
 choice! {
     /// How the turn is distributed along the curve.
     enum Mode {
-        Paper = "paper": "every CV turns by the same share of the remaining angle, so curves with more CVs bend more",
-        ResolutionFree = "resolution_free": "the bend does not depend on the number of CVs; it is that of \
-                `reference_segments` segments in `paper` mode. A share of 1 or more lies along the wind from the root",
+        Paper = "paper": "every CV turns by the same fraction of the remaining angle: curves with more CVs bend more",
+        ResolutionFree = "resolution_free": "the bend does not depend on the number of CVs: it is that of a \
+                curve of `reference_segments` segments in `paper` mode. With a `global_rotate` of 1 or more the whole \
+                curve lies along the wind",
     }
 }
 
@@ -58,15 +60,18 @@ params! { PARAMS:
     NOISE: Param<NoiseChoice> = Param::choice("noise", Some(NoiseKind::Perlin),
         "The noise that varies the wind's direction from place to place.");
     AMPLITUDE: Param<f32> = Param::float("amplitude", 0.5,
-        "Strength of the noise relative to the wind: 0 leaves the wind straight, at 1 both are equally strong.")
+        "Strength of the noise relative to the wind: at 0 the wind blows straight, at 1 noise and wind are equally \
+         strong.")
         .at_least(0.0).soft(0.0, 2.0).when(has_kind);
     FREQUENCY: Param<f64> = Param::double("frequency", 2.0,
-        "How fine the noise is: its largest features are about 1/frequency across.")
+        "How fine the noise is: its largest features are about 1/`frequency` metres across.")
         .unit(Unit::PerMetre).at_least(0.0).soft(0.1, 20.0).when(has_noise);
-    OCTAVES: Param<i64> = Param::int("octaves", 2, "Number of scales of noise, each half the size of the one before.")
+    OCTAVES: Param<i64> = Param::int("octaves", 2, "Number of layers of noise, each with features half as large as the \
+        one before: more give finer detail and cost more.")
         .within(1.0, 16.0).soft(1.0, 4.0).when(has_noise);
     ROUGHNESS: Param<f32> = Param::float("roughness", 0.5,
-        "Strength of each octave relative to the one before: 0 leaves only the largest, at 1 all are equally strong.")
+        "Strength of each octave relative to the one before: at 0 only the largest remains, at 1 all are equally \
+         strong.")
         .within(0.0, 1.0).when(|params| has_noise(params) && params.get(OCTAVES) > 1);
     SCROLL: Param<f64> = Param::double("scroll", 1.0,
         "How fast the noise pattern moves downwind. 0 holds it still.")
@@ -74,37 +79,37 @@ params! { PARAMS:
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
         "Whether the noise pattern stays in the world or sticks to the animal.").when(has_noise);
     WAVINESS: Param<f32> = Param::float("waviness", 0.0,
-        "How far the noise changes along a curve, relative to arc length: at 0 each curve bends as a whole, from about \
-         1 waves run through it.")
+        "How much the noise changes along a curve: at 0 each curve bends as a whole; from about 1 on, waves run \
+         through it. Each CV samples the noise this many times its arc length downwind of the root.")
         .soft(0.0, 4.0).when(has_noise);
     GLOBAL_ROTATE: Param<Maskable> = Param::maskable("global_rotate", 0.5,
-        "Share of the angle to the wind by which each CV turns the rest of its curve: 0 leaves the curves alone, 1 \
+        "Fraction of the angle to the wind by which each CV turns the rest of its curve: 0 leaves the curves alone, 1 \
          lays them along the wind.").soft(0.0, 1.0);
     RAMP_ROTATE: Param<Arc<Ramp>> = Param::ramp("ramp_rotate", &[[0.0, 1.0]],
         "Scales the turn along the curve, from root (0) to tip (1). Lower values near the root make a stiff base.");
     MODE: Param<Mode> = Param::choice("mode", Mode::Paper, "How the turn is distributed along the curve.");
     REFERENCE_SEGMENTS: Param<i64> = Param::int("reference_segments", 4,
-        "Number of segments in `paper` mode that gives the same bend.")
+        "In `resolution_free` mode every curve bends like one with this number of segments in `paper` mode.")
         .within(1.0, 10_000.0).soft(1.0, 32.0).when(|params| params.get(MODE) == Mode::ResolutionFree);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
-        "Share of each segment's turn that is applied: 0 leaves the curves alone, 1 applies the whole wind. Lengths \
-         are kept at any value.").within(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Selects another noise pattern.").when(has_noise);
+        "How much of each segment's turn is applied: 0 leaves the curves alone, 1 applies the whole wind. Lengths are \
+         kept at any value.").within(0.0, 1.0);
+    SEED: Param<Seed> = Param::seed("Each seed gives another noise pattern.").when(has_noise);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The bent curves. Lengths and roots are unchanged.");
 
 metrics! { METRICS:
-    MAX_ANGLE = Metric::new("max_angle", Unit::Radians, "The largest turn of a segment.");
+    MAX_ANGLE = Metric::new("max_angle", Unit::Radians, "The largest angle by which a segment was turned.");
     LENGTH_ERROR = Metric::length_error();
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind",
     2,
-    "Wind bends curves, root to tip, without stretching them. Each CV turns the rest of its curve towards the wind, \
-     whose direction noise varies from place to place; the noise moves downwind. An `envelope` on the CVs (1 if \
-     missing) scales the wind; gusts and shielding write it.",
+    "Bends curves in the wind, root to tip, without stretching them. Each CV turns the rest of its curve towards the \
+     wind. Noise, which moves downwind, varies the wind's direction from place to place. An `envelope` on the CVs (1 \
+     if missing) scales the wind; gusts and shielding write it.",
     Cook::Frame { cook, reads_clock: |params| has_noise(params) && params.get(SCROLL) != 0.0 },
 )
 .inputs(INPUTS)
@@ -179,7 +184,8 @@ fn rest_from_start(params: &Params) -> bool {
     has_noise(params) && params.get(NOISE_SPACE) == Space::Rest
 }
 
-/// What is added to a root to find its noise: the scene's origin, less how far the pattern has moved downwind.
+/// The offset from a root to its position in the noise: the scene's origin minus the distance that the pattern has
+/// moved downwind.
 fn noise_origin(cx: &FrameCx) -> [f64; 3] {
     let moved = cx.integral(cx.frame());
     std::array::from_fn(|axis| cx.origin()[axis] - moved[axis])
@@ -246,9 +252,9 @@ mod tests {
     const RIGHT: f64 = std::f64::consts::FRAC_PI_2;
 
     #[test]
-    fn segment_k_is_left_with_the_share_one_minus_g_to_the_k_of_the_angle() {
-        // W2 by hand: at every CV the rest of a straight curve turns by g of what is left, so segment k = 1… has
-        // 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
+    fn the_angle_of_segment_k_is_multiplied_by_one_minus_g_to_the_k() {
+        // W2 by hand: at every CV the rest of a straight curve turns by g times the remaining angle, so segment k = 1…
+        // has 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
         let out = calm(upright(4)).set(GLOBAL_ROTATE, Maskable { value: 0.5, attribute: None }).cook();
         for (k, angle) in angles(&out).iter().enumerate() {
             let left = RIGHT / f64::from(2 << k);
@@ -272,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn the_envelope_scales_the_turn_and_its_absence_is_one() {
+    fn the_envelope_scales_the_turn_and_counts_as_one_if_missing() {
         let with = |envelope: f32| {
             let mut curves = upright(1);
             curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![envelope; 2]).unwrap();
@@ -280,12 +286,12 @@ mod tests {
         };
         assert!((with(0.5) - RIGHT * 0.75).abs() < 1e-6);
         assert_eq!(with(0.0), RIGHT);
-        assert_eq!(with(-3.0), RIGHT, "an envelope below 0 is none");
+        assert_eq!(with(-3.0), RIGHT, "an envelope below 0 counts as 0");
         assert_eq!(with(1.0), angles(&calm(upright(1)).cook())[0]);
     }
 
     #[test]
-    fn masks_scale_point_by_point_and_say_when_they_are_missing() {
+    fn masks_scale_per_cv_and_missing_ones_are_refused() {
         let mut curves = upright(1);
         curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::point("soft"), vec![0.5, 1.0]).unwrap();
         let masked = Maskable { value: 0.5, attribute: Some("soft".into()) };
@@ -303,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_blend_is_half_the_turn_and_keeps_lengths() {
+    fn half_blend_is_half_the_turn_and_keeps_lengths() {
         let whole = angles(&calm(upright(4)).cook());
         let out = calm(upright(4)).set(BLEND, Maskable { value: 0.5, attribute: None }).cook();
         for (half, whole) in angles(&out).iter().zip(whole) {
@@ -313,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_turn_the_very_arrays_go_through() {
+    fn without_a_turn_the_same_arrays_pass_through() {
         let curves = field(2);
         for share in [GLOBAL_ROTATE, BLEND] {
             let out =
@@ -325,7 +331,7 @@ mod tests {
 
     #[test]
     fn noise_scrolls_downwind() {
-        // After a second at 2 m/s, what stood at x now stands at x + 2: curve 2 bends as curve 0 did.
+        // After a second at 2 m/s, the noise that was at x is at x + 2: curve 2 bends as curve 0 did.
         let windy = bench(&NODE).input(CURVES, field(4)).set(SCROLL, 2.0);
         let shape = |out: &BenchResult, curve: usize| {
             let cvs = &out.curves().positions()[out.curves().runs().range(curve)];
@@ -340,7 +346,7 @@ mod tests {
 
     #[test]
     fn a_keyed_scroll_does_not_jump() {
-        // From 1 to 100 m/s within a frame: the pattern may not move further than its speed allows.
+        // From 1 to 100 m/s within a frame: the pattern must not move farther than its speed allows.
         let windy =
             bench(&NODE).input(CURVES, field(3)).set(FREQUENCY, 0.001).keyed(SCROLL, &[(10.0, 1.0), (11.0, 100.0)]);
         let frames = windy.frames(8..=14);
@@ -353,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn any_frame_alone_has_the_bits_it_has_in_order() {
+    fn frames_cooked_alone_have_the_same_bits() {
         let windy = bench(&NODE)
             .input(CURVES, field(5))
             .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
@@ -387,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn the_scenes_origin_moves_the_noise_and_nothing_else() {
+    fn the_origin_of_the_scene_moves_the_noise_only() {
         let windy = bench(&NODE).input(CURVES, field(2));
         let at = |origin: [f64; 3], shift: f32| {
             let mut curves = field(2);
@@ -402,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn wind_of_any_length_and_against_the_curve_is_finite() {
+    fn wind_of_any_length_and_wind_against_the_curve_give_finite_results() {
         for wind in [[1e-300, 0.0, 0.0], [1e300, 1e300, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]] {
             let out = calm(upright(4)).set(WIND_DIR, wind).cook();
             assert!(out.curves().positions().as_flattened().iter().all(|x| x.is_finite()), "{wind:?}");
@@ -413,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_and_single_cv_curves_go_through() {
+    fn empty_and_single_cv_curves_pass_through() {
         let none = Geometry::from(Component::curves(Vec::new(), Vec::new()).unwrap());
         assert_eq!(bench(&NODE).input(CURVES, none).cook().curves().point_count(), 0);
         let dots = Geometry::from(Component::curves(vec![1, 1], vec![[1.0; 3], [2.0; 3]]).unwrap());

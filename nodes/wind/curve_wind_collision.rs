@@ -1,20 +1,19 @@
-//! Curve_Wind_Collision: curves bend around what the wind blows them into.
+//! Curve_Wind_Collision: keeps curves that are bent by wind out of colliders.
 //!
 //! W3. Root to tip, each segment starts from its rest direction, carried along by the turns of the segments before it,
-//! and turns towards the direction that the wind gave it until it meets a collider. A segment that the turn of another
-//! pushed into a collider is turned out first. `offset_root` lifts roots off the skin; `offset_scale` keeps curves that
-//! the wind presses flat at a share of their rest height.
+//! and turns towards the direction that the wind gave it until it meets a collider. A segment that an earlier turn has
+//! pushed into a collider is first turned out of it. `offset_root` lifts roots off the skin; `offset_scale` keeps
+//! curves that the wind presses flat at a fraction of their rest height.
 //!
 //! Departures:
-//! * `exact` stops at the first contact itself instead of the last of `rotation_steps` steps that misses: nothing
-//!   passes through a thin collider, and the cost does not grow with accuracy.
+//! * `exact` stops at the first contact itself instead of after the last of `rotation_steps` steps without one: nothing
+//!   passes through a thin collider, and cost does not grow with accuracy.
 //! * Turns stop `gap` of arc length short of contact, so that positions rounded to a file's f32 do not cross.
 //! * Neither W's collision nor the first contact is continuous in the wind. `coherence` redirects segments out of the
 //!   skin beforehand by a continuous map: on the bear, in wind that moves 0.50 % of all curves by more than a quarter
 //!   of their length in a frame, collision raises that to 1.07 %, and to 0.70 % at `coherence` 1
 //!   (tests/wind/coherence.rs).
-//! * `offset_scale` raises segments that would lie lower and leaves those that lie higher: wind may lift fur off the
-//!   skin.
+//! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
 
 use std::sync::Arc;
 
@@ -27,16 +26,16 @@ use crate::shared::surface::{Surface, tree};
 choice! {
     /// How a segment's turn is stopped.
     enum Method {
-        Exact = "exact": "at the first contact, computed in closed form, so that no collider is missed",
-        Steps = "steps": "as in the paper: it turns in `rotation_steps` steps and stops before the first that crosses \
-                a collider",
+        Exact = "exact": "at the first contact, computed in closed form, so that even a thin collider is not missed",
+        Steps = "steps": "as in the paper: it turns in `rotation_steps` equal steps and stops before the first one \
+                that crosses a collider; a thin collider may be jumped over",
     }
 }
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves as the wind bends them.");
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves after the wind has bent them.");
     REST: Input = Input::one("rest", Kind::Curves,
-        "The same curves before the wind, at the same frame: on a moving skin, attached to it.");
+        "The same curves before the wind, at the same frame. On a moving skin they are attached to it.");
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that curves must not cross, the skin included. They may move and deform.");
     SKIN: Input<Opt> = Input::optional("skin", Kind::Mesh,
@@ -44,45 +43,48 @@ inputs! { INPUTS:
 }
 
 params! { PARAMS:
-    METHOD: Param<Method> = Param::choice("method", Method::Exact, "How a segment's turn is stopped.");
-    ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Number of steps of a turn. With more, segments stop \
-        closer to the contact.")
+    METHOD: Param<Method> = Param::choice("method", Method::Exact, "How the turn of a segment is stopped.");
+    ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Number of steps of a turn. With more steps \
+        segments stop closer to the contact, at proportionally higher cost.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
-        "How far outside the skin each root is moved, together with its curve. If this is less than `gap`, the first \
-         part of a curve is not tested, as it lies in the skin.")
+        "How far outside the skin each root is moved, together with its curve. If this is less than `gap`, the \
+         beginning of a curve is not tested, because it touches the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     OFFSET_SCALE: Param<f64> = Param::double("offset_scale", -1.0,
-        "Least height over the skin, relative to the curves' height at rest: 1 keeps the coat's volume, less lets the \
-         wind press it down. Negative values turn this off.")
+        "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
+         let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
-    GAP: Param<f64> = Param::double("gap", 1e-4, "Arc length by which a turn stops short of a contact.")
+    GAP: Param<f64> = Param::double("gap", 1e-4,
+        "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
-    WIDTH: Param<Maskable> = Param::maskable("width", 0.0, "Thickness of the curves in collisions.")
+    WIDTH: Param<Maskable> = Param::maskable("width", 0.0,
+        "Diameter of the curves in collisions. At 0 they are infinitely thin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<f64> = Param::double("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward before collision, so that they do not flip \
-         from one side to another as the wind turns: 0 is the paper's collision, at 1 there are hardly more jumps than \
-         in the wind itself. The more directly the wind blows into the skin, the more this raises curves that would \
-         lie flat at 0.")
+         from one side to the other as the wind turns: at 0 they are not redirected, as in the paper; at 1 there are \
+         hardly more jumps than in the wind itself. The more directly the wind blows into the skin, the more upright \
+         this keeps curves that would otherwise lie flat.")
         .within(0.0, 1.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
-        "Share of each segment's collision response that is applied: 0 leaves the curves to the wind, 1 lets nothing \
-         through. Lengths are kept at any value.").within(0.0, 1.0);
+        "How much of each segment's collision response is applied: 0 leaves the curves as the wind bends them, 1 keeps \
+         them out of the colliders. Lengths are kept at any value.").within(0.0, 1.0);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the colliders. Lengths are kept.");
 
 metrics! { METRICS:
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
-        "Segments of the output that cross a collider; 0 while `blend` is 0.");
-    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that no turn frees from the collider they are in.")
-        .warn_above(0.0, "These segments still reach into a collider, because no turn about the CV before them frees \
-            them: roots deep in the skin, or curves between two colliders. Raise `offset_root`, or start from curves \
-            that are clear of the colliders.");
-    STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider at rest.");
+        "Segments of the output that cross a collider. Not counted while `blend` is 0.");
+    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that cross a collider and that no turn can free.")
+        .warn_above(0.0,
+        "These segments still reach into a collider, because no turn about the CV before them frees them: their roots \
+         lie deep in the skin, or they are caught between two colliders. Raise `offset_root`, or start from curves \
+         that are clear of the colliders.");
+    STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.");
     CONTACTS = Metric::new("contacts", Unit::None,
-        "Segments that a collider stops short of where the wind blows them.");
+        "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
         "How far the deepest unfreed segment reaches through a surface.");
     LENGTH_ERROR = Metric::length_error();
@@ -91,9 +93,9 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
     2,
-    "Curves bend around what the wind blows them into. Each segment, root to tip, turns from its rest direction \
-     towards the direction that the wind gave it, until it touches a collider. Place it after the wind, and wire the \
-     curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
+    "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
+     towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
+     wire the curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -148,7 +150,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         width: cx.mask(WIDTH, &curves)?,
     };
     let starts = curves.runs().starts();
-    // Computed once while nothing moves.
+    // Computed once for still colliders and curves.
     let tree = skin.as_ref().map(|skin| skin.tree().clone());
     let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;

@@ -1,17 +1,17 @@
-//! Curve_Wind_Gusts: gusts let the wind in where they pass.
+//! Curve_Wind_Gusts: gusts that pass over curves scale the wind.
 //!
 //! W5. A gust is a sphere that travels with the wind from a plane perpendicular to it; its influence is 1 at its centre
 //! and 0 at its boundary. Or it is a Gust_Control, placed by hand. `envelope` = incoming × clamp(`base` + Σ influences,
 //! 0, 1).
 //!
 //! What W leaves open:
-//! * A gust is a pure function of seed, index and repetition, so any frame cooks alone. Its path is ∫ speed · wind dt
-//!   from its start: where wind or speeds are keyed, gusts under way change course and speed, and never jump. The
-//!   position of its speed within the range is drawn once. All other ranges are read at the frame that is cooked.
+//! * A gust is a pure function of seed, index and repetition, so any frame can be cooked alone. Its path is ∫ speed ·
+//!   wind dt from its start: where wind or speeds are keyed, travelling gusts change course and speed but never jump.
+//!   The position of its speed within the range is drawn once. All other ranges are read at the cooked frame.
 //! * The launch plane lies upwind of the curves at the scene's first frame, perpendicular to the mean wind over the
 //!   frame before the gust's start, which does not depend on anything later.
-//! * Noise dents a sphere in its own space, by direction: it reaches no point beyond its radius, and its centre stays
-//!   1.
+//! * Noise dents a sphere in its own space, by direction: the gust never reaches beyond its radius, and the influence
+//!   at its centre stays 1.
 //! * A gust fades over its decay while it travels on.
 
 use crate::shared::direction::unit_direction;
@@ -33,58 +33,66 @@ params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
         "The direction that the wind blows towards and gusts travel in. Its length does not matter.")
         .history().when(is_asked);
-    NUM_GUSTS: Param<i64> = Param::int("num_gusts", 8, "Number of gusts. 0 leaves only those placed by hand.")
+    NUM_GUSTS: Param<i64> = Param::int("num_gusts", 8, "Number of gusts. With 0 there are only those placed by hand.")
         .within(0.0, 1e6).soft(0.0, 100.0);
-    RADIUS_RANGE: Param<Span> = Param::span("radius_range", [0.3, 0.6], "Radius of a gust, from its centre to its \
-        boundary.")
+    RADIUS_RANGE: Param<Span> = Param::span("radius_range", [0.3, 0.6], "Range of the gusts' radii, from centre to \
+        boundary. Each gust's is drawn at random from it.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     RADIUS_NOISE_RANGE: Param<Span> = Param::span("radius_noise_range", [0.0, 0.3],
-        "How deeply noise dents a gust, as a share of its radius: 0 leaves it a sphere, at 1 dents reach its centre. \
-         Noise never enlarges a gust.").within(0.0, 1.0).when(is_asked);
+        "How deeply noise dents a gust, as a fraction of its radius: at 0 it is a sphere, at 1 dents reach its centre. \
+         Noise never enlarges a gust. Each gust's value is drawn at random from this range.")
+        .within(0.0, 1.0).when(is_asked);
     SPEED_RANGE: Param<Span> = Param::span("speed_range", [1.0, 3.0],
-        "How fast a gust travels. Keys also change the speed of gusts that are under way.")
+        "Range of the speeds at which gusts travel. Keys also change the speed of gusts that are already travelling.")
         .unit(Unit::MetresPerSecond).at_least(0.0).soft(0.0, 20.0).history().when(is_asked);
-    START_FRAME_RANGE: Param<Span> = Param::span("start_frame_range", [1.0, 48.0], "The frame at which a gust starts.")
+    START_FRAME_RANGE: Param<Span> = Param::span("start_frame_range", [1.0, 48.0],
+        "Range of frames at which gusts start. Each gust's is drawn at random from it.")
         .unit(Unit::Frame).within(-1e9, 1e9).soft(-100.0, 1000.0).when(is_asked);
-    LIFE_RANGE: Param<Span> = Param::span("life_range", [24.0, 96.0], "How long a gust keeps its full strength.")
+    LIFE_RANGE: Param<Span> = Param::span("life_range", [24.0, 96.0],
+        "Range of durations for which gusts keep their full strength.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     DECAY_RANGE: Param<Span> = Param::span("decay_range", [6.0, 24.0],
-        "How long a gust takes to fade after its life, while it still travels. 0 ends it at once.")
+        "Range of durations over which gusts fade after their life, while they still travel. 0 ends them at once.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     DISTANCE: Param<f64> = Param::double("distance", 0.0,
-        "How far upwind of the curves gusts start. 0 takes the largest radius, so that they come in from outside.")
+        "How far upwind of the curves gusts start. 0 takes the largest radius, so that gusts start just outside the \
+         curves.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     AREA: Param<[f32; 2]> = Param::vec2("area", [0.0; 2],
-        "Width and height of the plane from which gusts start. 0 takes the width, or the height, of the curves as seen \
-         along the wind.").unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
+        "Width and height of the rectangle, across the wind, in which gusts start. 0 takes the width or the height of \
+         the curves as seen along the wind.").unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     REPEAT_EVERY: Param<f64> = Param::double("repeat_every", 0.0,
-        "Number of frames after which each gust is sent again with new random values. 0 sends it once.")
+        "Number of frames after which each gust is sent again, with new random values. With 0 it is sent once.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
-        "How much wind a gust lets in, from its centre (0) to its boundary (1).").when(is_asked);
+        "Strength of the wind within a gust, from its centre (0) to its boundary (1): 1 is the full wind.")
+        .when(is_asked);
     BASE: Param<f32> = Param::float("base", 0.0,
-        "Wind without a gust: 0 is calm between gusts, 1 is the full wind, to which gusts add nothing.")
+        "Strength of the wind outside gusts: at 0 it is calm between gusts; at 1 the full wind blows everywhere and \
+         gusts add nothing.")
         .within(0.0, 1.0);
-    SEED: Param<Seed> = Param::seed("Selects other gusts.").when(is_asked);
+    SEED: Param<Seed> = Param::seed("Each seed gives other gusts.").when(is_asked);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with their `envelope` scaled by the gusts.");
 
 metrics! { METRICS:
-    ACTIVE_GUSTS = Metric::new("active_gusts", Unit::None, "Gusts alive, not counting those placed by hand.");
+    ACTIVE_GUSTS = Metric::new("active_gusts", Unit::None,
+        "Gusts that are blowing or fading, without those placed by hand.");
     REACHED_POINTS = Metric::new("reached_points", Unit::None, "CVs within any gust, including those placed by hand.");
     DROPPED_GUSTS = Metric::new("dropped_gusts", Unit::None,
-        "Gusts left out because more than 65,536 would be alive at once: the oldest repetitions of each.")
-        .warn_above(0.0, "More than 65,536 gusts would be alive at once, so the oldest are missing. Lower `num_gusts`, \
-            `life_range` or `decay_range`, or raise `repeat_every`.");
+        "Gusts left out, the oldest repetitions first, because more than 65,536 would blow at the same time.")
+        .warn_above(0.0,
+        "More than 65,536 gusts would blow at the same time, so the oldest are missing. Lower `num_gusts`, \
+         `life_range` or `decay_range`, or raise `repeat_every`.");
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Gusts",
     1,
-    "Gusts let the wind in where they pass: they write the curves' `envelope`, by which Curve_Wind scales the wind. \
-     Gusts are spheres that travel with the wind, each with its own size, speed and start, and regions placed by hand \
-     with Gust_Control.",
+    "Sends gusts over the curves: writes their `envelope`, by which Curve_Wind scales the wind, so that it blows where \
+     a gust passes. Gusts are spheres that travel with the wind, each with its own random size, speed and start, or \
+     regions placed by hand with Gust_Control.",
     Cook::Frame { cook, reads_clock: sends },
 )
 .inputs(INPUTS)
@@ -165,7 +173,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
     let distance = if distance > 0.0 { distance } else { f64::from(cx.get(RADIUS_RANGE).high) };
     let area = cx.get(AREA).map(f64::from);
     let [_, slow, fast] = cx.integrals(cx.frame());
-    // Gusts that start within the same frame share its wind.
+    // Gusts that start within the same frame are launched by the same wind.
     let mut known = BTreeMap::new();
     let sphere = |gust: &Gust| {
         let whole = gust.start.floor() as i64;
@@ -186,17 +194,17 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
     (living.gusts.iter().map(sphere).collect(), living.dropped)
 }
 
-/// The wind around a whole frame at which gusts start.
+/// The wind at a whole frame at which gusts start, and over the frame before it.
 struct Launch {
     /// Its mean direction over the frame before, of length 1.
     wind: [f64; 3],
     /// ∫ speed · wind dt up to the whole frame, at the lower and the upper end of the range of speeds.
     upto: [[f64; 3]; 2],
-    /// The same over the frame before alone.
+    /// The same over only the frame before.
     step: [[f64; 3]; 2],
 }
 
-/// A mean of unit directions shorter than this has no reliable direction: the wind has reversed meanwhile.
+/// If the mean of unit directions is shorter than this, it has no reliable direction: the wind has reversed.
 const REVERSED: f64 = 0.1;
 
 impl Launch {
@@ -245,7 +253,7 @@ fn is_asked(params: &Params) -> bool {
     params.get(NUM_GUSTS) > 0
 }
 
-/// Whether gusts are sent that can reach anything.
+/// Whether any gust that is sent can reach anything.
 fn sends(params: &Params) -> bool {
     no_gusts(params).is_none()
 }

@@ -1,17 +1,17 @@
 //! Curve_Wind_Shielding: curves in the lee of a collider receive less wind.
 //!
-//! W4. From each CV a ray of length `offset` runs upwind. The share of a curve's CVs whose ray hits a collider is its
-//! `shielded` (W's alpha); its envelope is scaled by 1 − clamp(`shielded` · `shield`, 0, 1).
+//! W4. From each CV a ray of length `offset` runs upwind. The fraction of a curve's CVs whose ray hits a collider is
+//! its `shielded` (W's alpha); its envelope is scaled by 1 − clamp(`shielded` · `shield`, 0, 1).
 //!
 //! Departures:
-//! * W scales the envelope *by* alpha · `shield`, which calms the exposed side. Its first sentence and figure 1 calm
-//!   the lee, and so does this node.
+//! * W scales the envelope *by* alpha · `shield`, which would calm the exposed side. Its first sentence and figure 1
+//!   show that the lee is meant.
 //! * Rays are cast upwind from the CV, in a frame that looks along the wind ([`curves::shield`]), so a large offset
 //!   costs neither precision nor time. The skin that a CV lies on does not shelter it; the far side of a body does.
 //! * W's alpha takes n + 1 values and jumps between them as the wind turns. With `smooth` each CV looks upwind through
-//!   a cone and counts by the share of it that is covered, which is continuous. On the bear of `graphs/assets`, in wind
-//!   that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth` 0.5
-//!   and 0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 %
+//!   a cone and counts by the fraction of it that is covered, which is continuous. On the bear of `graphs/assets`, in
+//!   wind that turns by 1° a frame, the largest change of a curve's alpha in a frame falls from 1 to 0.28 at `smooth`
+//!   0.5 and 0.18 at 1, and the curves that change by more than 0.1 in a frame from 3.1 to 0.6 and 0.1 %
 //!   (tests/wind/shelter.rs).
 
 use std::sync::Arc;
@@ -25,8 +25,7 @@ use crate::shared::surface::tree;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves,
-        "The curves as they grow, before any wind bends them, so that shelter does not change while skin and wind stay \
-         the same.");
+        "The curves before any wind bends them. Shelter then changes only with the skin and the wind.");
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that block the wind, the skin included. They may move.");
 }
@@ -35,36 +34,36 @@ params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
         "The direction that the wind blows towards. Its length does not matter.");
     OFFSET: Param<f32> = Param::float("offset", 10.0,
-        "How far upwind of a CV a collider still shelters it. 0 shelters nothing.")
+        "Largest distance upwind at which a collider still shelters a CV. 0 shelters nothing.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 100.0);
     SHIELD: Param<f32> = Param::float("shield", 1.0,
-        "Share of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above 1, \
-         partly sheltered curves become calm as well.")
+        "Fraction of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above \
+         1 even partly sheltered curves become calm.")
         .at_least(0.0).soft(0.0, 1.0);
     SMOOTH: Param<f32> = Param::float("smooth", 0.0,
         "Softens the edge of the lee, so that shelter does not pop as the wind turns: each CV looks upwind through a \
-         cone instead of along a line, and is sheltered by the share of the cone that is covered. 0 is a line, 1 a \
-         cone with a half angle of 0.1 rad.")
+         cone instead of along a line, and is sheltered by the fraction of the cone that is covered. 0 is a line, 1 a \
+         cone with a half angle of 0.1 radians; a cone costs more.")
         .within(0.0, 1.0);
     SKIN_GAP: Param<f32> = Param::float("skin_gap", 0.0,
-        "A face whose plane is this close to a CV does not shelter it, as the CV lies on that face. 0 allows for \
-         rounding alone; for roots that lie deeper in the skin, give their depth.")
+        "A face whose plane is this close to a CV does not shelter it, because the CV lies on that face. 0 only allows \
+         for rounding; if roots lie deeper in the skin, set this to their depth.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");
 
 metrics! { METRICS:
-    SHELTERED = Metric::new("sheltered_curves", Unit::None, "Curves with any shelter.");
-    RAYS = Metric::new("rays", Unit::None, "Rays, or cones, that were cast.");
+    SHELTERED = Metric::new("sheltered_curves", Unit::None, "Curves that are at least partly sheltered.");
+    RAYS = Metric::new("rays", Unit::None, "Rays, or cones, that were cast: one per CV.");
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Shielding",
     1,
-    "Curves in the lee of a collider receive less wind. Each CV looks upwind; the share of a curve's CVs that see a \
-     collider is its `shielded`, which scales its `envelope` down. Place it before Curve_Wind, on curves that are not \
-     yet bent.",
+    "Reduces the wind for curves in the lee of a collider. Each CV looks upwind; the fraction of a curve's CVs that \
+     see a collider is written to `shielded` and scales the curve's `envelope` down. Place this node before \
+     Curve_Wind, on curves that are not yet bent.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -107,7 +106,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(OUT.with(curves))
 }
 
-/// The share of each curve's CVs that the colliders shelter.
+/// The fraction of each curve's CVs that the colliders shelter.
 fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
     let smooth = cx.get(SMOOTH);
     let walls: Vec<Wall> = cx.part(COLLIDERS).into_iter().map(|mesh| Wall::of(mesh, smooth > 0.0)).collect();
@@ -170,7 +169,7 @@ mod tests {
         Component::mesh(vec![4], vec![0, 1, 2, 3], points).unwrap().into()
     }
 
-    /// An upright curve half a unit in the lee of the wall, two of its four CVs above it; and one before it.
+    /// An upright curve half a unit behind the wall, with two of its four CVs above it; and one in front of it.
     fn curves(scale: f32) -> Geometry {
         let lee = [0.0, 0.8, 1.6, 2.4].map(|y| [0.5, y, 0.0]);
         let windward = [0.0, 0.5].map(|y| [-0.5, y, 0.0]);
@@ -183,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn half_sheltered_curve_loses_half_of_shield_at_any_scale() {
+    fn a_half_sheltered_curve_loses_half_of_shield_at_any_scale() {
         for scale in [1e-3, 1.0, 1e3] {
             let bench = bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale));
             let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, 0.5).cook();
@@ -194,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn an_envelope_that_comes_in_is_scaled() {
+    fn an_incoming_envelope_is_scaled() {
         let mut gusts = curves(1.0);
         gusts.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5, 0.25, 2.0, 0.0, 0.5, 0.5]).unwrap();
         let out = bench(&NODE).input(CURVES, gusts).input(COLLIDERS, wall(1.0)).cook();
@@ -202,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn more_than_all_of_the_wind_is_not_taken() {
+    fn no_more_than_all_of_the_wind_is_removed() {
         let out = behind_a_wall().set(SHIELD, 5.0).cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0][..]));
     }
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn shield_0_still_says_who_is_sheltered() {
+    fn with_shield_0_shielded_is_still_written() {
         let out = behind_a_wall().set(SHIELD, 0.0).cook();
         assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
         assert_eq!(out.curves().get(ENVELOPE), Some(&[1.0; 6][..]));
@@ -234,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_counts_a_cone_across_the_edge_by_its_share() {
+    fn smooth_counts_the_covered_fraction_of_a_cone() {
         // Half a radius above the wall's edge a disc is covered by 1/3 − √3 ÷ 4π = 0.1955.
         let height = 1.0 + 0.25 * libm::tan(0.1) as f32;
         let cv: Geometry = Component::curves(vec![1], vec![[0.5, height, 0.0]]).unwrap().into();
@@ -244,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn roots_deeper_in_the_skin_are_free_with_their_depth_as_gap() {
+    fn a_skin_gap_of_their_depth_frees_roots_within_the_skin() {
         let sunken: Geometry = Component::curves(vec![2], vec![[0.001, 0.0, 0.0], [-0.1, 0.0, 0.0]]).unwrap().into();
         let with = |gap| {
             let out = bench(&NODE).input(CURVES, sunken.clone()).input(COLLIDERS, wall(1.0)).set(SKIN_GAP, gap).cook();

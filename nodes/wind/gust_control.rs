@@ -21,8 +21,8 @@ choice! {
     /// The shape of a control.
     ShapeChoice for ControlShape {
         ControlShape::Sphere => "sphere": "a sphere, or an ellipsoid where the scales differ",
-        ControlShape::Cubes => "cubes": "a cube within a cube; with the default ramp, full influence inside the inner \
-                one, fading towards the outer one",
+        ControlShape::Cubes => "cubes": "a cube within a cube; with the default ramp the influence is full inside the \
+                inner one and fades towards the outer one",
     }
 }
 
@@ -32,17 +32,17 @@ params! { PARAMS:
     ROTATE: Param<Turn> = Param::rotation("rotate",
         "Rotates the region about its centre: about x, then y, then z. Between keys it rotates about a single axis.");
     SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
-        "The sphere's radius, or half the inner cube's edge, along its own x, y and z. If any is 0, there is no \
-         region.")
+        "Radius of the sphere, or half the edge of the inner cube, along its own x, y and z axes. If any is 0, the \
+         region is empty.")
         .unit(Unit::Metres).soft(0.01, 100.0);
     OUTER: Param<f32> = Param::float("outer", 2.0,
-        "Size of the outer cube relative to the inner one. At 1 the influence ends at the inner cube.")
+        "Size of the outer cube relative to the inner one. At 1 both are the same, and the influence ends abruptly.")
         .at_least(1.0).soft(1.0, 10.0).when(|params| params.get(SHAPE) == ControlShape::Cubes);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 1.0], [0.5, 1.0], [1.0, 0.0]],
-        "How much wind the region lets in, from its centre (0) to its boundary (1). For cubes the inner boundary is at \
-         0.5. Beyond the boundary there is no influence.");
+        "Strength of the wind within the region, from its centre (0) to its boundary (1). For cubes the inner boundary \
+         is at 0.5. Beyond the boundary there is no influence.");
     STRENGTH: Param<f32> = Param::float("strength", 1.0,
-        "Multiplies the influence. 0 turns it off, negative values take wind away.").soft(-1.0, 1.0);
+        "Multiplies the influence: 0 turns it off, negative values reduce the wind within the region.").soft(-1.0, 1.0);
 }
 
 const CONTROL: Output =
@@ -52,8 +52,8 @@ pub(crate) static NODE: Node = Node::new(
     "Gust_Control",
     1,
     "Places a gust of wind by hand, as a sphere or as a cube within a cube. Key its position, rotation and size to \
-     send it where the shot needs it, and wire it into `controls` of Curve_Wind_Gusts. Transform and Merge may come \
-     between: the region follows its points.",
+     send it where the shot needs it, and wire it into `controls` of Curve_Wind_Gusts. It may pass through Transform \
+     and Merge on the way: the region follows its points.",
     Cook::Pure(cook),
 )
 .params(PARAMS)
@@ -89,7 +89,7 @@ mod tests {
         Turn(turn)
     }
 
-    /// The influence at points of the controls that came out.
+    /// The influence of the resulting controls at points.
     fn felt(out: &BenchResult, points: &[[f32; 3]]) -> Vec<f32> {
         let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
         let none = Ramp::constant(0.0);
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_scaled_then_turned_then_moved() {
+    fn it_is_scaled_then_rotated_then_translated() {
         let out = linear(bench(&NODE))
             .set(SCALE, [4.0, 1.0, 1.0])
             .set(ROTATE, degrees(0.0, 0.0, 90.0))
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn keyed_rotation_turns_about_one_axis_and_keeps_the_size() {
+    fn keyed_rotation_is_about_one_axis_and_keeps_the_size() {
         let out = linear(bench(&NODE))
             .set(SCALE, [4.0, 1.0, 1.0])
             .source("rotate", {
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_of_a_ramp_of_any_kind_arrives() {
+    fn every_key_of_a_ramp_of_any_interpolation_is_passed_on() {
         for kind in [Interpolation::Linear, Interpolation::Smooth, Interpolation::Constant] {
             for count in [1, 2, 7, 900] {
                 let keys = (0..count).map(|k| [k as f32 / count as f32, (k % 3) as f32]).collect();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_ones_touch_nothing_and_far_ones_are_refused() {
+    fn flat_controls_have_no_influence_and_far_ones_are_refused() {
         for scale in [[1.0, 0.0, 1.0], [0.0; 3]] {
             assert_eq!(felt(&bench(&NODE).set(SCALE, scale).cook(), &[[0.0; 3], [0.1, 0.0, 0.1]]), [0.0, 0.0]);
         }

@@ -1,4 +1,4 @@
-//! Laws of attached curves.
+//! Properties of attached curves.
 
 use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
@@ -25,7 +25,7 @@ fn floor() -> Component {
     Component::mesh(counts, corners, points).unwrap()
 }
 
-/// Straight curves of 3 CVs, 0.2 long, leaning, all over the floor and a little above it.
+/// Leaning straight curves of 3 CVs, 0.2 long, all over the floor, with roots slightly above it.
 fn hair() -> Component {
     let curve = |i: u32| {
         let root = [0.39 * (i / 10) as f32 + 0.1, 0.01 * (i % 3) as f32, 0.39 * (i % 10) as f32 + 0.1];
@@ -40,7 +40,7 @@ fn moved(part: &Component, to: impl Fn([f64; 3]) -> [f64; 3]) -> Component {
     out
 }
 
-/// About z by twice the angle of that tangent, then along (1, 2, 3).
+/// Rotation about z by twice the angle of that tangent, then translation by (1, 2, 3).
 fn rigid([x, y, z]: [f64; 3], tangent: f64) -> [f64; 3] {
     let whole = 1.0 + tangent * tangent;
     let (s, c) = (2.0 * tangent / whole, (1.0 - tangent * tangent) / whole);
@@ -69,7 +69,7 @@ fn distance(a: Point, b: Point) -> f64 {
 }
 
 #[test]
-fn a_rigid_skin_carries_its_curves_rigidly() {
+fn rigid_motion_of_the_skin_moves_curves_rigidly() {
     for tangent in [0.0, 0.15, 1.0, 14.0] {
         let out = attach(hair(), floor(), moved(&floor(), |p| rigid(p, tangent))).cook();
         let expected = moved(&hair(), |p| rigid(p, tangent));
@@ -81,7 +81,7 @@ fn a_rigid_skin_carries_its_curves_rigidly() {
 }
 
 #[test]
-fn a_skin_that_grows_moves_roots_and_keeps_curves() {
+fn scaling_the_skin_moves_roots_and_keeps_the_shape_of_curves() {
     let out = attach(hair(), floor(), moved(&floor(), |p| p.map(|x| 3.0 * x))).cook();
     for (now, rest) in out.curves().positions().chunks(3).zip(hair().positions().chunks(3)) {
         let foot = [3.0 * rest[0][0], rest[0][1], 3.0 * rest[0][2]];
@@ -93,7 +93,7 @@ fn a_skin_that_grows_moves_roots_and_keeps_curves() {
 }
 
 #[test]
-fn however_the_skin_bends_lengths_are_kept_and_roots_keep_their_height() {
+fn bending_the_skin_keeps_lengths_and_heights_of_roots() {
     let out = attach(hair(), floor(), moved(&floor(), rolled)).cook();
     for (now, rest) in out.curves().positions().chunks(3).zip(hair().positions().chunks(3)) {
         for k in 0..2 {
@@ -105,7 +105,7 @@ fn however_the_skin_bends_lengths_are_kept_and_roots_keep_their_height() {
 }
 
 #[test]
-fn a_skin_at_rest_touches_nothing() {
+fn a_skin_at_rest_changes_no_array() {
     let curves = hair();
     let out = attach(curves.clone(), floor(), floor()).cook();
     let column = |part: &Component, name: &str| part.table(Owner::Point).column(name).unwrap().clone();
@@ -114,7 +114,7 @@ fn a_skin_at_rest_touches_nothing() {
 }
 
 #[test]
-fn rest_positions_are_written_where_there_are_none() {
+fn pref_is_written_if_it_is_missing() {
     let skin = || moved(&floor(), rolled);
     let out = attach(hair(), floor(), skin()).cook();
     assert_eq!(out.curves().get(PREF), Some(hair().positions()));
@@ -125,8 +125,8 @@ fn rest_positions_are_written_where_there_are_none() {
 }
 
 #[test]
-fn velocities_normals_and_orientations_turn_and_all_else_stays() {
-    // A quarter about z: x becomes y.
+fn velocities_normals_and_orientations_rotate_and_other_attributes_stay() {
+    // A quarter turn about z: x becomes y.
     let mut curves = hair();
     curves.set(V, vec![[2.0, 0.0, 0.0]; 300]).unwrap();
     curves.set(Attr::<Point>::element("N"), vec![[1.0, 0.0, 0.0]; 100]).unwrap();
@@ -144,7 +144,7 @@ fn velocities_normals_and_orientations_turn_and_all_else_stays() {
 }
 
 #[test]
-fn what_else_comes_with_the_curves_goes_through() {
+fn other_components_pass_through() {
     let mut both = Geometry::from(hair());
     both.put(floor());
     let out = bench(&NODE).input(CURVES, both).input(REST_SKIN, floor()).input(SKIN, moved(&floor(), rolled)).cook();
@@ -152,7 +152,7 @@ fn what_else_comes_with_the_curves_goes_through() {
 }
 
 #[test]
-fn other_faces_are_refused_with_both_counts() {
+fn a_skin_with_other_faces_is_refused_with_both_counts() {
     let one = Component::mesh(vec![3], vec![0, 1, 2], floor().positions().to_vec()).unwrap();
     let error = attach(hair(), floor(), one).try_cook().unwrap_err();
     let expected = "`skin` has 1 faces and 33 points, `rest_skin` 16 faces and 33 points, or their topology differs";
@@ -160,7 +160,7 @@ fn other_faces_are_refused_with_both_counts() {
 }
 
 #[test]
-fn no_face_to_hold_on_to_is_refused_and_no_curves_are_fine() {
+fn a_skin_without_faces_is_refused_unless_there_are_no_curves() {
     let empty = || Component::mesh(vec![], vec![], vec![]).unwrap();
     let error = attach(hair(), empty(), empty()).try_cook().unwrap_err();
     assert_eq!(error.fact, "`rest_skin` has no face to attach 100 curves to");
@@ -170,7 +170,7 @@ fn no_face_to_hold_on_to_is_refused_and_no_curves_are_fine() {
 }
 
 #[test]
-fn a_lost_skin_moves_its_curves_and_counts_them() {
+fn curves_on_a_collapsed_skin_move_without_rotating_and_are_counted() {
     let out = attach(hair(), floor(), moved(&floor(), |_| [5.0; 3])).cook();
     assert_eq!(out.metrics["unturned"], 100.0);
     for (now, rest) in out.curves().positions().chunks(3).zip(hair().positions().chunks(3)) {
@@ -180,8 +180,8 @@ fn a_lost_skin_moves_its_curves_and_counts_them() {
 }
 
 #[test]
-fn odd_curves_and_odd_skins_stay_finite() {
-    // One CV, equal CVs, a root far away; a face that is nothing at rest.
+fn degenerate_curves_and_skins_give_finite_results() {
+    // One CV, equal CVs, a root far away; a face without area at rest.
     let points = vec![[1.0, 0.0, 1.0], [2.0; 3], [2.0; 3], [1e6, 0.0, 0.0], [1e6, 1.0, 0.0]];
     let curves = Component::curves(vec![1, 2, 2], points).unwrap();
     let mut rest = floor();
@@ -192,7 +192,7 @@ fn odd_curves_and_odd_skins_stay_finite() {
 }
 
 #[test]
-fn the_order_of_frames_and_the_number_of_threads_change_no_bit() {
+fn bits_do_not_depend_on_the_order_of_frames_or_the_number_of_threads() {
     let skin = |frame: Frame| moved(&floor(), |p| rigid(rolled(p), 0.1 * frame.number())).into();
     let curves = |frame: Frame| moved(&hair(), |[x, y, z]| [x + 0.1 * frame.number() * y, y, z]).into();
     let moving = bench(&NODE).moving(CURVES, curves).input(REST_SKIN, floor()).moving(SKIN, skin);

@@ -1,4 +1,4 @@
-//! Laws of hairs between guides.
+//! Properties of hairs between guides.
 
 use super::*;
 use crate::curve_scatter;
@@ -13,7 +13,7 @@ fn ball() -> Component {
     Component::mesh(shape.counts, shape.corners, points).unwrap()
 }
 
-/// Straight, leaning curves of 5 CVs, as Curve_Scatter grows them: its input and param are called as those here.
+/// Leaning straight curves of 5 CVs from Curve_Scatter, whose input and param have the same names as here.
 fn scattered(skin: Component, density: f32) -> Component {
     bench(&curve_scatter::NODE).input(SKIN, skin).set(DENSITY, density).cook().curves().clone()
 }
@@ -28,14 +28,14 @@ fn moved(part: &Component, to: impl Fn([f64; 3]) -> [f64; 3]) -> Component {
     out
 }
 
-/// About z, farther each frame, and along.
+/// Rotates about z, farther each frame, and translates.
 fn rigid([x, y, z]: [f64; 3], frame: Frame) -> [f64; 3] {
     let a = 0.2 * (frame.number() - 1.0);
     let (s, c) = (2.0 * a / (1.0 + a * a), (1.0 - a * a) / (1.0 + a * a));
     [c * x - s * y + 0.5 * a, s * x + c * y, z - a]
 }
 
-/// Guides swung to a side, more to their tips: their roots stay.
+/// Guides bent sideways, most at their tips; their roots stay.
 fn blown(guides: &Component, by: f64) -> Component {
     let mut out = guides.clone();
     for (k, p) in out.edit(P).unwrap().iter_mut().enumerate() {
@@ -55,7 +55,7 @@ fn roots(out: &BenchResult) -> Vec<Point> {
 }
 
 #[test]
-fn hairs_at_the_roots_of_guides_are_the_guides() {
+fn hairs_at_the_roots_of_guides_equal_the_guides() {
     // The same seed and density give the same roots.
     let guides = scattered(ball(), 40.0);
     let out = interpolate(guides.clone(), ball()).set(DENSITY, 40.0).cook();
@@ -66,7 +66,7 @@ fn hairs_at_the_roots_of_guides_are_the_guides() {
 }
 
 #[test]
-fn roots_and_ids_do_not_hang_on_how_guides_are_blown() {
+fn roots_and_ids_do_not_depend_on_the_motion_of_guides() {
     let guides = scattered(ball(), 20.0);
     let swung = guides.clone();
     let wind = bench(&NODE)
@@ -81,7 +81,7 @@ fn roots_and_ids_do_not_hang_on_how_guides_are_blown() {
         assert_eq!(out.curves().get(CURVE_ID), still.curves().get(CURVE_ID));
         assert_eq!(out.curves().get(PREF), Some(still.curves().positions()));
     }
-    // They follow: at frame 9 every tip has gone its guides' way.
+    // They follow: by frame 9 every tip has moved as its guides have.
     let tips =
         |out: &BenchResult| -> Vec<Point> { out.curves().positions().iter().skip(4).step_by(5).copied().collect() };
     let (before, after) = (tips(&still), tips(&frames[2]));
@@ -89,7 +89,7 @@ fn roots_and_ids_do_not_hang_on_how_guides_are_blown() {
 }
 
 #[test]
-fn a_rigid_scene_moves_its_hairs_rigidly() {
+fn rigid_motion_of_the_scene_moves_hairs_rigidly() {
     let guides = scattered(ball(), 20.0);
     let carried = guides.clone();
     let moving = bench(&NODE)
@@ -105,7 +105,7 @@ fn a_rigid_scene_moves_its_hairs_rigidly() {
 }
 
 #[test]
-fn cvs_are_as_asked_or_as_the_guide_that_has_most() {
+fn the_number_of_cvs_is_that_of_the_param_or_of_the_guide_with_most() {
     let points = vec![[1.0, 0.0, 0.0], [1.2, 0.0, 0.0], [-1.0, 0.0, 0.0], [-1.1, 0.0, 0.0], [-1.2, 0.0, 0.0]];
     let guides = Component::curves(vec![2, 3], points).unwrap();
     let out = interpolate(guides.clone(), ball()).cook();
@@ -118,7 +118,7 @@ fn cvs_are_as_asked_or_as_the_guide_that_has_most() {
 }
 
 #[test]
-fn attributes_of_guides_are_mixed() {
+fn attributes_of_guides_are_blended() {
     let mut guides = scattered(ball(), 20.0);
     let (curves, cvs) = (guides.element_count(), guides.point_count());
     let along: Vec<f32> = (0..cvs).map(|k| (k % 5) as f32).collect();
@@ -142,8 +142,8 @@ fn attributes_of_guides_are_mixed() {
 }
 
 #[test]
-fn one_guide_each_makes_clumps() {
-    // Each hair then has the length of some guide, to rounding.
+fn one_guide_per_hair_makes_clumps() {
+    // Each hair then has the length of one of the guides, up to rounding.
     let guides = scattered(ball(), 20.0);
     let whole = |cvs: &[Point]| -> f64 {
         let step = |pair: &[Point]| {
@@ -160,7 +160,7 @@ fn one_guide_each_makes_clumps() {
 }
 
 #[test]
-fn a_mask_thins_and_a_wrong_one_is_refused() {
+fn a_mask_thins_hairs_and_an_unknown_mask_is_refused() {
     let mut skin = ball();
     let lawn: Vec<f32> = skin.positions().iter().map(|p| if p[1] > 0.5 { 1.0 } else { 0.0 }).collect();
     skin.set(Attr::<f32>::point("lawn"), lawn).unwrap();
@@ -187,7 +187,7 @@ fn guides_or_faces_that_change_are_refused() {
 }
 
 #[test]
-fn without_guides_or_skin_nothing_grows() {
+fn no_hairs_grow_without_guides_or_skin() {
     let none = Component::curves(vec![], vec![]).unwrap();
     let empty = Component::mesh(vec![], vec![], vec![]).unwrap();
     let guides = scattered(ball(), 5.0);
@@ -198,7 +198,7 @@ fn without_guides_or_skin_nothing_grows() {
 }
 
 #[test]
-fn odd_guides_stay_finite() {
+fn degenerate_guides_give_finite_hairs() {
     // One CV, equal CVs, far away, inside the ball.
     let points = vec![[1.0, 0.0, 0.0], [2.0; 3], [2.0; 3], [1e6, 0.0, 0.0], [1e6, 1.0, 0.0], [0.0; 3], [0.0, 0.1, 0.0]];
     let guides = Component::curves(vec![1, 2, 2, 2], points).unwrap();
@@ -210,7 +210,7 @@ fn odd_guides_stay_finite() {
 }
 
 #[test]
-fn the_order_of_frames_and_the_number_of_threads_change_no_bit() {
+fn bits_do_not_depend_on_the_order_of_frames_or_the_number_of_threads() {
     let guides = scattered(ball(), 20.0);
     let moving = bench(&NODE)
         .moving(GUIDES, move |frame| moved(&blown(&guides, frame.number()), |p| rigid(p, frame)).into())

@@ -1,4 +1,4 @@
-//! Laws of scattered curves.
+//! Properties of scattered curves.
 
 use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
@@ -27,7 +27,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 }
 
 #[test]
-fn density_times_area_curves_grow() {
+fn the_number_of_curves_is_density_times_area() {
     for (size, density, expected) in [(2.0, 100.0, 400), (0.1, 1e4, 100), (1.0, 0.4, 0), (1.0, 0.6, 1), (1.0, 0.0, 0)] {
         let out = meadow(square(size)).set(DENSITY, density).cook();
         assert_eq!(out.curves().element_count(), expected);
@@ -37,7 +37,7 @@ fn density_times_area_curves_grow() {
 }
 
 #[test]
-fn without_lean_curves_stand_on_the_skin() {
+fn without_lean_curves_are_perpendicular_to_the_skin() {
     let out = meadow(square(1.0))
         .set(DENSITY, 50.0)
         .set(LEAN, 0.0)
@@ -53,7 +53,7 @@ fn without_lean_curves_stand_on_the_skin() {
 }
 
 #[test]
-fn curves_are_straight_and_as_long_and_as_lean_as_asked() {
+fn curves_are_straight_with_length_and_lean_in_range() {
     let out = meadow(square(1.0)).set(LENGTH, Span { low: 0.2, high: 0.4 }).set(LEAN, 0.5).set(CVS, 4).cook();
     let (mut least, mut most, mut flattest) = (f64::MAX, 0.0_f64, f64::MAX);
     for cvs in out.curves().runs().ranges() {
@@ -65,13 +65,13 @@ fn curves_are_straight_and_as_long_and_as_lean_as_asked() {
         (least, most) = (least.min(whole), most.max(whole));
         flattest = flattest.min(f64::from(cvs[3][1]) / whole);
     }
-    // A thousand draws come near both ends and never pass them; half a right angle has cosine 0.7071.
+    // A thousand draws come close to both ends of the range and never leave it; half a right angle has cosine 0.7071.
     assert!(least > 0.2 - 1e-6 && least < 0.202 && most < 0.4 + 1e-6 && most > 0.398, "{least} {most}");
     assert!(flattest > std::f64::consts::FRAC_1_SQRT_2 - 1e-6 && flattest < 0.712, "{flattest}");
 }
 
 #[test]
-fn roots_lie_on_the_skin_and_apart() {
+fn roots_lie_on_the_skin_and_apart_from_each_other() {
     let sphere = numerics::shapes::sphere([2.0; 3], 12);
     let points = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
     let skin = Component::mesh(sphere.counts, sphere.corners, points).unwrap();
@@ -80,7 +80,7 @@ fn roots_lie_on_the_skin_and_apart() {
     let triangles = &cut.corners;
     let at = |corner: u32| skin.positions()[corner as usize].map(f64::from);
     for root in roots(&out) {
-        // Least height over the planes of triangles whose three sides it is within.
+        // Smallest distance from the planes of the triangles that the root projects into.
         let off = triangles
             .iter()
             .filter_map(|corners| height(root.map(f64::from), corners.map(at)))
@@ -91,11 +91,11 @@ fn roots_lie_on_the_skin_and_apart() {
     let nearest =
         |i: usize| (0..roots.len()).filter(|j| *j != i).map(|j| distance(roots[i], roots[j])).fold(f64::MAX, f64::min);
     let least = (0..roots.len()).map(nearest).fold(f64::MAX, f64::min);
-    // A hundred on a square metre are 0.1 apart in rows; at random, the nearest two of 1,200 would be 1.4e-3.
+    // A hundred in rows on a square metre are 0.1 apart; of 1,200 random ones the closest two would be 1.4e-3 apart.
     assert!(least > 0.045, "{least}");
 }
 
-/// Distance to the triangle's plane, where the foot is inside or a hair beside it.
+/// Distance to the triangle's plane, if the projection is inside the triangle or just beside it.
 fn height(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
     let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let cross =
@@ -122,7 +122,7 @@ fn a_higher_density_keeps_every_curve() {
 }
 
 #[test]
-fn a_mask_thins_in_proportion() {
+fn a_mask_scales_the_density() {
     // 0 along x = −0.5, 1 along x = 0.5: half of the curves, three quarters of them on the right.
     let mut skin = square(1.0);
     skin.set(Attr::<f32>::point("lawn"), vec![0.0, 0.0, 1.0, 1.0]).unwrap();
@@ -131,25 +131,25 @@ fn a_mask_thins_in_proportion() {
     let right = roots(&out).iter().filter(|root| root[0] > 0.0).count();
     assert!(all.abs_diff(2000) < 60, "{all}");
     assert!(right.abs_diff(1500) < 50, "{right}");
-    // Above 1 it thickens; all of it is what a density twice as high gives.
+    // A mask above 1 adds curves: 2 everywhere equals twice the density.
     skin.set(Attr::<f32>::point("lawn"), vec![2.0; 4]).unwrap();
     let doubled = meadow(skin.clone()).set(DENSITY, 500.0).set(MASK, "lawn".into()).cook();
     let plain = meadow(skin.clone()).set(DENSITY, 1000.0).cook();
     assert_eq!(doubled.curves().positions(), plain.curves().positions());
-    // Nothing, and less than nothing, grow nothing.
+    // Masks of 0 and below grow nothing.
     skin.set(Attr::<f32>::point("lawn"), vec![0.0, -1.0, 0.0, -5.0]).unwrap();
     assert_eq!(meadow(skin).set(MASK, "lawn".into()).cook().curves().element_count(), 0);
 }
 
 #[test]
-fn a_mask_that_is_not_there_or_no_number_is_refused() {
+fn a_missing_or_non_float_mask_is_refused() {
     let error = meadow(square(1.0)).set(MASK, "lawn".into()).try_cook().unwrap_err();
     assert_eq!(error.to_string(), "`mask` is `lawn`, which `skin` does not have; expected one float for each vertex");
     let error = meadow(square(1.0)).set(MASK, "P".into()).try_cook().unwrap_err();
     assert_eq!(error.fact, "`mask` is `P`, which is one float3 for each vertex");
 }
 
-/// The square turned by a quarter about z a frame and lifted.
+/// The square, rotated by a quarter turn about z in each frame and lifted.
 fn turned(frame: i64) -> Component {
     let mut skin = square(1.0);
     for p in skin.edit(P).unwrap() {
@@ -162,7 +162,7 @@ fn turned(frame: i64) -> Component {
 }
 
 #[test]
-fn curves_stay_on_a_skin_that_moves() {
+fn curves_stay_on_a_moving_skin() {
     let skin = bench(&NODE).moving(SKIN, |frame| turned(frame.floor_number()).into()).set(DENSITY, 40.0);
     let still = skin.clone().at(1.0).cook();
     let moved = skin.at(2.0).cook();
@@ -199,7 +199,7 @@ fn a_skin_whose_faces_change_is_refused() {
 }
 
 #[test]
-fn curves_take_texture_coordinates_and_normals_of_the_skin() {
+fn curves_take_texture_coordinates_and_normals_from_the_skin() {
     let mut skin = square(1.0);
     let uvw = skin.positions().iter().map(|p| [p[0] + 0.5, p[2] + 0.5, 0.0]).collect();
     skin.set(UVW, uvw).unwrap();
@@ -213,7 +213,7 @@ fn curves_take_texture_coordinates_and_normals_of_the_skin() {
 }
 
 #[test]
-fn another_seed_and_other_threads() {
+fn the_seed_changes_curves_and_the_number_of_threads_does_not() {
     let grown = |seed, threads| meadow(square(1.0)).set(SEED, Seed(seed)).threads(threads).cook();
     assert_eq!(grown(1, 1).geometry, grown(1, 7).geometry);
     assert_ne!(grown(1, 2).geometry, grown(2, 2).geometry);
@@ -230,7 +230,7 @@ fn a_skin_without_area_grows_nothing() {
 }
 
 #[test]
-fn a_scaled_scene_grows_the_same_scaled() {
+fn a_scaled_scene_grows_scaled_curves() {
     let grown = |scale: f32| {
         let length = Span { low: 0.05 * scale, high: 0.1 * scale };
         meadow(square(scale)).set(DENSITY, 1000.0 / (scale * scale)).set(LENGTH, length).cook()
@@ -243,7 +243,7 @@ fn a_scaled_scene_grows_the_same_scaled() {
 }
 
 #[test]
-fn any_cvs_and_lengths_are_finite() {
+fn any_number_of_cvs_and_any_length_give_finite_curves() {
     let curve = |cvs, length| {
         meadow(square(0.1)).set(DENSITY, 200.0).set(CVS, cvs).set(LENGTH, Span { low: 0.0, high: length }).cook()
     };
@@ -253,10 +253,10 @@ fn any_cvs_and_lengths_are_finite() {
 }
 
 #[test]
-fn more_than_fits_is_refused() {
+fn more_cvs_than_memory_should_hold_are_refused() {
     let error = meadow(square(1e6)).try_cook().unwrap_err();
     assert_eq!(error.fact, "1000000000000000 curves of 5 CVs would grow on 1000000000000 m², more than 67108864 CVs");
-    // A mask that leaves a small lawn of the same plain makes it fit: only faces it touches count.
+    // A mask that is 0 except on a small part makes the same plain fit: only faces under the mask count.
     let far = 1e6;
     let points =
         vec![[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [far, 0.0, 0.0], [far, 0.0, far], [0.0, 0.0, far]];

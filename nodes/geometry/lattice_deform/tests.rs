@@ -18,7 +18,7 @@ fn deform(geometry: impl Into<Geometry>) -> Bench {
     bench(&NODE).input(GEOMETRY, geometry)
 }
 
-/// Offsets of the eight corners of the default box, by an affine map of their places.
+/// Offsets of the eight corners of the default box that give an affine map.
 fn corners(offset: impl Fn([f64; 3]) -> [f64; 3]) -> Arc<Vec<Point>> {
     let corner = |k: usize| [k & 1, k >> 1 & 1, k >> 2].map(|k| k as f64 - 0.5);
     Arc::new((0..8).map(|k| offset(corner(k)).map(|x| x as f32)).collect())
@@ -32,7 +32,7 @@ fn wide() -> Arc<Vec<Point>> {
 #[test]
 fn it_conforms() {
     let pulled = |bench: Bench| bench.set(OFFSETS, corners(|[x, y, z]| [0.3 * y, 0.2 * x * z, 0.1 + 0.1 * x]));
-    // Two divisions along each axis, so that a basis shows, in a box that the samples stick out of.
+    // Two divisions along each axis, so that the bases differ, in a box smaller than the samples.
     let finer = |bench: Bench| {
         let mut offsets = vec![[0.0; 3]; 27];
         offsets[13] = [0.02, 0.05, -0.01];
@@ -43,7 +43,7 @@ fn it_conforms() {
 }
 
 #[test]
-fn offsets_of_an_affine_map_are_that_map() {
+fn offsets_of_an_affine_map_give_that_map() {
     let map = |[x, y, z]: [f64; 3]| [1.0 + 0.5 * y - 0.25 * x, 0.75 * z, 0.5 * x - 0.5 * z];
     for basis in [LatticeBasis::Trilinear, LatticeBasis::Bernstein] {
         let out = deform(ball()).set(OFFSETS, corners(map)).set(BASIS, basis).cook();
@@ -59,7 +59,7 @@ fn offsets_of_an_affine_map_are_that_map() {
 }
 
 #[test]
-fn no_offset_shares_everything_and_says_so() {
+fn zero_offsets_share_every_array_and_are_reported() {
     for offsets in [Vec::new(), vec![[0.0; 3]; 8]] {
         let mesh = ball();
         let out = deform(mesh.clone()).set(OFFSETS, Arc::new(offsets)).cook();
@@ -69,7 +69,7 @@ fn no_offset_shares_everything_and_says_so() {
 }
 
 #[test]
-fn only_positions_and_what_turns_with_them_are_touched() {
+fn only_positions_and_vectors_change() {
     let mut given = ball();
     given.set(V, vec![[1.0, 2.0, 3.0]; given.point_count()]).unwrap();
     given.set(PREF, vec![[7.0; 3]; given.point_count()]).unwrap();
@@ -83,13 +83,13 @@ fn only_positions_and_what_turns_with_them_are_touched() {
         assert_eq!(column(out), column(&given));
     }
     assert_eq!(out.get(V).unwrap()[3], [2.0, 2.0, 3.0]);
-    // A face across (1, 1) is across (1, 2) when it is stretched along x.
+    // A face perpendicular to (1, 1) is perpendicular to (1, 2) after stretching along x.
     let [x, y, _] = out.get(Attr::<[f32; 3]>::element("N")).unwrap()[0];
     assert!((x - 0.2_f32.sqrt()).abs() < 1e-6 && (y - 0.8_f32.sqrt()).abs() < 1e-6);
 }
 
 #[test]
-fn every_component_is_deformed_and_orientations_turn() {
+fn every_component_is_deformed_and_orientations_rotate() {
     // A quarter turn about z.
     let turn = corners(|[x, y, _]| [-y - x, x - y, 0.0]);
     let mut points = Component::points(vec![[0.5, 0.0, 0.25]]);
@@ -108,7 +108,7 @@ fn every_component_is_deformed_and_orientations_turn() {
 }
 
 #[test]
-fn keys_of_offsets_run_straight_between() {
+fn keyed_offsets_are_interpolated_linearly() {
     let still = Arc::new(vec![[0.0; 3]; 8]);
     let keyed = deform(Component::points(vec![[0.25, 0.0, 0.0]])).keyed(OFFSETS, &[(1.0, still), (5.0, wide())]);
     let at = |frame: f64| keyed.clone().at(frame).cook().part(Kind::Points).positions()[0];
@@ -116,7 +116,7 @@ fn keys_of_offsets_run_straight_between() {
 }
 
 #[test]
-fn outside_is_held_or_goes_on() {
+fn outside_the_box_the_deformation_is_held_or_extrapolated() {
     let wide = deform(Component::points(vec![[1.5, 0.0, 9.0]])).set(OFFSETS, wide());
     let at = |outside| wide.clone().set(OUTSIDE, outside).cook().part(Kind::Points).positions()[0];
     assert_eq!(at(Extrapolation::Hold), [2.0, 0.0, 9.0]);
@@ -124,7 +124,7 @@ fn outside_is_held_or_goes_on() {
 }
 
 #[test]
-fn what_is_folded_is_counted_and_its_volume_is_below_nothing() {
+fn folded_points_are_counted_and_have_negative_volume() {
     let out = deform(ball()).set(OFFSETS, corners(|[_, y, _]| [0.0, -1.5 * y, 0.0])).cook();
     assert_eq!(out.metrics["folded"], ball().point_count() as f64);
     assert!((out.metrics["min_jacobian"] + 0.5).abs() < 1e-6 && (out.metrics["volume_ratio"] + 0.5).abs() < 1e-6);
@@ -133,7 +133,7 @@ fn what_is_folded_is_counted_and_its_volume_is_below_nothing() {
 }
 
 #[test]
-fn what_is_no_lattice_is_refused() {
+fn invalid_lattices_are_refused() {
     let refused = |bench: Bench| bench.try_cook().unwrap_err();
     let count = refused(deform(ball()).set(OFFSETS, Arc::new(vec![[0.0; 3]; 9])));
     assert_eq!(count.fact, "`offsets` has 9 vectors for the control points of 1×1×1 divisions");
@@ -147,7 +147,7 @@ fn what_is_no_lattice_is_refused() {
 }
 
 #[test]
-fn extreme_places_are_deformed_or_refused() {
+fn extreme_positions_are_deformed_or_refused() {
     let at = |point: Point, outside| {
         deform(Component::points(vec![point])).set(OFFSETS, wide()).set(OUTSIDE, outside).try_cook()
     };

@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_are_the_same_where_they_are_one() {
+    fn columns_are_equal_if_they_share_one_array() {
         let part = Component::points(vec![[0.0; 3]]);
         let of = |part: &Component, name: &str| Array::of(part, name);
         assert!(of(&part, "P") == of(&part.clone(), "P") && of(&part, "x") == of(&part, "x"));

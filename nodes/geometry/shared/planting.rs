@@ -5,10 +5,10 @@ use curves::surface::SurfacePoint;
 use engine::prelude::*;
 use numerics::random::Key;
 
-/// At most this many CVs: with `Pref` and `uvw`, 2.4 gigabytes.
+/// Largest number of CVs: with `Pref` and `uvw` they take 2.4 gigabytes.
 const MOST_CVS: f64 = (1_u32 << 26) as f64;
 
-/// How many curves, and where.
+/// How many curves to plant, and where.
 pub(crate) struct Planting<'a> {
     /// Curves on a square metre.
     pub(crate) density: f32,
@@ -20,10 +20,11 @@ pub(crate) struct Planting<'a> {
 }
 
 impl Planting<'_> {
-    /// The roots by face, each with its index in the infinite sequence of which a higher density takes a longer prefix.
+    /// The roots, ordered by face, each with its index in the infinite sequence of which a higher density takes a
+    /// longer prefix.
     ///
     /// # Errors
-    /// Where there would be more CVs than memory should hold.
+    /// If there would be more than [`MOST_CVS`] CVs.
     pub(crate) fn roots(&self, cx: &Cx, skin: &Component) -> Result<Vec<(usize, SurfacePoint)>> {
         let whole = skin.triangles();
         let triangles = &whole.corners;
@@ -62,10 +63,10 @@ impl Planting<'_> {
     }
 }
 
-/// The skin's mask of that name, where one is named.
+/// The skin's mask of that name; `None` if the name is empty.
 ///
 /// # Errors
-/// Where the skin has no such float per point.
+/// If the skin has no float attribute of that name on its points.
 pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f32]>> {
     if name.is_empty() {
         return Ok(None);
@@ -80,20 +81,20 @@ pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f3
 /// The skin at the scene's first frame.
 ///
 /// # Errors
-/// Where its faces have changed since.
+/// If its faces have changed since.
 pub(crate) fn kept_faces<'c>(rest: &'c Component, now: &Component) -> Result<&'c Component> {
     if super::faces::same_faces(rest, now) {
         return Ok(rest);
     }
     let [now, rest] = [now, rest].map(|mesh| (mesh.element_count(), mesh.point_count()));
     let fact = format!(
-        "`skin` has {} faces and {} points, at the scene's first frame {} and {}, or their topology differs",
+        "`skin` has {} faces and {} points, but {} and {} at the scene's first frame, or its topology differs",
         now.0, now.1, rest.0, rest.1
     );
     Err(Error::refused(fact).hint("the skin may move, but must keep its faces"))
 }
 
-/// Whether both share one array of rows, or neither has any.
+/// Whether both share the array of a point attribute, or neither has that attribute.
 pub(crate) fn same_rows(a: &Component, b: &Component, name: &str) -> bool {
     match (a.table(Owner::Point).column(name), b.table(Owner::Point).column(name)) {
         (Some(a), Some(b)) => a.same(b),

@@ -1,4 +1,4 @@
-//! What file sources share: one component from a file, or written into the graph itself.
+//! Common to file sources: one component from a file, or written into the graph itself.
 
 use engine::files::File;
 use engine::geometry::GeometryError;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// The component of `kind` in a file; other geometry is ignored.
 ///
 /// # Errors
-/// Where the file cannot be read in the format of its extension, or has no such component.
+/// If the file cannot be read in the format of its extension, or has no such component.
 pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
     let path = file.path().display();
     let refused = |error: FormatError| {
@@ -38,7 +38,7 @@ impl Inline {
     /// Adds the attributes to a component.
     ///
     /// # Errors
-    /// Where one has the wrong type or number of rows.
+    /// If one has the wrong type or number of rows.
     pub(crate) fn add_to(self, component: &mut Component) -> Result<()> {
         let lists =
             [(Owner::Point, &self.points, "attributes"), (Owner::Element, &self.elements, "element_attributes")];
@@ -55,10 +55,10 @@ impl Inline {
 /// Integers written into the graph.
 ///
 /// # Errors
-/// Where one of them is below `least`.
+/// If one of them is below `least`.
 pub(crate) fn wholes(param: Param<Arc<Vec<i32>>>, numbers: &[i32], least: i32) -> Result<Vec<u32>> {
     if let Some(place) = numbers.iter().position(|number| *number < least) {
-        let fact = format!("`{}` has {} at place {place}, counted from 0", param.name(), numbers[place]);
+        let fact = format!("`{}` has {} at index {place}, counted from 0", param.name(), numbers[place]);
         return Err(Error::refused(fact).hint(format!("expected at least {least}")).of(param.name()));
     }
     Ok(numbers.iter().map(|number| number.unsigned_abs()).collect())
@@ -75,8 +75,8 @@ pub(crate) fn explained(error: GeometryError, indices: &'static str) -> Error {
             Error::refused(format!("`counts` adds up to {sum} corners, but `indices` has {corners}")).of("counts")
         }
         GeometryError::Index { corner, index, points } => {
-            let fact = format!("`{indices}` has {index} as number {corner}, but there are {points} `points`");
-            Error::refused(fact).hint("points and numbers are counted from 0").of(indices)
+            let fact = format!("`{indices}` has {index} at index {corner}, but there are {points} `points`");
+            Error::refused(fact).hint("points and indices are counted from 0").of(indices)
         }
         other => other.into(),
     }
@@ -85,7 +85,7 @@ pub(crate) fn explained(error: GeometryError, indices: &'static str) -> Error {
 /// Checks that exactly one of `file` and inline points is given.
 ///
 /// # Errors
-/// Where both or neither are.
+/// If both or neither are.
 pub(crate) fn file_or_inline(file: Option<&File>, has_inline: bool) -> Result<()> {
     match (file, has_inline) {
         (Some(_), true) => Err(Error::refused("it has both a `file` and `points`").hint("remove one of them")),
@@ -96,7 +96,8 @@ pub(crate) fn file_or_inline(file: Option<&File>, has_inline: bool) -> Result<()
     }
 }
 
-/// A numbered sequence of files in a folder of its own, for tests: what `text` says of each of the first frames.
+/// A numbered sequence of files in a temporary folder, for tests: `text` gives the contents of each of the first
+/// frames.
 #[cfg(test)]
 pub(crate) fn numbered_files(
     extension: &str,

@@ -1,4 +1,4 @@
-//! When goals pull which particles, and when they become the rest shape.
+//! Which particles goals pull, when, and when goals become the rest shape.
 //!
 //! A body moves from its start to its first goal, is held there, moves to the next, and is released after the last.
 
@@ -41,10 +41,10 @@ pub(super) fn damping(strength: f64) -> f64 {
 }
 
 impl<'a> Goals<'a> {
-    /// Of the geometries that came in at a frame; `start` is the simulation's first.
+    /// From the geometries at the input at a frame; `start` is the first frame of the simulation.
     ///
     /// # Errors
-    /// Where a goal fits no body, or two, or lacks the attributes of Softbody_Goal.
+    /// If a goal matches no body or two, or lacks the attributes of Softbody_Goal.
     pub(super) fn of(
         inputs: &StartInputs,
         setup: &'a SimulationSetup,
@@ -57,7 +57,7 @@ impl<'a> Goals<'a> {
             let number = |attribute: Attr<f32>| {
                 shape.get(attribute).and_then(|rows| rows.first()).map(|x| f64::from(*x)).ok_or_else(|| {
                     Error::refused(format!("`goals` {index} has no `{}`", attribute.name))
-                        .hint("make goals of shapes by Softbody_Goal")
+                        .hint("make goals with Softbody_Goal")
                 })
             };
             let key = GoalKey {
@@ -202,7 +202,7 @@ fn share_of_step(step: f64, whole: f64, frames: f64) -> Option<f64> {
     Some((whole / frames / (1.0 - gone)).min(1.0))
 }
 
-/// The wire of bodies that has the tets of a goal.
+/// The index of the wire whose body has the tets of a goal.
 fn owner(inputs: &StartInputs, index: usize, shape: &Component) -> Result<usize> {
     let fits = |geometry: &Arc<Geometry>| {
         geometry.tets().is_some_and(|body| {
@@ -218,7 +218,7 @@ fn owner(inputs: &StartInputs, index: usize, shape: &Component) -> Result<usize>
             let count = |part: &Component| format!("{} tets of {} points", part.element_count(), part.point_count());
             let has: Vec<String> = bodies.iter().filter_map(|body| body.tets().map(count)).collect();
             let fact = format!("`goals` {index} has {}, and no body has the same: {}", count(shape), has.join(", "));
-            Err(Error::refused(fact).hint("make goals from the tets that are simulated, by Softbody_Goal"))
+            Err(Error::refused(fact).hint("make goals with Softbody_Goal from the tets that are simulated"))
         }
         [a, b, ..] => {
             let fact = format!("`goals` {index} has the tets of both `bodies` {a} and {b}");
@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rest_shape_changes_by_equal_parts() {
+    fn the_rest_shape_changes_in_equal_steps() {
         let mut length = 1.0;
         for step in 1..=4 {
             let share = share_of_step(f64::from(step), 0.8, 4.0).unwrap();
@@ -240,7 +240,7 @@ mod tests {
             assert!((length - (1.0 + 0.2 * f64::from(step))).abs() < 1e-12);
         }
         assert_eq!(share_of_step(5.0, 0.8, 4.0), None);
-        assert_eq!(share_of_step(1.0, 1.0, 0.0), Some(1.0), "no frames: at once");
+        assert_eq!(share_of_step(1.0, 1.0, 0.0), Some(1.0), "with no frames the whole change is made at once");
         assert_eq!(share_of_step(1.0, 0.0, 4.0), None);
     }
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use bodies::collision::{Obstacle, ObstaclePose};
 use engine::prelude::*;
 
-/// The colliders of a step of `seconds`; `samples` are the wires at increasing times within it.
+/// The colliders of a step of `seconds`; `samples` holds the wires at increasing times within it.
 ///
 /// # Errors
-/// Where a collider changes its topology within the step, or a point is not finite.
+/// If a collider changes its topology within the step, or a point is not finite.
 pub(super) fn obstacles(
     samples: &[(Frame, Vec<Arc<Geometry>>)],
     seconds: f64,

@@ -80,6 +80,6 @@ fn needed(points: &Component, wire: usize, attribute: Attr<f32>) -> Result<&[f32
     points.get(attribute).ok_or_else(|| {
         let name = attribute.name;
         let has = points.describe(name).map_or("which it does not have".into(), |found| format!("which is {found}"));
-        Error::refused(format!("`pins` {wire} needs `{name}`, {has}")).hint("make pins of points by Softbody_Pin")
+        Error::refused(format!("`pins` {wire} needs `{name}`, {has}")).hint("make pins from points with Softbody_Pin")
     })
 }

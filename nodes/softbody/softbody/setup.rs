@@ -28,7 +28,7 @@ impl StartInputs {
     }
 }
 
-/// All bodies together, their particles in the order of the wires.
+/// All bodies together, with their particles in the order of the wires.
 pub(super) struct SimulationSetup {
     /// Particles at the start, metres.
     pub(super) rest: Vec<[f64; 3]>,
@@ -43,7 +43,7 @@ pub(super) struct SimulationSetup {
     /// The surface of each connected body, for contacts.
     pub(super) skins: Vec<BodySkin>,
     pub(super) pins: Vec<PinBinding>,
-    /// The output components, but for their positions.
+    /// The output components, except for their positions.
     pub(super) surface: Component,
     pub(super) body: Component,
     /// The embedding of each point of the surface in the tets.
@@ -68,7 +68,7 @@ impl ParticleNumber {
     /// A masked param over the particles of all bodies.
     ///
     /// # Errors
-    /// Where a body lacks the attribute.
+    /// If a body lacks the attribute.
     pub(super) fn of(cx: &Cx, inputs: &StartInputs, param: Param<Maskable>) -> Result<Self> {
         let mut mask = None;
         for geometry in &inputs.bodies {
@@ -84,7 +84,7 @@ impl ParticleNumber {
     }
 }
 
-/// What bodies are made of at a frame.
+/// Material params of all particles at a frame.
 pub(super) struct MaterialFields {
     density: ParticleNumber,
     stiffness: ParticleNumber,
@@ -231,9 +231,9 @@ impl Surface {
                 let carriers = embed(points, corners, mesh.positions());
                 let carriers = carriers.or_else(|| (mesh.point_count() == 0).then(Vec::new)).ok_or_else(|| {
                     Error::refused(format!(
-                        "no tet of `bodies` {wire} has a volume, so none carries the mesh beside them"
+                        "no tet of `bodies` {wire} has a volume, so none can carry the mesh that comes with them"
                     ))
-                    .hint("leave the mesh out, or take the tets that Tetrahedralize makes of it")
+                    .hint("remove the mesh, or use the tets that Tetrahedralize makes from it")
                 })?;
                 (mesh.clone(), carriers)
             }

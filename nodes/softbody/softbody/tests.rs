@@ -52,8 +52,9 @@ fn height(tasted: &BenchResult) -> f32 {
     tasted.mesh().positions().iter().map(|p| p[1]).fold(f32::NEG_INFINITY, f32::max)
 }
 
-/// Where samples have points, a block with points inside, another for each wire: the suite's own bodies are all surface,
-/// and all the same. Where samples have `surface_point`, it makes a point inside the longer block one of the surface.
+/// Replaces non-empty samples by a block with inner points, a different one for each wire: the suite's own bodies have
+/// no inner points and are all the same. Where samples have `surface_point`, it makes a point inside the longer block
+/// one of the surface.
 fn with_inside(wire: usize, given: Geometry) -> Geometry {
     let Some(tets) = given.tets().filter(|tets| tets.point_count() > 0) else { return given };
     let mut block = block([2 + wire, 2, 2], [0.0, 0.12 * wire as f32, 0.0], [0.1; 3]);
@@ -109,7 +110,7 @@ fn it_conforms() {
 }
 
 #[test]
-fn a_body_falls_as_all_bodies_do() {
+fn a_body_falls_along_a_parabola() {
     let frames = simulating(cube()).frames([1, 2, 13]);
     let rest = frames[0].mesh().positions();
     for (frame, time) in frames[1..].iter().zip([H, 12.0 * H]) {
@@ -122,14 +123,14 @@ fn a_body_falls_as_all_bodies_do() {
 }
 
 #[test]
-fn pinned_particles_are_where_their_pins_are_and_the_rest_hangs_on() {
+fn pinned_particles_follow_their_pins_and_the_rest_hangs_from_them() {
     let at = |frame: Frame| {
         let way = 0.01 * (frame.number() as f32 - 1.0);
         Geometry::from(pins(vec![[way, 0.1, 0.0], [way, 0.1, 0.1]], 0.06))
     };
     let frames = simulating(cube()).moving(PINS, at).frames(1..=12);
     let rest = frames[0].mesh().positions();
-    // On the upper edge at x = 0, and half-way from there: within 6 cm of one of the pins.
+    // On the upper edge at x = 0, and half-way from there: particles within 6 cm of one of the pins.
     let held = |p: &[f32; 3]| {
         [0.0_f32, 0.1]
             .iter()
@@ -147,7 +148,7 @@ fn pinned_particles_are_where_their_pins_are_and_the_rest_hangs_on() {
 }
 
 #[test]
-fn a_goal_that_was_reached_becomes_the_shape_at_rest() {
+fn a_goal_that_was_reached_becomes_the_rest_shape() {
     let mut goal = pressed(0, cube().into());
     let tets = goal.part_mut(Kind::Tets).unwrap();
     tets.set(GOAL_FRAME, vec![12.0]).unwrap();
@@ -167,7 +168,7 @@ fn a_goal_that_was_reached_becomes_the_shape_at_rest() {
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), p| (low.min(p[1]), high.max(p[1])));
     assert!((high - low - 0.06).abs() < 1e-6, "{low} {high}");
     assert!(frames[1].metrics["elastic"] < 1e-6, "{:?}", frames[1].metrics);
-    assert_eq!(rest.len(), 26, "the point inside is none of the surface's");
+    assert_eq!(rest.len(), 26, "the inner point is not part of the surface");
 }
 
 #[test]
@@ -178,7 +179,7 @@ fn a_block_rests_on_the_ground() {
     assert!((0.0..=1e-3).contains(&lowest(&frames[1])), "{}", lowest(&frames[1]));
     let moved = frames[1].mesh().positions().iter().zip(frames[2].mesh().positions()).map(|(p, q)| (p[1] - q[1]).abs());
     assert!(moved.fold(0.0, f32::max) < 1e-6);
-    // The weight of 1 dm³ of water presses E = 1e5 by a half of ρgh/E on the mean.
+    // A cube of 1 dm³ with the weight of water and E = 1e5 is compressed by ½ρgh/E on average.
     assert!((height(&frames[1]) - 0.1).abs() < 2e-3, "{}", height(&frames[1]));
 }
 
@@ -196,7 +197,7 @@ fn a_fine_surface_is_carried_by_coarse_tets() {
 }
 
 #[test]
-fn a_goal_of_no_body_or_of_two_is_refused_with_both_named() {
+fn a_goal_that_matches_no_body_or_two_is_refused() {
     let (goal, other) = (pressed(0, cube().into()), block([1; 3], [0.0; 3], [0.1; 3]));
     let refused = |bench: Bench| bench.input(GOALS, goal.clone()).at(2.0).try_cook().unwrap_err().fact;
     assert_eq!(
@@ -209,7 +210,7 @@ fn a_goal_of_no_body_or_of_two_is_refused_with_both_named() {
 #[test]
 fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
     let upper = || block([2, 1, 2], [0.0, 0.102, 0.0], [0.1, 0.05, 0.1]);
-    // The upper one is held by its top; the lower one hangs on the springs between them.
+    // The upper one is held at its top; the lower one hangs from the springs between them.
     let held = pins(vec![[0.0, 0.152, 0.0], [0.1, 0.152, 0.0], [0.0, 0.152, 0.1], [0.1, 0.152, 0.1]], 0.01);
     let coupled = |stiffness: f64| {
         simulating(cube())

@@ -14,7 +14,7 @@ fn ball() -> Component {
     mesh(&shapes::sphere([1.0; 3], 5))
 }
 
-/// The ball filled: tets, and the surface along.
+/// The filled ball: tets, and the surface with them.
 fn body() -> Geometry {
     let ball = ball();
     let faces = ball.faces().unwrap();
@@ -37,7 +37,7 @@ fn making(body: impl Into<Geometry>, shape: Component) -> Bench {
     bench(&NODE).input(BODY, body).input(SHAPE, shape)
 }
 
-/// The samples' bodies name the rows 0 to 3 of their surface at random: a shape of four points fits.
+/// `surface_point` of the samples' bodies is random in 0 to 3: a shape of four points fits.
 fn four_points(_: usize, given: Geometry) -> Geometry {
     let points = given.mesh().unwrap().positions();
     if points.len() < 4 {
@@ -52,7 +52,7 @@ fn it_conforms() {
 }
 
 #[test]
-fn the_inside_goes_along_with_an_affine_shape() {
+fn the_interior_follows_an_affine_shape_exactly() {
     let map: Map = |[x, y, z]| [1.0 + 0.5 * x - y, 0.25 * z + 2.0 * y, 0.75 * z + 0.125 * x];
     let out = making(body(), moved(ball(), map)).set(FRAME, 24.0).set(STRENGTH, 50.0).set(HOLD, 3.0).cook();
     let goal = out.part(Kind::Tets);
@@ -68,7 +68,7 @@ fn the_inside_goes_along_with_an_affine_shape() {
 }
 
 #[test]
-fn the_surface_is_where_the_shape_is_to_the_bit() {
+fn the_surface_equals_the_shape_to_the_bit() {
     let shape = moved(ball(), |[x, y, z]| [x + 0.3 * y * y, 0.6 * y, z - 0.4 * x * y]);
     let out = making(body(), shape.clone()).cook();
     assert_eq!(out.part(Kind::Tets).positions()[..shape.point_count()], *shape.positions());
@@ -76,7 +76,7 @@ fn the_surface_is_where_the_shape_is_to_the_bit() {
 }
 
 #[test]
-fn the_shape_at_rest_keeps_every_bit_and_all_else_is_shared() {
+fn the_rest_shape_keeps_every_bit_and_other_arrays_are_shared() {
     let body = body();
     let out = making(body.clone(), ball()).cook();
     let (goal, rest) = (out.part(Kind::Tets), body.tets().unwrap());
@@ -84,17 +84,17 @@ fn the_shape_at_rest_keeps_every_bit_and_all_else_is_shared() {
     assert!(goal.topology().same(rest.topology()));
     let rows = |part: &Component| part.table(Owner::Point).column("surface_point").unwrap().address();
     assert_eq!(rows(goal), rows(rest));
-    assert!(out.geometry.mesh().is_none(), "a goal is tets alone");
+    assert!(out.geometry.mesh().is_none(), "a goal consists of tets only");
 }
 
 #[test]
-fn a_shape_that_crosses_itself_is_told() {
+fn tets_inverted_by_a_self_crossing_shape_are_counted() {
     let out = making(body(), moved(ball(), |[x, y, z]| [x, if y > 0.0 { -2.0 * y } else { y }, z])).cook();
     assert!(out.metrics["inverted_tets"] > 50.0, "{:?}", out.metrics);
 }
 
 #[test]
-fn a_shape_of_another_surface_is_refused_with_both() {
+fn a_shape_of_another_surface_is_refused_with_both_counts() {
     let refused = |body: Geometry, shape: Component| making(body, shape).try_cook().unwrap_err().fact;
     let other = mesh(&shapes::sphere([1.0; 3], 4));
     let own = format!("{} faces and {} points", ball().element_count(), ball().point_count());
@@ -121,7 +121,7 @@ fn a_shape_of_another_surface_is_refused_with_both() {
 }
 
 #[test]
-fn a_body_that_does_not_know_its_surface_is_refused() {
+fn a_body_without_a_valid_surface_point_is_refused() {
     let with = |change: fn(&mut Component)| {
         let mut body = body();
         change(body.part_mut(Kind::Tets).unwrap());
@@ -137,11 +137,11 @@ fn a_body_that_does_not_know_its_surface_is_refused() {
     let none = with(|tets| tets.edit(SURFACE_POINT).unwrap().fill(-1));
     assert_eq!(none, "`surface_point` of `body` is below 0 everywhere: it has no surface");
     let far = with(|tets| tets.edit(SURFACE_POINT).unwrap()[0] = 7000);
-    assert!(far.starts_with("`surface_point` of `body` goes up to 7000, and its surface has "));
+    assert!(far.starts_with("`surface_point` of `body` goes up to 7000, but its surface has "));
 }
 
 #[test]
-fn a_keyed_strength_changes_the_strength_alone() {
+fn a_keyed_strength_changes_only_the_strength() {
     let shape = moved(ball(), |[x, y, z]| [x + 0.3 * y * y, y, z]);
     let keyed = making(body(), shape).keyed(STRENGTH, &[(1.0, 10.0), (5.0, 30.0)]);
     let frames = keyed.frames([1, 3]);

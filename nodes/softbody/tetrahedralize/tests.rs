@@ -30,7 +30,7 @@ fn volume(tets: &Component, which: impl Fn(usize) -> bool) -> f64 {
     tets.tet_corners().iter().enumerate().filter(|(tet, _)| which(*tet)).map(|(_, corners)| one(corners)).sum()
 }
 
-/// Faces the other way round.
+/// The mesh with its faces reversed.
 fn inside_out(_: usize, given: Geometry) -> Geometry {
     let mesh = given.mesh().unwrap();
     let faces = mesh.faces().unwrap();
@@ -47,14 +47,14 @@ fn it_conforms() {
 }
 
 #[test]
-fn a_cube_is_five_or_six_tets_of_its_volume_and_rides_along() {
+fn a_cube_is_five_or_six_tets_of_its_volume_and_is_passed_on() {
     let cube = mesh(&shapes::block([2.0, 1.0, 1.0], [1; 3]));
     let out = filling(cube.clone()).set(INTERIOR, false).cook();
     assert!((5..=6).contains(&tets(&out).element_count()));
     assert!((volume(tets(&out), |_| true) - 2.0).abs() < 1e-14);
     assert_eq!(tets(&out).positions(), cube.positions());
     let address = |mesh: &Component| mesh.table(Owner::Point).column("P").unwrap().address();
-    assert_eq!(address(out.mesh()), address(&cube), "the surface is the very one that came in");
+    assert_eq!(address(out.mesh()), address(&cube), "the surface is the input mesh itself");
     assert_eq!(tets(&out).get(SURFACE_POINT).unwrap(), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(tets(&out).get(SIDE).unwrap(), [1; 8]);
     assert_eq!((out.metrics["missing_faces"], out.metrics["repairs"]), (0.0, 0.0));
@@ -62,7 +62,7 @@ fn a_cube_is_five_or_six_tets_of_its_volume_and_rides_along() {
 }
 
 #[test]
-fn points_inside_are_marked_and_make_good_tets() {
+fn inner_points_are_marked_and_make_good_tets() {
     let ball = ball(8, 0.2);
     let n = ball.point_count();
     let out = filling(ball).cook();
@@ -82,7 +82,7 @@ fn an_egg_is_a_white_around_a_yolk() {
     let egg = ball(8, 0.06).concat(&ball(6, 0.03)).unwrap().concat(&ball(6, 0.0298)).unwrap();
     let out = filling(egg).cook();
     assert_eq!(out.metrics["bodies"], 2.0);
-    assert!(out.metrics["repairs"] > 0.0, "the wall of the cavity looked outwards");
+    assert!(out.metrics["repairs"] > 0.0, "the wall of the cavity faced outwards");
     let body = tets(&out).get(BODY).unwrap();
     let (white, yolk) = (volume(tets(&out), |tet| body[tet] == 0), volume(tets(&out), |tet| body[tet] == 1));
     let all = |n: usize, size: f64| volume(tets(&filling(ball(n, size)).cook()), |_| true);
@@ -96,7 +96,7 @@ fn an_egg_is_a_white_around_a_yolk() {
     );
 }
 
-/// A cube whose faces each have points of their own, with a stray point before them, a face twice, and inside out.
+/// An inside-out cube whose faces each have their own points, with an unused point and a duplicate face.
 fn untidy() -> Component {
     let cube = mesh(&shapes::block([1.0; 3], [1; 3]));
     let mut points = vec![[7.0, 8.0, 9.0]];
@@ -122,12 +122,12 @@ fn repairs_keep_attributes_with_their_points_and_faces() {
     assert_eq!(mesh.get(Attr::<i32>::element("paint")).unwrap(), [0, 1, 2, 3, 4, 5]);
     assert_eq!(mesh.get(Attr::<f32>::once("made")).unwrap(), [1.5]);
     assert!((volume(tets(&out), |_| true) - 1.0).abs() < 1e-12);
-    // 16 points joined and 1 dropped, 1 face dropped and 6 turned.
+    // 16 points merged and 1 removed, 1 face removed and 6 flipped.
     assert_eq!(out.metrics["repairs"], 24.0);
 }
 
 #[test]
-fn what_cannot_be_repaired_or_must_not_be_is_refused_with_its_place() {
+fn defects_that_cannot_or_must_not_be_repaired_are_refused_with_their_location() {
     let fact = |bench: Bench| bench.try_cook().unwrap_err().to_string();
     assert_eq!(
         fact(filling(untidy()).set(REPAIR, Repair::None)),
@@ -145,7 +145,7 @@ fn what_cannot_be_repaired_or_must_not_be_is_refused_with_its_place() {
 }
 
 #[test]
-fn nothing_is_no_body() {
+fn an_empty_surface_gives_no_body() {
     let none = Component::mesh(Vec::new(), Vec::new(), Vec::new()).unwrap();
     let out = filling(none).cook();
     assert_eq!((tets(&out).element_count(), out.mesh().element_count(), out.metrics["tets"]), (0, 0, 0.0));

@@ -9,7 +9,7 @@ fn field() -> Geometry {
     Component::curves(vec![5; 9], cvs.collect()).unwrap().into()
 }
 
-/// A mesh of one square under the field, and one upside down beneath it.
+/// A mesh of one square under the field, and another one upside down beneath it.
 fn ground() -> Geometry {
     let [a, b] = [-1.0, 8.0];
     let square = [[a, 0.0, a], [a, 0.0, b], [b, 0.0, b], [b, 0.0, a]];
@@ -26,14 +26,14 @@ fn change(geometry: &Geometry, kind: Kind, change: impl Fn([f64; 3]) -> [f64; 3]
     geometry
 }
 
-/// The field, blown along x by gusts: more at the tips.
+/// The field, blown along x by gusts, most at the tips.
 fn blown(frame: Frame) -> Geometry {
     let t = frame.number();
     let gust = libm::sin(0.37 * t) + 0.5 * libm::sin(1.9 * t);
     change(&field(), Kind::Curves, |[x, y, z]| [x + 0.2 * gust * y * y, y, z - 0.1 * gust * y])
 }
 
-/// Rolling and travelling: a turn about a slanting axis and a way.
+/// Rolling and travelling: a rotation about a slanting axis, and a translation.
 fn rolled(t: f64, p: [f64; 3]) -> [f64; 3] {
     let (s, c) = libm::sincos(0.31 * t);
     let n = [2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0];
@@ -79,10 +79,10 @@ fn conforms_to_its_declaration() {
 }
 
 #[test]
-fn a_tip_swings_as_the_equation_says() {
-    // A curve of one segment, 1 km long, so that restoring its length moves the tip along x by 1e-6 of what it swings;
-    // its target jumps by 1 m from frame 4 to 5, straight within the frame. From then on ξ'' = −2ζω·ξ' − ω²ξ with d = 1:
-    // over the jump the tip goes b, its speed (1 − e), and so on: here by a thousand small steps of the equation.
+fn a_tip_follows_the_spring_equation() {
+    // A curve of one segment, 1 km long, so that restoring its length moves the tip along x by only 1e-6 of its swing;
+    // its target moves by 1 m from frame 4 to 5, linearly within the frame, and then stays. The reference integrates
+    // the equation with d = 1 in small steps.
     let (frequency, zeta, fps) = (3.0, 0.3, 24.0);
     let tall = |frame: Frame| -> Geometry {
         let x = (frame.number() - 4.0).clamp(0.0, 1.0) as f32;
@@ -136,7 +136,7 @@ fn lengths_and_roots_are_kept_between_frames_too() {
 }
 
 #[test]
-fn any_frame_alone_or_backwards_has_the_bits_it_has_in_order() {
+fn frames_cooked_alone_or_backwards_have_the_same_bits() {
     let mut masked = field();
     let soft: Vec<f32> = (0..45).map(|k| 0.2 * (k % 7) as f32).collect();
     masked.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::point("soft"), soft).unwrap();
@@ -162,7 +162,7 @@ fn any_frame_alone_or_backwards_has_the_bits_it_has_in_order() {
 }
 
 #[test]
-fn a_window_of_a_tolerance_is_within_it_of_having_run_from_the_start() {
+fn the_error_of_a_window_is_within_the_tolerance() {
     let scene = || Scene { last: 200, ..Scene::default() };
     for damping in [0.2, 1.0, 3.0] {
         let with = |tolerance: f64| {
@@ -180,9 +180,9 @@ fn a_window_of_a_tolerance_is_within_it_of_having_run_from_the_start() {
 }
 
 #[test]
-fn a_keyed_frequency_looks_back_far_enough_past_its_key() {
+fn windows_after_a_key_of_the_frequency_are_long_enough() {
     let scene = || Scene { last: 200, ..Scene::default() };
-    // Slow until frame 180, where anchors after it would see short windows.
+    // Slow until frame 180; windows anchored after it would be too short if they used the frequency there.
     let keys = [(1.0, plain(0.8)), (180.0, plain(0.8)), (181.0, plain(12.0))];
     let with = |tolerance: f64| jiggled().scene(scene()).keyed(FREQUENCY, &keys).set(TOLERANCE, tolerance);
     for frame in [179.0, 181.0, 183.0, 190.0] {
@@ -193,7 +193,7 @@ fn a_keyed_frequency_looks_back_far_enough_past_its_key() {
 }
 
 #[test]
-fn skin_and_curves_moved_rigidly_together_do_not_swing_where_motion_is_inherited() {
+fn curves_moved_rigidly_with_their_skin_do_not_swing_if_motion_is_inherited() {
     let curves = |frame: Frame| change(&field(), Kind::Curves, |p| rolled(frame.number(), p));
     let skin = |frame: Frame| change(&ground(), Kind::Mesh, |p| rolled(frame.number(), p));
     let moving = |share: f32| bench(&NODE).moving(CURVES, curves).moving(SKIN, skin).set(INHERIT_MOTION, share);
@@ -211,7 +211,7 @@ fn skin_and_curves_moved_rigidly_together_do_not_swing_where_motion_is_inherited
 }
 
 #[test]
-fn wind_on_a_rolling_skin_swings_as_on_a_still_one() {
+fn curves_on_a_rolling_skin_swing_in_wind_as_on_a_still_one() {
     let windy = |roll: bool| {
         let curves = move |frame: Frame| {
             let t = if roll { frame.number() } else { 1.0 };
@@ -228,7 +228,7 @@ fn wind_on_a_rolling_skin_swings_as_on_a_still_one() {
 }
 
 #[test]
-fn without_a_swing_the_very_arrays_go_through() {
+fn without_swing_the_same_arrays_pass_through() {
     let column = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
     let still = field();
     let off = [
@@ -246,14 +246,14 @@ fn without_a_swing_the_very_arrays_go_through() {
 }
 
 #[test]
-fn as_a_keyed_blend_rises_curves_start_from_rest() {
+fn curves_start_from_rest_when_a_keyed_blend_rises() {
     let keys = [(1.0, plain(1.0)), (9.0, plain(0.0)), (20.0, plain(0.0)), (21.0, plain(1.0))];
-    // Where along its curve a CV lies does not matter: scenes that start at other frames have other lengths there.
+    // A constant ramp: scenes that start at other frames have other arc lengths there, which must not matter.
     let evenly = |bench: Bench| bench.set(RAMP, Arc::new(Ramp::constant(1.0))).set(TOLERANCE, 1e-9);
     let out = evenly(jiggled().keyed(BLEND, &keys)).frames(1..=48);
     assert!(out[4].metrics["max_offset"] > 0.0);
     assert_eq!(out[12].metrics["max_offset"], 0.0);
-    // As a scene that starts at frame 20, but for the wind's own time.
+    // The same as a scene that starts at frame 20 with the wind of that time.
     let late = |frame: Frame| blown(frame.plus(19));
     let fresh = evenly(bench(&NODE).moving(CURVES, late)).frames(1..=20);
     for k in 1..20 {
@@ -262,21 +262,21 @@ fn as_a_keyed_blend_rises_curves_start_from_rest() {
 }
 
 #[test]
-fn preroll_starts_the_scene_swinging() {
+fn with_preroll_the_scene_starts_in_motion() {
     let first = |preroll: i64| jiggled().set(PREROLL, preroll).cook();
     assert_eq!(bits(&first(0)), bits(&bench(&NODE).input(CURVES, blown(Frame::whole(1))).cook()));
     assert!(first(40).metrics["max_offset"] > 0.01);
-    // Beyond the window nothing more is seen.
+    // Frames beyond the window have no effect.
     let window = first(0).metrics["window_frames"] as i64;
     assert_eq!(bits(&first(window)), bits(&first(10 * window)));
-    // The same as a scene that began that much earlier, but for the lengths at its first frame.
+    // The same as a scene that starts that much earlier, except for the lengths at its first frame.
     let evenly = || jiggled().set(RAMP, Arc::new(Ramp::constant(1.0))).set(TOLERANCE, 1e-9);
     let scene = Scene { first: -39, last: 48, ..Scene::default() };
     assert_eq!(bits(&evenly().scene(scene).cook()), bits(&evenly().set(PREROLL, 40).cook()));
 }
 
 #[test]
-fn masks_swing_point_by_point_and_say_when_they_are_missing() {
+fn masks_act_per_cv_and_missing_ones_are_refused() {
     let masked = |mask: f32| {
         move |frame: Frame| {
             let mut curves = blown(frame);
@@ -289,7 +289,7 @@ fn masks_swing_point_by_point_and_say_when_they_are_missing() {
     let constant = |value: Maskable| Source::Constant(Maskable::erase(value));
     for param in ["frequency", "damping", "blend"] {
         let [scaled, plainly] = [by(0.8), plain(0.4)].map(|value| with(0.5).source(param, constant(value)));
-        // Windows differ, for a mask may be ¼ elsewhere; both reach the scene's start here.
+        // Windows differ, since a mask may be ¼ elsewhere; here both reach the start of the scene.
         assert_eq!(bits(&scaled.set(TOLERANCE, 1e-9).cook()), bits(&plainly.set(TOLERANCE, 1e-9).cook()));
         let error = jiggled().source(param, constant(by(0.5))).at(3.0).try_cook().unwrap_err();
         assert_eq!(error.fact, format!("`{param}` is masked by `mask`, which the curves do not have"));
@@ -299,7 +299,7 @@ fn masks_swing_point_by_point_and_say_when_they_are_missing() {
 }
 
 #[test]
-fn curves_and_skins_that_come_and_go_are_refused() {
+fn curves_and_skins_that_change_are_refused() {
     let other = |frame: Frame| -> Geometry {
         let count = if frame.number() < 5.0 { 3 } else { 2 };
         Component::curves(vec![count; 2], vec![[0.0; 3]; 2 * count as usize]).unwrap().into()
@@ -307,7 +307,8 @@ fn curves_and_skins_that_come_and_go_are_refused() {
     let error = bench(&NODE).moving(CURVES, other).at(6.0).try_cook().unwrap_err();
     assert_eq!(
         error.fact,
-        "`curves` is not what it was at the scene's first frame: 2 curves of 4 points, then 2 curves of 6 points"
+        "`curves` has changed since the scene's first frame: it had 2 curves of 6 points then, and has 2 curves of 4 \
+         points now"
     );
     let flipped = |frame: Frame| -> Geometry {
         let corners = if frame.number() < 5.0 { vec![0, 1, 2] } else { vec![0, 2, 1] };
@@ -316,7 +317,7 @@ fn curves_and_skins_that_come_and_go_are_refused() {
     let error = jiggled().moving(SKIN, flipped).at(6.0).try_cook().unwrap_err();
     assert_eq!(
         error.fact,
-        "`skin` is not what it was at the scene's first frame: 1 faces of 3 points, with another topology"
+        "`skin` has changed since the scene's first frame: it has 1 faces of 3 points with another topology"
     );
     assert!(jiggled().moving(SKIN, flipped).at(4.0).try_cook().is_ok());
 }
@@ -346,7 +347,7 @@ fn frequencies_from_a_millionth_to_a_thousand_million_hertz_and_any_damping_are_
 }
 
 #[test]
-fn nothing_single_and_folded_curves_go_through() {
+fn empty_single_cv_and_folded_curves_work() {
     let none = Geometry::from(Component::curves(Vec::new(), Vec::new()).unwrap());
     assert_eq!(bench(&NODE).moving(CURVES, move |_| none.clone()).at(5.0).cook().curves().point_count(), 0);
     let dots = |frame: Frame| -> Geometry {

@@ -24,8 +24,8 @@ fn conforms_to_its_declaration() {
 }
 
 #[test]
-fn a_hair_stops_its_gap_above_a_floor() {
-    // From half its length above the floor a segment turns down to 30°, less the gap over its length.
+fn a_hair_stops_one_gap_above_a_floor() {
+    // From half its length above the floor a segment turns down to 30°, minus the gap ÷ its length.
     for gap in [1e-4, 1e-2] {
         let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap).cook();
         let tip = out.curves().positions()[1];
@@ -37,7 +37,7 @@ fn a_hair_stops_its_gap_above_a_floor() {
 }
 
 #[test]
-fn several_colliders_are_met_and_the_first_is_the_skin() {
+fn all_colliders_stop_curves_and_the_first_is_the_default_skin() {
     let both = laid_down().input(COLLIDERS, floor(-5.0)).input(COLLIDERS, floor(0.0));
     let alone = laid_down().input(COLLIDERS, floor(0.0));
     assert_eq!(both.cook().curves().positions(), alone.cook().curves().positions());
@@ -48,7 +48,7 @@ fn several_colliders_are_met_and_the_first_is_the_skin() {
 }
 
 #[test]
-fn without_colliders_the_very_arrays_go_through() {
+fn without_colliders_the_same_arrays_pass_through() {
     let given = goal();
     let out = bench(&NODE).input(CURVES, given.clone()).input(REST, goal()).cook();
     let address = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
@@ -56,14 +56,14 @@ fn without_colliders_the_very_arrays_go_through() {
 }
 
 #[test]
-fn rest_of_other_curves_is_refused() {
+fn rest_curves_that_do_not_match_are_refused() {
     let other = bench(&NODE).input(CURVES, goal()).input(REST, curve(&[[0.0; 3]; 3])).input(COLLIDERS, floor(0.0));
     let expected = "`curves` (1 curve, 2 CVs) and `rest` (1 curve, 3 CVs) are not the same curves";
     assert_eq!(other.try_cook().unwrap_err().fact, expected);
 }
 
 #[test]
-fn any_number_of_steps_ends() {
+fn any_number_of_steps_terminates() {
     for steps in [1, 1_000_000] {
         let out = laid_down().input(COLLIDERS, floor(0.0)).set(METHOD, Method::Steps).set(ROTATION_STEPS, steps).cook();
         assert_eq!(out.metrics["crossings_left"], 0.0, "{steps}");

@@ -28,7 +28,7 @@ fn field(n: usize) -> Geometry {
     Component::curves(vec![5; n * n], (0..n * n).flat_map(|i| (0..5).map(move |k| cv(i, k))).collect()).unwrap().into()
 }
 
-/// One round gust of 1 m radius at 2 m/s, that starts at frame 12 and lasts.
+/// One round gust of 1 m radius at 2 m/s that starts at frame 12 and does not fade.
 fn single(curves: Geometry) -> Bench {
     bench(&NODE)
         .input(CURVES, curves)
@@ -44,7 +44,7 @@ fn envelope(out: &BenchResult) -> &[f32] {
     out.curves().get(ENVELOPE).unwrap()
 }
 
-/// Where along a ruler a gust of `falloff` 1…0 over 1 m has its centre.
+/// Position along a ruler of the centre of a gust with `falloff` 1…0 over 1 m.
 fn centre(out: &BenchResult) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for (p, value) in out.curves().positions().iter().zip(envelope(out)) {
@@ -65,8 +65,8 @@ fn control(shape: ControlShape, centre: [f32; 3], radius: f32, strength: f32) ->
     gust_control::component(points, shape, 2.0, strength, &falling).unwrap()
 }
 
-/// What the suite hangs on `controls`, made a control: its place from the points, its numbers from the attributes, which
-/// are random where they are there.
+/// Makes a control of what the suite wires into `controls`: its position comes from the points, its numbers from the
+/// attributes, which are random if present.
 fn as_control(_: usize, given: Geometry) -> Geometry {
     let points = given.points().unwrap();
     let Some((shapes, keys)) = points.get(gust_control::SHAPE).zip(points.get(gust_control::RAMP)) else {
@@ -86,7 +86,7 @@ fn as_control(_: usize, given: Geometry) -> Geometry {
 
 #[test]
 fn conforms_to_its_declaration() {
-    // The suite's curves are small: gusts of the default size fill them or miss them.
+    // The suite's curves are small: gusts of the default size cover all of them or none.
     let small = |bench: Bench| {
         bench
             .changed(CONTROLS, as_control)
@@ -101,8 +101,8 @@ fn conforms_to_its_declaration() {
 
 #[test]
 fn a_gust_peaks_at_its_start_plus_distance_over_speed() {
-    // Launched 3 m upwind of the one CV, at frame 12, at 2 m/s: there after 1.5 s, at frame 48. W5: 1 at its centre, 0 at
-    // its boundary, half a second, 12 frames, either way.
+    // Launched 3 m upwind of the CV at frame 12, at 2 m/s: it arrives after 1.5 s, at frame 48. W5: 1 at its centre, 0
+    // at its boundary, which passes half a second (12 frames) before and after.
     let gust = single(dot(5.0)).set(DISTANCE, 3.0);
     let at = |frame: f64| envelope(&gust.clone().at(frame).cook())[0];
     assert!((at(48.0) - 1.0).abs() < 1e-5);
@@ -116,15 +116,15 @@ fn a_gust_peaks_at_its_start_plus_distance_over_speed() {
 }
 
 #[test]
-fn without_a_distance_a_gust_starts_upwind_by_the_largest_radius() {
-    // The ruler begins at 0: at its start the gust touches it, 12 frames later its centre is there.
+fn with_distance_zero_a_gust_starts_upwind_by_the_largest_radius() {
+    // The ruler begins at 0: the gust touches it when it starts, and 12 frames later its centre is there.
     let gust = single(ruler(0.0, 4.0));
     assert_eq!(gust.clone().at(12.0).cook().metrics["reached_points"], 0.0);
     assert!((f64::from(envelope(&gust.at(24.0).cook())[0]) - 1.0).abs() < 1e-5);
 }
 
 #[test]
-fn gusts_add_up_to_base_and_scale_what_came_in() {
+fn gusts_add_to_the_base_and_scale_the_incoming_envelope() {
     let mut curves = dot(5.0);
     curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5]).unwrap();
     let gust = single(curves).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]]));
@@ -137,7 +137,7 @@ fn gusts_add_up_to_base_and_scale_what_came_in() {
 }
 
 #[test]
-fn after_its_life_a_gust_dies_down_while_it_travels() {
+fn after_its_life_a_gust_fades_while_it_travels() {
     let gust = single(ruler(-8.0, 20.0)).set(LIFE_RANGE, span(24.0, 24.0)).set(DECAY_RANGE, span(12.0, 12.0));
     let at = |frame: f64| gust.clone().at(frame).cook();
     let most = |out: &BenchResult| envelope(out).iter().copied().fold(0.0, f32::max);
@@ -150,7 +150,7 @@ fn after_its_life_a_gust_dies_down_while_it_travels() {
 }
 
 #[test]
-fn a_keyed_speed_and_wind_move_gusts_without_a_jump() {
+fn gusts_do_not_jump_when_speed_and_wind_are_keyed() {
     // 2 m/s up to frame 20, then up to 26 m/s at frame 44: v = 2 + (f − 20). ∫ from 12: 16 + 2n + n²/2 frames·m/s.
     let keys = [(20.0, span(2.0, 2.0)), (44.0, span(26.0, 26.0))];
     let gust = single(ruler(-4.0, 30.0)).set(DISTANCE, 2.0).keyed(SPEED_RANGE, &keys);
@@ -160,7 +160,7 @@ fn a_keyed_speed_and_wind_move_gusts_without_a_jump() {
         let found = centre(&gust.clone().at(frame).cook());
         assert!((found - (way - 6.0)).abs() < 1e-3, "frame {frame}: {found} for {}", way - 6.0);
     }
-    // Wind that turns about at frame 36, where it has come 4 m: its way back begins there.
+    // Wind that reverses at frame 36, when the gust has travelled 4 m and starts to move back.
     let keys = [(35.0, [1.0, 0.0, 0.0]), (36.0, [1.0, 0.0, 0.0]), (37.0, [-1.0, 0.0, 0.0])];
     let gust = single(ruler(-4.0, 30.0)).set(SPEED_RANGE, span(4.0, 4.0)).keyed(WIND_DIR, &keys);
     let at = |frame: f64| centre(&gust.clone().at(frame).cook());
@@ -169,9 +169,9 @@ fn a_keyed_speed_and_wind_move_gusts_without_a_jump() {
 }
 
 #[test]
-fn a_turning_wind_gives_each_gust_the_plane_of_its_start() {
-    // By frame 100 the wind has turned to z; a gust that starts then comes along z, one that started before turned with
-    // the wind and keeps its plane.
+fn each_gust_keeps_the_launch_plane_of_its_start() {
+    // By frame 100 the wind has turned to z. A gust that starts then moves along z; one that started earlier turned
+    // with the wind and keeps its launch plane.
     let keys = [(60.0, [1.0, 0.0, 0.0]), (80.0, [0.0, 0.0, 1.0])];
     let gust = |start: f32| {
         single(dot(0.0)).set(DISTANCE, 3.0).set(START_FRAME_RANGE, span(start, start)).keyed(WIND_DIR, &keys)
@@ -182,7 +182,7 @@ fn a_turning_wind_gives_each_gust_the_plane_of_its_start() {
 }
 
 #[test]
-fn a_start_between_frames_is_met_and_a_start_before_the_scene_too() {
+fn gusts_can_start_between_frames_and_before_the_scene() {
     let at = |start: f32, frame: f64| {
         let gust = single(dot(0.0)).set(DISTANCE, 3.0).set(START_FRAME_RANGE, span(start, start));
         envelope(&gust.at(frame).cook())[0]
@@ -193,14 +193,14 @@ fn a_start_between_frames_is_met_and_a_start_before_the_scene_too() {
 }
 
 #[test]
-fn repeated_gusts_come_again_at_any_frame_there_is() {
+fn repeated_gusts_return_at_any_frame() {
     let gust = single(dot(0.0)).set(DISTANCE, 3.0).set(LIFE_RANGE, span(60.0, 60.0)).set(REPEAT_EVERY, 100.0);
     for round in [-3.0, 0.0, 1.0, 12_345.0] {
         let out = gust.clone().at(48.0 + 100.0 * round).cook();
         assert!((envelope(&out)[0] - 1.0).abs() < 1e-5, "round {round}");
         assert_eq!(out.metrics["active_gusts"], 1.0);
     }
-    // Six rounds alive at once, and a flood of them bounded.
+    // Six repetitions at the same time; far too many are bounded.
     let crowd = gust.clone().set(LIFE_RANGE, span(590.0, 590.0)).set(DECAY_RANGE, span(0.0, 0.0)).at(1000.0).cook();
     assert_eq!((crowd.metrics["active_gusts"], crowd.metrics["dropped_gusts"]), (6.0, 0.0));
     let flood = gust.set(LIFE_RANGE, span(1e9, 1e9)).set(REPEAT_EVERY, 0.5).cook();
@@ -208,7 +208,7 @@ fn repeated_gusts_come_again_at_any_frame_there_is() {
 }
 
 #[test]
-fn any_frame_alone_has_the_bits_it_has_in_order() {
+fn frames_cooked_alone_have_the_same_bits() {
     let gusts = bench(&NODE)
         .input(CURVES, field(20))
         .input(CONTROLS, control(ControlShape::Cubes, [1.0, 0.0, 1.0], 0.4, -0.5))
@@ -230,8 +230,8 @@ fn any_frame_alone_has_the_bits_it_has_in_order() {
 }
 
 #[test]
-fn the_plane_stays_where_the_first_frames_curves_put_it() {
-    // The curves run away downwind as fast as the gust: it never gets nearer.
+fn the_launch_plane_depends_on_the_curves_of_the_first_frame_only() {
+    // The curves move downwind as fast as the gust, which therefore never gets closer.
     let moving = |frame: Frame| dot(0.0 + 2.0 * (frame.number() - 1.0) as f32 / 24.0);
     let gust = single(dot(0.0));
     let with = |frame: f64| {
@@ -247,7 +247,7 @@ fn the_plane_stays_where_the_first_frames_curves_put_it() {
 }
 
 #[test]
-fn controls_add_their_ramp_and_may_take_away() {
+fn controls_add_their_ramp_or_subtract_it() {
     let with = |controls: &[Component], base: f32| {
         let bench = bench(&NODE).input(CURVES, ruler(0.0, 4.0)).set(NUM_GUSTS, 0).set(BASE, base);
         let bench = controls.iter().fold(bench, |bench, control| bench.input(CONTROLS, control.clone()));
@@ -259,37 +259,38 @@ fn controls_add_their_ramp_and_may_take_away() {
     let calm = control(ControlShape::Sphere, [1.5, 0.0, 0.0], 1.0, -0.5);
     assert_eq!(with(&[ball.clone(), calm.clone()], 0.0), [0.0, 0.75, 0.0, 0.0, 0.0]);
     assert_eq!(with(std::slice::from_ref(&calm), 1.0), [1.0, 0.75, 0.5, 0.75, 1.0]);
-    // Merged on one wire they are the same.
+    // Merged into one wire they give the same result.
     assert_eq!(with(&[ball.concat(&calm).unwrap()], 0.25), with(&[ball, calm], 0.25));
 }
 
 #[test]
-fn points_that_are_no_control_are_refused() {
+fn points_that_are_not_a_control_are_refused() {
     let with = |points: Component| {
         let bench =
             bench(&NODE).input(CURVES, dot(0.0)).input(CONTROLS, control(ControlShape::Sphere, [0.0; 3], 1.0, 1.0));
         bench.input(CONTROLS, points).try_cook().unwrap_err()
     };
     let error = with(Component::points(vec![[0.0; 3]; 9]));
-    assert_eq!(error.fact, "wire 1 of `controls` is no Gust_Control: its points have no `gust_points`");
+    assert_eq!(error.fact, "wire 1 of `controls` is not a Gust_Control: its points have no `gust_points`");
     assert!(error.hint.unwrap().contains("Gust_Control"));
     let ball = control(ControlShape::Sphere, [0.0; 3], 1.0, 1.0);
     let strangers = ball.concat(&Component::points(vec![[0.0; 3]; 2])).unwrap();
-    let fact = format!("point {} of wire 1 of `controls` belongs to no whole Gust_Control", ball.point_count());
+    let fact =
+        format!("point {} of wire 1 of `controls` does not belong to a complete Gust_Control", ball.point_count());
     assert_eq!(with(strangers).fact, fact);
     let mut odd = ball.clone();
     odd.set(gust_control::SHAPE, vec![7; ball.point_count()]).unwrap();
     assert_eq!(with(odd).fact, "`gust_shape` of point 0 of wire 1 of `controls` is 7, expected 0 or 1");
     let mut odd = ball.clone();
     odd.set(gust_control::RAMP, (0..ball.point_count()).map(|k| [-(k as f32), 0.0, 0.0]).collect()).unwrap();
-    assert!(with(odd).fact.contains("is no ramp: ramp key 1 has x -1"));
+    assert!(with(odd).fact.contains("is not a ramp: ramp key 1 has x -1"));
     let mut odd = ball;
     odd.set(Attr::<f32>::point("gust_shape"), vec![0.0; odd.point_count()]).unwrap();
-    assert_eq!(with(odd).fact, "wire 1 of `controls` is no Gust_Control: its `gust_…` attributes have other types");
+    assert_eq!(with(odd).fact, "wire 1 of `controls` is not a Gust_Control: its `gust_…` attributes have other types");
 }
 
 #[test]
-fn a_base_of_1_leaves_the_very_array_alone_and_a_missing_one_becomes_1() {
+fn a_base_of_1_passes_the_envelope_through_and_writes_1_if_it_is_missing() {
     let mut curves = field(3);
     let out = single(curves.clone()).set(BASE, 1.0).at(20.0).cook();
     assert_eq!((envelope(&out), out.metrics["active_gusts"]), (&[1.0; 45][..], 0.0));
@@ -300,7 +301,7 @@ fn a_base_of_1_leaves_the_very_array_alone_and_a_missing_one_becomes_1() {
 }
 
 #[test]
-fn nothing_divides_by_nothing() {
+fn zero_sizes_and_speeds_do_not_divide_by_zero() {
     let gust = single(field(3)).set(START_FRAME_RANGE, span(-8.0, -8.0));
     let calm = |bench: Bench| {
         let out = bench.cook();
@@ -333,7 +334,7 @@ fn ranges_below_0_and_backwards_are_refused() {
 }
 
 #[test]
-fn scaled_with_its_scene_it_is_the_same() {
+fn results_do_not_depend_on_the_scale_of_the_scene() {
     let at = |scale: f32| {
         let mut curves = field(12);
         curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap().iter_mut().for_each(|p| *p = p.map(|x| x * scale));
@@ -353,7 +354,7 @@ fn scaled_with_its_scene_it_is_the_same() {
 }
 
 #[test]
-fn ten_thousand_gusts_end() {
+fn ten_thousand_gusts_terminate() {
     let out = bench(&NODE)
         .input(CURVES, field(100))
         .set(NUM_GUSTS, 10_000)

@@ -1,4 +1,4 @@
-//! Directions as an artist writes them: vectors of any length.
+//! Directions as artists write them: vectors of any length.
 
 use numerics::vector::direction;
 

@@ -3,8 +3,8 @@
 //! A control is a run of points. Its first four are its centre and the ends of its own x, y and z axis, so whatever
 //! moves the points moves the control: a Transform rotates, stretches and shears it, a Merge puts several on one wire.
 //! Each point of a run has `gust_points` (number of points in the run), `gust_shape` (0 sphere, 1 cubes), `gust_outer`
-//! (outer ÷ inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one per point from the run's first: x, y,
-//! and the interpolation (0 linear, 1 smooth, 2 constant). Points beyond the last key repeat it.
+//! (outer ÷ inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one per point from the first of the run:
+//! x, y, and the interpolation (0 linear, 1 smooth, 2 constant). Points beyond the last key repeat it.
 
 use curves::gusts::{AXIS_ROWS, Control, ControlShape};
 use engine::prelude::*;
@@ -22,7 +22,7 @@ const INTERPOLATIONS: [Interpolation; 3] = [Interpolation::Linear, Interpolation
 /// The points of one control: its outline, with at least one point per key of the ramp, and its attributes.
 ///
 /// # Errors
-/// Where there are more points than an i32 counts.
+/// If there are more points than an i32 can count.
 pub(crate) fn component(
     outline: Vec<[f32; 3]>,
     shape: ControlShape,
@@ -51,18 +51,20 @@ pub(crate) fn component(
 /// The controls among the points of wire `wire`, in order.
 ///
 /// # Errors
-/// Where any of the points belongs to no control.
+/// If any of the points does not belong to a control.
 pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> {
     let foreign =
-        |fact: String| Error::refused(fact).hint("wire the output of a Gust_Control, moved or merged as you like");
+        |fact: String| Error::refused(fact).hint("wire the output of a Gust_Control; it may be transformed and merged");
     let columns = (points.get(POINTS), points.get(SHAPE), points.get(OUTER), points.get(STRENGTH), points.get(RAMP));
     let (Some(runs), Some(shapes), Some(outers), Some(strengths), Some(keys)) = columns else {
         let lacks = [POINTS.name, SHAPE.name, OUTER.name, STRENGTH.name, RAMP.name]
             .into_iter()
             .find(|name| points.table(Owner::Point).column(name).is_none());
         let fact = match lacks {
-            Some(name) => format!("wire {wire} of `controls` is no Gust_Control: its points have no `{name}`"),
-            None => format!("wire {wire} of `controls` is no Gust_Control: its `gust_…` attributes have other types"),
+            Some(name) => format!("wire {wire} of `controls` is not a Gust_Control: its points have no `{name}`"),
+            None => {
+                format!("wire {wire} of `controls` is not a Gust_Control: its `gust_…` attributes have other types")
+            }
         };
         return Err(foreign(fact));
     };
@@ -76,7 +78,7 @@ pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> 
             || runs[first..first + count].iter().any(|run| *run != runs[first])
         {
             return Err(foreign(format!(
-                "point {first} of wire {wire} of `controls` belongs to no whole Gust_Control"
+                "point {first} of wire {wire} of `controls` does not belong to a complete Gust_Control"
             )));
         }
         let shape = usize::try_from(shapes[first]).ok().and_then(|shape| SHAPES.get(shape).copied());
@@ -87,7 +89,7 @@ pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> 
             ))
         })?;
         let ramp = ramp(&keys[first..first + count]).map_err(|error| {
-            foreign(format!("`gust_ramp` from point {first} of wire {wire} of `controls` is no ramp: {error}"))
+            foreign(format!("`gust_ramp` from point {first} of wire {wire} of `controls` is not a ramp: {error}"))
         })?;
         let centre = at[first].map(f64::from);
         let axes = [1, 2, 3].map(|axis| {

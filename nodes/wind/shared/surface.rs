@@ -1,4 +1,4 @@
-//! A mesh as a collider: a tree of its triangles, and its normals; computed once while it does not move.
+//! A mesh as a collider: a tree of its triangles, and its normals; computed once for a still mesh.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ impl Surface {
         &self.tree
     }
 
-    /// What the kernel takes.
+    /// The form that the kernel takes.
     pub(crate) fn skin(&self) -> SkinSurface<'_> {
         SkinSurface { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
     }
