@@ -39,7 +39,8 @@ impl EmbeddedPoint {
 
 /// Binds the points `carried` to `tets` over `points`; all in metres. `None` if no tet has a volume.
 ///
-/// # Panics If a tet has a corner index out of range.
+/// # Panics
+/// If a tet has a corner index out of range.
 pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec<EmbeddedPoint>> {
     let solid: Vec<u32> =
         (0..tets.len() as u32).filter(|tet| BarycentricMap::of(points, tets[*tet as usize]).is_some()).collect();

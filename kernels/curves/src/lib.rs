@@ -1,8 +1,8 @@
-//! Kernels that grow, carry, bend, swing and collide curves: plain slices in, plain slices out; knows no node and no
-//! geometry.
+//! Kernels that grow, attach, bend, swing and collide curves. Functions take and return plain slices; nothing here
+//! depends on nodes or on the engine's geometry.
 //!
-//! All that [`numerics`] promises holds: the same bits on any CPU and for any number of threads. How a kernel is written
-//! is said there.
+//! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads; that crate also
+//! describes how a kernel is written.
 
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 

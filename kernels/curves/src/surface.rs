@@ -21,7 +21,7 @@ impl SurfacePoint {
     /// Where the point is on `triangles` of `points`, in metres.
     ///
     /// # Panics
-    /// Where the triangle or one of its corners is out of range.
+    /// If the triangle or one of its corners is out of range.
     pub fn position(&self, points: &[[f32; 3]], triangles: &[[u32; 3]]) -> DVec3 {
         let [a, b, c] = triangles[self.triangle as usize].map(|corner| to_f64(points[corner as usize]));
         a * self.weights[0] + b * self.weights[1] + c * self.weights[2]

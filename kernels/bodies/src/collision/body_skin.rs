@@ -1,4 +1,4 @@
-//! The skin of a body: its surface triangles, and which of its elements are too close at rest to count as in contact.
+//! The skin of a body: its surface triangles, and which of their elements are too close at rest to count as contacts.
 
 use super::CollisionError;
 use super::closest_point::{ClosestPoint, along};
@@ -27,7 +27,8 @@ impl BodySkin {
     /// A skin of `triangles` over particles that are at `rest` without load; `links` are the springs of the body,
     /// which define neighbours in addition to the triangles' edges.
     ///
-    /// # Errors If an index is out of range or a coordinate is not finite.
+    /// # Errors
+    /// If an index is out of range or a coordinate is not finite.
     pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, CollisionError> {
         check_triangles(rest.len(), triangles)?;
         check_points(rest)?;

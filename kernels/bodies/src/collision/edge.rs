@@ -24,7 +24,7 @@ const LEAN_THROUGH: f64 = 0.5;
 /// The same for edges that are close.
 const LEAN_NEAR: f64 = 0.1;
 
-/// Tests two edges of different surfaces.
+/// Tests two edges of different surfaces for contact.
 pub(super) fn hit(
     first: &MovingSurface<'_>,
     edge: &Edge,

@@ -32,7 +32,8 @@ impl Obstacle {
     /// An obstacle of `triangles` over the points of each of `poses`, in a frame of `seconds`. With one pose it is at
     /// rest; times of poses must increase. `thickness` is the distance to keep, metres, `friction` Coulomb's μ.
     ///
-    /// # Errors Without a pose, or if a triangle's index is out of range or a number is not finite or negative.
+    /// # Errors
+    /// Without a pose, or if a triangle's index is out of range or a number is not finite or negative.
     pub fn new(
         triangles: &[[u32; 3]],
         poses: &[ObstaclePose],
@@ -90,7 +91,8 @@ impl Obstacle {
 
     /// Its velocity at the point of a triangle with barycentric `weights`, m/s.
     ///
-    /// # Panics If there is no such triangle.
+    /// # Panics
+    /// If there is no such triangle.
     pub fn velocity(&self, share: f64, triangle: u32, weights: [f64; 3]) -> [f64; 3] {
         self.velocity_of(share, &self.surface.triangles[triangle as usize], &weights).into()
     }

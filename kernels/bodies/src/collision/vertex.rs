@@ -1,6 +1,6 @@
 //! A moving point against the triangles of a moving surface: crossings and proximity.
 //!
-//! What decides is the side the point came from. A closed surface can only be entered from outside; an open one has
+//! The side that the point came from decides. A closed surface can only be entered from outside; an open one has
 //! two sides. After the first crossing only that triangle counts; other triangles are judged at that time.
 
 use super::closest_point::ClosestPoint;
@@ -55,14 +55,16 @@ pub(super) struct Hit {
     pub(super) weights: [f64; 3],
     /// Unit normal from the triangle to the point, at the end of the motion.
     pub(super) normal: DVec3,
-    /// Depth below the triangle's plane that is allowed for now.
+    /// Depth below the triangle's plane that is still allowed at the end of the motion, for a point that starts inside
+    /// and is pushed out gradually.
     pub(super) shift: f64,
     /// Distance at the end.
     clearance: f64,
 }
 
-/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending. `closest_at_start` finds
-/// the closest triangle at the start, for a point that may start inside and has no triangle close to it.
+/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending.
+/// `closest_at_start` finds the closest triangle at the start, for a point that may start inside and has no triangle
+/// close to it.
 pub(super) fn hits(
     path: &[DVec3],
     on: &MovingSurface<'_>,
@@ -120,8 +122,8 @@ pub(super) fn hits(
     merge(out, first);
 }
 
-/// The contact of a point that came close to some of the triangles `near` in between without crossing any: with the closest
-/// of them at the end of the motion.
+/// The contact of a point that came close to some of the triangles `near` in between without crossing any: with the
+/// closest of them at the end of the motion.
 fn passed_closely(path: &[DVec3], on: &MovingSurface<'_>, near: &[u32], reach: f64) -> Option<Hit> {
     let (surface, end) = (on.surface, path[path.len() - 1]);
     let passed = near.iter().filter(|face| approaches(path, on, **face, reach));
@@ -246,7 +248,8 @@ fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> 
     false
 }
 
-/// Of contacts from `first` on with similar normals keeps the deepest, and only a few in all, ordered by triangle.
+/// Of the contacts from `first` on, keeps the deepest of those with similar normals, and only a few in all, ordered by
+/// triangle.
 fn merge(hits: &mut Vec<Hit>, first: usize) {
     /// Cosine of the angle within which normals are similar.
     const SAME: f64 = 0.99;

@@ -64,7 +64,8 @@ pub struct GoalShape {
 
 /// Computes the goal shape.
 ///
-/// # Panics If an index is out of range or a point has no row.
+/// # Panics
+/// If an index is out of range or a point has no row.
 pub fn goal_shape(held: &HeldBody<'_>, limits: GoalLimits) -> GoalShape {
     let pieces = ConnectedPieces::of(held.points.len(), held.tets);
     let fits = Affine::of_pieces(held, &pieces);

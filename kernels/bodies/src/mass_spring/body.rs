@@ -153,7 +153,8 @@ struct MeshTet {
 impl SoftBody {
     /// A body with the shape of `mesh`, made of `material`, and explicit springs `joints`.
     ///
-    /// # Errors If a number is not finite, an index is out of range, or the total mass is zero.
+    /// # Errors
+    /// If a number is not finite, an index is out of range, or the total mass is zero.
     pub fn new(mesh: &Mesh<'_>, material: &Material<'_>, joints: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::from_mesh(mesh, joints)?;
         body.set_material(material)?;
@@ -162,7 +163,8 @@ impl SoftBody {
 
     /// A pure mass-spring network: `masses` in kilograms, joined by `springs`.
     ///
-    /// # Errors As [`SoftBody::new`].
+    /// # Errors
+    /// As [`SoftBody::new`].
     pub fn of_springs(points: &[[f64; 3]], masses: &[f64], springs: &[BodySpring]) -> Result<Self, BodyError> {
         let mut body = Self::from_mesh(&Mesh { points, ..Mesh::default() }, springs)?;
         let masses: Vec<f64> = masses.iter().copied().chain(std::iter::repeat(0.0)).take(points.len()).collect();
@@ -237,7 +239,8 @@ impl SoftBody {
 
     /// Changes masses and stiffnesses; shape and state are kept.
     ///
-    /// # Errors If the total mass is zero, or a number is not finite.
+    /// # Errors
+    /// If the total mass is zero, or a number is not finite.
     pub fn set_material(&mut self, material: &Material<'_>) -> Result<(), BodyError> {
         let mut masses = vec![0.0; self.len()];
         let mesh_spring_count = self.mesh_spring_count;

@@ -20,14 +20,14 @@ pub(super) const MODES: usize = 6;
 /// that: F is near 0 in the directions a contact resists and 1 elsewhere.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ContactFilters {
-    /// Index in `ways` for each particle; empty if no particle is filtered.
+    /// Index in `filters` for each particle; empty if no particle is filtered.
     of: Vec<u32>,
     /// F, column by column.
     filters: Vec<[[f64; 3]; 3]>,
 }
 
 impl ContactFilters {
-    /// Of a linear system; isolated particles (without springs) take no part in cluster motions.
+    /// The filters of a linear system; isolated particles (without springs) take no part in cluster motions.
     pub(super) fn new(system: &System) -> Self {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const NEGLIGIBLE: f64 = 0.1;

@@ -221,7 +221,7 @@ impl ContactConstraint {
     }
 
     /// For surfaces that penetrate each other at the start `x` of a step of `seconds`, limits the separation in that
-    /// step to `way` metres. Resolved at once within a short step, they would fly apart.
+    /// step to `separation` metres. Separated at once within a short step, they would fly apart.
     pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, separation: f64) -> Self {
         let through = -self.clearance(x, seconds) - self.gap;
         Self { allowed_depth: (through - separation).max(0.0), ..self }

@@ -128,7 +128,8 @@ impl BodySolver {
 
     /// Advances `state` by one frame.
     ///
-    /// # Panics If `state` does not fit `body`, a goal or pin has an index out of range, or `body` has another
+    /// # Panics
+    /// If `state` does not fit `body`, a goal or pin has an index out of range, or `body` has another
     /// topology than in [`BodySolver::new`].
     pub fn step(&mut self, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>) -> FrameReport {
         assert!(state.fits(body), "a state of another body");

@@ -106,7 +106,7 @@ impl Galerkin<'_> {
         }
     }
 
-    /// Displacement of a particle along `way` by each rigid motion of its cluster.
+    /// Displacement of a particle along `direction` by each rigid motion of its cluster.
     #[inline(always)]
     fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
         let direction = self.filters.at(particle).map_or(direction, |follows| follows.tr_mul(&direction));

@@ -4,8 +4,8 @@
 //! contacts act on particles. By default a frame is one step of TR-BDF2 with one Newton iteration for each of its two
 //! stages. The linear systems are solved matrix-free by conjugate gradients with a two-level preconditioner.
 //!
-//! Inside the solver a *particle* is an index in the solver's own order (see `particle_order`); indices as the caller
-//! gave them are called the caller's. A *piece* is a connected component of the spring graph, a *cluster* a compact
+//! Inside the solver a *particle* is an index in the solver's own order (see `particle_order`); *the caller's indices*
+//! are those of the input. A *piece* is a connected component of the spring graph, a *cluster* a compact
 //! part of a piece.
 //!
 //! Guarantees: bounded for any stiffness, mass and step size, also from inverted or crumpled states; second order in

@@ -151,9 +151,10 @@ impl StageSolver {
         }
     }
 
-    /// The positions `x`, with residual `r`, after each group was rotated as a whole so that it has the angular momentum that
-    /// the stage's equation demands, whatever linear solves left over; and the residual there. Springs and volumes are not
-    /// affected; the stiffness of contacts with obstacles is accounted for. `None` if there is nothing to rotate.
+    /// The positions `x`, with residual `r`, after each group was rotated as a whole so that it has the angular
+    /// momentum that the stage's equation demands, which corrects the error of linear solves; and the residual there.
+    /// Springs and volumes are not affected; the stiffness of contacts with obstacles is accounted for. `None` if there
+    /// is nothing to rotate.
     pub(super) fn corrected_angular_momentum(
         &self,
         context: &FrameContext<'_>,
@@ -216,7 +217,7 @@ impl StageSolver {
         Some((corrected, r))
     }
 
-    /// External and contact forces at the positions `x`: all that do not rotate with a group.
+    /// External and contact forces at the positions `x`: those that do not rotate with a group.
     fn other_forces(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> Vec<DVec3> {
         let body = context.body;
         let mut v = Vec::new();

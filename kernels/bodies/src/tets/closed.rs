@@ -43,9 +43,11 @@ impl ClosedSurface {
     /// the bodies. Closed shells within another one bound cavities, whatever their orientation, and shells within
     /// those are bodies again. A surface without faces, or with only degenerate ones, is closed around nothing.
     ///
-    /// # Errors The first fault that cannot, or may not, be repaired.
+    /// # Errors
+    /// The first fault that cannot, or may not, be repaired.
     ///
-    /// # Panics If a corner is out of range, or there are 2³² corners.
+    /// # Panics
+    /// If a corner is out of range, or there are 2³² corners.
     pub fn of(surface: &PolygonSurface, repair: bool) -> Result<Self, SurfaceFault> {
         if let Some(point) = surface.points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
             return Err(SurfaceFault::NotFinite { point: point as u32 });

@@ -4,7 +4,8 @@
 /// tets. `low` is the lowest corner and `size` the length of the sides, metres. All tets have the same orientation:
 /// seen from the fourth corner, the first three run counter-clockwise.
 ///
-/// # Panics If there are 2³² points.
+/// # Panics
+/// If there are 2³² points.
 pub fn cubes(cells: [usize; 3], low: [f64; 3], size: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = cells.map(|n| n + 1);
     assert!(nx.saturating_mul(ny).saturating_mul(nz) < 1 << 32, "{cells:?} are too many cubes");

@@ -286,7 +286,8 @@ impl SignedUnionFind {
 
     /// Connects two elements, with the same or opposite orientation.
     ///
-    /// # Errors If they are already connected with the other orientation.
+    /// # Errors
+    /// If they are already connected with the other orientation.
     pub(super) fn join(&mut self, a: u32, b: u32, turned: bool) -> Result<(), ()> {
         let ((a, a_turned), (b, b_turned)) = (self.root(a), self.root(b));
         let turned = turned ^ a_turned ^ b_turned;

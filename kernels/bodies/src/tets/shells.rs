@@ -32,7 +32,8 @@ pub(super) struct Shells {
 /// The shell of each polygon, numbered by first faces, and whether the polygon is oriented opposite to the shell's
 /// first.
 ///
-/// # Errors If an edge does not have two faces, or a shell is not orientable.
+/// # Errors
+/// If an edge does not have two faces, or a shell is not orientable.
 pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>, SurfaceFault> {
     let sides = polygons.sides();
     let edges = || sides.chunk_by(|a, b| a.ends == b.ends);
@@ -73,7 +74,8 @@ pub(super) fn pieces(polygons: &Polygons, safe: bool) -> Result<Vec<(u32, bool)>
 impl Shells {
     /// Triangulates the polygons and orients each shell away from its interior.
     ///
-    /// # Errors If a shell has no volume.
+    /// # Errors
+    /// If a shell has no volume.
     pub(super) fn outward(
         polygons: &Polygons,
         pieces: &mut [(u32, bool)],

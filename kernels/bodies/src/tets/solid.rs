@@ -82,7 +82,8 @@ const MOST_TRIED: f64 = (1 << 27) as f64;
 impl ClosedSurface {
     /// Fills the inside with Delaunay tets of the surface's points and, if requested, interior points.
     ///
-    /// # Errors If the spacing would make too many points, or shells overlap.
+    /// # Errors
+    /// If the spacing would make too many points, or shells overlap.
     pub fn fill(&self, fill: &FillSettings) -> Result<TetMesh, SurfaceFault> {
         let winding = Winding::new(&self.grid_points, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };

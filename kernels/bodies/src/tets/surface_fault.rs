@@ -138,7 +138,7 @@ impl SurfaceFault {
     /// What to do about it.
     pub fn hint(&self) -> &'static str {
         match self {
-            Self::NotFinite { .. } => "check what made the surface",
+            Self::NotFinite { .. } => "check the node or file that made the surface",
             Self::DuplicatePoint { .. }
             | Self::Degenerate { .. }
             | Self::DuplicateFace { .. }
@@ -148,7 +148,7 @@ impl SurfaceFault {
                 "only closed surfaces can be filled: close the hole, or give a thin wall a thickness"
             }
             Self::NonManifoldEdge { .. } => {
-                "take the faces inside the body out, or part the bodies that share the edge"
+                "remove the faces inside the body, or separate the bodies that share the edge"
             }
             Self::NonOrientable { .. } | Self::NoVolume { .. } => "only a surface around a volume can be filled",
             Self::SelfIntersection { .. } | Self::SelfOverlap { .. } => {

@@ -8,19 +8,18 @@ use numerics::vector::{DMat3, DQuat, DVec3, direction, to_f64};
 use rayon::prelude::*;
 use std::ops::{Add, Mul};
 
-/// Rows that a task takes at least: some 20 µs of work.
+/// Minimum number of rows in a task: some 20 µs of work.
 const TASK: usize = 256;
 
-/// Roots that a task binds: some 100 µs of work.
+/// Number of roots that a task binds: some 100 µs of work.
 const BOUND_AT_ONCE: usize = 64;
 
-/// Roots bound to a skin at rest; see [`crate::attach`]. It keeps what it needs of the skin: the triangles around the
-/// roots alone.
+/// Roots bound to a skin at rest; see [`crate::attach`]. Of the skin it keeps only the triangles around the roots.
 #[derive(Clone, Debug)]
 pub struct SkinBinding {
     roots: Vec<BoundRoot>,
-    /// The corners of the triangles that hold a root, in the order of the skin's points: neighbours in the mesh are
-    /// neighbours in memory.
+    /// The corners of the triangles that hold a root, in the order of the skin's points, so that neighbours in the mesh
+    /// are neighbours in memory.
     vertices: Vec<BoundVertex>,
     /// Rows of `triangles` around each vertex, one vertex after another.
     incident: Vec<u32>,
@@ -37,26 +36,27 @@ struct BoundRoot {
     offset: DVec3,
     /// Rows of `vertices`.
     vertices: [u32; 3],
-    /// Barycentric.
+    /// Barycentric weights.
     weights: [f64; 3],
 }
 
 /// A point of the skin.
 #[derive(Clone, Copy, Debug)]
 struct BoundVertex {
-    /// Which one.
+    /// Its index.
     point: u32,
     /// At rest, metres.
     position: DVec3,
-    /// Where its rows of `incident` end.
+    /// End of its rows in `incident`.
     incident_end: u32,
-    /// 1 ÷ the area of the triangles around it; 0 where they have none.
+    /// 1 ÷ the area of the triangles around it; 0 if they have none.
     inverse_area: f64,
-    /// The mean normal of the triangles around it, by area, of length 1; zero where there is none.
+    /// Unit normal: the area-weighted mean over the triangles around it; zero if undefined.
     normal: DVec3,
 }
 
-/// A triangle around a vertex. Its area times the gradient of its deformation is linear in the positions of its corners.
+/// A triangle around a vertex. Its area times the gradient of its deformation is linear in the positions of its
+/// corners.
 #[derive(Clone, Copy, Debug)]
 struct RestTriangle {
     points: [u32; 3],
@@ -70,11 +70,11 @@ struct RestTriangle {
 const NONE: u32 = u32::MAX;
 
 impl SkinBinding {
-    /// Binds `roots` to the closest points of `triangles`, rows of `points`; all in metres. `None` where there are roots
-    /// and no triangle with finite corners. A root that is not finite is bound to the first triangle.
+    /// Binds `roots` to the closest points of `triangles`, rows of `points`; all in metres. `None` if there are roots
+    /// but no triangle with finite corners. A root that is not finite is bound to the first triangle.
     ///
     /// # Panics
-    /// Where a corner of `triangles` is out of range.
+    /// If a corner of `triangles` is out of range.
     pub fn to_closest(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[[f32; 3]]) -> Option<Self> {
         if roots.is_empty() {
             return Some(Self::new(points, triangles, &[], Vec::new()));
@@ -88,7 +88,7 @@ impl SkinBinding {
     /// Binds roots that lie on the skin.
     ///
     /// # Panics
-    /// Where a corner of `triangles`, or a root's triangle, is out of range.
+    /// If a corner of `triangles`, or a root's triangle, is out of range.
     pub fn to_surface(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[SurfacePoint]) -> Self {
         let positions = roots.iter().map(|root| root.position(points, triangles)).collect();
         Self::new(points, triangles, roots, positions)
@@ -135,10 +135,10 @@ impl SkinBinding {
         self.roots.iter().map(|root| direction_or_zero(weighted(root.weights, root.vertices.map(normal)))).collect()
     }
 
-    /// How each root has moved and rotated since rest, where `now` are the skin's points.
+    /// How each root has moved and rotated since rest, given the skin's current points `now`.
     ///
     /// # Panics
-    /// Where there are fewer points than at rest.
+    /// If there are fewer points than at rest.
     pub fn poses(&self, now: &[[f32; 3]]) -> Vec<RootPose> {
         let deformed = self.triangles.par_iter().with_min_len(TASK).map(|triangle| triangle.deformation(now));
         let deformed: Vec<DMat3> = deformed.collect();
@@ -204,7 +204,7 @@ fn link_incident(vertices: &mut [BoundVertex], corners: impl Iterator<Item = [u3
     incident
 }
 
-/// Where the triangles around a vertex are in `incident`.
+/// The range of `incident` that holds the triangles around a vertex.
 fn range(vertices: &[BoundVertex], row: usize) -> std::ops::Range<usize> {
     let start = row.checked_sub(1).map_or(0, |before| vertices[before].incident_end);
     start as usize..vertices[row].incident_end as usize
@@ -219,7 +219,7 @@ impl RestTriangle {
         Self { points, gradients, normal: normal * (0.5 * twice_area.norm().sqrt()) }
     }
 
-    /// The normal, as long as the area is large.
+    /// The normal, with the area as its length.
     fn area_vector(&self) -> DVec3 {
         self.normal * (2.0 * self.normal.norm())
     }

@@ -6,32 +6,32 @@ use numerics::vector::{DQuat, DVec3, to_f32, to_f64};
 /// How a root has moved and rotated with its skin since rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RootPose {
-    /// Its position now less that at rest, metres.
+    /// Its current position minus that at rest, metres.
     pub translation: DVec3,
     /// The rotation about it.
     pub rotation: DQuat,
-    /// Whether the skin there has lost its directions (scaled to a line or a point): then `rotation` is the identity.
+    /// Whether the skin there has collapsed to a line or a point, so that `rotation` is the identity.
     pub lost: bool,
 }
 
-/// Curves that have followed their roots, and how well their lengths are kept.
+/// Curves moved by the poses of their roots, and how well their lengths are kept.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttachedCurves {
-    /// One point for every incoming one, metres.
+    /// One point for each input point, metres.
     pub points: Vec<[f32; 3]>,
-    /// Largest change of a segment's length ÷ its curve's length, as written.
+    /// Largest change of a segment's length ÷ its curve's length, measured on the results.
     pub length_error: f64,
 }
 
-/// Points that a task has at least.
+/// Minimum number of points in a task.
 const TASK: usize = 2048;
 
-/// Rotates curves `points[starts[i]..starts[i + 1]]` about their roots (first points) and translates them, by one pose for
-/// each curve.
+/// Rotates curves `points[starts[i]..starts[i + 1]]` about their roots (first points) and translates them, by one pose
+/// for each curve.
 ///
 /// # Panics
-/// Where `starts` does not run from 0 to the number of points, or there are fewer poses than curves.
+/// If `starts` does not run from 0 to the number of points, or there are fewer poses than curves.
 pub fn attach_curves(starts: &[u32], points: &[[f32; 3]], poses: &[RootPose]) -> AttachedCurves {
     let mut out = vec![[0.0; 3]; points.len()];
     let length_error = each_curve(starts, poses, &mut out, points, &|pose, now, rest| {
@@ -39,7 +39,7 @@ pub fn attach_curves(starts: &[u32], points: &[[f32; 3]], poses: &[RootPose]) ->
         for (now, rest) in now.iter_mut().zip(rest) {
             let rest = to_f64(*rest);
             let arm = rest - root;
-            // A sum of displacements: a skin that has not moved keeps the bits.
+            // Added as a displacement, so that a still skin changes no bit.
             *now = to_f32(rest + (pose.translation + (pose.rotation * arm - arm)));
         }
         relative_stretch(now, rest)
@@ -47,7 +47,7 @@ pub fn attach_curves(starts: &[u32], points: &[[f32; 3]], poses: &[RootPose]) ->
     AttachedCurves { points: out, length_error }
 }
 
-/// Largest change of a segment's length ÷ the length of the rest curve; 0 where that is 0.
+/// Largest change of a segment's length ÷ the length of the rest curve; 0 if that is 0.
 fn relative_stretch(now: &[[f32; 3]], rest: &[[f32; 3]]) -> f64 {
     let segment = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
     let (mut whole, mut largest) = (0.0, 0.0_f64);
@@ -75,7 +75,7 @@ pub fn rotate_orientations(starts: &[u32], rows: &mut [[f32; 4]], poses: &[RootP
     each_row(starts, poses, rows, &|rotation, row| rotate_orientation(rotation, *row));
 }
 
-/// `orientation` (x, y, z, w), then `rotation`.
+/// `orientation` (x, y, z, w) followed by `rotation`.
 pub(crate) fn rotate_orientation(rotation: &DQuat, orientation: [f32; 4]) -> [f32; 4] {
     let [x, y, z, w] = orientation.map(f64::from);
     (rotation.quaternion() * Quaternion::new(w, x, y, z)).coords.map(|x| x as f32).into()

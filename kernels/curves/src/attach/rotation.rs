@@ -1,25 +1,26 @@
 //! The rotation nearest to a matrix.
 //!
-//! The unit quaternion that maximises the trace of Rᵀ·A is the eigenvector of the largest eigenvalue of a symmetric
-//! 4×4 matrix (Horn 1987). Its characteristic polynomial has real roots only, so Newton's method from above falls onto
-//! the largest one and stops there (Theobald 2005); the eigenvector is a column of the adjugate.
+//! The unit quaternion that maximises the trace of Rᵀ·A is the eigenvector of the largest eigenvalue of a symmetric 4×4
+//! matrix (Horn 1987). Its characteristic polynomial has real roots only, so Newton's method from above converges
+//! monotonically to the largest one (Theobald 2005); the eigenvector is a column of the adjugate.
 //!
-//! Promise: for a rotation times any positive scale, that rotation to 1e-14; smooth in the matrix, mirrored and flat
-//! ones included, wherever there is one nearest rotation; none where there is not. Limit: a matrix of rank 1, or one
-//! that mirrors and scales its two lesser axes alike, has a circle of equally near rotations.
+//! Guarantees: for a rotation times any positive scale, that rotation to 1e-14; smooth in the matrix, mirrored and flat
+//! ones included, as long as the nearest rotation is unique; otherwise `None`. Limit: a matrix of rank 1, or one that
+//! mirrors and scales its two smaller axes equally, has a circle of equally near rotations.
 
 use nalgebra::{Quaternion, Unit};
 use numerics::vector::{DMat3, DQuat, DVec3};
 
-/// A bound on the derivative of the characteristic polynomial at the root, for a matrix of norm 1: 8·(σ₂+σ₃)(σ₁+σ₃)(σ₁+σ₂),
-/// 12 for a rotation and 0 where the nearest one is not unique. At this value the rounding of f32 positions rotates by
-/// about 0.01 radians; ten times farther from ambiguity that is less than what a skin does in a frame.
+/// A bound on the derivative of the characteristic polynomial at the root, for a matrix of norm 1:
+/// 8·(σ₂+σ₃)(σ₁+σ₃)(σ₁+σ₂), 12 for a rotation and 0 where the nearest one is not unique. At this value the rounding of
+/// f32 positions rotates by about 0.01 radians; ten times farther from ambiguity it is less than the motion of a skin
+/// in a frame.
 const AMBIGUOUS: f64 = 1e-4;
 
 /// Steps of Newton's method: about 6 are used, and 40 near a double root.
 const MAX_STEPS: usize = 64;
 
-/// The rotation R that makes |A − R| least (w ≥ 0); `None` where several are about as near, or A is not finite.
+/// The rotation R that minimises |A − R| (w ≥ 0); `None` if several are about equally near, or A is not finite.
 pub fn nearest_rotation(a: &DMat3) -> Option<DQuat> {
     let rows = [0, 1, 2].map(|k| a.row(k).transpose());
     let entries = rows.iter().flat_map(DVec3::iter);
@@ -27,7 +28,7 @@ pub fn nearest_rotation(a: &DMat3) -> Option<DQuat> {
     if !(largest > 0.0 && largest.is_finite()) {
         return None;
     }
-    // First near 1, so that squares neither vanish nor overflow.
+    // Scaled to about 1, so that squares neither vanish nor overflow.
     let rows = rows.map(|row| row / largest);
     let norm = rows.iter().flat_map(DVec3::iter).map(|x| x * x).sum::<f64>().sqrt();
     let rows = rows.map(|row| row / norm);
@@ -51,7 +52,7 @@ pub fn nearest_rotation(a: &DMat3) -> Option<DQuat> {
     (slope(root) > AMBIGUOUS).then(|| eigenvector(&horn(&rows), root))
 }
 
-/// The matrix whose largest eigenvector is the rotation, as w, x, y, z; from rows.
+/// Horn's matrix, whose dominant eigenvector is the rotation as w, x, y, z; from the rows of A.
 fn horn(rows: &[DVec3; 3]) -> [[f64; 4]; 4] {
     let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = rows.map(<[f64; 3]>::from);
     [
@@ -68,7 +69,8 @@ fn eigenvector(matrix: &[[f64; 4]; 4], value: f64) -> DQuat {
     for (k, row) in less.iter_mut().enumerate() {
         row[k] -= value;
     }
-    // The adjugate is the eigenvector times itself, up to a factor: the row of its largest diagonal has most digits.
+    // The adjugate is the eigenvector times itself, up to a factor: the row with the largest diagonal entry is the most
+    // accurate.
     let rows = adjugate(&less);
     let row = (0..4).fold(0, |best, k| if rows[k][k].abs() > rows[best][best].abs() { k } else { best });
     let [w, x, y, z] = rows[row];
@@ -164,14 +166,14 @@ mod tests {
     }
 
     #[test]
-    fn flat_matrices_have_one_and_lines_have_none() {
+    fn flat_matrices_have_a_rotation_and_lines_have_none() {
         let q = some_rotation(1);
         let scaled = |x, y, z| matrix(q) * DMat3::from_diagonal(&DVec3::new(x, y, z));
         assert!(apart(nearest_rotation(&scaled(2.0, 1.0, 0.0)).unwrap(), q) < 1e-14);
         for line in [0.0, 1e-6] {
             assert_eq!(nearest_rotation(&scaled(2.0, line, 0.0)), None);
         }
-        // A mirror flips the axis that counts least.
+        // A mirroring matrix flips its smallest axis.
         assert!(apart(nearest_rotation(&scaled(3.0, 2.0, -1.0)).unwrap(), q) < 1e-14);
         assert_eq!(nearest_rotation(&DMat3::from_diagonal(&DVec3::new(-1.0, 1.0, 1.0))), None);
     }

@@ -21,7 +21,7 @@ impl Skin {
         Self { points: shape.points.iter().map(|p| p.map(|x| x as f32)).collect(), triangles: shape.triangles() }
     }
 
-    /// `n` by `n` squares of size 1 in x and z, each cut by the diagonal from its least corner, facing up.
+    /// `n` by `n` squares of size 1 in x and z, each cut along the diagonal from its lowest corner, facing up.
     fn grid(n: u32) -> Self {
         let row = n + 1;
         let points = (0..row * row).map(|i| [(i / row) as f32, 0.0, (i % row) as f32]).collect();
@@ -40,7 +40,7 @@ impl Skin {
         SkinBinding::to_closest(&self.points, &self.triangles, roots).unwrap()
     }
 
-    /// Points on it, lifted by up to `lift`.
+    /// Points on the grid, lifted by up to `lift`.
     fn roots(&self, count: usize, lift: f32) -> Vec<Point> {
         let points = ScatterSurface::new(&self.points, &self.triangles).spread(count, Key::new(5));
         let normals = SkinBinding::to_surface(&self.points, &self.triangles, &points).normals();
@@ -52,13 +52,13 @@ impl Skin {
     }
 }
 
-/// Curves of 5 CVs from `roots`, 0.1 long, bent: and where each starts.
+/// Bent curves of 5 CVs from `roots`, 0.1 long, and the start of each.
 fn curves(roots: &[Point]) -> (Vec<u32>, Vec<Point>) {
     let cv = |(i, root): (usize, &Point)| {
         let key = Key::new(9).of(i as u64);
-        let way: [f32; 3] = std::array::from_fn(|k| 0.1 * key.of(k as u64).f32() - 0.05);
+        let slope: [f32; 3] = std::array::from_fn(|k| 0.1 * key.of(k as u64).f32() - 0.05);
         let root = *root;
-        (0..5).map(move |k| std::array::from_fn(|d| root[d] + 0.25 * k as f32 * way[d] + 0.002 * (k * k * d) as f32))
+        (0..5).map(move |k| std::array::from_fn(|d| root[d] + 0.25 * k as f32 * slope[d] + 0.002 * (k * k * d) as f32))
     };
     let starts = (0..=roots.len() as u32).map(|curve| 5 * curve).collect();
     (starts, roots.iter().enumerate().flat_map(cv).collect())
@@ -83,7 +83,7 @@ fn farthest(a: &[Point], b: &[Point]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (to_f64(*a) - to_f64(*b)).norm()).fold(0.0, f64::max)
 }
 
-/// What rounding to f32 alone makes of a length, as a share of its curve's: 4 ulp, as for every length in this crate.
+/// Change of a length by rounding to f32 alone, relative to its curve's: 4 ulp, as for every length in this crate.
 fn rounding(starts: &[u32], points: &[Point]) -> f64 {
     let size = points.iter().fold(0.0, |most: f32, p| most.max(numerics::vector::largest(*p)));
     let whole = |pair: &[u32]| {
@@ -107,7 +107,7 @@ fn a_rigid_skin_moves_its_curves_rigidly() {
         let poses = binding.poses(&skin.moved(rigid));
         let carried = attach_curves(&starts, &points, &poses);
         let expected: Vec<Point> = points.iter().map(|p| rigid(to_f64(*p).into()).map(|x: f64| x as f32)).collect();
-        // A scene of size 4, so 1e-6 of it and not less, as f32 has 2e-7 there.
+        // The tolerance is 1e-6 of a scene of size 4: f32 has a spacing of 2e-7 there.
         let worst = farthest(&carried.points, &expected);
         assert!(worst < 1e-6, "{worst}");
         assert!(poses.iter().all(|pose| between(pose.rotation, turn) < 2e-6 && !pose.lost));
@@ -147,15 +147,15 @@ fn stretch_along_the_skin_rotates_nothing_and_shear_rotates_by_half() {
     let bound = floor.bind(&floor.roots(50, 0.1));
     let stretched = bound.poses(&floor.moved(|[x, y, z]| [5.0 * x, y, 0.2 * z]));
     assert!(stretched.iter().all(|pose| between(pose.rotation, DQuat::identity()) < 1e-6));
-    // x += k·z. In the plane alone the nearest rotation turns by atan(k/2) about y, from z to x.
+    // x += k·z. In the plane, the nearest rotation is by atan(k/2) about y, from z to x.
     let sheared = bound.poses(&floor.moved(|[x, y, z]| [x + z, y, z]));
     assert!(sheared.iter().all(|pose| between(pose.rotation, about(UP, libm::atan(0.5))) < 1e-6));
 }
 
 #[test]
 fn a_twisted_cylinder_rotates_curves_about_its_axis_and_in_its_surface() {
-    // (r, θ, y) → (r, θ + 2y, y), r = 0.5: along the surface a shear by r·2 = 1, which turns by atan(1/2) about the
-    // normal, after the turn by 2y about the axis.
+    // (r, θ, y) → (r, θ + 2y, y), r = 0.5: along the surface a shear by r·2 = 1, which rotates by atan(1/2) about the
+    // normal, after a rotation by 2y about the axis.
     let twist = |n: usize| {
         let skin = Skin::of(&shapes::cylinder([1.0, 2.0, 1.0], n));
         let roots: Vec<Point> = skin.roots(2000, 0.0).into_iter().filter(|p| p[1].abs() < 0.7).collect();
@@ -176,7 +176,7 @@ fn a_twisted_cylinder_rotates_curves_about_its_axis_and_in_its_surface() {
     assert!(fine < 0.02 && fine < 0.5 * coarse, "{coarse} {fine}");
 }
 
-/// What is right of x = 2 turned up about that line.
+/// The part right of x = 2, folded up about that line.
 fn folded([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
     if x <= 2.0 {
         return [x, y, z];
@@ -187,8 +187,9 @@ fn folded([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
 
 #[test]
 fn a_fold_rotates_curves_by_half_on_the_edge_and_smoothly_beside_it() {
-    // A point on the edge has three triangles of equal area on either side: (I + R)/2, which turns by 45°. From there
-    // to the next point, where it is R, in a straight line: in the middle I/4 + 3R/4, atan(3).
+    // A point on the edge has three triangles of equal area on either side: (I + R)/2, a rotation by 45°. From there to
+    // the next point, where it is R, the matrix is interpolated linearly: in the middle I/4 + 3R/4, a rotation by
+    // atan(3).
     let floor = Skin::grid(4);
     let roots: Vec<Point> = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5].map(|x| [x, 0.0, 2.0]).to_vec();
     let poses = floor.bind(&roots).poses(&floor.moved(|p| folded(p, FRAC_PI_2)));
@@ -206,7 +207,7 @@ fn neighbours_rotate_alike_across_every_edge() {
     let poses = floor.bind(&line).poses(&floor.moved(|p| folded(p, FRAC_PI_2)));
     let most = poses.windows(2).map(|pair| between(pair[0].rotation, pair[1].rotation)).fold(0.0, f64::max);
     assert!(most < 3e-3, "{most}");
-    // And in time: a thousandth of the fold changes no rotation by more than three times that.
+    // Continuity in time: a thousandth of the fold changes no rotation by more than three times that.
     let bound = floor.bind(&line[..3000]);
     let at = |step: u32| bound.poses(&floor.moved(|p| folded(p, 2.5 * f64::from(step) / 1000.0)));
     for step in [0, 1, 300, 627, 628, 900] {
@@ -227,7 +228,7 @@ fn a_mirrored_scene_gives_the_mirrored_result() {
     let now: Vec<Point> = skin.moved(bent).iter().map(mirror).collect();
     let points: Vec<Point> = points.iter().map(mirror).collect();
     let roots: Vec<Point> = roots.iter().map(mirror).collect();
-    // Whether its faces are turned round, so that outside stays outside, or not.
+    // With faces reversed, so that outside stays outside, and without.
     for order in [[0, 1, 2], [0, 2, 1]] {
         let triangles = skin.triangles.iter().map(|corners| order.map(|k| corners[k])).collect();
         let mirrored = Skin { points: skin.points.iter().map(mirror).collect(), triangles };
@@ -238,7 +239,7 @@ fn a_mirrored_scene_gives_the_mirrored_result() {
 }
 
 #[test]
-fn a_scene_of_any_size_gives_the_same() {
+fn results_do_not_depend_on_the_scale_of_the_scene() {
     let skin = Skin::of(&shapes::sphere([1.0; 3], 8));
     let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * y * z, y - 0.3 * x, 1.2 * z];
     let roots = skin.roots(100, 0.05);
@@ -256,8 +257,8 @@ fn a_scene_of_any_size_gives_the_same() {
 }
 
 #[test]
-fn a_face_without_area_leaves_its_curves_to_its_neighbours() {
-    // One point of the grid lies on another: two triangles are lines, at rest or now.
+fn curves_on_a_face_without_area_follow_its_neighbours() {
+    // One point of the grid coincides with another: two triangles are lines, at rest or now.
     let flat = |mut skin: Skin| {
         skin.points[12] = skin.points[11];
         skin
@@ -275,7 +276,7 @@ fn a_face_without_area_leaves_its_curves_to_its_neighbours() {
 }
 
 #[test]
-fn a_collapsed_skin_moves_its_curves_and_rotates_none() {
+fn a_collapsed_skin_moves_its_curves_without_rotating_them() {
     let floor = Skin::grid(2);
     let roots = [[0.5, 0.0, 0.5], [1.5, 0.25, 1.0]];
     let bound = floor.bind(&roots);
@@ -293,7 +294,7 @@ fn a_collapsed_skin_moves_its_curves_and_rotates_none() {
 
 #[test]
 fn a_skin_turned_inside_out_rotates_its_curves_inwards() {
-    // Mirrored in its plane: the normal rotates by half a turn about some axis in the floor.
+    // Mirrored at its plane: the normal rotates by half a turn about some axis in the floor.
     let floor = Skin::grid(2);
     for pose in floor.bind(&floor.roots(10, 0.0)).poses(&floor.moved(|[x, y, z]| [-x, y, 0.9 * z])) {
         assert!(!pose.lost && (pose.rotation * DVec3::y()).y < -0.999, "{pose:?}");
@@ -301,7 +302,7 @@ fn a_skin_turned_inside_out_rotates_its_curves_inwards() {
 }
 
 #[test]
-fn non_finite_points_affect_only_what_touches_them() {
+fn non_finite_points_affect_only_roots_near_them() {
     let floor = Skin::grid(4);
     let roots: Vec<Point> = vec![[0.2, 0.0, 0.1], [3.8, 0.0, 3.9], [f32::NAN; 3], [f32::INFINITY, 0.0, 0.0]];
     let bound = floor.bind(&roots);
@@ -321,7 +322,7 @@ fn far_roots_are_bound_and_their_distance_is_reported() {
     let floor = Skin::grid(4);
     let bound = floor.bind(&[[2.0, 0.0, 2.0], [2.0, 30.0, 2.0], [2.5, -40.0, 1.0]]);
     assert_eq!(bound.max_distance(), 40.0);
-    // They rotate with the skin beneath them as if on a pole.
+    // They rotate with the skin beneath them as if on poles.
     let poses = bound.poses(&floor.moved(|p| rotated(about([0.0, 0.0, 1.0], FRAC_PI_2), p)));
     let at = |root: [f64; 3], pose: &RootPose| DVec3::from(root) + pose.translation;
     assert!((at([2.0, 30.0, 2.0], &poses[1]) - DVec3::new(-30.0, 2.0, 2.0)).norm() < 1e-5);
@@ -329,7 +330,7 @@ fn far_roots_are_bound_and_their_distance_is_reported() {
 }
 
 #[test]
-fn no_roots_and_no_faces() {
+fn empty_inputs_are_valid() {
     let floor = Skin::grid(1);
     assert!(floor.bind(&[]).poses(&floor.points).is_empty());
     assert!(SkinBinding::to_closest(&[], &[], &[]).is_some());
@@ -346,7 +347,7 @@ fn vectors_and_orientations_rotate_with_their_curves() {
     let mut vectors = [[1.0, 0.0, 2.0]; 3];
     rotate_vectors(&[0, 2, 3], &mut vectors, &[quarter, still]);
     assert!(farthest(&vectors, &[[0.0, 1.0, 2.0], [0.0, 1.0, 2.0], [1.0, 0.0, 2.0]]) < 1e-6);
-    // A quarter about z after a quarter about x.
+    // A quarter turn about z after a quarter turn about x.
     let half = (SQRT_2 / 2.0) as f32;
     let mut turns = [[half, 0.0, 0.0, half]; 2];
     rotate_orientations(&[0, 1, 2], &mut turns, &[quarter, still]);

@@ -1,32 +1,33 @@
 //! Directions into the skin are redirected out of it, continuously.
 //!
-//! First contact is not a continuous function of a segment's goal: a segment flat on the skin stays where it is or passes
-//! over it, depending on whether its goal is slightly below the skin or above, and wind straight into the skin presses
-//! curves now to one side, now to the other. No continuous map of all directions onto those above the skin keeps both
-//! these and the side; so the deeper a goal lies in the skin, the more upright a segment is left.
+//! First contact is not a continuous function of a segment's goal: a segment that lies flat on the skin stays there or
+//! sweeps across it, depending on whether its goal is slightly below or above the skin, and wind straight into the skin
+//! presses curves to one side or the other. No continuous map from all directions to those above the skin can leave the
+//! latter unchanged and keep the side of all others; so the deeper a goal lies in the skin, the more upright the
+//! segment is kept.
 
 use numerics::vector::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
-/// How upright, rather than along the curve, wind straight into the skin leaves a segment: found to halve the remaining
-/// jumps on fur.
+/// How upright a segment is kept by wind straight into the skin, relative to its direction along the curve: a value
+/// that was found to halve the remaining jumps on fur.
 const UPRIGHT: f64 = 1.0;
 
-/// How high above the skin the path from one side to the other leads.
+/// Height above the skin of the path from one side to the other.
 const ARCH: f64 = 2.0;
 
 /// The skin under a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ground {
-    /// Outward, unit.
+    /// Outward unit normal.
     pub(super) normal: DVec3,
     /// Height of the segment's pivot above it, metres.
     pub(super) height: f64,
 }
 
 impl Ground {
-    /// The direction that replaces `goal` for a segment of this length whose curve runs along `along`: the same where the
-    /// segment's end is above the ground, else one above it. Continuous in all arguments; unit vectors.
+    /// The direction that replaces `goal` for a segment of this length whose curve runs along `along`: unchanged if the
+    /// segment's end is above the ground, otherwise a direction above it. Continuous in all arguments; unit vectors.
     pub(super) fn lead_out(&self, along: &DVec3, goal: &DVec3, length: f64) -> DVec3 {
         let n = &self.normal;
         // The largest angle below the horizon that is allowed, and that of the goal.
@@ -44,14 +45,14 @@ impl Ground {
         let standing = self.left_standing(along, room);
         let Some(pressed) = edge(goal) else { return standing };
         let mixed = pressed * (1.0 - share) + standing * share + n * (ARCH * share * (1.0 - share) * room);
-        // Where there is room below, the path between two directions above the ground may dip into it.
+        // If there is room below the pivot, the path between two directions above the ground may still dip into it.
         match mixed.try_normalize(1e-9) {
             Some(led) if led.dot(n) < -libm::sin(lowest) => edge(&led).unwrap_or(pressed),
             led => led.unwrap_or(pressed),
         }
     }
 
-    /// The direction with the wind straight into the ground: as far down as there is room.
+    /// The result for wind straight into the ground: as far down as there is room.
     fn left_standing(&self, along: &DVec3, room: f64) -> DVec3 {
         let n = &self.normal;
         let above = along + n * ((-along.dot(n)).max(0.0) + UPRIGHT);

@@ -1,4 +1,4 @@
-//! Whether a segment crosses a triangle: in f64, on positions as written.
+//! Whether a segment crosses a triangle: in f64, on the f32 positions that are written.
 
 use super::triangle_filter::may_cross;
 use numerics::lanes::get;
@@ -8,7 +8,7 @@ use numerics::vector::{DVec3, Vec3, to_f64};
 /// A segment through a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// Where along the segment it passes, 0..1.
+    /// Position along the segment, 0..1.
     pub(super) share: f64,
     /// Distance from the plane of the nearer of the two ends.
     pub(super) depth: f64,

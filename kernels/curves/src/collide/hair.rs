@@ -6,10 +6,10 @@ use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
-/// Length of the first segment, in gaps, that is not tested where the root may lie on the skin.
+/// Length, in gaps, at the start of the first segment that is not tested if the root may lie on the skin.
 const SKIPPED_GAPS: f64 = 5.0;
 
-/// An incoming curve, and where it is written.
+/// An input curve, and where its result is written.
 pub(super) struct Hair<'a> {
     /// Index of its root among all CVs.
     pub(super) first: usize,
@@ -20,25 +20,25 @@ pub(super) struct Hair<'a> {
     pub(super) out: &'a mut [Vec3],
 }
 
-/// Memory that curves reuse.
+/// Buffers that curves reuse.
 #[derive(Default)]
 pub(super) struct Scratch<'t> {
     nearby: Nearby<'t>,
     goal: Vec<DVec3>,
 }
 
-/// What one segment hands on to the next.
+/// State passed from one segment to the next.
 struct Carried {
     /// Composition of all rotations so far.
     rotation: DQuat,
-    /// About which a segment turns whose goal is opposite to it.
+    /// The axis about which a segment turns whose goal is opposite to it.
     axis: DVec3,
     /// Direction of the previous segment; zero at the root.
     before: DVec3,
 }
 
 impl Hair<'_> {
-    /// Writes the curve after its collisions.
+    /// Collides the curve and writes the result.
     #[inline(always)]
     pub(super) fn collide<'t>(&mut self, how: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
         let mut reached = Reached::default();
@@ -65,7 +65,7 @@ impl Hair<'_> {
             let wanted = along / along.norm();
             let rounding = 1.2e-7 * (f64::from(largest) + length);
             let segment = self.segment(how, k, &wanted, [length, rounding], &mut carried);
-            // Not where the skin redirects the segment, or its goal was raised.
+            // Not if the skin redirects the segment, or if its goal was raised.
             let may_keep_goal = segment.to == wanted && goal[k + 1] == to_f64(self.goal[k + 1]);
             let direction = self.turn(how, k, &segment, may_keep_goal, nearby, &mut reached);
             carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
@@ -145,7 +145,7 @@ impl Hair<'_> {
         turned.direction
     }
 
-    /// Segments that cross something as they are written.
+    /// Number of written segments that cross something.
     #[inline(always)]
     fn crossings(&self, how: &Collide<'_>) -> u64 {
         let mut count = 0;
@@ -155,7 +155,7 @@ impl Hair<'_> {
         count
     }
 
-    /// The largest change of a segment's length, as a share of the curve's.
+    /// The largest change of a segment's length, relative to the curve's.
     fn length_error(&self) -> f64 {
         let (mut worst, mut whole) = (0.0_f64, 0.0);
         for k in 1..self.out.len() {
@@ -171,7 +171,7 @@ impl Hair<'_> {
         cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
     }
 
-    /// The CVs' goals: as they come in, or kept off the skin by `offset_scale` of their rest distance.
+    /// The CVs' goals: the input, or kept off the skin by `offset_scale` times their rest distance.
     #[inline(always)]
     fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
@@ -219,7 +219,7 @@ impl Hair<'_> {
     }
 }
 
-/// Spherical interpolation from one unit vector to another; through `axis` × `from` where they are opposite.
+/// Spherical interpolation from one unit vector to another; through `axis` × `from` if they are opposite.
 fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     let turn = from.cross(to);
     let (sine, cosine) = (turn.norm(), from.dot(to));
@@ -228,7 +228,7 @@ fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     from * cosine + n.cross(from) * sine
 }
 
-/// The smallest rotation from one unit vector to another; about `axis` where they are opposite.
+/// The smallest rotation from one unit vector to another; about `axis` if they are opposite.
 fn smallest_rotation(from: &DVec3, to: &DVec3, axis: &DVec3) -> DQuat {
     let real = 1.0 + from.dot(to);
     let imaginary = if real > 1e-12 { from.cross(to) } else { *axis };

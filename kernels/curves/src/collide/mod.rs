@@ -5,10 +5,10 @@
 //! turns out of it, on the great circle towards the surface's normal there. First contact is a closed form (see
 //! [`sector`]).
 //!
-//! Promise: segments keep their goal's lengths up to the rounding of positions; written segments of a curve that crosses
-//! nothing at rest cross no triangle, except those counted in [`Collided::unfreed_segments`]; a curve that meets nothing
-//! keeps its goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are obstacles, not
-//! volumes, so a curve wholly inside a surface stays there.
+//! Guarantees: segments keep the lengths of the goal up to the rounding of positions; written segments of a curve that
+//! crosses nothing at rest cross no triangle, except those counted in [`Collided::unfreed_segments`]; a curve without
+//! contacts keeps the goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
+//! obstacles, not volumes, so a curve wholly inside a surface stays there.
 
 mod coherence;
 mod crossing;
@@ -36,14 +36,14 @@ use std::ops::Range;
 pub enum ContactMethod {
     /// At first contact, in closed form.
     Exact,
-    /// As in the paper: at the last of so many equal steps that crosses nothing.
+    /// As in the paper: after this many equal steps, at the last one that crosses nothing.
     Steps(u32),
 }
 
-/// What curves collide with, and how.
+/// Obstacles and settings of a collision.
 #[derive(Clone)]
 pub struct Collide<'a> {
-    /// The obstacles' triangles, a tree an obstacle.
+    /// The obstacles' triangles, one tree for each obstacle.
     pub obstacles: &'a [&'a TriangleTree],
     /// The surface that the curves grow on.
     pub skin: Option<SkinSurface<'a>>,
@@ -59,9 +59,9 @@ pub struct Collide<'a> {
     pub offset_scale: Option<f64>,
     /// The result of [`at_rest`] for the same curves, if known.
     pub at_rest: Option<&'a AtRest>,
-    /// Share of each segment's collision that is kept, 0..1.
+    /// Fraction of each segment's collision response that is kept, 0..1.
     pub blend: Masked<'a, f32>,
-    /// Thickness of the curves, metres, one value a CV where masked.
+    /// Diameter of the curves, metres; a mask has one value for each CV.
     pub width: Masked<'a, f32>,
 }
 
@@ -77,19 +77,19 @@ impl Collide<'_> {
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collided {
-    /// One point for every incoming one.
+    /// One point for each input point.
     pub points: Vec<Vec3>,
     /// Segments that could not be freed from what they cross.
     pub unfreed_segments: u64,
-    /// Segments that cross something as written: with full blend the unfreed ones.
+    /// Segments that cross something in the written result; with full blend the same as the unfreed ones.
     pub crossings_left: u64,
     /// Curves that cross something at rest.
     pub started_inside: u64,
-    /// Segments stopped short of their goal.
+    /// Segments stopped before their goal.
     pub contacts: u64,
-    /// How far a segment reaches through a surface at most, metres.
+    /// Largest distance by which a segment reaches through a surface, metres.
     pub deepest_overlap: f64,
-    /// Largest |length − goal's| of a segment ÷ curve length, as written.
+    /// Largest |length − goal's length| of a segment ÷ curve length, in the written result.
     pub length_error: f64,
 }
 
@@ -115,13 +115,13 @@ impl Reached {
     }
 }
 
-/// CVs that a task has at least: some 100 µs of work.
+/// Minimum number of CVs in a task: some 100 µs of work.
 const TASK_CVS: usize = 256;
 
 /// Collides curves `goal[starts[i]..starts[i + 1]]`, whose rest shapes are the same ranges of `rest`.
 ///
 /// # Panics
-/// Where `starts` does not run up to the number of points of both.
+/// If `starts` does not run up to the number of points of both.
 pub fn collide(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
     collide_on(Path::chosen(), starts, rest, goal, how)
 }

@@ -7,13 +7,13 @@ use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use rayon::prelude::*;
 
-/// Successive segments that share one query of the trees.
+/// Number of successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
 
-/// Curves a task.
+/// Number of curves in a task.
 const TASK_CURVES: usize = 64;
 
-/// What depends on curves, obstacles and skin at rest only, not on the wind; see [`at_rest`].
+/// Everything that depends only on curves, obstacles and skin at rest, not on the wind; see [`at_rest`].
 #[derive(Clone, Debug, Default)]
 pub struct AtRest {
     curves: Vec<Grown>,
@@ -28,8 +28,8 @@ pub(super) struct Grown {
     pub(super) inside: bool,
 }
 
-/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass it
-/// in [`Collide::at_rest`] while these and the curves do not change.
+/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass
+/// it in [`Collide::at_rest`] while these and the curves do not change.
 ///
 /// # Panics
 /// As [`super::collide()`].

@@ -1,8 +1,9 @@
 //! The sector that a segment sweeps when it turns about its pivot, and where a triangle blocks it.
 //!
-//! A triangle intersects the sector's plane in a straight piece. Along the part of it inside the circle the angle seen
-//! from the pivot is monotonic, so that part blocks one interval of angles, which its ends give in closed form. A thick
-//! segment is a slab: it is blocked by the triangle's part between two planes, whose outline is up to five such pieces.
+//! A triangle intersects the sector's plane in a line segment, here called a piece. Along the part of it inside the
+//! circle the angle seen from the pivot is monotonic, so that part blocks one interval of angles, which its ends give
+//! in closed form. A thick segment is a slab: it is blocked by the triangle's part between two planes, whose outline is
+//! up to five such pieces.
 //!
 //! Computed in f64 relative to the pivot: exact up to f64 rounding. Angles in radians, lengths in metres.
 
@@ -13,15 +14,15 @@ use numerics::vector::DVec3;
 pub(super) struct Sector {
     /// The point about which it turns.
     pub(super) pivot: DVec3,
-    /// Unit: its direction.
+    /// Its direction, unit.
     pub(super) u: DVec3,
     /// Unit, perpendicular to `u`, in the direction it turns.
     pub(super) v: DVec3,
     /// u × v.
     pub(super) n: DVec3,
-    /// Obstacles farther from the pivot are ignored: the length of the segment and a margin.
+    /// Obstacles farther from the pivot are ignored: the length of the segment plus a margin.
     pub(super) reach: f64,
-    /// Obstacles nearer to the pivot are ignored.
+    /// Obstacles closer to the pivot are ignored.
     pub(super) inner: f64,
     /// Half the thickness across the plane; 0 tests the plane itself.
     pub(super) half: f64,
@@ -51,15 +52,15 @@ impl Sector {
         self.u * cosine + self.v * sine
     }
 
-    /// Calls `found` with each interval of angles that the triangle blocks; may leave out intervals behind the segment and
-    /// those that stop no turn before the direction `until`.
+    /// Calls `found` with each interval of angles that the triangle blocks; may leave out intervals behind the segment
+    /// and those that stop no turn before the direction `until`.
     pub(super) fn blocked_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
-        // A point that lies over the ray at an angle α by `back`, a radius r out, is by asin(back/r) ≥ back/r past α.
+        // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
         let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
         let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
             [true, true] => false,
             [false, false] => !(over(p) && over(q)),
-            // A piece from behind to the front passes the start or, on its left, the far side.
+            // A piece from behind to the front passes the start or, on its left, the opposite direction.
             [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
             [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
         };
@@ -141,7 +142,8 @@ impl Sector {
         if all.hi - all.lo > std::f64::consts::PI {
             pieces().copied().for_each(found);
         } else if all.lo < 0.0 && all.hi >= 0.0 {
-            // It touches the thick segment at its start: the side it is on is decided by its cut with the middle plane.
+            // It touches the thick segment at the start: its intersection with the middle plane decides which side it
+            // is on.
             if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
                 self.within_reach(piece, |p, q| found(Blocked::between(p, q)));
             }
@@ -182,14 +184,14 @@ impl Blocked {
         let angle = |p: P2| libm::atan2(p[1], p[0]);
         let radius = |p: P2| (p[0] * p[0] + p[1] * p[1]).sqrt();
         let (lo, hi) = (angle(first), angle(last));
-        // An interval across the far side continues past π.
+        // An interval across the opposite direction continues past π.
         let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
         Self { lo, hi, lo_radius: radius(first), hi_radius: radius(last) }
     }
 }
 
-/// Where the plane at `level` cuts a triangle with corners at these heights. A corner at the level counts as above it in
-/// every triangle, so that a closed surface is cut along closed lines.
+/// Where the plane at height `level` cuts a triangle with corners at these heights. A corner at the level counts as
+/// above it in every triangle, so that a closed surface is cut along closed lines.
 fn slice(heights: &[f64; 3], level: f64, flat: impl Fn(usize) -> P2) -> Option<[P2; 2]> {
     let above = heights.map(|height| height >= level);
     let alone = match above {

@@ -1,4 +1,5 @@
-//! One segment's turn: towards its goal until something is met; first out of what it crosses already.
+//! The turn of one segment: first out of anything that it already crosses, then towards its goal until it meets
+//! something.
 
 use super::crossing::{Crossing, corners, first_crossing};
 use super::sector::{Blocked, Sector};
@@ -8,7 +9,7 @@ use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
 
-/// How perpendicular to a surface a segment has to be for the curve to decide the direction out.
+/// How perpendicular to a surface a segment has to be for the shape of the curve to decide the direction out.
 const STRAIGHT_IN: f64 = 1e-3;
 
 /// A segment about to turn.
@@ -19,7 +20,7 @@ pub(super) struct Segment {
     /// Its direction, and that of its goal: unit.
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// The axis about which it turns where the two are opposite.
+    /// The axis about which it turns if the two are opposite.
     pub(super) axis: DVec3,
     /// Direction of the previous segment; zero at the root.
     pub(super) before: DVec3,
@@ -39,9 +40,9 @@ pub(super) struct Segment {
 pub(super) struct Turned {
     /// Its direction now.
     pub(super) direction: DVec3,
-    /// Whether something stopped it short of its goal.
+    /// Whether something stopped it before its goal.
     pub(super) met: bool,
-    /// Whether nothing was near the swept sector: it crosses nothing, however positions are rounded.
+    /// Whether nothing was near the swept sector, so that it crosses nothing, however positions are rounded.
     pub(super) clear: bool,
 }
 
@@ -69,7 +70,7 @@ impl Segment {
         }
     }
 
-    /// As [`Segment::turn`], after that ended in a crossing: obstacles are thickened by the rounding error.
+    /// As [`Segment::turn`], for use after that ended in a crossing: obstacles are thickened by the rounding error.
     #[inline(always)]
     pub(super) fn turn_wary<'t>(
         &self,
@@ -117,7 +118,7 @@ impl Segment {
         }
     }
 
-    /// The end of the segment in this direction, as written.
+    /// The end of the segment in this direction, rounded as written.
     pub(super) fn end(&self, direction: &DVec3) -> Vec3 {
         to_f32(self.pivot + direction * self.length)
     }
@@ -148,7 +149,7 @@ impl Segment {
         Stop::None
     }
 
-    /// The nearest free direction on the great circle away from what the segment crosses; `None` where there is none
+    /// The nearest free direction on the great circle away from what the segment crosses; `None` if there is none
     /// within half a turn.
     #[inline(always)]
     fn turn_out<'t>(
@@ -158,7 +159,8 @@ impl Segment {
         nearby: &mut Nearby<'t>,
     ) -> Option<DVec3> {
         let crossed = self.crosses(&self.from, nearby);
-        // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is taken.
+        // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is
+        // chosen.
         let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
         let sector = self.sector(self.from, outwards);
         let (low, high) = sector.bounds(&-sector.u);
@@ -284,7 +286,7 @@ impl Sector {
         libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
     }
 
-    /// A box around everything it sweeps while it turns to the unit vector `end` in its plane.
+    /// Bounds of everything it sweeps while it turns to the unit vector `end` in its plane.
     fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);

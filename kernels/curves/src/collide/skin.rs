@@ -4,7 +4,7 @@ use super::coherence::Ground;
 use numerics::tree::{Closest, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// How many times a root is lifted where the surface curves below it.
+/// Largest number of times that a root is lifted, as the surface may curve below it.
 const LIFTS: usize = 4;
 
 /// A skin: tree, triangles and normals of its points.
@@ -37,7 +37,7 @@ pub fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
 }
 
 impl SkinSurface<'_> {
-    /// The outward unit normal at a point of the surface; `None` where undefined.
+    /// The outward unit normal at a point of the surface; `None` if undefined.
     pub(super) fn normal(&self, at: &Closest) -> Option<DVec3> {
         let corners = self.triangles[at.triangle as usize];
         let mixed = (0..3)
@@ -51,7 +51,7 @@ impl SkinSurface<'_> {
         let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
         let away = p - to_f64(closest.point);
-        // Near an edge the interpolated normal is not along the distance: it only decides the sign.
+        // Near an edge the interpolated normal is not parallel to the offset: it only decides the sign.
         let height = away.norm().copysign(away.dot(&normal));
         Some((height, normal))
     }
@@ -63,12 +63,13 @@ impl SkinSurface<'_> {
         Some(Ground { normal, height: height.max(0.0) })
     }
 
-    /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged where it is that high.
+    /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged if it is that high
+    /// already.
     #[inline(always)]
     pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
         let rest = to_f64(rest);
         let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
-        // It cannot have come nearer by more than its displacement.
+        // It cannot have come closer by more than its displacement.
         let moved = (goal - rest).norm();
         if height - moved >= scale * height {
             return *goal;
@@ -79,7 +80,7 @@ impl SkinSurface<'_> {
         }
     }
 
-    /// The displacement that lifts a root to `offset` above the skin: zero where it is that high.
+    /// The displacement that lifts a root to `offset` above the skin: zero if it is that high already.
     #[inline(always)]
     pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
         let mut shift = DVec3::zeros();

@@ -5,7 +5,7 @@ use numerics::lanes::LANES;
 use numerics::tree::Block;
 use numerics::vector::{self, Vec3, cross, dot, sub, to_f32};
 
-/// Rounding error of a few products of differences, as a share of the largest difference.
+/// Rounding error of a few products of differences, relative to the largest difference.
 const ROUNDING: f32 = 2e-6;
 
 /// The part of a sector that is still to be tested: angles from 0 to that of `until`, at most π.

@@ -1,4 +1,4 @@
-//! Mixing the shapes and the attributes of guides.
+//! Blending the shapes and attributes of guides.
 
 use super::resample::ResampledGuides;
 use super::weights::{GuideWeight, GuideWeights};
@@ -7,42 +7,43 @@ use nalgebra::{Quaternion, Unit};
 use numerics::vector::{DQuat, DVec3, Quat, to_f32, to_f64};
 use rayon::prelude::*;
 
-/// From what hairs are mixed, and where they are now.
+/// What hairs are blended from, and their current positions.
 #[derive(Clone, Copy, Debug)]
 pub struct HairBlend<'a> {
     /// The guides of each hair.
     pub weights: &'a GuideWeights,
     /// The hairs' roots now, metres.
     pub roots: &'a [DVec3],
-    /// How the hairs' roots and the guides' have moved and rotated since rest; `None` where the skin is at rest.
+    /// How the roots of hairs and guides have moved and rotated since rest; `None` if the skin is at rest.
     pub poses: Option<HairAndGuidePoses<'a>>,
 }
 
 /// Poses of the hairs, and of the guides.
 pub type HairAndGuidePoses<'a> = (&'a [RootPose], &'a [RootPose]);
 
-/// Mixed hairs, and how well their lengths are kept.
+/// Blended hairs, and how well their lengths are kept.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlendedHairs {
     /// The hairs' points, root first, hair by hair, metres.
     pub points: Vec<[f32; 3]>,
-    /// Largest difference of a hair's length, as written, from the mix of its guides' lengths, as a share of that.
+    /// Largest difference between a hair's length, measured on the result, and the blend of its guides' lengths,
+    /// relative to the latter.
     pub length_error: f64,
 }
 
-/// Hairs that a task makes at least: some 30 µs of work.
+/// Minimum number of hairs in a task: some 30 µs of work.
 const TASK: usize = 64;
 
-/// Below this share of the guides' own lengths the sum of their segments is rounding error and has no direction.
+/// Below this fraction of the guides' own lengths the sum of their segments is rounding error and has no direction.
 const CANCELLED: f64 = 1e-9;
 
-/// Hairs with the shape that `guides` have now.
+/// Hairs blended from the current shapes of `guides`.
 ///
 /// # Panics
-/// Where a slice is shorter than the hairs or guides.
+/// If a slice is shorter than the hairs or guides.
 pub fn blend_hairs(guides: ResampledGuides, blend: &HairBlend) -> BlendedHairs {
-    // Each guide with its own root's rotation undone: the shapes are mixed at rest.
+    // The rotation of each guide's own root is undone, so that shapes are blended at rest.
     let guides = match blend.poses {
         None => guides,
         Some((_, poses)) => guides.with_chords(|guide, chord| poses[guide].rotation.inverse() * chord),
@@ -99,7 +100,7 @@ fn to_rotation(rotation: Quat) -> DQuat {
     Unit::new_unchecked(Quaternion::new(w, x, y, z))
 }
 
-/// What the rows of an attribute stand for.
+/// The owner of an attribute's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurveDomain {
     /// One row for each CV.
@@ -109,7 +110,7 @@ pub enum CurveDomain {
 }
 
 impl HairBlend<'_> {
-    /// The mix of numbers.
+    /// Blended numbers.
     ///
     /// # Panics
     /// As [`blend_hairs`].
@@ -131,7 +132,7 @@ impl HairBlend<'_> {
         })
     }
 
-    /// The mix of vectors, rotated from frame to frame as segments are.
+    /// Blended vectors, rotated from frame to frame as segments are.
     ///
     /// # Panics
     /// As [`blend_hairs`].
@@ -146,7 +147,7 @@ impl HairBlend<'_> {
         })
     }
 
-    /// Orientations (quaternions x, y, z, w): the heaviest guide's, rotated from frame to frame.
+    /// Orientations (quaternions x, y, z, w): those of the guide with the largest weight, rotated from frame to frame.
     ///
     /// # Panics
     /// As [`blend_hairs`].
@@ -160,7 +161,7 @@ impl HairBlend<'_> {
         heaviest.par_iter().enumerate().with_min_len(TASK).map(rotated).collect()
     }
 
-    /// For what cannot be mixed: the row of the heaviest guide, for each row of the hairs.
+    /// For values that cannot be blended: for each row of the hairs, the row of the guide with the largest weight.
     ///
     /// # Panics
     /// As [`blend_hairs`].
@@ -177,7 +178,7 @@ impl HairBlend<'_> {
         })
     }
 
-    /// From a guide's frame to a hair's, both now.
+    /// The rotation from a guide's current frame to a hair's.
     fn rotation(&self, hair: usize, guide: &GuideWeight) -> DQuat {
         let rest = to_rotation(guide.rotation);
         match self.poses {
@@ -186,7 +187,7 @@ impl HairBlend<'_> {
         }
     }
 
-    /// The rows of the hairs, each from the index of its hair and of its CV within it.
+    /// Evaluates a row for each CV of the hairs, given the index of its hair and that of the CV within it.
     fn each<T: Send>(
         &self,
         guides: &ResampledGuides,

@@ -1,9 +1,9 @@
-//! Guides cut into as many segments as a hair has.
+//! Guides resampled to the number of segments of a hair.
 
 use numerics::vector::{DVec3, to_f64};
 use rayon::prelude::*;
 
-/// Guides with as many segments as a hair has. A guide with as many CVs keeps its own; any other is cut evenly along its
+/// Guides with as many segments as a hair. A guide with as many CVs keeps them; any other is resampled evenly along its
 /// length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResampledGuides {
@@ -21,22 +21,22 @@ pub(super) struct GuideSegment {
     pub(super) length: f64,
 }
 
-/// Where on a guide a hair's CV is.
+/// The position on a guide that corresponds to a hair's CV.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GuideSample {
     /// The CV before, as a row of the guides' points.
     pub(super) before: u32,
     /// The CV after.
     pub(super) after: u32,
-    /// 0 at the one before, 1 at the one after.
+    /// Interpolation: 0 at the CV before, 1 at the one after.
     pub(super) fraction: f32,
 }
 
 impl ResampledGuides {
-    /// Cuts guides `points[starts[i]..starts[i + 1]]` to `cvs` (1 or more) CVs.
+    /// Resamples guides `points[starts[i]..starts[i + 1]]` to `cvs` (1 or more) CVs.
     ///
     /// # Panics
-    /// Where `starts` does not run from 0 to the number of points.
+    /// If `starts` does not run from 0 to the number of points.
     pub fn new(starts: &[u32], points: &[[f32; 3]], cvs: usize) -> Self {
         let segments = cvs.saturating_sub(1);
         let guides = starts.len().saturating_sub(1);
@@ -65,7 +65,7 @@ impl ResampledGuides {
         &self.samples[guide * (self.segments + 1)..(guide + 1) * (self.segments + 1)]
     }
 
-    /// With the chords of each guide mapped.
+    /// The guides with their chords mapped.
     pub(super) fn with_chords(mut self, map: impl Fn(usize, DVec3) -> DVec3 + Sync) -> Self {
         if self.segments > 0 {
             self.pieces.par_chunks_mut(self.segments).enumerate().for_each(|(guide, pieces)| {
@@ -76,7 +76,7 @@ impl ResampledGuides {
     }
 }
 
-/// Where the CVs of a hair are on a guide whose first CV is row `start`.
+/// The positions of the CVs of a hair on a guide whose first CV is row `start`.
 fn cut(start: u32, points: &[[f32; 3]], samples: &mut [GuideSample]) {
     let last = points.len() - 1;
     if points.len() == samples.len() {

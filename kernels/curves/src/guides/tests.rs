@@ -16,7 +16,7 @@ fn on_floor(x: f32, z: f32) -> OrientedPoint {
     OrientedPoint { position: [x, 0.0, z], normal: UP }
 }
 
-/// `count` places on a floor of 1 by 1.
+/// `count` positions on a floor of 1 by 1.
 fn floor(count: u64, seed: u64) -> Vec<OrientedPoint> {
     let at = |i| {
         let key = Key::new(seed).of(i);
@@ -25,7 +25,7 @@ fn floor(count: u64, seed: u64) -> Vec<OrientedPoint> {
     (0..count).map(at).collect()
 }
 
-/// `count` places on a sphere of radius 1.
+/// `count` positions on a sphere of radius 1.
 fn ball(count: u64, seed: u64) -> Vec<OrientedPoint> {
     let at = |i| {
         let key = Key::new(seed).of(i);
@@ -62,7 +62,7 @@ fn roots(points: &[OrientedPoint]) -> Vec<DVec3> {
     points.iter().map(|point| to_f64(point.position)).collect()
 }
 
-/// Hairs of `cvs` CVs from guides that stand as they did.
+/// Hairs of `cvs` CVs from guides at rest.
 fn hairs(guides: (&[u32], &[Point]), weights: &GuideWeights, hairs: &[OrientedPoint], cvs: usize) -> BlendedHairs {
     blend_hairs(
         ResampledGuides::new(guides.0, guides.1, cvs),
@@ -70,7 +70,7 @@ fn hairs(guides: (&[u32], &[Point]), weights: &GuideWeights, hairs: &[OrientedPo
     )
 }
 
-fn way(points: &[Point]) -> f64 {
+fn arc_length(points: &[Point]) -> f64 {
     points.windows(2).map(|pair| (to_f64(pair[1]) - to_f64(pair[0])).norm()).sum()
 }
 
@@ -83,7 +83,7 @@ fn weights_are_those_of_franke_and_little() {
     // R = 4: ((4 − 1)/(4·1))² = 9/16 and ((4 − 2)/(4·2))² = 1/16.
     let found = weights_of(&[1.0, 2.0], Some(4.0));
     assert!((found[0] - 0.9).abs() < 1e-12 && (found[1] - 0.1).abs() < 1e-12);
-    // The farthest is about to be exchanged, and gives nothing.
+    // The farthest is about to be replaced, and has weight 0.
     assert_eq!(weights_of(&[1.0, 4.0], Some(4.0)), [1.0, 0.0]);
     // No guide is left out: 1/d².
     let found = weights_of(&[1.0, 2.0], None);
@@ -118,7 +118,7 @@ fn the_nearest_guides_are_those_of_an_exhaustive_search() {
             let shares = mixed.of(hair);
             assert_eq!(shares.len(), count);
             for (share, (distance, guide)) in shares.iter().zip(&all) {
-                // Two as far as one another to rounding may change places.
+                // Two that are equally far up to rounding may be exchanged.
                 assert!(
                     share.guide == *guide || raw(*distance) / sum < 1e-4 || shares.iter().any(|s| s.guide == *guide)
                 );
@@ -130,7 +130,7 @@ fn the_nearest_guides_are_those_of_an_exhaustive_search() {
 }
 
 #[test]
-fn weights_move_no_faster_than_hairs() {
+fn weights_change_continuously_along_the_skin() {
     // Along a line through 400 guides, 5 cm apart, in steps of 20 µm: every share of every guide changes little, also
     // where guides are exchanged. With one guide it jumps, from 1 to 0.
     let guides = floor(400, 5);
@@ -154,7 +154,7 @@ fn weights_move_no_faster_than_hairs() {
 
 #[test]
 fn the_other_side_of_a_thin_sheet_is_far_away() {
-    // Guides of both sides 1 mm apart, a hair above: those below are a thousandth as far, and have no say.
+    // Guides on both sides, 1 mm apart, and hairs above: guides below are almost as close but must not contribute.
     let above = floor(50, 6);
     let below = above.iter().map(|point| OrientedPoint {
         position: [point.position[0], -1e-3, point.position[2]],
@@ -166,7 +166,7 @@ fn the_other_side_of_a_thin_sheet_is_far_away() {
 }
 
 #[test]
-fn a_hair_at_a_guides_root_is_the_guide() {
+fn a_hair_at_a_guides_root_equals_the_guide() {
     for rooted in [floor(200, 8), ball(200, 8)] {
         let (starts, points) = grown(&rooted, 6);
         for count in [1, 3, 200] {
@@ -177,7 +177,7 @@ fn a_hair_at_a_guides_root_is_the_guide() {
 }
 
 #[test]
-fn between_two_guides_a_hair_has_their_mean_length_and_direction() {
+fn a_hair_between_two_guides_has_their_mean_length_and_direction() {
     // 1 up and 2 along x: in the middle 1.5 along (2, 1, 0)/√5, as segments count by their length.
     let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) = joined(&[&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]]);
@@ -186,14 +186,14 @@ fn between_two_guides_a_hair_has_their_mean_length_and_direction() {
     let [x, y] = [2.0, 1.0].map(|x: f64| (1.5 * x / 5.0_f64.sqrt()) as f32);
     assert!(close(&found.points, &[[0.5, 0.0, 0.0], [0.5 + x, y, 0.0]], 1e-7), "{found:?}");
     assert!(found.length_error < 1e-6);
-    // A quarter of the way: 1/d² gives 0.9 and 0.1.
+    // A quarter of the arc_length: 1/d² gives 0.9 and 0.1.
     let quarter = [on_floor(0.25, 0.0)];
     let found = hairs((&starts, &points), &guide_weights(&rooted, &quarter, 2), &quarter, 2);
-    assert!((way(&found.points) - 1.1).abs() < 1e-6);
+    assert!((arc_length(&found.points) - 1.1).abs() < 1e-6);
 }
 
 #[test]
-fn guides_that_cancel_leave_the_heaviest_ones_direction_and_no_length_is_lost() {
+fn guides_that_cancel_give_the_direction_of_the_largest_weight_and_keep_the_length() {
     let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) = joined(&[&[[0.0; 3], [0.0, 0.0, 1.0]], &[[1.0, 0.0, 0.0], [1.0, 0.0, -1.0]]]);
     let middle = [on_floor(0.5, 0.0)];
@@ -202,7 +202,7 @@ fn guides_that_cancel_leave_the_heaviest_ones_direction_and_no_length_is_lost() 
 }
 
 #[test]
-fn hairs_are_as_long_as_the_mix_of_their_guides() {
+fn hairs_have_the_blended_length_of_their_guides() {
     let (guides, asked) = (ball(100, 9), ball(1000, 10));
     let (starts, points) = grown(&guides, 5);
     let mixed = guide_weights(&guides, &asked, 4);
@@ -211,15 +211,15 @@ fn hairs_are_as_long_as_the_mix_of_their_guides() {
         for (hair, cvs) in found.points.chunks(cvs).enumerate() {
             let guide = |guide: u32| &points[starts[guide as usize] as usize..starts[guide as usize + 1] as usize];
             let expected: f64 =
-                mixed.of(hair).iter().map(|share| f64::from(share.weight) * way(guide(share.guide))).sum();
-            assert!((way(cvs) - expected).abs() < 2e-6, "{} is not {expected}", way(cvs));
+                mixed.of(hair).iter().map(|share| f64::from(share.weight) * arc_length(guide(share.guide))).sum();
+            assert!((arc_length(cvs) - expected).abs() < 2e-6, "{} is not {expected}", arc_length(cvs));
         }
         assert!(found.length_error < 2e-5, "{}", found.length_error);
     }
 }
 
 #[test]
-fn a_guide_with_other_cvs_is_cut_evenly_along_itself() {
+fn a_guide_with_another_number_of_cvs_is_resampled_evenly() {
     // A corner at (0, 2, 0) after 2 of its 4 metres, its CVs uneven.
     let guide = [[0.0; 3], [0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [2.0, 2.0, 0.0]];
     let rooted = [on_floor(0.0, 0.0)];
@@ -229,15 +229,15 @@ fn a_guide_with_other_cvs_is_cut_evenly_along_itself() {
     assert!(close(&cut(5), &[[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 2.0, 0.0], [2.0, 2.0, 0.0]], 1e-6));
     // Its own CVs are kept, however uneven.
     assert!(close(&cut(4), &guide, 1e-7));
-    // As one segment it goes from root to tip, and is as long as the whole.
+    // As one segment it reaches from root to tip and has the length of the whole curve.
     let half = 4.0 / 2.0_f32.sqrt();
     assert!(close(&cut(2), &[[0.0; 3], [half, half, 0.0]], 1e-6));
     assert_eq!(cut(1), [[0.0; 3]]);
 }
 
 #[test]
-fn on_a_ball_hairs_stand_as_their_guides_do() {
-    // Straight guides along the normal: so is every hair.
+fn on_a_ball_hairs_stand_at_the_angle_of_their_guides() {
+    // With straight guides along the normal, every hair is along the normal.
     let (guides, asked) = (ball(60, 11), ball(500, 12));
     let lists: Vec<[Point; 3]> =
         guides.iter().map(|point| [1.0, 1.1, 1.2].map(|r: f32| point.position.map(|x| x * r))).collect();
@@ -255,8 +255,8 @@ fn some_rotation(seed: u64) -> DQuat {
 }
 
 #[test]
-fn hairs_of_attached_guides_are_hairs_mixed_at_rest_and_attached() {
-    // Every root has a rotation of its own, of guides and of hairs.
+fn hairs_of_attached_guides_equal_hairs_blended_at_rest_and_then_attached() {
+    // Every root, of guides and of hairs, has its own rotation.
     let (guides, asked) = (ball(80, 13), ball(300, 14));
     let (starts, points) = grown(&guides, 5);
     let mixed = guide_weights(&guides, &asked, 4);
@@ -290,8 +290,8 @@ fn hairs_of_attached_guides_are_hairs_mixed_at_rest_and_attached() {
 }
 
 #[test]
-fn numbers_are_mixed_and_other_values_are_those_of_the_heaviest_guide() {
-    // Between two guides, a quarter of the way: 0.9 and 0.1.
+fn numbers_are_blended_and_other_values_come_from_the_largest_weight() {
+    // Between two guides, a quarter of the arc_length: 0.9 and 0.1.
     let rooted = [on_floor(0.0, 0.0), on_floor(1.0, 0.0)];
     let (starts, points) =
         joined(&[&[[0.0; 3], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]], &[[1.0, 0.0, 0.0], [1.0, 2.0, 0.0]]]);
@@ -333,8 +333,8 @@ fn every_simd_path_and_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn the_order_of_hairs_changes_none_of_them() {
-    // How far the hair before had to look is a guess and no more.
+fn hairs_do_not_depend_on_their_order() {
+    // The search radius of the previous hair must only be a guess.
     let (guides, asked) = (ball(300, 17), ball(500, 18));
     let back: Vec<OrientedPoint> = asked.iter().rev().copied().collect();
     let (there, back) = (guide_weights(&guides, &asked, 4), guide_weights(&guides, &back, 4));
@@ -342,7 +342,7 @@ fn the_order_of_hairs_changes_none_of_them() {
 }
 
 #[test]
-fn fewer_guides_than_asked_and_none() {
+fn there_may_be_fewer_guides_than_requested_or_none() {
     let asked = floor(10, 19);
     let two = guide_weights(&floor(2, 20), &asked, 5);
     assert!((0..10).all(|hair| two.of(hair).len() == 2));
@@ -399,7 +399,7 @@ fn non_finite_roots_affect_only_their_own_hairs() {
 
 #[test]
 fn exactly_opposite_normals_have_a_rotation() {
-    // One guide on the other side and no other: the hair is the guide, turned over.
+    // The only guide is on the opposite side: the hair is the guide turned over.
     let guide = OrientedPoint { position: [0.0; 3], normal: [0.0, -1.0, 0.0] };
     let hair = [on_floor(0.0, 0.0)];
     let mixed = guide_weights(&[guide], &hair, 3);

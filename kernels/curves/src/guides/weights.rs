@@ -1,4 +1,4 @@
-//! From which guides each hair is mixed, and by how much.
+//! The guides that each hair is blended from, and their weights.
 
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::{Path, kernel};
@@ -6,7 +6,7 @@ use numerics::tree::{Block, NONE, TriangleTree};
 use numerics::vector::{self, Quat, Vec3, largest, power_of_two_to_one, to_f64};
 use rayon::prelude::*;
 
-/// Most guides that one hair is mixed from.
+/// Largest number of guides that a hair is blended from.
 pub const MAX_GUIDES: usize = 32;
 
 /// A point with the skin's unit normal there; a zero normal is unknown and counts as perpendicular to all others.
@@ -18,18 +18,18 @@ pub struct OrientedPoint {
     pub normal: Vec3,
 }
 
-/// What one guide gives to one hair.
+/// The contribution of one guide to a hair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideWeight {
-    /// Which guide.
+    /// Index of the guide.
     pub guide: u32,
-    /// Its share; those of one hair sum to 1.
+    /// Its weight; those of one hair sum to 1.
     pub weight: f32,
-    /// From the guide's frame to the hair's, at rest.
+    /// Rotation from the guide's frame to the hair's, at rest.
     pub rotation: Quat,
 }
 
-/// From which guides each hair is mixed, and by how much.
+/// The guides that each hair is blended from, and their weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuideWeights {
     per_hair: usize,
@@ -37,7 +37,7 @@ pub struct GuideWeights {
 }
 
 impl GuideWeights {
-    /// The guides of a hair, heaviest first.
+    /// The guides of a hair, by decreasing weight.
     pub fn of(&self, hair: usize) -> &[GuideWeight] {
         &self.weights[hair * self.per_hair..(hair + 1) * self.per_hair]
     }
@@ -48,13 +48,14 @@ impl GuideWeights {
     }
 }
 
-/// Hairs that a task weighs: some 50 µs of work.
+/// Number of hairs in a task: some 50 µs of work.
 const TASK: usize = 128;
 
-/// Added to 1 + cos: a guide that faces the opposite way counts as two thousand times as far, not as infinitely far.
+/// Added to 1 + cos: a guide that faces the opposite direction counts as two thousand times as far, not as infinitely
+/// far.
 const BEHIND: f32 = 1e-3;
 
-/// For each of `hairs` the weights of its `count` (1 to [`MAX_GUIDES`]) nearest guides, or of all where there are fewer.
+/// For each of `hairs` the weights of its `count` (1 to [`MAX_GUIDES`]) nearest guides, or of all if there are fewer.
 pub fn guide_weights(guides: &[OrientedPoint], hairs: &[OrientedPoint], count: usize) -> GuideWeights {
     guide_weights_on(Path::chosen(), guides, hairs, count)
 }
@@ -91,7 +92,8 @@ fn chunk(search: &GuideSearch<'_>, hairs: &[OrientedPoint], per_hair: usize, wei
     let mut reach = search.first_reach;
     let mut before = hairs.first().map_or([0.0; 3], |hair| hair.position);
     for (hair, weights) in hairs.iter().zip(weights.chunks_mut(per_hair)) {
-        // As far as was needed for the hair before, plus the distance from it: a guess, which changes no result.
+        // First guess of the search radius: that of the previous hair plus the distance from it. It does not affect
+        // results.
         let moved = vector::length(vector::scale(vector::sub(hair.position, before), search.unit));
         let moved = if moved < reach { moved } else { reach };
         let nearest = search.nearest(hair, per_hair + 1, (reach + moved) * GUESS);
@@ -108,7 +110,7 @@ const GUESS: f32 = 1.05;
 struct GuideSearch<'a> {
     guides: &'a [OrientedPoint],
     tree: TriangleTree,
-    /// Of the guides of each block of the tree.
+    /// Positions and normals of the guides in each block of the tree.
     normals: Vec<Lanes<3>>,
     /// In which block each guide is.
     block_of: Vec<u32>,
@@ -141,7 +143,7 @@ impl<'a> GuideSearch<'a> {
         Self { guides, tree, normals, block_of, origin, unit, first_reach }
     }
 
-    /// The `count` nearest guides (all, where there are fewer); of equally near ones the first.
+    /// The `count` nearest guides, or all if there are fewer; of equally near ones the first.
     #[inline(always)]
     fn nearest(&self, hair: &OrientedPoint, count: usize, guess: f32) -> Nearest {
         let at = vector::scale(vector::sub(hair.position, self.origin), self.unit);
@@ -149,7 +151,7 @@ impl<'a> GuideSearch<'a> {
         loop {
             // Everything lies within 8 of everything else.
             let all = reach >= FARTHEST || !reach.is_finite();
-            // Finite: an infinite box would meet blank lanes.
+            // Finite, because an infinite box would meet blank lanes.
             let reached = if all { f32::MAX } else { reach };
             let mut nearest = Nearest::new(count, reached);
             self.tree.visit_box(at.map(|x| x - reached), at.map(|x| x + reached), |block, lanes| {
@@ -185,7 +187,7 @@ impl<'a> GuideSearch<'a> {
     }
 }
 
-/// More than any two points are apart, in units of the search.
+/// Larger than any distance between two points, in units of the search.
 const FARTHEST: f32 = 8.0;
 
 /// The nearest guides so far, nearest first.
@@ -193,7 +195,7 @@ struct Nearest {
     found: [(f32, u32); MAX_GUIDES + 1],
     len: usize,
     count: usize,
-    /// What is farther is left out.
+    /// Guides farther than this are ignored.
     limit: f32,
 }
 
@@ -221,7 +223,7 @@ impl Nearest {
         }
     }
 
-    /// Distance of the farthest.
+    /// Distance of the farthest of them.
     #[inline(always)]
     fn reach(&self) -> f32 {
         if self.len == 0 { 0.0 } else { self.found[self.len - 1].0 }
@@ -239,7 +241,7 @@ fn weigh(nearest: &Nearest, guides: &[OrientedPoint], hair: &OrientedPoint, out:
     }
 }
 
-/// Weights of guides, nearest first, where `beyond` is the distance of the next one, if there is one.
+/// Weights of guides, nearest first; `beyond` is the distance of the next one, if any.
 #[inline(always)]
 fn shepard_weights(found: &[(f32, u32)], beyond: Option<f32>) -> [f64; MAX_GUIDES] {
     let mut weights = [0.0; MAX_GUIDES];
@@ -251,7 +253,7 @@ fn shepard_weights(found: &[(f32, u32)], beyond: Option<f32>) -> [f64; MAX_GUIDE
             // The hair is rooted where one or several guides are.
             if distance == 0.0 { 1.0 } else { 0.0 }
         } else {
-            // Scaled by the square of the least distance, so that none overflows.
+            // Scaled by the square of the smallest distance, so that none overflows.
             let fade = beyond.map_or(1.0, |beyond| 1.0 - distance / f64::from(beyond));
             let share = fade * (least / distance);
             share * share
@@ -265,8 +267,8 @@ fn shepard_weights(found: &[(f32, u32)], beyond: Option<f32>) -> [f64; MAX_GUIDE
     weights
 }
 
-/// The least rotation that takes one unit vector to another; about any perpendicular axis where they are opposite, none
-/// where one is zero.
+/// The smallest rotation from one unit vector to another; about any perpendicular axis if they are opposite, the
+/// identity if one is zero.
 fn least_rotation(from: Vec3, to: Vec3) -> Quat {
     if from == to || from == [0.0; 3] || to == [0.0; 3] {
         return vector::IDENTITY;

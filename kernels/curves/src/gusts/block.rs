@@ -8,7 +8,7 @@ use numerics::noise;
 use numerics::simd::kernel;
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
-/// The least share of a radius that noise leaves: a boundary at the centre would enclose nothing.
+/// The smallest fraction of a radius that noise leaves: with the boundary at the centre nothing would be inside.
 const LEAST_LEFT: f32 = 1e-3;
 
 /// Position of a sphere's centre on the noise lattice: no lattice point coincides with the ends of its axes.
@@ -19,7 +19,7 @@ const ROWS: usize = BLOCK / LANES;
 
 kernel! {
     /// Writes the values of up to [`BLOCK`] points within `bounds`, which the regions of `near` may reach, to `out`;
-    /// returns how many points some influence reaches.
+    /// returns how many points any influence reaches.
     pub(super) fn block_values(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
 }
 
@@ -101,12 +101,12 @@ fn clamped(value: f32) -> f32 {
 #[derive(Clone, Copy)]
 struct Sum {
     value: F32x16,
-    /// 1 where some influence was added.
+    /// 1 if any influence was added.
     reached: [u32; LANES],
 }
 
 impl Sum {
-    /// Adds `influence` × `strength` where `share` lies within the boundary.
+    /// Adds `influence` × `strength` if `share` lies within the boundary.
     #[inline(always)]
     fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32) {
         for lane in 0..LANES {
@@ -150,7 +150,7 @@ impl Ball {
         }
     }
 
-    /// Distances of points from the centre (0) to the boundary (1); `None` where all are outside.
+    /// Distances of points, from the centre (0) to the boundary (1); `None` if all are outside.
     #[inline(always)]
     fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
         let mut away = [F32x16::splat(0.0); 3];
@@ -175,15 +175,15 @@ impl Ball {
         Some(share)
     }
 
-    /// Moves the boundary inwards by noise: rescales shares of the radius to shares of what noise leaves of it in that
-    /// direction. The noise depends on the direction only, so the falloff along each ray from the centre stays
+    /// Moves the boundary inwards by noise: rescales fractions of the radius to fractions of the remaining radius in
+    /// that direction. The noise depends on the direction only, so the falloff along each ray from the centre stays
     /// monotonic.
     #[inline(always)]
     fn dent(&self, away: &Lanes<3>, share: &mut F32x16) {
         let mut cells = *away;
         for lane in 0..LANES {
             let length = share.0[lane];
-            // Points outside are not used; far outside their direction would overflow.
+            // Points outside are not used; far outside, their direction would overflow.
             let inside = length > 0.0 && length < 1.0;
             let inverse = LUMPS / if inside { length } else { 1.0 };
             for axis in 0..3 {

@@ -21,8 +21,8 @@ pub enum ControlShape {
     Cubes,
 }
 
-/// A control whose volume is less than this share of the product of its axes' lengths is flat: more than f32 rounding
-/// makes of three coplanar axes, less than any stretch in practice.
+/// A control is flat if its volume is less than this fraction of the product of its axes' lengths: above f32 rounding
+/// of three coplanar axes, below any stretch in practice.
 const FLAT: f64 = 1e-6;
 
 /// A region with its own space and its own ramp.
@@ -34,7 +34,7 @@ pub struct Control {
     outer: f64,
     ramp: Ramp,
     strength: f32,
-    /// The matrix from the scene to the control's own space, row by row; `None` where it is flat.
+    /// The matrix from the scene to the control's own space, row by row; `None` if it is flat.
     inverse: Option<[DVec3; 3]>,
 }
 
@@ -66,7 +66,7 @@ impl Control {
         self.strength
     }
 
-    /// How far it reaches along x, y and z; `None` where it reaches nothing.
+    /// Half its extent along x, y and z; `None` if it reaches nothing.
     pub(super) fn reach(&self) -> Option<DVec3> {
         self.inverse.filter(|_| self.strength != 0.0)?;
         let ends = |axis: usize| DVec3::from(self.axes.map(|end| end[axis]));
@@ -100,7 +100,7 @@ pub(super) struct Local {
     shape: ControlShape,
     centre: Vec3,
     rows: [Vec3; 3],
-    /// Increase of the share per unit beyond the inner cube; infinite where both cubes are the same.
+    /// Increase of the share per unit beyond the inner cube; infinite if both cubes are the same.
     beyond: f32,
 }
 
@@ -140,7 +140,7 @@ impl Local {
     }
 }
 
-/// The inverse of the matrix whose columns are `axes`, row by row; `None` where they span no volume.
+/// The inverse of the matrix whose columns are `axes`, row by row; `None` if they span no volume.
 fn inverse(axes: [DVec3; 3]) -> Option<[DVec3; 3]> {
     // Each axis is normalised first: no product overflows, and flatness does not depend on scale.
     let lengths = axes.map(|axis| axis.norm());

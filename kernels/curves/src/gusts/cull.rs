@@ -9,7 +9,7 @@ use numerics::vector::{DVec3, Vec3};
 /// A low and a high corner.
 pub(super) type Bounds = [Vec3; 2];
 
-/// Bounds of no points: they meet nothing, and joining them changes nothing.
+/// Bounds of no points: they overlap nothing, and their union with others changes nothing.
 pub(super) const NOWHERE: Bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
 
 /// Coordinates of sixteen points.
@@ -38,7 +38,7 @@ fn bounds_body(points: &[Vec3]) -> Bounds {
     low.iter().zip(high).fold(NOWHERE, |bounds, (low, high)| join(bounds, [*low, *high]))
 }
 
-/// The bounds around both.
+/// The union with other bounds.
 pub(super) fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
     [[0, 1, 2].map(|k| low[k].min(other_low[k])), [0, 1, 2].map(|k| high[k].max(other_high[k]))]
 }
@@ -61,7 +61,7 @@ impl Boxes {
         }
     }
 
-    /// How many there are.
+    /// Number of boxes.
     pub(super) fn len(&self) -> usize {
         self.regions.len()
     }
@@ -71,7 +71,7 @@ impl Boxes {
         self.regions[index] as usize
     }
 
-    /// 1 for each of the sixteen boxes from `first` on that `bounds` meets, else 0.
+    /// 1 for each of the sixteen boxes from `first` on that overlaps `bounds`, else 0.
     #[inline(always)]
     pub(super) fn meet(&self, first: usize, [low, high]: &Bounds) -> [u32; LANES] {
         let mut met = [0; LANES];
@@ -98,7 +98,7 @@ impl Boxes {
 }
 
 kernel! {
-    /// The boxes of `all` that `bounds` meets, in order.
+    /// The boxes of `all` that overlap `bounds`, in order.
     pub(super) fn meeting(all: &Boxes, bounds: &Bounds) -> Boxes = meeting_body;
 }
 

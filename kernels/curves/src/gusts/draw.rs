@@ -16,7 +16,7 @@ pub struct Draw {
     pub gusts: u32,
     /// Metres.
     pub radius: [f32; 2],
-    /// Share of the radius that noise may take away, clamped to 0..1.
+    /// Fraction of the radius by which noise may dent a gust, clamped to 0..1.
     pub noise: [f32; 2],
     /// First frame of a gust's first round.
     pub start: [f64; 2],
@@ -31,7 +31,7 @@ pub struct Draw {
 /// The shortest time from a round to the next, in frames: the finest step that frames can take.
 const SHORTEST_ROUND: f64 = 1.0 / 5040.0;
 
-/// Most gusts alive at a moment: bounds the memory for any settings.
+/// Largest number of gusts alive at a moment: bounds the memory for any settings.
 pub const MOST_LIVING: u64 = 1 << 16;
 
 /// A gust alive at a moment.
@@ -43,17 +43,17 @@ pub struct Gust {
     pub strength: f32,
     /// Metres.
     pub radius: f32,
-    /// Share of the radius that noise may take away, 0..1.
+    /// Fraction of the radius by which noise may dent it, 0..1.
     pub noise: f32,
-    /// Where in the range of speeds it is, 0..1.
+    /// Position of its speed within the range, 0..1.
     pub speed: f64,
-    /// Where on the launch plane it starts: −1..1 along each side.
+    /// Start on the launch plane: −1..1 along each side.
     pub position: [f64; 2],
     /// Seed of its noise.
     pub salt: u32,
 }
 
-/// All gusts alive at a moment, by index, then by round.
+/// All gusts alive at a moment, ordered by index, then by round.
 #[must_use]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Living {
@@ -63,7 +63,7 @@ pub struct Living {
     pub dropped: u64,
 }
 
-/// What each random number is for.
+/// Uses of random numbers.
 #[derive(Clone, Copy)]
 enum Draws {
     Start,
@@ -98,7 +98,7 @@ impl Draw {
         living
     }
 
-    /// The first and the last round that may be alive at `frame`; none are where the first is after the last.
+    /// The first and the last round that may be alive at `frame`; none is if the first is after the last.
     fn rounds(&self, start: f64, frame: f64) -> [i64; 2] {
         if self.repeat < SHORTEST_ROUND {
             return [0, 0];
@@ -109,7 +109,7 @@ impl Draw {
         [since(longest).floor() as i64, since(0.0).ceil() as i64]
     }
 
-    /// One round; `None` where it is not alive.
+    /// One round; `None` if it is not alive.
     fn gust(&self, key: Key, start: f64, frame: f64) -> Option<Gust> {
         let of = |draw: Draws| key.of(draw as u64);
         let strength =
@@ -135,7 +135,7 @@ fn between(key: Key, [low, high]: [f64; 2]) -> f64 {
     (low + (high - low) * key.f64()).clamp(low.min(high), high.max(low))
 }
 
-/// 1 from age 0 up to `life`, then straight down to 0 over `decay`.
+/// 1 from age 0 to `life`, then falling linearly to 0 over `decay`.
 fn strength(age: f64, life: f64, decay: f64) -> f32 {
     if age < 0.0 || age >= life + decay {
         return 0.0;

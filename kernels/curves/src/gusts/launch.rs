@@ -1,4 +1,4 @@
-//! Where gusts start: a rectangle across the wind, upwind of everything.
+//! The rectangle across the wind, upwind of everything, in which gusts start.
 
 use numerics::vector::{DVec3, Vec3, to_f64};
 
@@ -10,13 +10,13 @@ pub struct Plane {
     half: [DVec3; 2],
 }
 
-/// Cosine to the vertical beyond which a wind has no upward side of its own.
+/// Cosine of the angle to the vertical beyond which a wind has no well-defined upward side.
 const VERTICAL: f64 = 0.999;
 
 impl Plane {
-    /// The rectangle `distance` upwind of a box, `area` wide and high, metres; an extent of 0 is that of the box as seen
-    /// along the wind. `wind` has length 1. Its first side is level, its second as upright as possible; under a wind
-    /// straight up or down they are z and x.
+    /// The rectangle `distance` upwind of a box, `area` wide and high, metres; an extent of 0 is that of the box as
+    /// seen along the wind. `wind` has length 1. Its first side is level, its second as upright as possible; under a
+    /// wind straight up or down they are z and x.
     pub fn new([low, high]: [Vec3; 2], wind: [f64; 3], distance: f64, area: [f64; 2]) -> Self {
         let ([low, high], wind) = ([to_f64(low), to_f64(high)], DVec3::from(wind));
         let (centre, half) = (low * 0.5 + high * 0.5, high * 0.5 - low * 0.5);
@@ -29,7 +29,7 @@ impl Plane {
         Self { centre: centre - wind * upwind, half: [side(across, area[0]), side(up, area[1])] }
     }
 
-    /// The point at `position` of the rectangle, −1..1 each way.
+    /// The point at `position` of the rectangle, −1..1 along each side.
     pub fn at(&self, position: [f64; 2]) -> [f64; 3] {
         (self.centre + self.half[0] * position[0] + self.half[1] * position[1]).into()
     }

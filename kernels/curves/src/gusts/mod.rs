@@ -1,14 +1,15 @@
-//! Gusts: regions that pass over points and let the wind in (W5).
+//! Gusts: regions that pass over points and raise the wind there (W5).
 //!
-//! The value at a point is `clamp(base + Σ influences, 0, 1)`: first the gusts' spheres, then the controls, each in their
-//! order. The influence of a sphere is 1 at its centre and falls off to 0 at its boundary; that of a control is its ramp
-//! over the distance in the control's own space.
+//! The value at a point is `clamp(base + Σ influences, 0, 1)`: first the gusts' spheres, then the controls, each in
+//! their order. The influence of a sphere is 1 at its centre and falls off to 0 at its boundary; that of a control is
+//! its ramp over the distance in the control's own space.
 //!
-//! Promise: a point that nothing reaches gets exactly `base`; the same bits on every SIMD path and number of threads,
-//! whatever was culled; finite for any finite points; at most points × regions evaluations, fewer where whole blocks of
-//! points are beyond a region or saturated already. Limit: culling is efficient only if neighbours in the list are
-//! neighbours in space, as the CVs of a groom are. Distances are computed relative to a nearby point, so precision does
-//! not depend on the scene's distance from the origin beyond that of f32 positions. Positions in metres, times in frames.
+//! Guarantees: a point that no region reaches gets exactly `base`; the same bits on every SIMD path and number of
+//! threads, whatever was culled; finite for any finite points; at most points × regions evaluations, fewer if whole
+//! blocks of points are outside a region or already saturated. Limit: culling is efficient only if neighbours in the
+//! list are neighbours in space, as the CVs of a groom are. Distances are computed relative to a nearby point, so
+//! precision does not depend on the scene's distance from the origin beyond that of f32 positions. Positions in metres,
+//! times in frames.
 
 mod block;
 mod control;
@@ -33,11 +34,11 @@ use rayon::prelude::*;
 pub struct Sphere {
     /// Its centre.
     pub centre: [f64; 3],
-    /// Points farther from the centre are not reached; below [`SMALLEST`] none are.
+    /// Points farther from the centre are not reached. A gust with a radius below [`SMALLEST`] reaches none.
     pub radius: f32,
     /// Factor of its influence, 0..1.
     pub strength: f32,
-    /// Share of the radius that noise may take away, 0..1.
+    /// Fraction of the radius by which noise may dent the sphere, 0..1.
     pub noise: f32,
     /// Seed of its noise.
     pub salt: u32,
@@ -46,15 +47,15 @@ pub struct Sphere {
 /// Everything that influences points.
 #[derive(Clone, Debug)]
 pub struct Gusts<'a> {
-    /// The value of a point that nothing reaches, 0..1.
+    /// The value of a point that no region reaches, 0..1.
     pub base: f32,
-    /// Influence of a sphere from its centre (0) to its boundary (1).
+    /// Influence within a sphere, from its centre (0) to its boundary (1).
     pub falloff: &'a Ramp,
     /// The gusts.
     pub spheres: &'a [Sphere],
     /// Regions placed by hand.
     pub controls: &'a [Control],
-    /// Factor of each point's value: below 0 or NaN counts as 0; `None` is 1 everywhere.
+    /// Factor on each point's value: below 0 or NaN counts as 0; `None` is 1 everywhere.
     pub incoming: Option<&'a [f32]>,
 }
 
@@ -62,31 +63,31 @@ pub struct Gusts<'a> {
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Influence {
-    /// One value a point.
+    /// One value for each point.
     pub values: Vec<f32>,
     /// Points with an influence other than 0.
     pub reached: usize,
 }
 
-/// The least radius of a gust, in metres: its inverse and its square are still finite.
+/// The smallest radius of a gust, in metres, whose inverse and square are still finite.
 pub const SMALLEST: f32 = 1e-36;
 
-/// Points of a task: some 30 µs of work where there are gusts, against a few for handing it to a thread.
+/// Number of points in a task: some 30 µs of work if there are gusts, against a few for handing it to a thread.
 const TASK: usize = 2048;
 
-/// Points that are culled together: about a dozen hairs.
+/// Number of points that are culled together: about a dozen hairs.
 const BLOCK: usize = 64;
 
 /// Cells of noise across a sphere's radius: about four lumps around it.
 const LUMPS: f32 = 1.5;
 
-/// Share by which bounds are enlarged for culling: more than all rounding errors together.
+/// Fraction by which bounds are enlarged for culling: more than all rounding errors together.
 const MARGIN: f64 = 1e-4;
 
 /// The value of each point.
 ///
 /// # Panics
-/// Where `incoming` is shorter than `points`.
+/// If `incoming` is shorter than `points`.
 pub fn evaluate(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
     evaluate_on(Path::chosen(), points, gusts)
 }
@@ -114,7 +115,7 @@ pub fn evaluate_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influe
     Influence { values, reached }
 }
 
-/// The gusts, and what can be computed from them once for all points.
+/// The gusts, with everything that can be computed once for all points.
 struct Prepared<'a> {
     gusts: &'a Gusts<'a>,
     falloff: Profile,
@@ -122,7 +123,7 @@ struct Prepared<'a> {
     ramps: Vec<Profile>,
     /// Bounds of the regions, spheres first.
     boxes: Boxes,
-    /// No influence is below 0: a point that has reached 1 stays there.
+    /// No influence is negative, so a point that has reached 1 stays there.
     only_adds: bool,
 }
 
@@ -148,7 +149,7 @@ impl<'a> Prepared<'a> {
         Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, only_adds }
     }
 
-    /// Writes the values of a task's points; returns how many some influence reaches.
+    /// Writes the values of a task's points; returns how many of them any influence reaches.
     fn task(&self, path: Path, points: &[[f32; 3]], out: &mut [f32]) -> usize {
         let mut bounds = [NOWHERE; TASK / BLOCK];
         let mut whole = NOWHERE;

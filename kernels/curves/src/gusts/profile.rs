@@ -5,7 +5,7 @@
 use numerics::lanes::{F32x16, LANES};
 use numerics::ramp::{Interpolation, Ramp};
 
-/// A ramp as polynomials, one a key.
+/// A ramp as polynomials, one for each key.
 pub(super) struct Profile {
     /// The value left of the first key.
     first: f32,
@@ -18,7 +18,7 @@ pub(super) struct Profile {
 struct Piece {
     x: f32,
     y: f32,
-    /// One over the distance to the next key; 0 where that is too short for its inverse to be finite.
+    /// One over the distance to the next key; 0 if that is too short for its inverse to be finite.
     inverse: f32,
     rise: f32,
 }

@@ -1,6 +1,6 @@
 //! Sixteen curves side by side: one lane for each curve, one state for each CV of a lane.
 //!
-//! A lane whose curve has ended repeats its last CV, of which nothing is written.
+//! A lane whose curve has ended repeats its last CV, which is not written again.
 
 use super::response::Response;
 use super::rigid_step::RigidStep;
@@ -17,7 +17,7 @@ pub(super) struct F64x16(pub(super) [f64; LANES]);
 impl F64x16 {
     pub(super) const ZERO: Self = Self([0.0; LANES]);
 
-    /// The value that `of` gives for each lane.
+    /// Evaluates `of` for each lane.
     #[inline(always)]
     fn from_fn(of: impl Fn(usize) -> f64) -> Self {
         let mut out = Self::ZERO;
@@ -28,14 +28,14 @@ impl F64x16 {
     }
 }
 
-/// What `of` gives for each axis. Not a loop: where f32 and f64 mix, the compiler would unroll the lanes inside of it and
-/// make vectors of three axes.
+/// Evaluates `of` for each axis. Not a loop: with mixed f32 and f64 the compiler would unroll the lanes inside it and
+/// vectorise over the three axes.
 #[inline(always)]
 fn axes<T>(of: impl Fn(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
 }
 
-/// b − a, exactly where they are near each other.
+/// b − a, exact if they are close to each other.
 #[inline(always)]
 fn between(a: &Lanes<3>, b: &Lanes<3>) -> [F64x16; 3] {
     axes(|axis| F64x16::from_fn(|lane| f64::from(b[axis].0[lane]) - f64::from(a[axis].0[lane])))
@@ -44,7 +44,7 @@ fn between(a: &Lanes<3>, b: &Lanes<3>) -> [F64x16; 3] {
 /// The state of one CV of each lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CvState {
-    /// From the target to where the CV is, metres.
+    /// Offset of the CV from its target, metres.
     pub(super) offset: [F64x16; 3],
     /// Metres per step.
     pub(super) velocity: [F64x16; 3],
@@ -72,13 +72,13 @@ impl Responses {
 /// Up to sixteen curves.
 #[derive(Clone, Debug)]
 pub(super) struct CurveLanes {
-    /// The curve of each lane; the last one for a lane without a curve.
+    /// The curve of each lane; the last curve for a lane without one.
     pub(super) curve: [u32; LANES],
     first: [u32; LANES],
     last: [u32; LANES],
-    /// CVs of each lane: 0 where it has no curve.
+    /// Number of CVs of each lane: 0 if it has no curve.
     count: [u32; LANES],
-    /// CVs of the longest curve.
+    /// Largest number of CVs of a curve.
     pub(super) longest: usize,
 }
 
@@ -108,7 +108,7 @@ impl CurveLanes {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step as u32) as usize)
     }
 
-    /// Writes the CVs that lanes have to `out`, whose first point is `base`.
+    /// Writes the CVs of the lanes to `out`, whose first point has index `base`.
     #[inline(always)]
     fn write(&self, step: usize, points: &Lanes<3>, base: usize, out: &mut [Vec3]) {
         for lane in 0..LANES {
@@ -130,7 +130,7 @@ impl CurveLanes {
 }
 
 kernel! {
-    /// A step to `targets`, with the motion that each curve inherits, if any.
+    /// Steps to `targets`, with the motion that each curve inherits, if any.
     pub(super) fn step_lanes(
         curves: &CurveLanes,
         states: &mut [CvState],
@@ -218,7 +218,7 @@ impl InheritedMotion {
         }
     }
 
-    /// What the rotation adds to a vector.
+    /// Change of a vector by the rotation.
     #[inline(always)]
     fn rotated(&self, v: &[F64x16; 3]) -> [F64x16; 3] {
         let mut out = [F64x16::ZERO; 3];
@@ -232,7 +232,7 @@ impl InheritedMotion {
     }
 }
 
-/// How much of the offset is shown at a CV of each curve, 0..1.
+/// Fraction of the offset that is applied at a CV of each curve, 0..1.
 #[inline(always)]
 fn shown_at(blend: &Masked<'_, f32>, curves: &CurveLanes, step: usize) -> F64x16 {
     let Some(mask) = blend.mask else { return F64x16([f64::from(blend.value); LANES]) };
@@ -245,8 +245,8 @@ fn shown_at(blend: &Masked<'_, f32>, curves: &CurveLanes, step: usize) -> F64x16
 }
 
 kernel! {
-    /// Writes where the curves are, their segments as long as their targets', to `out`, whose first point is `base`.
-    /// Gives the largest square of a distance from the target.
+    /// Writes the curves, with segments as long as their targets', to `out`, whose first point has index `base`.
+    /// Returns the largest squared distance from the target.
     pub(super) fn shape_lanes(
         curves: &CurveLanes,
         states: &[CvState],
@@ -271,7 +271,7 @@ fn shape(curves: &CurveLanes, states: &[CvState], blend: Masked<'_, f32>, base: 
         let swung =
             axes(|axis| F64x16::from_fn(|lane| rest[axis].0[lane] + (next[axis].0[lane] - shown[axis].0[lane])));
         let (long, now) = (squares(&rest), squares(&swung));
-        // Equal segments give exactly 1; one without a direction keeps its target's.
+        // Equal segments give exactly 1; a segment without a direction keeps its target's.
         let ratio = F64x16::from_fn(|lane| (long.0[lane] / now.0[lane]).sqrt());
         let scale = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { ratio.0[lane] } else { 0.0 });
         let straight = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { 0.0 } else { 1.0 });
@@ -291,7 +291,7 @@ fn shape(curves: &CurveLanes, states: &[CvState], blend: Masked<'_, f32>, base: 
             F32x16::from_fn(|lane| {
                 let (target, moved) = (state.target[axis].0[lane], moved[axis].0[lane]);
                 let to = (f64::from(target) + moved) as f32;
-                // Not the sum where nothing moved: −0 + 0 would lose its sign.
+                // Unmoved coordinates are not summed: −0 + 0 would lose its sign.
                 if moved == 0.0 { target } else { to }
             })
         });

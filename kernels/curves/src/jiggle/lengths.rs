@@ -1,16 +1,16 @@
-//! Curves between two shapes whose segments have the lengths between theirs.
+//! Interpolated curves whose segments have interpolated lengths.
 
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
-/// Gives the segments of `points`, curves somewhere between the shapes `near[0]` and `near[1]`, the length at `share`
-/// between those of the two; directions and roots stay. Segments without a direction are left as they are.
+/// Rescales the segments of `points`, which lie between the shapes `near[0]` and `near[1]`, to the length interpolated
+/// at `share` between those of the two. Directions and roots are kept, and so are segments without a direction.
 ///
 /// # Panics
-/// Where a slice is shorter than `starts` says.
+/// If a slice is shorter than `starts` says.
 pub fn with_lengths_between(starts: &[u32], near: [&[Vec3]; 2], share: f32, points: &mut [Vec3]) {
     let length = |points: &[Vec3], k: usize| (to_f64(points[k + 1]) - to_f64(points[k])).norm();
     for ends in starts.windows(2).filter(|ends| ends[0] < ends[1]) {
-        // By how much the CV was moved: one that need not move keeps its bits.
+        // Displacement of the CV so far: a CV that need not move keeps its bits.
         let mut moved = DVec3::zeros();
         let mut ahead = points[ends[0] as usize];
         for k in ends[0] as usize..ends[1] as usize - 1 {

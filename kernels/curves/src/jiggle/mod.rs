@@ -1,13 +1,14 @@
 //! Jiggle: every CV of a curve is tied by a damped spring to its position on the incoming curve, the target (W5).
 //!
-//! Between frames the target moves in a straight line, and the spring's response to that is exact: any stiffness, damping
-//! and step is stable. Lengths are restored on the output, root to tip, and never fed back into the state. Where the
-//! root's skin moves, a share of that motion carries state and target along ([`RigidStep`]).
+//! Between frames the target moves in a straight line, and the spring's response to that is exact: any stiffness,
+//! damping and step is stable. Lengths are restored on the output, root to tip, and never fed back into the state.
+//! Where the root's skin moves, a fraction of that motion is applied to state and target ([`RigidStep`]).
 //!
-//! Promise: the exact response to the piecewise-linear target within 1e-9 of its size for ω·dt from 1e-6 to 1e6 and
+//! Guarantees: the exact response to the piecewise-linear target within 1e-9 of its size for ω·dt from 1e-6 to 1e6 and
 //! damping ratios from 1e-3 to 1e3; the root keeps its bits; segments as long as the target's within 4 ulp of the
-//! positions; curves that stand still keep their bits; the same bits on every SIMD path and number of threads. State and
-//! coefficients are f64; lanes are curves, so a step costs what the longest of sixteen curves has. Metres, hertz, seconds.
+//! positions; curves that stand still keep their bits; the same bits on every SIMD path and number of threads. State
+//! and coefficients are f64; lanes are curves, so the cost of a step is that of the longest of sixteen curves. Metres,
+//! hertz, seconds.
 
 mod curve_lanes;
 mod lengths;
@@ -29,7 +30,7 @@ use response::Response;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// How far a mask may scale frequency and damping, either way.
+/// Range in which a mask may scale frequency and damping.
 pub const MASK_RANGE: [f32; 2] = [0.25, 4.0];
 
 /// The spring of each CV. Masks have one value for each CV and are clamped to [`MASK_RANGE`].
@@ -55,17 +56,17 @@ pub struct Jiggle {
     response_key: Option<ResponseKey>,
 }
 
-/// Curves that one task steps.
+/// Number of curves in a task.
 #[derive(Clone, Debug)]
 struct CurveBatch {
     points: Range<usize>,
     groups: Vec<CurveLanes>,
-    /// Of all groups, one after the other.
+    /// State of all groups, one after the other.
     states: Vec<CvState>,
     responses: Vec<Responses>,
 }
 
-/// What the responses were computed from.
+/// Inputs from which the responses were computed.
 #[derive(Clone, Debug, PartialEq)]
 struct ResponseKey {
     /// Frequency, damping, dt.
@@ -76,7 +77,7 @@ struct ResponseKey {
     drag: Drag,
 }
 
-/// Swinging curves.
+/// Curves with their swing.
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct JiggledCurves {
@@ -86,14 +87,15 @@ pub struct JiggledCurves {
     pub max_offset: f64,
 }
 
-/// CVs that a batch has at least: some 20 µs of work per step.
+/// Minimum number of CVs in a batch: some 20 µs of work per step.
 const BATCH_CVS: usize = 2048;
 
 impl Jiggle {
-    /// Curves `targets[starts[i]..starts[i + 1]]` at rest on their targets. `rest` gives the arc length at which each CV lies.
+    /// Curves `targets[starts[i]..starts[i + 1]]` at rest on their targets. `rest` gives the arc length at which each
+    /// CV lies.
     ///
     /// # Panics
-    /// Where `starts` falls or does not run from 0 to the number of points, or `rest` is shorter.
+    /// If `starts` falls or does not run from 0 to the number of points, or `rest` is shorter.
     pub fn at_rest(starts: &[u32], rest: &[Vec3], targets: &[Vec3]) -> Self {
         let curves = starts.len().saturating_sub(1);
         let mut ranges = Vec::new();
@@ -110,16 +112,16 @@ impl Jiggle {
         Self { along: along(starts, rest), starts: starts.to_vec(), batches, response_key: None }
     }
 
-    /// Where each curve starts among the points, and where the last ends.
+    /// Index of the first point of each curve, and the number of points at the end.
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// A step of `dt` seconds, in which the targets move straight to `targets`; `carries` is the motion
-    /// that each curve inherits.
+    /// Takes a step of `dt` seconds, in which the targets move linearly to `targets`; `carries` is the motion that each
+    /// curve inherits.
     ///
     /// # Panics
-    /// Where a slice is shorter than the points or curves.
+    /// If a slice is shorter than the points or curves.
     pub fn step(&mut self, targets: &[Vec3], spring: &Spring<'_>, dt: f64, carries: Option<&[RigidStep]>) {
         self.step_on(Path::chosen(), targets, spring, dt, carries);
     }
@@ -148,11 +150,11 @@ impl Jiggle {
         });
     }
 
-    /// Where the curves are: `blend` of the way from their targets to where they swing (0…1), with
-    /// their targets' lengths.
+    /// The curves, interpolated by `blend` (0…1) from their targets to their swinging positions, with their targets'
+    /// lengths.
     ///
     /// # Panics
-    /// Where the mask is shorter than the points.
+    /// If the mask is shorter than the points.
     pub fn shape(&self, blend: Masked<'_, f32>) -> JiggledCurves {
         self.shape_on(Path::chosen(), blend)
     }
@@ -206,7 +208,7 @@ impl Jiggle {
             let steps = batch.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
             for ((curves, step), responses) in steps.zip(&mut batch.responses) {
                 for (lane, cv) in curves.at(step).into_iter().enumerate() {
-                    // The root follows exactly, whatever the ramp is there.
+                    // The root follows exactly, whatever the value of the ramp there.
                     responses.set(lane, if step == 0 { Response::RIGID } else { response(cv) });
                 }
             }

@@ -1,19 +1,20 @@
-//! One step of a damped spring, exact for a target that moves straight from where it was to where it is.
+//! One step of a damped spring, exact for a target that moves linearly from its previous to its current position.
 //!
-//! x'' = −2ζω(x' − d·τ') − ω²(x − τ), with ξ = x − τ and velocities p a step (v·dt), is over a step in which the target
-//! moves by D: ξ₁ = aξ₀ + bp₀ + kD, p₁ = cξ₀ + ep₀ + lD. All six depend on ω·dt and ζ alone. The forms here subtract no
-//! numbers that are nearly equal: near ζ = 1 and for steps from 1e-12 to 1e12 they keep ten digits. f64, no unit.
+//! The equation x'' = −2ζω(x' − d·τ') − ω²(x − τ) has, with ξ = x − τ, velocities per step p = v·dt and a target that
+//! moves by D, the solution ξ₁ = aξ₀ + bp₀ + kD, p₁ = cξ₀ + ep₀ + lD. All six coefficients depend on ω·dt and ζ only.
+//! The formulas used avoid cancellation: near ζ = 1 and for ω·dt from 1e-12 to 1e12 they keep ten digits. f64,
+//! dimensionless.
 
 /// What the damper resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drag {
-    /// Motion against the target: d = 1.
+    /// Motion relative to the target: d = 1.
     Target,
     /// All motion, as in still air: d = 0.
     World,
 }
 
-/// The six numbers of a step.
+/// The six coefficients of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Response {
     pub(super) a: f64,
@@ -28,7 +29,7 @@ impl Response {
     /// A spring so stiff that it follows exactly.
     pub(super) const RIGID: Self = Self { a: 0.0, b: 0.0, c: 0.0, e: 0.0, k: 0.0, l: 1.0 };
 
-    /// Of a step of `phase` ω·dt ≥ 0 at damping ratio `zeta` > 0.
+    /// Coefficients of a step with `phase` = ω·dt ≥ 0 at damping ratio `zeta` > 0.
     pub(super) fn new(phase: f64, zeta: f64, drag: Drag) -> Self {
         if !phase.is_finite() || !zeta.is_finite() {
             return Self::RIGID;
@@ -68,21 +69,21 @@ impl Response {
     }
 }
 
-/// Steps of `phase` ω·dt after which a spring has forgotten all but `tolerance` of how it stood and moved, for every
-/// damping ratio between the two of `zetas`; the largest number where it never does.
+/// Number of steps with `phase` = ω·dt after which less than `tolerance` of the initial displacement and velocity
+/// remains, for every damping ratio between the two `zetas`; the largest integer if that never happens.
 ///
-/// A bound, not an estimate: with x as wide as 1 and v as fast as ω at the start, |x| stays below `tolerance` from there
-/// on. From the slowest root, ω(ζ − √(ζ² − 1)) or ζω, and what the roots' closeness near ζ = 1 adds.
+/// A bound, not an estimate: starting with |x| ≤ 1 and |v| ≤ ω, |x| stays below `tolerance` after that number. It
+/// follows from the slowest root, ω(ζ − √(ζ² − 1)) or ζω, and a term for nearly equal roots near ζ = 1.
 pub fn steps_to_forget(phase: f64, zetas: [f64; 2], tolerance: f64) -> u32 {
-    // The slowest root is fastest at ζ = 1 and falls off to both sides, so the ends are the worst.
+    // The slowest root decays fastest at ζ = 1 and more slowly on both sides, so the ends of the range are the worst.
     let phases = zetas.map(|zeta| phase_to_forget(zeta, tolerance));
     let steps = (phases[0].max(phases[1]) / phase).ceil();
-    // Saturates; a NaN (0 ÷ 0) would come from a spring that has nothing to forget.
+    // The cast saturates; NaN (0 ÷ 0) occurs only if there is nothing to decay.
     steps as u32
 }
 
-/// ω·t after which (1 + (1 + ζ)·m)·e^(−rωt) ≤ `tolerance`, r the slowest root and m the most that the two roots together
-/// make of it: ωt, but no more than their distance allows.
+/// ω·t after which (1 + (1 + ζ)·m)·e^(−rωt) ≤ `tolerance`, where r is the slowest root and m bounds the factor by which
+/// the two roots together exceed it: ωt, but no more than their distance allows.
 fn phase_to_forget(zeta: f64, tolerance: f64) -> f64 {
     let (root, most) = match zeta < 1.0 {
         true => (zeta, 1.0 / ((1.0 - zeta) * (1.0 + zeta)).sqrt()),
@@ -92,7 +93,7 @@ fn phase_to_forget(zeta: f64, tolerance: f64) -> f64 {
         }
     };
     let mut phase = 0.0;
-    // Each round comes closer from below, by a factor that falls with the phase.
+    // Each iteration approaches the solution from below.
     for _ in 0..100 {
         let grown = 1.0 + (1.0 + zeta) * most.min(phase);
         let next = (libm::log(grown / tolerance) / root).max(0.0);

@@ -1,16 +1,16 @@
-//! The rigid motion that carries a curve's oscillators along before each step: a share of how its root has moved.
+//! The rigid motion applied to a curve's oscillators before each step: a fraction of the motion of its root.
 
 use crate::attach::{RootPose, SkinBinding};
 use numerics::vector::{DMat3, DQuat, DVec3, rotation};
 use rayon::prelude::*;
 
-/// Curves that a task has at least.
+/// Minimum number of curves in a task.
 const TASK: usize = 512;
 
-/// A rigid motion x → x + `change`·(x − `about`) + `shift`; exactly nothing for no motion.
+/// A rigid motion x → x + `change`·(x − `about`) + `shift`; changes nothing for no motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidStep {
-    /// The rotation matrix less the identity.
+    /// The rotation matrix minus the identity.
     pub(super) change: DMat3,
     /// Metres.
     pub(super) about: DVec3,
@@ -33,9 +33,9 @@ impl RigidStep {
         steps.map(|((root, from), to)| Self::between(*root, from, to, share)).collect()
     }
 
-    /// A share of the motion from one pose of a root to another: about the root, that share of the rotation's angle (the
-    /// shorter way round) and of the translation. 0 is no motion, 1 all of it. `root` is its position at rest, in metres.
-    /// Where the skin has lost its directions in either pose nothing rotates: no rotation is known between them.
+    /// A fraction of the motion from one pose of a root to another: about the root, that fraction of the rotation's
+    /// angle (at most half a turn) and of the translation. 0 is no motion, 1 all of it. `root` is its position at rest,
+    /// in metres. If the skin has collapsed in either pose, there is no rotation, since none is defined between them.
     pub fn between(root: DVec3, from: &RootPose, to: &RootPose, share: f64) -> Self {
         if share == 0.0 || from == to {
             return Self::NONE;
@@ -50,7 +50,7 @@ impl RigidStep {
     }
 }
 
-/// The rotation about the same axis by a share of the angle.
+/// The rotation about the same axis by a fraction of the angle.
 fn part_of(whole: &DQuat, share: f64) -> DQuat {
     if share == 1.0 {
         return *whole;
@@ -64,7 +64,7 @@ fn part_of(whole: &DQuat, share: f64) -> DQuat {
     rotation(axis / sine, 2.0 * share * libm::atan2(sine, whole.w.abs()))
 }
 
-/// The matrix of a rotation less the identity: exactly zero for none, and without cancellation for a small one.
+/// The matrix of a rotation minus the identity: exactly zero for no rotation, and without cancellation for a small one.
 fn less_identity(rotation: &DQuat) -> DMat3 {
     let (x, y, z, w) = (rotation.i, rotation.j, rotation.k, rotation.w);
     DMat3::new(

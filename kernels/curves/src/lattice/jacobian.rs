@@ -4,22 +4,22 @@ use crate::attach::{nearest_rotation, rotate_orientation};
 use numerics::vector::{DMat3, DVec3, direction, to_f32, to_f64};
 use rayon::prelude::*;
 
-/// Rows a thread takes at a time.
+/// Number of rows that a thread takes at a time.
 const CHUNK: usize = 4096;
 
 /// Differences of positions, such as velocities: J·v.
 ///
 /// # Panics
-/// Where there are fewer matrices than rows.
+/// If there are fewer matrices than rows.
 pub fn map_vectors(rows: &mut [[f32; 3]], jacobians: &[DMat3]) {
     each(rows, jacobians, |v, jacobian| to_f32(jacobian * to_f64(v)));
 }
 
-/// Normals: still perpendicular to the deformed surface, on the side that its winding says is outside, of length 1. One
-/// without a direction afterwards, where the surface is squeezed to a line, is left as it is.
+/// Unit normals: perpendicular to the deformed surface, on the side that its winding defines as outside. A normal
+/// without a direction after the deformation, because the surface is squeezed to a line, is left unchanged.
 ///
 /// # Panics
-/// Where there are fewer matrices than rows.
+/// If there are fewer matrices than rows.
 pub fn map_normals(rows: &mut [[f32; 3]], jacobians: &[DMat3]) {
     each(rows, jacobians, |row, jacobian| {
         // (J·a) × (J·b) is the cofactor matrix of J times a × b.
@@ -30,17 +30,17 @@ pub fn map_normals(rows: &mut [[f32; 3]], jacobians: &[DMat3]) {
     });
 }
 
-/// Orientations (quaternions x, y, z, w): rotated by the rotation nearest to the Jacobian, where there is one.
+/// Orientations (quaternions x, y, z, w): rotated by the rotation nearest to the Jacobian, if there is one.
 ///
 /// # Panics
-/// Where there are fewer matrices than rows.
+/// If there are fewer matrices than rows.
 pub fn map_orientations(rows: &mut [[f32; 4]], jacobians: &[DMat3]) {
     each(rows, jacobians, |q, jacobian| {
         nearest_rotation(jacobian).map_or(q, |rotation| rotate_orientation(&rotation, q))
     });
 }
 
-/// Maps rows; where the Jacobian is the identity, they keep their bits.
+/// Maps rows; those with the identity as Jacobian keep their bits.
 fn each<T: Copy + Send + Sync>(rows: &mut [T], jacobians: &[DMat3], map: impl Fn(T, &DMat3) -> T + Sync) {
     assert!(jacobians.len() >= rows.len(), "{} rows and {} matrices", rows.len(), jacobians.len());
     rows.par_chunks_mut(CHUNK).zip(jacobians.par_chunks(CHUNK)).for_each(|(rows, jacobians)| {

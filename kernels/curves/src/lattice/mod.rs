@@ -1,16 +1,16 @@
 //! Free-form deformation: a box of control points, each displaced by an offset, deforms the space in it (Sederberg &
 //! Parry, *Free-Form Deformation of Solid Geometric Models*, 1986).
 //!
-//! A point at u, v, w of the box is displaced by Σ Bᵢ(u)·Bⱼ(v)·Bₖ(w)·offsetᵢⱼₖ. B are Bernstein polynomials whose degree
-//! is the number of divisions, so that the whole box bends smoothly, or tent functions, so that each cell depends on its
-//! own corners and cells meet without a gap. Both reproduce affine maps.
+//! A point at u, v, w of the box is displaced by Σ Bᵢ(u)·Bⱼ(v)·Bₖ(w)·offsetᵢⱼₖ. B are Bernstein polynomials whose
+//! degree is the number of divisions, so that the whole box bends smoothly, or tent functions, so that each cell
+//! depends on its own corners and cells meet without a gap. Both reproduce affine maps.
 //!
-//! Promise: a point where all offsets that reach it are 0 keeps its bits; offsets that are an affine function of the
+//! Guarantees: a point keeps its bits if all offsets that affect it are 0; offsets that are an affine function of the
 //! control points' positions give that affine map to the rounding of f32 (within the box, and outside with
-//! [`Extrapolation::Extend`]); the Jacobian is the map's exact derivative, one-sided where the map has a crease; the same
+//! [`Extrapolation::Extend`]); the Jacobian is the map's exact derivative, one-sided at creases of the map; the same
 //! bits on every SIMD path and number of threads. Computed in f64, rounded once. Limits: the trilinear map has creases
-//! between cells, and so has the boundary of the box with [`Extrapolation::Hold`]; a lattice may fold space over, which
-//! [`Deformed::folded`] counts. Metres.
+//! between cells, and both maps at the boundary of the box with [`Extrapolation::Hold`]; a lattice may fold space,
+//! which [`Deformed::folded`] counts. Metres.
 
 mod jacobian;
 mod point_group;
@@ -27,14 +27,14 @@ use rayon::prelude::*;
 pub enum LatticeBasis {
     /// Linear within a cell: the eight control points around a point displace it.
     Trilinear,
-    /// All control points act everywhere, near ones most.
+    /// All control points act everywhere, the nearest most strongly.
     Bernstein,
 }
 
 /// How points outside the box are displaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extrapolation {
-    /// As the nearest point of the box.
+    /// Like the nearest point of the box.
     Hold,
     /// Linearly along each axis, with the slope at the edge of the box.
     Extend,
@@ -55,25 +55,26 @@ pub struct DeformationLattice<'a> {
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deformed {
-    /// One point for every incoming one.
+    /// One point for each input point.
     pub points: Vec<[f32; 3]>,
-    /// The Jacobian of the map at each; empty where not asked for.
+    /// The Jacobian of the map at each point; empty if not requested.
     pub jacobians: Vec<DMat3>,
-    /// Least determinant of a Jacobian: the share of its volume that the most compressed spot keeps. 1 without points.
+    /// Smallest determinant of a Jacobian: the fraction of volume that remains at the most compressed point. 1 without
+    /// points.
     pub min_determinant: f64,
-    /// Points with a determinant of 0 or less: space is flattened or inside out there.
+    /// Number of points with a determinant of 0 or less, where space is flattened or inside out.
     pub folded: usize,
 }
 
-/// Control points of a lattice with so many cells along each axis; `None` where the number overflows.
+/// Number of control points of a lattice with these numbers of cells; `None` if it overflows.
 pub fn control_points(divisions: [usize; 3]) -> Option<usize> {
     divisions.iter().try_fold(1_usize, |count, cells| count.checked_mul(cells.checked_add(1)?))
 }
 
 impl<'a> DeformationLattice<'a> {
-    /// The box between the corners `from` and `to`, cut into `divisions` cells along x, y and z; an offset a control
-    /// point, x running fastest, then y. `None` where the box has no volume, a division is 0, or the number of offsets is
-    /// not that of the control points.
+    /// The box between the corners `from` and `to`, cut into `divisions` cells along x, y and z; one offset for each
+    /// control point, x varying fastest, then y. `None` if the box has no volume, a division is 0, or the number of
+    /// offsets is not that of the control points.
     pub fn new(
         [from, to]: [[f64; 3]; 2],
         divisions: [usize; 3],
@@ -92,7 +93,7 @@ impl<'a> DeformationLattice<'a> {
         self.offsets.as_flattened().iter().all(|x| *x == 0.0)
     }
 
-    /// Deforms points; with the Jacobians where asked for.
+    /// Deforms points, and computes the Jacobians if requested.
     pub fn deform(&self, points: &[[f32; 3]], jacobians: bool) -> Deformed {
         self.deform_on(Path::chosen(), points, jacobians)
     }
@@ -137,7 +138,7 @@ impl<'a> DeformationLattice<'a> {
     }
 }
 
-/// Points that a thread takes at a time, whole groups.
+/// Number of points that a thread takes at a time, in whole groups.
 const TASK: usize = 128 * LANES;
 
 #[derive(Clone, Copy)]

@@ -5,7 +5,7 @@ use numerics::lanes::LANES;
 use numerics::simd::kernel;
 use numerics::vector::DMat3;
 
-/// Sixteen `f64`, a point each.
+/// Sixteen `f64`, one for each point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct F64x16(pub(super) [f64; LANES]);
@@ -17,9 +17,9 @@ const ZERO: F64x16 = F64x16([0.0; LANES]);
 pub(super) struct PointGroup {
     positions: [F64x16; 3],
     displacements: [F64x16; 3],
-    /// ∂ displacement: by the axis of the derivative, then by component.
+    /// Derivatives of the displacements: by axis of the derivative, then by component.
     slopes: [[F64x16; 3]; 3],
-    /// Of the Jacobian of the whole map.
+    /// Determinants of the Jacobian of the map.
     pub(super) determinant: F64x16,
 }
 
@@ -30,7 +30,7 @@ impl Default for PointGroup {
 }
 
 impl PointGroup {
-    /// Takes up to sixteen points; the remaining lanes keep what they had.
+    /// Loads up to sixteen points; the remaining lanes keep their values.
     pub(super) fn load(&mut self, points: &[[f32; 3]]) {
         for (lane, point) in points.iter().enumerate() {
             for k in 0..3 {
@@ -43,7 +43,7 @@ impl PointGroup {
     pub(super) fn store(&self, points: &mut [[f32; 3]]) {
         for (lane, point) in points.iter_mut().enumerate() {
             for k in 0..3 {
-                // −0 + 0 is 0, so a coordinate that does not move is not written.
+                // −0 + 0 is +0, so a coordinate that does not move is not written.
                 if self.displacements[k].0[lane] != 0.0 {
                     point[k] = (self.positions[k].0[lane] + self.displacements[k].0[lane]) as f32;
                 }
@@ -73,7 +73,7 @@ struct Weight {
 
 const NO_WEIGHT: Weight = Weight { value: ZERO, slope: ZERO };
 
-/// Memory that groups reuse.
+/// Buffers that groups reuse.
 #[derive(Default)]
 pub(super) struct Scratch {
     /// By axis, the weights of the control points along it.
@@ -128,7 +128,7 @@ fn body(lattice: &DeformationLattice<'_>, scratch: &mut Scratch, group: &mut Poi
     determinants(group);
 }
 
-/// Coordinates along an axis of the box, 0 to 1, and how far beyond that the points are.
+/// Coordinates along an axis of the box, 0 to 1, and the distance of the points beyond that range.
 #[inline(always)]
 fn box_coordinates(lattice: &DeformationLattice<'_>, axis: usize, positions: &F64x16) -> (F64x16, F64x16) {
     let (mut inside, mut beyond) = (ZERO, ZERO);
@@ -142,8 +142,8 @@ fn box_coordinates(lattice: &DeformationLattice<'_>, axis: usize, positions: &F6
     (inside, beyond)
 }
 
-/// Weights of the two control points around each point, and the cell it is in. A point between two cells belongs to the
-/// upper one.
+/// Weights of the two control points around each point, and the cell it is in. A point on the boundary between two
+/// cells belongs to the upper one.
 #[inline(always)]
 fn tents(divisions: usize, along: &F64x16, weights: &mut Vec<Weight>) -> [usize; LANES] {
     weights.clear();
@@ -164,7 +164,7 @@ fn tents(divisions: usize, along: &F64x16, weights: &mut Vec<Weight>) -> [usize;
 }
 
 /// Bernstein polynomials of degree n from those of degree n − 1, by de Casteljau's scheme: sums of products of numbers
-/// from 0 to 1, so no precision is lost. B′ᵢⁿ = n·(Bᵢ₋₁ⁿ⁻¹ − Bᵢⁿ⁻¹).
+/// from 0 to 1, without cancellation. B′ᵢⁿ = n·(Bᵢ₋₁ⁿ⁻¹ − Bᵢⁿ⁻¹).
 #[inline(always)]
 fn bernstein(degree: usize, along: &F64x16, weights: &mut Vec<Weight>) {
     weights.clear();
@@ -176,15 +176,15 @@ fn bernstein(degree: usize, along: &F64x16, weights: &mut Vec<Weight>) {
             for lane in 0..LANES {
                 let t = along.0[lane];
                 weights[i].value.0[lane] = (1.0 - t) * own.0[lane] + t * before.0[lane];
-                // Overwritten by each degree; the last one stays.
+                // Overwritten for each degree; the last one remains.
                 weights[i].slope.0[lane] = degree as f64 * (before.0[lane] - own.0[lane]);
             }
         }
     }
 }
 
-/// As a share of a point's distance from the origin and the box's extent: a point that rounding puts so far outside still
-/// has the slopes of the inside. The box around an object is as large as it, and f32 rounds by a sixteenth of this.
+/// Relative to a point's distance from the origin and the box's extent: a point that rounding puts this far outside
+/// still has the slopes of the inside. f32 rounds by a sixteenth of this.
 const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
 
 /// Extends a weight to points outside the box, and makes its slope one per metre.

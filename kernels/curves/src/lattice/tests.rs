@@ -8,7 +8,7 @@ const UNIT: [[f64; 3]; 2] = [[0.0; 3], [1.0; 3]];
 const BASES: [LatticeBasis; 2] = [LatticeBasis::Trilinear, LatticeBasis::Bernstein];
 const EXTRAPOLATIONS: [Extrapolation; 2] = [Extrapolation::Hold, Extrapolation::Extend];
 
-/// An offset a control point, from its position in the unit box.
+/// One offset for each control point, from its position in the unit box.
 fn offsets(divisions: [usize; 3], offset: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f32; 3]> {
     let mut offsets = Vec::new();
     for k in 0..=divisions[2] {
@@ -66,7 +66,7 @@ fn with_two_divisions_the_centre_control_point_moves_the_centre_fully_or_by_an_e
 
 #[test]
 fn affine_offsets_give_the_affine_map_inside_and_extrapolated() {
-    // Eighths, so that f32 holds the offsets of halves and quarters: extrapolation would enlarge their rounding.
+    // Multiples of an eighth, so that f32 holds the offsets exactly: extrapolation would magnify rounding.
     let map = [[0.375, -0.75, 0.25], [0.5, -0.375, 0.125], [-0.25, 0.625, 0.875]];
     let affine = |p: [f64; 3]| [0, 1, 2].map(|row| 0.25 + map[row][0] * p[0] + map[row][1] * p[1] + map[row][2] * p[2]);
     for divisions in [[1, 1, 1], [3, 2, 5], [4, 16, 2], [16, 1, 7]] {
@@ -119,7 +119,7 @@ fn points_outside_a_held_box_move_as_its_nearest_point() {
 
 #[test]
 fn a_point_that_rounding_puts_outside_has_the_slopes_of_the_inside() {
-    // Mirrored along x and z, in a box as large as its contents: 0.36 is more in f32 than in f64.
+    // Mirrored along x and z, in a box as large as its contents: 0.36 is larger in f32 than in f64.
     let corners = [[0.24, 0.0, 0.0], [0.36, 1.0, 1.0]];
     let turned = offsets([1; 3], |[x, _, z]| [-1.12 * x, 0.0, -2.0 * z]);
     for basis in BASES {
@@ -131,7 +131,7 @@ fn a_point_that_rounding_puts_outside_has_the_slopes_of_the_inside() {
 }
 
 #[test]
-fn no_offset_keeps_every_bit() {
+fn zero_offsets_keep_every_bit() {
     let points = [[-0.0, 0.1, 1e-40], [0.3, -0.0, 7e20]];
     for basis in BASES {
         let offsets = vec![[0.0, -0.0, 0.0]; 60];
@@ -206,7 +206,7 @@ fn folded_points_are_counted() {
 
 #[test]
 fn normals_stay_perpendicular_and_vectors_and_orientations_follow() {
-    // Sheared: x + y, y, z. A face along x keeps its normal y; one along y turns with it.
+    // Sheared: x + y, y, z. A face along x keeps its normal y; one along y rotates.
     let shear = DMat3::new(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
     let mut normals = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
     map_normals(&mut normals, &[shear; 3]);

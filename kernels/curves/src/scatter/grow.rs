@@ -1,7 +1,7 @@
 //! Straight curves that grow from points on triangles.
 //!
-//! Promise: a root lies on its triangle to the rounding of f32; a curve has the length asked for; both rotate and move
-//! with the triangle. Limit: curves are straight, and may cross each other and the surface.
+//! Guarantees: a root lies on its triangle to the rounding of f32; a curve has the requested length; both move and
+//! rotate with the triangle. Limit: curves are straight, and may cross each other and the surface.
 
 use super::{area_vector, corners_of};
 use crate::surface::SurfacePoint;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 pub struct Blade {
     /// Its root.
     pub root: SurfacePoint,
-    /// Root to tip, metres.
+    /// Length from root to tip, metres.
     pub length: f32,
     /// Angle to the surface's normal, radians.
     pub lean: f32,
@@ -22,7 +22,7 @@ pub struct Blade {
     pub around: f32,
 }
 
-/// Unit normals of the points: the mean over the triangles around each, weighted by area; zero where it has no direction.
+/// Unit normals of the points: the mean over the triangles around each, weighted by area; zero if undefined.
 pub fn vertex_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<DVec3> {
     let mut sums = vec![DVec3::zeros(); positions.len()];
     for triangle in triangles {
@@ -34,12 +34,12 @@ pub fn vertex_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<DVe
     sums.into_iter().map(|sum| direction(sum).unwrap_or_else(DVec3::zeros)).collect()
 }
 
-/// The CVs of the blades, `cvs` (2 or more) each, root to tip and evenly spaced. `normals` are those of the points, of any
-/// length, and are interpolated over a triangle; where they cancel, the triangle's own is used, and y where it has no
-/// area.
+/// The CVs of the blades, `cvs` (2 or more) each, root to tip and evenly spaced. `normals` are those of the points, of
+/// any length, and are interpolated over a triangle; if they cancel, the triangle's own normal is used, or y if it has
+/// no area.
 ///
 /// # Panics
-/// Where a corner is out of range.
+/// If a corner is out of range.
 pub fn grow(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
@@ -76,7 +76,7 @@ fn leaning(up: DVec3, edge: DVec3, blade: &Blade) -> DVec3 {
     up * cos + (side * c + across * s) * sin
 }
 
-/// Perpendicular to the unit vector `up`, towards the axis it is least along.
+/// A unit vector perpendicular to `up`, towards the axis with its smallest component.
 fn perpendicular(up: DVec3) -> DVec3 {
     let axis = DVec3::ith(up.iamin(), 1.0);
     direction(up.cross(&axis.cross(&up))).unwrap_or(axis)

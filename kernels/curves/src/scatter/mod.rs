@@ -1,13 +1,13 @@
 //! Points spread evenly over triangles: no two close together, and no void between them.
 //!
-//! Relaxation dart throwing (McCool & Fiume 1992): candidate i, uniform over the area, is accepted where no point
-//! accepted before it is nearer than `SPACING · √(area ÷ i)`. Distances are straight through space; points on triangles
-//! that face apart ignore each other, so the two sides of a thin sheet fill alike.
+//! Relaxation dart throwing (McCool & Fiume 1992): candidate i, uniform over the area, is accepted if no previously
+//! accepted point is closer than `SPACING · √(area ÷ i)`. Distances are Euclidean; points on triangles that face in
+//! opposite directions ignore each other, so that both sides of a thin sheet are filled equally.
 //!
-//! Promise: progressive. The points of a shorter list are the first of a longer one and each list is as even as the
-//! other, so a density may vary over the surface by keeping fewer of the first. A pure function of positions, triangles
-//! and key, for any number of threads. Limit: a list is shorter than asked for where the surface has no area, or where
-//! `MAX_CANDIDATES` per point were not enough (about 3 are).
+//! Guarantees: progressive: the points of a shorter list are the first of a longer one, and every list is evenly
+//! distributed, so the density can vary over the surface by keeping shorter prefixes. A pure function of positions,
+//! triangles and key, for any number of threads. Limit: a list is shorter than requested if the surface has no area, or
+//! if `MAX_CANDIDATES` per point were not enough (about 3 usually are).
 
 mod grow;
 mod point_grid;
@@ -20,28 +20,30 @@ use numerics::vector::{DVec3, to_f64};
 use point_grid::PointGrid;
 use rayon::prelude::*;
 
-/// As a share of √(area ÷ candidates). The nearest neighbours of n points on a plane are then at least 0.48·√(area ÷ n)
-/// apart and 0.73 on average (random ones 0 and 0.5). At 0.6 it is 0.42 and 0.69; at 1.3 0.57 and 0.78, for twice the time.
+/// Relative to √(area ÷ candidates). Nearest neighbours among n points on a plane are then at least 0.48·√(area ÷ n)
+/// and on average 0.73·√(area ÷ n) apart (random ones 0 and 0.5). At 0.6 it is 0.42 and 0.69; at 1.3 0.57 and 0.78, for
+/// twice the time.
 const SPACING: f64 = 0.8;
 
 /// Candidates per point after which the search ends.
 const MAX_CANDIDATES: u64 = 32;
 
-/// Candidates of the first round; each later round adds a quarter of all so far.
+/// Number of candidates in the first round; each later round adds a quarter of all so far.
 const FIRST_ROUND: u64 = 256;
 
-/// Golden ratio × 2⁶⁴: multiples of it, modulo 1, fill a line evenly however many there are.
+/// Golden ratio × 2⁶⁴: any number of its multiples, modulo 1, fill a line evenly.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Triangles to spread points over.
 pub struct ScatterSurface<'a> {
     positions: &'a [[f32; 3]],
     triangles: &'a [[u32; 3]],
-    /// Area of the triangles up to and including each, m².
+    /// Cumulative area of the triangles, m².
     cumulative_area: Vec<f64>,
-    /// Of each triangle, not normalised.
+    /// Normal of each triangle, not normalised.
     normals: Vec<DVec3>,
-    /// The least coordinates of all corners. Points are stored relative to it: none is negative, so a cast rounds down.
+    /// The smallest coordinates of all corners. Points are stored relative to them: none is negative, so a cast rounds
+    /// down.
     low: DVec3,
 }
 
@@ -49,7 +51,7 @@ impl<'a> ScatterSurface<'a> {
     /// The triangles, rows of `positions` (metres).
     ///
     /// # Panics
-    /// Where a corner is out of range.
+    /// If a corner is out of range.
     pub fn new(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> Self {
         let normals = triangles.par_iter().map(|corners| area_vector(corners_of(positions, *corners)));
         let normals: Vec<DVec3> = normals.collect();
@@ -59,7 +61,7 @@ impl<'a> ScatterSurface<'a> {
             area
         });
         let cumulative_area = cumulative_area.collect();
-        // Of the triangles' corners alone: a stray point far away would cost all others their digits.
+        // Only of corners of triangles: a stray point far away would cost all others precision.
         let corners = || triangles.as_flattened().iter().map(|corner| positions[*corner as usize]);
         let least = |k: usize| corners().map(|p| f64::from(p[k])).fold(f64::INFINITY, f64::min);
         Self { positions, triangles, cumulative_area, normals, low: DVec3::new(least(0), least(1), least(2)) }
@@ -79,7 +81,7 @@ impl<'a> ScatterSurface<'a> {
         while self.area() > 0.0 && points.len() < count && tried < last {
             let round = tried..(tried + FIRST_ROUND.max(tried / 4)).min(last);
             grid.refine(self.spacing(round.start));
-            // First, on all threads, against the points of earlier rounds; then, in order, against those of this one.
+            // First, in parallel, against the points of earlier rounds; then, in order, against those of this one.
             let fit: Vec<(u64, SurfacePoint, DVec3)> = round
                 .clone()
                 .into_par_iter()
@@ -101,16 +103,16 @@ impl<'a> ScatterSurface<'a> {
         points
     }
 
-    /// How far candidate `i` must be from all accepted before it, metres.
+    /// Minimum distance of candidate `i` from all points accepted before it, metres.
     fn spacing(&self, i: u64) -> f64 {
         SPACING * (self.area() / (i + 1) as f64).sqrt()
     }
 
-    /// Candidate `i`: by multiples of the golden ratio along the list of triangles and across the rows within each, at
-    /// random along a row.
+    /// Candidate `i`: multiples of the golden ratio give its position in the list of triangles and across the rows of
+    /// the triangle; its position along a row is random.
     fn candidate(&self, i: u64, key: Key) -> SurfacePoint {
         let along = key.u64().wrapping_add(i.wrapping_mul(GOLDEN));
-        // Never rounded up to the very end, where no triangle begins.
+        // Must not be rounded up to the end, where no triangle begins.
         let target = ((along >> 11) as f64 / (1_u64 << 53) as f64 * self.area()).min(self.area().next_down());
         let triangle = self.cumulative_area.partition_point(|end| *end <= target);
         let start = if triangle == 0 { 0.0 } else { self.cumulative_area[triangle - 1] };

@@ -1,7 +1,7 @@
-//! A hash grid of points that grows finer as more are added.
+//! A hash grid of points that is refined as more are added.
 //!
-//! Cells are cubes at least twice as wide as the spacing, so eight of them hold all that is nearer than it. Cells that
-//! hash to the same chain cost time and change no result.
+//! Cells are cubes at least twice as wide as the spacing, so eight of them contain all points closer than it. Cells
+//! that hash to the same chain cost time but do not affect results.
 
 use numerics::vector::DVec3;
 
@@ -16,7 +16,7 @@ pub(super) struct PointGrid {
 
 /// One accepted point.
 pub(super) struct AcceptedPoint {
-    /// Metres from the least corner.
+    /// Position relative to the lowest corner, metres.
     pub(super) at: DVec3,
     pub(super) triangle: u32,
     /// The next older point of its chain.
@@ -37,7 +37,7 @@ impl PointGrid {
         Self { points: Vec::new(), cells_per_metre: 0.5 / spacing, heads: vec![NONE; chains], least_chains: chains }
     }
 
-    /// Fits the cells to a spacing that has shrunk.
+    /// Adapts the cells to a smaller spacing.
     pub(super) fn refine(&mut self, spacing: f64) {
         let needed = 0.5 / spacing;
         if needed <= TOO_WIDE * self.cells_per_metre {
@@ -65,7 +65,7 @@ impl PointGrid {
     pub(super) fn any_near(&self, at: DVec3, first: usize, matches: impl Fn(&AcceptedPoint) -> bool) -> bool {
         let scaled = at * self.cells_per_metre;
         let own = [0, 1, 2].map(|k| scaled[k] as i64);
-        // Along each axis the nearer neighbour. The own cell is most likely to hold a match and comes first.
+        // Along each axis the nearer neighbour. The point's own cell is most likely to contain a match and comes first.
         let next = [0, 1, 2].map(|k| if scaled[k] - (own[k] as f64) < 0.5 { -1 } else { 1 });
         (0..8).any(|corner: i64| {
             let cell = [0, 1, 2].map(|k| own[k].wrapping_add(next[k] * (corner >> k & 1)));

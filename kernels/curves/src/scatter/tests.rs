@@ -20,7 +20,7 @@ fn gaps(positions: &[DVec3]) -> Vec<f64> {
 }
 
 #[test]
-fn no_two_points_are_close_and_no_hole_is_left() {
+fn points_are_neither_close_together_nor_leave_gaps() {
     let square = ScatterSurface::new(&SQUARE, &HALVES);
     for count in [30, 100, 300, 1000, 3000] {
         let points = square.spread(count, Key::new(3));
@@ -30,7 +30,7 @@ fn no_two_points_are_close_and_no_hole_is_left() {
         let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
         let mean = gaps.iter().sum::<f64>() / count as f64;
         assert!(least > 0.47 && mean > 0.71, "{count}: least {least}, mean {mean}");
-        // The widest void: of a square lattice 0.71, of random points 1.6 and more.
+        // The largest gap: 0.71 for a square lattice, 1.6 and more for random points.
         let lattice = (0..1600).map(|k| DVec3::new(f64::from(k % 40) / 39.0, 0.0, f64::from(k / 40) / 39.0));
         let farthest = lattice
             .map(|at| positions.iter().map(|position| (*position - at).norm()).fold(f64::INFINITY, f64::min))
@@ -49,7 +49,7 @@ fn a_shorter_list_begins_a_longer_one() {
 }
 
 #[test]
-fn bands_of_a_sphere_get_points_by_their_area() {
+fn the_number_of_points_is_proportional_to_area() {
     let sphere = numerics::shapes::sphere([2.0; 3], 8);
     let positions: Vec<[f32; 3]> = sphere.points.iter().map(|p| p.map(|x| x as f32)).collect();
     let (mut triangles, mut first, mut ends) = (Vec::new(), 0, Vec::new());
@@ -69,21 +69,21 @@ fn bands_of_a_sphere_get_points_by_their_area() {
         let band = ScatterSurface::new(&positions, &triangles[start..end]);
         let expected = band.area() / whole.area() * count as f64;
         let found = points.iter().filter(|point| (start..end).contains(&(point.triangle as usize))).count() as f64;
-        // Random points would stray by √expected.
+        // The number of random points would deviate by √expected.
         assert!((found - expected).abs() < 1.2 * expected.sqrt(), "{found} of {expected}");
         start = end;
     }
 }
 
 #[test]
-fn both_sides_of_a_thin_sheet_fill_alike() {
+fn both_sides_of_a_thin_sheet_are_filled_equally() {
     let low = SQUARE.map(|p| [p[0], p[1] - 1e-3, p[2]]);
     let sheet = [SQUARE, low].concat();
     let triangles = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
     let points = ScatterSurface::new(&sheet, &triangles).spread(1000, Key::new(2));
     let above = points.iter().filter(|point| point.triangle < 2).count();
     assert!(above.abs_diff(500) < 20, "{above}");
-    // Sides that face the same way are one sheet: together as sparse as one.
+    // Sides that face in the same direction count as one sheet: together they are as sparse as one.
     let doubled = [[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]];
     let points = ScatterSurface::new(&sheet, &doubled).spread(1000, Key::new(2));
     let gaps = gaps(&positions_of(&sheet, &doubled, &points));
@@ -113,11 +113,11 @@ fn a_scene_scaled_by_a_power_of_two_gets_the_same_points() {
 }
 
 #[test]
-fn a_surface_without_area_gets_no_point() {
+fn a_surface_without_area_gets_no_points() {
     assert!(ScatterSurface::new(&[], &[]).spread(10, Key::new(0)).is_empty());
     let line = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
     assert!(ScatterSurface::new(&line, &[[0, 1, 2]]).spread(10, Key::new(0)).is_empty());
-    // Beside real ones, such triangles get none.
+    // Among others, triangles without area get no points.
     let triangles = [[0, 0, 1], [0, 2, 1], [1, 1, 1], [0, 3, 2], [2, 2, 0]];
     let points = ScatterSurface::new(&SQUARE, &triangles).spread(500, Key::new(0));
     assert_eq!(points.len(), 500);
@@ -132,7 +132,7 @@ fn a_stray_point_far_away_changes_nothing() {
 }
 
 #[test]
-fn weights_are_shares() {
+fn weights_are_barycentric() {
     for point in ScatterSurface::new(&SQUARE, &HALVES).spread(1000, Key::new(8)) {
         assert!(point.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
         assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
@@ -155,14 +155,14 @@ fn assert_close(found: &[[f32; 3]], expected: &[[f32; 3]]) {
 }
 
 #[test]
-fn without_lean_a_blade_stands_on_the_normal() {
+fn without_lean_a_blade_is_along_the_normal() {
     // Corners (0,0), (1,1), (1,0) by ¼, ½, ¼: the root is at (0.75, 0.5).
     let expected = [[0.75, 0.0, 0.5], [0.75, 1.0, 0.5], [0.75, 2.0, 0.5]];
     assert_close(&grown(&SQUARE, blade(0.0, 1.0), 3), &expected);
 }
 
 #[test]
-fn a_blade_leans_from_the_first_edge_round_the_normal() {
+fn the_direction_of_lean_is_measured_from_the_first_edge_about_the_normal() {
     let right = std::f32::consts::FRAC_PI_2;
     let h = std::f32::consts::FRAC_1_SQRT_2;
     // The first edge runs along (1, 0, 1).
@@ -172,7 +172,7 @@ fn a_blade_leans_from_the_first_edge_round_the_normal() {
 }
 
 #[test]
-fn blades_turn_and_move_with_their_triangle() {
+fn blades_move_and_rotate_with_their_triangle() {
     // A quarter turn about z, then up by 5: x → y, y → −x.
     let turn = |p: &[f32; 3]| [-p[1], p[0] + 5.0, p[2]];
     let still = grown(&SQUARE, blade(0.7, 2.0), 4);
@@ -181,7 +181,7 @@ fn blades_turn_and_move_with_their_triangle() {
 }
 
 #[test]
-fn a_blade_on_a_triangle_without_area_stands_up() {
+fn a_blade_on_a_triangle_without_area_is_upright() {
     let flat = [[1.0, 2.0, 3.0]; 4];
     assert_close(&grown(&flat, blade(0.0, 0.0), 2), &[[1.0, 2.0, 3.0], [1.0, 4.0, 3.0]]);
     assert!(grown(&flat, blade(0.4, 0.3), 5).as_flattened().iter().all(|x| x.is_finite()));

@@ -1,13 +1,14 @@
-//! The share of a cone that a mesh covers, sixteen triangles at a time.
+//! The fraction of a cone that a mesh covers, sixteen triangles at a time.
 //!
-//! The cone's cross-section is a disc. How many times a mesh covers a point of it, counting triangles that show the same
-//! face, changes only across silhouette edges as seen from the cone's tip. So its mean over the disc is its value at the
-//! centre plus, for each such edge, an integral along the part of it inside the disc (Green's theorem): half the area it
-//! spans with the centre less the disc's sector, over the disc's area. When an edge crosses the centre, both jump by
-//! opposite amounts, and an edge adds nothing where it enters the disc: the mean is continuous in the wind.
+//! The cone's cross-section is a disc. The number of times that a mesh covers a point of the disc, counting triangles
+//! that show the same face, changes only across silhouette edges as seen from the cone's tip. Its mean over the disc is
+//! therefore its value at the centre plus, for each such edge, an integral along the part of the edge inside the disc
+//! (Green's theorem): half the area it spans with the centre minus that of the disc's sector, divided by the disc's
+//! area. When an edge crosses the centre, both terms jump by opposite amounts, and an edge contributes nothing when it
+//! enters the disc, so the mean is continuous in the wind.
 //!
-//! Front and back faces are counted separately; the larger mean is taken, at most 1. That is exact where the visible
-//! surface is one layer or covers the whole disc, and an upper bound where layers overlap in part.
+//! Front and back faces are counted separately; the larger mean is taken, at most 1. That is exact if the visible
+//! surface is one layer or covers the whole disc, and an upper bound if layers overlap partly.
 
 use super::Obstacle;
 use super::rays::{Seen, beside};
@@ -19,22 +20,22 @@ use numerics::trig;
 use numerics::vector::{self, Vec3, cross, sub};
 use std::f32::consts::PI;
 
-/// Share of the offset, at its far end, over which shelter fades out: a collider that moves past the end would otherwise
-/// appear and vanish abruptly.
+/// Fraction of the offset, at its far end, over which shelter fades out: a collider that moves past the end would
+/// otherwise appear and vanish abruptly.
 const FADE: f32 = 0.1;
 
-/// A share this close to 0 or 1 counts as that: above the rounding of the sums.
+/// A fraction this close to 0 or 1 is rounded to it: above the rounding of the sums.
 const ROUNDING: f32 = 2e-5;
 
 /// Offset of the disc's centre from the ray, in radii along both axes: meshes are often symmetric, and a corner exactly
 /// at the centre would have no angle.
 const ASIDE: [f32; 2] = [3e-5, 2e-5];
 
-/// How far outside the disc edges are clipped before the perspective division, in radii.
+/// Distance outside the disc at which edges are clipped before the perspective division, in radii.
 const MARGIN: f32 = 2.0;
 
 kernel! {
-    /// Writes the covered share of the cone of each CV, with half angle `cone`, to `covered`.
+    /// Writes the covered fraction of the cone of each CV, with half angle `cone`, to `covered`.
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
@@ -154,7 +155,7 @@ impl Cone {
         (area > 0.0) & (volume.abs() > self.gap * area)
     }
 
-    /// The share of the wind that is stopped at a distance: 1 but near the end of the offset.
+    /// The fraction of the wind that is stopped by a surface at a distance: 1 except near the end of the offset.
     #[inline(always)]
     fn weight(&self, distance: f32) -> f32 {
         let weight = (1.0 - distance / self.reach) * (1.0 / FADE);
@@ -162,20 +163,21 @@ impl Cone {
         if weight < 1.0 { weight } else { 1.0 }
     }
 
-    /// What an edge adds to the mean over the disc: an integral over the part of it inside the disc, as seen from the
+    /// Contribution of an edge to the mean over the disc: an integral over the part of it inside the disc, as seen from
+    /// the
     /// centre. The surface is on the left of the edge.
     #[inline(always)]
     fn edge(&self, from: Vec3, to: Vec3) -> f32 {
         let (start, end) = self.near_the_cone(from, to);
         let along = sub(to, from);
-        // An end that is not clipped keeps its bits: the next edge begins there.
+        // An end that is not clipped keeps its bits, since the next edge begins there.
         let p = vector::add(from, vector::scale(along, start));
         let q = vector::sub(to, vector::scale(along, 1.0 - end));
         let in_front = (start < end) & (p[2] > 0.0) & (q[2] > 0.0);
         let (near, far) = (1.0 / (p[2] * self.slope), 1.0 / (q[2] * self.slope));
         let ([px, py], [qx, qy]) = ([p[0] * near, p[1] * near], [q[0] * far, q[1] * far]);
 
-        // Where the straight line from p to q lies in the unit disc.
+        // The part of the line from p to q inside the unit disc.
         let [dx, dy] = [qx - px, qy - py];
         let square = dx * dx + dy * dy;
         let half = px * dx + py * dy;
@@ -201,7 +203,7 @@ impl Cone {
         if sound { share } else { 0.0 }
     }
 
-    /// The interval of an edge, 0…1, inside the pyramid around the cone; start ≥ end where it is outside.
+    /// The interval of an edge, 0…1, inside the pyramid around the cone; start ≥ end if it is outside.
     #[inline(always)]
     fn near_the_cone(&self, from: Vec3, to: Vec3) -> (f32, f32) {
         let (mut start, mut end) = (0.0, 1.0);
@@ -243,7 +245,7 @@ impl Region for &Cone {
     }
 }
 
-/// Whether the axis is to the left of an edge, seen along the axis. Where it lies on the edge, that holds for exactly one
+/// Whether the axis is to the left of an edge, seen along the axis. If it lies on the edge, that holds for exactly one
 /// of the edge's two directions, so exactly one of two neighbouring triangles contains it.
 #[inline(always)]
 fn is_left(from: Vec3, to: Vec3) -> bool {

@@ -5,8 +5,8 @@ use numerics::tree::{NONE, TriangleTree};
 use numerics::vector::Vec3;
 use rayon::prelude::*;
 
-/// Third corners of neighbours, an entry a block of the tree. Side k runs from corner k to the next; a side without a
-/// neighbour has its own first corner instead, which makes a triangle without area.
+/// Third corners of neighbours, one entry for each block of the tree. Side k runs from corner k to the next; a side
+/// without a neighbour has its own first corner instead, which makes a triangle without area.
 pub(super) struct Edges(Vec<[Lanes<3>; 3]>);
 
 /// One side of a triangle.
@@ -25,12 +25,12 @@ struct Side {
 pub struct Neighbours(Vec<[u32; 3]>);
 
 impl Neighbours {
-    /// Two triangles are neighbours where they run along the same two points in opposite directions, as consistently wound
-    /// faces do; where more than two meet, they are paired in order and the rest have none. Of the points it only
-    /// matters which are finite.
+    /// Two triangles are neighbours where they run along the same two points in opposite directions, as consistently
+    /// wound faces do; where more than two meet, they are paired in order and the rest have none. Of the points it only
+    /// matters whether they are finite.
     ///
     /// # Panics
-    /// Where an index is out of range.
+    /// If an index is out of range.
     pub fn of(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         Self(thirds(points, triangles))
     }

@@ -9,12 +9,12 @@ pub(super) struct Frame {
     centre: DVec3,
     /// Two axes across the wind and the one upwind, each of length `unit`.
     axes: [DVec3; 3],
-    /// Frame units a metre.
+    /// Frame units per metre.
     unit: f64,
 }
 
-/// How close a CV on a triangle is to its plane at most, in the frame's unit: [`SKIN`] of the collider's size but at most
-/// `most`, and at least `least`.
+/// Largest distance of a CV on a triangle from its plane, in the frame's unit: [`SKIN`] times the collider's size, but
+/// at most `most` and at least `least`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gap {
     least: f32,
@@ -22,24 +22,24 @@ pub(super) struct Gap {
 }
 
 impl Gap {
-    /// The gap at a collider of a size.
+    /// The gap for a collider of this size.
     #[inline(always)]
     pub(super) fn at(self, size: f32) -> f32 {
         self.least.max(self.most.min(SKIN * size))
     }
 }
 
-/// As a share of a collider's size: above the rounding of text files with six digits, below any modelled gap.
+/// Relative to a collider's size: above the rounding of text files with six digits, below any modelled gap.
 const SKIN: f32 = 1e-5;
 
-/// As a share of a curve's size: 1e-5 of a collider as large as a landscape is longer than a hair.
+/// Relative to a curve's size: 1e-5 of a collider as large as a landscape is longer than a hair.
 const HAIR: f32 = 1e-2;
 
 /// Rounding error of a position and of the plane of a triangle there, in ulp.
 const ULPS: f32 = 4.0;
 
 impl Frame {
-    /// `None` where `wind` has no direction.
+    /// `None` if `wind` has no direction.
     pub(super) fn of(wind: [f64; 3], points: &[Vec3], colliders: &[Collider<'_>]) -> Option<Self> {
         let upwind = direction(-DVec3::from(wind))?;
         let bounds = Bounds::of(points);
@@ -81,7 +81,7 @@ impl Frame {
     }
 }
 
-/// Least and largest coordinates; both 0 without points.
+/// Smallest and largest coordinates; both 0 without points.
 struct Bounds {
     low: Vec3,
     high: Vec3,

@@ -1,16 +1,16 @@
 //! Which curves are in the lee of colliders: the kernel of Curve_Wind_Shielding (W4).
 //!
-//! A ray is cast upwind from each CV. As all rays are parallel, everything is rotated into a frame whose third axis points
-//! upwind; there a ray is a box without width, a hit test is a point-in-triangle test, and a large offset costs no
-//! precision. Instead of a ray a CV may use a cone: the result is the share of the cone that is covered.
+//! A ray is cast upwind from each CV. As all rays are parallel, everything is rotated into a frame whose third axis
+//! points upwind; there a ray is a box without width, a hit test is a point-in-triangle test, and a large offset costs
+//! no precision. Instead of a ray a CV may use a cone: the result is the fraction of the cone that is covered.
 //!
-//! Promise: rays are exact up to the rounding of positions and [`Shield::skin_gap`], do not slip through between triangles
-//! that share points, and are stopped by either side of a face. The covered share of a cone is a continuous function of
-//! the wind. The same bits on every SIMD path and number of threads; finite for any input.
+//! Guarantees: rays are exact up to the rounding of positions and [`Shield::skin_gap`], do not pass between triangles
+//! that share points, and are stopped by either side of a face. The covered fraction of a cone is a continuous function
+//! of the wind. The same bits on every SIMD path and number of threads; finite for any input.
 //!
-//! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the gap. So a root on
-//! the windward side of a closed skin is exposed, and one on the lee side is sheltered by the opposite side of the skin,
-//! at any angle of the wind. Limit: a root buried deeper than the gap is covered by the skin above it.
+//! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the gap. So a root
+//! on the windward side of a closed skin is exposed, and one on the lee side is sheltered by the opposite side of the
+//! skin, at any angle of the wind. Limit: a root buried deeper than the gap is covered by the skin above it.
 
 mod cone;
 mod edges;
@@ -35,14 +35,14 @@ pub struct Collider<'a> {
     pub points: &'a [Vec3],
     /// Three indices of `points` each; their winding does not matter for rays.
     pub triangles: &'a [[u32; 3]],
-    /// A tree over them, where one exists: saves building another.
+    /// A tree over them, if there is one already.
     pub tree: Option<&'a TriangleTree>,
-    /// Their [`Neighbours`], where known: saves finding them, for cones.
+    /// Their [`Neighbours`], if known; used for cones.
     pub neighbours: Option<&'a Neighbours>,
 }
 
 impl<'a> Collider<'a> {
-    /// A collider without tree and neighbours.
+    /// A collider without precomputed tree and neighbours.
     pub fn of(points: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Self {
         Self { points, triangles, tree: None, neighbours: None }
     }
@@ -51,30 +51,30 @@ impl<'a> Collider<'a> {
 /// How shelter is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Shield {
-    /// Where the wind blows to, of any length; nothing is sheltered from a wind of 0.
+    /// Direction that the wind blows towards, of any length; nothing is sheltered from a wind of 0.
     pub wind: [f64; 3],
-    /// How far upwind of a CV something shelters it, metres.
+    /// Largest distance upwind at which a collider shelters a CV, metres.
     pub offset: f32,
     /// Half the opening angle of the cone, radians, 0…0.5; 0 is a ray.
     pub cone: f32,
-    /// A CV this close to a triangle's plane lies on it, metres. At least the smaller of 1e-5 of the collider's size and
-    /// 1e-2 of the curve's, and 4 ulp of the CV's largest coordinate.
+    /// A CV this close to a triangle's plane lies on it, metres. At least the smaller of 1e-5 of the collider's size
+    /// and 1e-2 of the curve's, and 4 ulp of the CV's largest coordinate.
     pub skin_gap: f32,
 }
 
-/// CVs that are sorted together: enough to lie close together, and few enough to stay in a cache.
+/// Number of CVs that are sorted together: enough to be dense, few enough to stay in a cache.
 const SORTED_CVS: usize = 1 << 18;
 
-/// Groups of sixteen CVs that a task has: some 30 µs of work.
+/// Number of groups of sixteen CVs in a task: some 30 µs of work.
 const TASK_GROUPS: usize = 32;
 
-/// Curves a task averages over.
+/// Number of curves that a task averages over.
 const TASK_CURVES: usize = 1024;
 
 /// A collider in the frame of the wind.
 struct Obstacle {
     tree: TriangleTree,
-    /// Twice the area of each triangle, a block an entry.
+    /// Twice the area of each triangle, one entry for each block.
     areas: Vec<F32x16>,
     /// Neighbours of each triangle, which cones need; `None` for rays.
     edges: Option<Edges>,
@@ -82,11 +82,11 @@ struct Obstacle {
     size: f32,
 }
 
-/// The share of each curve's CVs that `colliders` shelter, 0…1; a curve's CVs are
+/// The fraction of each curve's CVs that `colliders` shelter, 0…1; a curve's CVs are
 /// `points[starts[i]..starts[i + 1]]`.
 ///
 /// # Panics
-/// Where `starts` decreases or ends beyond `points`, or a triangle's index is out of range.
+/// If `starts` decreases or ends beyond `points`, or a triangle's index is out of range.
 pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
     shield_on(Path::chosen(), starts, points, colliders, shield)
 }

@@ -8,7 +8,7 @@ use numerics::tree::Cuboid;
 use numerics::vector::{Vec3, sub};
 
 kernel! {
-    /// 1 in `covered` for each of up to sixteen CVs that has a collider within `reach` upwind.
+    /// Sets `covered` to 1 for each of up to sixteen CVs that has a collider within `reach` upwind.
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
@@ -105,15 +105,15 @@ pub(super) struct Seen {
     pub(super) inside: bool,
     /// Twice its area across the ray, ≥ 0 where inside.
     pub(super) across: f32,
-    /// `across` times the distance along the ray; also twice its area times the distance of its plane; negative where the
-    /// triangle lies behind the start.
+    /// `across` times the distance along the ray; also twice its area times the distance of its plane; negative if the
+    /// triangle is behind the start.
     pub(super) towards: f32,
     /// Six times the volume of the tetrahedron that it spans with the start.
     pub(super) volume: f32,
 }
 
 impl Seen {
-    /// From the corners less the start.
+    /// From the corners relative to the start.
     #[inline(always)]
     pub(super) fn from([a, b, c]: [Vec3; 3]) -> Self {
         let [x, y, z] = [beside(b, c), beside(c, a), beside(a, b)];
@@ -126,8 +126,8 @@ impl Seen {
     }
 }
 
-/// Twice the signed area that a side spans with the axis, seen along the axis: negative where the axis is to the right
-/// of the side from `p` to `q`.
+/// Twice the signed area that a side spans with the axis, seen along the axis: negative if the axis is to the right of
+/// the side from `p` to `q`.
 #[inline(always)]
 pub(super) fn beside(p: Vec3, q: Vec3) -> f32 {
     p[0] * q[1] - p[1] * q[0]

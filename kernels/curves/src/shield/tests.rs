@@ -17,7 +17,7 @@ fn lone(points: &[Vec3]) -> Vec<u32> {
 
 const STILL: Shield = Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, cone: 0.0, skin_gap: 0.0 };
 
-/// The share of each point as a curve of one CV.
+/// The result for each point as a curve of one CV.
 fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
     shield(&lone(points), points, &[Collider::of(&mesh.0, &mesh.1)], how)
 }
@@ -51,7 +51,7 @@ fn two_walls_shelter_all_that_either_shelters() {
 #[test]
 fn a_sphere_shelters_its_silhouette_at_any_offset() {
     // A ray upwind along x from p meets the unit sphere where y² + z² < 1, between √(1 − y² − z²) either side of
-    // x = 0. The mesh lies within 3e-4 of the sphere: points closer than that to a change are left out.
+    // x = 0. The mesh lies within 3e-4 of the sphere: points closer than that to the silhouette are left out.
     let mesh = sphere(64);
     let points: Vec<Vec3> =
         (0..4000u64).map(|i| [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).f32() * 5.0 - 2.5)).collect();
@@ -80,7 +80,8 @@ fn a_sphere_shelters_its_silhouette_at_any_offset() {
 
 #[test]
 fn roots_on_a_sphere_are_sheltered_on_its_lee_side_only() {
-    // On the vertices, on the middles of edges and in faces, at any turn of the wind; a face's width from the terminator.
+    // On the vertices, on the middles of edges and in faces, at any turn of the wind; a face's width from the
+    // terminator.
     let (points, triangles) = sphere(24);
     let mut roots = points.clone();
     for [a, b, c] in &triangles {
@@ -183,7 +184,7 @@ fn shelter_is_the_same_at_any_scale_and_far_from_the_origin() {
 }
 
 #[test]
-fn any_input_gives_a_share() {
+fn any_input_gives_a_fraction() {
     let inf = f32::INFINITY;
     let points = [[f32::NAN, 0.0, 0.0], [inf, 0.0, 0.0], [1e38, -1e38, 1e38], [1e-45, 0.0, 0.0], [0.5, 0.0, 0.0]];
     let (mut wall, triangles) = wall(0.0);
@@ -227,7 +228,7 @@ fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
 mod cones {
     use super::*;
 
-    /// The share of 20,000 rays of a cone, evenly spread over its disc, that meet the sphere.
+    /// The fraction of 20,000 rays, evenly spread over the disc of a cone, that hit the sphere.
     fn sampled(p: Vec3, mesh: &(Vec<Vec3>, Vec<[u32; 3]>), cone: f64) -> f32 {
         let slope = libm::tan(cone);
         let n = 2000;
@@ -242,7 +243,7 @@ mod cones {
     }
 
     #[test]
-    fn a_cone_s_share_matches_that_of_many_rays() {
+    fn the_covered_fraction_of_a_cone_matches_that_of_many_rays() {
         let mesh = sphere(8);
         for p in [
             [3.0, 0.9, 0.1],
@@ -271,7 +272,7 @@ mod cones {
         for mesh in [(points.clone(), triangles), (points, turned), (loose, vec![[0, 1, 2], [3, 4, 5]])] {
             let how = Shield { cone: 0.1, offset: 1e6, ..STILL };
             let slope = libm::tan(0.1) as f32;
-            // At the edge; half a radius in (1 − 0.1955); a quarter at the corner; all, and nothing.
+            // At the edge; half a radius inside (1 − 0.1955); a quarter at the corner; fully covered, and not at all.
             let at = |y: f32, z: f32| shares(&[[2.0, y, z]], &mesh, &how)[0];
             for (y, z, expected) in [
                 (1.0, 0.3, 0.5),
@@ -287,7 +288,7 @@ mod cones {
     }
 
     #[test]
-    fn shares_are_continuous_as_the_wind_turns() {
+    fn covered_fractions_are_continuous_as_the_wind_turns() {
         // A hundred thousandth of a turn at a time past a tumbled cube: a ray's share would jump by 1.
         let cube = shapes::block([1.0; 3], [1; 3]);
         let triangles = cube.triangles();

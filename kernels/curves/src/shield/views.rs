@@ -1,6 +1,6 @@
 //! The CVs in the frame, sorted so that sixteen successive ones see nearly the same triangles.
 //!
-//! Curves may lie in memory in any order and may be long, so CVs are sorted rather than curves: into the cells of a grid
+//! Curves may lie in memory in any order and may be long, so CVs are sorted instead of curves: into the cells of a grid
 //! across the wind, along a Z-order curve, in two passes.
 
 use super::frame::{Frame, Gap};
@@ -23,13 +23,13 @@ pub(super) struct Views {
     starts: Vec<u32>,
 }
 
-/// Curves that a task transforms into the frame.
+/// Number of curves that a task transforms into the frame.
 const TASK: usize = 256;
 
-/// CVs a cell on average.
+/// Average number of CVs in a cell.
 const IN_CELL: usize = 4;
 
-/// Log₂ of the most cells along a side of the grid.
+/// Log₂ of the largest number of cells along a side of the grid.
 const FINEST: u32 = 8;
 
 impl Views {
@@ -58,7 +58,7 @@ impl Views {
         Self { sorted, order, starts }
     }
 
-    /// All CVs, sorted so that near ones are close to each other.
+    /// All CVs, sorted so that neighbours are close to each other.
     pub(super) fn sorted(&self) -> &[View] {
         &self.sorted
     }
@@ -69,7 +69,7 @@ impl Views {
     }
 }
 
-/// Some curves' starts, and the room for their CVs.
+/// Starts of some curves, and space for their CVs.
 type Task<'a> = (&'a [u32], &'a mut [View]);
 
 /// The curves in tasks, each with its part of `views`.
@@ -116,7 +116,7 @@ fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
 /// Cells across the wind.
 struct Grid {
     low: [f32; 2],
-    /// Cells a unit of length.
+    /// Cells per unit of length.
     fine: [f32; 2],
     /// Index of the last cell along an axis.
     last: f32,
@@ -150,7 +150,7 @@ impl Grid {
     }
 }
 
-/// Spreads sixteen bits: a zero between each two.
+/// Spreads sixteen bits, with a zero between neighbours.
 fn spread(x: u32) -> u32 {
     let x = (x | x << 8) & 0x00ff_00ff;
     let x = (x | x << 4) & 0x0f0f_0f0f;

@@ -11,18 +11,18 @@ use numerics::vector::{self, IDENTITY, Vec3};
 /// 2e-7), and the axis of rotation is taken from the curve instead.
 const OPPOSITE: f32 = 1e-6;
 
-/// Area between curve and chord, as a share of the curve's size², above which the curve is bent and not straight up to
-/// rounding.
+/// Area between curve and chord, relative to the curve's size², above which the curve counts as bent, not as straight
+/// up to rounding.
 const STRAIGHT: f32 = 1e-5;
 
 /// The state of sixteen curves at a pivot.
 pub(super) struct Chain {
     /// The rotations of this and all earlier pivots, composed.
     turned: Lanes<4>,
-    /// Displacement of the CV in units, and what its sum has lost to rounding (Kahan).
+    /// Displacement of the CV in units, and the rounding error of its sum (Kahan).
     offset: Lanes<3>,
     carry: Lanes<3>,
-    /// The axes that curves bend about at rest, where one was needed.
+    /// The axes about which curves bend at rest, if one was needed.
     bulges: [Option<Vec3>; LANES],
 }
 
@@ -33,7 +33,7 @@ impl Chain {
     }
 
     /// Rotates the rest of the curve about the pivot by `share` of the angle from its tip to `towards`; `chord` is the
-    /// incoming tip less the incoming pivot. `bulge` gives the axis that a lane's curve bends about, or 0.
+    /// input tip minus the input pivot. `bulge` gives the axis that a lane's curve bends about, or 0.
     #[inline(always)]
     pub(super) fn turn(&mut self, chord: &Lanes<3>, towards: &Lanes<3>, share: &F32x16, bulge: impl Fn(usize) -> Vec3) {
         let mut tip = [F32x16::splat(0.0); 3];
@@ -65,7 +65,8 @@ impl Chain {
         }
     }
 
-    /// Advances to the next CV, at the end of `segment`; returns the displacement that the rotation of the segment adds.
+    /// Advances to the next CV, at the end of `segment`; returns the displacement that the rotation of the segment
+    /// adds.
     #[inline(always)]
     pub(super) fn advance(&mut self, bend: &Bend<'_>, segment: &Lanes<3>, at: &[usize; LANES]) -> Lanes<3> {
         let whole = bend.blend.value >= 1.0 && bend.blend.mask.is_none();
@@ -105,7 +106,7 @@ impl Chain {
         let mut out = self.turned;
         for lane in 0..LANES {
             let [x, y, z, w] = get(&self.turned, lane);
-            // The shorter rotation: one past π is one of less than π in the opposite sense.
+            // The shorter rotation: one by more than π equals one by less than π in the opposite sense.
             let part = if w < 0.0 { -part.0[lane] } else { part.0[lane] };
             let part = if sine.0[lane] > 0.0 { part / sine.0[lane] } else { 0.0 };
             let whole = share.0[lane] >= 1.0;
@@ -116,7 +117,7 @@ impl Chain {
         out
     }
 
-    /// The incoming CVs `points`, displaced: the same bits where the displacement is 0.
+    /// The input CVs `points`, displaced: the same bits if the displacement is 0.
     #[inline(always)]
     pub(super) fn displace(&self, points: &Lanes<3>, unit: &Unit) -> Lanes<3> {
         let mut out = *points;
@@ -133,7 +134,7 @@ impl Chain {
 
 /// The smallest rotation from one direction to another.
 struct Between {
-    /// Of length 1, or 0 where it is undefined.
+    /// Of length 1, or 0 if undefined.
     axis: Vec3,
     /// 0..π.
     angle: f32,
@@ -142,7 +143,7 @@ struct Between {
 }
 
 impl Between {
-    /// From `from` to `to`, of any lengths; no rotation where one is zero.
+    /// From `from` to `to`, of any lengths; no rotation if one is zero.
     #[inline(always)]
     fn of(from: Vec3, to: Vec3) -> Self {
         let normal = vector::cross(from, to);
@@ -160,8 +161,8 @@ impl Between {
     }
 }
 
-/// An axis to rotate `tip` about: the one the curve is bent about, `bulge`, or any perpendicular to `tip` where it is
-/// straight.
+/// An axis to rotate `tip` about: the one the curve is bent about, `bulge`, or any perpendicular to `tip` if the curve
+/// is straight.
 fn own_axis(bulge: Vec3, tip: Vec3) -> Vec3 {
     let along = vector::dot(bulge, tip) / vector::dot(tip, tip);
     let upright = vector::sub(bulge, vector::scale(tip, along));

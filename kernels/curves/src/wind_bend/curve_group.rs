@@ -1,4 +1,4 @@
-//! Sixteen curves, root to tip: one step a pivot, in loops over lanes.
+//! Sixteen curves, root to tip: one step for each pivot, in loops over lanes.
 //!
 //! A lane whose curve has ended, or that has none, repeats its last CV: its segments have no length, so nothing rotates
 //! and no lane masks are needed.
@@ -16,15 +16,15 @@ use numerics::vector::{self, Vec3};
 pub(super) struct CurveGroup<'a> {
     /// Index of the first one.
     pub(super) first: usize,
-    /// Where each starts, and where the last ends.
+    /// Start of each, and end of the last.
     pub(super) starts: &'a [u32],
     pub(super) points: &'a [Vec3],
 }
 
-/// Memory that groups reuse; an entry a step.
+/// Buffers that groups reuse, with an entry for each step.
 #[derive(Default)]
 pub(super) struct Scratch {
-    /// Incoming CVs.
+    /// Input CVs.
     points: Vec<Lanes<3>>,
     /// Arc length from the root to the CV, in the lane's unit.
     arc: Vec<F32x16>,
@@ -73,20 +73,20 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
     tally.reached(&length)
 }
 
-/// Where each lane's curve lies in the points.
+/// Position of each lane's curve in the points.
 pub(super) struct Curves {
-    /// Where the group's points begin.
+    /// Index of the group's first point.
     base: usize,
     first: [usize; LANES],
     last: [usize; LANES],
-    /// CVs of the lane's curve: 0 where it has none.
+    /// Number of CVs of the lane's curve: 0 if it has none.
     count: [usize; LANES],
-    /// CVs of the longest curve, at least 1.
+    /// Largest number of CVs of a curve, at least 1.
     longest: usize,
 }
 
 impl Curves {
-    /// `None` where the group has no CV.
+    /// `None` if the group has no CVs.
     fn of(group: &CurveGroup<'_>) -> Option<Self> {
         let base = group.starts[0] as usize;
         let mut curves = Self { base, first: [base; LANES], last: [base; LANES], count: [0; LANES], longest: 0 };
@@ -101,7 +101,7 @@ impl Curves {
         (curves.longest > 0).then_some(curves)
     }
 
-    /// The index of each lane's CV at `step`: of the last one where the curve has ended.
+    /// The index of each lane's CV at `step`: of the last one if the curve has ended.
     #[inline(always)]
     pub(super) fn at(&self, step: usize) -> [usize; LANES] {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step))
@@ -139,8 +139,8 @@ impl Curves {
         }
     }
 
-    /// A vector along the axis about which a lane's incoming curve bends, whose length is the area between the curve and
-    /// its chord ÷ its size²; 0 where it is straight.
+    /// A vector along the axis about which a lane's input curve bends, whose length is the area between the curve and
+    /// its chord ÷ its size²; 0 if it is straight.
     fn bulge(&self, lane: usize, points: &[Vec3]) -> Vec3 {
         let cvs = &points[self.first[lane]..=self.last[lane]];
         let size = cvs.iter().map(|cv| vector::largest(vector::sub(*cv, cvs[0]))).fold(0.0, f32::max);

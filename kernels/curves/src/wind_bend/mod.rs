@@ -1,15 +1,15 @@
 //! Wind on curves: the kernel of Curve_Wind (W2), sixteen curves side by side.
 //!
 //! Root to tip, one pivot at a time, the rest of the curve rotates about the pivot, from the direction of its *current*
-//! tip towards the wind. The accumulated rotation is one quaternion carried down the curve, so the cost is linear in CVs
-//! where moving all later points would be quadratic.
+//! tip towards the wind. The accumulated rotation is one quaternion carried down the curve, so the cost is linear in
+//! the number of CVs; moving all later points would be quadratic.
 //!
-//! Promise: the root keeps its bits; segments keep their lengths within 1e-5 of the curve's plus 4 ulp of the positions,
-//! at any number of CVs; CVs that do not move keep their bits; the same bits on every SIMD path and number of threads;
-//! finite for any finite positions below 1e37. All arithmetic is on differences of CVs, scaled to 1…2 by a power of two,
-//! so precision does not depend on the scene's position and scale beyond that of f32 positions. Limit: between exactly
-//! opposite directions the axis of rotation is undefined; within 1e-6 rad of that it is taken from the curve. Metres,
-//! radians.
+//! Guarantees: the root keeps its bits; segments keep their lengths within 1e-5 of the curve's plus 4 ulp of the
+//! positions, at any number of CVs; CVs that do not move keep their bits; the same bits on every SIMD path and number
+//! of threads; finite for any finite positions below 1e37. All arithmetic is on differences of CVs, scaled to 1…2 by a
+//! power of two, so precision does not depend on the scene's position and scale beyond that of f32 positions. Limit:
+//! between exactly opposite directions the axis of rotation is undefined; within 1e-6 rad of that it is taken from the
+//! curve. Metres, radians.
 
 mod chain;
 mod curve_group;
@@ -25,7 +25,7 @@ use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use rayon::prelude::*;
 
-/// By which share of the angle to the wind a pivot rotates.
+/// The fraction of the angle to the wind by which a pivot rotates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BendMode {
     /// As in the paper: g at every pivot. Segment k of a straight curve ends at an angle of θ₀(1−g)ᵏ⁺¹, k from 0, so
@@ -39,12 +39,12 @@ pub enum BendMode {
     },
 }
 
-/// How curves bend. Slices have one value a CV unless stated.
+/// Settings of the bend. Slices have one value for each CV unless stated.
 #[derive(Clone, Debug)]
 pub struct Bend<'a> {
-    /// Where wind blows to, of length 1.
+    /// Direction that the wind blows towards, of length 1.
     pub wind: [f32; 3],
-    /// Share g of the angle that a pivot turns: 0 none, 1 all of it.
+    /// Fraction g of the angle by which a pivot turns: 0 none, 1 all of it.
     pub rotate: Masked<'a, f32>,
     /// Scales `rotate`; below 0 or NaN counts as 0.
     pub envelope: Option<&'a [f32]>,
@@ -52,7 +52,7 @@ pub struct Bend<'a> {
     pub ramp: &'a Ramp,
     /// How g acts along the curve.
     pub mode: BendMode,
-    /// Share of each segment's whole turn that is kept, 0..1; 0 gives the incoming bits.
+    /// Fraction of each segment's turn that is applied, 0..1; 0 gives the input bits.
     pub blend: Masked<'a, f32>,
     /// Noise that varies the wind's direction.
     pub noise: Option<BendNoise<'a>>,
@@ -64,15 +64,15 @@ pub struct Bend<'a> {
 pub struct BendNoise<'a> {
     /// The field.
     pub field: &'a Field,
-    /// Of the noise, relative to a wind of length 1; 0 costs nothing.
+    /// Amplitude of the noise, relative to a wind of length 1; 0 costs nothing.
     pub amplitude: f32,
-    /// Cells of the field a metre.
+    /// Cells of the field per metre.
     pub frequency: f64,
-    /// Share of its arc length by which a CV samples downwind of its root; at 0 one sample a curve is enough.
+    /// A CV samples this many times its arc length downwind of its root; at 0 one sample for each curve is enough.
     pub waviness: f32,
-    /// Added to the root, in metres: the scene's origin less the scroll's offset.
+    /// Added to the root, in metres: the scene's origin minus the offset of the scroll.
     pub origin: [f64; 3],
-    /// Where to sample a curve's noise, one a curve; `None` is at its own root.
+    /// Position at which each curve's noise is sampled; `None`: its own root.
     pub roots: Option<&'a [[f32; 3]]>,
 }
 
@@ -80,11 +80,11 @@ pub struct BendNoise<'a> {
 #[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bent {
-    /// One point for every incoming one.
+    /// One point for each input point.
     pub points: Vec<[f32; 3]>,
     /// Largest rotation of a segment, in radians, 0..π.
     pub max_angle: f32,
-    /// Largest |length − incoming| ÷ curve length, of segments and of whole curves as written.
+    /// Largest |length − input length| ÷ curve length, of segments and of whole curves, measured on the result.
     pub length_error: f32,
 }
 
@@ -101,13 +101,13 @@ impl Reached {
     }
 }
 
-/// CVs a task has at least: some 30 µs of work, against a few for handing it to a thread.
+/// Minimum number of CVs in a task: some 30 µs of work, against a few for handing it to a thread.
 const TASK_CVS: usize = 2048;
 
 /// Bends curves `points[starts[i]..starts[i + 1]]`; curves of one CV pass through unchanged.
 ///
 /// # Panics
-/// Where `starts` decreases or does not run from 0 to the number of points, or a slice of `bend` is
+/// If `starts` decreases or does not run from 0 to the number of points, or a slice of `bend` is
 /// shorter than its points or curves.
 pub fn bend(starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
     bend_on(Path::chosen(), starts, points, bend)

@@ -1,12 +1,12 @@
-//! The share of its angle to the wind by which each pivot rotates.
+//! The fraction of the angle to the wind by which each pivot rotates.
 
 use super::{Bend, BendMode};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
 use numerics::vector;
 
-/// Largest share: beyond 1 a segment swings past the wind, beyond thousands its angle is meaningless; up to here sine and
-/// cosine of half the angle are still accurate.
+/// Largest fraction: beyond 1 a segment turns past the wind, beyond thousands its angle is meaningless. Up to this
+/// value sine and cosine of half the angle are still accurate.
 const LARGEST: f32 = 5e5;
 
 /// The shares of successive pivots.
@@ -23,8 +23,8 @@ impl<'a> Share<'a> {
         Self { bend, length, middle: F32x16::splat(0.0) }
     }
 
-    /// The shares at the pivots whose segments run between two `arcs`; `at` are the pivots' indices. 0 for a segment of
-    /// no length.
+    /// The shares at the pivots whose segments run between two `arcs`; `at` are the pivots' indices. 0 for a segment
+    /// without length.
     #[inline(always)]
     pub(super) fn at(&mut self, arcs: [&F32x16; 2], segment: &Lanes<3>, at: &[usize; LANES]) -> F32x16 {
         let mut u = F32x16::splat(0.0);
@@ -69,7 +69,7 @@ impl<'a> Share<'a> {
         for lane in 0..LANES {
             let middle = 0.5 * arcs[0].0[lane] + 0.5 * arcs[1].0[lane];
             let middle = along(middle, self.length.0[lane]);
-            // A segment of no length does not rotate; its part of Δ is left to the next.
+            // A segment without length does not rotate; its part of Δ is added to the next.
             let still = vector::largest(get(segment, lane)) == 0.0;
             let middle = if still { self.middle.0[lane] } else { middle };
             exponent.0[lane] = (middle - self.middle.0[lane]) * reference_segments;
@@ -83,13 +83,13 @@ impl<'a> Share<'a> {
     }
 }
 
-/// Arc length as a share of a curve's length; 0 on a curve of no length.
+/// Arc length relative to a curve's length; 0 on a curve without length.
 #[inline(always)]
 fn along(arc: f32, length: f32) -> f32 {
     if length > 0.0 { arc / length } else { 0.0 }
 }
 
-/// One value a lane of `values`, or 1 where there are none.
+/// The value for each lane from `values`, or 1 if there are none.
 #[inline(always)]
 pub(super) fn gather(values: Option<&[f32]>, at: &[usize; LANES]) -> F32x16 {
     match values {

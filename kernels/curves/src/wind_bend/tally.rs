@@ -7,8 +7,8 @@ use numerics::vector;
 
 /// Running measures of sixteen curves, in units.
 pub(super) struct Tally {
-    /// Squares of the difference and of the sum of a segment before and after, where their ratio, the squared tangent of
-    /// half the angle between them, is largest: accurate from 0 to π.
+    /// Squares of the difference and of the sum of a segment before and after, where their ratio, the squared tangent
+    /// of half the angle between them, is largest: accurate from 0 to π.
     difference: F32x16,
     sum: F32x16,
     /// Largest change of a segment's length, and the sum of all changes.
@@ -22,7 +22,7 @@ impl Tally {
         Self { difference: zero, sum: one, largest: zero, total: zero }
     }
 
-    /// Adds a segment: as it came in, the displacement of its end by its rotation, and as written.
+    /// Adds a segment: its input, the displacement of its end by its rotation, and its result.
     #[inline(always)]
     pub(super) fn add(&mut self, segment: &Lanes<3>, moved: &Lanes<3>, written: &Lanes<3>) {
         for lane in 0..LANES {

@@ -5,14 +5,14 @@ use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::vector;
 
-/// Largest amplitude: by then the wind's own part is below rounding, and squares are still far from overflow.
+/// Largest amplitude: the wind's own part is then below rounding, and squares are still far from overflow.
 const LARGEST: f32 = 1e12;
 
 /// The wind's direction at the CVs of sixteen curves.
 pub(super) struct WindDirection<'a> {
     wind: [f32; 3],
     noise: Option<&'a BendNoise<'a>>,
-    /// Where the roots sample the noise, in metres, an array an axis.
+    /// Positions at which the roots sample the noise, in metres, one array for each axis.
     roots: [[f64; LANES]; 3],
     /// Length of each lane's unit in metres.
     unit: &'a F32x16,

@@ -62,9 +62,9 @@ const THICKNESS: f64 = 1e-3;
 /// A pin that rolls ten thicknesses a frame, 1 cm deep in the block of [`rolled_over`].
 fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let (points, triangles) = cylinder(8, 0.05, 0.3);
-    let way = frame * 10.0 * THICKNESS;
-    let (sine, cosine) = libm::sincos(-way / 0.05);
-    let put = |[x, y, z]: &[f64; 3]| [cosine * x - sine * y - 0.08 + way, sine * x + cosine * y + 0.1, z + 0.06];
+    let distance = frame * 10.0 * THICKNESS;
+    let (sine, cosine) = libm::sincos(-distance / 0.05);
+    let put = |[x, y, z]: &[f64; 3]| [cosine * x - sine * y - 0.08 + distance, sine * x + cosine * y + 0.1, z + 0.06];
     (points.iter().map(put).collect(), triangles)
 }
 
@@ -213,8 +213,8 @@ fn bits_under_contact_are_the_same_for_any_number_of_threads_and_after_a_resume(
     assert!(one == whole(3, false) && one == whole(2, true));
 }
 
-/// A corner that ended up beyond a plate stays there, on the side it came to. Once it stretches edges to over eight
-/// times their length they are released, and it returns.
+/// A corner that has slipped beyond a plate is kept on that side. Once it stretches edges to more than eight times
+/// their length, they are released, and it returns.
 #[test]
 fn a_corner_snagged_on_a_plate_is_released_when_overstretched() {
     let (side, thick) = (0.1, 0.02);

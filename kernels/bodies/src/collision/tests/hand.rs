@@ -92,9 +92,9 @@ fn a_spike_rising_into_a_triangle_pushes_it_up() {
 #[test]
 fn points_of_a_spinning_cylinder_keep_their_radius_and_match_its_poses() {
     let (points, faces) = cylinder(8, 0.05, 0.4);
-    let turned = |angle: f64, way: f64| -> Vec<[f64; 3]> {
+    let turned = |angle: f64, distance: f64| -> Vec<[f64; 3]> {
         let (sine, cosine) = libm::sincos(angle);
-        points.iter().map(|[x, y, z]| [cosine * x - sine * y + way, sine * x + cosine * y, *z]).collect()
+        points.iter().map(|[x, y, z]| [cosine * x - sine * y + distance, sine * x + cosine * y, *z]).collect()
     };
     let poses = [pose(0.0, &points), pose(0.5, &turned(2.5, 0.1)), pose(1.0, &turned(3.0, 0.1))];
     let pin = Obstacle::new(&faces, &poses, 0.04, 1e-3, 0.5).unwrap();
@@ -195,9 +195,9 @@ fn facing_sheets_touch_but_neighbouring_elements_do_not() {
     }
 }
 
-/// A spike rises to a millimetre below a sheet of two triangles with one corner pulled away. Stretched to over eight
-/// times its rest length, that triangle is released, and so is the corner, which no other edge holds; the rest of the
-/// sheet is not.
+/// A spike rises to a millimetre below a sheet of two triangles with one corner pulled away. When that triangle is
+/// stretched to more than eight times its rest length, it is released, and so is the corner, which has no other edges;
+/// the rest of the sheet is not.
 #[test]
 fn overstretched_skin_is_released() {
     let rest = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];

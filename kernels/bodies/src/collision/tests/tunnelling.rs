@@ -4,18 +4,23 @@ use super::*;
 use nalgebra::Matrix3;
 
 /// Whether the segment from `p` crosses a triangle (Möller & Trumbore), and whether from above.
-fn goes_through(p: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<bool> {
-    let system = Matrix3::from_columns(&[-way, b - a, c - a]);
+fn crossing_side(p: DVec3, displacement: DVec3, [a, b, c]: [DVec3; 3]) -> Option<bool> {
+    let system = Matrix3::from_columns(&[-displacement, b - a, c - a]);
     let x = system.try_inverse()? * (p - a);
     let inside = x.iter().all(|x| (0.0..=1.0).contains(x)) && x[1] + x[2] <= 1.0;
-    inside.then(|| (b - a).cross(&(c - a)).dot(&way) < 0.0)
+    inside.then(|| (b - a).cross(&(c - a)).dot(&displacement) < 0.0)
 }
 
 /// Small triangles, and their positions after the motion.
-fn specks(count: u64, size: f64, start: impl Fn(u64) -> DVec3, way: impl Fn(u64) -> DVec3) -> [Vec<[f64; 3]>; 2] {
+fn specks(
+    count: u64,
+    size: f64,
+    start: impl Fn(u64) -> DVec3,
+    displacement: impl Fn(u64) -> DVec3,
+) -> [Vec<[f64; 3]>; 2] {
     let from = (0..count).flat_map(|k| [0, 1, 2].map(|corner| (start(k) + random(77, 3 * k + corner) * size).into()));
     let from: Vec<[f64; 3]> = from.collect();
-    let to = from.iter().zip(0..).map(|(p, index)| (DVec3::from(*p) + way(index / 3)).into()).collect();
+    let to = from.iter().zip(0..).map(|(p, index)| (DVec3::from(*p) + displacement(index / 3)).into()).collect();
     [from, to]
 }
 
@@ -28,8 +33,8 @@ fn no_fast_vertex_tunnels_through_a_plate_or_a_blade() {
     const COUNT: u64 = 33_334;
     for (size, thickness) in [([1.0, 1e-3, 1.0], 1e-3), ([0.5, 1e-5, 0.05], 1e-3)] {
         let (points, faces) = cuboid(size);
-        let way = DVec3::new(0.02, 0.1, -0.01);
-        let moved: Vec<[f64; 3]> = points.iter().map(|p| (DVec3::from(*p) + way).into()).collect();
+        let displacement = DVec3::new(0.02, 0.1, -0.01);
+        let moved: Vec<[f64; 3]> = points.iter().map(|p| (DVec3::from(*p) + displacement).into()).collect();
         let plate = Obstacle::new(&faces, &[pose(0.0, &points), pose(1.0, &moved)], 1.0, thickness, 0.5).unwrap();
         let above = |k: u64| {
             let p = random(1, k).component_mul(&DVec3::new(1.4 * size[0], 0.3, 1.4 * size[2]));
@@ -46,18 +51,18 @@ fn no_fast_vertex_tunnels_through_a_plate_or_a_blade() {
         let (mut through, mut near) = (0, 0);
         for vertex in 0..from.len() {
             let p = DVec3::from(from[vertex]);
-            let relative = DVec3::from(to[vertex]) - p - way;
+            let relative = DVec3::from(to[vertex]) - p - displacement;
             let entered = faces.iter().any(|face| {
-                goes_through(p, relative, face.map(|corner| DVec3::from(points[corner as usize]))) == Some(true)
+                crossing_side(p, relative, face.map(|corner| DVec3::from(points[corner as usize]))) == Some(true)
             });
             if entered {
                 through += 1;
                 let holds = |contact: &&Contact| {
                     let n = DVec3::from(contact.normal);
-                    n.dot(&(p + way)) - contact.offset > -1e-12
+                    n.dot(&(p + displacement)) - contact.offset > -1e-12
                         && n.dot(&DVec3::from(to[vertex])) - contact.offset < 0.0
                 };
-                // It may also have come around a corner; then at least one side has to hold it.
+                // It may also have moved around a corner; then at least one side has to stop it.
                 assert!(of[vertex].iter().any(holds), "{vertex} went through: {:?}", of[vertex]);
             } else if vertex % 50 == 0 {
                 let distance = |t: f64| {
@@ -84,14 +89,14 @@ fn no_fast_edge_tunnels_through_a_ridge() {
     let mut from: Vec<[f64; 3]> = Vec::new();
     let mut to: Vec<[f64; 3]> = Vec::new();
     for k in 0..COUNT {
-        let (at, along, way) = (random(3, k), random(4, k), random(5, k));
+        let (at, along, displacement) = (random(3, k), random(4, k), random(5, k));
         let middle = DVec3::new(2.2 * at.x, 0.01 + 0.2 * (at.y + 0.5), 0.2 * at.z);
         let half = DVec3::new(0.1 * along.x, 0.05 * along.y, 0.1);
-        let way = DVec3::new(0.2 * way.x, -0.2 * (way.y + 0.5), 0.2 * way.z);
-        let trailing = middle - (way - up).normalize();
+        let displacement = DVec3::new(0.2 * displacement.x, -0.2 * (displacement.y + 0.5), 0.2 * displacement.z);
+        let trailing = middle - (displacement - up).normalize();
         for p in [middle - half, middle + half, trailing] {
             from.push(p.into());
-            to.push((p + way).into());
+            to.push((p + displacement).into());
         }
     }
     let skin = BodySkin::new(&from, &triples(COUNT), &[]).unwrap();
@@ -105,9 +110,9 @@ fn no_fast_edge_tunnels_through_a_ridge() {
     for k in 0..COUNT as usize {
         let [p, q, end] = [from[3 * k], from[3 * k + 1], to[3 * k]].map(DVec3::from);
         let [a, b] = [DVec3::from(tent[0]), DVec3::from(tent[1])];
-        let way = end - p - up;
+        let displacement = end - p - up;
         // p + s(q − p) + t·displacement = a + u(b − a).
-        let Some(inverse) = Matrix3::from_columns(&[q - p, way, a - b]).try_inverse() else { continue };
+        let Some(inverse) = Matrix3::from_columns(&[q - p, displacement, a - b]).try_inverse() else { continue };
         let x = inverse * (a - p);
         if x.iter().all(|x| (0.0..=1.0).contains(x)) {
             through += 1;
@@ -115,9 +120,8 @@ fn no_fast_edge_tunnels_through_a_ridge() {
             let mut mine =
                 contacts.iter().filter(|contact| contact.particles[..2] == pair && contact.weights[1] != 0.0);
             assert!(
-                mine.any(
-                    |contact| DVec3::from(contact.normal).dot(&way) < 0.0 && (contact.weights[1] - x[0]).abs() < 1e-6
-                ),
+                mine.any(|contact| DVec3::from(contact.normal).dot(&displacement) < 0.0
+                    && (contact.weights[1] - x[0]).abs() < 1e-6),
                 "{k} went through at {x:?}"
             );
         }
@@ -130,9 +134,9 @@ fn spin(scale: f64) -> Vec<Contact> {
     const COUNT: u64 = 2000;
     let (points, faces) = cylinder(4, 0.1 * scale, 0.4 * scale);
     let (sine, cosine) = libm::sincos(0.8);
-    let way = 0.05 * scale;
+    let displacement = 0.05 * scale;
     let turned: Vec<[f64; 3]> =
-        points.iter().map(|[x, y, z]| [cosine * x - sine * y + way, sine * x + cosine * y, *z]).collect();
+        points.iter().map(|[x, y, z]| [cosine * x - sine * y + displacement, sine * x + cosine * y, *z]).collect();
     let poses = [pose(0.0, &points), pose(1.0, &turned)];
     let pin = Obstacle::new(&faces, &poses, 1.0, 2e-3 * scale, 0.5).unwrap();
     let [from, to] = specks(COUNT, 0.05 * scale, |k| random(8, k) * (0.5 * scale), |k| random(9, k) * (0.1 * scale));

@@ -120,7 +120,7 @@ fn a_block_dropped_on_the_ground_comes_to_rest_there() {
         assert!(lowest(&state) < THICKNESS);
         assert!(fastest(&state) < 1e-4 * 9.81 / 24.0, "E {stiffness}, volume {volume}: {}", fastest(&state));
         assert!(newton < 240 * 6, "{newton} iterations");
-        // Its weight compresses a cube of height h by ½ρgh²/E, give or take its sides.
+        // Its weight compresses a cube of height h by about ½ρgh²/E.
         let sag = 0.2 - centre(&body, &state).y;
         assert!(sag < 0.4 * 1000.0 * 9.81 * 0.16 / stiffness + THICKNESS, "{sag}");
     }

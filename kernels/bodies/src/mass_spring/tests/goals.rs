@@ -46,7 +46,7 @@ fn a_body_stays_in_a_goal_that_became_its_rest_shape() {
     let mut solver = BodySolver::new(&body);
     for number in 0..240 {
         if (24..28).contains(&number) {
-            // A quarter, a third, a half, then all of what is left.
+            // A quarter, a third, a half, then all of the remaining change.
             let _ = reset(&body, &mut state, &shape, 1.0 / f64::from(28 - number), 1.0);
         }
         let force_implicit_euler = (24..28).contains(&number);
@@ -89,7 +89,7 @@ fn a_reset_keeps_dents_and_returns_the_energy_it_adds() {
     let nowhere = vec![[f64::NAN; 3]; body.len()];
     let kept = state.clone();
     assert_eq!(reset(&body, &mut state, &nowhere, 1.0, 0.0), 0.0);
-    assert_eq!(state, kept, "what has no goal stays");
+    assert_eq!(state, kept, "particles without a goal stay");
 }
 
 #[test]

@@ -118,7 +118,7 @@ fn a_mirrored_tetrahedron_recovers() {
     let mut state = State::at_rest(&body);
     state.positions[3][2] = -1.0;
     let report = steps(&body, &mut state, &BARE, 100);
-    assert_eq!(report.inverted_tets, 1, "springs alone are content with a mirror image");
+    assert_eq!(report.inverted_tets, 1, "springs alone cannot tell a mirror image");
     let report = steps(&body, &mut state, &SolverFrame { volume: 1.0, ..BARE }, 100);
     assert_eq!(report.inverted_tets, 0);
     assert!((report.volume_ratio - 1.0).abs() < 1e-3);
@@ -134,7 +134,7 @@ fn zero_length_springs_and_coinciding_particles_stay_finite() {
         let mut state = State::at_rest(&body);
         let report = survives(&body, &mut state, &SolverFrame { integrator, ..BARE }, 5.0);
         let length = (DVec3::from(state.positions[1]) - DVec3::from(state.positions[2])).norm();
-        assert!(report.kinetic.is_finite() && length > 0.3, "doubled particles part: {length}");
+        assert!(report.kinetic.is_finite() && length > 0.3, "coinciding particles separate: {length}");
         let tight = (DVec3::from(state.positions[0]) - DVec3::from(state.positions[1])).norm();
         assert!(tight < 0.1, "{tight}");
     }
@@ -233,7 +233,7 @@ fn invalid_bodies_are_refused() {
     assert_eq!(error.to_string(), "tetrahedron 0 joins particles [0, 1, 2, 4]; expected distinct indices below 4");
     let error = body(&[[0.0; 3], [f64::NAN; 3]], &[], 1.0).unwrap_err();
     assert_eq!(error.to_string(), "point 1 is not finite");
-    // A point in no tetrahedron is light, not nothing.
+    // A point in no tetrahedron has a small mass, not zero.
     let loose = [points[0], points[1], points[2], points[3], [9.0; 3]];
     let mesh = Mesh { points: &loose, tets: &[[0, 1, 2, 3]], ..Mesh::default() };
     let masses = SoftBody::new(&mesh, &material(1.0, 1.0, 0.0), &[]).unwrap().masses();

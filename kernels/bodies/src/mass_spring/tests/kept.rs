@@ -1,9 +1,9 @@
-//! Invariants besides momentum and energy (those are in tests/softbody/accuracy): rest, bits.
+//! Invariants besides momentum and energy (which tests/softbody/accuracy covers): rest, bits.
 
 use super::*;
 
 #[test]
-fn a_rigid_motion_meets_no_force() {
+fn rigid_motion_causes_no_force() {
     let body = block_body([3, 3, 3], 0.1, &material(1000.0, 1e9, 0.01));
     let mut state = State::at_rest(&body);
     let turn = nalgebra::Rotation3::from_scaled_axis(DVec3::new(0.3, -1.2, 0.7));
@@ -50,7 +50,7 @@ fn bits_are_the_same_for_any_number_of_threads_and_after_a_resume() {
 }
 
 #[test]
-fn an_empty_frame_changes_no_bit() {
+fn a_frame_of_zero_seconds_changes_no_bit() {
     let body = block_body([2, 2, 2], 0.1, &material(1000.0, 1e5, 0.01));
     let mut state = State::at_rest(&body);
     let before = state.clone();

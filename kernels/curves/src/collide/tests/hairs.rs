@@ -58,8 +58,8 @@ fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Upright fur on the unit sphere, and what a wind along `wind` would make of it: each segment turned by half of what
-/// is left.
+/// Upright fur on the unit sphere, and its shape in a wind along `wind`: each segment turned by half of the remaining
+/// angle.
 fn fur(curves: u64, cvs: usize, long: f64, wind: DVec3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
     let (mut rest, mut goal) = (Vec::new(), Vec::new());
     for k in 0..curves {
@@ -104,8 +104,8 @@ fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
 
 #[test]
 fn a_hair_blown_down_stops_one_gap_above_the_floor() {
-    // From its root 0.1 above the floor a segment of length 1 is to point down: it stops where sin φ = 0.1, less the
-    // arc 1e-4 of a radius of 1.
+    // From its root 0.1 above the floor a segment of length 1 is to point down: it stops at sin φ = 0.1, minus an arc
+    // of 1e-4 at radius 1.
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
     let obstacles = [&tree];
@@ -134,7 +134,7 @@ fn a_hair_without_contact_keeps_its_goal_s_bits() {
 #[test]
 fn a_segment_pushed_through_a_wall_by_the_previous_one_turns_out_of_it() {
     // The rest curve goes up, then hooks over to +x. Turning the first segment to +x hooks the second down through the
-    // floor, from where it turns up again until it is free: level, its gap above the floor.
+    // floor, from where it turns up again until it is free: level, one gap above the floor.
     let (points, triangles) = floor();
     let tree = TriangleTree::build(&points, &triangles);
     let obstacles = [&tree];
@@ -236,7 +236,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     for scale in [1.0, 0.5] {
         let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale), ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &kept);
-        // Lengths are kept, so a CV lies a little lower than what was asked, above all at a bend.
+        // Lengths are kept, so a CV lies slightly lower than requested, especially at a bend.
         let share: Vec<f64> = out.points.iter().zip(&rest).map(|(now, rest)| height(now) / height(rest)).collect();
         let low = share.iter().filter(|share| **share < 0.6 * scale).count();
         assert!(low < share.len() / 100, "{scale}: {low}");
@@ -250,7 +250,7 @@ fn without_offset_roots_on_the_skin_keep_their_bits() {
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let (starts, mut rest, mut goal) = fur(300, 4, 0.3, DVec3::x());
-    // Roots on corners of the mesh: nothing lies nearer.
+    // Roots on corners of the mesh: nothing is closer.
     for (k, ends) in starts.windows(2).enumerate() {
         let corner = to_f64(mesh.0[k % mesh.0.len()]);
         let base = to_f64(goal[ends[0] as usize]);

@@ -51,7 +51,7 @@ fn first_by_events(sector: &Sector, corners: &[DVec3; 3]) -> Option<f64> {
             }
         }
     }
-    // What it crosses at the start is met at once.
+    // Anything it crosses at the start is met at once.
     if crosses(&DVec3::zeros(), &(sector.u * sector.reach), corners) {
         angles.push(0.0);
     }
@@ -70,7 +70,7 @@ fn a_level_segment_meets_a_floor_at_the_arcsine_of_its_height() {
 
 #[test]
 fn a_needle_is_met_at_its_angle() {
-    // An upright sliver at 30° from the start, half way out.
+    // An upright sliver at 30° from the start, at half the radius.
     let at = DVec3::new(0.5 * libm::cos(FRAC_PI_6), 0.5 * libm::sin(FRAC_PI_6), 0.0);
     let needle = [at + DVec3::new(0.0, 0.0, -1.0), at + DVec3::new(1e-7, 0.0, 1.0), at + DVec3::new(0.0, 1e-7, 1.0)];
     let found = first(&sector(DVec3::x(), DVec3::y(), 1.0), &needle).unwrap();
@@ -123,7 +123,7 @@ fn a_million_random_turns_meet_triangles_at_the_angle_of_the_first_event() {
 
 #[test]
 fn a_thick_segment_is_stopped_beside_its_plane() {
-    // The plane of the turn passes 0.01 beside a sheet that stands across it further out.
+    // The plane of the turn passes at a distance of 0.01 from a sheet that stands across it farther out.
     let beside = [DVec3::new(0.5, 0.5, 0.01), DVec3::new(0.6, 0.4, 0.5), DVec3::new(0.4, 0.6, 0.5)];
     let thin = sector(DVec3::x(), DVec3::y(), 1.0);
     assert_eq!(first(&thin, &beside), None);

@@ -1,4 +1,4 @@
-//! Controls: shares worked by hand, own spaces, flat ones, outlines.
+//! Controls: distances worked out by hand, their own spaces, flat controls, outlines.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn linear(keys: &[[f32; 2]]) -> Ramp {
     Ramp::new(keys.to_vec(), Interpolation::Linear).unwrap()
 }
 
-/// Reads off the share itself: 1 − share inside, 0 outside.
+/// A ramp that shows the distance itself: 1 − distance inside, 0 outside.
 fn felt(control: Control, points: &[[f32; 3]]) -> Vec<f32> {
     let falloff = one();
     evaluate(points, &Gusts { base: 0.0, falloff: &falloff, spheres: &[], controls: &[control], incoming: None }).values
@@ -30,7 +30,7 @@ fn the_share_in_cubes_is_a_half_at_the_inner_and_1_at_the_outer_boundary() {
     let points = [[0.0; 3], [0.5, 0.1, -0.2], [0.3, -1.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 3.1, 0.0]];
     // Outer 3: m = 0, ½, 1, 2, 3, 3.1; shares 0, ¼, ½, ¾, 1, beyond.
     assert_eq!(felt(control(3.0), &points), [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]);
-    // Outer 1, and what is less: nothing beyond the inner cube.
+    // Outer 1 and less: nothing beyond the inner cube.
     for outer in [1.0, 0.2, f64::NAN] {
         assert_eq!(felt(control(outer), &points), [1.0, 0.75, 0.5, 0.0, 0.0, 0.0]);
     }
@@ -77,7 +77,7 @@ fn a_control_without_volume_reaches_nothing() {
             assert_eq!(felt(control, &[[0.0; 3], [0.1, 0.1, 0.0]]), [0.0, 0.0], "{axes:?}");
         }
     }
-    // Thin is not flat.
+    // A thin control is not flat.
     let thin = [UNIT[0], UNIT[1], [0.0, 0.0, 1e-9]];
     assert_eq!(felt(Control::new(ControlShape::Sphere, [0.0; 3], thin, 2.0, one(), 1.0), &[[0.0; 3]]), [1.0]);
 }

@@ -1,4 +1,4 @@
-//! Extremes: nothing there, sizes at the ends of f32, ten thousand gusts over each other.
+//! Extremes: empty inputs, sizes at the ends of f32, ten thousand overlapping gusts.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn no_points_or_no_gusts_is_valid() {
 }
 
 #[test]
-fn radii_of_0_and_hardly_more_reach_nothing() {
+fn radii_of_almost_0_reach_nothing() {
     let falloff = one();
     for radius in [0.0, f32::MIN_POSITIVE, -1.0, f32::NAN] {
         assert_eq!(evaluate(&[[0.0; 3]], &only(&falloff, &[sphere([0.0; 3], radius)])).values, [0.0], "{radius}");
@@ -49,7 +49,7 @@ fn ten_thousand_overlapping_gusts_saturate_at_1() {
         .collect();
     let felt = evaluate(&points, &only(&falloff, &gusts));
     assert_eq!((felt.values, felt.reached), (vec![1.0; points.len()], points.len()));
-    // Weak ones, so that none of them may be left out.
+    // Weak ones, so that none of them may be skipped.
     let weak: Vec<Sphere> = gusts[..1000].iter().map(|gust| Sphere { strength: 1e-5, noise: 0.0, ..*gust }).collect();
     let felt = evaluate(&points, &only(&falloff, &weak));
     assert!(felt.values.iter().all(|x| (5e-3..1e-2).contains(x)));

@@ -37,10 +37,10 @@ fn draws_lie_in_their_ranges_and_depend_on_seed_and_index_only() {
         assert!((1.0..=48.0).contains(&gust.start) && (0.0..1.0).contains(&gust.speed));
         assert!(gust.position.iter().all(|x| (-1.0..1.0).contains(x)));
     }
-    // More gusts leave those that were there alone; another seed does not.
+    // More gusts do not change the others; another seed does.
     assert_eq!(Draw { gusts: 60, ..PLAIN }.at(50.0).gusts[..gusts.len()], gusts);
     assert_ne!(Draw { seed: 8, ..PLAIN }.at(50.0).gusts, gusts);
-    // Neighbours at a later moment are the same gusts.
+    // At a later moment the same gusts are found.
     let later = PLAIN.at(50.5).gusts;
     let same = gusts.iter().filter(|a| later.iter().any(|b| b.salt == a.salt && b.start == a.start));
     assert!(same.count() + 3 > gusts.len());
@@ -57,7 +57,7 @@ fn a_gust_repeats_with_new_random_numbers() {
     assert_eq!(starts(-88.0), [-90.0], "rounds reach back without end");
     assert_eq!(starts(50.0), [0.0; 0]);
     assert_ne!(at(12.0)[0].radius, at(112.0)[0].radius);
-    // Round 0 is the gust that does not come again.
+    // Round 0 equals the gust without repetition.
     assert_eq!(Draw { repeat: 0.0, ..draw }.at(12.0).gusts, at(12.0));
 }
 
@@ -78,7 +78,7 @@ fn too_many_rounds_are_bounded_and_counted() {
     let living = draw.at(100.0);
     assert!(living.gusts.len() as u64 <= MOST_LIVING && living.gusts.len() > 50_000);
     assert!(living.dropped > 900_000_000_000);
-    // Too short to be one: it does not come again.
+    // Too short for a round: the gust does not repeat.
     assert_eq!(Draw { repeat: 1e-30, ..PLAIN }.at(50.0), PLAIN.at(50.0));
     assert_eq!(Draw { gusts: 0, ..PLAIN }.at(50.0), Living::default());
 }
@@ -86,7 +86,7 @@ fn too_many_rounds_are_bounded_and_counted() {
 #[test]
 fn the_plane_lies_upwind_of_the_box_and_covers_it() {
     let box_ = [[0.0, 0.0, 0.0], [4.0, 2.0, 6.0]];
-    // Along x: 1 m before x = 0; level is −z, up is y.
+    // Wind along x: the plane is 1 m before x = 0; its level side is −z, its upright side y.
     let plane = Plane::new(box_, [1.0, 0.0, 0.0], 1.0, [0.0; 2]);
     assert_eq!(plane.at([0.0, 0.0]), [-1.0, 1.0, 3.0]);
     assert_eq!(plane.at([1.0, 1.0]), [-1.0, 2.0, 0.0]);
@@ -99,7 +99,7 @@ fn the_plane_lies_upwind_of_the_box_and_covers_it() {
         assert_eq!(plane.at([0.0, 0.0])[1], 1.0 - wind[1]);
         assert_eq!([(corner[0] - 2.0).abs(), (corner[2] - 3.0).abs()], [2.0, 3.0]);
     }
-    // Askew: no corner of the box is upwind of the plane.
+    // An oblique wind: no corner of the box is upwind of the plane.
     let wind = [0.6, -0.48, 0.64];
     let start = Plane::new(box_, wind, 0.0, [0.0; 2]).at([0.3, -0.8]);
     for corner in 0..8 {

@@ -26,7 +26,7 @@ fn only<'a>(falloff: &'a Ramp, spheres: &'a [Sphere]) -> Gusts<'a> {
     Gusts { base: 0.0, falloff, spheres, controls: &[], incoming: None }
 }
 
-/// Points strewn over a cube of this half size about a centre.
+/// Random points in a cube of this half size about a centre.
 fn strewn(count: u64, centre: [f32; 3], half: f32) -> Vec<[f32; 3]> {
     let point =
         |k: u64| [0, 1, 2].map(|axis| centre[axis as usize] + Key::new(3).of(k).of(axis).between([-half, half]));

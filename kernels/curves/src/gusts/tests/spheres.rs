@@ -57,10 +57,10 @@ fn noise_keeps_the_centre_and_stays_within_the_sphere() {
     for noise in [0.1, 0.5, 1.0] {
         let dented = evaluate(&points, &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
         for (dented, round) in dented.values.iter().zip(&round.values) {
-            assert!(dented <= round, "noise took nothing away: {dented} over {round}");
+            assert!(dented <= round, "noise did not shrink the gust: {dented} and {round}");
         }
         assert!(dented.reached > 0 && dented.reached < round.reached);
-        // The boundary lies at 1 − noise at the least.
+        // The boundary is at 1 − noise or farther.
         let least = 0.999 * (1.0 - noise);
         let inside =
             points.iter().zip(&dented.values).filter(|(p, _)| p.iter().map(|x| x * x).sum::<f32>() < least * least);

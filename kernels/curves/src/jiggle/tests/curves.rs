@@ -8,13 +8,14 @@ fn distance(a: Vec3, b: Vec3) -> f64 {
     (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|d| d * d).sum::<f64>().sqrt()
 }
 
-/// Distance of a position this large from the next.
+/// Spacing of f32 positions of this size.
 fn ulp(points: &[Vec3]) -> f64 {
     let largest = points.iter().map(|point| vector::largest(*point)).fold(0.0, f32::max);
     f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
 }
 
-/// Segments as long as their targets' to 1e-5 of the curve and 4 ulp; roots the same bits.
+/// Checks that segments are as long as their targets' to 1e-5 of the curve and 4 ulp, and that roots have the same
+/// bits.
 fn assert_kept(starts: &[u32], targets: &[Vec3], found: &[Vec3]) {
     for ends in starts.windows(2) {
         let curve = ends[0] as usize..ends[1] as usize;
@@ -57,7 +58,7 @@ fn lengths_and_roots_are_kept_and_every_path_and_number_of_threads_has_the_same_
 #[test]
 fn lengths_are_restored_root_to_tip_by_hand() {
     // Both segments of length 1 upwards; the free CVs are pushed by 1 and by 1 along x. Segment 1 points to (1, 1): it
-    // ends at (√½, √½). Segment 2 stays upright, and its root is there.
+    // ends at (√½, √½). Segment 2 stays upright and starts there.
     let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
     let mut jiggle = Jiggle::at_rest(&[0, 3], &points, &points);
     for cv in 1..3 {
@@ -69,22 +70,22 @@ fn lengths_are_restored_root_to_tip_by_hand() {
     assert!(shaped.points.iter().zip(expected).all(|(a, b)| distance(*a, b) < 2e-7), "{shaped:?}");
     let far = 2.0 - f64::sqrt(2.0);
     assert!((shaped.max_offset - far.sqrt()).abs() < 1e-12);
-    // Half of the push: (½, 1) ÷ √1.25. A mask of ½ does the same; nothing of it the very bits.
+    // Half of the push: (½, 1) ÷ √1.25. A mask of ½ gives the same, and 0 the same bits.
     let half = jiggle.shape(0.5.into());
     assert!((half.points[1][0] - 0.5 / 1.25_f32.sqrt()).abs() < 1e-7);
     assert_eq!(jiggle.shape(Masked { value: 1.0, mask: Some(&[0.5; 3]) }), half);
     assert_eq!(
         jiggle.shape(Masked { value: 0.25, mask: Some(&[9.0; 3]) }).points,
         jiggle.shape(1.0.into()).points,
-        "a mask ends at the whole"
+        "the masked blend is clamped to 1"
     );
     assert_eq!(jiggle.shape(Masked { value: 1.0, mask: Some(&[0.0, -1.0, 0.0]) }).points, points);
-    // Nothing was fed back.
+    // Lengths are not fed back into the state.
     assert_eq!(jiggle.batches[0].states[1].offset[0].0[0], 1.0);
 }
 
 #[test]
-fn what_stands_still_keeps_its_bits() {
+fn still_curves_keep_their_bits() {
     let (starts, points) = wobbling(60, 9, 3.0);
     let points: Vec<Vec3> = points.iter().map(|p| [p[0], -0.0, p[2]]).collect();
     let ramp = soft();
@@ -138,7 +139,7 @@ fn masks_scale_frequency_and_damping_from_a_quarter_to_four() {
 }
 
 #[test]
-fn a_spring_that_changes_on_the_way_is_heard() {
+fn a_spring_may_change_between_steps() {
     let ramp = soft();
     let run = |phases: [f64; 3]| {
         let mut jiggle = Jiggle::at_rest(&ONE, &at(0.0), &at(0.0));
@@ -152,7 +153,7 @@ fn a_spring_that_changes_on_the_way_is_heard() {
 }
 
 #[test]
-fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_come_out() {
+fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_work() {
     let ramp = rising();
     let long: Vec<Vec3> = (0..10_000).map(|k| [0.0, k as f32 * 1e-4, 0.0]).collect();
     let mut points = vec![[1.0; 3], [2.0; 3], [2.0; 3], [3.0; 3], [3.0; 3], [3.0; 3]];
@@ -172,7 +173,7 @@ fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_come_out() {
 }
 
 #[test]
-fn a_scene_scaled_by_a_power_of_two_swings_the_same_bits() {
+fn scaling_by_a_power_of_two_is_exact() {
     let ramp = rising();
     let run = |scale: f32| {
         let frame = |frame: f32| wobbling(40, 6, frame).1.iter().map(|p| p.map(|x| x * scale)).collect::<Vec<_>>();
@@ -190,7 +191,7 @@ fn a_scene_scaled_by_a_power_of_two_swings_the_same_bits() {
 }
 
 #[test]
-fn between_two_shapes_lengths_are_between_theirs() {
+fn lengths_are_interpolated_between_two_shapes() {
     let starts = [0, 3, 3, 4];
     let from = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [5.0; 3]];
     let to = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 1.0], [5.0; 3]];

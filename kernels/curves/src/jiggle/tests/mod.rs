@@ -29,7 +29,7 @@ fn at(x: f32) -> [Vec3; 2] {
     [[0.0, 0.0, 0.0], [x, 1.0, 0.0]]
 }
 
-/// How far along x the second CV is, before lengths are restored.
+/// Position along x of the second CV, before lengths are restored.
 fn free(jiggle: &Jiggle) -> f64 {
     let state = &jiggle.batches[0].states[1];
     f64::from(state.target[0].0[0]) + state.offset[0].0[0]

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// e^M by scaling and squaring, M 4 × 4: an oracle that shares no formula with the kernel.
+/// e^M by scaling and squaring for a 4 × 4 matrix M: a reference that shares no formula with the kernel.
 fn exponential(m: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     let size = m.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut halvings = 0;
@@ -32,7 +32,8 @@ fn exponential(m: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     sum
 }
 
-/// Where a spring is after each of the steps between `targets`: (x, v/ω, target, its speed/ω) by the matrix exponential.
+/// Position of a spring after each of the steps between `targets`, by the matrix exponential on (x, v/ω, target, its
+/// speed/ω).
 fn exact(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     let d = if drag == Drag::Target { 1.0 } else { 0.0 };
     let row = [-1.0, -2.0 * zeta, 1.0, 2.0 * zeta * d];
@@ -78,7 +79,7 @@ fn any_step_and_damping_gives_the_exact_response_to_the_piecewise_linear_target(
             for drag in [Drag::Target, Drag::World] {
                 for targets in signals(100) {
                     let (found, exact) = (run(phase, zeta, drag, &targets), exact(phase, zeta, drag, &targets));
-                    // Squaring a stiff exponential costs the oracle digits.
+                    // Squaring a stiff exponential costs the reference digits.
                     let tolerance = 1e-9 + 4e-16 * phase * (1.0 + zeta);
                     assert!(tolerance < 1e-6);
                     for (frame, (found, exact)) in found.iter().zip(&exact).enumerate() {
@@ -93,14 +94,14 @@ fn any_step_and_damping_gives_the_exact_response_to_the_piecewise_linear_target(
 
 #[test]
 fn free_decay_by_hand() {
-    // Pulled from 1 to 0 within a step so short that the spring does not notice: then x = e^(−ζωt)(cos σωt + ζ/σ·sin σωt)
-    // for ζ < 1, (1 + ωt)·e^(−ωt) for ζ = 1. The pull itself: the limit of a step of no length.
+    // The target moves from 1 to 0 within a step so short that the spring does not respond; then x = e^(−ζωt)(cos σωt +
+    // ζ/σ·sin σωt) for ζ < 1, (1 + ωt)·e^(−ωt) for ζ = 1. The first step is the limit of a step of zero length.
     let (phase, frames) = (0.37, 60);
     for zeta in [0.025, 0.6, 1.0] {
         let ramp = soft();
         let mut jiggle = Jiggle::at_rest(&ONE, &at(1.0), &at(1.0));
         jiggle.step(&at(0.0), &spring(1e-12, zeta, &ramp, Drag::World), 1.0, None);
-        // A velocity is metres a step, and that step was short.
+        // Velocities are in metres per step, and that step was short.
         jiggle.batches[0].states[1].velocity = [F64x16::ZERO; 3];
         for frame in 1..=frames {
             jiggle.step(&at(0.0), &spring(phase, zeta, &ramp, Drag::Target), 1.0, None);
@@ -116,7 +117,7 @@ fn free_decay_by_hand() {
 }
 
 #[test]
-fn a_steady_ramp_is_met_with_drag_to_the_target_and_lagged_by_two_zeta_over_omega_without() {
+fn the_lag_behind_a_steady_ramp_is_zero_or_two_zeta_over_omega() {
     // x'' = 0, x' = target' in ξ = −2ζ(1 − d)·V/ω.
     let targets: Vec<f32> = (0..400).map(|k| k as f32 * 0.125).collect();
     for (drag, lag) in [(Drag::Target, 0.0), (Drag::World, 2.0 * 0.5 / 0.8 * 0.125)] {
@@ -126,7 +127,7 @@ fn a_steady_ramp_is_met_with_drag_to_the_target_and_lagged_by_two_zeta_over_omeg
 }
 
 #[test]
-fn against_the_true_sine_the_error_falls_with_the_square_of_the_step() {
+fn the_error_for_a_sine_falls_with_the_square_of_the_step() {
     // Of x'' = −2ζ(x' − d·cos) − (x − sin) at ω = 1 and target sin(2t): steady part by complex division.
     let (zeta, forcing, end) = (0.3, 2.0_f64, 12.0);
     let error = |steps: u32| {
@@ -139,7 +140,7 @@ fn against_the_true_sine_the_error_falls_with_the_square_of_the_step() {
             jiggle.step(&at(libm::sin(forcing * time) as f32), &spring(1.0, zeta, &ramp, Drag::Target), dt, None);
             fine.push(free(&jiggle));
         }
-        // Homogeneous part from rest at x = 0, x' = 0 added to the steady one.
+        // The homogeneous part, from rest at x = 0, x' = 0, is added to the steady one.
         let (re, im) = (1.0 - forcing * forcing, 2.0 * zeta * forcing);
         // H = (1 + iq)/(re + i·im), q = 2ζ·forcing: steady x = Im(H·e^{i·forcing·t}).
         let size = re * re + im * im;
@@ -175,7 +176,7 @@ fn extremes_stay_finite_and_bounded_by_the_targets() {
 }
 
 #[test]
-fn a_spring_has_forgotten_its_start_by_the_end_of_its_window_and_not_long_before() {
+fn the_window_bounds_the_influence_of_the_initial_state_tightly() {
     for zeta in [0.025, 0.3, 0.9, 0.999, 1.0, 1.001, 2.0, 10.0] {
         for phase in [0.02, 0.3, 2.0] {
             for tolerance in [1e-2, 1e-3, 1e-6] {

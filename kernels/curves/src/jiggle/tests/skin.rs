@@ -4,7 +4,7 @@ use super::*;
 use crate::attach::{RootPose, SkinBinding, attach_curves};
 use numerics::vector::{DMat3, DQuat, DVec3, rotation, to_f32, to_f64};
 
-/// A triangle, and a curve of four CVs upon it.
+/// A triangle, and a curve of four CVs on it.
 const FACE: [Vec3; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [0.0, 0.125, 1.0]];
 
 fn curve(frame: u32) -> Vec<Vec3> {
@@ -23,7 +23,7 @@ fn bound(points: &[Vec3], roots: &[Vec3]) -> SkinBinding {
     SkinBinding::to_closest(points, &[[0, 1, 2]], roots).unwrap()
 }
 
-/// The curves' offsets after `frames` frames, over a skin that moves as `motion` says, or none.
+/// The curves' offsets after `frames` frames, over a skin that moves by `motion`, or without a skin.
 fn run(frames: u32, share: f64, skinned: bool, motion: impl Fn(u32) -> (f64, [f64; 3])) -> Vec<Vec3> {
     let at = |points: &[Vec3], frame: u32| {
         let (angle, by) = motion(frame);
@@ -55,7 +55,7 @@ fn tumbling(frame: u32) -> (f64, [f64; 3]) {
 }
 
 #[test]
-fn with_all_motion_inherited_a_swing_on_a_tumbling_skin_is_the_swing_on_a_still_one_moved_along() {
+fn inheriting_all_motion_gives_the_swing_on_a_still_skin_moved_along() {
     for frames in [1, 3, 10, 40] {
         let still = run(frames, 1.0, true, |_| (0.0, [0.0; 3]));
         let (angle, by) = tumbling(frames);
@@ -67,7 +67,7 @@ fn with_all_motion_inherited_a_swing_on_a_tumbling_skin_is_the_swing_on_a_still_
 
 #[test]
 fn rigid_motion_of_skin_and_curves_alone_leaves_no_swing() {
-    // The curve is its own at rest, so all it does is the skin's.
+    // The curve is at rest relative to the skin, so all of its motion is the skin's.
     let rest = curve(0);
     let roots = bound(&FACE, &rest[..1]);
     let ramp = rising();
@@ -86,7 +86,7 @@ fn rigid_motion_of_skin_and_curves_alone_leaves_no_swing() {
 }
 
 #[test]
-fn with_none_inherited_it_swings_as_in_the_world_to_the_bit() {
+fn inheriting_no_motion_equals_having_no_skin_to_the_bit() {
     assert_eq!(bits(&run(20, 0.0, true, tumbling)), bits(&run(20, 1.0, false, tumbling)));
 }
 
@@ -95,7 +95,7 @@ fn pose(rotation: DQuat, translation: [f64; 3]) -> RootPose {
 }
 
 #[test]
-fn a_share_of_a_motion_is_that_share_of_angle_and_translation() {
+fn a_fraction_of_a_motion_is_that_fraction_of_angle_and_translation() {
     let about_z = |angle: f64| rotation(DVec3::z(), angle);
     let root = DVec3::new(1.0, 0.0, 0.0);
     for angle in [0.1, 1.0, 3.1, -2.0] {
@@ -106,7 +106,7 @@ fn a_share_of_a_motion_is_that_share_of_angle_and_translation() {
         assert!((step.change - expected).amax() < 1e-14, "{angle}: {step:?}");
         assert_eq!((step.about, step.shift), (root, DVec3::new(0.25, 1.0, 0.0)));
     }
-    // Half a turn exactly, about each axis: half of it is a quarter, whichever way round.
+    // Half a turn exactly, about each axis: half of it is a quarter turn, in either direction.
     for axis in 0..3 {
         let mut imaginary = [0.0; 3];
         imaginary[axis] = 1.0;
@@ -123,13 +123,13 @@ fn a_share_of_a_motion_is_that_share_of_angle_and_translation() {
 }
 
 #[test]
-fn a_skin_that_collapses_moves_its_curves_and_rotates_none() {
+fn a_collapsed_skin_moves_its_curves_without_rotating_them() {
     let roots = bound(&FACE, &[[0.25; 3]]);
     let [whole, turned, flat] =
         [FACE.to_vec(), moved(&FACE, 1.0, [0.0; 3]), vec![[1.0; 3]; 3]].map(|skin| roots.poses(&skin)[0]);
     assert!(flat.lost && !turned.lost);
     let root = DVec3::repeat(0.25);
-    // Into the collapse and out of it.
+    // Steps into the collapse and out of it.
     for (from, to) in [(turned, flat), (flat, turned)] {
         let step = RigidStep::between(root, &from, &to, 1.0);
         assert_eq!((step.change, step.shift), (DMat3::zeros(), to.translation - from.translation));

@@ -1,4 +1,4 @@
-//! Stiff, empty and absurd input: finite output, kept lengths, no panic.
+//! Stiff, empty and extreme input: finite output, kept lengths, no panic.
 
 use super::*;
 use numerics::masked::Masked;
@@ -69,7 +69,7 @@ fn against_the_wind_a_curve_turns_in_the_plane_it_bends_in() {
         let arc = vec![[0.0; 3], [-0.3, 0.2 * side, 0.0], [-0.7, 0.2 * side, 0.0], [-1.0, 0.0, 0.0]];
         let bent = Groom::of(&[arc]).bend(&plain(&ramp));
         assert!(bent.points.iter().all(|cv| cv[2].abs() < 1e-6), "{:?}", bent.points);
-        // On in the sense of its own bend: over the side it bulges away from.
+        // It continues in the sense of its own bend, over the side opposite to its bulge.
         assert!(bent.points[3][1] * side < -0.3, "{:?}", bent.points);
     }
 }
@@ -192,7 +192,7 @@ fn nan_in_one_curve_neither_panics_nor_touches_the_others() {
 
 #[test]
 fn ten_thousand_pivots_against_the_wind_take_linear_time() {
-    // So little turns at each pivot that all of them stay opposite; each asks for the curve's axis.
+    // Each pivot turns so little that all of them stay opposite to the wind; each needs the curve's axis.
     let ramp = one();
     let curve = straight([0.0; 3], [-1.0, 0.0, 0.0], 10_000);
     let groom = Groom::of(&vec![curve; 32]);

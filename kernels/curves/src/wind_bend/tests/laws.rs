@@ -1,11 +1,11 @@
-//! Laws with a closed form, and those of symmetry.
+//! Closed forms and symmetries.
 
 use super::*;
 use numerics::masked::Masked;
 use numerics::noise::NoiseKind;
 use std::f64::consts::PI;
 
-/// Straight up-ish at `theta` to the wind (along x).
+/// A straight curve at an angle of `theta` to the wind (along x).
 fn leaning(theta: f64) -> Vec3 {
     [libm::cos(theta) as f32, (0.6 * libm::sin(theta)) as f32, (0.8 * libm::sin(theta)) as f32]
 }
@@ -85,7 +85,7 @@ fn resolution_free_angles_follow_the_middle_of_each_segment() {
 }
 
 #[test]
-fn resolution_free_lies_along_the_wind_at_once_from_g_1_on() {
+fn resolution_free_lies_along_the_wind_from_g_1_on() {
     let ramp = one();
     let mode = BendMode::ResolutionFree { reference_segments: 4.0 };
     for g in [1.0, 3.0] {
@@ -127,7 +127,7 @@ fn scene_and_wind_turned_moved_or_scaled_together_give_the_same_shape() {
     let expected: Vec<_> = bent.iter().map(|cv| turned(*cv)).collect();
     assert!(farthest(&groom.map(turned).bend(&with).points, &expected) < 1e-5);
 
-    // Moved by powers of two, so that the input keeps its digits but for those beyond 2⁻²¹.
+    // Moved by powers of two, so that the input keeps its digits except those beyond 2⁻²¹.
     let moved = |cv| vector::add(cv, [8.0, -4.0, 16.0]);
     let expected: Vec<_> = bent.iter().map(|cv| moved(*cv)).collect();
     assert!(farthest(&groom.map(moved).bend(&plain(&ramp)).points, &expected) < 1e-5 + 4.0 * ulp(16.0));

@@ -9,7 +9,7 @@ use numerics::ramp::Interpolation;
 use numerics::random::Key;
 use numerics::vector::{self, DVec3, Vec3, to_f64};
 
-/// Curves, their CVs in one list.
+/// Curves, with their CVs in one list.
 struct Groom {
     starts: Vec<u32>,
     points: Vec<Vec3>,
@@ -28,7 +28,7 @@ impl Groom {
         bend(&self.starts, &self.points, with)
     }
 
-    /// With all CVs mapped.
+    /// The groom with all CVs mapped.
     fn map(&self, change: impl Fn(Vec3) -> Vec3) -> Self {
         Self { starts: self.starts.clone(), points: self.points.iter().map(|cv| change(*cv)).collect() }
     }
@@ -108,8 +108,8 @@ fn ulp(largest: f32) -> f64 {
     f64::from(f32::from_bits(largest.to_bits() + 1)) - f64::from(largest)
 }
 
-/// Roots keep their bits, all is finite, and segments and curves keep their lengths within 1e-5 of the curve's and 4 ulp
-/// of the positions.
+/// Roots keep their bits, all is finite, and segments and curves keep their lengths within 1e-5 of the curve's and 4
+/// ulp of the positions.
 fn assert_kept(groom: &Groom, bent: &Bent) {
     assert!(bent.max_angle.is_finite() && bent.length_error.is_finite());
     for ends in groom.starts.windows(2) {
