@@ -1,4 +1,4 @@
-//! A bench for one node: the inputs and params of a test, cooked as a graph would cook them.
+//! A bench for one node: inputs and params from a test, cooked as in a graph.
 //!
 //! ```ignore
 //! let out = bench(&NODE).input(CURVES, curves).set(SHIELD, 0.5).cook();
@@ -61,7 +61,7 @@ impl Bench {
     /// Adds a wire to an input.
     ///
     /// # Panics
-    /// Where the node has no such input.
+    /// If the node has no such input.
     #[must_use]
     pub fn input<A>(self, input: Input<A>, geometry: impl Into<Geometry>) -> Self {
         let geometry = geometry.into();
@@ -71,17 +71,17 @@ impl Bench {
     /// Adds a wire whose geometry moves.
     ///
     /// # Panics
-    /// Where the node has no such input.
+    /// If the node has no such input.
     #[must_use]
     pub fn moving<A>(self, input: Input<A>, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
         self.wire(input.name(), Arc::new(at), true)
     }
 
-    /// Changes the geometry of every wire of an input, whether added before or after: for inputs that accept only what a
-    /// certain node makes.
+    /// Changes the geometry of every wire of an input, whether added before or after this call: for inputs that accept
+    /// only the output of a certain node.
     ///
     /// # Panics
-    /// Where the node has no such input.
+    /// If the node has no such input.
     #[must_use]
     pub fn changed<A>(mut self, input: Input<A>, change: Change) -> Self {
         let place = self.node.inputs.iter().position(|declared| declared.spec().name == input.name());
@@ -90,7 +90,7 @@ impl Bench {
         self
     }
 
-    /// Where each param's value comes from, in the order of the declaration.
+    /// The source of each param's value, in the order of the declaration.
     pub(crate) fn sources(&self) -> &[Source] {
         &self.params
     }
@@ -105,16 +105,16 @@ impl Bench {
     /// Sets a param.
     ///
     /// # Panics
-    /// Where the node has no such param.
+    /// If the node has no such param.
     #[must_use]
     pub fn set<T: ParamType>(self, param: Param<T>, value: T::Value) -> Self {
         self.source(param.name(), Source::Constant(T::erase(value)))
     }
 
-    /// Animates a param with keys at frames, linear between them.
+    /// Animates a param with keys at frames, interpolated linearly.
     ///
     /// # Panics
-    /// Where the node has no such param.
+    /// If the node has no such param.
     #[must_use]
     pub fn keyed<T: ParamType>(self, param: Param<T>, keys: &[(f64, T::Value)]) -> Self {
         let keys = keys.iter().map(|(frame, value)| (*frame, T::erase(value.clone()))).collect();
@@ -122,10 +122,10 @@ impl Bench {
         self.source(param.name(), Source::Keys(Arc::new(keys), T::shape()))
     }
 
-    /// Sets where a param's value comes from.
+    /// Sets the source of a param's value.
     ///
     /// # Panics
-    /// Where the node has no such param.
+    /// If the node has no such param.
     #[must_use]
     pub fn source(mut self, param: &str, source: Source) -> Self {
         let place = self.node.params.iter().position(|declared| declared.spec().name == param);
@@ -159,7 +159,7 @@ impl Bench {
     /// Cooks one frame of the first output.
     ///
     /// # Panics
-    /// Where the node refuses.
+    /// If the node refuses.
     pub fn cook(&self) -> BenchResult {
         self.try_cook().unwrap_or_else(|error| panic!("{error}"))
     }
@@ -167,7 +167,7 @@ impl Bench {
     /// Cooks one frame of the first output.
     ///
     /// # Errors
-    /// Where the node refuses.
+    /// If the node refuses.
     pub fn try_cook(&self) -> Result<BenchResult, Error> {
         let mut frames = self.try_frames(&[self.frame]).map_err(|error| error.error.clone())?;
         Ok(frames.remove(0))
@@ -176,7 +176,7 @@ impl Bench {
     /// Cooks whole frames of the first output, in the order given.
     ///
     /// # Panics
-    /// Where the node refuses.
+    /// If the node refuses.
     pub fn frames(&self, frames: impl IntoIterator<Item = i64>) -> Vec<BenchResult> {
         let frames: Vec<Frame> = frames.into_iter().map(Frame::whole).collect();
         self.try_frames(&frames).unwrap_or_else(|error| panic!("{error}"))
@@ -185,7 +185,7 @@ impl Bench {
     /// Cooks frames of the first output, in the order given.
     ///
     /// # Errors
-    /// Where the node refuses one of them.
+    /// If the node refuses one of them.
     pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<BenchResult>, Arc<CookError>> {
         let graph = self.graph();
         let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
@@ -244,7 +244,7 @@ impl Bench {
 /// Cooks all outputs of a graph at some frames: results by output and frame, and the report.
 ///
 /// # Panics
-/// Where the request cannot be cooked at all.
+/// If the request cannot be cooked at all.
 pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(usize, Frame), Arc<Geometry>>, Report) {
     let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
     let mut found = BTreeMap::new();
@@ -271,7 +271,7 @@ impl BenchResult {
     /// The component of a kind.
     ///
     /// # Panics
-    /// Where it is absent.
+    /// If it is absent.
     pub fn part(&self, kind: Kind) -> &Component {
         self.geometry.part(kind).unwrap_or_else(|| panic!("the result has no {kind}"))
     }
@@ -279,7 +279,7 @@ impl BenchResult {
     /// The curves.
     ///
     /// # Panics
-    /// Where there are none.
+    /// If there are none.
     pub fn curves(&self) -> &Component {
         self.part(Kind::Curves)
     }
@@ -287,7 +287,7 @@ impl BenchResult {
     /// The mesh.
     ///
     /// # Panics
-    /// Where there is none.
+    /// If there is none.
     pub fn mesh(&self) -> &Component {
         self.part(Kind::Mesh)
     }

@@ -1,7 +1,7 @@
-//! What every node promises, checked from its declaration alone, and a bench for the tests of one node.
+//! Checks of what every node promises, derived from its declaration alone, and a bench for testing a single node.
 //!
-//! A node's test calls [`conforms`]. The suite reads the declaration, tries the node with sample geometry and values of its
-//! params, and reports every broken promise. There is one file per promise:
+//! A node's test calls [`conforms`]. The suite reads the declaration, cooks the node with sample geometry and param
+//! values, and reports every broken promise. There is one file per promise:
 //!
 //! | promise | file |
 //! |---|---|
@@ -14,13 +14,13 @@
 //! | Outputs carry the declared components; metrics are published and finite. | `outputs` |
 //! | A stage reported as left out has no effect. | `left_out` |
 //! | Results are finite and nothing panics, on degenerate and extreme geometry too. | `errors` |
-//! | Bits depend on what the node is given and on nothing else. | `determinism` |
+//! | Bits depend on inputs, params and frame only. | `determinism` |
 //! | The bits of a frame do not depend on which other frames are cooked. | `frames` |
 //! | A solver's checkpoint holds its whole state. | `checkpoints` |
 //!
-//! The suite is a search, not a proof. It may miss what a node does only with more than a few hundred rows or with a rare
-//! pair of values. It cannot see an undeclared attribute that no sample has, nor whether a stage that is left out costs
-//! time. What it cannot invent (files, texts in a language) a test supplies through [`Conformance::with`].
+//! The suite is a search, not a proof. It may miss behaviour that occurs only with more than a few hundred rows or with
+//! a rare pair of values. It cannot detect an undeclared attribute that no sample has, nor whether a stage that is left
+//! out costs time. Values that it cannot invent (files, code) are supplied by the test through [`Conformance::with`].
 
 mod bench;
 mod panics;

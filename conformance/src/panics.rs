@@ -1,7 +1,7 @@
 //! Keeps panics that a test expects off the terminal.
 //!
-//! Panics outside [`quietly`] are printed as usual. Limit: while any thread is inside, panics of cooking threads are not
-//! printed, whichever test they cook for.
+//! Panics outside [`quietly`] are printed as usual. Limit: while any thread is inside, panics of cooking threads are
+//! not printed, whichever test they cook for.
 
 use std::cell::Cell;
 use std::sync::Once;
@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 thread_local! { static HERE: Cell<bool> = const { Cell::new(false) }; }
 
-/// How many threads are inside [`quietly`].
+/// Number of threads inside [`quietly`].
 static INSIDE: AtomicUsize = AtomicUsize::new(0);
 
 /// Runs `work`; panics in it, and in the threads that cook for it, are not printed.
 ///
-/// The panic hook is set once and stays: it belongs to the whole process, and tests that run in parallel would remove each
-/// other's.
+/// The panic hook is set once and stays: it belongs to the whole process, and tests that run in parallel would remove
+/// each other's.
 pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -32,7 +32,7 @@ pub fn quietly<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Marks a thread as inside; dropped on the way out, also when `work` panics.
+/// Marks a thread as inside; dropped on exit, also when `work` panics.
 struct Inside(bool);
 
 impl Inside {

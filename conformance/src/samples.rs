@@ -1,7 +1,7 @@
-//! Sample geometry: small components of every kind, in several forms, with attributes that a node did not ask for.
+//! Sample geometry: small components of every kind, in several forms, with additional attributes.
 //!
-//! All samples of one kind and form have the same topology, whatever their seed, so that what a node compares point by
-//! point (a rest pose, a moving skin) matches.
+//! All samples of one kind and form have the same topology, whatever their seed, so that components that a node
+//! compares point by point (a rest pose, a moving skin) match.
 
 use numerics::random::Key;
 
@@ -24,16 +24,16 @@ pub(crate) enum Form {
     Huge,
     /// Coordinates that are denormal.
     Tiny,
-    /// All points on one spot.
+    /// All points at one position.
     Heap,
-    /// Small, a long way from the origin.
+    /// Small, far from the origin.
     Far,
-    /// Nothing but curves without length and coincident points, and a flat face or tet among the others.
+    /// Only curves without length and coincident points, and a flat face or tet among the others.
     Degenerate,
 }
 
 impl Form {
-    /// Forms that no scene should have, and some will.
+    /// Degenerate and extreme forms, which occur nevertheless.
     pub(crate) const EXTREMES: [Self; 6] =
         [Self::Empty, Self::Huge, Self::Tiny, Self::Heap, Self::Far, Self::Degenerate];
 
@@ -56,15 +56,15 @@ impl Form {
 /// Which attributes besides `P` a sample has.
 #[derive(Clone, Copy)]
 pub(crate) struct Dress<'a> {
-    /// Attributes that the node reads, random; their seed.
+    /// Attributes that the node reads, with random values; their seed.
     pub(crate) declared: Option<u64>,
-    /// Attributes that it does not read, random; their seed.
+    /// Attributes that it does not read, with random values; their seed.
     pub(crate) others: Option<u64>,
     /// What the node reads.
     pub(crate) reads: &'a [(String, Owner, ColumnType)],
 }
 
-/// The components of a wire into an input; `any` chooses them where the input takes any.
+/// The components of a wire into an input; `any` chooses them if the input takes any.
 pub(crate) fn kinds(needs: Needs, any: usize) -> Vec<Kind> {
     match needs {
         Needs::Kind(kind) => vec![kind],
@@ -79,7 +79,7 @@ pub(crate) fn kinds(needs: Needs, any: usize) -> Vec<Kind> {
     }
 }
 
-/// A geometry with components of `kinds`. `seed` moves points and changes nothing else.
+/// A geometry with components of `kinds`. `seed` only moves points.
 pub(crate) fn geometry(kinds: &[Kind], form: Form, seed: u64, dress: Dress) -> Geometry {
     let mut geometry = Geometry::default();
     for kind in kinds {
@@ -150,13 +150,13 @@ fn dressed(part: &mut Component, form: Form, dress: Dress) {
     }
 }
 
-/// A number for a name.
+/// A hash of a name.
 fn hash(name: &str) -> u64 {
     name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(257).wrapping_add(u64::from(byte)))
 }
 
-/// A rest pose: points of another sample of that form, moved a little. It does not depend on where the points of `part`
-/// are, so that a change of one is not a change of the other.
+/// A rest pose: the points of another sample of that form, moved slightly. It does not depend on the points of `part`,
+/// so that the two can change independently.
 fn rest(part: &Component, form: Form, at: Key) -> Column {
     let moved = |(row, p): (usize, &[f32; 3])| p.map(|x| x + 0.01 * at.of(row as u64).f32());
     let other = component(part.kind(), form, Key::new(5));
@@ -198,7 +198,7 @@ fn component(kind: Kind, form: Form, at: Key) -> Component {
     }
 }
 
-/// Up to 2 mm in each direction, so that nothing is regular by accident.
+/// Random offsets of up to 2 mm, so that nothing is regular by accident.
 fn jitter(at: Key, row: usize) -> [f32; 3] {
     std::array::from_fn(|k| at.of((row * 3 + k) as u64).between([-0.002, 0.002]))
 }
@@ -211,7 +211,7 @@ fn settled(form: Form, at: Key, mut positions: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
     positions
 }
 
-/// Which CVs of a curve lie on one spot.
+/// Which CVs of a curve coincide.
 #[derive(Clone, Copy)]
 enum Doubled {
     No,
@@ -369,7 +369,8 @@ fn tets(form: Form, at: Key) -> Component {
         positions.extend(
             (0..8).map(|k| [0.05 * corner(k, 0) + 0.06 * cube as f32, 0.05 * corner(k, 1), 0.05 * corner(k, 2)]),
         );
-        // From corner 0 to corner 7 along the axes in each of their six orders; odd orders have the opposite orientation.
+        // From corner 0 to corner 7 along the axes in each of their six orders; odd orders have the opposite
+        // orientation.
         let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
         for (place, order) in orders.iter().enumerate() {
             let [a, b] = [1 << order[0], (1 << order[0]) | (1 << order[1])];
@@ -432,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ball_is_closed_and_its_faces_look_outwards() {
+    fn the_ball_is_closed_and_faces_outwards() {
         let mesh = component(Kind::Mesh, Form::Small, Key::new(0));
         let faces = mesh.faces().expect("a mesh");
         let mut edges = std::collections::BTreeMap::new();
@@ -450,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn tets_are_turned_the_right_way() {
+    fn tets_are_positively_oriented() {
         let part = component(Kind::Tets, Form::Other, Key::new(3));
         for tet in part.tet_corners() {
             let [a, b, c, d] = tet.map(|k| part.positions()[k as usize]);

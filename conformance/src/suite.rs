@@ -19,17 +19,17 @@ use engine::param::{Source, Unset};
 /// Checks all promises of a node, and fails with everything that was found.
 ///
 /// # Panics
-/// Where the node does not conform.
+/// If the node does not conform.
 pub fn conforms(node: &'static Node) {
     conformance(node).run();
 }
 
-/// Everything that is wrong with a node, one finding per line; empty where it conforms.
+/// Everything that is wrong with a node, one finding per line; empty if it conforms.
 pub fn faults(node: &'static Node) -> Vec<String> {
     conformance(node).faults()
 }
 
-/// The suite for a node that needs what the suite cannot invent; see [`Conformance::with`].
+/// The suite for a node that needs values that the suite cannot invent; see [`Conformance::with`].
 pub fn conformance(node: &'static Node) -> Conformance {
     Conformance { node, samples: Vec::new() }
 }
@@ -41,8 +41,8 @@ pub struct Conformance {
 }
 
 impl Conformance {
-    /// Tries the node with what `prepare` sets on the bench, such as a file or a text in a language. Several samples take
-    /// turns. The params that a sample sets are not varied.
+    /// Adds a sample: `prepare` sets values on the bench, such as a file or code. Trials alternate between several
+    /// samples. The params that a sample sets are not varied.
     #[must_use]
     pub fn with(mut self, prepare: impl Fn(Bench) -> Bench + Send + Sync + 'static) -> Self {
         self.samples.push(Arc::new(prepare));
@@ -52,7 +52,7 @@ impl Conformance {
     /// Checks all promises, and fails with everything that was found.
     ///
     /// # Panics
-    /// Where the node does not conform.
+    /// If the node does not conform.
     pub fn run(self) {
         let name = self.node.name;
         let faults = self.faults();
@@ -73,7 +73,7 @@ impl Conformance {
         if !tried.iter().any(|(_, outcome)| outcome.is_whole()) {
             let first = tried.first().and_then(|(_, outcome)| outcome.errors.first());
             if let Some((_, ErrorKind::Refused | ErrorKind::File, error)) = first {
-                let fact = "it refuses all that the suite can offer; give it samples with `with`";
+                let fact = "it refuses all samples of the suite; provide suitable ones with `with`";
                 findings.add(format!("{fact}: {error}"));
             }
             return findings.0;
@@ -94,7 +94,7 @@ impl Conformance {
     }
 }
 
-/// What was found, each once.
+/// Findings, each once.
 #[derive(Default)]
 pub(crate) struct Findings(Vec<String>);
 
@@ -124,7 +124,8 @@ fn try_all(subject: &Subject) -> Vec<(Trial, Outcome)> {
     trials.map(|trial| (trial.clone(), subject.run(&trial, &frames))).collect()
 }
 
-/// Default params: with attributes and without, with optional inputs and without, lists of 0, 1 and 2 wires, both forms.
+/// Default params: with attributes and without, with optional inputs and without, lists of 0, 1 and 2 wires, and two
+/// forms.
 fn defaults(subject: &Subject) -> Vec<Trial> {
     let full = subject.defaults(2);
     let mut bare = Trial { declared: None, others: None, ..subject.defaults(0) };

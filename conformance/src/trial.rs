@@ -17,7 +17,7 @@ use engine::param::{ParamSpec, Params, Source, Value};
 use engine::plan::{Plan, Request};
 use engine::time::Frame;
 
-/// Sets what the suite cannot invent: files, texts in a language.
+/// Sets values that the suite cannot invent, such as files and code.
 pub(crate) type Prepare = Arc<dyn Fn(Bench) -> Bench + Send + Sync>;
 
 /// The node under test, and its declaration.
@@ -32,11 +32,11 @@ pub(crate) struct Subject {
 /// How inputs change with time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motion {
-    /// They stand still, and the engine knows.
+    /// They do not change, and the engine knows.
     Still,
     /// They move.
     Moving,
-    /// They stand still, and the engine does not know.
+    /// They do not change, but the engine does not know.
     Unknown,
 }
 
@@ -44,9 +44,9 @@ pub(crate) enum Motion {
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
     pub(crate) settings: Vec<Source>,
-    /// Which of the prepared samples, where there are any.
+    /// Index of the prepared sample, if there are any.
     pub(crate) sample: usize,
-    /// By input: the seed of each wire.
+    /// For each input the seed of each wire.
     pub(crate) wires: Vec<Vec<u64>>,
     pub(crate) form: Form,
     /// Seed of the attributes that the node declares to read.
@@ -71,7 +71,7 @@ impl Trial {
         trial
     }
 
-    /// The same with the points of one input elsewhere.
+    /// The same with other positions of one input's points.
     pub(crate) fn reseeded(&self, input: usize) -> Self {
         let mut trial = self.clone();
         trial.wires[input].iter_mut().for_each(|seed| *seed += 1_000);
@@ -79,25 +79,25 @@ impl Trial {
     }
 }
 
-/// What came out of a trial.
+/// The outcome of a trial.
 pub(crate) struct Outcome {
     pub(crate) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
     /// The first error of each node, by output.
     pub(crate) errors: Vec<(usize, ErrorKind, String)>,
     pub(crate) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
-    /// Which params were read.
+    /// The params that were read.
     pub(crate) read: Vec<bool>,
     pub(crate) left_out: Vec<LeftOut>,
-    /// Attributes read and written, where the params decide which.
+    /// Attributes read and written, if they depend on params.
     pub(crate) names: Option<[AttrNames; 2]>,
-    /// The geometry of each wire; where inputs move, the node got other positions.
+    /// The geometry of each wire; moving inputs had other positions.
     pub(crate) given: Vec<Vec<Geometry>>,
 }
 
-/// The engine with that number of threads.
+/// An engine with that number of threads.
 pub(crate) fn engine(threads: usize) -> &'static Engine {
     static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
-        // Without memory, so that no trial finds results of an earlier one.
+        // Without a cache, so that no trial finds results of an earlier one.
         [1, 2, 7].map(|threads| (threads, Engine::new(&Settings { threads, memory: 0 }).expect("threads")))
     });
     let found = ENGINES.iter().find(|(count, _)| *count == threads);
@@ -195,8 +195,9 @@ impl Subject {
         (bench.graph(), given)
     }
 
-    /// What a component that passes through comes from: the input that the output is like, else the first single input that
-    /// has such a component.
+    /// The source of a component that passes through: the input that the output is like, otherwise the first single
+    /// input with
+    /// such a component.
     pub(crate) fn source<'o>(&self, outcome: &'o Outcome, output: &Output, kind: Kind) -> Option<&'o Geometry> {
         let index = match output.carries {
             Carries::Like(name) => self.inputs.iter().position(|input| input.name == name)?,
@@ -208,7 +209,7 @@ impl Subject {
         outcome.given[index].first()
     }
 
-    /// The stages that the node reports as left out in a trial, without cooking it; none where params are refused.
+    /// The stages that the node reports as left out in a trial, without cooking it; none if params are refused.
     pub(crate) fn left_out(&self, trial: &Trial) -> Vec<LeftOut> {
         let (graph, _) = self.graph(trial);
         let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: self.frames() };
@@ -216,7 +217,7 @@ impl Subject {
         quietly(|| catch_unwind(AssertUnwindSafe(stages))).ok().flatten().unwrap_or_default()
     }
 
-    /// The params of a trial at the start of the scene; `None` where they are refused.
+    /// The params of a trial at the start of the scene; `None` if they are refused.
     pub(crate) fn params(&self, trial: &Trial) -> Option<Params> {
         let (graph, _) = self.graph(trial);
         let request = Request::everything(&graph);
@@ -330,7 +331,7 @@ impl Outcome {
         self.digest(&|_| false)
     }
 
-    /// A hash of the results at one frame, or of the errors where there are none.
+    /// A hash of the results at one frame, or of the errors if there are none.
     pub(crate) fn at(&self, frame: Frame) -> Key {
         let mut key = Hasher::default();
         let mut there = false;
@@ -344,7 +345,7 @@ impl Outcome {
         key.finish()
     }
 
-    /// Whether all frames of all outputs came out.
+    /// Whether all frames of all outputs were delivered.
     pub(crate) fn is_whole(&self) -> bool {
         self.errors.is_empty()
     }

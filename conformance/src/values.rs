@@ -18,8 +18,8 @@ pub struct RangeEnd {
     pub outside: Value,
 }
 
-/// The finite ends of a param's hard range, the lower one first; none for params without numbers. A value of several
-/// numbers has all of them at the end.
+/// The finite ends of a param's hard range, the lower one first; none for params without numbers. If a value has
+/// several numbers, all of them are at the end.
 pub fn range_ends(spec: &ParamSpec) -> Vec<RangeEnd> {
     let hard = spec.facts.hard;
     let whole = matches!(spec.shape, Shape::Int | Shape::Int3);
@@ -42,7 +42,7 @@ pub fn range_ends(spec: &ParamSpec) -> Vec<RangeEnd> {
     [(hard.low, -1.0), (hard.high, 1.0)].into_iter().filter(|(end, _)| end.is_finite()).filter_map(end).collect()
 }
 
-/// Values worth trying: both ends of the range, its middle, each option. None is refused.
+/// Values to try: both ends of the range, its middle, each option. All are valid.
 pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     let [low, high] = ends(spec);
     let middle = 0.5 * low + 0.5 * high;
@@ -100,7 +100,7 @@ pub(crate) fn candidates(spec: &ParamSpec) -> Vec<Value> {
     values.into_iter().filter(|value| spec.refuses(value).is_none()).collect()
 }
 
-/// A random value: often the default, often a candidate, otherwise anywhere in the usual range.
+/// A random value: often the default, often one of the candidates, otherwise anywhere in the usual range.
 pub(crate) fn random(spec: &ParamSpec, at: Key) -> Value {
     let candidates = candidates(spec);
     let pick = at.of(1).f32();
@@ -125,11 +125,11 @@ pub(crate) fn random(spec: &ParamSpec, at: Key) -> Value {
     }
 }
 
-/// Whole numbers above this are not tried without need: they may be counts of things to make.
+/// Integers above this are not tried without need: they may be counts of elements.
 const MOST_COUNT: f64 = 64.0;
 
-/// The range of values that are tried: the hard range where it is finite, otherwise the usual range, otherwise a wide range
-/// around the default. Whole numbers keep to the usual range where the hard one is too wide.
+/// The range of values that are tried: the hard range where it is finite, otherwise the usual range, otherwise a wide
+/// range around the default. Integers stay in the usual range if the hard one is too wide.
 pub(crate) fn ends(spec: &ParamSpec) -> [f64; 2] {
     let (hard, soft) = (spec.facts.hard, spec.facts.soft);
     let default = largest(&spec.default);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_keep_to_what_is_sensible_to_try() {
+    fn integers_stay_in_a_sensible_range() {
         let count = Param::<i64>::int("n", 8, "").within(1.0, 1e6).soft(1.0, 20.0).spec();
         assert_eq!(candidates(&count)[..2], [Value::Int(1), Value::Int(20)]);
         let count = Param::<i64>::int("n", 8, "").at_least(0.0).spec();
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn no_value_is_one_the_param_refuses() {
+    fn every_value_is_accepted_by_its_param() {
         let specs = [
             Param::<[f64; 3]>::direction("d", [1.0, 0.0, 0.0], "").spec(),
             Param::<[f32; 3]>::vec3("v", [1.0; 3], "").above(0.0).soft(0.1, 10.0).spec(),

@@ -1,6 +1,6 @@
 //! Promise: a node reads the attributes that it declares to read, and no others.
 //!
-//! `P` counts as read wherever the result depends on where points are, so a node that moves points reads it as well.
+//! `P` counts as read if the result depends on the positions of points, so a node that moves points reads it too.
 
 use engine::geometry::{Kind, Name, P};
 use engine::node::AttrNames;
@@ -16,27 +16,27 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     check_others(subject, tried, findings);
 }
 
-/// Each declared attribute, where it alone is missing, changes the result of some trial.
+/// Removing any one declared attribute changes the result of some trial.
 fn check_declared(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     let frames = subject.frames();
     for attribute in subject.node.reads.iter().filter(|attribute| attribute.spec().0 != P.name) {
         let name = attribute.spec().0;
         let written = subject.node.writes.iter().any(|write| write.spec().0 == name);
-        // An attribute that only passes through is not read: it is compared only where the node writes it.
+        // An attribute that only passes through is not read: it is compared only if the node writes it.
         let ignore = |other: &str| !written && other == name;
-        // Mixtures first: an attribute matters in more of them than of the trials with one param changed.
+        // Mixtures first: more of them depend on an attribute than trials with a single changed param.
         let mut dressed = tried.iter().rev().filter(|(trial, _)| trial.declared.is_some());
         let matters = dressed.any(|(trial, outcome)| {
             let without = Trial { without: Some(name.to_owned()), ..trial.clone() };
             subject.run(&without, &frames).digest(&ignore) != outcome.digest(&ignore)
         });
         if !matters {
-            findings.add(format!("it declares to read the attribute `{name}`, which never changes anything"));
+            findings.add(format!("it declares to read the attribute `{name}`, but it never affects the result"));
         }
     }
 }
 
-/// A node that does not declare to read `P` gives the same result wherever the points of its inputs are.
+/// A node that does not declare to read `P` gives the same result for any positions of its inputs' points.
 fn check_positions(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     let node = subject.node;
     if node.reads.iter().any(|read| read.spec().0 == P.name) {
@@ -85,7 +85,7 @@ fn check_others(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Fi
             Some([AttrNames::These(names), _]) => names,
             None => &[],
         };
-        // What the params name has the same seed as the rest: such a trial says nothing.
+        // Attributes that are named by params have the same seed as the rest, so such a trial is inconclusive.
         if masks(&trial.settings).chain(dynamic).next().is_some() {
             continue;
         }

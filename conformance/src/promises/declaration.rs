@@ -11,7 +11,7 @@ use engine::param::{Bounds, ParamSpec, Params, Shape, Unit, Value};
 /// Adds what is wrong; returns whether the node can be tried at all.
 pub(crate) fn check(node: &'static Node, findings: &mut Findings) -> bool {
     if !is_node_name(node.name) {
-        findings.add(format!("its name `{}` is not made of capitalised words joined by `_`", node.name));
+        findings.add(format!("its name `{}` does not consist of capitalised words joined by `_`", node.name));
     }
     if node.version == 0 {
         findings.add("its version is 0; the first is 1");
@@ -23,7 +23,7 @@ pub(crate) fn check(node: &'static Node, findings: &mut Findings) -> bool {
     let specs = match quietly(|| catch_unwind(AssertUnwindSafe(|| node.param_specs()))) {
         Ok(specs) => specs,
         Err(_) => {
-            findings.add("the default of one of its ramps is no ramp");
+            findings.add("the default of one of its ramps is not a valid ramp");
             return false;
         }
     };
@@ -139,13 +139,13 @@ fn check_attributes(what: &str, attributes: &[&dyn AttrDecl], findings: &mut Fin
             findings.add(format!("it {what} `{name}` as {kind}, which is always {fixed}"));
         }
         if known.contains(&(name, owner)) {
-            findings.add(format!("it lists `{name}` twice among what it {what}"));
+            findings.add(format!("it lists `{name}` twice in what it {what}"));
         }
         known.push((name, owner));
     }
 }
 
-/// What plans ask before anything is cooked may depend only on params that are `fixed`, or that have `history`.
+/// Declarations that the planner evaluates before cooking may depend only on params that are `fixed` or have `history`.
 fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mut Findings) {
     let fixed = |spec: &ParamSpec| spec.facts.fixed;
     if let Some(attributes) = node.attributes {
@@ -155,7 +155,7 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
         // Controls in code may be animated; the attributes that it names stay the same.
         for spec in read.iter().filter(|spec| !fixed(spec) && spec.shape != Shape::Code) {
             findings
-                .add(format!("its attributes depend on `{}`, which may be animated; declare it `fixed`", spec.name));
+                .add(format!("its attributes depend on `{}`, which can be animated; declare it `fixed`", spec.name));
         }
     }
     if let Cook::Solver(..) = node.cook {
@@ -163,7 +163,7 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
             node.start_frame(params);
         });
         for spec in read.iter().filter(|spec| !fixed(spec)) {
-            findings.add(format!("its start depends on `{}`, which may be animated; declare it `fixed`", spec.name));
+            findings.add(format!("its start depends on `{}`, which can be animated; declare it `fixed`", spec.name));
         }
     }
     let integrated = read_by(specs, |params| {
@@ -176,7 +176,7 @@ fn check_what_plans_read(node: &'static Node, specs: &[ParamSpec], findings: &mu
     }
     for spec in specs.iter().filter(|spec| spec.facts.history) {
         if !integrated.iter().any(|read| read.name == spec.name) {
-            findings.add(format!("`{}` is declared with `history`, and nothing is integrated over it", spec.name));
+            findings.add(format!("`{}` is declared with `history`, but nothing is integrated over it", spec.name));
         }
     }
 }
@@ -196,7 +196,7 @@ fn read_by(specs: &[ParamSpec], ask: impl Fn(&Params)) -> Vec<ParamSpec> {
             _ => spec.default.clone(),
         };
         let params = Params::new(specs.into(), specs.iter().map(value).collect());
-        // What panics here panics when the node is tried, and is reported then.
+        // A panic here also occurs in trials and is reported there.
         let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| ask(&params))));
         read.iter_mut().enumerate().for_each(|(index, read)| *read |= params.was_read(index));
     }

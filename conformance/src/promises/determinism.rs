@@ -1,5 +1,4 @@
-//! Promise: bits depend on what the node is given and on nothing else: neither on how often it ran before, nor on the
-//! number of threads.
+//! Promise: bits depend on inputs, params and frame only, not on earlier runs or the number of threads.
 
 use crate::promises::errors;
 use crate::samples::Form;
@@ -14,7 +13,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
 fn check_again(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     for (trial, outcome) in tried.iter().step_by(2) {
         if subject.run(trial, &subject.frames()).whole() != outcome.whole() {
-            findings.add("it gives other bits on a second run: it remembers something, or reads what it was not given");
+            findings.add("it gives different bits on a second run: it keeps state, or reads what it was not given");
         }
     }
 }
@@ -27,7 +26,7 @@ fn check_threads(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut F
         errors::check_outcome(&one, Form::Large, findings);
         for threads in [2, 7] {
             if subject.run_on(threads, false, &large, &frames).whole() != one.whole() {
-                findings.add(format!("it gives other bits on {threads} threads than on one"));
+                findings.add(format!("it gives different bits on {threads} threads and on one"));
             }
         }
     }

@@ -1,6 +1,6 @@
-//! Promise: whatever a node is given, it returns finite numbers or refuses with a message. It never panics, and never
-//! makes NaN of sound numbers: not of curves of one CV, doubled CVs, coincident points or flat faces either. Only
-//! coordinates whose squares overflow excuse NaN, which the engine then reports.
+//! Promise: for any input a node returns finite numbers or refuses with a message. It never panics, and never returns
+//! NaN for finite input, not even for curves of one CV, doubled CVs, coincident points or flat faces. Only coordinates
+//! whose squares overflow may give NaN, which the engine then reports.
 
 use engine::error::ErrorKind;
 
@@ -18,7 +18,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
             let trial = Trial { form, ..trial.clone() };
             check_outcome(&subject.run(&trial, &frames), form, findings);
         }
-        // One empty input beside others that have rows is as common as all of them empty.
+        // One empty input beside non-empty ones is as common as all of them empty.
         for index in 0..subject.inputs.len() {
             let trial = Trial { empty: Some(index), ..trial.clone() };
             check_outcome(&subject.run(&trial, &frames), Form::Empty, findings);
@@ -26,7 +26,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     }
 }
 
-/// Adds the errors of one trial that are the node's own fault, whatever it was given.
+/// Adds those errors of a trial that are the node's fault for any input.
 pub(crate) fn check_outcome(outcome: &Outcome, form: Form, findings: &mut Findings) {
     let given = match form {
         Form::Small | Form::Other => String::new(),
@@ -36,8 +36,10 @@ pub(crate) fn check_outcome(outcome: &Outcome, form: Form, findings: &mut Findin
         match kind {
             ErrorKind::Panic => findings.add(format!("it panics{given}: {error}")),
             ErrorKind::Contract => findings.add(format!("it breaks its declaration{given}: {error}")),
-            ErrorKind::NotFinite if !form.may_overflow() => findings.add(format!("it lets NaN out{given}: {error}")),
-            ErrorKind::Cancelled => findings.add("it reports that it was cancelled, and nobody cancelled it"),
+            ErrorKind::NotFinite if !form.may_overflow() => {
+                findings.add(format!("its result contains NaN{given}: {error}"))
+            }
+            ErrorKind::Cancelled => findings.add("it reports that it was cancelled, but it was not"),
             ErrorKind::File | ErrorKind::Refused | ErrorKind::NotFinite => {}
         }
     }

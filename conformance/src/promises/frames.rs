@@ -1,5 +1,5 @@
-//! Promise: the bits of a frame do not depend on which other frames are cooked, nor on the clock where the node says that
-//! it does not read it, nor on the number of the frame where a window's inputs stand still.
+//! Promise: the bits of a frame do not depend on which other frames are cooked, nor on the clock if the node says that
+//! it does not read it, nor on the frame number if a window's inputs do not change.
 
 use engine::node::Cook;
 use engine::param::Source;
@@ -23,20 +23,20 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     }
 }
 
-/// Each frame alone, last first, against all of them together.
+/// Compares each frame cooked alone, last first, with all of them cooked together.
 fn check_alone(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     let frames = subject.frames();
     for (trial, outcome) in sound(tried, 6) {
         for frame in frames.iter().rev() {
             let alone = subject.run(trial, &[*frame]);
             if alone.at(*frame) != outcome.at(*frame) {
-                findings.add(format!("frame {frame} alone has other bits than among others"));
+                findings.add(format!("frame {frame} has different bits when it is cooked alone"));
             }
         }
     }
 }
 
-/// A node that says it does not read the clock, at two times.
+/// Cooks a node that says it does not read the clock at two times.
 fn check_clock(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     let Cook::Frame { reads_clock, .. } = subject.node.cook else { return };
     for (trial, _) in tried {
@@ -50,19 +50,19 @@ fn check_clock(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Fin
             subject.run(&trial, &[Frame::whole(first)]).at(Frame::whole(first))
         };
         if at(1) != at(10) {
-            findings.add("it says that it does not read the clock, and gives other bits at another frame");
+            findings.add("it says that it does not read the clock, but gives different bits at another frame");
         }
     }
 }
 
-/// A window over inputs that stand still without the engine knowing it.
+/// Cooks a window over constant inputs that the engine does not know to be constant.
 fn check_still(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     for (trial, _) in sound(tried, 6) {
         let still = Trial { motion: Motion::Unknown, ..trial.clone() };
         let frames = [1, 2, 9, 30].map(Frame::whole);
         let outcome = subject.run(&still, &frames);
         if frames.iter().any(|frame| outcome.at(*frame) != outcome.at(frames[0])) {
-            findings.add("over inputs that stand still its result moves; the engine relies on it to stand still too");
+            findings.add("its result changes while its inputs do not; the engine relies on it staying the same");
         }
     }
 }

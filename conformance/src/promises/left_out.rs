@@ -1,15 +1,15 @@
 //! Promise: a stage that the node reports as left out has no effect on the result.
 //!
-//! What is checked while a stage is left out:
-//! * Attributes that are written whenever nothing is left out are there all the same.
-//! * Where the whole node is left out (stage `all`), every array of the input comes out as it is, at the same address: a
-//!   node that does its work anyway makes new ones. Attributes it adds are the same in every row. The same holds for the
-//!   attribute that a stage is named after.
-//! * What the stage's name and its reasons name, params and inputs alike, changes nothing as long as the stage stays left
-//!   out: neither values near the one that switched it off, nor the other switches of the stage.
+//! While a stage is left out, these are checked:
+//! * Attributes that are always written when nothing is left out are still written.
+//! * Where the whole node is left out (stage `all`), every array of the input is passed through at the same address (a
+//!   node that does the work anyway makes new ones), and added attributes are the same in every row. The same holds for
+//!   the attribute that a stage is named after.
+//! * Params and inputs that are named in the stage's name or reasons have no effect as long as the stage stays left
+//!   out: neither values near the one that switched it off, nor the stage's other switches.
 //!
-//! What cannot be checked: a param that matters in a stage only, unless it has a `when` (the engine then keeps its value
-//! from the node) or a reason names it; and whether a stage that changes nothing is computed all the same.
+//! Not checked: a param that affects only that stage, unless it has a `when` (the engine then hides its value from the
+//! node) or is named in a reason; and whether a stage without effect is computed nevertheless.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,10 +22,10 @@ use crate::suite::Findings;
 use crate::trial::{Motion, Outcome, Subject, Trial};
 use crate::values;
 
-/// The stage that is the whole node.
+/// The stage that stands for the whole node.
 const WHOLE_NODE: &str = "all";
 
-/// Trials that are varied for each reason of each stage.
+/// Number of trials that are varied for each reason of each stage.
 const TRIALS: usize = 2;
 
 pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
@@ -44,7 +44,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     }
 }
 
-/// By stage, all that its name and its reasons name.
+/// For each stage, everything named in its name and reasons.
 fn names(tried: &[(Trial, Outcome)]) -> BTreeMap<&'static str, BTreeSet<String>> {
     let mut names: BTreeMap<_, BTreeSet<String>> = BTreeMap::new();
     for left in tried.iter().flat_map(|(_, outcome)| &outcome.left_out) {
@@ -55,14 +55,14 @@ fn names(tried: &[(Trial, Outcome)]) -> BTreeMap<&'static str, BTreeSet<String>>
     names
 }
 
-/// What the stage would write is the input's own array, or the same in every row.
+/// Anything the stage would write is the input's own array, or the same in every row.
 fn check_untouched(subject: &Subject, trial: &Trial, left: &LeftOut, findings: &mut Findings) {
     let whole = left.stage == WHOLE_NODE;
     let writes = subject.node.writes.iter().any(|attribute| attribute.spec().0 == left.stage);
     if !whole && !writes {
         return;
     }
-    // Inputs that move are made anew for each frame and share nothing.
+    // Moving inputs are new for each frame and share no arrays.
     let still = subject.run(&Trial { motion: Motion::Still, ..trial.clone() }, &subject.frames());
     for ((output, _), geometry) in &still.found {
         let output = subject.node.outputs[*output];
@@ -75,7 +75,7 @@ fn check_untouched(subject: &Subject, trial: &Trial, left: &LeftOut, findings: &
                 let shared = given.table(owner).column(name).is_some_and(|given| given.same(column));
                 if !shared && (**name == *P.name || !is_uniform(column)) {
                     findings.add(format!(
-                        "it leaves out `{}` ({}) and still makes a new `{name}` for the {}",
+                        "it leaves out `{}` ({}), but still makes a new `{name}` for the {}",
                         left.stage,
                         left.why,
                         part.kind()
@@ -91,7 +91,7 @@ fn is_uniform(column: &Column) -> bool {
     column.is_empty() || column.gather(&vec![0; column.len()]) == *column
 }
 
-/// What the stage names changes nothing as long as the same stages stay left out.
+/// Params and inputs that the stage names have no effect as long as the same stages stay left out.
 fn check_without_effect(
     subject: &Subject,
     (trial, outcome): (&Trial, &Outcome),
@@ -108,19 +108,16 @@ fn check_without_effect(
             return;
         }
         let after = subject.run(other, &subject.frames());
-        // Params that are refused, such as the name of a missing mask, are refused in any case.
+        // Invalid params, such as the name of a missing mask, are refused in any case.
         if after.is_whole() && after.whole() != before {
-            findings.add(format!(
-                "it leaves out `{}` ({}), and {what} changes the result all the same",
-                left.stage, left.why
-            ));
+            findings.add(format!("it leaves out `{}` ({}), but {what} still affects the result", left.stage, left.why));
         }
     };
     for (index, spec) in subject.specs.iter().enumerate().filter(|(_, spec)| names.contains(spec.name)) {
         let other = |value: &Value| !matches!(&trial.settings[index], Source::Constant(now) if now == value);
         let near = nearby(spec, &trial.settings[index]);
         for value in params::values(subject, index).into_iter().filter(other).chain(near) {
-            // Two options that both leave out a stage may differ in all else.
+            // Two options that both leave out a stage may differ in everything else.
             let same_reason = matches!(spec.shape, Shape::Choice(_));
             compare(&trial.with(index, value), same_reason, &format!("`{}`", spec.name));
         }
@@ -132,7 +129,7 @@ fn check_without_effect(
     }
 }
 
-/// Numbers a little to each side of what a param is.
+/// Numbers slightly above and below the value of a param.
 fn nearby(spec: &ParamSpec, source: &Source) -> Vec<Value> {
     let [low, high] = values::ends(spec);
     let step = 1e-3 * (high - low);
@@ -147,7 +144,7 @@ fn nearby(spec: &ParamSpec, source: &Source) -> Vec<Value> {
     [-step, step].into_iter().filter_map(|by| near(value, by)).filter(|value| spec.refuses(value).is_none()).collect()
 }
 
-/// Attributes that are written whenever nothing is left out are there when something is.
+/// Attributes that are always written when nothing is left out are also written when something is.
 fn check_written(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
     let mut always: Option<BTreeMap<(usize, String), bool>> = None;
     let whole = |outcome: &&Outcome| outcome.is_whole() && !outcome.found.is_empty();
@@ -176,7 +173,7 @@ fn check_written(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut F
         let written = written(outcome);
         for ((index, name), _) in always.iter().filter(|(index, there)| **there && written.get(*index) != Some(&true)) {
             let (stage, output) = (outcome.left_out[0].stage, subject.node.outputs[*index].name);
-            findings.add(format!("it leaves out `{stage}` and then lacks `{name}` on its output `{output}`"));
+            findings.add(format!("while it leaves out `{stage}`, its output `{output}` lacks `{name}`"));
         }
     }
 }

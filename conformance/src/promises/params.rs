@@ -14,7 +14,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     }
 }
 
-/// Most pairs of trials that are compared for one param.
+/// Largest number of pairs of trials that are compared for one param.
 const PAIRS: usize = 60;
 
 fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, findings: &mut Findings) {
@@ -29,7 +29,7 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, find
     }
     let values = values(subject, index);
     if !matters(subject, tried, index, &values) {
-        findings.add(format!("the param `{}` never changes anything", spec.name));
+        findings.add(format!("the param `{}` never affects the result", spec.name));
     }
     if spec.shape == Shape::Masked {
         let [low, high] = [0.35, 0.85].map(|share| between(subject, index, share));
@@ -43,12 +43,12 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, find
             })
         });
         if !masked {
-            findings.add(format!("the mask of `{}` never changes anything", spec.name));
+            findings.add(format!("the mask of `{}` never affects the result", spec.name));
         }
     }
 }
 
-/// A number `share` of the way through what a masked param may be.
+/// The number at `share` (0…1) of the range of a masked param.
 fn between(subject: &Subject, index: usize, share: f64) -> f64 {
     let numbers: Vec<f64> = values::candidates(&subject.specs[index]).iter().map(Value::number).collect();
     let (low, high) = numbers.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
@@ -67,10 +67,10 @@ pub(crate) fn values(subject: &Subject, index: usize) -> Vec<Value> {
     values
 }
 
-/// How many more mixtures are searched for one in which a param is read.
+/// Number of additional mixtures that are searched for one in which a param is read.
 const SOUGHT: u64 = 400;
 
-/// Trials in which the param is read, as far as the declaration says: those already cooked, then more mixtures.
+/// Trials in which the param is read according to the declaration: those already cooked, then more mixtures.
 pub(crate) fn trials<'t>(
     subject: &'t Subject,
     tried: &'t [(Trial, Outcome)],
@@ -110,7 +110,7 @@ fn matters(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, values: 
     false
 }
 
-/// Whether a sample without that param comes out otherwise, or two samples do.
+/// Whether a sample without that param gives another result, or two samples give different results.
 fn prepared_matters(subject: &Subject, index: usize) -> bool {
     let frames = subject.frames();
     let run = |sample: usize| {

@@ -29,7 +29,7 @@ fn check_output(
         Some([_, AttrNames::These(names)]) => names.as_slice(),
         None => &[],
     };
-    // Inputs that move have other positions at every frame; trials with inputs that stand still check those.
+    // Moving inputs have other positions at every frame; trials with constant inputs cover those.
     let writes = |name: &str| {
         let declared = node.writes.iter().any(|attribute| attribute.spec().0 == name);
         declared || declaration::has(more, name) || moving && name == P.name

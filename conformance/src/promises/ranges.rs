@@ -1,5 +1,5 @@
-//! Promise: every param accepts its whole hard range, ends included, and refuses what lies just outside, by name. That its
-//! usual range lies within the hard one is part of the declaration.
+//! Promise: every param accepts its whole hard range, ends included, and refuses values just outside, by name. The
+//! check that its usual range lies within the hard one is part of `declaration`.
 
 use engine::error::ErrorKind;
 use engine::param::Value;
@@ -9,7 +9,7 @@ use crate::suite::Findings;
 use crate::trial::{Outcome, Subject, Trial};
 use crate::values::{RangeEnd, range_ends};
 
-/// Whole numbers above this are not cooked: they may be counts of things to make, or of steps to take.
+/// Integers above this are not cooked: they may be counts of elements or of steps.
 const MOST_COOKED: i64 = 1_000;
 
 pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
@@ -19,18 +19,18 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
         if ends.is_empty() {
             continue;
         }
-        // What a sample sets is not varied.
+        // Params set by a sample are not varied.
         if (0..subject.samples.len()).any(|sample| subject.prepared(sample).contains(&index)) {
             continue;
         }
-        // A trial in which the param is read; where there is none, another promise says so.
+        // A trial in which the param is read; if there is none, another promise reports it.
         let Some((trial, _)) = params::trials(subject, tried, index).next() else { continue };
         for RangeEnd { inside, outside } in ends {
             if let Some((fact, hint)) = spec.refuses(&inside) {
                 findings.add(format!("`{}` refuses {inside}, an end of its range: {fact}; {hint}", spec.name));
             }
-            // What lies just above an end that is refused itself can be as dear as it is small; a value a little farther
-            // inside is among the trials.
+            // Just above an excluded end, a value can be very expensive to cook; the trials contain one a little
+            // farther inside.
             let open = spec.facts.hard.open && outside.number() == spec.facts.hard.low;
             if !open && !is_dear(&inside) {
                 errors::check_outcome(&subject.run(&trial.with(index, inside), &frames), trial.form, findings);

@@ -15,7 +15,7 @@ fn by_envelope(cx: &Cx) -> Result<Outputs> {
 }
 
 #[test]
-fn attributes_that_are_read_are_declared_and_matter() {
+fn attributes_that_are_read_must_be_declared_and_matter() {
     finds(
         shift(by_envelope),
         "it reads an attribute that it does not declare (`envelope`): the result changes where it is changed",
@@ -23,12 +23,12 @@ fn attributes_that_are_read_are_declared_and_matter() {
     assert_eq!(findings_of(shift(by_envelope).reads(&[&P, &ENVELOPE])), [""; 0]);
     finds_only(
         GOOD.reads(&[&P, &SHIELDED]),
-        "it declares to read the attribute `shielded`, which never changes anything",
+        "it declares to read the attribute `shielded`, but it never affects the result",
     );
 }
 
 #[test]
-fn positions_that_are_read_are_declared() {
+fn positions_that_are_read_must_be_declared() {
     let finding = "it reads `P`, which it does not declare: the result changes with the points of `curves`";
     finds_only(Node { reads: &[], ..GOOD }, finding);
     let measures = shift(|cx| {
@@ -50,6 +50,6 @@ fn positions_that_are_read_are_declared() {
 fn a_declared_attribute_that_is_not_read_is_found_beside_one_that_is() {
     finds_only(
         shift(by_envelope).reads(&[&P, &ENVELOPE, &SHIELDED]),
-        "it declares to read the attribute `shielded`, which never changes anything",
+        "it declares to read the attribute `shielded`, but it never affects the result",
     );
 }

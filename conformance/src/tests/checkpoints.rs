@@ -23,7 +23,7 @@ impl Chain for Fall {
     }
 }
 
-/// The same, with a speed that no checkpoint holds.
+/// The same, with a speed that is not in the checkpoint.
 #[derive(Serialize, Deserialize)]
 struct Forgetful {
     points: Vec<[f32; 3]>,
@@ -58,7 +58,7 @@ pub(super) fn falling() -> Node {
 }
 
 #[test]
-fn a_solver_whose_checkpoints_lose_something_is_found() {
+fn incomplete_checkpoints_are_found() {
     assert_eq!(findings_of(falling()), [""; 0]);
     let forgetful = Node { cook: Cook::solver::<Forgetful>(|_| None), ..falling() };
     finds_only(forgetful, "its state loses something when it is written to a checkpoint and read back");

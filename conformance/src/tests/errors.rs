@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_node_that_panics_is_found_wherever_it_does() {
+fn a_panic_is_found_for_any_kind_of_sample() {
     let empty = shift(|cx| {
         let root = cx.part(CURVES).positions()[0][1];
         Ok(OUT.with(up(cx, cx.get(AMOUNT) + root)?))
@@ -23,10 +23,10 @@ fn a_node_that_panics_is_found_wherever_it_does() {
 }
 
 #[test]
-fn a_node_that_makes_nan_of_sound_numbers_is_found() {
+fn nan_for_finite_input_is_found() {
     let node = shift(|cx| Ok(OUT.with(up(cx, (cx.get(AMOUNT) - 0.05).sqrt())?)));
-    finds_only(node, "it lets NaN out: `P` of point 0 of the curves is NaN or infinite");
-    // Of coordinates near the largest f32 nothing else can be made, and the engine says so.
+    finds_only(node, "its result contains NaN: `P` of point 0 of the curves is NaN or infinite");
+    // For coordinates near the largest f32, NaN is unavoidable, and the engine reports it.
     let squares = shift(|cx| {
         let mut curves = cx.input(CURVES).clone();
         if let Some(part) = curves.part_mut(Kind::Curves) {
@@ -57,7 +57,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 #[test]
-fn nan_at_degenerate_curves_alone_is_found() {
+fn nan_for_degenerate_curves_only_is_found() {
     type BadCook = fn(&Cx) -> Result<Outputs>;
     let bad: [(&str, BadCook); 4] = [
         ("doubled CVs", |cx| {
@@ -87,9 +87,12 @@ fn nan_at_degenerate_curves_alone_is_found() {
     ];
     for (what, cook) in bad {
         let found = findings_of(shift(cook));
-        assert!(found.iter().any(|line| line.starts_with("it lets NaN out: `P` of point")), "{what}: {found:#?}");
+        assert!(
+            found.iter().any(|line| line.starts_with("its result contains NaN: `P` of point")),
+            "{what}: {found:#?}"
+        );
     }
-    // With its guard, the last of them is sound.
+    // With a guard, the last of them is correct.
     let guarded = shift(|cx| {
         by_share(cx, |cvs, cv| {
             let length = cvs.windows(2).map(|pair| distance(pair[0], pair[1])).sum::<f32>();
@@ -100,7 +103,7 @@ fn nan_at_degenerate_curves_alone_is_found() {
 }
 
 #[test]
-fn nan_at_coincident_points_alone_is_found() {
+fn nan_for_coincident_points_only_is_found() {
     const POINTS: Input = Input::one("points", Kind::Points, "Points to move.");
     const SPREAD: Output = Output::like("points", &POINTS, "The points, moved.");
     let node = Node::new(
@@ -118,5 +121,5 @@ fn nan_at_coincident_points_alone_is_found() {
         }),
     );
     let node = node.inputs(&[&POINTS]).params(&[&AMOUNT]).outputs(&[&SPREAD]).reads(&[&P]).writes(&[&P]);
-    finds(node, "it lets NaN out: `P` of point 10 of the points");
+    finds(node, "its result contains NaN: `P` of point 10 of the points");
 }

@@ -11,12 +11,15 @@ fn with_clock(reads_clock: fn(&Params) -> bool) -> Node {
 #[test]
 fn a_node_that_denies_reading_the_clock_is_found() {
     assert_eq!(findings_of(with_clock(|params| params.get(AMOUNT) != 0.0)), [""; 0]);
-    finds_only(with_clock(|_| false), "it says that it does not read the clock, and gives other bits at another frame");
+    finds_only(
+        with_clock(|_| false),
+        "it says that it does not read the clock, but gives different bits at another frame",
+    );
     finds(with_clock(|params| params.get(SPARE) != 0.0), "it reads the param `spare`, which it does not declare");
 }
 
 #[test]
-fn an_integral_passes() {
+fn integrals_must_be_declared() {
     const SPEED: Param<f64> =
         Param::double("speed", 1.0, "How fast they move.").unit(Unit::MetresPerSecond).soft(-2.0, 2.0).history();
     const CREEP: Node = Node {
@@ -41,17 +44,17 @@ fn an_integral_passes() {
 }
 
 #[test]
-fn a_frame_that_depends_on_frames_before_it_is_found() {
+fn dependence_on_earlier_frames_is_found() {
     static LAST: AtomicU32 = AtomicU32::new(0);
     let cook: fn(&FrameCx) -> Result<Outputs> = |cx| {
         let last = LAST.swap(cx.frame().floor_number() as u32, Ordering::Relaxed);
         Ok(OUT.with(up(cx, cx.get(AMOUNT) * last as f32)?))
     };
     let node = Node { cook: Cook::Frame { cook, reads_clock: |_| true }, ..GOOD };
-    finds(node, "alone has other bits than among others");
+    finds(node, "has different bits when it is cooked alone");
 }
 
-/// A window that lags; with a leak, it sinks a little every frame.
+/// A window that lags; with the leak its result also sinks slightly in every frame.
 struct Lag<const LEAK: bool>(Vec<[f32; 3]>);
 
 impl<const LEAK: bool> Chain for Lag<LEAK> {
@@ -75,8 +78,8 @@ impl<const LEAK: bool> Chain for Lag<LEAK> {
 }
 
 #[test]
-fn a_window_stands_still_over_what_does() {
+fn a_window_over_constant_inputs_must_be_constant() {
     let lag = |cook| Node { cook, ..GOOD }.params(&[&SPARE]);
     assert_eq!(findings_of(lag(Cook::window::<Lag<false>>(|_, _| Past::frames(8)))), [""; 0]);
-    finds_only(lag(Cook::window::<Lag<true>>(|_, _| Past::frames(8))), "over inputs that stand still its result moves");
+    finds_only(lag(Cook::window::<Lag<true>>(|_, _| Past::frames(8))), "its result changes while its inputs do not");
 }

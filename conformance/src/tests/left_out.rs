@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn what_is_left_out_still_writes_its_attributes() {
+fn a_stage_that_is_left_out_must_still_write_its_attributes() {
     const DUST: Attr<f32> = Attr::point("dust");
     let dusty: fn(&Cx) -> Result<Outputs> = |cx| {
         let mut curves = up(cx, cx.get(AMOUNT))?;
@@ -15,21 +15,21 @@ fn what_is_left_out_still_writes_its_attributes() {
     let leaves_out: fn(&Params, &Wires) -> Vec<LeftOut> =
         |params, _| if params.get(TWICE) { Vec::new() } else { vec![LeftOut::new("dust", "`twice` is false")] };
     let node = shift(dusty).params(&[&AMOUNT, &TWICE]).writes(&[&P, &DUST]).leaves_out(leaves_out);
-    finds_only(node, "it leaves out `dust` and then lacks `dust` on its output `curves`");
+    finds_only(node, "while it leaves out `dust`, its output `curves` lacks `dust`");
 }
 
 type LeavesOut = fn(&Params, &Wires) -> Vec<LeftOut>;
 
 #[test]
-fn a_node_left_out_as_a_whole_hands_its_input_through() {
+fn a_node_left_out_as_a_whole_must_pass_its_input_through() {
     let leaves_out: LeavesOut = |params, _| match params.get(AMOUNT) {
         0.0 => vec![LeftOut::new("all", "`amount` is 0")],
         _ => Vec::new(),
     };
-    // The early return was lost: the work is done, and moves nothing.
+    // Without the early return: the work is done, but moves nothing.
     finds_only(
         GOOD.leaves_out(leaves_out),
-        "it leaves out `all` (`amount` is 0) and still makes a new `P` for the curves",
+        "it leaves out `all` (`amount` is 0), but still makes a new `P` for the curves",
     );
     let returns_early = shift(|cx| match cx.get(AMOUNT) {
         0.0 => Ok(OUT.with(cx.input(CURVES).clone())),
@@ -46,12 +46,12 @@ fn a_stage_left_out_too_often_is_found() {
     };
     finds_only(
         GOOD.leaves_out(leaves_out),
-        "it leaves out `shift` (`amount` is small), and `amount` changes the result all the same",
+        "it leaves out `shift` (`amount` is small), but `amount` still affects the result",
     );
 }
 
 #[test]
-fn a_stage_that_is_not_left_out_in_truth_is_found() {
+fn a_stage_that_is_not_really_left_out_is_found() {
     let leaves_out: LeavesOut = |params, _| match (params.get(TWICE), params.get(SPARE)) {
         (false, _) => vec![LeftOut::new("extra", "`twice` is false")],
         (true, 0.0) => vec![LeftOut::new("extra", "`spare` is 0")],
@@ -68,12 +68,12 @@ fn a_stage_that_is_not_left_out_in_truth_is_found() {
     });
     finds_only(
         runs_on.params(&[&AMOUNT, &TWICE, &SPARE]).leaves_out(leaves_out),
-        "it leaves out `extra` (`twice` is false), and `spare` changes the result all the same",
+        "it leaves out `extra` (`twice` is false), but `spare` still affects the result",
     );
 }
 
 #[test]
-fn an_input_whose_stage_is_left_out_changes_nothing() {
+fn an_input_whose_stage_is_left_out_must_have_no_effect() {
     let leaves_out: LeavesOut = |params, _| match params.get(TWICE) {
         true => Vec::new(),
         false => vec![LeftOut::new("other", "`twice` is false")],
@@ -84,6 +84,6 @@ fn an_input_whose_stage_is_left_out_changes_nothing() {
     });
     finds_only(
         node.inputs(&[&CURVES, &OTHER]).params(&[&AMOUNT, &TWICE]).leaves_out(leaves_out),
-        "it leaves out `other` (`twice` is false), and the input `other` changes the result all the same",
+        "it leaves out `other` (`twice` is false), but the input `other` still affects the result",
     );
 }

@@ -1,4 +1,4 @@
-//! For every promise nodes that break it, and nodes of every kind that keep all of them.
+//! For each promise nodes that break it, and nodes of every kind that keep all of them.
 
 mod attributes;
 mod checkpoints;
@@ -41,7 +41,7 @@ const SKINS: Input<Many> = Input::many("skins", Kind::Mesh, "Meshes beside them.
 const OUT: Output = Output::like("curves", &CURVES, "The curves, moved.");
 const AMOUNT: Param<f32> = Param::float("amount", 0.1, "How far they move.").unit(Unit::Metres).soft(0.0, 1.0);
 const SPARE: Param<f32> = Param::float("spare", 0.1, "How much further they move.").within(0.0, 1.0);
-const WAY: Param<Way> = Param::choice("way", Way::Up, "Which way they move.");
+const WAY: Param<Way> = Param::choice("way", Way::Up, "The direction in which they move.");
 const TWICE: Param<bool> = Param::bool("twice", false, "Moves them twice as far.");
 const HEIGHT: Metric = Metric::new("height", Unit::Metres, "How far they were moved.");
 
@@ -70,19 +70,19 @@ fn leak(node: Node) -> &'static Node {
     Box::leak(Box::new(node))
 }
 
-/// All that the suite finds wrong with a node.
+/// All findings of the suite for a node.
 fn findings_of(node: Node) -> Vec<String> {
     faults(leak(node))
 }
 
-/// The suite finds this, and perhaps what follows from it.
+/// The suite reports this, and possibly consequences.
 #[track_caller]
 fn finds(node: Node, finding: &str) {
     let found = findings_of(node);
     assert!(found.iter().any(|line| line.contains(finding)), "expected {finding:?}, found {found:#?}");
 }
 
-/// The suite finds this and nothing else.
+/// The suite reports this and nothing else.
 #[track_caller]
 fn finds_only(node: Node, finding: &str) {
     let found = findings_of(node);

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn outputs_carry_what_they_say() {
+fn outputs_must_carry_what_they_declare() {
     finds(shift(|_| Ok(Outputs::default())), "it returns no `curves`");
     let swapped = shift(|cx| {
         let by = cx.get(AMOUNT);
@@ -16,7 +16,7 @@ fn outputs_carry_what_they_say() {
 }
 
 #[test]
-fn metrics_are_declared_published_and_finite() {
+fn metrics_must_be_declared_published_and_finite() {
     let publishes: fn(&Cx) -> Result<Outputs> = |cx| {
         cx.publish(HEIGHT, f64::from(cx.get(AMOUNT)));
         Ok(OUT.with(up(cx, cx.get(AMOUNT))?))

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn only_what_is_declared_is_read() {
+fn undeclared_reads_are_found() {
     finds(
         shift(|cx| Ok(OUT.with(up(cx, cx.get(AMOUNT) + cx.get(SPARE))?))),
         "it reads the param `spare`, which it does not declare",
@@ -18,7 +18,7 @@ fn only_what_is_declared_is_read() {
 }
 
 #[test]
-fn a_read_behind_a_choice_and_a_switch_and_a_missing_wire_is_found() {
+fn undeclared_reads_behind_a_choice_a_switch_and_a_missing_wire_are_found() {
     let node = shift(|cx| {
         let hidden = cx.get(WAY) == Way::Along && cx.get(TWICE) && cx.input(OTHER).is_none();
         let more = if hidden { cx.get(SPARE) } else { cx.input(OTHER).map_or(0.0, first_y) };
@@ -33,20 +33,20 @@ fn a_read_behind_a_choice_and_a_switch_and_a_missing_wire_is_found() {
 }
 
 #[test]
-fn every_param_is_read_and_matters() {
+fn every_param_must_be_read_and_matter() {
     finds_only(GOOD.params(&[&AMOUNT, &SPARE]), "it never reads the param `spare`");
     let idle = shift(|cx| Ok(OUT.with(up(cx, cx.get(AMOUNT) + 0.0 * cx.get(SPARE))?)));
-    finds_only(idle.params(&[&AMOUNT, &SPARE]), "the param `spare` never changes anything");
+    finds_only(idle.params(&[&AMOUNT, &SPARE]), "the param `spare` never affects the result");
     const SEED: Param<Seed> = Param::seed("Picks another shift.");
     let seeded = shift(|cx| {
         let _ = cx.get(SEED);
         Ok(OUT.with(up(cx, cx.get(AMOUNT))?))
     });
-    finds_only(seeded.params(&[&AMOUNT, &SEED]), "the param `seed` never changes anything");
+    finds_only(seeded.params(&[&AMOUNT, &SEED]), "the param `seed` never affects the result");
 }
 
 #[test]
-fn a_param_that_is_read_in_one_rare_mixture_matters() {
+fn a_param_that_is_read_in_rare_mixtures_passes() {
     const RARE: Param<f32> = Param::float("rare", 0.5, "How much further they move.")
         .within(0.0, 1.0)
         .when(|params| params.get(WAY) == Way::Along && params.get(TWICE));
@@ -67,7 +67,7 @@ fn a_mask_must_matter() {
         let blend = cx.mask(BLEND, cx.part(CURVES))?.value;
         Ok(OUT.with(up(cx, cx.get(AMOUNT) * blend)?))
     });
-    finds_only(deaf.params(&[&AMOUNT, &BLEND]), "the mask of `blend` never changes anything");
+    finds_only(deaf.params(&[&AMOUNT, &BLEND]), "the mask of `blend` never affects the result");
     let masked = shift(|cx| {
         let numerics::masked::Masked { value: blend, mask } = cx.mask(BLEND, cx.part(CURVES))?;
         let mut curves = cx.input(CURVES).clone();

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn what_a_node_does_not_write_passes_through() {
+fn attributes_that_are_not_written_must_pass_through() {
     let writes: fn(&Cx) -> Result<Outputs> = |cx| {
         let mut curves = up(cx, cx.get(AMOUNT))?;
         if let Some(part) = curves.part_mut(Kind::Curves) {
@@ -37,7 +37,7 @@ fn what_a_node_does_not_write_passes_through() {
 }
 
 #[test]
-fn topology_is_shared_unless_it_is_declared_to_change() {
+fn topology_must_be_shared_unless_it_is_declared_to_change() {
     let again: fn(&Cx) -> Result<Outputs> = |cx| {
         let moved = up(cx, cx.get(AMOUNT))?;
         let Some(part) = moved.curves() else { return Ok(OUT.with(moved)) };

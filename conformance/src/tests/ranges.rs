@@ -20,5 +20,5 @@ fn an_end_that_is_read_behind_a_switch_is_tried() {
         let further = if cx.get(TWICE) { 1.0 / (1.0 - cx.get(SHARE)) } else { 0.0 };
         Ok(OUT.with(up(cx, cx.get(AMOUNT) + further)?))
     });
-    finds_only(node.params(&[&AMOUNT, &TWICE, &SHARE]), "it lets NaN out: `P` of point 0 of the curves");
+    finds_only(node.params(&[&AMOUNT, &TWICE, &SHARE]), "its result contains NaN: `P` of point 0 of the curves");
 }

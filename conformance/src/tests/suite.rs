@@ -1,4 +1,4 @@
-//! Nodes without faults pass, whatever they take; what the suite cannot invent comes from the test.
+//! Nodes without faults pass, whatever their inputs; values that the suite cannot invent come from the test.
 
 use super::*;
 
@@ -8,13 +8,13 @@ fn a_node_that_keeps_to_its_declaration_passes() {
 }
 
 #[test]
-fn a_node_that_refuses_everything_asks_for_samples() {
+fn a_node_that_refuses_every_sample_needs_samples_from_the_test() {
     let node = shift(|cx| Err(Error::refused(format!("`amount` is {}", cx.get(AMOUNT)))));
-    finds_only(node, "it refuses all that the suite can offer; give it samples with `with`: `amount` is 0.1");
+    finds_only(node, "it refuses all samples of the suite; provide suitable ones with `with`: `amount` is 0.1");
 }
 
 #[test]
-fn a_text_in_a_language_comes_from_the_test() {
+fn code_comes_from_the_test() {
     const CODE: Param<engine::geometry::Name> = Param::text("code", "", "What is done: `up`, or `down`.").fixed();
     let node = shift(|cx| match &*cx.get(CODE) {
         "up" => Ok(OUT.with(up(cx, cx.get(AMOUNT))?)),
@@ -22,7 +22,7 @@ fn a_text_in_a_language_comes_from_the_test() {
         other => Err(Error::refused(format!("`code` is {other:?}")).hint("write `up` or `down`")),
     });
     let node = leak(node.params(&[&AMOUNT, &CODE]));
-    assert!(faults(node)[0].contains("it refuses all that the suite can offer"));
+    assert!(faults(node)[0].contains("it refuses all samples of the suite"));
     let samples =
         conformance(node).with(|bench| bench.set(CODE, "up".into())).with(|bench| bench.set(CODE, "down".into()));
     assert_eq!(samples.faults(), [""; 0]);
