@@ -1,7 +1,8 @@
-//! Draws obj files into one picture, to look at what the rasteriser does.
+//! Draws obj files into one picture, to inspect the rasteriser.
 //!
-//! `cargo run --release -p preview --example look -- OUT.png [--size WxH] [--camera TEXT] [--color-by NAME] [--curve-width METRES]
-//! [--note TEXT] [--repeat N] FILE.obj…`. Reads `v`, `f` and `l` lines. `--color-by` knows `along` (root to tip), `length` (of a curve) and `height`.
+//! `cargo run --release -p preview --example look -- OUT.png [--size WxH] [--camera TEXT] [--color-by NAME]
+//! [--curve-width METRES] [--note TEXT] [--repeat N] FILE.obj…`. Reads `v`, `f` and `l` lines. `--color-by` knows
+//! `along` (root to tip), `length` (of a curve) and `height`.
 
 use std::error::Error;
 use std::fs;
@@ -12,7 +13,7 @@ use preview::{Layer, PictureSettings, render};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let out = arguments.next().ok_or("expected a name of the picture")?;
+    let out = arguments.next().ok_or("expected the name of the picture")?;
     let (mut settings, mut files, mut repeat) = (PictureSettings::default(), Vec::new(), 1_usize);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("`{argument}` needs a value"));

@@ -1,25 +1,26 @@
 //! The camera: position, target and angle; written and read as text, or fitted to bounds.
 //!
-//! Promise: [`Camera::fit`] holds all of the box, touching the margin on two opposite sides, and depends on nothing
-//! but the box and the picture's shape, so a sequence that gives one box keeps one camera. Limit: no lens shift, no roll
-//! beyond what `up` says.
+//! Guarantees: [`Camera::fit`] shows the whole box, touching the margin on two opposite sides, and depends only on the
+//! box and the picture's aspect, so a sequence with one box has one camera. Limit: no lens shift, no roll except by
+//! `up`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use numerics::vector::{DVec3, direction, to_f64};
 
-/// Vertical angle of view where none is given, degrees: narrow enough to show little distortion.
+/// Default vertical angle of view, degrees: narrow enough to show little distortion.
 const FOV: f64 = 30.0;
-/// What [`Camera::fit`] leaves free around the box, as a share of half the picture.
+/// Margin of [`Camera::fit`] around the box, as a fraction of half the picture.
 const MARGIN: f64 = 0.08;
-/// From the target to the eye in [`Camera::fit`]: three-quarter view from the front right, a little from above.
+/// Direction from the target to the eye in [`Camera::fit`]: a three-quarter view from the front right, slightly from
+/// above.
 const THREE_QUARTER: [f64; 3] = [0.52, 0.30, 0.80];
 
-/// Least and greatest coordinates, metres.
+/// Smallest and largest coordinates, metres.
 pub type BoundingBox = [[f32; 3]; 2];
 
-/// Where a picture is taken from. Lengths in metres, Y up, right-handed.
+/// A camera. Lengths in metres, Y up, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     eye: DVec3,
@@ -44,11 +45,11 @@ pub enum CameraError {
     /// An invalid value.
     #[error("`{name}` is `{value}`, expected {expected}")]
     Value {
-        /// Which part.
+        /// Name of the setting.
         name: &'static str,
-        /// What was given.
+        /// The given value.
         value: String,
-        /// What it should be.
+        /// A description of valid values.
         expected: &'static str,
     },
     /// No viewing direction.
@@ -59,10 +60,10 @@ pub enum CameraError {
 impl Camera {
     /// A camera at `eye` that looks at `target`; `up` points up in the picture; `fov` is the vertical angle in degrees.
     ///
-    /// Where `up` is along the view (a view from straight above), Z, then X takes its place.
+    /// If `up` is parallel to the view (a view from straight above), Z or else X takes its place.
     ///
     /// # Errors
-    /// Where a number is not finite, `up` is zero, `fov` is not in 1…170, or `eye` is `target`.
+    /// If a number is not finite, `up` is zero, `fov` is not in 1…170, or `eye` is `target`.
     pub fn new(eye: [f64; 3], target: [f64; 3], up: [f64; 3], fov: f64) -> Result<Self, CameraError> {
         for (name, value) in [("eye", eye), ("target", target)] {
             if value.iter().any(|x| !x.is_finite()) {
@@ -84,10 +85,10 @@ impl Camera {
         Ok(Self { eye: eye_at, target: target_at, up: up_along, fov })
     }
 
-    /// The three-quarter view that holds all of `bounds` in a picture `aspect` (width ÷ height) wide.
+    /// The three-quarter view that shows all of `bounds` in a picture with this `aspect` (width ÷ height).
     ///
-    /// Give the union over all frames and outputs, and all pictures have one camera. A box without extent is
-    /// seen from as far as a box of 1 m would be; bounds that are not finite count as the unit box.
+    /// With the union over all frames and outputs, all pictures have one camera. A box without extent is seen from the
+    /// distance of a box of 1 m; bounds that are not finite count as the unit box.
     pub fn fit(bounds: BoundingBox, aspect: f64) -> Self {
         let [low, high] = proper(bounds);
         let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
@@ -98,7 +99,7 @@ impl Camera {
         let tan_y = half_tangent(FOV) * (1.0 - MARGIN);
         let tan_x = tan_y * aspect;
 
-        // A corner (x, y, z) of the box, z along the view, is inside where |x − eye_x| ≤ (z − eye_z)·tan. The largest
+        // A corner (x, y, z) of the box, z along the view, is inside if |x − eye_x| ≤ (z − eye_z)·tan. The largest
         // x − z·tan and −x − z·tan over the corners therefore bound the eye from both sides.
         let mut most = [f64::NEG_INFINITY; 4];
         for corner in corners([low, high]) {
@@ -129,7 +130,7 @@ impl Camera {
         self.fov
     }
 
-    /// Right, up and forward, each of length 1 and square to the others.
+    /// Right, up and forward: unit vectors, perpendicular to each other.
     pub(crate) fn axes(&self) -> [DVec3; 3] {
         axes(self.target - self.eye, self.up)
     }
@@ -162,7 +163,7 @@ impl FromStr for Camera {
     }
 }
 
-/// The text that reads back as this camera.
+/// The text from which this camera can be read back.
 impl fmt::Display for Camera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [eye, target, up] = [self.eye, self.target, self.up].map(|v| commas(v.into()));
@@ -172,7 +173,7 @@ impl fmt::Display for Camera {
 
 /// Right, up and forward of a view along `forward`.
 fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
-    /// Sine of the angle below which `up` says nothing about the picture's up.
+    /// Sine of the angle to the view below which `up` does not define the picture's up.
     const ALONG: f64 = 1e-6;
     let forward = direction(forward).unwrap_or(-DVec3::z());
     let square = |up: DVec3| direction(up).map(|up| forward.cross(&up)).filter(|right| right.norm() > ALONG);
@@ -193,7 +194,7 @@ pub(crate) fn proper(bounds: BoundingBox) -> [DVec3; 2] {
     }
     let size = (high - low).norm();
     let far = low.iter().chain(&high).fold(0.0_f64, |most, x| most.max(x.abs()));
-    // Below the spacing of f32 at that distance there is nothing to see.
+    // An extent below the spacing of f32 at that distance cannot be seen.
     let smallest = far * f64::from(f32::EPSILON);
     if size > smallest { [low, high] } else { [low.add_scalar(-0.5), high.add_scalar(0.5)] }
 }
@@ -232,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_reads_back_what_it_writes() {
+    fn a_written_camera_reads_back() {
         let camera: Camera = "eye=1,2.5,3 target=0,-1e-3,0 fov=35".parse().unwrap();
         assert_eq!(camera.eye(), [1.0, 2.5, 3.0]);
         assert_eq!(camera.fov(), 35.0);
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_camera_says_what_is_wrong() {
+    fn invalid_cameras_are_refused_with_the_reason() {
         assert_eq!(error("eye=1,2 target=0,0,0"), "`eye` is `1,2`, expected three finite numbers like `1,2,3`");
         assert_eq!(error("eye=1,2,x target=0,0,0"), "`eye` is `1,2,x`, expected three finite numbers like `1,2,3`");
         assert_eq!(error("eye=1,2,3"), "`target` is missing, expected a camera like `eye=1,2,3 target=0,0,0 fov=35`");
@@ -260,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fitted_camera_holds_the_bounds_and_touches_the_margin() {
+    fn a_fitted_camera_shows_the_bounds_and_touches_the_margin() {
         for bounds in [
             [[-0.4, 0.0, -0.3], [0.4, 1.0, 0.3]],
             [[0.0, 0.0, 0.0], [10.0, 0.0, 10.0]],
@@ -283,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_without_extent_or_number_still_give_a_camera() {
+    fn empty_and_non_finite_bounds_give_a_camera() {
         let point = Camera::fit([[3.0; 3]; 2], 1.0);
         let unit_box = Camera::fit([[2.5; 3], [3.5; 3]], 1.0);
         assert_eq!(point, unit_box);
@@ -291,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_from_straight_above_has_a_picture_up() {
+    fn a_view_from_straight_above_has_an_up_direction() {
         let camera: Camera = "eye=0,5,0 target=0,0,0".parse().unwrap();
         let [right, up, forward] = camera.axes();
         assert_eq!(forward, -DVec3::y());

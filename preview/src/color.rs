@@ -1,8 +1,8 @@
-//! Colour: light as numbers and as bytes, the colour map of attributes, and what a component is painted with.
+//! Colour: linear light and bytes, the colour map of attributes, and the colours of a component.
 //!
-//! Colours are linear light with the primaries of sRGB; a picture's bytes are sRGB. Promise: the colour map's lightness
-//! rises evenly, so that a printed or colour-blind reading keeps the order of values. Limit: a colour attribute is
-//! taken as linear and clamped to 0…1.
+//! Colours are linear light with the primaries of sRGB; a picture's bytes are sRGB. Guarantees: the colour map's
+//! lightness rises evenly, so that the order of values is visible in print and with colour blindness. Limit: a colour
+//! attribute is taken as linear and clamped to 0…1.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -14,11 +14,11 @@ use crate::shape::level_set;
 use crate::vector::mix;
 use numerics::vector::{Vec3, length};
 
-/// Attributes that are a colour by their name, where they are three or four wide; the first there is drawn.
+/// Attributes that are colours by their name, if they have three or four components; the first that exists is drawn.
 const COLOR_NAMES: [&str; 3] = ["Cd", "color", "displayColor"];
 /// Colour of values that are not finite: no colour map and no default has it.
 const NOT_A_NUMBER: Vec3 = [1.0, 0.0, 0.6];
-/// Colour of components that lack the attribute shown.
+/// Colour of components that lack the displayed attribute.
 const WITHOUT: Vec3 = [0.30, 0.30, 0.31];
 
 /// Viridis (Nathaniel Smith and Stéfan van der Walt, CC0) at tenths, sRGB.
@@ -36,7 +36,8 @@ const MAP: [[u8; 3]; 11] = [
     [253, 231, 37],
 ];
 
-/// The colour of `share` (clamped to 0…1) of the range, sRGB: dark violet over green to yellow, with lightness rising evenly.
+/// The colour at `share` (clamped to 0…1) of the range, sRGB: from dark violet through green to yellow, with evenly
+/// rising lightness.
 pub fn color_map(share: f32) -> [u8; 3] {
     encode(mapped(share))
 }
@@ -47,13 +48,13 @@ fn mapped(share: f32) -> Vec3 {
     }
     let at = share.clamp(0.0, 1.0) * (MAP.len() - 1) as f32;
     let low = (at as usize).min(MAP.len() - 2);
-    // Between neighbours of sRGB bytes, where steps look even.
+    // Interpolated in sRGB, where steps look even.
     let [a, b] = [low, low + 1].map(|k| MAP[k].map(f32::from));
     mix(a, b, at - low as f32).map(|byte| decode(byte / 255.0))
 }
 
-/// Least and greatest finite value of an attribute over all layers: of a vector its length, of `v` in a volume the
-/// speed of its liquid cells. `None` where no layer has a value.
+/// Smallest and largest finite value of an attribute over all layers: the length of vectors; for `v` of a volume, the
+/// speed of its liquid cells. `None` if no layer has a value.
 ///
 /// For a sequence, take the union over its frames.
 pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
@@ -79,7 +80,7 @@ pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
     range
 }
 
-/// Names that `color_by` can take, for a message: every attribute of every layer but `P`, in order.
+/// Valid names for `color_by`, for a message: every attribute of every layer except `P`, in order.
 pub fn attribute_names<'a>(layers: &[Layer<'a>]) -> BTreeSet<&'a str> {
     let of = |geometry: &'a Geometry| {
         let columns = geometry.parts().flat_map(|part| part.columns().map(|(_, name, _)| &**name));
@@ -88,13 +89,13 @@ pub fn attribute_names<'a>(layers: &[Layer<'a>]) -> BTreeSet<&'a str> {
     layers.iter().flat_map(|layer| of(layer.geometry)).filter(|name| *name != "P").collect()
 }
 
-/// The one attribute a volume can show.
+/// The only attribute that a volume can show.
 pub(crate) const SPEED: &str = "v";
 
 /// The colour of each point or element.
 #[derive(Debug)]
 pub(crate) enum Paint {
-    /// One colour that shows no attribute, so it is lit fully.
+    /// One colour that does not show an attribute, so it is fully lit.
     Plain(Vec3),
     /// One row per point.
     Points(Vec<Vec3>),
@@ -103,7 +104,7 @@ pub(crate) enum Paint {
 }
 
 impl Paint {
-    /// What `part` is painted with: by the attribute asked for, else a colour attribute, else `plain`.
+    /// The colours of `part`: from the requested attribute, otherwise a colour attribute, otherwise `plain`.
     pub(crate) fn of(part: &Component, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         let painted = match color_by {
             Some((name, range)) => find(part, name).map(|(owner, column)| {
@@ -129,7 +130,7 @@ impl Paint {
         }
     }
 
-    /// What a volume's surface is painted with, one row per point.
+    /// The colours of a volume's surface, one row per point.
     pub(crate) fn of_speeds(speeds: Option<Vec<f32>>, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         match (speeds, color_by) {
             (Some(speeds), Some((_, range))) => {
@@ -149,9 +150,9 @@ impl Paint {
     }
 }
 
-/// Where `value` lies in the range, 0…1 within; the middle of a range without extent.
+/// Position of `value` in the range, 0…1 inside; 0.5 for a range without extent.
 fn share(value: f32, [low, high]: [f32; 2]) -> f32 {
-    // Halves, as the difference of two great numbers may overflow.
+    // In halves, as the difference of two large numbers may overflow.
     let extent = 0.5 * high - 0.5 * low;
     if !value.is_finite() {
         f32::NAN
@@ -196,7 +197,7 @@ pub(crate) fn decode(value: f32) -> f32 {
 
 /// sRGB bytes of linear light, clamped to 0…1.
 pub(crate) fn encode(linear: Vec3) -> [u8; 3] {
-    /// Steps of linear light: the finest byte step, near black, is 1.2 of them.
+    /// Number of steps of linear light: the smallest byte step, near black, is 1.2 of them.
     const STEPS: usize = 4096;
     static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
         let byte = |step: usize| {
@@ -220,10 +221,10 @@ mod tests {
     }
 
     #[test]
-    fn the_color_map_gets_lighter_all_the_way() {
+    fn the_color_map_gets_evenly_lighter() {
         let steps: Vec<f64> = (0..=100).map(|k| lightness(color_map(k as f32 / 100.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[1] > pair[0]), "{steps:?}");
-        // Evenly: no tenth of the range has less than half or more than twice its share.
+        // Evenly: no tenth of the range has less than half or more than twice the average rise.
         for pair in steps.iter().step_by(10).collect::<Vec<_>>().windows(2) {
             let share = (pair[1] - pair[0]) / (steps[100] - steps[0]) * 10.0;
             assert!((0.5..2.0).contains(&share), "{share}");
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_over_all_layers_and_skips_what_is_not_finite() {
+    fn a_range_covers_all_layers_and_skips_non_finite_values() {
         let points = |values: Vec<f32>| {
             let mut part = Component::points(vec![[0.0; 3]; values.len()]);
             part.set_column(Owner::Point, "heat", Column::new(values)).unwrap();
@@ -271,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_color_attribute_is_drawn_as_it_is() {
+    fn a_color_attribute_is_drawn_unchanged() {
         let mut part = Component::points(vec![[0.0; 3]]);
         part.set_column(Owner::Once, "Cd", Column::new(vec![[0.1_f32, 2.0, 0.3]])).unwrap();
         assert_eq!(Paint::of(&part, None, [0.5; 3]).at(0, 0), [0.1, 1.0, 0.3]);

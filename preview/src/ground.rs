@@ -1,8 +1,9 @@
-//! The floor under the scene: only its shadow is drawn on the backdrop, so it has no horizon and hides nothing.
+//! The floor under the scene: only the shadows on it are drawn over the backdrop, so it has no horizon and hides
+//! nothing.
 //!
-//! Promise: the floor lies at the lowest point of the bounds and darkens only, softly: where the key light is blocked,
-//! and close under what nearly touches it. Limit: no shadow farther than `HALF` from the middle of the scene, none
-//! for an eye below the floor.
+//! Guarantees: the floor is at the lowest point of the bounds and only darkens, softly: where the key light is blocked,
+//! and close under objects that nearly touch it. Limit: no shadows farther than `HALF` from the middle of the scene,
+//! and none for an eye below the floor.
 
 use rayon::prelude::*;
 
@@ -11,19 +12,19 @@ use crate::scene::Scene;
 use crate::view::View;
 use numerics::vector::{Vec3, add, scale, sub};
 
-/// Half the side of the floor, stage units, and texels per side.
+/// Half the side of the floor, stage units; and texels per side.
 const HALF: f32 = 2.6;
 const TEXELS: usize = 320;
-/// Height at which something over the floor darkens it half as much as touching it, stage units.
+/// Height at which an object above the floor darkens it half as much as one that touches it, stage units.
 const CONTACT_HEIGHT: f32 = 0.05;
-/// Share of the backdrop's light that full shadow, and full contact, take.
+/// Fraction of the backdrop's light that is removed by full shadow, and by full contact.
 const SHADOW: f32 = 0.38;
 const CONTACT: f32 = 0.45;
-/// Texels that box filters reach to each side; three of them in a row are near a Gaussian.
+/// Radius of the box filters, texels; three of them in a row approximate a Gaussian.
 const SHADOW_BLUR: usize = 4;
 const CONTACT_BLUR: usize = 3;
 
-/// How dark the floor is.
+/// Darkness of the floor.
 pub(crate) struct Ground {
     height: f32,
     light: Vec<f32>,
@@ -34,8 +35,8 @@ impl Ground {
     pub(crate) fn of(scene: &Scene, light: &Light, height: f32) -> Self {
         let up = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
         let from_below = DepthMap::from(scene, [0.0, height, 0.0], up);
-        let near = |way: f32| {
-            let heights = way.max(0.0) / CONTACT_HEIGHT;
+        let near = |distance: f32| {
+            let heights = distance.max(0.0) / CONTACT_HEIGHT;
             1.0 / (1.0 + heights * heights)
         };
         let texels = |value: &(dyn Fn(Vec3) -> f32 + Sync)| -> Vec<f32> {
@@ -52,16 +53,16 @@ impl Ground {
         }
     }
 
-    /// Share of the backdrop's light at the pixel x, y.
+    /// Fraction of the backdrop's light that remains at the pixel x, y.
     pub(crate) fn light(&self, view: &View, x: f32, y: f32) -> f32 {
         let eye = view.eye();
         let ray = sub(view.unproject([x, y, 1.0]), eye);
-        let way = (self.height - eye[1]) / ray[1];
-        // Written so that a level ray and NaN see no floor.
-        if !(way > 0.0 && ray[1] < 0.0) {
+        let distance = (self.height - eye[1]) / ray[1];
+        // Written so that level rays and NaN do not hit the floor.
+        if !(distance > 0.0 && ray[1] < 0.0) {
             return 1.0;
         }
-        let [u, _, v] = add(eye, scale(ray, way)).map(|x| (x / HALF + 1.0) * 0.5 * TEXELS as f32 - 0.5);
+        let [u, _, v] = add(eye, scale(ray, distance)).map(|x| (x / HALF + 1.0) * 0.5 * TEXELS as f32 - 0.5);
         let inside = |x: f32| x >= 0.0 && x < (TEXELS - 1) as f32;
         if !(inside(u) && inside(v)) {
             return 1.0;
@@ -73,10 +74,11 @@ impl Ground {
     }
 }
 
-/// Three box filters along rows and columns; what lies beyond the border is 0.
+/// Three box filters along rows and columns, with 0 beyond the border.
 fn blur(mut texels: Vec<f32>, reach: usize) -> Vec<f32> {
     for _ in 0..6 {
-        // Along the rows, written as columns: after two rounds both are done and all lies as before.
+        // Filters rows and writes them as columns: after two rounds both directions are done and the layout is
+        // restored.
         let blurred: Vec<Vec<f32>> = texels.par_chunks(TEXELS).map(|row| box_filter(row, reach)).collect();
         texels = (0..TEXELS * TEXELS).map(|k| blurred[k % TEXELS][k / TEXELS]).collect();
     }

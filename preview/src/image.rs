@@ -1,6 +1,6 @@
-//! Pictures: rows of sRGB bytes, put side by side or on a sheet, and written as PNG.
+//! Pictures: rows of sRGB bytes, joined side by side or on a contact sheet, and written as PNG.
 //!
-//! Promise: the bytes of a PNG depend on the picture alone. Limit: 8 bits per channel, no alpha; at most
+//! Guarantees: the bytes of a PNG depend only on the picture. Limit: 8 bits per channel, no alpha; at most
 //! [`Image::MOST_PIXELS`].
 
 use std::io::Write;
@@ -21,13 +21,13 @@ const GAP: usize = 4;
 const GAP_COLOR: [u8; 3] = [255; 3];
 
 impl Image {
-    /// Most pixels a picture may have: 768 MiB of bytes.
+    /// Largest number of pixels in a picture: 768 MiB of bytes.
     pub const MOST_PIXELS: usize = 1 << 28;
 
     /// A picture of one colour, sRGB.
     ///
     /// # Errors
-    /// Where it would have no pixel, or more than [`Image::MOST_PIXELS`].
+    /// If it would have no pixel, or more than [`Image::MOST_PIXELS`].
     pub fn filled(width: usize, height: usize, color: [u8; 3]) -> Result<Self, PreviewError> {
         match width.checked_mul(height) {
             Some(pixels) if (1..=Self::MOST_PIXELS).contains(&pixels) => {
@@ -55,12 +55,12 @@ impl Image {
     /// Row `y` of pixels, to be drawn into.
     ///
     /// # Panics
-    /// Where `y` is not below the height.
+    /// If `y` is not below the height.
     pub(crate) fn row_mut(&mut self, y: usize) -> &mut [[u8; 3]] {
         &mut self.rows[y * self.width..(y + 1) * self.width]
     }
 
-    /// Copies `panel` to `left`, `top`, where all of it has room.
+    /// Copies `panel` to `left`, `top`; it must fit.
     fn paste(&mut self, panel: &Self, left: usize, top: usize) {
         for (y, row) in panel.rows.chunks(panel.width).enumerate() {
             self.row_mut(top + y)[left..left + panel.width].copy_from_slice(row);
@@ -70,7 +70,7 @@ impl Image {
     /// Writes the picture as PNG, 24 bits per pixel, packed as tightly as the encoder can.
     ///
     /// # Errors
-    /// Where `to` cannot be written.
+    /// If `to` cannot be written.
     pub fn write_png(&self, to: impl Write) -> Result<(), PreviewError> {
         let size = [self.width, self.height].map(|pixels| pixels as u32);
         let mut encoder = png::Encoder::new(to, size[0], size[1]);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_has_every_panel_in_its_place() {
+    fn a_sheet_has_every_panel_at_its_position() {
         let panels = [gradient(5, 4), gradient(3, 2), gradient(5, 4)];
         let sheet = contact_sheet(&panels, 2).unwrap();
         assert_eq!((sheet.width(), sheet.height()), (5 + GAP + 5, 4 + GAP + 4));
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_without_pixels_or_beyond_memory_are_refused() {
+    fn empty_and_too_large_pictures_are_refused() {
         let text = |error: Result<Image, PreviewError>| error.unwrap_err().to_string();
         assert_eq!(text(Image::filled(0, 5, [0; 3])), "the picture is 0 × 5 pixels, expected 1 to 268435456 in all");
         assert!(Image::filled(usize::MAX, 2, [0; 3]).is_err());

@@ -1,12 +1,12 @@
-//! Pictures of geometry, drawn by a small z-buffer rasteriser of our own: no GPU, no window.
+//! Pictures of geometry, drawn by a small z-buffer rasteriser without GPU or window.
 //!
-//! Curves have width and are shaded along their tangent, meshes and the skins of tets are lit, points are balls, volumes
-//! show their zero level; an attribute can be the colour. [`render`] draws one panel; [`side_by_side`] and
-//! [`contact_sheet`] join panels; [`Image::write_png`] writes. For a sequence give every frame the same
+//! Curves have width and are shaded along their tangent, meshes and the skins of tets are lit, points are balls,
+//! volumes show their zero level; an attribute can be shown as colour. [`render`] draws one panel; [`side_by_side`] and
+//! [`contact_sheet`] join panels; [`Image::write_png`] writes them. For a sequence, give every frame the same
 //! [`PictureSettings::bounds`] (the [`union`] of [`bounds`]) and [`PictureSettings::range`].
 //!
-//! Promise: the same bits on any number of threads and any CPU; no panic and no endless work on any geometry. Limit: a
-//! preview, not a renderer: no textures, no transparency but of what is thinner than a pixel.
+//! Guarantees: the same bits on any number of threads and any CPU; no panic and bounded work for any geometry. Limit: a
+//! preview, not a renderer: no textures, and transparency only for things thinner than a pixel.
 
 mod camera;
 mod color;
@@ -32,11 +32,11 @@ pub use scene::{bounds, union};
 /// A geometry in a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// What the label calls it: an output's name.
+    /// Its name in the label: an output's name.
     pub name: &'a str,
     /// What is drawn.
     pub geometry: &'a Geometry,
-    /// Linear light 0…1, where no attribute colours it; each kind of component has its own default.
+    /// Linear light 0…1, used without a colour attribute; each kind of component has its own default.
     pub color: Option<[f32; 3]>,
 }
 
@@ -54,26 +54,26 @@ pub struct PictureSettings {
     pub width: usize,
     /// Pixels down.
     pub height: usize,
-    /// Where from; [`Camera::fit`] around the bounds else.
+    /// The camera; by default [`Camera::fit`] around the bounds.
     pub camera: Option<Camera>,
-    /// What the camera frames, the floor lies under and the light reaches; the layers' own bounds else.
+    /// Bounds for the camera, the floor and the lights; by default those of the layers.
     pub bounds: Option<BoundingBox>,
     /// Attribute that gives the colour: a number, a vector by its length, or a colour by its name (`Cd`, `color`,
-    /// `displayColor`). What has it not is grey. Without it such a colour attribute is drawn where there is one.
+    /// `displayColor`). Components without it are grey. If `None`, a colour attribute is drawn if there is one.
     pub color_by: Option<String>,
-    /// Values at the ends of the colour map; the layers' [`attribute_range`] else.
+    /// Values at the ends of the colour map; by default the layers' [`attribute_range`].
     pub range: Option<[f32; 2]>,
-    /// Width of all curves, whatever their `width` says.
+    /// Width of all curves; overrides their `width`.
     pub curve_width: Option<f32>,
-    /// Diameter of all points, whatever their `width` says.
+    /// Diameter of all points; overrides their `width`.
     pub point_width: Option<f32>,
-    /// The backdrop where it is brightest, sRGB.
+    /// Brightest colour of the backdrop, sRGB.
     pub background: [u8; 3],
-    /// Whether a floor under the bounds takes shadows.
+    /// Whether a floor under the bounds receives shadows.
     pub ground: bool,
     /// Whether the layers' names are written into the upper left.
     pub names: bool,
-    /// What is written after them: the frame.
+    /// Text that is written after them: the frame.
     pub note: Option<String>,
     /// Whether a bar explains the colours of `color_by`.
     pub legend: bool,
@@ -116,7 +116,7 @@ pub enum PreviewError {
     EmptySheet {
         /// Pictures given.
         panels: usize,
-        /// Columns asked for.
+        /// Requested columns.
         columns: usize,
     },
     /// The file could not be written.

@@ -1,9 +1,10 @@
-//! The studio's light: a key from the upper left of the camera with shadows, a fill from the right, and sky and floor.
+//! The lighting: a key from the upper left of the camera with shadows, a fill from the right, and sky and floor.
 //!
 //! Surfaces are matt with a faint gloss. Strands are lit along their tangent (Kajiya and Kay, "Rendering fur with three
-//! dimensional textures", 1989): sin(T, L) of the light, and a highlight where the tangent mirrors it to the eye.
-//! Promise: colours that show an attribute keep their order, as they get less contrast and no gloss.
-//! Limit: one bounce; shadows have the grain of `MAP_PIXELS` pixels over the scene, and beyond its bounds there is none.
+//! dimensional textures", 1989): by the sine between tangent and light, with a highlight where the tangent reflects the
+//! light to the eye. Guarantees: colours that show an attribute keep their order, as they are lit with less contrast
+//! and no gloss. Limit: one bounce; shadows have a resolution of `MAP_PIXELS` pixels over the scene, and there are none
+//! beyond its bounds.
 
 use rayon::prelude::*;
 
@@ -21,18 +22,18 @@ const KEY_LIGHT: Vec3 = [1.04, 1.00, 0.94];
 const FILL_LIGHT: Vec3 = [0.17, 0.18, 0.20];
 const SKY_LIGHT: Vec3 = [0.36, 0.37, 0.40];
 const FLOOR_LIGHT: Vec3 = [0.20, 0.19, 0.18];
-/// How far the key reaches round a surface, as from a large lamp.
+/// How far the key light wraps around a surface, as from a large lamp.
 const WRAP: f32 = 0.12;
 const GLOSS: f32 = 0.04;
 const HAIR_GLOSS: f32 = 0.22;
-/// Light on a colour that shows an attribute: from this in the dark to 1 in full light, so that none gets brighter.
+/// Light on a colour that shows an attribute: from this in the dark to 1 in full light, so that it never gets brighter.
 const MEASURED: f32 = 0.45;
-/// Full light: key, sky and fill on what faces them best.
+/// Full light: key, sky and fill on a surface that faces them.
 const FULL: f32 = 1.45;
 
 /// Pixels per side of a light's view, each of 16 samples.
 const MAP_PIXELS: usize = 192;
-/// Half the side of what a light's view shows, stage units: the scene's bounds lie within 1.
+/// Half the side of a light's view, stage units: the scene's bounds lie within 1.
 const MAP_HALF: f32 = 1.05;
 
 /// Lights and their shadows.
@@ -46,7 +47,8 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    /// Lights `scene` for a camera. Strands and balls get their share of the key here, surfaces when they are drawn.
+    /// Lights `scene` for a camera. The key light on strands and balls is computed here, that on surfaces when they are
+    /// drawn.
     pub(crate) fn set_up(scene: &mut Scene, view: &View, measured: bool) -> Self {
         let right = view.axes()[0];
         let back = unit(cross(right, [0.0, 1.0, 0.0])).unwrap_or(scale(view.axes()[2], -1.0));
@@ -65,13 +67,13 @@ impl Light {
         light
     }
 
-    /// Share of the key that reaches a point of the stage.
+    /// Fraction of the key light that reaches a point of the stage.
     pub(crate) fn reaching(&self, at: Vec3) -> f32 {
-        // A pixel of the map: nearer things may be the point's own.
+        // The size of a pixel of the map: closer geometry may be the point's own.
         self.shadow.clear(at, self.shadow.pixel())
     }
 
-    /// A point of a surface; `normal` is on the side that is seen.
+    /// A point of a surface; `normal` is on the visible side.
     pub(crate) fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Vec3 {
         let to_eye = unit(sub(self.eye, at)).unwrap_or(self.key);
         let normal = unit(normal).unwrap_or(to_eye);
@@ -79,7 +81,7 @@ impl Light {
         self.matt(normal, to_eye, color, self.shadow.clear(off_skin, 0.5 * self.shadow.pixel()))
     }
 
-    /// A point of a matt surface with a faint gloss, of which the key sees `lit`.
+    /// A point of a matt surface with a faint gloss, `lit` by that fraction of the key light.
     pub(crate) fn matt(&self, normal: Vec3, to_eye: Vec3, color: Vec3, lit: f32) -> Vec3 {
         let key = ((dot(normal, self.key) + WRAP) / (1.0 + WRAP)).max(0.0) * lit;
         let fill = dot(normal, self.fill).max(0.0);
@@ -126,21 +128,21 @@ fn sixteenth_power(x: f32) -> f32 {
     eighth * eighth
 }
 
-/// How near things are to a parallel view: what a lamp sees, or the floor.
+/// Depth of the scene in a parallel view: as seen by a lamp, or from the floor.
 pub(crate) struct DepthMap {
     view: View,
     pixels: Vec<Lanes>,
 }
 
 impl DepthMap {
-    /// What a lamp that shines along `direction` sees of the scene's bounds.
+    /// The view of the scene's bounds from a lamp that shines along `direction`.
     pub(crate) fn towards(scene: &Scene, direction: Vec3) -> Self {
         let aside = if direction[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = unit(cross(direction, aside)).unwrap_or([1.0, 0.0, 0.0]);
         Self::from(scene, [0.0; 3], [right, cross(right, direction), direction])
     }
 
-    /// What is seen from the plane through `eye`, along `axes[2]`.
+    /// The view from the plane through `eye` along `axes[2]`.
     pub(crate) fn from(scene: &Scene, eye: Vec3, axes: [Vec3; 3]) -> Self {
         let view = View::parallel(eye, axes, MAP_HALF, MAP_PIXELS);
         let tiles = raster::draw(&Screen::of(scene, &view, [MAP_PIXELS; 2]), &DepthOnly, |tile| tile);
@@ -159,7 +161,8 @@ impl DepthMap {
         2.0 * MAP_HALF / MAP_PIXELS as f32
     }
 
-    /// Share of the samples in which the point is not hidden; what is less than `slack` in front of it does not count.
+    /// Fraction of the samples in which the point is not hidden; geometry less than `slack` in front of it does not
+    /// count.
     pub(crate) fn clear(&self, at: Vec3, slack: f32) -> f32 {
         let [x, y, nearness] = self.view.project(at);
         self.blend([x, y], 1.0, |lanes| {
@@ -168,8 +171,8 @@ impl DepthMap {
         })
     }
 
-    /// A pixel's `value`, blended over the nine around x, y by a quadratic B-spline, so that it has no steps and no kinks;
-    /// `beyond` outside.
+    /// A pixel's `value`, blended over the nine around x, y by a quadratic B-spline, so that it is smooth; `beyond`
+    /// outside.
     fn blend(&self, at: [f32; 2], beyond: f32, value: impl Fn(&Lanes) -> f32) -> f32 {
         if !at.iter().all(|x| *x >= 1.0 && *x < (MAP_PIXELS - 1) as f32) {
             return beyond;
@@ -189,7 +192,8 @@ impl DepthMap {
         sum
     }
 
-    /// Mean of `value` of the distance from the map's plane to what is seen, over the samples near `at`; 0 where nothing is.
+    /// Mean of `value` applied to the distance from the map's plane to the visible geometry, over the samples near
+    /// `at`; 0 for empty samples.
     pub(crate) fn seen(&self, at: Vec3, value: impl Fn(f32) -> f32) -> f32 {
         let [x, y, _] = self.view.project(at);
         self.blend([x, y], 0.0, |lanes| {
@@ -212,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_roof_shades_what_is_under_it_and_half_at_its_edge() {
+    fn a_roof_shades_points_under_it_and_half_at_its_edge() {
         let map = DepthMap::towards(&roof(), [0.0, -1.0, 0.0]);
         assert_eq!(map.clear([0.0, 0.0, 0.0], 0.0), 0.0);
         assert_eq!(map.clear([0.0, 0.6, 0.0], 0.0), 1.0);
@@ -222,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_to_what_is_seen_is_measured_from_the_plane() {
+    fn distance_to_visible_geometry_is_measured_from_the_plane() {
         let up = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
         let map = DepthMap::from(&roof(), [0.0, -1.0, 0.0], up);
         assert!((map.seen([0.1, -1.0, 0.2], |distance| distance) - 1.5).abs() < 1e-5);

@@ -14,15 +14,15 @@ use numerics::vector::{Vec3, add, scale, sub};
 
 /// Bounds of an empty scene: a metre around the origin.
 const NOTHING: crate::BoundingBox = [[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]];
-/// Share of the backdrop's light that the corners of the picture lose.
+/// Fraction of the backdrop's light that is missing in the corners of the picture.
 const VIGNETTE: f32 = 0.30;
-/// Light that a thick strand loses towards its edges, as it is round.
+/// Fraction of light that a thick strand loses towards its edges, as it is round.
 const ROUND: f32 = 0.45;
 
-/// Draws the layers into one picture. Without anything to draw it is the backdrop.
+/// Draws the layers into one picture. An empty scene gives the backdrop.
 ///
 /// # Errors
-/// Where the picture would have no pixel, or too many.
+/// If the picture would have no pixel, or too many.
 pub fn render(layers: &[Layer<'_>], settings: &PictureSettings) -> Result<Image, PreviewError> {
     let size = [settings.width, settings.height];
     let mut image = Image::filled(size[0], size[1], settings.background)?;
@@ -73,7 +73,7 @@ impl Shader for Studio<'_> {
     }
 
     fn strand(&self, color: Vec3, across: f32, radius: f32) -> Vec3 {
-        // Below two pixels across there is no edge to see.
+        // Below a width of two pixels no edge is visible.
         let seen = ((radius - 1.0) * 0.5).clamp(0.0, 1.0);
         let height = (1.0 - across * across).max(0.0).sqrt();
         scale(color, 1.0 - ROUND * seen * (1.0 - height))
@@ -115,7 +115,7 @@ fn resolve(tile: &Tile<Vec3>, backdrop: &Backdrop, view: &View) -> Vec<[u8; 3]> 
         if bare == SAMPLES {
             return encode(behind());
         }
-        // What is bright beyond white is cut before the mean, or its edge would have steps.
+        // Values above white are clamped before the mean, otherwise their edges would have steps.
         let sum = tile.color[index].iter().fold([0.0; 3], |sum, color| add(sum, color.map(|x| x.min(1.0))));
         let sum = if bare > 0 { add(sum, scale(behind(), bare as f32)) } else { sum };
         encode(scale(sum, 1.0 / SAMPLES as f32))

@@ -1,7 +1,7 @@
-//! What is drawn: the layers' components as triangles, strands and dots on the stage, painted but not yet lit.
+//! The drawn scene: the layers' components as triangles, strands and balls on the stage, coloured but not yet lit.
 //!
-//! Promise: every component of every layer is there, in the order of the layers, then mesh, tets, volume, curves, points.
-//! Limit: triangles and CVs that are not finite are left out, one by one.
+//! Guarantees: contains every component of every layer, in the order of the layers, then mesh, tets, volume, curves,
+//! points. Limit: non-finite triangles and CVs are left out individually.
 
 use engine::geometry::{Component, Kind, Owner, Volume, WIDTH};
 use rayon::prelude::*;
@@ -45,12 +45,12 @@ pub(crate) struct Dot {
     pub(crate) at: Vec3,
     pub(crate) radius: f32,
     pub(crate) color: Vec3,
-    /// Share of the key light that reaches it.
+    /// Fraction of the key light that reaches it.
     pub(crate) lit: f32,
     pub(crate) seed: u32,
 }
 
-/// All that is drawn.
+/// Everything that is drawn.
 #[derive(Debug, Default)]
 pub(crate) struct Scene {
     pub(crate) triangles: Vec<[Corner; 3]>,
@@ -59,8 +59,7 @@ pub(crate) struct Scene {
     pub(crate) dots: Vec<Dot>,
 }
 
-/// Default colours, linear light: clay, dark skin where curves may grow on it, putty, honey, brown
-/// hair, water.
+/// Default colours, linear light: clay, dark skin if curves may grow on it, putty, honey, brown hair, water.
 const MESH: Vec3 = [0.50, 0.45, 0.39];
 const SKIN: Vec3 = [0.21, 0.135, 0.09];
 const TETS: Vec3 = [0.62, 0.46, 0.28];
@@ -68,22 +67,22 @@ const VOLUME: Vec3 = [0.58, 0.24, 0.035];
 const CURVES: Vec3 = [0.50, 0.26, 0.105];
 const POINTS: Vec3 = [0.12, 0.32, 0.60];
 
-/// Default width of a curve, as a share of half the scene's diagonal: hair on an animal that fills the picture.
+/// Default width of a curve, relative to half the scene's diagonal: hair on an animal that fills the picture.
 const CURVE_WIDTH: f32 = 0.0035;
-/// Width of such a curve at its tip, as a share of its width at the root.
+/// Width of such a curve at its tip, relative to its width at the root.
 const TIP: f32 = 0.3;
-/// Default diameter of a point, as a share of the mean spacing of that many points in half the scene's diagonal, and its
-/// limits, so that single points are not too large and a million points still visible.
+/// Default diameter of a point, relative to the mean spacing of that many points in half the scene's diagonal, and its
+/// limits, so that single points are not too large and a million points are still visible.
 const POINT_WIDTH: f32 = 1.1;
 const POINT_WIDTHS: [f32; 2] = [0.004, 0.06];
-/// Light at the root of a strand, as a share of that at its tip: neighbours shade the root.
+/// Light at the root of a strand relative to that at its tip, since neighbours shade the root.
 const ROOT: f32 = 0.5;
-/// How far a strand's colour may lie from the next one's.
+/// Largest random difference in colour between strands.
 const STRAND_TINT: f32 = 0.22;
 
-/// Least and greatest coordinates of all that is drawn, metres; `None` where nothing is.
+/// Smallest and largest coordinates of everything that is drawn, metres; `None` for an empty scene.
 ///
-/// Give the union over all frames and outputs as [`PictureSettings::bounds`], and every picture is framed the same.
+/// With the union over all frames and outputs as [`PictureSettings::bounds`], every picture is framed in the same way.
 pub fn bounds(layers: &[Layer<'_>]) -> Option<BoundingBox> {
     let mut bounds = None::<BoundingBox>;
     for layer in layers {
@@ -103,7 +102,7 @@ pub fn bounds(layers: &[Layer<'_>]) -> Option<BoundingBox> {
     bounds
 }
 
-/// The least box around both.
+/// The smallest box around both.
 pub fn union(a: Option<BoundingBox>, b: Option<BoundingBox>) -> Option<BoundingBox> {
     match (a, b) {
         (Some([a, b]), Some([c, d])) => Some([[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))]),
@@ -220,7 +219,7 @@ impl Scene {
     }
 }
 
-/// Widths on the stage: as asked for, else the attribute, else a default.
+/// Widths on the stage: the requested one, otherwise the attribute, otherwise a default.
 struct Widths<'a> {
     asked: Option<f32>,
     rows: Option<(Owner, &'a [f32])>,
@@ -274,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_component_is_there() {
+    fn every_kind_of_component_is_drawn() {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [1; 3] };
         let mut geometry = Geometry::from(Component::curves(vec![3, 1], corners.clone()).unwrap())
@@ -289,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_left_out_alone() {
+    fn only_non_finite_elements_are_left_out() {
         let at = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN, 0.0, 0.0]];
         let mesh: Geometry = Component::mesh(vec![3, 3], vec![0, 1, 2, 1, 2, 3], at.clone()).unwrap().into();
         assert_eq!(scene(&mesh).triangles.len(), 1);
@@ -308,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_width_is_the_one_asked_for_else_the_attribute_else_the_default() {
+    fn a_width_is_the_requested_one_or_the_attribute_or_the_default() {
         let mut part = Component::curves(vec![2], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap();
         let stage = Stage::of([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
         assert_eq!(Widths::of(&part, None, &stage, 0.25).at(0, 0), 0.25);

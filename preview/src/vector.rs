@@ -1,13 +1,13 @@
-//! What pictures do with vectors and linear colours beyond `numerics::vector`.
+//! Operations on vectors and linear colours that are not in `numerics::vector`.
 
 use numerics::vector::{Vec3, add, largest, length, scale};
 
-/// `a` at length 1; `None` where it has no direction or no finite length.
+/// `a` scaled to length 1; `None` if it has no direction or no finite length.
 pub(crate) fn unit(a: Vec3) -> Option<Vec3> {
-    // By the greatest coordinate first, so that squares neither vanish nor overflow.
+    // Divided by the largest coordinate first, so that squares neither vanish nor overflow.
     let largest = largest(a);
     let near_one = a.map(|x| x / largest);
-    // NaN where a coordinate is not finite, or all are 0.
+    // NaN if a coordinate is not finite, or all are 0.
     let length = length(near_one);
     (length > 0.0).then(|| near_one.map(|x| x / length))
 }

@@ -1,8 +1,9 @@
 //! From the stage to the screen and back: a camera's perspective, or the parallel view of a light.
 //!
-//! The stage is the scene moved and scaled so that its bounds have their centre at 0 and half a diagonal of 1: all that
-//! follows works with numbers near 1, whatever the scene's own scale. The screen is pixels, x right, y down, and a
-//! *nearness* that is linear on the screen and greater for what is nearer: 1/z in perspective, −z in parallel.
+//! The stage is the scene moved and scaled so that its bounds have their centre at 0 and half a diagonal of 1:
+//! everything that follows works with numbers near 1, whatever the scene's scale. The screen is pixels, x right, y
+//! down, and a *nearness* that is linear on the screen and larger for closer points: 1/z in perspective, −z in
+//! parallel.
 
 use crate::camera::{BoundingBox, Camera, proper};
 use numerics::vector::{DVec3, Vec3, add, dot, scale, sub, to_f32, to_f64};
@@ -10,7 +11,7 @@ use numerics::vector::{DVec3, Vec3, add, dot, scale, sub, to_f32, to_f64};
 /// Nothing nearer to a perspective eye than this is drawn, stage units: a thousandth of half the scene's diagonal.
 pub(crate) const NEAR: f32 = 1e-3;
 
-/// How the scene lies on the stage.
+/// The map from the scene to the stage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stage {
     centre: DVec3,
@@ -24,7 +25,7 @@ impl Stage {
         Self { centre: (low + high) * 0.5, size: (high - low).norm() * 0.5 }
     }
 
-    /// A position in metres, on the stage; not finite where it was not.
+    /// Maps a position in metres to the stage; non-finite positions stay non-finite.
     pub(crate) fn place(&self, p: Vec3) -> Vec3 {
         self.place_exact(to_f64(p))
     }
@@ -33,21 +34,21 @@ impl Stage {
         to_f32((p - self.centre) * (1.0 / self.size))
     }
 
-    /// A length in metres, on the stage; 0 where it is negative or not finite.
+    /// Maps a length in metres to the stage; 0 if it is negative or not finite.
     pub(crate) fn length(&self, metres: f32) -> f32 {
         let length = (f64::from(metres) / self.size) as f32;
         if length.is_finite() { length.max(0.0) } else { 0.0 }
     }
 }
 
-/// How lengths shrink with distance.
+/// Perspective or parallel projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Lens {
     Perspective,
     Parallel,
 }
 
-/// Where the stage is seen from.
+/// A view of the stage.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
     eye: Vec3,
@@ -61,7 +62,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// What `camera` sees of the stage in a picture of `width` × `height` pixels.
+    /// The view of `camera` in a picture of `width` × `height` pixels.
     pub(crate) fn perspective(camera: &Camera, stage: &Stage, width: usize, height: usize) -> Self {
         Self {
             eye: stage.place_exact(camera.eye().into()),
@@ -72,7 +73,7 @@ impl View {
         }
     }
 
-    /// What lies within `half` of `eye` sideways, on `size` × `size` pixels, seen along `axes[2]`.
+    /// A parallel view along `axes[2]` that covers `half` to each side of `eye` with `size` × `size` pixels.
     pub(crate) fn parallel(eye: Vec3, axes: [Vec3; 3], half: f32, size: usize) -> Self {
         let middle = size as f32 / 2.0;
         Self { eye, axes, middle: [middle; 2], zoom: middle / half, lens: Lens::Parallel }
@@ -87,17 +88,17 @@ impl View {
         self.axes
     }
 
-    /// Along the view, stage units.
+    /// Distance along the view, stage units.
     pub(crate) fn distance(&self, p: Vec3) -> f32 {
         dot(self.axes[2], sub(p, self.eye))
     }
 
-    /// Whether a perspective eye is too near to `p`, or past it.
+    /// Whether `p` is too close to a perspective eye, or behind it.
     pub(crate) fn is_behind(&self, p: Vec3) -> bool {
         self.lens == Lens::Perspective && self.distance(p) < NEAR
     }
 
-    /// x, y in pixels and nearness; meaningless where [`View::is_behind`].
+    /// x, y in pixels and nearness; meaningless if [`View::is_behind`].
     pub(crate) fn project(&self, p: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| dot(axis, sub(p, self.eye)));
         let (shrink, nearness) = match self.lens {
@@ -107,7 +108,7 @@ impl View {
         [self.middle[0] + self.zoom * shrink * x, self.middle[1] - self.zoom * shrink * y, nearness]
     }
 
-    /// Where on the stage a point of the screen is: the inverse of [`View::project`].
+    /// Position on the stage of a point on the screen: the inverse of [`View::project`].
     pub(crate) fn unproject(&self, [x, y, nearness]: Vec3) -> Vec3 {
         let z = match self.lens {
             Lens::Perspective => 1.0 / nearness,
@@ -129,7 +130,7 @@ impl View {
         }
     }
 
-    /// How much nearer than `p` a point `length` before it is.
+    /// Difference in nearness between `p` and a point `length` in front of it.
     pub(crate) fn nearer(&self, p: Vec3, length: f32) -> f32 {
         match self.lens {
             Lens::Perspective => {
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn at_ninety_degrees_half_the_height_is_seen_at_its_own_distance() {
+    fn at_ninety_degrees_half_the_height_equals_the_distance() {
         let (stage, view) = head_on();
         let [x, y, _] = view.project(stage.place([5.0, 10.0, 0.0]));
         assert!((x - 125.0).abs() < 1e-3 && y.abs() < 1e-3, "{x} {y}");

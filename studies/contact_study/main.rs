@@ -1,4 +1,4 @@
-//! Depth of penetration under hard contact, and cost of individual frames: dough of 5 kPa at rest, rolled over,
+//! Depth of penetration under hard contact, and cost of individual frames, for dough of 5 kPa at rest, rolled over,
 //! pressed and hit. The cost of a frame at more sizes is measured by `cargo bench --bench softbody`.
 //!
 //! `cargo run --release -p studies --bin contact_study [case]… [tiny|small|large]… [self] [steps=N] [frames=N]

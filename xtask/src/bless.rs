@@ -1,11 +1,11 @@
-//! `bless`: stored expectations written anew.
+//! `bless`: rewrites stored expectations.
 
 use std::path::Path;
 use std::process::Command;
 
 use clap::ValueEnum;
 
-/// Something that is stored and checked.
+/// A stored expectation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Expectation {
     /// Bits of the example graphs' first frames: tests/graphs.txt
@@ -23,7 +23,7 @@ pub(crate) enum Expectation {
 }
 
 impl Expectation {
-    /// What of cargo writes it.
+    /// Arguments of the cargo command that writes it.
     fn command(self) -> &'static [&'static str] {
         match self {
             Self::Graphs => &["test", "--test", "graphs", "every_example_has_the_stored_bits"],
@@ -48,10 +48,10 @@ impl Expectation {
     }
 }
 
-/// Stores expectations anew, all of them if none is named, and shows the difference.
+/// Rewrites the named expectations, or all of them if none is named, and shows the difference.
 ///
 /// # Errors
-/// Where what writes one of them fails; the others are stored all the same.
+/// If a command fails; the other expectations are written nevertheless.
 pub(crate) fn store(root: &Path, named: &[Expectation]) -> Result<String, String> {
     let all = if named.is_empty() { Expectation::value_variants() } else { named };
     let run = |program: &str, arguments: &[&str]| {
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_file_to_store_has_its_folder() {
+    fn every_expectation_has_an_existing_folder() {
         for expectation in Expectation::value_variants() {
             for file in expectation.files() {
                 let folder = crate::root().join(file).parent().map(Path::to_owned);

@@ -32,14 +32,14 @@ enum Chore {
         #[arg(long)]
         seed: bool,
     },
-    /// Store the expectations of tests and benches anew, and show what changed
+    /// Rewrite the stored expectations of tests and benches, and show what changed
     Bless {
         /// Which; all if none is named
         expectations: Vec<bless::Expectation>,
     },
 }
 
-/// What a node knows of time.
+/// Whether a node depends on time.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Time {
     /// Its inputs and params alone.

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use crate::template::{Options, render};
 
-/// Writes node `name` into `family`; says what to do next.
+/// Writes node `name` into `family`; returns a message with the next step.
 ///
 /// # Errors
-/// Where a name is not allowed, the family is unknown, or the node exists already.
+/// If a name is not allowed, the family is unknown, or the node exists already.
 pub(crate) fn write(root: &Path, name: &str, family: &str, options: &Options) -> Result<String, String> {
     let module = module_name(name)?;
     for param in options.mask.iter().chain(&options.ramp) {
@@ -40,7 +40,7 @@ fn module_name(name: &str) -> Result<String, String> {
     };
     match parts().all(word) {
         true => Ok(name.to_ascii_lowercase()),
-        false => Err(format!("`{name}` is not a node's name; write it like Curve_Smooth")),
+        false => Err(format!("`{name}` is not a valid name of a node; write it like Curve_Smooth")),
     }
 }
 
@@ -48,16 +48,16 @@ fn check_param(name: &str) -> Result<(), String> {
     let fits = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         && name != "seed";
-    if fits { Ok(()) } else { Err(format!("`{name}` is not a param's name; write it like ramp_rotate")) }
+    if fits { Ok(()) } else { Err(format!("`{name}` is not a valid name of a param; write it like ramp_rotate")) }
 }
 
-/// The family's `lib.rs` with a module and a line in `NODES` more, both in order.
+/// The family's `lib.rs` with the module and its line in `NODES` added in order.
 fn with_module(text: &str, module: &str) -> Option<String> {
     let text = inserted(text, &format!("mod {module};"), |line| line.starts_with("mod "))?;
     if text.contains("= &[\n") {
         return inserted(&text, &format!("    &{module}::NODE,"), |line| line.starts_with("    &"));
     }
-    // A list on one line is broken into lines first.
+    // A list on one line is first split into lines.
     let start = text.find("= &[")? + "= &[".len();
     let end = start + text[start..].find("];")?;
     let mut entries: Vec<String> =
@@ -68,7 +68,7 @@ fn with_module(text: &str, module: &str) -> Option<String> {
     Some(format!("{}\n{lines}{}", &text[..start], &text[end..]))
 }
 
-/// `text` with `line` put in order among the lines that are `like` it.
+/// `text` with `line` inserted in order among the lines that are `like` it.
 fn inserted(text: &str, line: &str, like: impl Fn(&str) -> bool) -> Option<String> {
     let lines: Vec<&str> = text.lines().collect();
     let last = lines.iter().rposition(|other| like(other))?;
@@ -83,14 +83,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_module_and_its_node_are_put_in_order() {
+    fn a_module_and_its_node_are_inserted_in_order() {
         let before = "//! F.\n\nmod a;\nmod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &c::NODE,\n];\n";
         let after = "//! F.\n\nmod a;\nmod b;\nmod c;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n    &c::NODE,\n];\n";
         assert_eq!(with_module(before, "b").unwrap(), after);
     }
 
     #[test]
-    fn a_list_on_one_line_is_broken() {
+    fn a_list_on_one_line_is_split() {
         let before = "mod a;\n\npub static NODES: &[&Node] = &[&a::NODE];\n";
         let after = "mod a;\nmod b;\n\npub static NODES: &[&Node] = &[\n    &a::NODE,\n    &b::NODE,\n];\n";
         assert_eq!(with_module(before, "b").unwrap(), after);

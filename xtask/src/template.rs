@@ -1,6 +1,6 @@
-//! The text of a new node: a start that passes conformance, uses all cores and shows where things go.
+//! The text of a new node: a starting point that passes conformance, uses all cores and shows the structure.
 
-/// What a new node has besides its curves.
+/// Options of a new node.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Options {
     /// Whether its result depends on the frame's time.
@@ -47,7 +47,7 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
         .replace("FACTORS", &factors.join(" * "))
 }
 
-/// Lines that end in `//? tag` are there with that option alone.
+/// Lines that end in `//? tag` are kept only with that option.
 const TEMPLATE: &str = r#"//! NODE_NAME: moves CVs across their curve.
 //!
 //! Say here which paper and section it implements, and where and why it departs from it.
@@ -68,7 +68,7 @@ params! { PARAMS:
         .unit(Unit::Metres).soft(0.0, 1.0);
     RAMP: Param<Arc<Ramp>> = Param::ramp("RAMP_PARAM", &[[0.0, 0.0], [1.0, 1.0]], //? ramp
         "Scales the movement along the curve, from root (0) to tip (1)."); //? ramp
-    SEED: Param<Seed> = Param::seed("Selects another share of the movement for each curve."); //? seed
+    SEED: Param<Seed> = Param::seed("Each seed moves every curve by another random fraction."); //? seed
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The moved curves. Their segments keep their lengths.");
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    /// The same texts are compiled, and conform, in the repository's own tests.
+    /// The repository's tests compile the same texts and check that the nodes conform.
     #[test]
     fn rendered_nodes_are_those_that_the_tests_compile() {
         let full = Options { reads_clock: true, mask: Some("bend".into()), ramp: Some("falloff".into()), seed: true };

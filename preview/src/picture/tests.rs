@@ -60,7 +60,7 @@ fn a_scene_at_any_scale_is_the_same_picture() {
 }
 
 #[test]
-fn nothing_is_the_backdrop_alone() {
+fn an_empty_scene_is_the_backdrop() {
     let empty = render(&[], &small()).unwrap();
     assert_eq!(empty, picture(&Geometry::default(), &small()));
     assert_eq!(empty, picture(&Component::points(vec![]).into(), &small()));
@@ -68,7 +68,7 @@ fn nothing_is_the_backdrop_alone() {
 }
 
 #[test]
-fn something_is_seen_in_the_middle_and_its_shadow_beside_it() {
+fn an_object_is_visible_in_the_middle_and_its_shadow_beside_it() {
     let geometry = Geometry::from(Component::points(vec![[0.0, 0.5, 0.0]]));
     let settings =
         PictureSettings { point_width: Some(1.0), bounds: Some([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]]), ..small() };
@@ -83,7 +83,7 @@ fn something_is_seen_in_the_middle_and_its_shadow_beside_it() {
 }
 
 #[test]
-fn hostile_geometry_is_a_picture_too() {
+fn any_geometry_gives_a_picture() {
     let values = [0.0, 1.0, -1.0, 1e-30, 1e30, -3e38, f32::NAN, f32::INFINITY];
     let points: Vec<[f32; 3]> = (0..512).map(|k| [values[k % 8], values[k / 8 % 8], values[k / 64]]).collect();
     let corners: Vec<u32> = (0..510).chain((0..510).map(|k| k * 37 % 512)).collect();
@@ -125,7 +125,7 @@ fn hostile_geometry_is_a_picture_too() {
 }
 
 #[test]
-fn names_and_a_note_are_written_and_nothing_else_changes() {
+fn only_labels_change_when_names_and_a_note_are_written() {
     let geometry = still_life(1.0);
     let quiet = picture(&geometry, &small());
     let named = picture(&geometry, &PictureSettings { names: true, ..small() });
@@ -146,7 +146,7 @@ fn a_picture_without_pixels_is_an_error() {
 }
 
 #[test]
-fn a_wider_range_moves_the_colors_and_keeps_them_between_frames() {
+fn a_fixed_range_keeps_colors_between_frames() {
     let geometry = still_life(1.0);
     let layers = [Layer::new("one", &geometry)];
     let range = attribute_range(&layers, "heat");
@@ -155,7 +155,7 @@ fn a_wider_range_moves_the_colors_and_keeps_them_between_frames() {
     let own = picture(&geometry, &by_heat);
     assert_eq!(own, picture(&geometry, &PictureSettings { range, ..by_heat.clone() }));
     assert_ne!(own, picture(&geometry, &PictureSettings { range: Some([0.0, 600.0]), ..by_heat.clone() }));
-    // The bounds that render takes by itself are those a caller would give for one frame.
+    // The default bounds are those that a caller would give for one frame.
     assert_eq!(own, picture(&geometry, &PictureSettings { bounds: bounds(&layers), ..by_heat }));
 }
 

@@ -1,12 +1,12 @@
 //! Which primitives may touch which tile.
 //!
-//! Promise: a tile meets its primitives in one order, whatever the number of threads: those that touch more than
-//! `WIDE` tiles first, then the others, each in the order given. Limit: at most `WIDE` entries per primitive, so memory
-//! stays linear; a wide one costs every tile a look at its box.
+//! Guarantees: the primitives of a tile have a fixed order for any number of threads: those that touch more than `WIDE`
+//! tiles first, then the others, each in the given order. Limit: at most `WIDE` entries per primitive, so memory stays
+//! linear; the box of a wide primitive is tested for every tile.
 
 use super::TILE;
 
-/// Tiles from which a primitive is not entered into each.
+/// Number of tiles above which a primitive is not entered into each of them.
 const WIDE: usize = 64;
 
 /// Pixels from the first to the last, both included.
@@ -27,7 +27,7 @@ impl PixelBox {
         })
     }
 
-    /// What both have.
+    /// The intersection of both.
     pub(crate) fn meet(&self, other: &Self) -> Option<Self> {
         let low = [0, 1].map(|k| self.low[k].max(other.low[k]));
         let high = [0, 1].map(|k| self.high[k].min(other.high[k]));
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tile_meets_what_touches_it_in_order_wide_ones_first() {
+    fn a_tile_lists_its_primitives_in_order_wide_ones_first() {
         let edge = TILE as f32;
         let size = [TILE * 20, TILE * 20];
         let pixels = |low: f32, high: f32| PixelBox::within([low; 2], [high; 2], size).unwrap();
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_or_nowhere_has_no_pixels() {
+    fn boxes_outside_or_of_nan_have_no_pixels() {
         let size = [8, 8];
         assert_eq!(PixelBox::within([-5.0, 0.0], [-0.1, 4.0], size), None);
         assert_eq!(PixelBox::within([8.0, 0.0], [9.0, 4.0], size), None);

@@ -1,9 +1,9 @@
-//! Which samples of a pixel a triangle, a segment or a ball covers, and how near they are.
+//! Which samples of a pixel a triangle, a segment or a ball covers, and their depth.
 //!
-//! Promise: triangles that share an edge leave no sample of it uncovered, as both work its line out from the same two
-//! ends in the same order. A thin strand or small ball covers its share of each pixel's samples to within one of 16,
-//! differently in the next pixel, and independently of other strands: what lies behind shows through by its share.
-//! Limit: a segment is straight on the screen, and its nearness is linear along it.
+//! Guarantees: triangles that share an edge leave no sample on it uncovered, as both compute its line from the same two
+//! ends in the same order. A thin strand or small ball covers its fraction of each pixel's samples to within one of 16,
+//! with a different pattern in each pixel and independently of other strands, so that geometry behind it shows through
+//! accordingly. Limit: a segment is straight on the screen, and its nearness is linear along it.
 
 use super::bins::PixelBox;
 use super::project::{ScreenDot, ScreenSegment, ScreenTriangle};
@@ -11,14 +11,14 @@ use super::{Lanes, SAMPLE_X, SAMPLE_Y, SAMPLES, Shader, Tile, UNCOVERED};
 use crate::vector::mix;
 use numerics::vector::{Vec3, add, scale};
 
-/// Order in which samples are covered as a share grows (Bayer's matrix): any first few of them lie apart.
+/// Order in which samples are covered as the fraction grows (Bayer's matrix): the first ones are always far apart.
 const RANK: [u32; SAMPLES] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
 /// Steps of that order from pixel to pixel, as 32-bit fractions: the plastic number's powers, which fill the unit
 /// interval evenly along every line (Roberts, "The unreasonable effectiveness of quasirandom sequences").
 const NEXT_COLUMN: u32 = 0xC13F_A9A9;
 const NEXT_ROW: u32 = 0x91E1_0DA5;
 
-/// Which samples of pixel x, y a share (0…1) of it covers.
+/// The samples of pixel x, y that are covered by a fraction (0…1) of it.
 #[inline(always)]
 fn thin_out(depth: &mut Lanes, share: f32, [x, y]: [usize; 2], seed: u32) {
     if share >= 1.0 {
@@ -42,7 +42,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Twice the area of the triangle that p, q and (x, y) make: positive where they turn right on the screen.
+    /// Twice the area of the triangle p, q, (x, y): positive if they are clockwise on the screen.
     fn edge(p: Vec3, q: Vec3) -> Self {
         let flipped = (q[0], q[1]) < (p[0], p[1]);
         let (p, q) = if flipped { (q, p) } else { (p, q) };
@@ -73,7 +73,8 @@ pub(super) fn triangle<S: Shader>(tile: &mut Tile<S::Color>, triangle: &ScreenTr
     if !(area.abs() > 0.0 && area.is_finite()) {
         return;
     }
-    // Positive inside, whichever way the triangle turns; a change of sign keeps the bits two neighbours agree on.
+    // Positive inside for either orientation of the triangle; a change of sign preserves the bits that neighbours
+    // share.
     let edges = [Plane::edge(q, r), Plane::edge(r, p), Plane::edge(p, q)].map(|edge| edge.scaled(area.signum()));
     // Each is 1 at its corner and 0 on the opposite edge.
     let planes = edges.map(|edge| edge.scaled(1.0 / area.abs()));
@@ -99,7 +100,7 @@ pub(super) fn triangle<S: Shader>(tile: &mut Tile<S::Color>, triangle: &ScreenTr
                 depth[k] = if inside { near + depth_offsets[k] } else { UNCOVERED };
             }
             tile.put([x, y], &depth, |at| {
-                // Shares on the screen times nearness are shares in space.
+                // Barycentric weights on the screen times nearness are those in space.
                 let weights: Vec3 = std::array::from_fn(|k| {
                     let share = planes[k].at(f64::from(at[0]), f64::from(at[1]));
                     (share.max(0.0) * nearness[k]) as f32
@@ -111,7 +112,8 @@ pub(super) fn triangle<S: Shader>(tile: &mut Tile<S::Color>, triangle: &ScreenTr
                 };
                 let corners = &triangle.corners;
                 let normal = blend([0, 1, 2].map(|k| corners[k].normal));
-                // The winding, not the normal, says which side is seen: at a silhouette a smooth normal looks away.
+                // The winding, not the normal, decides which side is visible: at a silhouette a smooth normal points
+                // away.
                 let seen = scale(normal, if area > 0.0 { -1.0 } else { 1.0 });
                 shader.surface(at, seen, blend([0, 1, 2].map(|k| corners[k].color)))
             });
@@ -125,7 +127,7 @@ pub(super) fn segment<S: Shader>(tile: &mut Tile<S::Color>, segment: &ScreenSegm
     let [p, q] = segment.at;
     let [px, py, qx, qy] = [p[0], p[1], q[0], q[1]].map(f64::from);
     let length = ((qx - px) * (qx - px) + (qy - py) * (qy - py)).sqrt();
-    // A segment seen from its end is a disc around it: any axis will do.
+    // A segment seen end-on is a disc, for which any axis is valid.
     let [ax, ay] = if length > 0.0 { [(qx - px) / length, (qy - py) / length] } else { [1.0, 0.0] };
     let along = Plane { a: ax, b: ay, c: -(ax * px + ay * py) };
     let aside = Plane { a: -ay, b: ax, c: ay * px - ax * py };

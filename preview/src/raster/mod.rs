@@ -1,8 +1,8 @@
 //! The z-buffer: 16 samples per pixel, each with its own nearness and colour, tile by tile.
 //!
-//! Promise: the same bits on any number of threads, as a tile is one task and meets its primitives in a fixed order; of
-//! two samples equally near the first drawn stays. A primitive costs at most its pixels in the picture. Limit: a
-//! primitive is shaded once per pixel, at the middle of the samples it covers, as graphics cards do with multisampling.
+//! Guarantees: the same bits on any number of threads, as a tile is one task with a fixed order of primitives; of two
+//! equally near samples the first drawn stays. A primitive costs at most its pixels in the picture. Limit: a primitive
+//! is shaded once per pixel, at the middle of the samples it covers, as graphics cards do with multisampling.
 
 mod bins;
 mod cover;
@@ -15,17 +15,17 @@ pub(crate) use project::Screen;
 
 use numerics::vector::Vec3;
 
-/// Pixels per side of a tile: its samples fit a core's second cache.
+/// Pixels per side of a tile, whose samples fit into a core's L2 cache.
 pub(crate) const TILE: usize = 16;
 /// Samples per pixel.
 pub(crate) const SAMPLES: usize = 16;
 /// One number per sample.
 pub(crate) type Lanes = [f32; SAMPLES];
-/// Nearness of a sample that nothing covers.
+/// Nearness of an uncovered sample.
 pub(crate) const UNCOVERED: f32 = f32::NEG_INFINITY;
 
 /// Samples of a pixel, x right and y down from its upper left corner: a 4 × 4 grid turned so that no two samples share
-/// a row or a column, which gives a nearly upright edge 16 shades of grey, not 4.
+/// a row or a column, which gives a nearly upright edge 16 shades of grey instead of 4.
 pub(crate) const SAMPLE_X: Lanes = sample_axis(true);
 pub(crate) const SAMPLE_Y: Lanes = sample_axis(false);
 
@@ -41,19 +41,20 @@ const fn sample_axis(is_x: bool) -> Lanes {
     lanes
 }
 
-/// What a covered pixel looks like. Positions are x, y in pixels and nearness.
+/// Shading of covered pixels. Positions are x, y in pixels and nearness.
 pub(crate) trait Shader: Sync {
     /// Of a sample.
     type Color: Copy + Default + Send;
-    /// A point of a triangle; `normal` is on the side that is seen.
+    /// A point of a triangle; `normal` is on the visible side.
     fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Self::Color;
-    /// A point of a strand, lit already, `across` of its radius from its axis and `radius` pixels wide to each side.
+    /// A point of a strand that is lit already, at `across` times its radius from its axis; `radius` is in pixels.
     fn strand(&self, color: Vec3, across: f32, radius: f32) -> Self::Color;
-    /// A point of a ball, `across` of its radius right and up of its middle; `lit` by that share of the key light.
+    /// A point of a ball, `across` times its radius right of and above its centre; `lit` by that fraction of the key
+    /// light.
     fn ball(&self, across: [f32; 2], color: Vec3, lit: f32) -> Self::Color;
 }
 
-/// Draws nothing but how near things are, as a light sees them.
+/// Draws only nearness, as for a light.
 pub(crate) struct DepthOnly;
 
 impl Shader for DepthOnly {
@@ -69,7 +70,7 @@ pub(crate) struct Tile<C> {
     pub(crate) top: usize,
     /// Nearness of each pixel's samples.
     pub(crate) depth: Vec<Lanes>,
-    /// Colour of each pixel's samples; the default where nothing covers them.
+    /// Colour of each pixel's samples; the default if uncovered.
     pub(crate) color: Vec<[C; SAMPLES]>,
 }
 
@@ -87,7 +88,7 @@ impl<C: Copy + Default> Tile<C> {
         PixelBox { low: [self.left, self.top], high: [self.left + TILE - 1, self.top + TILE - 1] }
     }
 
-    /// Draws `depth` (uncovered samples are [`UNCOVERED`]) into pixel x, y of the picture where it is nearer.
+    /// Draws `depth` (uncovered samples are [`UNCOVERED`]) into pixel x, y of the picture if it is nearer.
     #[inline(always)]
     fn put(&mut self, [x, y]: [usize; 2], depth: &Lanes, shade: impl FnOnce(Vec3) -> C) {
         let pixel = (y - self.top) * TILE + (x - self.left);
@@ -119,7 +120,7 @@ impl<C: Copy + Default> Tile<C> {
     }
 }
 
-/// Draws `screen` and hands each tile to `finish`; the answers are in rows of tiles, left to right.
+/// Draws `screen` and passes each tile to `finish`; the results are in rows of tiles, left to right.
 pub(crate) fn draw<S: Shader, R: Send>(
     screen: &Screen,
     shader: &S,

@@ -1,8 +1,8 @@
-//! The scene as a view sees it: triangles, segments and discs on the screen, cut where they pass behind the eye.
+//! The scene in a view: triangles, segments and discs on the screen, clipped behind the eye.
 //!
-//! Promise: nothing on the screen is closer than [`crate::view::NEAR`] or not finite. What is thinner than a pixel is
-//! drawn a pixel wide and as much thinner in coverage, so that a line of any width has the light of its area. Limit: a
-//! ball or CV is dropped whole where its centre is behind the eye.
+//! Guarantees: nothing on the screen is closer than [`crate::view::NEAR`] or not finite. Anything thinner than a pixel
+//! is drawn one pixel wide with proportionally less coverage, so that a line of any width has the light of its area.
+//! Limit: a ball or CV is dropped if its centre is behind the eye.
 
 use rayon::prelude::*;
 
@@ -27,10 +27,10 @@ pub(crate) struct ScreenSegment {
     pub(crate) at: [Vec3; 2],
     /// Pixels, at each end.
     pub(crate) radius: [f32; 2],
-    /// Share of the samples within that are covered, at each end.
+    /// Fraction of the samples inside that are covered, at each end.
     pub(crate) cover: [f32; 2],
     pub(crate) color: [Vec3; 2],
-    /// Whether the strand ends there: flat, where a joint is round.
+    /// Whether the strand ends there: an end is flat, a joint round.
     pub(crate) ends: [bool; 2],
     pub(crate) seed: u32,
     pub(crate) pixels: PixelBox,
@@ -41,7 +41,7 @@ pub(crate) struct ScreenDot {
     pub(crate) at: Vec3,
     pub(crate) radius: f32,
     pub(crate) cover: f32,
-    /// How much nearer its front is than its centre.
+    /// Difference in nearness between its front and its centre.
     pub(crate) bulge: f32,
     pub(crate) color: Vec3,
     pub(crate) lit: f32,
@@ -49,7 +49,7 @@ pub(crate) struct ScreenDot {
     pub(crate) pixels: PixelBox,
 }
 
-/// All that may touch the picture.
+/// All primitives that may touch the picture.
 pub(crate) struct Screen {
     /// Width and height, pixels.
     pub(crate) size: [usize; 2],
@@ -72,7 +72,7 @@ impl Screen {
     }
 }
 
-/// What of a triangle lies before the eye: none, one or two triangles.
+/// The part of a triangle in front of the eye: none, one or two triangles.
 fn clip(corners: &[Corner; 3], view: &View) -> [Option<[Corner; 3]>; 2] {
     let behind = corners.map(|corner| view.is_behind(corner.at));
     if behind == [false; 3] {
@@ -97,7 +97,7 @@ fn clip(corners: &[Corner; 3], view: &View) -> [Option<[Corner; 3]>; 2] {
     if kept.len() < 3 { [None, None] } else { [part(1), part(2)] }
 }
 
-/// Where on the way from a to b the eye's near plane is met.
+/// Position of the near plane between a and b.
 fn crossing(a: Vec3, b: Vec3, view: &View) -> f32 {
     let (from, to) = (view.distance(a), view.distance(b));
     ((NEAR - from) / (to - from)).clamp(0.0, 1.0)
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_through_the_eye_is_cut_into_what_lies_before_it() {
+    fn a_triangle_through_the_eye_is_clipped() {
         let count = |z| clip(&corners(z), &view()).into_iter().flatten().count();
         assert_eq!(count([0.0, 0.0, 0.0]), 1);
         assert_eq!(count([0.0, 0.0, 2.0]), 2);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_strand_is_a_pixel_wide_and_covers_its_share() {
+    fn a_thin_strand_is_a_pixel_wide_with_reduced_coverage() {
         let knot = |y: f32| Knot { at: [0.0, y, 0.0], tangent: [0.0, 1.0, 0.0], radius: 0.1 / 64.0, color: [1.0; 3] };
         let knots = [knot(-0.5), knot(0.5)];
         let strand = Strand { knots: 0..2, seed: 0 };

@@ -11,7 +11,7 @@ fn view() -> View {
     View::parallel([0.0, 0.0, 10.0], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], SIDE as f32 / 2.0, SIDE)
 }
 
-/// Where on the stage the screen's x, y is, `near` of the stage's middle.
+/// Position on the stage of x, y on the screen, at a nearness relative to the stage's middle.
 fn at([x, y]: [f32; 2], near: f32) -> Vec3 {
     [x - SIDE as f32 / 2.0, SIDE as f32 / 2.0 - y, near]
 }
@@ -28,7 +28,7 @@ fn add_strand(scene: &mut Scene, points: &[[f32; 2]], width: f32) {
     scene.strands.push(Strand { knots: start..scene.knots.len(), seed: scramble(start as u32) });
 }
 
-/// Shows colours as they are.
+/// Shows colours unchanged.
 struct Flat;
 
 impl Shader for Flat {
@@ -70,7 +70,7 @@ fn samples_of_a_pixel_share_no_row_and_no_column() {
 }
 
 #[test]
-fn a_triangle_covers_all_within_and_half_along_its_diagonal() {
+fn a_triangle_covers_its_inside_and_half_along_its_diagonal() {
     let scene = Scene { triangles: vec![triangle([[0.0, 0.0], [8.0, 0.0], [0.0, 8.0]], 0.0, 1.0)], ..Scene::default() };
     for (y, row) in drawn(&scene).iter().enumerate() {
         for (x, covered) in row.iter().enumerate() {
@@ -84,7 +84,7 @@ fn a_triangle_covers_all_within_and_half_along_its_diagonal() {
 }
 
 #[test]
-fn a_triangle_is_the_same_either_way_round() {
+fn a_triangle_is_the_same_in_either_orientation() {
     let corners = [[3.3, 4.7], [20.1, 9.9], [11.6, 27.2]];
     let there = Scene { triangles: vec![triangle(corners, 0.0, 1.0)], ..Scene::default() };
     let back = Scene { triangles: vec![triangle([corners[0], corners[2], corners[1]], 0.0, 1.0)], ..Scene::default() };
@@ -92,7 +92,7 @@ fn a_triangle_is_the_same_either_way_round() {
 }
 
 #[test]
-fn the_nearer_triangle_is_seen_whichever_is_drawn_first() {
+fn the_nearer_triangle_is_visible_in_any_drawing_order() {
     let corners = [[0.0, 0.0], [64.0, 0.0], [0.0, 64.0]];
     let (near, far) = (triangle(corners, 1.0, 1.0), triangle(corners, -1.0, 0.25));
     for triangles in [vec![near, far], vec![far, near]] {
@@ -103,7 +103,8 @@ fn the_nearer_triangle_is_seen_whichever_is_drawn_first() {
 
 #[test]
 fn triangles_around_a_point_leave_no_gap() {
-    // Corners anywhere around the picture, the hub within a pixel, so that edges pass between samples in every way.
+    // Corners anywhere around the picture, with the hub inside a pixel, so that edges pass between samples in all
+    // directions.
     let fraction = |k: u32| scramble(k) as f32 / u32::MAX as f32;
     for round in 0..40 {
         let hub = [10.0 + 12.0 * fraction(7 * round), 10.0 + 12.0 * fraction(7 * round + 1)];
@@ -116,10 +117,10 @@ fn triangles_around_a_point_leave_no_gap() {
 }
 
 #[test]
-fn a_strand_covers_length_times_width_however_thin() {
+fn a_strand_of_any_width_covers_length_times_width() {
     for width in [0.01, 0.1, 0.7, 1.0, 3.0] {
         for end in [[28.0, 4.0], [28.0, 9.3], [28.0, 27.1], [4.4, 28.0]] {
-            // The mean over strands a little apart, each in a picture of its own, as they would hide each other.
+            // The mean over slightly shifted strands, each in its own picture, since they would hide each other.
             let long = length([end[0] - 4.0, end[1] - 4.0, 0.0]);
             let mean = (0..400).map(|k| {
                 let mut scene = Scene::default();
@@ -135,7 +136,7 @@ fn a_strand_covers_length_times_width_however_thin() {
 }
 
 #[test]
-fn a_strand_of_a_tenth_of_a_pixel_has_a_tenth_of_coverage_all_along() {
+fn a_strand_of_a_tenth_of_a_pixel_has_a_tenth_of_coverage_everywhere() {
     let mut scene = Scene::default();
     add_strand(&mut scene, &[[4.0, 10.5], [28.0, 10.5]], 0.1);
     let row = drawn(&scene)[10];
@@ -144,8 +145,8 @@ fn a_strand_of_a_tenth_of_a_pixel_has_a_tenth_of_coverage_all_along() {
 }
 
 #[test]
-fn thin_strands_hide_what_is_behind_by_their_share() {
-    // Ten strands of half a pixel in one place: each lets half through, so that next to nothing is left.
+fn thin_strands_hide_the_background_by_their_coverage() {
+    // Ten strands of half a pixel at one position: each lets half through, so that almost nothing remains.
     let mut scene = Scene::default();
     (0..10).for_each(|_| add_strand(&mut scene, &[[0.0, 16.5], [32.0, 16.5]], 0.5));
     assert!(area(&scene) > 0.97 * 32.0);
@@ -157,14 +158,14 @@ fn thin_strands_hide_what_is_behind_by_their_share() {
 fn a_bent_strand_has_a_round_joint_and_flat_ends() {
     let mut scene = Scene::default();
     add_strand(&mut scene, &[[16.0, 4.0], [16.0, 16.0], [28.0, 16.0]], 8.0);
-    // Two arms of 12 × 8, the square where they cross counted once, and a quarter disc outside the joint.
+    // Two arms of 12 × 8, with the square of their overlap counted once, and a quarter disc outside the joint.
     let expected = 2.0 * 12.0 * 8.0 - 16.0 + std::f32::consts::PI * 16.0 / 4.0;
     assert!((area(&scene) - expected).abs() < 0.5, "{} {expected}", area(&scene));
     assert_eq!(drawn(&scene)[3], [0.0; SIDE]);
 }
 
 #[test]
-fn a_ball_covers_its_disc_however_small() {
+fn a_ball_of_any_size_covers_its_disc() {
     for radius in [0.1_f32, 0.4, 2.0, 6.0] {
         let mean = (0..2000).map(|k| {
             let middle = at([16.0 + (k % 40) as f32 / 40.0, 16.0 + (k / 40) as f32 / 50.0], 0.0);
@@ -172,7 +173,7 @@ fn a_ball_covers_its_disc_however_small() {
             area(&Scene { dots: vec![ball], ..Scene::default() })
         });
         let mean = mean.sum::<f32>() / 2000.0;
-        // A ball below a pixel is a disc of π/4 pixels, thinned out.
+        // A ball smaller than a pixel is a disc of π/4 pixels with reduced coverage.
         assert!((mean / (std::f32::consts::PI * radius * radius) - 1.0).abs() < 0.06, "{radius}: {mean}");
     }
 }

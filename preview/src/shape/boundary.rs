@@ -1,7 +1,7 @@
 //! The skin of a set of tets: the faces that only one tet has.
 //!
-//! Promise: faces wind counter-clockwise seen from outside where the tets are positively oriented, in the order of their
-//! sorted corners. Limit: a face that three or more tets share is not skin either.
+//! Guarantees: faces wind counter-clockwise seen from outside where the tets are positively oriented, in the order of
+//! their sorted corners. Limit: a face that three or more tets share is not skin either.
 
 /// A triangle of the skin and the tet it belongs to.
 pub(crate) fn boundary(tets: &[[u32; 4]]) -> Vec<([u32; 3], u32)> {

@@ -1,9 +1,9 @@
 //! The zero level of a volume as a mesh, by naive surface nets: a point in every cube of eight cell centres that the
 //! level crosses, at the mean of its edges' crossings, and a quad across every crossed edge.
 //!
-//! Promise: closed for any level set, as all beyond the grid counts as outside; faces wind counter-clockwise seen from
-//! outside (φ > 0); points in the order of the grid. Limit: first order in the cell, sharp edges are rounded, and where
-//! two sheets meet in one cube they share its point. A value that is not finite counts as outside.
+//! Guarantees: closed for any level set, as everything beyond the grid counts as outside; faces wind counter-clockwise
+//! seen from outside (φ > 0); points in the order of the grid. Limit: first order in the cell, sharp edges are rounded,
+//! and two sheets that meet in one cube share its point. A value that is not finite counts as outside.
 
 use engine::geometry::{BLOCK_EDGE, FieldCursor, Grid, SparseField, Volume, VolumeSampler};
 use numerics::vector::length;
@@ -80,7 +80,7 @@ impl Field<'_> {
         if value.is_finite() { value } else { outside }
     }
 
-    /// The point of a cube, metres; `None` where the level does not cross it.
+    /// The point of a cube, metres; `None` if the level does not cross it.
     fn point(&self, cursor: &mut FieldCursor, cube: [i64; 3]) -> Option<[f32; 3]> {
         let corner =
             |bits: usize| -> [i64; 3] { std::array::from_fn(|axis| cube[axis] - 1 + (bits >> axis & 1) as i64) };
@@ -143,7 +143,7 @@ mod tests {
         Volume::new(grid, level_set, [0, 1, 2].map(|axis| vec![0.0; grid.faces(axis)])).unwrap()
     }
 
-    /// Every edge is in as many quads one way as the other.
+    /// Every edge occurs equally often in both directions.
     fn assert_closed(surface: &Surface) {
         let mut edges: Vec<[u32; 2]> =
             surface.quads.iter().flat_map(|q| (0..4).map(move |k| [q[k], q[(k + 1) % 4]])).collect();

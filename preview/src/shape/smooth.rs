@@ -1,18 +1,18 @@
-//! Normals at the corners of triangles: smooth over what bends gently, sharp at a crease.
+//! Normals at the corners of triangles: smooth across gentle bends, sharp at creases.
 //!
-//! Promise: a corner's normal is the area-weighted mean over the triangles at its point that bend away from its own by
-//! less than `CREASE`. Limit: a point with more than `MOST_AROUND` triangles is smooth all round; an `N`
-//! attribute is not read, as a node that moves points may have left it behind.
+//! Guarantees: a corner's normal is the area-weighted mean over the triangles at its point that bend away from its own
+//! by less than `CREASE`. Limit: a point with more than `MOST_AROUND` triangles is smooth all round; an `N` attribute
+//! is not read, as a node that moves points may not have updated it.
 
 use rayon::prelude::*;
 
 use crate::vector::unit;
 use numerics::vector::{Vec3, add, cross, dot, sub};
 
-/// Cosine of the angle between triangles from which their edge is drawn sharp: 40 degrees. A sphere of 9 or more
+/// Cosine of the angle between triangles above which their edge is drawn sharp: 40 degrees. A sphere of 9 or more
 /// segments stays smooth, an octagonal prism shows its edges.
 const CREASE: f32 = 0.766;
-/// Triangles at a point that are compared with each other; the hub of a great fan would cost their square.
+/// Largest number of triangles at a point that are compared with each other; the cost is its square.
 const MOST_AROUND: usize = 64;
 
 /// Normals at the three corners of each triangle. Rows of `triangles` are rows of `points`.

@@ -1,16 +1,16 @@
-//! The letters of labels: a 5 × 7 bitmap font with room for descenders, each letter as wide as it needs.
+//! The letters of labels: a 5 × 7 bitmap font with descenders and variable width.
 //!
-//! Promise: every character has a glyph; those the font lacks show as an empty box. Limit: ASCII letters, digits and
-//! what names and numbers need.
+//! Guarantees: every character has a glyph; unknown ones show as an empty box. Limit: ASCII letters, digits, and the
+//! characters of names and numbers.
 
 /// Rows of a glyph: seven above the base line, two below.
 #[cfg(test)]
 const ROWS: usize = 9;
 
-/// The glyph of a character that the font lacks.
+/// The glyph of an unknown character.
 const MISSING: &str = "#####/#...#/#...#/#...#/#...#/#...#/#####";
 
-/// Rows from the top, apart by `/`; rows that are left out or empty are blank.
+/// Rows from the top, separated by `/`; omitted or empty rows are blank.
 const GLYPHS: &[(char, &str)] = &[
     (' ', "..."),
     ('!', "#/#/#/#/#/./#"),

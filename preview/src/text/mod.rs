@@ -1,6 +1,6 @@
 //! Text in a picture: the label in the upper left, the legend of the colour map in the lower left.
 //!
-//! Promise: text is clipped at the picture's border. Limit: whole dots, one line.
+//! Guarantees: text is clipped at the picture's border. Limit: whole dots, one line.
 
 mod font;
 
@@ -14,7 +14,7 @@ const SPACE: usize = 1;
 const BAR: [usize; 2] = [120, 5];
 /// From the top of one line to the next, dots.
 const LINE: usize = 12;
-/// Share of the backdrop that shows through the letters: softer than black on white.
+/// Fraction of the backdrop that shows through the letters: softer than black on white.
 const FAINT: f32 = 0.25;
 
 /// Writes `label` into the upper left.
@@ -41,12 +41,12 @@ pub(crate) fn legend(image: &mut Image, name: &str, [low, high]: [f32; 2]) {
     write(image, &high, [right, below], dot);
 }
 
-/// Pixels per dot: text keeps about one share of the picture.
+/// Pixels per dot: text has about the same size relative to any picture.
 fn dot_size(image: &Image) -> usize {
     (image.height().min(image.width()) / 300).max(1)
 }
 
-/// Dots across.
+/// Width in dots.
 fn length(text: &str) -> usize {
     text.chars().map(|character| font::glyph(character).1 + SPACE).sum::<usize>().saturating_sub(SPACE)
 }
