@@ -16,7 +16,7 @@ params! { PARAMS:
     TURNS: Param<f32> = Param::float("turns", 3.0, "Turns from root to tip.").soft(0.0, 10.0);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 0.0], [1.0, 1.0]],
         "Scales the radius along the curve, from root (0) to tip (1).");
-    SEED: Param<Seed> = Param::seed("Selects another starting angle for each curve.");
+    SEED: Param<Seed> = Param::seed("Each seed gives the curves other starting angles.");
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The wound curves. Their segments keep their lengths.");

@@ -1,10 +1,10 @@
-//! A table of laws: how accurately each one is met and the limit it has to meet. It is printed, checked, and compared with
-//! the table in docs/.
+//! A table of laws with the accuracy at which each is met, and its limit. The table is printed, checked, and compared
+//! with the one in docs/.
 
 #![allow(dead_code, reason = "each suite uses part of it")]
 
-/// How much is computed: `cargo test` runs coarse forms of the laws that take long, `cargo bench --bench laws` all of them
-/// in full.
+/// How much is computed: `cargo test` runs coarse forms of laws that take long, `cargo bench --bench laws` the full
+/// forms.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Effort {
     Coarse,
@@ -20,15 +20,15 @@ impl Effort {
     }
 }
 
-/// A law, how accurately it was met, and the limit.
+/// A law, the accuracy at which it was met, and the limit.
 pub(crate) struct Figure {
     law: &'static str,
     measured: String,
     limit: String,
     holds: bool,
-    /// Known not to hold.
+    /// Whether the law is known not to hold.
     missed: bool,
-    /// Measured in a coarse form, so that docs/ has another number.
+    /// Whether it was measured in a coarse form, so that docs/ has another figure.
     coarse: bool,
 }
 
@@ -37,13 +37,13 @@ impl Figure {
         Self { law, measured, limit, holds, missed: false, coarse: false }
     }
 
-    /// The largest error found, of at most `limit`.
+    /// The largest error found; it must be at most `limit`.
     pub(crate) fn error(law: &'static str, worst: f64, limit: f64, unit: &str) -> Self {
         Self::new(law, format!("{worst:.1e}{unit}"), format!("{limit:.0e}{unit}"), worst <= limit)
     }
 
-    /// Pairs of an error and the rounding of stored positions, each error of at most `limit` plus that rounding: shows the
-    /// pair closest to its limit.
+    /// Pairs of an error and the rounding of stored positions; each error must be at most `limit` plus that rounding.
+    /// Shows the pair closest to its limit.
     pub(crate) fn stored(
         law: &'static str,
         errors: impl IntoIterator<Item = [f64; 2]>,
@@ -57,7 +57,7 @@ impl Figure {
         Self::new(law, format!("{error:.1e}{unit}"), limits, error <= limit + storage)
     }
 
-    /// Numbers that all lie within `limits`.
+    /// Numbers that must all lie within `limits`.
     pub(crate) fn within(law: &'static str, found: &[f64], [low, high]: [f64; 2]) -> Self {
         let least = found.iter().copied().fold(f64::INFINITY, f64::min);
         let most = found.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -66,17 +66,17 @@ impl Figure {
         Self::new(law, measured, format!("{low}…{high}"), holds)
     }
 
-    /// Something that must not happen: `count` is the number of times it did, `of` the number of times it could have.
+    /// Something that must not happen: `count` is the number of times it did, out of `of` cases.
     pub(crate) fn never(law: &'static str, count: usize, of: usize) -> Self {
         Self::new(law, format!("{count} of {of}"), "0".into(), count == 0 && of > 0)
     }
 
-    /// Marks a law that is known not to hold; the check fails once it does hold.
+    /// Marks a law that is known not to hold; the check fails if it does.
     pub(crate) fn missed(self) -> Self {
         Self { missed: true, ..self }
     }
 
-    /// Marks a law that has a coarse form: what that measures is not compared with docs/.
+    /// Marks a law that has a coarse form, whose figure is not compared with docs/.
     pub(crate) fn has_coarse_form(self, effort: Effort) -> Self {
         Self { coarse: effort == Effort::Coarse, ..self }
     }
@@ -86,7 +86,7 @@ impl Figure {
         format!("| {} | {} | {}{missed} |", self.law, self.measured, self.limit)
     }
 
-    /// Whether docs show this row: where the form is coarse, another number measured.
+    /// Whether docs show this row; for a coarse form the figure may differ.
     fn is_shown_as(&self, shown: &str) -> bool {
         let ends = |row: &str| -> Option<(String, String)> {
             let mut cells = row.split(" | ");
@@ -111,7 +111,7 @@ pub(crate) fn table_range(docs: &str) -> std::ops::Range<usize> {
     start..start + rest.find("\n\n").map_or(rest.len(), |end| end + 1)
 }
 
-/// Prints the table and gives the rows of laws that do not hold, or hold although they are marked as missed.
+/// Prints the table and returns the rows of laws that do not hold, or that hold although they are marked as missed.
 pub(crate) fn broken(figures: &[Figure]) -> Vec<String> {
     print!("{}", table(figures));
     figures.iter().filter(|figure| figure.holds == figure.missed).map(Figure::row).collect()
@@ -127,10 +127,10 @@ pub(crate) fn check(figures: &[Figure], page: &str, docs: &str) {
     );
     let shown: Vec<&str> = docs[table_range(docs)].lines().skip(2).collect();
     let same = figures.len() == shown.len() && figures.iter().zip(&shown).all(|(figure, row)| figure.is_shown_as(row));
-    assert!(same, "{page} shows another table than this one; `cargo xtask bless laws` writes it:\n{}", table(figures));
+    assert!(same, "the table in {page} differs from this one; `cargo xtask bless laws` writes it:\n{}", table(figures));
 }
 
-/// Four units in the last place of the largest coordinate: how far storing positions in f32 may move a point.
+/// Four units in the last place of the largest coordinate: an upper bound on the rounding of positions to f32.
 pub(crate) fn storage(points: &[[f32; 3]]) -> f64 {
     let largest = points.as_flattened().iter().fold(0.0_f32, |most, x| most.max(x.abs()));
     4.0 * (f64::from(largest.next_up()) - f64::from(largest))

@@ -1,5 +1,5 @@
-//! What holds for the sources as a whole: where nodes stand, what they may use, what README says of them, and that no two
-//! public types share a name.
+//! Properties of the sources as a whole: where nodes are listed, what they may use, README's table of nodes, and that
+//! no two public types share a name.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 
@@ -31,7 +31,7 @@ fn sources(path: &Path) -> Vec<(PathBuf, String)> {
 #[path = "../../docs/examples/curve_helix.rs"]
 mod curve_helix;
 
-/// What `cargo xtask new-node` writes; xtask's tests see to it that these are its texts.
+/// Nodes written by `cargo xtask new-node`; xtask's tests check that these are its texts.
 #[path = "../new_nodes/curve_full.rs"]
 mod curve_full;
 #[path = "../new_nodes/curve_plain.rs"]
@@ -44,6 +44,6 @@ fn the_guide_for_authors_shows_the_node_that_is_compiled() {
     let (production, _) = node.split_once("#[cfg(test)]").unwrap();
     assert!(
         guide.contains(production.trim_end()),
-        "docs/writing_nodes.md quotes another node than docs/examples/curve_helix.rs"
+        "the node in docs/writing_nodes.md differs from docs/examples/curve_helix.rs"
     );
 }

@@ -1,4 +1,4 @@
-//! Every node stands in its file and in its family's list, and nowhere else; nodes do not use each other.
+//! Every node is in its own file and in its family's list, and nowhere else; nodes do not use each other.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,7 +8,8 @@ use super::paths::paths;
 use super::tokens::{Token, tokens};
 use super::{root, sources};
 
-/// Node modules of a family: files and folders beside `lib.rs`, except for `shared`, which holds what several nodes use.
+/// Node modules of a family: files and folders beside `lib.rs`, except for `shared`, which holds what several nodes
+/// use.
 fn modules(family: &Path) -> BTreeSet<String> {
     let entries = fs::read_dir(family).unwrap().map(|entry| entry.unwrap().path());
     entries
@@ -58,12 +59,7 @@ fn every_family_is_in_the_catalogue() {
             let file = files.iter().find(|file| file.exists()).unwrap();
             let name = declared_name(&fs::read_to_string(file).unwrap());
             let name = name.unwrap_or_else(|| panic!("{} declares no node", file.display()));
-            assert_eq!(
-                name.to_ascii_lowercase(),
-                module,
-                "{}: the file has another name than its node",
-                file.display()
-            );
+            assert_eq!(name.to_ascii_lowercase(), module, "{}: the names of file and node differ", file.display());
             let known = convect::CATALOGUE.names().any(|known| known == name);
             assert!(known, "`{name}` is not in the catalogue: add its family to `FAMILIES` in src/lib.rs");
         }
@@ -71,17 +67,18 @@ fn every_family_is_in_the_catalogue() {
 }
 
 #[test]
-fn names_are_unique_and_lead_to_their_file() {
+fn names_are_unique_and_match_their_files() {
     let mut seen = BTreeSet::new();
     for node in convect::CATALOGUE.nodes() {
-        assert!(seen.insert(node.name), "{} is there twice", node.name);
+        assert!(seen.insert(node.name), "{} is listed twice", node.name);
         let module = node.name.to_ascii_lowercase();
         let found = families().iter().any(|family| modules(family).contains(&module));
         assert!(found, "{}: no file or folder `{module}` in any family", node.name);
     }
 }
 
-/// What a source of node module `module[0]` uses of the nodes `others`, or of the crate as a whole, by which it could.
+/// The item of another node in `others` that a source of node module `module[0]` uses, or a path that opens the whole
+/// crate.
 fn uses(source: &str, module: &[String], others: &BTreeSet<String>) -> Vec<String> {
     let of_another = |name: &String| *name != module[0] && others.contains(name);
     let found = paths(source, module).into_iter().filter_map(|path| match path.names.first() {
@@ -98,7 +95,7 @@ fn module_of(file: &Path, family: &Path) -> Vec<String> {
     names.filter(|name| name != "mod").collect()
 }
 
-/// A node's tests may cook another node to make their input.
+/// A node's tests may cook other nodes to make their input.
 #[test]
 fn nodes_do_not_call_each_other() {
     let is_node = |file: &Path| !file.ends_with("lib.rs") && !file.ends_with("tests.rs");
@@ -117,7 +114,7 @@ fn nodes_do_not_call_each_other() {
 }
 
 #[test]
-fn a_call_of_another_node_is_found_however_it_is_written() {
+fn calls_of_other_nodes_are_found_in_any_notation() {
     let others = ["bend", "gust"].map(str::to_owned).into();
     let module = ["gust".to_owned()];
     let bad = [

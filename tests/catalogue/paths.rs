@@ -5,16 +5,17 @@ use super::tokens::{Token, tokens};
 /// A path that begins at `crate`, `self` or `super`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SourcePath {
-    /// Its names from the crate's root on.
+    /// Its names, starting at the crate's root.
     pub(crate) names: Vec<String>,
     /// Whether it brings all of a module into scope, or a module under another name.
     pub(crate) opens: bool,
 }
 
-/// The paths in the source of a module whose own path is `module`. Names that are in scope by other means are no paths.
+/// The paths in the source of a module whose own path is `module`. Names that are in scope by other means are not
+/// found.
 pub(crate) fn paths(source: &str, module: &[String]) -> Vec<SourcePath> {
     let mut found = Paths { tokens: tokens(source), at: 0, found: Vec::new() };
-    // Inline modules around, and the depth of braces at which each began.
+    // Enclosing inline modules, and the depth of braces at which each began.
     let mut inside: Vec<(String, usize)> = Vec::new();
     let mut depth = 0;
     while let Some(token) = found.tokens.get(found.at).cloned() {
@@ -56,7 +57,7 @@ impl Paths {
         self.tokens.get(self.at)
     }
 
-    /// Reads a path, or a tree of them in braces, that begins here; `prefix` is what stands before its braces.
+    /// Reads a path, or a tree of them in braces, that begins here; `prefix` is the path before its braces.
     fn tree(&mut self, prefix: &[String], here: &[String]) {
         let mut names = prefix.to_vec();
         loop {
@@ -71,7 +72,7 @@ impl Paths {
                     while self.token().is_some_and(|token| *token != Token::Mark('}')) {
                         let before = self.at;
                         self.tree(&names, here);
-                        // A comma, or what no tree of paths has.
+                        // A comma, or a token that does not belong to a tree of paths.
                         self.at += usize::from(self.token() == Some(&Token::Mark(',')) || self.at == before);
                     }
                     self.at += 1;

@@ -1,4 +1,4 @@
-//! README's table of nodes is the catalogue's: each node with the first sentence of its help.
+//! README's table of nodes matches the catalogue: each node with the first sentence of its help.
 
 use std::fs;
 
@@ -24,6 +24,10 @@ fn readme_lists_the_catalogue() {
     if std::env::var_os("BLESS").is_some() {
         fs::write(&path, readme.replace(&found, &table())).unwrap();
     } else {
-        assert_eq!(found, table(), "README's table of nodes is not the catalogue's; `cargo xtask bless` writes it");
+        assert_eq!(
+            found,
+            table(),
+            "README's table of nodes differs from the catalogue; `cargo xtask bless readme` writes it"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Rust source as tokens: enough to find paths, names of types and texts, without what comments and texts contain.
+//! Rust source as tokens: enough to find paths, names of types and string literals, ignoring the contents of comments.
 
 /// A piece of source.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,7 +107,7 @@ fn quote(rest: &str) -> usize {
 }
 
 #[test]
-fn comments_texts_and_characters_hold_no_words() {
+fn words_in_comments_texts_and_characters_are_ignored() {
     let source = r##"
         // a /* b
         /* c /* d */ e */ f::g "h \" i" r#"j " k"# 'l' '\'' '"' m<'n>

@@ -1,15 +1,15 @@
-//! No two public types of the workspace share a name: a name found anywhere means one thing.
+//! No two public types of the workspace share a name, so that a name means one thing everywhere.
 
 use std::collections::BTreeMap;
 
 use super::tokens::{Token, tokens};
 use super::{root, sources};
 
-/// Folders with the sources of the workspace's libraries and programs; their `tests` are not looked at.
+/// Folders with the sources of the workspace's libraries and programs; their `tests` are ignored.
 const FOLDERS: [&str; 8] =
     ["conformance/src", "engine/src", "formats/src", "kernels", "nodes", "numerics/src", "preview/src", "src"];
 
-/// Names that several public types have, and why they may.
+/// Names that several public types share, and why.
 const SHARED: [(&str, &str); 6] = [
     ("Args", "each verb of the program has its own, and is named with it: `cook::Args`"),
     ("Bounds", "of a param's range; of a picture, in `preview`"),
@@ -47,7 +47,7 @@ fn no_two_public_types_share_a_name() {
 }
 
 #[test]
-fn public_types_alone_are_found() {
+fn only_public_types_are_found() {
     let source =
         "pub struct A; pub(crate) struct B; enum C {} pub enum D {} pub trait E { type F; } pub type G<T> = Vec<T>;
         // pub struct H;

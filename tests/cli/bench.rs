@@ -1,4 +1,4 @@
-//! A folder with a scene in it, and the program run there.
+//! A folder that contains a scene, in which the program is run.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -70,7 +70,7 @@ impl Bench {
         fs::write(path, text).unwrap();
     }
 
-    /// The program, about to run here.
+    /// A command that runs the program here.
     pub(crate) fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_convect"));
         command.args(args).current_dir(self.folder.path()).stdin(Stdio::null());
@@ -82,14 +82,14 @@ impl Bench {
         Ran::of(&self.command(args).output().unwrap())
     }
 
-    /// Runs what should work, and gives stdout.
+    /// Runs a command that must succeed, and returns stdout.
     pub(crate) fn done(&self, args: &[&str]) -> String {
         let ran = self.run(args);
         assert_eq!(ran.code, Some(0), "{args:?}: {}", ran.stderr);
         ran.stdout
     }
 
-    /// The same, where stdout is JSON.
+    /// The same for JSON on stdout.
     pub(crate) fn json(&self, args: &[&str]) -> Value {
         let text = self.done(args);
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{args:?}: {error} in {text}"))
@@ -114,7 +114,7 @@ impl Bench {
     }
 }
 
-/// Names in a folder, sorted, with hidden ones; empty where there is no folder.
+/// Names in a folder, sorted, with hidden ones; empty if there is no folder.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -142,7 +142,7 @@ impl Ran {
     }
 }
 
-/// Upright curves of five CVs, a quarter tall, an eighth apart; an obj file.
+/// An obj file with upright curves of five CVs, 0.25 tall and 0.125 apart.
 pub(crate) fn blades(count: usize) -> String {
     let mut text = String::new();
     for blade in 0..count {

@@ -68,7 +68,8 @@ fn explain_shows_how_far_back_a_window_reads_and_its_cost() {
                "jiggle": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" }, "params": { "frequency": 12 } } },
              "outputs": { "hair": "jiggle" } }"#,
     );
-    // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors, each but the first run up from 9 earlier.
+    // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors; for each but the first, 9 earlier
+    // frames are run.
     let text = bench.done(&["explain", "g.json"]);
     assert!(text.contains("186 steps for 96 frames: window of 9 frames, restarted every 9"), "{text}");
     let plan = bench.json(&["explain", "g.json", "--json"]);

@@ -6,7 +6,7 @@ fn check(bench: &Bench) -> Ran {
     bench.run(&["check", "g.json"])
 }
 
-/// What `check` says of one node with these params.
+/// The message of `check` for one node with these params.
 fn said(kind: &str, params: &str) -> (Option<i32>, String) {
     let graph = format!(
         r#"{{"convect": 1, "nodes": {{"a": {{"type": "{kind}", "params": {{{params}}}}}}}, "outputs": {{"o": "a"}}}}"#
@@ -25,7 +25,7 @@ fn geometry_written_into_the_graph_is_checked() {
         (
             "Curve_In",
             format!(r#"{curve}, "counts": [2, -1]"#),
-            "nodes.a.params.counts: `counts` has -1 at place 1, counted from 0; expected at least 1",
+            "nodes.a.params.counts: `counts` has -1 at index 1, counted from 0; expected at least 1",
         ),
         (
             "Curve_In",
@@ -40,18 +40,18 @@ fn geometry_written_into_the_graph_is_checked() {
         (
             "Mesh_In",
             format!(r#"{square}, "indices": [0, 1, -1]"#),
-            "nodes.a.params.indices: `indices` has -1 at place 2, counted from 0; expected at least 0",
+            "nodes.a.params.indices: `indices` has -1 at index 2, counted from 0; expected at least 0",
         ),
         (
             "Mesh_In",
             format!(r#"{square}, "indices": [0, 1, 3]"#),
-            "nodes.a.params.indices: `indices` has 3 as number 2, but there are 3 `points`; points and numbers are \
+            "nodes.a.params.indices: `indices` has 3 at index 2, but there are 3 `points`; points and indices are \
              counted from 0",
         ),
         (
             "Tet_In",
             format!(r#"{tet}, "tets": [[0, 1, 2, 7]]"#),
-            "nodes.a.params.tets: `tets` has 7 as number 3, but there are 4 `points`; points and numbers are counted \
+            "nodes.a.params.tets: `tets` has 7 at index 3, but there are 4 `points`; points and indices are counted \
              from 0",
         ),
         (
@@ -80,7 +80,7 @@ fn a_gap_in_a_sequence_is_found_before_anything_cooks() {
     let ran = bench.run(&["cook", "g.json"]);
     assert_eq!((ran.code, ran.stderr.as_str(), bench.names("out").len()), (Some(1), expected, 0));
     bench.done(&["cook", "g.json", "--frames", "5-6", "--format", "json"]);
-    assert_eq!(bench.names("out").len(), 2, "files of frames that nobody asks for may be missing");
+    assert_eq!(bench.names("out").len(), 2, "files of frames that are not requested may be missing");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn params_that_leave_their_range_at_some_frame_are_found() {
     let expected = "g.json:8:31: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction, \
                     at frame 2; give a vector that is not zero, such as [1, 0, 0]\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), expected));
-    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1"]).code, Some(0), "a cook asks for its frames only");
+    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1"]).code, Some(0), "a cook checks its own frames only");
 
     let graph = CALM_AT_2.replace(r#""keyframes": [[1, [1, 0, 0]], [3, [-1, 0, 0]]]"#, r#""expr": ["1", "0", "0"]"#);
     let octaves =

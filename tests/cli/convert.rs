@@ -16,7 +16,7 @@ fn geometry_survives_a_round_trip_through_every_readable_format() {
 }
 
 #[test]
-fn what_a_format_drops_is_noted() {
+fn data_that_a_format_drops_is_noted() {
     let bench = Bench::new();
     bench.write("a.json", r#"{"points": {"points": [[0, 0, 0]], "point_attributes": {"heat": [1.5]}}}"#);
     let ran = bench.run(&["convert", "a.json", "a.obj"]);
@@ -59,7 +59,7 @@ fn the_frame_is_the_number_in_the_name() {
 }
 
 #[test]
-fn a_sequence_becomes_one_file_or_a_file_a_frame() {
+fn a_sequence_becomes_one_file_or_one_file_per_frame() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
     bench.done(&["cook", "g.json", "--format", "usdc", "--output", "grass", "--out", "usd"]);

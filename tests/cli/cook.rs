@@ -1,4 +1,4 @@
-//! `cook`, as far as it goes well: files and their names, frames, settings, the report.
+//! `cook` without errors: files and their names, frames, settings, the report.
 
 use std::fs;
 
@@ -45,7 +45,7 @@ fn frames_are_ranges_steps_and_sub_frames() {
 }
 
 #[test]
-fn a_json_file_says_its_frame_and_time() {
+fn a_json_file_contains_its_frame_and_time() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json", "--format", "json", "--frames", "10.5"]);
     let file = bench.read_json("out/grass.0010_5.json");
@@ -61,7 +61,7 @@ fn outputs_are_chosen_by_name_and_folders_are_made() {
 }
 
 #[test]
-fn quiet_says_nothing_and_verbose_more() {
+fn quiet_prints_nothing_and_verbose_prints_more() {
     let bench = Bench::new();
     assert_eq!(bench.run(&["cook", "g.json", "-q"]).stderr, "");
     assert!(bench.run(&["cook", "g.json", "-v"]).stderr.contains("wind (Curve_Wind): 4 cooked"));
@@ -95,7 +95,7 @@ fn the_report_is_as_documented() {
     let documented = ["type", "time", "cooks", "from_cache", "left_out", "wall_ms", "cpu_ms", "peak_bytes", "metrics"];
     documented.iter().for_each(|key| assert!(!wind[key].is_null(), "`{key}` in {wind}"));
     assert_eq!((&wind["type"], &wind["time"], &wind["cooks"]), (&json!("Curve_Wind"), &json!("frame"), &json!(2)));
-    assert_eq!(keys(&wind["metrics"]["max_angle"]), ["1", "2"], "a value a frame");
+    assert_eq!(keys(&wind["metrics"]["max_angle"]), ["1", "2"], "one value per frame");
     assert!(keys(&wind["left_out"][0]).iter().eq(&["stage", "why"]), "{wind}");
     let grass = &report["outputs"]["grass"];
     assert_eq!((&grass["from"], &grass["frames"], &grass["errors"]), (&json!("wind"), &json!(2), &json!([])));
@@ -114,7 +114,7 @@ fn a_preview_is_a_png_beside_the_outputs() {
 }
 
 #[test]
-fn files_that_were_there_are_replaced() {
+fn existing_files_are_replaced() {
     let bench = Bench::new();
     bench.write("out/grass.usdc", "old");
     bench.write("out/other.txt", "kept");
@@ -158,5 +158,5 @@ fn curves_on_a_moving_skin_have_velocities() {
     );
     bench.done(&["cook", "g.json", "--format", "json"]);
     let v = bench.read_json("out/o.0002.json")["curves"]["point_attributes"]["v"][0].clone();
-    assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m a frame, 10 frames a second: {v}");
+    assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m per frame at 10 frames per second: {v}");
 }

@@ -1,4 +1,4 @@
-//! `diff`: 0 the same, 1 different, 2 trouble.
+//! `diff`: exit code 0 the same, 1 different, 2 errors.
 
 use serde_json::json;
 

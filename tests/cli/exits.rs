@@ -1,4 +1,4 @@
-//! Exit codes: 0 done, 1 file, 2 command line, 3 graph, 4 cook; of two classes the lowest.
+//! Exit codes: 0 success, 1 file, 2 command line, 3 graph, 4 cook; the lowest if there are faults of several classes.
 
 use std::fs;
 
@@ -97,7 +97,7 @@ fn of_two_classes_of_faults_the_lowest_exit_code_is_used() {
     let both = format!(r#"{MISSING}, "b": {{"type": "Curve_Inn"}}"#);
     let ran = Bench::with_graph(&graph(&both)).run(&["check", "g.json"]);
     assert_eq!(ran.code, Some(1));
-    assert!(ran.stderr.ends_with("2 faults\n"), "both are told: {}", ran.stderr);
+    assert!(ran.stderr.ends_with("2 faults\n"), "both are reported: {}", ran.stderr);
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn a_node_that_fails_at_a_frame_exits_with_4_and_affects_only_its_output() {
     assert_eq!(
         (ran.code, bench.names("usd")),
         (Some(4), vec!["still.usdc".into()]),
-        "a sequence is whole or not there"
+        "an incomplete USD file is not written"
     );
     assert_eq!(bench.run(&["cook", "g.json", "--frames", "1,3", "--out", "usd"]).code, Some(0));
 }
@@ -130,7 +130,7 @@ fn an_output_that_cannot_be_written_exits_with_1() {
         let ran = bench.run(&["cook", "g.json", "--out", "taken", "--format", format]);
         assert_eq!(ran.code, Some(1), "{}", ran.stderr);
     }
-    assert_eq!(bench.names("taken"), ["o.0001.json", "o.usdc"], "no temporary is left");
+    assert_eq!(bench.names("taken"), ["o.0001.json", "o.usdc"], "no temporary file is left");
     for args in [["--report", "none/report.json"], ["--cache", "file"]] {
         let ran = bench.run(&[&["cook", "g.json"], &args[..]].concat());
         assert_eq!((ran.code, bench.names("out").len()), (Some(1), 0), "before it cooks: {}", ran.stderr);

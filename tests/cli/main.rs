@@ -1,6 +1,6 @@
-//! The program as its users meet it: the built binary, run in folders of its own.
+//! The built program as users run it, each time in a folder of its own.
 //!
-//! Whatever a test is about, each run through [`bench`] also holds that nobody sees a panic or a backtrace.
+//! Every run through [`bench`] also checks that no panic or backtrace is shown.
 
 #![allow(clippy::unwrap_used, reason = "a value that is not there fails the test")]
 

@@ -1,5 +1,5 @@
-//! What a user reads when something is wrong, whole. The engine's tests hold the wording of each fault; these hold that
-//! it arrives: all faults at once, with place and hint, and nothing around them.
+//! Complete error output as users see it. The engine's tests check the wording of each fault; these check that all
+//! faults are printed at once, with position and hint, and nothing else.
 
 use crate::bench::{Bench, CALM_AT_2};
 
@@ -11,7 +11,7 @@ fn stderr(graph: &str, args: &[&str]) -> String {
 }
 
 #[test]
-fn the_message_for_a_truncated_file_says_what_was_left_open() {
+fn the_message_for_a_truncated_file_names_the_open_object() {
     let expected =
         "g.json:1:26: the file ends inside the object that opens on line 1, column 25; is the rest missing?\n";
     assert_eq!(stderr(r#"{"convect": 1, "nodes": {"#, &["check", "g.json"]), expected);

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::bench::{Bench, GRAPH};
 
-/// The notes of a cook: those on stderr, which are those in the report.
+/// The notes of a cook, which are the same on stderr and in the report.
 fn notes(bench: &Bench, args: &[&str]) -> Vec<String> {
     let ran = bench.run(&[&["cook", "g.json", "--report", "report.json"], args].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
@@ -47,11 +47,11 @@ fn a_requested_attribute_that_no_frame_has_is_noted() {
     ];
     assert_eq!(notes(&bench, &[]), expected);
     assert_eq!(notes(&bench, &["--cache", "cache"]), expected);
-    assert_eq!(notes(&bench, &["--cache", "cache"])[1], expected[1], "and of frames on disk");
+    assert_eq!(notes(&bench, &["--cache", "cache"])[1], expected[1], "and for frames on disk");
 }
 
 #[test]
-fn what_a_format_drops_is_noted_once_per_output() {
+fn data_that_a_format_drops_is_noted_once_per_output() {
     let bench = two_curves(r#""attributes": {"gain": [0.0, 1.0, 2.0, 3.0]}, "width": 0.1"#, r#""wind""#);
     let expected =
         ["output `o` was written without `gain` of curves, `width` of curves: obj cannot hold it; usdc and json can"];

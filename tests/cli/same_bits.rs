@@ -1,4 +1,4 @@
-//! The same bits whatever the threads, the order of frames, the memory, the cache or the CPU.
+//! The same bits for any number of threads, order of frames, amount of memory, cache and CPU.
 
 use std::collections::BTreeMap;
 use std::process::Stdio;
@@ -57,7 +57,7 @@ fn a_cache_cold_or_warm_changes_nothing() {
         bench.write(&format!("cache/{name}"), "broken");
     }
     bench.done(&[&COOK[..], &["--cache", "cache", "--out", "broken"]].concat());
-    assert!(bench.files("broken") == expected, "a broken cache is no cache");
+    assert!(bench.files("broken") == expected, "a broken cache is ignored");
 }
 
 #[test]

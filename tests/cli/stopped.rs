@@ -1,4 +1,4 @@
-//! Cooks that are cut short: by Ctrl-C, by a kill, by a full disk, by a reader that has seen enough, by little memory.
+//! Cooks that are cut short: by Ctrl-C, a kill, a full disk, a closed pipe or little memory.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::bench::{Bench, Ran, names};
 
-/// Far more frames than any test waits for.
+/// Many more frames than any test waits for.
 const LONG: &str = "1-1000000";
 
 fn signal(name: &str, child: &Child) {
@@ -35,7 +35,7 @@ fn ended(child: Child) -> Ran {
 }
 
 #[test]
-fn ctrl_c_leaves_whole_frames_and_no_temporary() {
+fn ctrl_c_leaves_complete_frames_and_no_temporary_files() {
     let bench = Bench::new();
     let args = ["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass", "--report", "report.json"];
     let child = start(&bench, &args);
@@ -160,7 +160,7 @@ fn a_closed_pipe_on_stdout_is_not_an_error() {
     }
 }
 
-/// A file system of 64 kB, gone with this.
+/// A file system of 64 kB, unmounted on drop.
 struct TinyDisk<'a>(&'a Path);
 
 impl<'a> TinyDisk<'a> {

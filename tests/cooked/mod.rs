@@ -21,7 +21,7 @@ pub(crate) const BEAR: &str = r#"
 /// Frames of each output.
 type Frames = Vec<Vec<Geometry>>;
 
-/// By node, name and frame.
+/// Metrics by node, name and frame.
 pub(crate) type Metrics = BTreeMap<String, BTreeMap<String, BTreeMap<Frame, f64>>>;
 
 /// A graph of these nodes, over frames 1…`frames`, with these outputs.
@@ -42,7 +42,7 @@ fn text(nodes: &str, outputs: &[&str], frames: i64) -> String {
     )
 }
 
-/// Every output of these nodes at frames 1…`frames`.
+/// Cooks every output of these nodes at frames 1…`frames`.
 pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
     cook_graph(&graph(nodes, outputs, frames), frames).0
 }
@@ -76,7 +76,7 @@ fn load(text: &str, outputs: &[&str], set: &[(&str, &str)]) -> Result<Graph, Str
     Ok(graph)
 }
 
-/// Of a node, or `"node.port"`.
+/// The result of a node, or of `"node.port"`.
 fn output(graph: &Graph, name: &str) -> GraphOutput {
     let (id, port) = name.split_once('.').unwrap_or((name, ""));
     let node = graph.nodes.iter().position(|node| &*node.id == id).unwrap();
@@ -95,7 +95,7 @@ fn cook_graph(graph: &Graph, frames: i64) -> (Frames, Metrics) {
     ((0..graph.outputs.len()).map(of_output).collect(), metrics(graph, report))
 }
 
-/// All that was published.
+/// All published metrics.
 pub(crate) fn metrics(graph: &Graph, report: Report) -> Metrics {
     let metrics = graph.nodes.iter().zip(report.nodes).map(|(node, report)| {
         let named = report.metrics.into_iter().map(|(name, values)| (name.to_string(), values));

@@ -17,7 +17,7 @@ use engine::node::Cook;
 use engine::plan::Request;
 use engine::time::Frame;
 
-/// By output and frame, a hash of everything in the geometry.
+/// For each output and frame a hash of the whole geometry.
 pub(crate) type Keys = BTreeMap<(String, Frame), Key>;
 
 /// graphs/NAME/NAME.json, by name.

@@ -17,7 +17,7 @@ params! { PARAMS:
         .unit(Unit::Metres).soft(0.0, 1.0);
     RAMP: Param<Arc<Ramp>> = Param::ramp("falloff", &[[0.0, 0.0], [1.0, 1.0]],
         "Scales the movement along the curve, from root (0) to tip (1).");
-    SEED: Param<Seed> = Param::seed("Selects another share of the movement for each curve.");
+    SEED: Param<Seed> = Param::seed("Each seed moves every curve by another random fraction.");
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The moved curves. Their segments keep their lengths.");

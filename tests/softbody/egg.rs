@@ -4,7 +4,7 @@ use crate::cooked::cook_file;
 use crate::measure::{distance, points, volume};
 use engine::geometry::Geometry;
 
-/// Whether a tet has the point inside, by more than rounding of f32 positions.
+/// Whether a point is inside a tet by more than the rounding of f32 positions.
 fn holds(tet: [[f64; 3]; 4], p: &[f64; 3]) -> bool {
     let whole = volume(tet);
     (0..4).all(|k| {

@@ -1,5 +1,5 @@
-//! Soft bodies: how accurately they meet their laws, extreme scenes, and the figures of docs/softbody.md for dough and the
-//! egg of paper R. Everything checked is printed too: `cargo test --test softbody -- --nocapture`.
+//! Soft bodies: how accurately they meet their laws, extreme scenes, and the figures of docs/softbody.md for dough and
+//! the egg of paper R. All checked figures are printed: `cargo test --test softbody -- --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 

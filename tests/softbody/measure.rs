@@ -1,4 +1,4 @@
-//! Points, distances and volumes of what was cooked.
+//! Points, distances and volumes of cooked geometry.
 
 use engine::geometry::{Geometry, Kind};
 use numerics::vector::DVec3;

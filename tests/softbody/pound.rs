@@ -1,4 +1,4 @@
-//! `graphs/dough_pound`: the conflict that paper R describes, between a hand that presses and a goal shape.
+//! `graphs/dough_pound`: the conflict between a pressing hand and a goal shape that paper R describes.
 
 use crate::cooked::cook_file;
 use crate::measure::{distance, points};
@@ -10,7 +10,7 @@ const GOAL: usize = 24;
 const LATER: usize = 36;
 
 #[test]
-fn goals_inside_leave_the_dent_that_goals_on_all_take_away() {
+fn goals_on_the_interior_keep_the_dent_that_goals_on_all_particles_remove() {
     let outputs = ["inside.tets", "everywhere.tets", "free.tets", "bun", "body", "hand"];
     let (frames, metrics) = cook_file("dough_pound", &outputs, LATER as i64);
     let at = |output: usize, frame: usize| points(&frames[output][frame - 1]);
@@ -20,7 +20,7 @@ fn goals_inside_leave_the_dent_that_goals_on_all_take_away() {
         let all = at(output, frame);
         (skin..all.len()).map(|k| distance(&all[k], &goal[k])).sum::<f64>() / (all.len() - skin) as f64 / SIZE
     };
-    // Under the hand: upper surface particles within 2.5 cm of its lowest point.
+    // Particles under the hand: on the upper surface, within 2.5 cm of its lowest point.
     let hand = at(5, 16);
     let tip = hand.iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
     let under: Vec<usize> = (0..skin)
@@ -42,6 +42,6 @@ fn goals_inside_leave_the_dent_that_goals_on_all_take_away() {
     assert!(mean(2, GOAL) > 0.05);
     for name in ["inside", "everywhere", "free"] {
         let deepest = metrics[name]["deepest_overlap"].values().copied().fold(0.0, f64::max);
-        assert!(deepest < 2e-3, "{name}: nothing is passed, {deepest}");
+        assert!(deepest < 2e-3, "{name}: no collider is penetrated, {deepest}");
     }
 }

@@ -4,7 +4,7 @@ use crate::cooked::cook_file;
 use crate::measure::{points, volume_of};
 use engine::geometry::Geometry;
 
-/// How high dough is across the place where the pin's axis is at x, metres over the ground.
+/// Height of the dough in a strip across the position x of the pin's axis, metres above the ground.
 fn height(dough: &Geometry, x: f64) -> f64 {
     let near = points(dough).into_iter().filter(|p| (p[0] - x).abs() < 0.012 && p[2].abs() < 0.03);
     near.map(|p| p[1]).fold(0.0, f64::max)
@@ -51,5 +51,5 @@ fn dough_flattens_under_the_pin_swells_in_front_of_it_and_keeps_its_dent() {
         most("inverted_tets"),
         most("substeps_used")
     );
-    assert!(most("deepest_overlap") < 2e-3, "nothing is passed");
+    assert!(most("deepest_overlap") < 2e-3, "no collider is penetrated");
 }

@@ -22,7 +22,7 @@ pub(crate) struct Scene {
     colliders: Vec<At>,
     goals: Vec<Geometry>,
     pins: Option<At>,
-    /// By name, as a graph file has them.
+    /// Params by name, as in a graph file.
     params: BTreeMap<String, String>,
     fps: f64,
 }
@@ -79,13 +79,13 @@ impl Scene {
         Self { fps, ..self }
     }
 
-    /// With this param, in place of what it was.
+    /// Replaces a param.
     pub(crate) fn set(mut self, name: &str, value: impl Display) -> Self {
         self.params.insert(name.into(), value.to_string());
         self
     }
 
-    /// The height below which no particle may be; `None` without a ground.
+    /// The lowest allowed height of particles; `None` without a ground.
     pub(crate) fn kept_from_ground(&self) -> Option<f64> {
         let number = |name: &str, default: f64| self.params.get(name).map_or(default, |value| value.parse().unwrap());
         let there = self.params.get("ground").is_some_and(|value| value == "true");
@@ -116,7 +116,7 @@ impl Scene {
         )
     }
 
-    /// The first fault that such a graph has before anything is cooked.
+    /// The first fault of such a graph before cooking.
     pub(crate) fn fault(&self) -> Option<String> {
         fault(&self.nodes(), "soft")
     }

@@ -9,12 +9,13 @@ pub(crate) fn block(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
     cut(cells, side, low, |_| 0)
 }
 
-/// The same, each cube cut as the mirror image of its neighbours, so that a block with an even number of cells is symmetric.
+/// The same, each cube cut as the mirror image of its neighbours, so that a block with an even number of cells is
+/// symmetric.
 pub(crate) fn mirrored(cells: [u32; 3], side: f64, low: [f64; 3]) -> Component {
     cut(cells, side, low, |[x, y, z]| (x & 1) + 2 * (y & 1) + 4 * (z & 1))
 }
 
-/// Which axes each cube is turned round along, a bit each.
+/// The axes along which each cube is mirrored, one bit for each.
 fn cut(cells: [u32; 3], side: f64, low: [f64; 3], turned: impl Fn([u32; 3]) -> u32) -> Component {
     let counts = cells.map(|n| n + 1);
     let (mut points, mut tets) = (Vec::new(), Vec::new());

@@ -1,11 +1,12 @@
-//! How many curves jump from a frame to the next in a smooth wind: the figures of Curve_Wind_Collision's `coherence`.
+//! How many curves jump between consecutive frames in a smooth wind: the figures for Curve_Wind_Collision's
+//! `coherence`.
 
 use engine::geometry::Geometry;
 use numerics::vector::{self, Vec3};
 
 use crate::cooked::{BEAR, cook};
 
-/// Of all curves and frames, the share that moves by more than a quarter of its length from the frame before.
+/// The fraction of curves, over all frames, that move by more than a quarter of their length since the frame before.
 fn jumps(frames: &[Geometry]) -> f64 {
     let (mut jumps, mut all) = (0, 0);
     for (before, after) in frames.iter().zip(&frames[1..]) {
@@ -50,6 +51,6 @@ fn coherent_collision_adds_few_jumps_to_those_of_the_wind() {
         100.0 * plain,
         100.0 * coherent
     );
-    assert!((0.004..0.0055).contains(&wind), "the wind alone is as smooth as it was: {wind}");
+    assert!((0.004..0.0055).contains(&wind), "the smoothness of the wind alone has changed: {wind}");
     assert!(coherent < 0.007 && coherent < 0.7 * plain, "{coherent} against {plain}");
 }

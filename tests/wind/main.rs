@@ -1,5 +1,5 @@
-//! The wind chain: how accurately it meets its laws, extreme scenes, and the figures of docs/wind.md for the bear. Everything
-//! checked is printed too: `cargo test --test wind -- --nocapture`.
+//! The wind chain: how accurately it meets its laws, extreme scenes, and the figures of docs/wind.md for the bear. All
+//! checked figures are printed: `cargo test --test wind -- --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 

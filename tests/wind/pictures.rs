@@ -27,7 +27,7 @@ fn figure_1_crosses_the_skin_only_without_collisions_and_is_calm_in_the_lee() {
     assert!(a > segments / 10 && b as f64 <= unfreed[0] && c as f64 <= unfreed[1]);
     assert!((0.3..0.6).contains(&sheltered), "{sheltered}");
 
-    // The calm of c: how far wind moves tips, by shelter.
+    // Mean displacement of tips by wind, exposed and in the lee.
     let moved = |output: usize| -> [f64; 2] {
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
         for (cvs, share) in part(5).runs().ranges().zip(shares) {

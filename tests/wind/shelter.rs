@@ -1,10 +1,10 @@
-//! How shelter changes from frame to frame, as the wind turns slowly: the figures of Curve_Wind_Shielding.
+//! Changes of shelter between frames as the wind turns slowly: the figures for Curve_Wind_Shielding.
 
 use engine::geometry::SHIELDED;
 
 use crate::cooked::{BEAR, cook};
 
-/// The share of each curve at each of `frames` degrees.
+/// `shielded` of each curve at each of `frames` degrees.
 fn turning(smooth: f32, frames: i64) -> Vec<Vec<f32>> {
     let lee = format!(
         r#"{BEAR} "lee": {{
@@ -17,8 +17,8 @@ fn turning(smooth: f32, frames: i64) -> Vec<Vec<f32>> {
     frames.iter().map(|frame| frame.curves().unwrap().get(SHIELDED).unwrap().to_vec()).collect()
 }
 
-/// The largest change of a curve's share from a frame to the next, the share of curves that change by more than a tenth
-/// in a frame, and the mean share.
+/// The largest change of a curve's `shielded` between consecutive frames, the fraction of curves that change by more
+/// than a tenth in a frame, and the mean of `shielded`.
 fn changes(frames: &[Vec<f32>]) -> [f64; 3] {
     let (mut largest, mut jumps, mut pairs) = (0.0_f64, 0, 0);
     for (before, after) in frames.iter().zip(&frames[1..]) {

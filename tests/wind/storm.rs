@@ -1,4 +1,5 @@
-//! The whole chain on a skin that moves and deforms, as it is written: no curve goes through the skin, lengths are kept.
+//! The whole chain on a moving and deforming skin, checked on written positions: no curve crosses the skin, lengths are
+//! kept.
 //!
 //! Crossings are found by parry's ray casts in f64, which share no code with the kernel.
 
@@ -34,7 +35,7 @@ pub(crate) fn crossings(curves: &Component, skin: &TriMesh) -> usize {
     count
 }
 
-/// Segments both of whose ends are in the body.
+/// Number of segments with both ends inside the body.
 fn inside(curves: &Component, skin: &TriMesh) -> usize {
     let mut count = 0;
     for cvs in curves.runs().ranges() {
@@ -44,7 +45,8 @@ fn inside(curves: &Component, skin: &TriMesh) -> usize {
     count
 }
 
-/// The largest change of a segment's length against rest, as a share of the curve's and beyond what f32 positions hold.
+/// The largest change of a segment's length relative to rest, beyond the rounding of f32 positions, relative to the
+/// curve's length.
 fn length_error(curves: &Component, rest: &Component) -> f64 {
     let mut worst = 0.0_f64;
     for cvs in curves.runs().ranges() {

@@ -1,4 +1,4 @@
-//! Goals, pins and coupling springs; measured on the node.
+//! Goals, pins and coupling springs, measured on the node.
 
 use engine::time::Frame as Time;
 
@@ -11,7 +11,7 @@ fn flat(body: &engine::geometry::Component) -> engine::geometry::Component {
     shapes::changed(body, |_, [x, y, z]| [x * wider, y * 0.5, z * wider])
 }
 
-/// After the goal was reached, became the rest shape and was released: the largest strain of a spring relative to its
+/// After a goal was reached, became the rest shape and was released: the largest strain of a spring relative to its
 /// length in the goal, with the rounding of stored positions, and the elastic energy left ÷ E·V.
 fn released() -> ([f64; 2], f64) {
     let (modulus, side) = (1e4, 0.3_f64);
@@ -28,19 +28,19 @@ fn released() -> ([f64; 2], f64) {
     (worst, cooked.metric("elastic").last().unwrap() / (modulus * side * side * side))
 }
 
-/// A goal is the only force on a block: the number of surface particles that move, and the number of all.
+/// A goal on the interior is the only force on a block: the number of surface particles that move, and of all.
 fn pulled_surface() -> (usize, usize) {
     let body = shapes::block([3; 3], 0.1, [0.0; 3]);
     let scene = Scene::of(body.clone()).goal(flat(&body), 2.0, 1e4, 24.0).set("gravity", "[0, 0, 0]");
     let cooked = scene.set("stiffness", 0).set("volume", 0).run(6);
-    let way = |from: &[V], to: &[V]| from.iter().zip(to).map(|(a, b)| distance(a, b)).collect::<Vec<_>>();
+    let moved = |from: &[V], to: &[V]| from.iter().zip(to).map(|(a, b)| distance(a, b)).collect::<Vec<_>>();
     let skin = |place: usize| crate::measure::points(cooked.surface[place].as_ref().unwrap());
-    assert!(largest(way(&cooked.at(0), &cooked.at(5))) > 0.01, "what is inside heads for the goal");
-    let surface = way(&skin(0), &skin(5));
-    (surface.iter().filter(|way| **way > 0.0).count(), surface.len())
+    assert!(largest(moved(&cooked.at(0), &cooked.at(5))) > 0.01, "the interior moves towards the goal");
+    let surface = moved(&skin(0), &skin(5));
+    (surface.iter().filter(|moved| **moved > 0.0).count(), surface.len())
 }
 
-/// How often a pinned particle is not exactly where the animation puts it, and how often it could be.
+/// Number of pinned particles, over all frames, that are not exactly at their animated positions, and of all.
 fn off_pins() -> [usize; 2] {
     let body = shapes::block([4, 2, 2], 0.1, [0.0; 3]);
     let held: Vec<usize> = (0..body.point_count()).filter(|i| body.positions()[*i][0] == 0.0).collect();
@@ -62,14 +62,14 @@ fn off_pins() -> [usize; 2] {
         let found = cooked.at(frame);
         for particle in &near {
             let place = body.positions()[*particle];
-            let way = |k: usize| f64::from(to[k]) + (f64::from(place[k]) - f64::from(from[k]));
-            off += usize::from((0..3).any(|k| found[*particle][k] != f64::from(way(k) as f32)));
+            let moved = |k: usize| f64::from(to[k]) + (f64::from(place[k]) - f64::from(from[k]));
+            off += usize::from((0..3).any(|k| found[*particle][k] != f64::from(moved(k) as f32)));
         }
     }
     [off, 24 * near.len()]
 }
 
-/// The largest length ÷ rest length of the coupling springs between a cube that is pinned and one that hangs from it.
+/// The largest length ÷ rest length of the coupling springs between a pinned cube and one that hangs from it.
 fn joined() -> f64 {
     let (lower, upper) = (shapes::block([2; 3], 0.05, [0.0; 3]), shapes::block([2; 3], 0.05, [0.0, 0.102, 0.0]));
     let top: Vec<[f32; 3]> = upper.positions().iter().filter(|p| p[1] > 0.2).copied().collect();
@@ -92,10 +92,14 @@ pub(super) fn figures() -> Vec<Figure> {
     let (strain, energy) = released();
     let (pulled, [off, pinned]) = (pulled_surface(), off_pins());
     vec![
-        Figure::stored("A goal reached, reset and let go: strain off its shape", [strain], 1e-6, ""),
+        Figure::stored("A goal that became the rest shape and was released: strain relative to it", [strain], 1e-6, ""),
         Figure::error("energy left in its springs ÷ E·V", energy, 1e-12, ""),
-        Figure::never("surface particles that a goal moves, without springs", pulled.0, pulled.1),
-        Figure::never("pinned particles not, to the bit, where the animation puts them", off, pinned),
-        Figure::within("Springs that join two bodies, the lower hanging: longest ÷ at rest", &[joined()], [1.0, 1.1]),
+        Figure::never("surface particles moved by a goal on the interior, without springs", pulled.0, pulled.1),
+        Figure::never("pinned particles that differ in any bit from the animation", off, pinned),
+        Figure::within(
+            "Coupling springs that carry a hanging body: largest length ÷ rest length",
+            &[joined()],
+            [1.0, 1.1],
+        ),
     ]
 }

@@ -1,4 +1,4 @@
-//! Conservation of momentum and energy, and free fall; measured on the solver, as the node gives no velocities.
+//! Conservation of momentum and energy, and free fall, measured on the solver, since the node outputs no velocities.
 
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ fn angular(body: &SoftBody, state: &State) -> V {
     each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, DVec3::from(*x).cross(&DVec3::from(*v)).into(), mass))
 }
 
-/// A block that turns, stretches and moves.
+/// A block that rotates, stretches and moves.
 fn thrown(damping: f64) -> (SoftBody, State) {
     let body = block([5, 4, 3], 0.1, 1e5, damping);
     let mut state = State::at_rest(&body);
@@ -30,7 +30,7 @@ fn thrown(damping: f64) -> (SoftBody, State) {
     (body, state)
 }
 
-/// The share of its momentum that it gains or loses in 200 steps.
+/// The relative change of its momentum in 200 steps.
 fn lost_momentum(integrator: Integrator, volume: f64) -> f64 {
     let (body, mut state) = thrown(0.0);
     let before = momentum(&body, &state);
@@ -38,7 +38,7 @@ fn lost_momentum(integrator: Integrator, volume: f64) -> f64 {
     distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
-/// The same of two blocks that are joined and pull at each other.
+/// The same for two coupled blocks that pull at each other.
 fn lost_by_a_pair() -> f64 {
     let one = shapes::block([2; 3], 0.1, [0.0; 3]);
     let mut points: Vec<V> = one.positions().iter().map(|p| p.map(f64::from)).collect();
@@ -56,8 +56,8 @@ fn lost_by_a_pair() -> f64 {
     distance(&momentum(&body, &state), &before) / DVec3::from(before).norm()
 }
 
-/// What a block that turns about z loses of its angular momentum in so many steps, so many of them a turn; and how many
-/// of them were implicit Euler, which loses two thirds.
+/// Relative loss of angular momentum of a block that rotates about z, over a number of steps with a number of steps per
+/// turn; and how many of them were implicit Euler, which loses two thirds.
 fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
     let body = block([4, 3, 3], 0.1, modulus, 0.0);
     let mut state = State::at_rest(&body);
@@ -98,7 +98,7 @@ fn fall(integrator: Integrator, fallen: f64) -> f64 {
 
 pub(super) fn figures(effort: Effort) -> Vec<Figure> {
     let accurate = Integrator::Accurate { tolerance: 1e-3 };
-    let ways = [(Integrator::Default, 0.0), (Integrator::Default, 1.0), (Integrator::Euler, 1.0), (accurate, 1.0)];
+    let cases = [(Integrator::Default, 0.0), (Integrator::Default, 1.0), (Integrator::Euler, 1.0), (accurate, 1.0)];
     let moduli = effort.choose(&[1e5][..], &[1e5, 1e6, 1e8]);
     let turns: Vec<(f64, u32)> = moduli.iter().map(|modulus| lost_turning(*modulus, 100.0, 1000)).collect();
     let finer = lost_turning(1e5, 200.0, 2000);
@@ -113,32 +113,32 @@ pub(super) fn figures(effort: Effort) -> Vec<Figure> {
     vec![
         Figure::error(
             "A free body: momentum lost in 200 steps",
-            largest(ways.map(|(integrator, volume)| lost_momentum(integrator, volume))),
+            largest(cases.map(|(integrator, volume)| lost_momentum(integrator, volume))),
             1e-10,
             "",
         ),
-        Figure::error("of two that are joined", lost_by_a_pair(), 1e-9, ""),
+        Figure::error("the same for two coupled bodies", lost_by_a_pair(), 1e-9, ""),
         Figure::error(
-            "angular momentum lost in 1,000 steps, 100 a turn, E 1e5 to 1e8 Pa",
+            "angular momentum lost in 1,000 steps, 100 per turn, E 1e5 to 1e8 Pa",
             largest(turns.iter().map(|turn| turn.0)),
             2e-3,
             "",
         )
         .has_coarse_form(effort),
-        Figure::within("it falls with the step: order", &[libm::log2(turns[0].0 / finer.0)], [1.8, 3.2]),
+        Figure::within("order at which that loss falls with the step", &[libm::log2(turns[0].0 / finer.0)], [1.8, 3.2]),
         Figure::never(
-            "steps of those that fell back to `euler`",
+            "number of those steps that fell back to `euler`",
             turns.iter().map(|turn| turn.1 as usize).sum(),
             1000 * turns.len(),
         )
         .has_coarse_form(effort),
-        Figure::error("energy over its start, undriven, with and without damping", largest(gains), 1e-6, ""),
+        Figure::error("growth of energy without external driving, with and without damping", largest(gains), 1e-6, ""),
         Figure::error(
-            "free fall over a second: from the parabola",
+            "free fall over a second: distance from the parabola",
             largest([fall(Integrator::Default, 0.5), fall(accurate, 0.5)]),
             1e-9,
             " m",
         ),
-        Figure::error("`euler`: from its own sum", euler, 1e-9, " m"),
+        Figure::error("the same with `euler`: distance from its exact sum", euler, 1e-9, " m"),
     ]
 }

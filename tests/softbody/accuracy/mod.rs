@@ -1,8 +1,9 @@
-//! How accurately each law of soft bodies is met, with the limit it has to meet: one table, printed, checked, and compared
-//! with docs/softbody.md.
+//! How accurately each law of soft bodies is met, with its limit: one table, printed, checked, and compared with
+//! docs/softbody.md.
 //!
-//! Laws are closed forms, or computed in f64 by code that shares nothing with the solver. They are measured on what the node
-//! gives, stored in f32; momentum, energy and single springs, which the node does not show, on the solver's state.
+//! Laws are closed forms, or computed in f64 by code that shares nothing with the solver. They are measured on the
+//! node's output, stored in f32; momentum, energy and single springs, which the node does not output, on the solver's
+//! state.
 
 mod asked;
 mod kept;
@@ -36,7 +37,7 @@ pub(crate) fn figures(effort: Effort) -> Vec<Figure> {
     figures.into_iter().flatten().collect()
 }
 
-/// No gravity, no volume: springs alone.
+/// No gravity, no volume preservation: only springs.
 const BARE: SolverFrame<'static> = SolverFrame {
     seconds: 1.0 / 24.0,
     gravity: [0.0; 3],

@@ -1,4 +1,4 @@
-//! Bodies that came to rest, as the node gives them, against the balance of the same springs.
+//! Bodies at rest in the node's output, compared with the equilibrium of the same springs.
 
 use super::*;
 use crate::scene::Scene;
@@ -24,7 +24,8 @@ fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
     b
 }
 
-/// Where weight and springs balance, by Newton's method from nearby: each particle's weight, those that are held.
+/// The equilibrium of weight and springs, by Newton's method from a nearby state; given each particle's weight and the
+/// particles that are held.
 fn balance(springs: &[shapes::Spring], weights: &[V], held: &[bool], near: &[V]) -> Vec<V> {
     let free: Vec<usize> = (0..near.len()).filter(|i| !held[*i]).collect();
     let row = |i: usize| free.binary_search(&i).ok();
@@ -61,10 +62,11 @@ fn balance(springs: &[shapes::Spring], weights: &[V], held: &[bool], near: &[V])
             return x;
         }
     }
-    panic!("the springs' balance was not found");
+    panic!("the equilibrium was not found");
 }
 
-/// How far a beam of 1 m, held at one end, is from its springs' balance, and what storing it takes.
+/// Distance of a beam of 1 m, held at one end, from the equilibrium of its springs, and the rounding of stored
+/// positions.
 fn cantilever() -> [f64; 2] {
     let beam = shapes::block([8, 2, 2], 0.125, [0.0; 3]);
     let root: Vec<[f32; 3]> = beam.positions().iter().filter(|p| p[0] == 0.0).copied().collect();
@@ -102,7 +104,7 @@ fn modulus(cells: u32) -> f64 {
     let cooked = scene.set("stiffness", 1e5).set("density", 100).set("damping", 0.05).cook([48], 2);
     let points = cooked.last();
     let middle = |x: f32| mean(&end(x).iter().map(|i| points[*i]).collect::<Vec<_>>())[0];
-    // Away from the ends that are held; F = 2U ÷ Δ on 1 m².
+    // Away from the held ends; F = 2U ÷ Δ on 1 m².
     let strain = middle(3.0) - middle(2.0) - 1.0;
     2.0 * cooked.metric("elastic").last().unwrap() / f64::from(PULL) / strain / 1e5
 }
@@ -112,9 +114,13 @@ pub(super) fn figures(effort: Effort) -> Vec<Figure> {
     let moduli: Vec<f64> = cells.iter().map(|cells| modulus(*cells)).collect();
     let apart = largest(moduli.iter().flat_map(|a| moduli.iter().map(move |b| a / b - 1.0)));
     vec![
-        Figure::stored("A beam that came to rest: from the balance of its springs", [cantilever()], 1e-6, " L"),
-        Figure::within("modulus of a pulled bar ÷ `stiffness`, 4 to 10 cells across", &moduli, [0.88, 1.12])
-            .has_coarse_form(effort),
-        Figure::error("between those resolutions", apart, 3e-2, "").has_coarse_form(effort),
+        Figure::stored("A beam at rest: distance from the equilibrium of its springs", [cantilever()], 1e-6, " L"),
+        Figure::within(
+            "effective modulus of a stretched bar ÷ `stiffness`, 4 to 10 cells across",
+            &moduli,
+            [0.88, 1.12],
+        )
+        .has_coarse_form(effort),
+        Figure::error("its variation between those resolutions", apart, 3e-2, "").has_coarse_form(effort),
     ]
 }

@@ -6,7 +6,7 @@ use bodies::mass_spring::Integrator;
 
 use super::*;
 
-/// Of the first stretch over the spring's length.
+/// Initial stretch ÷ the spring's length.
 const STRETCH: f64 = 0.1;
 
 /// Two particles of `mass`, joined by a stretched spring of length 1.
@@ -22,7 +22,7 @@ fn stretch(state: &State) -> f64 {
     state.positions[1][0] - state.positions[0][0] - 1.0
 }
 
-/// The largest error over one period of `steps` steps, ÷ the first stretch.
+/// The largest error over one period of `steps` steps, ÷ the initial stretch.
 fn error(mass: f64, stiffness: f64, zeta: f64, steps: u32, integrator: Integrator) -> f64 {
     let reduced = 0.5 * mass;
     let omega = (stiffness / reduced).sqrt();
@@ -69,8 +69,8 @@ fn beyond_start() -> f64 {
     largest(all.flat_map(|seconds| [Integrator::Default, Integrator::Euler].map(|how| one(seconds, how))))
 }
 
-/// The largest error over the slowest period of eight particles on a string, held at one end, of 1 kg and `light` in
-/// turn; ÷ the largest of the mode that swings alone.
+/// The largest error over the slowest period of a chain of eight particles, held at one end, of alternately 1 kg and
+/// `light`, ÷ the amplitude of the slowest mode, which alone is excited.
 fn chain(light: f64) -> f64 {
     const COUNT: usize = 8;
     let masses: [f64; COUNT] = std::array::from_fn(|i| if i % 2 == 0 { light } else { 1.0 });
@@ -111,14 +111,24 @@ fn chain(light: f64) -> f64 {
 pub(super) fn figures() -> Vec<Figure> {
     vec![
         Figure::error(
-            "One spring over a period of 200 steps, k 1e-6 to 1e12 N/m, m 1e-6 to 1e6 kg",
+            "One spring over a period of 200 steps: error, k 1e-6 to 1e12 N/m, m 1e-6 to 1e6 kg",
             every_spring(),
             2e-4,
             "",
         ),
-        Figure::within("its error falls with the step: order", &orders(Integrator::Default), [1.9, 2.1]),
-        Figure::within("`euler`: order", &orders(Integrator::Euler), [0.9, 1.1]),
-        Figure::error("energy and stretch over their start, steps of 1e-3 to 1e9 s", beyond_start(), 1e-6, ""),
-        Figure::error("a chain of masses 1e9 apart, over a period of its slowest swing", chain(1e-9), 1e-3, ""),
+        Figure::within("its order of convergence", &orders(Integrator::Default), [1.9, 2.1]),
+        Figure::within("its order with `euler`", &orders(Integrator::Euler), [0.9, 1.1]),
+        Figure::error(
+            "growth of energy and stretch beyond their initial values, steps of 1e-3 to 1e9 s",
+            beyond_start(),
+            1e-6,
+            "",
+        ),
+        Figure::error(
+            "a chain with a mass ratio of 1e9: error over one period of its slowest mode",
+            chain(1e-9),
+            1e-3,
+            "",
+        ),
     ]
 }

@@ -11,7 +11,7 @@ const G: f64 = 9.81;
 const FPS: f64 = 24.0;
 const THICKNESS: f64 = 1e-3;
 
-/// A block of 0.4 m that falls 0.2 m, at E, `damping` and `volume`; at frames 1, 240 and 241.
+/// A block of 0.4 m that falls 0.2 m, with this E, `damping` and `volume`, at frames 1, 240 and 241.
 fn dropped(modulus: f64, damping: f64, volume: f64) -> Cooked {
     let block = shapes::block([4; 3], 0.1, [0.0, 0.2, 0.0]);
     let scene = Scene::of(block).set("stiffness", modulus).set("damping", damping).set("volume", volume);
@@ -20,8 +20,8 @@ fn dropped(modulus: f64, damping: f64, volume: f64) -> Cooked {
     cooked
 }
 
-/// How far the middle of a block on the ground is from where its weight presses it, as a share of its height: mean of
-/// the column's sag is ρgh²/3E, and its foot is kept off the ground by `thickness`.
+/// Relative error of the height of the middle of a block on the ground: the mean sag of the column is ρgh²/3E, and
+/// `thickness` keeps its base off the ground.
 fn height_error() -> f64 {
     let modulus = 1e6;
     let height = mean(&dropped(modulus, 2e-3, 1.0).last())[1];
@@ -38,8 +38,8 @@ fn speed_at_rest() -> f64 {
     largest([fastest(5e4, 0.0), fastest(5e4, 1.0), fastest(1e7, 1.0)])
 }
 
-/// A block on a slope of 30° with friction μ: how far it moves along it in a second, ÷ its length, and its acceleration
-/// by g(sin − μ cos).
+/// A block on a slope of 30° with friction μ: its displacement along the slope in a second ÷ its length, and the
+/// relative error of its acceleration g(sin 30° − μ cos 30°).
 fn on_slope(friction: f64) -> [f64; 2] {
     let (sine, cosine) = (0.5, 0.75_f64.sqrt());
     let block = shapes::block([4, 2, 4], 0.1, [0.0, 0.9 * THICKNESS, 0.0]);
@@ -55,8 +55,8 @@ fn pressed(cells: u32) -> Cooked {
     let height = 0.1 * f64::from(cells);
     let block = shapes::mirrored([6, cells, 6], 0.1, [0.0, THICKNESS, 0.0]);
     let upper = move |frame: Time| {
-        let way = 0.5 * height * ((frame.number() - 1.0) / 48.0).min(1.0);
-        let foot = height + 2.0 * THICKNESS - way;
+        let distance = 0.5 * height * ((frame.number() - 1.0) / 48.0).min(1.0);
+        let foot = height + 2.0 * THICKNESS - distance;
         shapes::cuboid([-0.5, foot, -0.5], [1.1, foot + 0.1, 1.1])
     };
     let scene = Scene::of(block).collider(|_| shapes::cuboid([-0.5, -0.1, -0.5], [1.1, 0.0, 1.1])).collider(upper);
@@ -66,7 +66,7 @@ fn pressed(cells: u32) -> Cooked {
     cooked
 }
 
-/// How far the middle of its width is from that of its foot and how far its widths differ, ÷ its width.
+/// Distance of the centre of its bulge from that of its base, and difference of its widths, ÷ its width.
 fn askew(points: &[V]) -> f64 {
     let ends = |axis: usize| {
         let along = || points.iter().map(|p| p[axis]);
@@ -79,13 +79,13 @@ fn askew(points: &[V]) -> f64 {
 
 const SIDES: usize = 32;
 
-/// A pin that rolls on by ten thicknesses a frame, 1 cm into the dough.
+/// A pin that rolls ten thicknesses per frame, 1 cm deep in the dough.
 fn pin(frame: Time) -> Geometry {
-    let way = (frame.number() - 1.0) * 10.0 * THICKNESS;
+    let distance = (frame.number() - 1.0) * 10.0 * THICKNESS;
     let (mut points, mut counts, mut corners) = (Vec::new(), vec![4; SIDES], Vec::new());
     for k in 0..SIDES {
-        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * k as f64 / SIDES as f64 - way / 0.05);
-        let place = |z: f64| [0.05 * cosine - 0.08 + way, 0.05 * sine + 0.1, z].map(|x| x as f32);
+        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * k as f64 / SIDES as f64 - distance / 0.05);
+        let place = |z: f64| [0.05 * cosine - 0.08 + distance, 0.05 * sine + 0.1, z].map(|x| x as f32);
         points.extend([place(-0.09), place(0.21)]);
         let next = (k + 1) % SIDES;
         corners.extend([2 * k, 2 * next, 2 * next + 1, 2 * k + 1]);
@@ -97,7 +97,7 @@ fn pin(frame: Time) -> Geometry {
     Component::mesh(counts, corners.iter().map(|corner| *corner as u32).collect(), points).unwrap().into()
 }
 
-/// Whether a point is within the pin: behind all of its sides, by more than what storing it takes.
+/// Whether a point is inside the pin: behind all of its sides by more than the rounding of stored positions.
 fn within(points: &[V], p: &V) -> bool {
     let depth = |k: usize| {
         let (a, b) = (points[2 * k], points[2 * ((k + 1) % SIDES)]);
@@ -108,8 +108,8 @@ fn within(points: &[V], p: &V) -> bool {
     (-0.09..0.21).contains(&p[2]) && (0..SIDES).all(|k| depth(k) > 1e-7)
 }
 
-/// Dough under the pin: the deepest overlap it publishes ÷ `thickness`, and how many of its particles are within the pin
-/// or below the ground, of how many.
+/// Dough under the pin: the published deepest overlap ÷ `thickness`, how many of its particles are inside the pin or
+/// below the ground, and of how many.
 fn rolled(modulus: f64) -> (f64, usize, usize) {
     let dough = shapes::block([12, 3, 6], 0.02, [0.0; 3]);
     let scene = Scene::of(dough).collider(pin).set("stiffness", modulus).set("damping", 0.02).set("friction", 0.3);
@@ -134,28 +134,28 @@ pub(super) fn figures() -> Vec<Figure> {
     let rolled = [2e4, 5e3].map(rolled);
     let overlap = largest(rolled.iter().map(|found| found.0).chain([deepest(&cube), deepest(&flat)]));
     vec![
-        Figure::error("A block dropped on the ground: height of its middle", height_error(), 1e-2, " L"),
-        Figure::error("its fastest particle after 240 frames", speed_at_rest(), 1e-4, " g·dt"),
-        Figure::error("on 30° with μ of 0.7 and more: creep in a second", largest(sticks), 1e-4, " L"),
-        Figure::error("with μ of 0.5 and less: acceleration by g(sin − μ cos)", largest(slides), 1e-2, ""),
+        Figure::error("A block dropped on the ground: error of the height of its middle", height_error(), 1e-2, " L"),
+        Figure::error("speed of its fastest particle after 240 frames", speed_at_rest(), 1e-4, " g·dt"),
+        Figure::error("on a slope of 30° with μ ≥ 0.7: creep in a second", largest(sticks), 1e-4, " L"),
+        Figure::error("with μ ≤ 0.5: error of the acceleration g(sin 30° − μ cos 30°)", largest(slides), 1e-2, ""),
         Figure::error(
-            "Between plates at half its height: volume of a cube, of a block half as high",
+            "Pressed to half its height between plates: volume error of a cube and of a block half as high",
             largest([volume(&cube), volume(&flat)]),
             2e-2,
             "",
         ),
-        Figure::error("how far the block's bulge is from symmetry", askew(&flat.last()), 2e-2, " L"),
-        // Springs pressed to half their length push sideways more than those beside them hold: with all integrators.
-        Figure::error("and the cube's, which gives way to one side", askew(&cube.last()), 2e-2, " L").missed(),
-        Figure::never("tets inside out there", turned(&cube) + turned(&flat), 6 * 6 * 6 * (6 + 3)),
+        Figure::error("asymmetry of the block's bulge", askew(&flat.last()), 2e-2, " L"),
+        // Springs pressed to half their length push sideways more than their neighbours resist, with every integrator.
+        Figure::error("asymmetry of the cube, which buckles to one side", askew(&cube.last()), 2e-2, " L").missed(),
+        Figure::never("inverted tets in both", turned(&cube) + turned(&flat), 6 * 6 * 6 * (6 + 3)),
         Figure::error(
-            "Under those plates, and a rolling pin that moves 10 `thickness` a frame: `deepest_overlap`",
+            "Under those plates, and under a pin that rolls 10 `thickness` per frame: `deepest_overlap`",
             overlap,
             1.0,
             " `thickness`",
         ),
         Figure::never(
-            "particles within the pin or the ground",
+            "particles inside the pin or the ground",
             rolled.iter().map(|found| found.1).sum(),
             rolled.iter().map(|found| found.2).sum(),
         ),

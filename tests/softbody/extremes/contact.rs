@@ -1,8 +1,8 @@
-//! Plates that leave no room, hands that go through in a frame, friction and gravity beyond reason.
+//! Plates that leave no room, colliders that pass through within a frame, extreme friction and gravity.
 
 use super::*;
 
-/// A plate that comes down to the ground, and `below` it.
+/// A plate that moves down to the ground, or `below` it.
 fn crushed(below: f64) -> Scene {
     let plate = move |frame: Frame| {
         let foot = 0.11 - (0.11 + below) * ((frame.number() - 1.0) / 3.0).min(1.0);
@@ -11,7 +11,7 @@ fn crushed(below: f64) -> Scene {
     grounded(cube(0.002)).collider(plate)
 }
 
-/// A box that goes through the body in a frame.
+/// A box that passes through the body within a frame.
 fn slapped() -> Scene {
     let hand = |frame: Frame| {
         let x = (frame.number() - 1.5).clamp(-0.5, 0.5);
@@ -20,7 +20,7 @@ fn slapped() -> Scene {
     Scene::of(cube(0.02)).collider(hand)
 }
 
-/// A sheet without thickness that goes up through the body in a frame.
+/// A sheet without thickness that moves up through the body within a frame.
 fn swept() -> Scene {
     let sheet = |frame: Frame| {
         let y = (frame.number() - 2.0).clamp(-0.5, 0.5) as f32;
@@ -31,7 +31,7 @@ fn swept() -> Scene {
 }
 
 #[test]
-fn overlap_with_plates_that_leave_no_room_and_hands_that_pass_through_is_prevented_or_published() {
+fn overlap_with_extreme_colliders_is_prevented_or_published() {
     let still = |low: V, high: V| move |_: Frame| cuboid(low, high);
     let flipping = |frame: Frame| {
         let side = if frame.floor_number() % 2 == 0 { -1.0 } else { 1.0 };
@@ -39,7 +39,7 @@ fn overlap_with_plates_that_leave_no_room_and_hands_that_pass_through_is_prevent
     };
     let cooked = hold([
         ("pressed to nothing", crushed(0.0)),
-        ("and beyond", crushed(0.05)),
+        ("pressed below the ground", crushed(0.05)),
         ("pressed to nothing, E 1e9", crushed(0.0).set("stiffness", "1e9")),
         ("pressed to nothing, thin", crushed(0.0).set("thickness", "1e-5")),
         ("a hand through it in a frame", slapped()),
@@ -53,7 +53,7 @@ fn overlap_with_plates_that_leave_no_room_and_hands_that_pass_through_is_prevent
         ("two colliders in one place", grounded(cube(0.0)).collider(crushed_by).collider(crushed_by)),
         ("thicker than the body", grounded(cube(0.002)).set("thickness", 1).set("self_collision", true)),
     ]);
-    assert!(cooked[1].most("deepest_overlap") >= 1e-3, "there is no room, and it is said");
+    assert!(cooked[1].most("deepest_overlap") >= 1e-3, "there is no room, which is published");
 }
 
 fn crushed_by(_: Frame) -> Geometry {

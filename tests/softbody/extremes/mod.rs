@@ -1,9 +1,9 @@
-//! Soft bodies at their extremes: absurd numbers, nothing at all, springs, pins and goals that no body should have, hands
-//! that go through in a frame.
+//! Soft bodies at extremes: absurd numbers, empty inputs, unreasonable springs, pins and goals, colliders that pass
+//! through within a frame.
 //!
-//! Each row of a table is a scene, and is held to the same with every integrator: what comes out is finite and the same bits
-//! on one thread and on seven, a frame takes a bounded number of iterations, what could not be met is in the metrics (tets
-//! inside out, volume, what is nearer to the ground than asked); or the scene is refused by a message, never by a panic.
+//! Each row of a table is a scene. With every integrator, its result is finite and has the same bits on one thread and
+//! on seven, a frame takes a bounded number of iterations, and violations are published as metrics (inverted tets,
+//! volume, distances from the ground below `thickness`); or the scene is refused with a message, never with a panic.
 
 mod contact;
 mod empty;
@@ -23,7 +23,8 @@ type V = [f64; 3];
 
 /// Frames of every scene.
 const FRAMES: i64 = 4;
-/// Iterations that a frame may take: linear, Newton's, and steps. The solver cuts a frame into 256 steps at most.
+/// Largest number of linear iterations, Newton iterations and steps in a frame. The solver divides a frame into at most
+/// 256 steps.
 const MOST: [(&str, f64); 3] = [("cg", 1e6), ("newton", 1e4), ("substeps_used", 256.0)];
 const INTEGRATORS: [&str; 3] = ["default", "euler", "accurate"];
 
@@ -32,7 +33,7 @@ fn cube(height: f64) -> Component {
     block([2; 3], 0.05, [0.0, height, 0.0])
 }
 
-/// Holds the node to what the module says, in each of these scenes; gives what the default integrator made.
+/// Checks the guarantees of this module for each of these scenes; returns the results of the default integrator.
 fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
     let (mut held, mut broken) = (Vec::new(), Vec::new());
     for (what, scene) in rows {
@@ -53,7 +54,7 @@ fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
     held
 }
 
-/// Holds the node to a refusal whose message has these words, for each of these scenes.
+/// Checks that each of these scenes is refused with a message that contains these words.
 fn refused<const N: usize>(rows: [(&str, Scene, &str); N]) {
     for (what, scene, words) in rows {
         let cooked = scene.cook(1..=FRAMES, 2);
@@ -65,7 +66,7 @@ fn refused<const N: usize>(rows: [(&str, Scene, &str); N]) {
     }
 }
 
-/// What is not as the module says.
+/// Violations of the guarantees of this module.
 fn faults(scene: &Scene, cooked: &Cooked) -> Vec<String> {
     if !cooked.errors.is_empty() {
         return cooked.errors.iter().map(|(_, said)| said.clone()).collect();
@@ -99,13 +100,13 @@ fn faults(scene: &Scene, cooked: &Cooked) -> Vec<String> {
     faults
 }
 
-/// What storing points may move one by, metres.
+/// Rounding of stored positions, metres.
 fn rounding(points: &[V]) -> f64 {
     let largest = points.as_flattened().iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     largest * f64::from(f32::EPSILON)
 }
 
-/// Tets that lie the other way round than at rest by more than rounding; those that were flat are none.
+/// Tets that are inverted relative to their rest shape by more than rounding, without those that were flat.
 fn inverted(rest: &[V], points: &[V], tets: &[[u32; 4]]) -> usize {
     let volume = |at: &[V], tet: &[u32; 4]| crate::measure::volume(tet.map(|corner| at[corner as usize]));
     let size = |at: &[V], tet: &[u32; 4]| {
@@ -128,7 +129,7 @@ fn with(mut body: Component, name: &'static str, of: impl Fn(usize) -> f32) -> C
     body
 }
 
-/// On the ground, a thickness above it.
+/// The scene with a ground, one thickness below the body.
 fn grounded(body: impl Into<Geometry>) -> Scene {
     Scene::of(body).set("ground", true)
 }

@@ -4,7 +4,7 @@ use super::*;
 use conformance::{RangeEnd, range_ends};
 use engine::param::Value;
 
-/// A cube and a plate under it, at a scale; with `thickness` at that scale where `fits`.
+/// A cube and a plate under it, at a scale; with `thickness` at that scale if `fits`.
 fn scaled(scale: f64, fits: bool) -> Scene {
     let body = changed(&cube(0.002), |_, p| p.map(|x| x * scale));
     let plate = cuboid([-0.3, -0.1, -0.3], [0.4, 0.0, 0.4]);
@@ -17,7 +17,7 @@ fn scaled(scale: f64, fits: bool) -> Scene {
 
 #[test]
 fn scenes_of_any_scale_position_and_frame_rate_stay_finite() {
-    let away = |way: f64| Scene::of(changed(&cube(0.0), move |_, p| p.map(|x| x + way))).set("ground", true);
+    let away = |offset: f64| Scene::of(changed(&cube(0.0), move |_, p| p.map(|x| x + offset))).set("ground", true);
     let at = |fps: f64| grounded(cube(0.02)).at(fps);
     hold([
         ("1e-6", scaled(1e-6, true)),
@@ -54,7 +54,7 @@ fn nan_and_infinity_are_refused_by_name_in_every_input() {
         };
         let soft = r#"{ "value": 1000, "attribute": "soft" }"#;
         refused([
-            ("a place", Scene::of(tets("P", bad)), "`P` of point 7 of the tets is NaN or infinite"),
+            ("a position", Scene::of(tets("P", bad)), "`P` of point 7 of the tets is NaN or infinite"),
             (
                 "a mask",
                 Scene::of(tets("soft", bad)).set("stiffness", soft),
@@ -86,10 +86,10 @@ fn unsorted_duplicate_single_and_missing_keyframes_work_or_are_refused_by_name()
 }
 
 #[test]
-fn bodies_stay_sound_at_both_ends_of_every_range() {
+fn bodies_stay_finite_at_both_ends_of_every_range() {
     let node = convect::CATALOGUE.get("Softbody").unwrap();
     let goal = changed(&cube(0.002), |_, [x, y, z]| [1.2 * x, 0.7 * y, 1.2 * z]);
-    // Something for every param to act on.
+    // A scene in which every param has an effect.
     let busy = || {
         let top = cube(0.002).positions()[26];
         let scene = grounded(cube(0.002)).and(block([1; 3], 0.1, [0.0, 0.105, 0.0]));

@@ -1,4 +1,4 @@
-//! Springs, masses, shapes, pins and goals that no body should have.
+//! Extreme springs, masses, shapes, pins and goals.
 
 use super::*;
 
@@ -12,7 +12,7 @@ const LIGHT: &str = r#"{ "value": 1000, "attribute": "light" }"#;
 
 #[test]
 fn bodies_with_springs_and_masses_of_any_ratio_hold_together() {
-    // k of an edge of 3 cm is some hundredth of E.
+    // k of an edge of 3 cm is about a hundredth of E.
     let soft = |body: Component| with(body, "soft", |i| power(3, i, [-4.0, 14.0]));
     let light = |body: Component| with(body, "light", |i| if i % 2 == 0 { 1.0 } else { 1e-6 });
     let both = light(soft(cube(0.002)));
@@ -67,8 +67,9 @@ fn pinned_particles_follow_pins_that_hold_everything_or_tear_the_body() {
     let body = cube(0.0);
     let all: Vec<[f32; 3]> = body.positions().to_vec();
     let side: Vec<[f32; 3]> = all.iter().filter(|p| p[0] == 0.0).copied().collect();
-    let moved =
-        |pins: &[[f32; 3]], way: f32| -> Vec<[f32; 3]> { pins.iter().map(|[x, y, z]| [x + way, *y, *z]).collect() };
+    let moved = |pins: &[[f32; 3]], offset: f32| -> Vec<[f32; 3]> {
+        pins.iter().map(|[x, y, z]| [x + offset, *y, *z]).collect()
+    };
     let (there, back) = (side.clone(), side.clone());
     let jerk = move |frame: Frame| moved(&there, if (1.5..2.5).contains(&frame.number()) { 10.0 } else { 0.0 });
     let away = move |frame: Frame| moved(&back, 10.0 * (frame.number() as f32 - 1.0));
@@ -82,11 +83,11 @@ fn pinned_particles_follow_pins_that_hold_everything_or_tear_the_body() {
         ("pins that hold nothing", Scene::of(body.clone()).pins(0.0, |_| vec![[9.0; 3]])),
         ("no pins", Scene::of(body.clone()).pins(1.0, |_| vec![])),
     ]);
-    assert!(cooked[0].last() == cooked[0].at(0), "what is pinned stays");
-    for (place, way) in [(1, 10.0), (2, 0.0)] {
+    assert!(cooked[0].last() == cooked[0].at(0), "pinned particles stay");
+    for (place, offset) in [(1, 10.0), (2, 0.0)] {
         let held =
-            |at: &[V]| at.iter().zip(body.positions()).filter(|(_, rest)| rest[0] == 0.0).all(|(p, _)| p[0] == way);
-        assert!(held(&cooked[2].at(place)), "they are there, then back");
+            |at: &[V]| at.iter().zip(body.positions()).filter(|(_, rest)| rest[0] == 0.0).all(|(p, _)| p[0] == offset);
+        assert!(held(&cooked[2].at(place)), "they follow the pins there and back");
     }
 }
 
@@ -94,7 +95,7 @@ fn pinned_particles_follow_pins_that_hold_everything_or_tear_the_body() {
 fn bodies_move_towards_goals_that_are_unreachable_or_change_every_frame() {
     let body = cube(0.0);
     let far = changed(&body, |_, [x, y, z]| [x + 1e3, y, z]);
-    let nearer = |way: f64| changed(&body, move |_, [x, y, z]| [x + way, y, z]);
+    let nearer = |offset: f64| changed(&body, move |_, [x, y, z]| [x + offset, y, z]);
     let inside_out = changed(&body, |_, [x, y, z]| [0.1 - x, y, z]);
     let flat = changed(&body, |_, [x, _, z]| [x, 0.0, z]);
     let aimed = |goal: &Component, frame: f32| Scene::of(body.clone()).goal(goal.clone(), frame, 1e4, 1.0);

@@ -33,8 +33,8 @@ fn angle_to_x(ends: &[Point]) -> f64 {
     libm::atan2((y * y + z * z).sqrt(), x)
 }
 
-/// Errors of segments' angles, each with what storing the positions may turn it by; `law` gives the share of the angle
-/// that is left from the segment's number and its middle's u.
+/// Errors of segments' angles, each with the rotation that rounding of stored positions may cause; `law` gives the
+/// remaining fraction of the angle from the segment's number and the u of its middle.
 fn angle_errors(root: Point, segments: usize, mode: BendMode, law: impl Fn(f64, usize, f64) -> f64) -> Vec<[f64; 2]> {
     let mut errors = Vec::new();
     for theta in [1e-3, 0.3, 1.2, 1.5, 2.7, 3.1] {
@@ -50,7 +50,7 @@ fn angle_errors(root: Point, segments: usize, mode: BendMode, law: impl Fn(f64, 
     errors
 }
 
-/// How far the tip is from that of the finest curve, of length 1.
+/// Distance of the tip from that of the finest curve, of length 1.
 fn tip_error(segments: usize, g: f32) -> f64 {
     let tip = |segments| *bent([0.0; 3], 2.0, segments, g, RESOLUTION_FREE).last().unwrap();
     let (tip, finest) = (tip(segments), tip(1024));
@@ -59,7 +59,7 @@ fn tip_error(segments: usize, g: f32) -> f64 {
 
 pub(super) fn figures() -> Vec<Figure> {
     let counts = [2, 4, 8, 32, 128];
-    // W2: every pivot turns the rest of a straight curve by the share g of what is left.
+    // W2: every pivot turns the rest of a straight curve by g times the remaining angle.
     let paper = |root: Point| {
         (1..=8).flat_map(move |n| angle_errors(root, n, BendMode::Paper, |left, k, _| libm::pow(left, k as f64 + 1.0)))
     };
@@ -80,20 +80,20 @@ pub(super) fn figures() -> Vec<Figure> {
     let at_9_cvs = shares.map(|g| tip_error(8, g)).into_iter().fold(0.0, f64::max);
     vec![
         Figure::stored(
-            "Curve_Wind: segment k of a straight curve is left with θ₀(1−g)^k, 1 to 8 segments",
+            "Curve_Wind: angle θ₀(1−g)^k of segment k of a straight curve, 1 to 8 segments",
             paper([0.0; 3]),
             2e-6,
             " rad",
         ),
-        Figure::stored("the same a kilometre away", paper(far), 2e-6, " rad"),
+        Figure::stored("the same a kilometre from the origin", paper(far), 2e-6, " rad"),
         Figure::stored(
-            "`resolution_free`: θ₀(1−g)^(u·n) in the middle of every segment, 3 to 129 CVs",
+            "`resolution_free`: angle θ₀(1−g)^(u·n) in the middle of every segment, 3 to 129 CVs",
             free([0.0; 3]),
             2e-6,
             " rad",
         ),
-        Figure::stored("the same a kilometre away", free(far), 2e-6, " rad"),
-        Figure::within("its tips converge, 3 to 129 CVs: order", &orders.concat(), [1.7, 2.3]),
-        Figure::error("its tip at 9 CVs", at_9_cvs, 1e-2, " L"),
+        Figure::stored("the same a kilometre from the origin", free(far), 2e-6, " rad"),
+        Figure::within("order of convergence of its tip, 3 to 129 CVs", &orders.concat(), [1.7, 2.3]),
+        Figure::error("error of its tip at 9 CVs", at_9_cvs, 1e-2, " L"),
     ]
 }

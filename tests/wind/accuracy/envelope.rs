@@ -1,4 +1,4 @@
-//! Gusts and shelter: where the wind is let in.
+//! Gusts and shelter: the envelope of the wind.
 
 use curves::shield::{Collider, Shield, shield};
 use engine::geometry::ENVELOPE;
@@ -8,9 +8,9 @@ use numerics::shapes;
 use super::Figure;
 use crate::cooked::cook;
 
-/// The largest error of the envelope of one CV that a gust passes: it starts 3 m upwind at frame 12 and goes 2 m/s, so
-/// its centre is there at frame 48 and a radius of 1 m takes 12 frames; 1 − t²(3 − 2t) between (W5: "1 at its centre, 0
-/// at its boundary", and the default falloff).
+/// The largest error of the envelope of one CV that a gust passes. The gust starts 3 m upwind at frame 12 and moves at
+/// 2 m/s, so its centre arrives at frame 48, and a radius of 1 m takes 12 frames; in between the envelope is 1 − t²(3 −
+/// 2t) (W5: "1 at its centre, 0 at its boundary", and the default falloff).
 fn gust_error() -> f64 {
     let nodes = r#"
         "cv": { "type": "Curve_In", "params": { "points": [[5, 0, 0]], "counts": [1] } },
@@ -25,7 +25,7 @@ fn gust_error() -> f64 {
     frames.iter().enumerate().map(error).fold(0.0, f64::max)
 }
 
-/// CVs over which the envelope leaves 0…1 while 300 gusts pass, of all.
+/// Number of CVs and frames with an envelope outside 0…1 while 300 gusts pass, and of all.
 fn over_full() -> [usize; 2] {
     let nodes = r#"
         "fur": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]] } },
@@ -50,7 +50,7 @@ fn strewn(count: u64, half: f32) -> Vec<Point> {
     (0..count).map(|i| [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).between([-half, half]))).collect()
 }
 
-/// Rays that are wrong, of those surely off the silhouette.
+/// Number of wrong rays, among those clearly away from the silhouette.
 ///
 /// A ray upwind along x from p meets the unit sphere where y² + z² < 1, at x ∓ √(1 − y² − z²).
 fn wrong_rays((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 2] {
@@ -64,12 +64,14 @@ fn wrong_rays((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 2] {
             let [x, y, z] = point.map(f64::from);
             let inside = 1.0 - y * y - z * z;
             let half = inside.max(0.0).sqrt();
-            let ways = [x + half, x - half];
-            let unsure = |way: f64| way.abs().min((way - f64::from(offset)).abs()) < 2e-3 / half.max(1e-2);
-            if inside.abs() < 2e-3 || ways.into_iter().any(unsure) {
+            let distances = [x + half, x - half];
+            let unsure =
+                |distance: f64| distance.abs().min((distance - f64::from(offset)).abs()) < 2e-3 / half.max(1e-2);
+            if inside.abs() < 2e-3 || distances.into_iter().any(unsure) {
                 continue;
             }
-            let met = inside > 0.0 && ways.iter().any(|way| *way > 0.0 && *way <= f64::from(offset));
+            let met =
+                inside > 0.0 && distances.iter().any(|distance| *distance > 0.0 && *distance <= f64::from(offset));
             sure += 1;
             wrong += usize::from(found != f32::from(u8::from(met)));
         }
@@ -77,7 +79,8 @@ fn wrong_rays((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 2] {
     [wrong, sure]
 }
 
-/// Curves of 7 CVs whose share is no number of CVs ÷ 7, and those whose share changes when all is mirrored with the wind.
+/// Number of curves of 7 CVs whose `shielded` is not a multiple of 1/7, and of those whose `shielded` changes if scene
+/// and wind are mirrored.
 fn odd_curves((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 3] {
     let points = strewn(3500, 1.5);
     let starts: Vec<u32> = (0..=500).map(|curve| 7 * curve).collect();
@@ -96,18 +99,18 @@ pub(super) fn figures() -> Vec<Figure> {
     let [broken, turned, curves] = odd_curves(&sphere);
     vec![
         Figure::error(
-            "Curve_Wind_Gusts: a gust that passes a CV, 1 at its centre, 0 from its boundary",
+            "Curve_Wind_Gusts: envelope of a CV that a gust passes, 1 at its centre, 0 from its boundary on",
             gust_error(),
             1e-5,
             "",
         ),
-        Figure::never("300 gusts over each other: envelopes outside 0…1", over, values),
+        Figure::never("300 overlapping gusts: envelopes outside 0…1", over, values),
         Figure::never(
-            "Curve_Wind_Shielding: wrong rays off the silhouette of a sphere, offsets 0.2 to 1e4 m",
+            "Curve_Wind_Shielding: wrong rays away from the silhouette of a sphere, offsets 0.2 to 1e4 m",
             wrong,
             rays,
         ),
-        Figure::never("shares that are no whole number of CVs", broken, curves),
-        Figure::never("shares that differ when all is mirrored with the wind", turned, curves),
+        Figure::never("values of `shielded` that are not a whole number of CVs ÷ all", broken, curves),
+        Figure::never("values of `shielded` that change if scene and wind are mirrored", turned, curves),
     ]
 }

@@ -1,5 +1,5 @@
-//! How accurately each law of the wind chain is met, with the limit it has to meet: one table, printed, checked, and
-//! compared with docs/wind.md.
+//! How accurately each law of the wind chain is met, with its limit: one table, printed, checked, and compared with
+//! docs/wind.md.
 //!
 //! Laws are closed forms, computed in f64 by code that shares nothing with the kernels.
 

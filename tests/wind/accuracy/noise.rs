@@ -8,7 +8,7 @@ use crate::cooked::cook;
 
 const POINTS: u64 = 40_000;
 
-/// The mean of what `of` gives over many random points, number by number.
+/// The mean of each number in `of` over many random points.
 fn average<const N: usize>(of: impl Fn([f64; 3]) -> [f64; N]) -> [f64; N] {
     let mut sums = [0.0; N];
     for i in 0..POINTS {
@@ -18,7 +18,8 @@ fn average<const N: usize>(of: impl Fn([f64; 3]) -> [f64; N]) -> [f64; N] {
     sums.map(|sum| sum / POINTS as f64)
 }
 
-/// Mean and rms of each component, and the largest correlation between any two of them, here and 2 cells apart and more.
+/// Mean and rms of each component, and the largest correlation between any two of them, here and 2 cells apart and
+/// more.
 fn statistics(kind: NoiseKind) -> ([f64; 3], [f64; 3], f64) {
     let field = Field::new(kind, 1, 0.5, 3);
     let at = |p: [f64; 3]| field.at(p).map(f64::from);
@@ -40,8 +41,8 @@ fn statistics(kind: NoiseKind) -> ([f64; 3], [f64; 3], f64) {
     (mean, rms, most)
 }
 
-/// The order at which the jump of the second derivative across faces of cells falls with the step: 1 where there is
-/// none, 0 where there is one.
+/// The order at which the jump of the second derivative across faces of cells falls with the step: 1 if it is
+/// continuous, 0 if it jumps.
 fn smoothness(kind: NoiseKind) -> f64 {
     let field = Field::new(kind, 1, 0.5, 8);
     let jump = |step: f64| {
@@ -58,7 +59,7 @@ fn smoothness(kind: NoiseKind) -> f64 {
 /// Cells along a side of wavelet noise's period.
 const SIDE: usize = 64;
 
-/// Cook & DeRose 2005, appendix: the filter that halves, from its middle outwards.
+/// Cook & DeRose 2005, appendix: the downsampling filter, from its middle outwards.
 const HALVING: [f64; 16] = [
     0.655_340, 0.033_979, -0.243_780, -0.025_936, 0.103_311, 0.011_655, -0.044_412, -0.005_040, 0.019_120, 0.002_172,
     -0.008_233, -0.000_938, 0.003_546, 0.000_410, -0.001_528, 0.000_334,
@@ -75,12 +76,14 @@ fn each_line(values: &mut [f64], change: impl Fn(&[f64]) -> Vec<f64>) {
     }
 }
 
-/// The share of wavelet noise's energy that is left when it is halved and doubled again (Cook & DeRose 2005, section 3).
+/// The fraction of wavelet noise's energy that remains after downsampling and upsampling (Cook & DeRose 2005, section
+/// 3).
 fn left_after_halving() -> f64 {
     let field = Field::new(NoiseKind::Wavelet, 1, 0.5, 3);
     let cell = |i: usize| [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)].map(|x| x as f64);
     let mut values: Vec<f64> = (0..SIDE * SIDE * SIDE).map(|i| f64::from(field.at(cell(i))[0])).collect();
-    // On its lattice it is (1, 6, 1)/8 of its coefficients along each axis: what is found is solved for them.
+    // At its lattice points the noise is its coefficients filtered by (1, 6, 1)/8 along each axis, which is inverted
+    // here.
     each_line(&mut values, |line| {
         let mut solved = line.to_vec();
         for _ in 0..15 {
@@ -100,7 +103,7 @@ fn left_after_halving() -> f64 {
     energy(&values) / before
 }
 
-/// How far curves differ from those upwind of them a second before, at 2 m/s: shapes of curves 2 m apart.
+/// Difference between the shapes of curves and of those 2 m upwind a second earlier, with a scroll of 2 m/s.
 fn scroll_error() -> f64 {
     let roots = (0..40).map(|i| (f64::from(i % 8), 0.37 * f64::from(i / 8)));
     let points: Vec<String> = roots.map(|(x, z)| format!("[{x}, 0, {z}], [{x}, 0.5, {z}], [{x}, 1, {z}]")).collect();
@@ -134,16 +137,21 @@ pub(super) fn figures() -> Vec<Figure> {
     let rms: Vec<f64> = gradient.iter().flat_map(|(_, rms, _)| *rms).collect();
     let alike = gradient.iter().map(|(_, _, most)| *most).fold(0.0, f64::max);
     vec![
-        Figure::error("gradient noise on its lattice, 6 octaves", f64::from(on_lattice), 0.0, ""),
+        Figure::error("gradient noise at its lattice points, 6 octaves: largest value", f64::from(on_lattice), 0.0, ""),
         Figure::error("gradient and billow noise: mean", means, 1e-2, ""),
         Figure::within("their rms", &rms, [0.15, 0.4]),
-        Figure::error("their correlation between components, and 2 cells apart and more", alike, 5e-2, ""),
+        Figure::error("their correlation between components, and at distances of 2 cells and more", alike, 5e-2, ""),
         Figure::within(
-            "gradient noise is C²: order at which steps of its second derivative across cells vanish",
+            "gradient noise is C²: order at which jumps of its second derivative between cells vanish",
             &[smoothness(NoiseKind::Perlin)],
             [0.9, 1.1],
         ),
-        Figure::error("it scrolls downwind: curves 2 m on, a second later at 2 m/s", scroll_error(), 1e-5, " L"),
-        Figure::error("wavelet noise: energy left when it is halved", left_after_halving(), 1e-2, ""),
+        Figure::error(
+            "it scrolls downwind at 2 m/s: difference from curves 2 m upwind a second earlier",
+            scroll_error(),
+            1e-5,
+            " L",
+        ),
+        Figure::error("wavelet noise: energy that remains after downsampling by two", left_after_halving(), 1e-2, ""),
     ]
 }

@@ -14,7 +14,7 @@ fn product(a: &Square, b: &Square) -> Square {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// e^M, by its series on a small part of M and squaring: of e^M − 1, so that a small M loses nothing.
+/// e^M by scaling and squaring, applied to e^M − 1 so that a small M loses no precision.
 fn exponential(m: Square) -> Square {
     let size = m.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let halvings = (0..).find(|n| size / libm::exp2(f64::from(*n)) < 1e-3).unwrap();
@@ -35,12 +35,13 @@ fn applied(m: &Square, v: [f64; 4]) -> [f64; 4] {
     std::array::from_fn(|i| (0..4).map(|k| m[i][k] * v[k]).sum())
 }
 
-/// 1 where the damper resists motion against the target, else 0.
+/// 1 if the damper resists motion relative to the target, otherwise 0.
 fn share(drag: Drag) -> f64 {
     if drag == Drag::Target { 1.0 } else { 0.0 }
 }
 
-/// Where the spring is at each frame, its target straight between `targets`: of (x, v/ω, target, its speed/ω).
+/// Position of the spring at each frame, for a target that moves linearly between `targets`; the state is (x, v/ω,
+/// target, its speed/ω).
 fn exact(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     let row = [-1.0, -2.0 * zeta, 1.0, 2.0 * zeta * share(drag)];
     let step =
@@ -56,10 +57,10 @@ fn exact(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     found
 }
 
-/// So tall that restoring its length moves the tip along x by no more than rounding does.
+/// So tall that restoring its length moves the tip along x by less than rounding.
 const TALL: f32 = 1e5;
 
-/// Where the tip of a tall segment is, ω·`dt` = `phase` a step.
+/// Positions of the tip of a tall segment with ω·`dt` = `phase` in each step.
 fn swung(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     let ramp = Ramp::constant(1.0);
     let spring = Spring { frequency: (phase / (2.0 * PI)).into(), damping: zeta.into(), softness: &ramp, drag };
@@ -74,7 +75,7 @@ fn swung(phase: f64, zeta: f64, drag: Drag, targets: &[f32]) -> Vec<f64> {
     found
 }
 
-/// A pull that is let go, a step, a ramp, a sine and noise, sampled once a frame.
+/// A pull that is released, a step, a ramp, a sine and noise, sampled once per frame.
 fn signals() -> [Vec<f32>; 5] {
     let of = |signal: &dyn Fn(usize) -> f32| (0..60).map(signal).collect();
     [
@@ -101,7 +102,8 @@ fn worst_response() -> f64 {
     worst
 }
 
-/// Orders of the error against the true sine, as frames come closer: of (x, v, s, c) with s' = Ωc, c' = −Ωs, at ω = 1.
+/// Orders of convergence to the response to a true sine as the frame rate increases; the state is (x, v, s, c) with s'
+/// = Ωc, c' = −Ωs, at ω = 1.
 fn orders() -> Vec<f64> {
     let (forcing, end) = (2.0_f64, 12.0);
     let mut orders = Vec::new();
@@ -122,7 +124,7 @@ fn orders() -> Vec<f64> {
     orders
 }
 
-/// Frames whose bits differ alone or in another order from those in order, of all that were tried.
+/// Number of frames that have other bits when they are cooked alone or in another order, and of all that were tried.
 fn other_bits() -> [usize; 2] {
     let nodes = r#"
         "fur": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 2, 1]] } },
@@ -148,12 +150,12 @@ pub(super) fn figures() -> Vec<Figure> {
     let [others, frames] = other_bits();
     vec![
         Figure::error(
-            "Curve_Jiggle: exact response to pull, step, ramp, sine and noise, ζ 0.025 to 10, ω·dt 1e-6 to 1e6",
+            "Curve_Jiggle: error of the response to pull, step, ramp, sine and noise, ζ 0.025 to 10, ω·dt 1e-6 to 1e6",
             worst_response(),
             1e-5,
             "",
         ),
-        Figure::within("against the true sine: order", &orders(), [1.8, 2.2]),
-        Figure::never("frames that differ alone or backwards from those in order", others, frames),
+        Figure::within("order of convergence to the response to a true sine", &orders(), [1.8, 2.2]),
+        Figure::never("frames with other bits if they are cooked alone or backwards", others, frames),
     ]
 }

@@ -1,4 +1,4 @@
-//! The whole chain, turned, moved and scaled with its scene.
+//! The whole chain, rotated, moved and scaled with its scene.
 
 use engine::geometry::Component;
 use numerics::vector::{DVec3, to_f64};
@@ -6,19 +6,19 @@ use numerics::vector::{DVec3, to_f64};
 use super::{Figure, storage};
 use crate::cooked::cook;
 
-/// How a scene is changed: first scaled, then turned about x, y and z, then moved.
+/// A change of a scene: first scaled, then rotated about x, y and z, then moved.
 struct Change {
     scale: f64,
     /// Degrees.
     turn: [f64; 3],
-    way: [f64; 3],
+    translation: [f64; 3],
 }
 
-/// Of the longest curve, and of the shortest segment, as they are.
+/// Length of the longest curve, and of the shortest segment, before the change.
 const LENGTH: f64 = 0.4;
 const SEGMENT: f64 = 0.05;
 
-const NONE: Change = Change { scale: 1.0, turn: [0.0; 3], way: [0.0; 3] };
+const NONE: Change = Change { scale: 1.0, turn: [0.0; 3], translation: [0.0; 3] };
 
 impl Change {
     fn turned(&self, mut v: [f64; 3]) -> [f64; 3] {
@@ -32,16 +32,16 @@ impl Change {
 
     fn of(&self, p: [f32; 3]) -> [f64; 3] {
         let p = self.turned(p.map(|x| f64::from(x) * self.scale));
-        std::array::from_fn(|k| p[k] + self.way[k])
+        std::array::from_fn(|k| p[k] + self.translation[k])
     }
 
     /// The chain on a furry ball in a wind that turns, with a gust placed by hand.
     fn scene(&self, noise: &str) -> String {
-        let Self { scale, turn, way } = self;
+        let Self { scale, turn, translation } = self;
         let moved = |name: &str| {
             format!(
                 r#""{name}": {{ "type": "Transform", "inputs": {{ "geometry": "{name}_here" }},
-                     "params": {{ "scale": [{scale}, {scale}, {scale}], "rotate": {turn:?}, "translate": {way:?} }} }},"#
+                     "params": {{ "scale": [{scale}, {scale}, {scale}], "rotate": {turn:?}, "translate": {translation:?} }} }},"#
             )
         };
         let [from, to] = [[1.0, 0.1, -0.2], [0.8, -0.3, 0.6]].map(|wind| self.turned(wind));
@@ -74,8 +74,8 @@ impl Change {
     }
 }
 
-/// How far wind, swing and collision of the scene so changed are beside those of the scene as it is, changed, as shares
-/// of the longest curve; each with what storing positions may turn its segments by.
+/// Distance between the results of wind, swing and collision for the changed scene and the changed results for the
+/// original scene, relative to the longest curve; each with the error that rounding of stored positions may cause.
 fn errors(change: &Change, noise: &str) -> Vec<[f64; 2]> {
     let stages = ["wind", "swing", "out"];
     let [here, there] = [&NONE, change].map(|change| cook(&change.scene(noise), &stages, 12));
@@ -95,18 +95,23 @@ fn errors(change: &Change, noise: &str) -> Vec<[f64; 2]> {
 pub(super) fn figures() -> Vec<Figure> {
     let calm = r#""noise": "none""#;
     let turned = Change { turn: [20.0, -50.0, 70.0], ..NONE };
-    let moved = Change { way: [8.0, -4.0, 16.0], ..NONE };
+    let moved = Change { translation: [8.0, -4.0, 16.0], ..NONE };
     let scaled = |scale: f64| errors(&Change { scale, ..NONE }, calm);
     vec![
-        Figure::stored("the whole chain: scene and wind turned together", errors(&turned, calm), 1e-5, " L"),
-        Figure::stored("moved by 18 m", errors(&moved, calm), 1e-5, " L"),
         Figure::stored(
-            "moved by 18 m, with noise that sticks to `Pref`",
+            "the whole chain: change if scene and wind are rotated together",
+            errors(&turned, calm),
+            1e-5,
+            " L",
+        ),
+        Figure::stored("if they are moved by 18 m", errors(&moved, calm), 1e-5, " L"),
+        Figure::stored(
+            "if they are moved by 18 m, with noise sampled at `Pref`",
             errors(&moved, r#""noise_space": "rest""#),
             1e-5,
             " L",
         ),
-        Figure::stored("scaled to a thousandth", scaled(1e-3), 1e-5, " L"),
-        Figure::stored("scaled to a thousandfold", scaled(1e3), 1e-5, " L"),
+        Figure::stored("if they are scaled to a thousandth", scaled(1e-3), 1e-5, " L"),
+        Figure::stored("if they are scaled by a thousand", scaled(1e3), 1e-5, " L"),
     ]
 }

@@ -1,4 +1,4 @@
-//! Colliders that should not be: thin, fast, inside out, doubled, holed, reversed; and curves that start within them.
+//! Difficult colliders: thin, fast, inside out, duplicated, with holes, reversed; and curves that start inside them.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn count(cooked: &Cooked, name: &str) -> Vec<f64> {
     cooked.counts[name].clone()
 }
 
-/// Wind that presses hairs into what they stand on.
+/// Wind that presses hairs into the surface they stand on.
 fn pressed() -> Scene {
     Scene::new().with("gusts", r#""base": 1"#).with("lee", r#""shield": 0"#).with(
         "wind",
@@ -48,8 +48,12 @@ fn curves_that_start_inside_a_collider_are_counted_and_do_not_get_deeper() {
         ("between two sheets", between(0.01, &[0.0, 0.5])),
     ]);
     assert_eq!(count(&cooked[0], "started_inside"), [20.0; 3]);
-    assert_eq!(count(&cooked[1], "crossings_left"), [0.0; 3], "lifted out, they are as free as any");
-    assert_eq!(count(&cooked[2], "started_inside"), [0.0; 3], "surfaces are obstacles: within is free");
+    assert_eq!(count(&cooked[1], "crossings_left"), [0.0; 3], "lifted out, they are free");
+    assert_eq!(
+        count(&cooked[2], "started_inside"),
+        [0.0; 3],
+        "surfaces are obstacles, not volumes: the inside is free"
+    );
     assert_eq!(count(&cooked[2], "crossings_left"), [0.0; 3]);
     assert_eq!(count(&cooked[3], "started_inside"), [20.0; 3]);
     assert_eq!(count(&cooked[4], "started_inside"), [0.0; 3]);
@@ -58,7 +62,7 @@ fn curves_that_start_inside_a_collider_are_counted_and_do_not_get_deeper() {
 }
 
 #[test]
-fn no_kind_of_collider_is_passed_through() {
+fn no_kind_of_collider_is_crossed() {
     let thin = pressed().fur(|_| curves(&grass(0.01, 2))).skin(|_| sheets(&[0.0, -1e-6]));
     let reversed = pressed().skin(|_| ball_of(|all| all.into_iter().map(|[a, b, c]| [a, c, b]).collect()));
     let flipping = |frame: Frame| {
@@ -80,7 +84,7 @@ fn no_kind_of_collider_is_passed_through() {
         assert!(count(&cooked[k], "contacts").iter().all(|contacts| *contacts > 0.0), "{k}");
     }
     let bits = |cooked: &Cooked| cooked.of(2, "out").unwrap().positions().to_vec();
-    assert_eq!(bits(&cooked[1]), bits(&cooked[2]), "a face twice is a face");
+    assert_eq!(bits(&cooked[1]), bits(&cooked[2]), "duplicate faces have no effect");
 }
 
 #[test]

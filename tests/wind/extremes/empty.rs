@@ -30,7 +30,7 @@ fn empty_and_degenerate_curves_pass_through_every_node() {
     let none = Scene::new().cook_some(&NODES, &[], 2);
     assert!(none.frames.is_empty() && none.errors.is_empty(), "no frames are no work");
     assert_eq!(cooked[0].of(2, "out").unwrap().point_count(), 0);
-    assert_eq!(cooked[1].of(2, "out").unwrap().positions(), [root; 3], "what has one CV does not bend");
+    assert_eq!(cooked[1].of(2, "out").unwrap().positions(), [root; 3], "a curve of one CV does not bend");
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! The wind nodes at their extremes: absurd numbers, nothing at all, wind from everywhere, colliders that should not be.
+//! The wind nodes at extremes: absurd numbers, empty inputs, wind from any direction, difficult colliders.
 //!
-//! Each row of a table is a scene, and all of its nodes are held to the same: what comes out is finite, has the lengths
-//! and roots that went in, envelopes of 0…1, no crossing that is not counted, and the same bits on one thread and on
-//! seven; or it is refused, where the row says so, by a message and never by a panic.
+//! Each row of a table is a scene. The results of all its nodes are finite, keep lengths and roots, have envelopes in
+//! 0…1 and no uncounted crossings, and have the same bits on one thread and on seven; or the scene is refused, if the
+//! row says so, with a message and never with a panic.
 
 mod colliders;
 mod empty;
@@ -27,18 +27,18 @@ use crate::cooked::{fault, graph, metrics};
 type Point = [f32; 3];
 type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
 
-/// The nodes that are held to it: the chain, and what carries and fills curves.
+/// The nodes that are checked: the chain, and the nodes that attach and interpolate curves.
 const NODES: [&str; 7] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs"];
 
-/// What all nodes of a row are given.
+/// The inputs of all nodes in a row.
 #[derive(Clone)]
 struct Scene {
     fur: At,
     skin: At,
-    /// By node, its params.
+    /// Params by node.
     params: BTreeMap<&'static str, String>,
     fps: f64,
-    /// Nodes that refuse it.
+    /// Nodes that refuse the scene.
     refused: &'static [&'static str],
 }
 
@@ -70,7 +70,7 @@ impl Scene {
         Self { skin: Arc::new(at), ..self }
     }
 
-    /// With these params of a node, in place of those it has here.
+    /// Replaces the params of a node.
     fn with(mut self, node: &'static str, params: impl Into<String>) -> Self {
         self.params.insert(node, params.into());
         self
@@ -104,7 +104,7 @@ impl Scene {
         )
     }
 
-    /// The first fault that such a graph has before anything is cooked.
+    /// The first fault of such a graph before cooking.
     fn fault(&self) -> Option<String> {
         fault(&self.nodes(), "out")
     }
@@ -150,12 +150,12 @@ impl Scene {
     }
 }
 
-/// What came out.
+/// The outcome.
 #[derive(PartialEq)]
 struct Cooked {
-    /// By frame, what each node made.
+    /// For each frame the result of each node.
     frames: Vec<Vec<Option<Arc<Geometry>>>>,
-    /// What collision counted, by frame.
+    /// Collision's counts by frame.
     counts: BTreeMap<&'static str, Vec<f64>>,
     /// Node, kind and message.
     errors: Vec<(String, ErrorKind, String)>,
@@ -168,7 +168,7 @@ impl Cooked {
     }
 }
 
-/// Holds every node to what the module says, in each of these scenes; gives what they made.
+/// Checks the guarantees of this module for every node in each of these scenes; returns the results.
 fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
     let held = rows.into_iter().map(|(what, scene)| {
         let cooked = scene.cook(1);
@@ -185,7 +185,7 @@ fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
     held.collect()
 }
 
-/// Checks all frames of what came out.
+/// Checks all frames of an outcome.
 fn check_all(what: &str, cooked: &Cooked, scene: &Scene) {
     for frame in 0..3 {
         let at = Frame::whole(frame as i64 + 1);
@@ -218,7 +218,7 @@ fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometr
     }
 }
 
-/// The largest change of a segment's length, as a share of the curve's and beyond what storing positions may change.
+/// The largest change of a segment's length beyond the rounding of stored positions, relative to the curve's length.
 fn length_error(made: &Component, fur: &Component) -> f64 {
     let mut worst = 0.0_f64;
     for cvs in fur.runs().ranges() {
@@ -238,8 +238,8 @@ fn length_error(made: &Component, fur: &Component) -> f64 {
     worst
 }
 
-/// Segments that pass through a triangle: the segment's ends on either side of it, all three edges passed on the same
-/// side; in f64.
+/// Segments that pass through a triangle: their ends are on opposite sides of it, and they pass all three edges on the
+/// same side; in f64.
 fn crossings(curves: &Component, mesh: &Component) -> usize {
     let corners = |triangle: &[u32; 3]| triangle.map(|corner| to_f64(mesh.positions()[corner as usize]));
     let triangles: Vec<[DVec3; 3]> = mesh.triangles().corners.iter().map(corners).collect();
@@ -255,13 +255,13 @@ fn crossings(curves: &Component, mesh: &Component) -> usize {
     segments.filter(|ends| triangles.iter().any(|triangle| crosses(to_f64(ends[0]), to_f64(ends[1]), triangle))).count()
 }
 
-/// Curves as CVs a curve.
+/// Curves from lists of CVs.
 fn curves(list: &[Vec<Point>]) -> Geometry {
     let counts = list.iter().map(|curve| curve.len() as u32).collect();
     Component::curves(counts, list.concat()).unwrap().into()
 }
 
-/// Curves of `cvs` CVs and this length, that stand and lean on the ball.
+/// Leaning curves of `cvs` CVs and this length on the ball.
 fn hairs(count: u64, cvs: usize, length: f32) -> Vec<Vec<Point>> {
     let hair = |k: u64| {
         let up = direction(Key::new(5).of(k));
@@ -284,7 +284,7 @@ fn ball() -> Geometry {
     ball_of(|triangles| triangles)
 }
 
-/// The ball's points, joined otherwise.
+/// The ball's points with other faces.
 fn ball_of(triangles: impl Fn(Vec<[u32; 3]>) -> Vec<[u32; 3]>) -> Geometry {
     let ball = icosphere(0.5, 2);
     mesh(&triangles(ball.triangles()), ball.points.iter().map(|p| p.map(|x| x as f32)).collect())
@@ -294,7 +294,7 @@ fn mesh(triangles: &[[u32; 3]], points: Vec<Point>) -> Geometry {
     Component::mesh(vec![3; triangles.len()], triangles.as_flattened().to_vec(), points).unwrap().into()
 }
 
-/// Every position of a geometry changed.
+/// A geometry with every position mapped.
 fn moved(mut geometry: Geometry, change: impl Fn(Point) -> Point) -> Geometry {
     for kind in [Kind::Curves, Kind::Mesh] {
         if let Some(part) = geometry.part_mut(kind) {

@@ -11,7 +11,7 @@ fn changed(change: impl Fn(Point) -> Point + Clone + Send + Sync + 'static) -> S
     Scene::new().fur(move |_| moved(curves(&hairs(20, 5, 0.3)), &change)).skin(move |_| moved(ball(), &of_ball))
 }
 
-/// At a scale, with the params that are lengths at that scale.
+/// A scaled scene, with params that are lengths scaled too.
 fn scaled(scale: f64) -> Scene {
     let size = scale as f32;
     changed(move |p| p.map(|x| x * size))
@@ -30,7 +30,7 @@ fn scaled(scale: f64) -> Scene {
 }
 
 #[test]
-fn a_scene_of_any_size_and_place_is_finite_and_keeps_its_lengths() {
+fn scenes_of_any_scale_and_position_are_finite_and_keep_lengths() {
     hold([
         ("1e-6", scaled(1e-6)),
         ("1e6", scaled(1e6)),
@@ -98,7 +98,7 @@ fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
         for spec in known.param_specs() {
             for RangeEnd { inside, .. } in range_ends(&spec) {
                 let Some(text) = json(&inside) else { continue };
-                // Each step is computed, and at a blend of 0 crossings are not looked for.
+                // Every step costs time, and at a blend of 0 crossings are not counted.
                 let dear = spec.name == "rotation_steps" && inside != Value::Int(1);
                 if dear || spec.name == "blend" && id == "out" && inside.number() == 0.0 {
                     continue;

@@ -1,4 +1,4 @@
-//! Wind from everywhere, gusts by the thousand, springs of any stiffness, curves of any number.
+//! Wind from any direction, thousands of gusts, springs of any stiffness, any number of curves.
 
 use super::*;
 use engine::geometry::SHIELDED;
@@ -81,7 +81,7 @@ fn springs_of_any_stiffness_and_damping_are_stable() {
         ("1e9 Hz, ζ 1e-6, against still air", swing(r#""frequency": 1e9, "damping": 1e-6, "drag": "world""#)),
         ("1e-6 Hz, ζ 1e6, against still air", swing(r#""frequency": 1e-6, "damping": 1e6, "drag": "world""#)),
     ]);
-    // So stiff a spring is where the wind is, to the rounding of its positions.
+    // Such a stiff spring follows the wind up to the rounding of positions.
     let apart = |a: &Component, b: &Component| {
         let pairs = a.positions().iter().zip(b.positions());
         pairs.map(|(a, b)| (to_f64(*a) - to_f64(*b)).norm()).fold(0.0, f64::max)
@@ -114,13 +114,13 @@ fn million() -> Scene {
 }
 
 #[test]
-fn a_million_curves_go_through_the_chain() {
+fn a_million_curves_pass_through_the_chain() {
     let cooked = million().cook_some(&["lee", "out"], &[1], 2);
     assert_eq!(cooked.errors, []);
     let [lee, out] = ["lee", "out"].map(|node| cooked.of(0, node).unwrap());
     assert_eq!((lee.element_count(), out.element_count()), (1_000_000, 1_000_000));
     let share = lee.get(SHIELDED).unwrap().iter().filter(|share| **share > 0.0).count();
-    assert!((400_000..500_000).contains(&share), "hardly half of the ball is in the lee: {share}");
+    assert!((400_000..500_000).contains(&share), "about half of the ball should be in the lee: {share}");
     assert!(length_error(out, lee) <= 1e-5);
 }
 
@@ -134,6 +134,6 @@ fn a_million_curves_are_attached_and_interpolated() {
     let fur = (million().fur)(Frame::whole(2));
     let turned = fur.curves().unwrap().positions().iter().map(|[x, y, z]| [*z, *y, -*x]);
     let apart = turned.zip(grown.positions()).map(|(a, b)| (to_f64(a) - to_f64(*b)).norm()).fold(0.0, f64::max);
-    assert!(apart < 1e-6, "a quarter turn carries all: {apart}");
+    assert!(apart < 1e-6, "a quarter turn moves all curves rigidly: {apart}");
     assert!(hairs.element_count() > 30_000);
 }

@@ -23,15 +23,15 @@ fn random_unit(key: Key) -> DVec3 {
     if (0.01..1.0).contains(&v.dot(&v)) { v / v.norm() } else { random_unit(key.of(9)) }
 }
 
-/// A segment of length 1 that is to turn about one end.
+/// A segment of length 1 about to turn about one end.
 struct Turn {
     rest: [Point; 2],
     goal: [Point; 2],
     pivot: DVec3,
-    /// Where it points, and which way it turns: unit, at a right angle.
+    /// Its direction, and the direction in which it turns: unit, perpendicular.
     u: DVec3,
     v: DVec3,
-    /// How far.
+    /// Angle of the turn.
     goal_angle: f64,
 }
 
@@ -58,10 +58,10 @@ impl Turn {
     }
 }
 
-/// Where a turn first meets something.
+/// The angle at which a turn first meets something.
 enum First {
     Never,
-    /// Between these angles, which differ only by how a mesh approximates a round shape.
+    /// Between these angles, which differ only because the mesh approximates a round shape.
     At([f64; 2]),
     Grazes,
 }
@@ -73,7 +73,7 @@ struct Case {
     turns: Vec<(Turn, First)>,
 }
 
-/// Distance kept from contact; with segments of length 1, about the angle too.
+/// Distance kept from contact; for segments of length 1 approximately also the angle.
 const GAP: f64 = 1e-6;
 
 /// Thin curves without a skin.
@@ -92,7 +92,7 @@ fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: ContactMethod, gap: f64)
     }
 }
 
-/// The largest error of the angle at which turns stop, and the farthest that any passes its first contact.
+/// The largest error of the angle at which turns stop, and the largest distance beyond first contact.
 fn worst(case: &Case) -> [f64; 2] {
     let tree = TriangleTree::build(&case.points, &case.triangles);
     let obstacles = [&tree];
@@ -121,7 +121,7 @@ fn worst(case: &Case) -> [f64; 2] {
     [error, past]
 }
 
-/// Random turns about pivots that `pivot` gives.
+/// Random turns about pivots given by `pivot`.
 fn turns(
     count: u64,
     salt: u64,
@@ -148,9 +148,9 @@ pub(super) fn figures() -> Vec<Figure> {
     let past = cases.iter().map(|(_, [_, past])| *past).fold(0.0, f64::max);
     let mut figures: Vec<Figure> =
         cases.iter().map(|(law, [error, _])| Figure::error(law, *error, 1e-4, " rad")).collect();
-    figures.push(Figure::error("how far any of these goes past its first contact", past, 1e-5, " L"));
+    figures.push(Figure::error("largest distance of any of these beyond first contact", past, 1e-5, " L"));
     figures.push(Figure::within(
-        "`steps` comes nearer to `exact` as 1/steps, 2 to 256: slope",
+        "`steps` converges to `exact` as 1/steps, 2 to 256 steps: slope",
         &[steps::slope()],
         [0.8, 1.2],
     ));

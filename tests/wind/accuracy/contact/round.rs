@@ -21,8 +21,8 @@ pub(super) fn floor() -> Case {
     Case { points, triangles: vec![[0, 1, 2], [0, 2, 3]], turns: turns(4000, 1, pivot, first) }
 }
 
-/// The angle at which a segment of length 1 first meets a circle of radius `r` about `centre`, in the plane of the turn:
-/// touching it, or with its tip. None where it does not; NaN where that is in doubt.
+/// The angle at which a segment of length 1 first meets a circle of radius `r` about `centre`, in the plane of the
+/// turn: with its side or with its tip. None if it does not; NaN if that is uncertain.
 fn meets_circle(centre: [f64; 2], r: f64) -> Option<f64> {
     let (away, at) = (libm::hypot(centre[0], centre[1]), libm::atan2(centre[1], centre[0]));
     let short = away - r - 1.0;
@@ -36,7 +36,7 @@ fn meets_circle(centre: [f64; 2], r: f64) -> Option<f64> {
         true => libm::asin(r / away),
         false => libm::acos((away * away + 1.0 - r * r) / (2.0 * away)),
     };
-    // Blocked from at − aside to at + aside.
+    // Blocked between at − aside and at + aside.
     let start = (at - aside).rem_euclid(TAU);
     Some(if start > TAU - 2.0 * aside - 0.02 || start < 0.02 { f64::NAN } else { start })
 }
@@ -69,8 +69,8 @@ pub(super) fn sphere() -> Case {
     Case { points, triangles, turns: turns(3000, 2, pivot, first) }
 }
 
-/// A cylinder of radius ¼ about z, met by the segment's flank: its line touches it where (p × d)² = r²·d² across z, a
-/// quadratic form in the sine and cosine of φ.
+/// A cylinder of radius ¼ about z, touched by the segment's side: its line touches it where (p × d)² = r²·d² across z,
+/// a quadratic form in the sine and cosine of φ.
 pub(super) fn cylinder() -> Case {
     const RADIUS: f64 = 0.25;
     const SIDES: u32 = 2048;
@@ -99,7 +99,8 @@ pub(super) fn cylinder() -> Case {
             let root = 0.5 * (at + sign * libm::acos(share));
             [root.rem_euclid(TAU), (root + PI).rem_euclid(TAU)]
         });
-        // Roots are those of the whole line: behind the pivot nothing is met, beyond the tip this test does not apply.
+        // The roots are those of the infinite line: those behind the pivot do not count, and beyond the tip this test
+        // does not apply.
         let ahead = roots.filter_map(|root| {
             let d = turn.direction(root);
             let distance = -flat(p, [d[0], d[1]]) / flat([d[0], d[1]], [d[0], d[1]]);

@@ -1,8 +1,8 @@
-//! Edges and needles: a turn meets them where they pass through its plane.
+//! Edges and needles: a turn meets them where they intersect its plane.
 
 use super::*;
 
-/// The angle and distance at which the line from `a` to `b` passes the plane of the turn, if it does.
+/// The angle and distance at which the line from `a` to `b` intersects the plane of the turn, if it does.
 fn passes(turn: &Turn, a: DVec3, b: DVec3) -> Option<(f64, f64)> {
     let n = turn.u.cross(&turn.v);
     let [above, below] = [a, b].map(|end| n.dot(&(end - turn.pivot)));
@@ -18,12 +18,12 @@ pub(super) fn blades() -> [f64; 2] {
     edges(7, false)
 }
 
-/// Needles a millionth thick.
+/// Needles 1e-6 thick.
 pub(super) fn needles() -> [f64; 2] {
     edges(8, true)
 }
 
-/// Turns against an edge that stands across their plane and leans; an edge a mesh.
+/// Turns against an oblique edge that crosses their plane; one mesh for each edge.
 fn edges(salt: u64, needle: bool) -> [f64; 2] {
     let mut all = [0.0_f64; 2];
     for batch in 0..40 {
@@ -41,7 +41,7 @@ fn edges(salt: u64, needle: bool) -> [f64; 2] {
         let triangles = vec![[0, 1, 3], [0, 3, 2], [0, 1, 5], [0, 5, 4]];
         let turn = |k: u64| {
             let key = key.of(100 + k);
-            // About a pivot from which it comes against the edge.
+            // About a pivot from which it meets the edge.
             let n = (edge + random_unit(key) * 0.8).normalize();
             let radial = aside.cross(&n).normalize();
             let distance = 0.1 + 0.85 * key.of(5).f64();

@@ -25,7 +25,7 @@ pub(super) fn slope() -> f64 {
         let apart = |(a, b): (&Point, &Point)| (to_f64(*a) - to_f64(*b)).norm();
         end(ContactMethod::Steps(steps)).iter().zip(&exact).map(apart).sum::<f64>()
     };
-    // The line through (log steps, log error) with the least squares.
+    // Least-squares line through (log steps, log error).
     let rows: Vec<[f64; 2]> = (1..=8).map(|k| [f64::from(k), libm::log2(error(1 << k))]).collect();
     let mean = [0, 1].map(|axis| rows.iter().map(|row| row[axis]).sum::<f64>() / rows.len() as f64);
     let product = |a: usize, b: usize| rows.iter().map(|row| (row[a] - mean[a]) * (row[b] - mean[b])).sum::<f64>();
