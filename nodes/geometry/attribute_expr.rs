@@ -35,12 +35,12 @@ params! { PARAMS:
         "One assignment per line, such as `envelope = clamp(envelope*P.y, 0, 1)` or `P.y += 0.1*sin(time)`. Assigning \
          to a new name creates an attribute: a number or a vector, like the value. `let h = P.y*2` defines `h` for the \
          following lines only. Expressions can use attributes (components are `.x .y .z .w`), the graph's controls, \
-         `frame`, `time` (seconds), `fps`, `seed`, `pi`, `i` (the point's or element's index, from 0) and `count`. \
-         Where an attribute has the same name as a control, write `@name` for the attribute. Operators are `+ - * / % \
-         ^`, comparisons, `&& || !` and `a ? b : c`. Functions are sin cos tan asin acos atan atan2 radians degrees \
-         sqrt exp log pow mod abs sign floor ceil round fract min max clamp mix step smoothstep fit noise rand vec \
-         length distance dot cross normalize. `rand(i)` is a random number from 0 to 1 for each row, `noise(P)` a \
-         smooth pattern. Angles are in radians. Empty code does nothing.");
+         `frame`, `time` (seconds), `fps`, `seed`, `pi`, `i` (the index of the point or element, from 0) and `count` \
+         (how many there are). Where an attribute has the same name as a control, write `@name` for the attribute. \
+         Operators are `+ - * / % ^`, comparisons, `&& || !` and `a ? b : c`. Functions are sin cos tan asin acos atan \
+         atan2 radians degrees sqrt exp log pow mod abs sign floor ceil round fract min max clamp mix step smoothstep \
+         fit noise rand vec length distance dot cross normalize. `rand(i)` is a random number from 0 to 1 for each \
+         point or element, `noise(P)` a smooth pattern. Angles are in radians. Empty code does nothing.");
     COMPONENT: Param<Part> = Param::choice("component", Part::Curves, "The component that the code runs on.");
     OVER: Param<Over> = Param::choice("over", Over::Points,
         "Whether the code runs once per point or once per element.");

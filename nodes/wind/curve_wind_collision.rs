@@ -27,15 +27,15 @@ choice! {
     /// How a segment's turn is stopped.
     enum Method {
         Exact = "exact": "at the first contact, computed in closed form, so that even a thin collider is not missed",
-        Steps = "steps": "as in the paper: it turns in `rotation_steps` equal steps and stops before the first one \
-                that crosses a collider; a thin collider may be jumped over",
+        Steps = "steps": "it turns in `rotation_steps` equal steps and stops before the first one that crosses a \
+            collider, as in the paper; thin colliders may be missed",
     }
 }
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves after the wind has bent them.");
     REST: Input = Input::one("rest", Kind::Curves,
-        "The same curves before the wind, at the same frame. On a moving skin they are attached to it.");
+        "The same curves before the wind, at the same frame; on a moving skin, the curves from Curve_Attach.");
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that curves must not cross, the skin included. They may move and deform.");
     SKIN: Input<Opt> = Input::optional("skin", Kind::Mesh,
@@ -63,7 +63,7 @@ params! { PARAMS:
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<f64> = Param::double("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward before collision, so that they do not flip \
-         from one side to the other as the wind turns: at 0 they are not redirected, as in the paper; at 1 there are \
+         from one side to the other as the wind turns: at 0 they are not redirected; at 1 there are \
          hardly more jumps than in the wind itself. The more directly the wind blows into the skin, the more upright \
          this keeps curves that would otherwise lie flat.")
         .within(0.0, 1.0);
@@ -166,7 +166,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(OUT.with(curves))
 }
 
-/// What curves at rest are tested against; equal where trees are the same objects.
+/// Everything that the test of rest curves depends on besides the curves; equal if the trees are the same objects.
 struct Still {
     obstacles: Vec<Arc<TriangleTree>>,
     skin: Option<Arc<TriangleTree>>,

@@ -76,7 +76,7 @@ struct BarycentricMap {
 }
 
 impl BarycentricMap {
-    /// Of a tet; `None` if it has no volume.
+    /// The map for a tet; `None` if it has no volume.
     fn of(points: &[Vec3], tet: [u32; 4]) -> Option<Self> {
         /// Smallest determinant ÷ product of edge lengths of a tet with a volume: above the rounding of f32
         /// positions.

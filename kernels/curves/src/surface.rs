@@ -18,7 +18,7 @@ impl SurfacePoint {
         std::array::from_fn(|k| a * corners[0][k] + b * corners[1][k] + c * corners[2][k])
     }
 
-    /// Where the point is on `triangles` of `points`, in metres.
+    /// The position of the point on `triangles` of `points`, in metres.
     ///
     /// # Panics
     /// If the triangle or one of its corners is out of range.

@@ -2,9 +2,9 @@
 
 use engine::prelude::*;
 
-/// Of a body's points: the corresponding point of the surface; −1 inside.
+/// On points of a body: the corresponding point of the surface; −1 inside.
 pub(crate) const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
-/// Of a body's tets: 1 if a tet is too flat to have a meaningful volume, else 0.
+/// On tets of a body: 1 if the tet is too flat to have a meaningful volume, else 0.
 pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
 
 /// Of a goal: the frame at which the body reaches it.

@@ -60,7 +60,7 @@ impl Plane {
         self.a * x + self.b * y + self.c
     }
 
-    /// What the samples of a pixel have above its corner.
+    /// Values at the samples of a pixel, relative to that at its corner.
     fn offsets(&self) -> Lanes {
         let (a, b) = (self.a as f32, self.b as f32);
         std::array::from_fn(|k| a * SAMPLE_X[k] + b * SAMPLE_Y[k])

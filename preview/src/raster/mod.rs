@@ -43,7 +43,7 @@ const fn sample_axis(is_x: bool) -> Lanes {
 
 /// Shading of covered pixels. Positions are x, y in pixels and nearness.
 pub(crate) trait Shader: Sync {
-    /// Of a sample.
+    /// Colour of a sample.
     type Color: Copy + Default + Send;
     /// A point of a triangle; `normal` is on the visible side.
     fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Self::Color;

@@ -35,7 +35,7 @@ struct PoseInterval {
 }
 
 impl Motion {
-    /// Of poses at increasing times, all with the same number of finite points.
+    /// From poses at increasing times, all with the same number of finite points.
     pub(super) fn new(poses: &[ObstaclePose]) -> Self {
         let intervals =
             poses.windows(2).map(|pair| PoseInterval::between(&pair[0].positions, &pair[1].positions)).collect();

@@ -146,7 +146,7 @@ fn is_behind(surface: &TriangleSurface, at: &Moment<'_>, nearest: &ClosestPoint,
     surface.outward(at, nearest).dot(&(point - nearest.point)) < 0.0
 }
 
-/// What a point does with a triangle during the motion.
+/// Behaviour of a point relative to a triangle during the motion.
 enum Approach {
     /// Stays away.
     Far,

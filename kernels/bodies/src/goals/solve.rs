@@ -74,14 +74,14 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
     Solved { rows, steps, residual }
 }
 
-/// `to` += `share` · `of`, by coordinate.
+/// `to` += `share` · `of` for each coordinate.
 fn add(to: &mut [DVec3], share: DVec3, of: &[DVec3]) {
     for (to, of) in to.iter_mut().zip(of) {
         *to += share.component_mul(of);
     }
 }
 
-/// By coordinate; 0 where the divisor is 0.
+/// Quotients by coordinate; 0 if the divisor is 0.
 fn quotient(a: DVec3, b: DVec3) -> DVec3 {
     a.zip_map(&b, |a, b| if b > 0.0 { a / b } else { 0.0 })
 }

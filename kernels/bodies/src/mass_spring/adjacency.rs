@@ -22,7 +22,7 @@ pub(super) struct Adjacency {
 }
 
 impl Adjacency {
-    /// Of springs with these ends.
+    /// The adjacency of springs with these ends.
     pub(super) fn new(clusters: &Partition, ends: &[[u32; 2]]) -> Self {
         let mut cluster = Vec::new();
         for index in 0..clusters.len() {

@@ -27,7 +27,7 @@ pub struct SkinBinding {
     max_distance: f64,
 }
 
-/// Where one root is bound.
+/// The binding of one root.
 #[derive(Clone, Copy, Debug)]
 struct BoundRoot {
     /// At rest, metres.

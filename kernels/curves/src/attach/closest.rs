@@ -1,18 +1,18 @@
 //! The point of a skin that is closest to a root. This file is the only one that uses parry.
 //!
-//! parry's bounding volume hierarchy is searched nearest box first, and its triangle says where on a face the closest
-//! point lies. What parry leaves open is settled here, so that the answer depends on positions and faces alone, not on the
-//! shape of the hierarchy:
+//! parry's bounding volume hierarchy is searched nearest box first, and its triangles give the closest point on a face.
+//! parry does not define which of equally close faces it finds. Here that is settled, so that the result depends on
+//! positions and faces only, not on the shape of the hierarchy:
 //!
 //! * Corners are passed in the order of their coordinates. Faces that share an edge, and faces that lie on each other,
-//!   then give the same bits for the same closest point, whichever way round they are listed.
-//! * parry drops boxes and faces that are exactly as far as the best so far. Here they are visited, and of equally close
-//!   faces the one listed first is taken. A closest point is moved into its face's box if rounding put it outside, so a
-//!   box is never farther than what it contains.
+//!   then give the same bits for the same closest point, in whichever order their corners are listed.
+//! * parry skips boxes and faces that are exactly as far as the best so far. Here they are visited, and of equally
+//!   close faces the one listed first is taken. A closest point that rounding put outside its face's box is moved into
+//!   it, so a box is never farther than its contents.
 //!
-//! Promise: the same bits on any number of threads; no panic for any position. Coordinates are f32, and f64 holds fourth
-//! powers of their differences. Limit: faces without area are left out unless there are no others, faces with a corner
-//! that is not finite always.
+//! Guarantees: the same bits on any number of threads; no panic for any position. Coordinates are f32, and f64 holds
+//! fourth powers of their differences. Limit: faces without area are ignored unless there are no others; faces with a
+//! non-finite corner always are.
 
 use crate::surface::SurfacePoint;
 use numerics::vector::{DVec3, to_f64};
@@ -23,7 +23,8 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::Triangle;
 use std::cell::Cell;
 
-/// Each box is grown by this share of its face's longest side: parry splits by volume, and a flat skin has none.
+/// Each box is enlarged by this fraction of its face's longest side, because parry splits by volume and a flat skin has
+/// none.
 const THICKENED: f64 = 1.0 / 16.0;
 
 /// The faces of a skin, to be searched.
@@ -37,7 +38,7 @@ pub(super) struct ClosestFaces {
 struct SortedFace {
     /// Index in the list of triangles.
     triangle: u32,
-    /// Which corner of the listed triangle each is.
+    /// For each corner its position in the listed triangle.
     slots: [u8; 3],
     corners: Triangle,
 }
@@ -47,17 +48,18 @@ struct SortedFace {
 struct Candidate {
     /// Distance squared.
     square: f64,
-    /// Row of `faces`.
+    /// Index in `faces`.
     face: u32,
     /// Of the sorted corners.
     weights: [f64; 3],
 }
 
 impl ClosestFaces {
-    /// The faces among `triangles`, indices of `points` (metres), that a root can be bound to; `None` where there are none.
+    /// The faces among `triangles`, indices of `points` (metres), that a root can be bound to; `None` if there are
+    /// none.
     ///
     /// # Panics
-    /// Where a corner is out of range.
+    /// If a corner is out of range.
     pub(super) fn new(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Self> {
         let sorted = |(triangle, corners): (usize, &[u32; 3])| {
             let corners = corners.map(|corner| points[corner as usize]);
@@ -75,7 +77,7 @@ impl ClosestFaces {
 
     /// The closest point to each root; the first corner of the first face for a root that is not finite.
     pub(super) fn find_each(&self, roots: &[[f32; 3]]) -> Vec<SurfacePoint> {
-        // Roots that follow each other are mostly near each other: where the last one was bound bounds the search.
+        // Consecutive roots are usually near each other, so the face of the last one bounds the search.
         let mut hint = 0;
         let find = |root: &[f32; 3]| {
             let found = self.find(*root, hint);
@@ -85,7 +87,7 @@ impl ClosestFaces {
         roots.iter().map(find).collect()
     }
 
-    /// The closest point to `root`. Any face as `hint` gives the same result.
+    /// The closest point to `root`. The result does not depend on the face given as `hint`.
     fn find(&self, root: [f32; 3], hint: u32) -> Candidate {
         if !root.iter().all(|x| x.is_finite()) {
             return Candidate { square: f64::INFINITY, face: 0, weights: [1.0, 0.0, 0.0] };
@@ -106,7 +108,7 @@ impl ClosestFaces {
         best.get()
     }
 
-    /// With the weights in the order of the listed triangle's corners.
+    /// Permutes the weights to the order of the listed triangle's corners.
     fn surface_point(&self, Candidate { face, weights, .. }: Candidate) -> SurfacePoint {
         let SortedFace { triangle, slots, .. } = self.faces[face as usize];
         let mut listed = [0.0; 3];
@@ -136,7 +138,7 @@ impl SortedFace {
         Aabb::new(exact.mins - by, exact.maxs + by)
     }
 
-    /// The closest point to `root`; `face` is the row of this face.
+    /// The closest point to `root`; `face` is the index of this face.
     fn closest(&self, face: u32, root: Vector) -> Candidate {
         let (projected, location) = self.corners.project_local_point_and_get_location(root, true);
         let Triangle { a, b, c } = self.corners;
@@ -146,7 +148,7 @@ impl SortedFace {
     }
 }
 
-/// Weights that rounding has brought below 0 or above 1, brought back.
+/// Clamps weights that rounding has brought below 0 or above 1.
 fn proper(weights: [f64; 3]) -> [f64; 3] {
     if weights.iter().all(|weight| (0.0..=1.0).contains(weight)) {
         return weights;
@@ -182,7 +184,7 @@ mod tests {
         (sphere.points.iter().map(|p| p.map(|x| x as f32)).collect(), sphere.triangles())
     }
 
-    /// Triangles that have nothing to do with each other.
+    /// Unconnected triangles.
     fn soup(count: u32) -> Mesh {
         let points = (0..3 * u64::from(count)).map(|k| some_point(3, k, 1.0)).collect();
         (points, (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect())
@@ -200,7 +202,7 @@ mod tests {
         ClosestFaces::new(points, triangles).unwrap().find_each(roots)
     }
 
-    /// Distance to a triangle: the least to its sides, or to its plane where the foot is inside.
+    /// Distance to a triangle: the smallest to its sides, or that to its plane if the projection is inside.
     fn distance(root: [f32; 3], corners: [[f32; 3]; 3]) -> f64 {
         let [a, b, c] = corners.map(|corner| to_f64(corner) - to_f64(root));
         let side = |a: DVec3, b: DVec3| {
@@ -241,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn of_equally_close_faces_the_one_listed_first_is_taken() {
+    fn the_first_of_equally_close_faces_is_taken() {
         // Two faces share the edge from 0 to 1; the root is off that edge, outside of both.
         for k in 0..500 {
             let [a, b, root] = [0, 1, 2].map(|which| some_point(10 + which, k, 1.0));
@@ -270,7 +272,7 @@ mod tests {
     fn the_hint_and_the_order_of_roots_change_nothing() {
         let mesh = sphere();
         let faces = ClosestFaces::new(&mesh.0, &mesh.1).unwrap();
-        // The centre is about as far from all faces.
+        // The centre is about equally far from all faces.
         let mut roots = some_roots(60);
         roots.push([0.0; 3]);
         for root in roots {

@@ -63,7 +63,7 @@ fn momentum(body: &SoftBody, state: &State) -> DVec3 {
     each.fold(DVec3::zeros(), |sum, (v, mass)| sum + DVec3::from(*v) * mass)
 }
 
-/// About the origin.
+/// Angular momentum about the origin.
 fn angular_momentum(body: &SoftBody, state: &State) -> DVec3 {
     let motion = state.positions.iter().zip(&state.velocities).zip(body.masses());
     motion.map(|((x, v), mass)| DVec3::from(*x).cross(&DVec3::from(*v)) * mass).sum()
