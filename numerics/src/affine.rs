@@ -5,8 +5,8 @@
 //! untouched; every row is independent, so any number of threads gives the same bits. Limit: a quaternion expresses
 //! rotations only, so orientations follow the rotation and neither scale nor mirror.
 
-use crate::vector::{DMat3, DQuat, DVec3, direction, to_f32, to_f64};
-use nalgebra::{Quaternion, Unit};
+use crate::vector::{DMat3, DQuat, DVec3, direction, to_f32, to_f64, unit_quaternion};
+use nalgebra::Quaternion;
 use rayon::prelude::*;
 
 /// Rows a thread takes at a time.
@@ -112,7 +112,7 @@ impl Affine {
 
 impl Linear {
     fn new(scale: DVec3, rotation: [f64; 4]) -> Self {
-        let rotation = Unit::new_unchecked(Quaternion::from(rotation));
+        let rotation = unit_quaternion(rotation);
         let rotated = DMat3::from_columns(&[DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| rotation * axis));
         let times_columns = |factors: DVec3| DMat3::from_fn(|row, k| rotated[(row, k)] * factors[k]);
         let [x, y, z] = scale.abs().into();

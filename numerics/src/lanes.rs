@@ -50,6 +50,26 @@ impl F32x16 {
     }
 }
 
+/// Sixteen `f64`, aligned as the widest vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct F64x16(pub [f64; LANES]);
+
+impl F64x16 {
+    /// 0 on every lane.
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// The value that `of` gives for each lane.
+    #[inline(always)]
+    pub fn from_fn(of: impl Fn(usize) -> f64) -> Self {
+        let mut out = Self::ZERO;
+        for lane in 0..LANES {
+            out.0[lane] = of(lane);
+        }
+        out
+    }
+}
+
 /// A vector or quaternion a lane, stored by component.
 pub type Lanes<const N: usize> = [F32x16; N];
 

@@ -33,17 +33,21 @@ pub fn to_f32(v: DVec3) -> Vec3 {
 
 /// The unit vector along `v`, for any length; `None` where it is zero or not finite.
 pub fn direction(v: DVec3) -> Option<DVec3> {
-    let largest = v.amax();
-    (largest > 0.0 && v.iter().all(|x| x.is_finite())).then(|| {
-        let v = v / largest;
-        v / v.norm()
-    })
+    let near_one = v / v.amax();
+    // NaN where a component is not finite, or all are 0.
+    let length = near_one.norm();
+    (length > 0.0).then(|| near_one / length)
 }
 
 /// The rotation by `radians` about `axis`, a unit vector; the same bits on any platform.
 pub fn rotation(axis: DVec3, radians: f64) -> DQuat {
     let (sine, cosine) = libm::sincos(0.5 * radians);
     Unit::new_unchecked(Quaternion::from_parts(cosine, axis * sine))
+}
+
+/// The rotation of the unit quaternion x, y, z, w.
+pub fn unit_quaternion(q: [f64; 4]) -> DQuat {
+    Unit::new_unchecked(Quaternion::from(q))
 }
 
 /// x, y, z.
@@ -95,6 +99,14 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 #[inline(always)]
 pub fn length(a: Vec3) -> f32 {
     dot(a, a).sqrt()
+}
+
+/// The unit vector along `a`, for any length; `None` where it is zero or not finite.
+pub fn unit(a: Vec3) -> Option<Vec3> {
+    let largest = largest(a);
+    let near_one = a.map(|x| x / largest);
+    let length = length(near_one);
+    (length > 0.0).then(|| near_one.map(|x| x / length))
 }
 
 /// The largest magnitude of a component.
@@ -211,6 +223,17 @@ mod tests {
             let along = dot(side, scale(v, power_of_two_to_one(largest(v)).0));
             assert!((length(side) - 1.0).abs() < 1e-6 && along.abs() < 1e-6, "{v:?} {side:?}");
         }
+    }
+
+    #[test]
+    fn unit_works_at_any_length_but_zero() {
+        for size in [1e-30, 1.0, 1e30] {
+            let [x, y, z] = unit([3.0 * size, 0.0, -4.0 * size]).unwrap();
+            assert!((x - 0.6).abs() < 1e-6 && y == 0.0 && (z + 0.8).abs() < 1e-6, "{size}");
+        }
+        assert_eq!(unit([0.0; 3]), None);
+        assert_eq!(unit([f32::NAN, 1.0, 0.0]), None);
+        assert_eq!(unit([1.0, f32::INFINITY, 0.0]), None);
     }
 
     #[test]

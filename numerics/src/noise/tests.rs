@@ -1,6 +1,7 @@
 //! Statistics of noise fields over many cells.
 
 use super::*;
+use crate::vector::DVec3;
 
 const KINDS: [NoiseKind; 3] = [NoiseKind::Perlin, NoiseKind::Billow, NoiseKind::Wavelet];
 
@@ -17,7 +18,7 @@ fn squared(value: f32) -> f64 {
 
 /// Correlation between component `a` and component `b` a `distance` further.
 fn correlation(field: &Field, a: usize, b: usize, distance: [f64; 3]) -> f64 {
-    let moved = |p: [f64; 3]| [p[0] + distance[0], p[1] + distance[1], p[2] + distance[2]];
+    let moved = |p: [f64; 3]| (DVec3::from(p) + DVec3::from(distance)).into();
     let product = average(|p| f64::from(field.at(p)[a]) * f64::from(field.at(moved(p))[b]));
     let squares = [a, b].map(|c| average(|p| squared(field.at(p)[c])));
     product / (squares[0] * squares[1]).sqrt()

@@ -200,7 +200,7 @@ fn an_icosphere_is_closed_and_its_volume_approaches_the_balls_by_order_two() {
         let sphere = icosphere(2.0, times);
         assert_eq!(sphere.counts.len(), 20 << (2 * times));
         assert_eq!((open_edges(&sphere), euler(&sphere)), (0, 2), "{times}");
-        assert!(sphere.points.iter().all(|p| (p.iter().map(|x| x * x).sum::<f64>().sqrt() - 2.0).abs() < 1e-12));
+        assert!(sphere.points.iter().all(|p| (DVec3::from(*p).norm() - 2.0).abs() < 1e-12));
     }
     let order = libm::log2(ball(3) / ball(4));
     assert!((order - 2.0).abs() < 0.05, "{order}");
