@@ -95,7 +95,7 @@ impl ClosestFaces {
         let root = parry(to_f64(root));
         let best = Cell::new(self.faces[hint as usize].closest(hint, root));
         // A box or face exactly as far as the best so far is visited, as it may hold a face listed before it.
-        let box_distance = |node: &BvhNode, _| square(outside(node, root)).next_down();
+        let box_distance = |node: &BvhNode, _| outside(node, root).length_squared().next_down();
         let face_distance = |face: u32, _| {
             let found = self.faces[face as usize].closest(face, root);
             let so_far = best.get();
@@ -129,7 +129,7 @@ impl SortedFace {
     }
 
     fn has_area(&self) -> bool {
-        square(self.corners.scaled_normal()) > 0.0
+        self.corners.scaled_normal().length_squared() > 0.0
     }
 
     fn thickened_box(&self) -> Aabb {
@@ -144,7 +144,7 @@ impl SortedFace {
         let Triangle { a, b, c } = self.corners;
         let point = projected.point.clamp(a.min(b).min(c), a.max(b).max(c));
         let weights = location.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
-        Candidate { square: square(point - root), face, weights: proper(weights) }
+        Candidate { square: (point - root).length_squared(), face, weights: proper(weights) }
     }
 }
 
@@ -161,10 +161,6 @@ fn proper(weights: [f64; 3]) -> [f64; 3] {
 /// How far `p` is outside of a node's box, axis by axis.
 fn outside(node: &BvhNode, p: Vector) -> Vector {
     (node.mins() - p).max(p - node.maxs()).max(Vector::ZERO)
-}
-
-fn square(v: Vector) -> f64 {
-    v.x * v.x + v.y * v.y + v.z * v.z
 }
 
 fn parry(v: DVec3) -> Vector {

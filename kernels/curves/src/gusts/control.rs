@@ -10,7 +10,7 @@
 
 use numerics::lanes::{F32x16, LANES, Lanes};
 use numerics::ramp::Ramp;
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
 /// The shape of a control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,8 +122,7 @@ impl Local {
         match self.shape {
             ControlShape::Sphere => {
                 for lane in 0..LANES {
-                    let [x, y, z] = [own[0].0[lane], own[1].0[lane], own[2].0[lane]];
-                    share.0[lane] = (x * x + y * y + z * z).sqrt();
+                    share.0[lane] = vector::length([own[0].0[lane], own[1].0[lane], own[2].0[lane]]);
                 }
             }
             ControlShape::Cubes => {

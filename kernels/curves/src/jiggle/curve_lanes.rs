@@ -4,29 +4,10 @@
 
 use super::response::Response;
 use super::rigid_step::RigidStep;
-use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
 use numerics::masked::Masked;
 use numerics::simd::kernel;
 use numerics::vector::Vec3;
-
-/// Sixteen `f64`, aligned as the widest vector.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct F64x16(pub(super) [f64; LANES]);
-
-impl F64x16 {
-    pub(super) const ZERO: Self = Self([0.0; LANES]);
-
-    /// Evaluates `of` for each lane.
-    #[inline(always)]
-    fn from_fn(of: impl Fn(usize) -> f64) -> Self {
-        let mut out = Self::ZERO;
-        for lane in 0..LANES {
-            out.0[lane] = of(lane);
-        }
-        out
-    }
-}
 
 /// Evaluates `of` for each axis. Not a loop: with mixed f32 and f64 the compiler would unroll the lanes inside it and
 /// vectorise over the three axes.

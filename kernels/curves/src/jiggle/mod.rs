@@ -19,8 +19,8 @@ pub use lengths::with_lengths_between;
 pub use response::{Drag, steps_to_forget};
 pub use rigid_step::RigidStep;
 
-use curve_lanes::{CurveLanes, CvState, F64x16, Responses, shape_lanes, step_lanes};
-use numerics::lanes::LANES;
+use curve_lanes::{CurveLanes, CvState, Responses, shape_lanes, step_lanes};
+use numerics::lanes::{F64x16, LANES};
 use numerics::masked::Masked;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;

@@ -18,7 +18,7 @@ mod point_group;
 pub use jacobian::{map_normals, map_orientations, map_vectors};
 use numerics::lanes::LANES;
 use numerics::simd::Path;
-use numerics::vector::DMat3;
+use numerics::vector::{DMat3, DVec3};
 use point_group::{PointGroup, Scratch, displace_group};
 use rayon::prelude::*;
 
@@ -82,7 +82,7 @@ impl<'a> DeformationLattice<'a> {
         basis: LatticeBasis,
         extrapolation: Extrapolation,
     ) -> Option<Self> {
-        let extent = [0, 1, 2].map(|k| to[k] - from[k]);
+        let extent: [f64; 3] = (DVec3::from(to) - DVec3::from(from)).into();
         let is_box = extent.iter().all(|x| *x > 0.0 && x.is_finite()) && divisions.iter().all(|cells| *cells > 0);
         let fits = control_points(divisions) == Some(offsets.len());
         (is_box && fits).then_some(Self { from, extent, divisions, offsets, basis, extrapolation })

@@ -1,16 +1,11 @@
 //! Sixteen points in a lattice, side by side.
 
 use super::{DeformationLattice, Extrapolation, LatticeBasis};
-use numerics::lanes::LANES;
+use numerics::lanes::{F64x16, LANES};
 use numerics::simd::kernel;
 use numerics::vector::DMat3;
 
-/// Sixteen `f64`, one for each point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
-pub(super) struct F64x16(pub(super) [f64; LANES]);
-
-const ZERO: F64x16 = F64x16([0.0; LANES]);
+const ZERO: F64x16 = F64x16::ZERO;
 
 /// Sixteen points: positions, displacements and their derivatives.
 #[derive(Clone)]

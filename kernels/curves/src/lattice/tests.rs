@@ -2,7 +2,7 @@
 
 use super::*;
 use numerics::random::Key;
-use numerics::vector::DVec3;
+use numerics::vector::to_f64;
 
 const UNIT: [[f64; 3]; 2] = [[0.0; 3], [1.0; 3]];
 const BASES: [LatticeBasis; 2] = [LatticeBasis::Trilinear, LatticeBasis::Bernstein];
@@ -67,8 +67,8 @@ fn with_two_divisions_the_centre_control_point_moves_the_centre_fully_or_by_an_e
 #[test]
 fn affine_offsets_give_the_affine_map_inside_and_extrapolated() {
     // Multiples of an eighth, so that f32 holds the offsets exactly: extrapolation would magnify rounding.
-    let map = [[0.375, -0.75, 0.25], [0.5, -0.375, 0.125], [-0.25, 0.625, 0.875]];
-    let affine = |p: [f64; 3]| [0, 1, 2].map(|row| 0.25 + map[row][0] * p[0] + map[row][1] * p[1] + map[row][2] * p[2]);
+    let map = DMat3::new(0.375, -0.75, 0.25, 0.5, -0.375, 0.125, -0.25, 0.625, 0.875);
+    let affine = |p: [f64; 3]| (map * DVec3::from(p)).map(|x| 0.25 + x).into();
     for divisions in [[1, 1, 1], [3, 2, 5], [4, 16, 2], [16, 1, 7]] {
         let offsets = offsets(divisions, affine);
         for basis in BASES {
@@ -78,21 +78,15 @@ fn affine_offsets_give_the_affine_map_inside_and_extrapolated() {
                     extrapolation == Extrapolation::Extend && divisions.iter().all(|cells| cells.is_power_of_two());
                 let range = if extends { [-3.0, 4.0] } else { [0.0, 1.0] };
                 let points = random(100, range);
-                let expected: Vec<[f64; 3]> = points
-                    .iter()
-                    .map(|p| {
-                        let p = p.map(f64::from);
-                        let by = affine(p);
-                        [0, 1, 2].map(|k| p[k] + by[k])
-                    })
-                    .collect();
+                let expected: Vec<[f64; 3]> =
+                    points.iter().map(|p| (to_f64(*p) + DVec3::from(affine(p.map(f64::from)))).into()).collect();
                 let out = lattice.deform(&points, true);
                 assert_close(&out.points, &expected, 1e-6);
                 for jacobian in out.jacobians {
                     for row in 0..3 {
                         for axis in 0..3 {
                             let own = f64::from(u8::from(row == axis));
-                            assert!((jacobian[(row, axis)] - own - map[row][axis]).abs() < 2e-6);
+                            assert!((jacobian[(row, axis)] - own - map[(row, axis)]).abs() < 2e-6);
                         }
                     }
                 }

@@ -3,6 +3,7 @@
 use super::*;
 use numerics::random::Key;
 use numerics::shapes;
+use numerics::vector::{DVec3, to_f64};
 
 /// A sphere of radius 1.
 fn sphere(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -92,9 +93,9 @@ fn roots_on_a_sphere_are_sheltered_on_its_lee_side_only() {
     let mesh = (points, triangles);
     for wind in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.3, 0.5, -0.8], [1.0, 1.0, 1.0]] {
         let found = shares(&roots, &mesh, &Shield { wind, ..STILL });
-        let length = wind.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let downwind = DVec3::from(wind).normalize();
         for (root, found) in roots.iter().zip(found) {
-            let lee: f64 = (0..3).map(|k| f64::from(root[k]) * wind[k] / length).sum();
+            let lee = to_f64(*root).dot(&downwind);
             if lee.abs() > 0.07 {
                 assert_eq!(found, f32::from(u8::from(lee > 0.0)), "{root:?} in {wind:?}");
             }

@@ -104,7 +104,7 @@ fn an_outline_begins_with_its_centre_and_axes_and_lies_on_its_boundaries() {
             assert!(points.len() >= least);
             for p in &points[AXIS_ROWS..] {
                 let size = match shape {
-                    ControlShape::Sphere => p.iter().map(|x| x * x).sum::<f32>().sqrt(),
+                    ControlShape::Sphere => vector::length(*p),
                     ControlShape::Cubes => p.iter().fold(0.0_f32, |most, x| most.max(x.abs())),
                 };
                 assert!(

@@ -8,6 +8,7 @@ mod spheres;
 use super::*;
 use numerics::ramp::Interpolation;
 use numerics::random::Key;
+use numerics::vector;
 
 /// The default: smooth from 1 to 0.
 fn smooth() -> Ramp {

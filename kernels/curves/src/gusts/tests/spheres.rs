@@ -62,8 +62,7 @@ fn noise_keeps_the_centre_and_stays_within_the_sphere() {
         assert!(dented.reached > 0 && dented.reached < round.reached);
         // The boundary is at 1 − noise or farther.
         let least = 0.999 * (1.0 - noise);
-        let inside =
-            points.iter().zip(&dented.values).filter(|(p, _)| p.iter().map(|x| x * x).sum::<f32>() < least * least);
+        let inside = points.iter().zip(&dented.values).filter(|(p, _)| vector::length(**p) < least);
         assert!(inside.into_iter().all(|(_, value)| *value > 0.0));
         let centre = evaluate(&[[0.0; 3]], &only(&falloff, &[Sphere { noise, ..sphere([0.0; 3], 1.0) }]));
         assert_eq!(centre.values, [1.0]);

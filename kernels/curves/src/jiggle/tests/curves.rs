@@ -5,7 +5,7 @@ use numerics::masked::Masked;
 use numerics::vector;
 
 fn distance(a: Vec3, b: Vec3) -> f64 {
-    (0..3).map(|k| f64::from(a[k]) - f64::from(b[k])).map(|d| d * d).sum::<f64>().sqrt()
+    (to_f64(a) - to_f64(b)).norm()
 }
 
 /// Spacing of f32 positions of this size.
