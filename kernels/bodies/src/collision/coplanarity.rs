@@ -197,7 +197,7 @@ mod tests {
     use super::*;
 
     /// Sign changes of (t − a)(t − b)(t − c), as the determinant of a diagonal matrix.
-    fn product(roots: [f64; 3]) -> Vec<(f64, bool)> {
+    fn of_roots(roots: [f64; 3]) -> Vec<(f64, bool)> {
         let at = |t: f64| {
             let [a, b, c] = roots.map(|root| t - root);
             [DVec3::x() * a, DVec3::y() * b, DVec3::z() * c]
@@ -207,12 +207,12 @@ mod tests {
 
     #[test]
     fn a_product_of_three_linear_factors_changes_sign_at_each_root() {
-        let found = product([0.2, 0.5, 0.9]);
+        let found = of_roots([0.2, 0.5, 0.9]);
         assert_eq!(found.len(), 3);
         for ((t, above), (want, side)) in found.into_iter().zip([(0.2, false), (0.5, true), (0.9, false)]) {
             assert!((t - want).abs() < 1e-14 && above == side, "{t} is not {want}");
         }
-        assert_eq!(product([-1.0, 2.0, 3.0]).len(), 0);
-        assert_eq!(product([0.3, 7.0, -9.0]).len(), 1);
+        assert_eq!(of_roots([-1.0, 2.0, 3.0]).len(), 0);
+        assert_eq!(of_roots([0.3, 7.0, -9.0]).len(), 1);
     }
 }

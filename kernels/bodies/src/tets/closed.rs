@@ -1,6 +1,6 @@
 //! A surface that has been verified: closed, consistently oriented, not self-intersecting.
 
-use numerics::vector::to_f64;
+use numerics::vector::{DVec3, to_f64};
 use rayon::prelude::*;
 
 use super::edges::edges;
@@ -110,8 +110,8 @@ impl ClosedSurface {
     pub(super) fn longest_side(&self, triangle: u32) -> f64 {
         let corners = self.shells.triangles[triangle as usize].map(|corner| self.grid_points[corner as usize]);
         let square = |k: usize| {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            [0, 1, 2].map(|axis| f64::from(a[axis] - b[axis])).iter().map(|d| d * d).sum::<f64>()
+            let [a, b] = [k, (k + 1) % 3].map(|k| DVec3::from(corners[k].map(f64::from)));
+            (a - b).norm_squared()
         };
         square(0).max(square(1)).max(square(2)).sqrt()
     }

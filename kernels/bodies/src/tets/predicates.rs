@@ -4,6 +4,7 @@
 //! Differences have 24 bits, 2 × 2 minors 49 and squared distances 50, all exact in f64. The rounding of later
 //! operations is bounded, and where the bound is not decisive, 128-bit integers are used.
 
+use nalgebra::Vector3;
 use numerics::vector::DVec3;
 
 /// A grid point as f64.
@@ -31,9 +32,7 @@ pub(crate) fn orient(a: &At, b: &At, c: &At, d: &At) -> f64 {
 #[cold]
 fn orient_exactly(b: At, c: At, d: At) -> f64 {
     let [b, c, d] = [b, c, d].map(whole);
-    let minor = |i: usize, j: usize| i128::from(c[i] * d[j] - c[j] * d[i]);
-    let term = |i: usize, j: usize, k: usize| i128::from(b[i]) * minor(j, k);
-    (term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1)) as f64
+    determinant(&b, &c, &d) as f64
 }
 
 /// Positive if `e` is inside the circumsphere of the positive tet `abcd`, 0 if it is on it.
@@ -61,16 +60,18 @@ fn in_small_sphere(rows: &[At; 4], det: f64) -> f64 {
 #[cold]
 fn in_sphere_exactly(rows: &[At; 4]) -> f64 {
     let [a, b, c, d] = rows.map(whole);
-    let minor = |p: &[i64; 3], q: &[i64; 3]| i128::from(p[0] * q[1] - q[0] * p[1]);
-    let volume = |p: &[i64; 3], q: &[i64; 3], r: &[i64; 3]| {
-        i128::from(p[2]) * minor(q, r) - i128::from(q[2]) * minor(p, r) + i128::from(r[2]) * minor(p, q)
-    };
-    let square = |p: &[i64; 3]| i128::from(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-    let det = square(&a) * volume(&b, &c, &d) - square(&b) * volume(&a, &c, &d) + square(&c) * volume(&a, &b, &d)
-        - square(&d) * volume(&a, &b, &c);
+    let square = |p: &Vector3<i64>| i128::from(p.dot(p));
+    let det = square(&a) * determinant(&b, &c, &d) - square(&b) * determinant(&a, &c, &d)
+        + square(&c) * determinant(&a, &b, &d)
+        - square(&d) * determinant(&a, &b, &c);
     det as f64
 }
 
-fn whole(p: At) -> [i64; 3] {
-    [p.x as i64, p.y as i64, p.z as i64]
+/// p·(q×r), exactly.
+fn determinant(p: &Vector3<i64>, q: &Vector3<i64>, r: &Vector3<i64>) -> i128 {
+    p.map(i128::from).dot(&q.cross(r).map(i128::from))
+}
+
+fn whole(p: At) -> Vector3<i64> {
+    p.map(|x| x as i64)
 }

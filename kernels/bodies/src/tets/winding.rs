@@ -5,6 +5,8 @@
 //! integers; a ray through an edge crosses exactly one of its two triangles, as if it were displaced slightly towards
 //! +x and even less towards +y.
 
+use nalgebra::Vector3;
+
 use super::grid::{GridPoint, SIDE};
 
 /// Triangles by the squares they cover in x and y.
@@ -110,9 +112,8 @@ fn passed(corners: [GridPoint; 3], sum: [i64; 3], parts: i64) -> i32 {
     if turn == 0 {
         return 0;
     }
-    let [a, b, c] = corners.map(|corner| corner.map(i64::from));
-    let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
-    let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let before: i128 = (0..3).map(|k| i128::from(normal[k]) * i128::from(to[0][k])).sum();
+    let [a, b, c] = corners.map(|corner| Vector3::from(corner.map(i64::from)));
+    let normal = (b - a).cross(&(c - a));
+    let before = normal.map(i128::from).dot(&Vector3::from(to[0].map(i128::from)));
     if i128::from(turn) * before < 0 { turn } else { 0 }
 }

@@ -70,7 +70,7 @@ fn cospherical_points_are_delaunay_with_and_without_the_centre() {
     for x in -61..=61 {
         for y in -61..=61_i32 {
             for z in -61..=61_i32 {
-                if x * x + y * y + z * z == radius {
+                if [x, y, z].iter().map(|x| x * x).sum::<i32>() == radius {
                     grid_points.push([x + 61, y + 61, z + 61]);
                 }
             }

@@ -8,9 +8,10 @@ mod surfaces;
 use super::grid::GridPoint;
 use super::predicates::{in_sphere, orient};
 use super::{Delaunay, NONE};
+use nalgebra::Vector3;
 use numerics::random::Key;
 use numerics::shapes;
-use numerics::vector::DVec3;
+use numerics::vector::{self, DVec3};
 
 fn at(grid_point: GridPoint) -> DVec3 {
     DVec3::from(grid_point.map(f64::from))
@@ -24,11 +25,10 @@ fn random(count: u64, side: i32, seed: u64) -> Vec<GridPoint> {
 
 /// Six times the volume of all tets.
 fn volume(grid_points: &[GridPoint], tets: &[[u32; 4]]) -> i128 {
-    let whole = |corner: u32| grid_points[corner as usize].map(i128::from);
+    let whole = |corner: u32| Vector3::from(grid_points[corner as usize].map(i128::from));
     let six = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(whole);
-        let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-        b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0])
+        (b - a).dot(&(c - a).cross(&(d - a)))
     };
     tets.iter().map(six).sum()
 }
@@ -119,7 +119,7 @@ impl Mesh {
     }
 
     fn moved(&self, by: [f32; 3]) -> Self {
-        let points = self.points.iter().map(|p| [p[0] + by[0], p[1] + by[1], p[2] + by[2]]).collect();
+        let points = self.points.iter().map(|p| vector::add(*p, by)).collect();
         Self { points, ..self.clone() }
     }
 

@@ -84,7 +84,8 @@ fn true_side(grid_points: &[GridPoint; 4]) -> i32 {
 fn true_sphere(grid_points: &[GridPoint; 5]) -> i32 {
     let row = |p: &GridPoint| {
         let [x, y, z] = p.map(i64::from);
-        [x, y, z, x * x + y * y + z * z, 1].map(Big::of).to_vec()
+        let square: i64 = [x, y, z].iter().map(|x| x * x).sum();
+        [x, y, z, square, 1].map(Big::of).to_vec()
     };
     -Big::determinant(&grid_points.iter().map(row).collect::<Vec<_>>()).sign()
 }
@@ -139,9 +140,9 @@ fn nearly_coplanar_and_cospherical_points_agree_with_the_oracle() {
         let draw = |n: u64| key.of(k).of(n).f64();
         let scale = [f64::from(SIDE), 1e5, 300.0][(k % 3) as usize];
         let on_sphere = |n: u64| {
-            let p: [f64; 3] = std::array::from_fn(|axis| draw(10 * n + axis as u64) - 0.5);
-            let length = p.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-3);
-            p.map(|x| (scale * (0.5 + 0.49 * x / length)) as i32)
+            let p = DVec3::from([0, 1, 2].map(|axis| draw(10 * n + axis) - 0.5));
+            let length = p.norm().max(1e-3);
+            p.map(|x| (scale * (0.5 + 0.49 * x / length)) as i32).into()
         };
         let on_plane = |n: u64| {
             let (u, v) = (draw(10 * n), draw(10 * n + 1));

@@ -3,6 +3,7 @@
 use super::super::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use super::{Mesh, ball, block, joined, turned_block};
 use numerics::random::Key;
+use numerics::vector::{DVec3, to_f64};
 
 fn closed(mesh: &Mesh) -> ClosedSurface {
     let starts = mesh.starts();
@@ -17,9 +18,8 @@ fn fill(mesh: &Mesh, spacing: f64, interior: bool) -> (ClosedSurface, TetMesh) {
 }
 
 fn volume(solid: &TetMesh, tet: &[u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|corner| solid.points[corner as usize].map(f64::from));
-    let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-    (b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0])) / 6.0
+    let [a, b, c, d] = tet.map(|corner| to_f64(solid.points[corner as usize]));
+    (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
 }
 
 /// Properties of every filled surface.
@@ -117,7 +117,7 @@ fn a_cube_has_its_volume_and_points_at_the_spacing() {
     let lengths: Vec<f64> = edges
         .map(|(a, b)| {
             let (a, b) = (solid.points[a as usize], solid.points[b as usize]);
-            (0..3).map(|k| f64::from(a[k] - b[k]) * f64::from(a[k] - b[k])).sum::<f64>().sqrt()
+            (to_f64(a) - to_f64(b)).norm()
         })
         .collect();
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
@@ -148,8 +148,8 @@ fn a_ball_in_a_ball_is_a_cavity_exact_to_its_facets() {
     assert!(solid.sides[n..closed.points.len()].iter().all(|side| *side == ShellSide::Inner));
     // No tet crosses the cavity.
     assert!(solid.tets.iter().all(|tet| {
-        let middle = [0, 1, 2].map(|k| tet.iter().map(|c| f64::from(solid.points[*c as usize][k])).sum::<f64>() / 4.0);
-        middle.iter().map(|x| x * x).sum::<f64>().sqrt() > 0.57
+        let middle = tet.iter().map(|corner| to_f64(solid.points[*corner as usize])).sum::<DVec3>() / 4.0;
+        middle.norm() > 0.57
     }));
 }
 
