@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use bodies::mass_spring;
 use engine::prelude::*;
+use numerics::vector::{DVec3, to_f64};
 
 use super::GoalOn;
 use super::setup::{SimulationSetup, StartInputs};
@@ -82,7 +83,7 @@ impl<'a> Goals<'a> {
             {
                 let to = self.place(&now, particle, point);
                 let from = before.as_ref().map_or(to, |before| self.place(before, particle, point));
-                let between = [from, to];
+                let between = [from.into(), to.into()];
                 out.push(mass_spring::GoalSpring {
                     particle: particle as u32,
                     between,
@@ -101,11 +102,11 @@ impl<'a> Goals<'a> {
         }
     }
 
-    fn place(&self, sample: &GoalSample<'_>, particle: usize, point: usize) -> [f64; 3] {
-        let wide = |shape: &[[f32; 3]]| shape[point].map(f64::from);
-        let from = sample.from.map_or(self.setup.rest[particle], wide);
-        let to = wide(sample.to);
-        if sample.share >= 1.0 { to } else { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * sample.share) }
+    fn place(&self, sample: &GoalSample<'_>, particle: usize, point: usize) -> DVec3 {
+        let of = |shape: &[[f32; 3]]| to_f64(shape[point]);
+        let from = sample.from.map_or(self.setup.rest[particle].into(), of);
+        let to = of(sample.to);
+        if sample.share >= 1.0 { to } else { from + (to - from) * sample.share }
     }
 
     /// The target of a wire's body at a frame; `None` if it has no goals, and after its release.
@@ -140,7 +141,7 @@ impl<'a> Goals<'a> {
             let Some(now) = self.sample(wire, frame) else { continue };
             let shape = shape.get_or_insert_with(|| vec![[f64::NAN; 3]; self.setup.rest.len()]);
             for (point, particle) in particles.clone().enumerate() {
-                shape[particle] = self.place(&now, particle, point);
+                shape[particle] = self.place(&now, particle, point).into();
             }
         }
         shape
@@ -180,10 +181,7 @@ impl<'a> Goals<'a> {
             for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
             {
                 let to = self.place(&now, particle, point);
-                sum += (0..3)
-                    .map(|k| (to[k] - positions[particle][k]) * (to[k] - positions[particle][k]))
-                    .sum::<f64>()
-                    .sqrt();
+                sum += (to - DVec3::from(positions[particle])).norm();
                 count += 1.0;
             }
         }

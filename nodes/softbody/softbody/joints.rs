@@ -5,6 +5,7 @@
 //! within the radius such that each lies outside the other's surface, or, where surfaces overlap, each inside.
 
 use bodies::mass_spring::BodySpring;
+use numerics::vector::DVec3;
 
 /// The most springs that start from one particle.
 const MOST: usize = 4;
@@ -30,7 +31,7 @@ pub(super) fn couple(with: &Couple<'_>) -> Vec<BodySpring> {
         return Vec::new();
     }
     let normals = normals(with);
-    let at = |particle: u32| with.points[particle as usize];
+    let at = |particle: u32| DVec3::from(with.points[particle as usize]);
     // Sorted by x, so that particles close in x are close in the list.
     let mut row: Vec<u32> = with.triangles.as_flattened().to_vec();
     row.sort_unstable();
@@ -45,14 +46,13 @@ pub(super) fn couple(with: &Couple<'_>) -> Vec<BodySpring> {
             if (q[0] - p[0]).abs() > reach {
                 return false;
             }
-            let way: [f64; 3] = std::array::from_fn(|k| q[k] - p[k]);
-            let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
-            let far = dot(&way, &way).sqrt();
+            let towards = q - p;
+            let distance = towards.norm();
             let [n, m] = [*particle, other].map(|one| normals[one as usize]);
-            let facing = if far > 0.0 { dot(&n, &way) * dot(&m, &way) < 0.0 } else { dot(&n, &m) < 0.0 };
-            if far <= reach && facing && with.parts[*particle as usize] != with.parts[other as usize] {
-                let rank = nearest.partition_point(|known| *known <= (far, other));
-                nearest.insert(rank, (far, other));
+            let facing = if distance > 0.0 { n.dot(&towards) * m.dot(&towards) < 0.0 } else { n.dot(&m) < 0.0 };
+            if distance <= reach && facing && with.parts[*particle as usize] != with.parts[other as usize] {
+                let rank = nearest.partition_point(|known| *known <= (distance, other));
+                nearest.insert(rank, (distance, other));
                 nearest.truncate(MOST);
             }
             true
@@ -69,22 +69,19 @@ pub(super) fn couple(with: &Couple<'_>) -> Vec<BodySpring> {
             ends: *ends,
             stiffness: with.stiffness,
             damping: with.damping * with.stiffness,
-            length: (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum::<f64>().sqrt(),
+            length: (q - p).norm(),
         }
     };
     pairs.iter().map(spring).collect()
 }
 
 /// Normals of the particles, by the area of their triangles.
-fn normals(with: &Couple<'_>) -> Vec<[f64; 3]> {
-    let mut normals = vec![[0.0; 3]; with.points.len()];
+fn normals(with: &Couple<'_>) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::zeros(); with.points.len()];
     for corners in with.triangles {
-        let [a, b, c] = corners.map(|corner| with.points[corner as usize]);
-        let (p, q): ([f64; 3], [f64; 3]) = (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-        for corner in corners {
-            let sum = &mut normals[*corner as usize];
-            (0..3).for_each(|k| sum[k] += p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
-        }
+        let [a, b, c] = corners.map(|corner| DVec3::from(with.points[corner as usize]));
+        let twice_area = (b - a).cross(&(c - a));
+        corners.iter().for_each(|corner| normals[*corner as usize] += twice_area);
     }
     normals
 }

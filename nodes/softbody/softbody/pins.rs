@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bodies::mass_spring::{GoalSpring, Pin};
 use engine::prelude::*;
+use numerics::vector::{DVec3, to_f64};
 
 use crate::shared::attributes::{PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH};
 
@@ -13,7 +14,7 @@ pub(super) struct PinBinding {
     wire: usize,
     point: usize,
     /// From the pin to the particle at the start, metres.
-    offset: [f64; 3],
+    offset: DVec3,
 }
 
 /// Binds each particle to the nearest pin within whose radius it lies at the start.
@@ -22,12 +23,14 @@ pub(super) fn bind_pins(wires: &[Arc<Geometry>], rest: &[[f64; 3]]) -> Result<Ve
     for (wire, geometry) in wires.iter().enumerate() {
         let pins = geometry.require(Kind::Points)?;
         let radii = needed(pins, wire, PIN_RADIUS)?;
-        for (point, (place, radius)) in pins.positions().iter().zip(radii).enumerate() {
+        for (point, (pin, radius)) in pins.positions().iter().zip(radii).enumerate() {
             for (particle, at) in rest.iter().enumerate() {
-                let offset: [f64; 3] = std::array::from_fn(|k| at[k] - f64::from(place[k]));
-                let far = offset.iter().map(|x| x * x).sum::<f64>().sqrt();
-                if far <= f64::from(*radius) && nearest[particle].as_ref().is_none_or(|(least, _)| far < *least) {
-                    nearest[particle] = Some((far, PinBinding { particle: particle as u32, wire, point, offset }));
+                let offset = DVec3::from(*at) - to_f64(*pin);
+                let distance = offset.norm();
+                if distance <= f64::from(*radius)
+                    && nearest[particle].as_ref().is_none_or(|(least, _)| distance < *least)
+                {
+                    nearest[particle] = Some((distance, PinBinding { particle: particle as u32, wire, point, offset }));
                 }
             }
         }
@@ -58,7 +61,7 @@ pub(super) fn pull(
                 Error::refused(format!("`pins` {} no longer has the point {}", binding.wire, binding.point))
                     .hint("pins need as many points, in the same order, at every frame")
             })?;
-            Ok(std::array::from_fn(|k| f64::from(at[k]) + binding.offset[k]))
+            Ok((to_f64(*at) + binding.offset).into())
         };
         let between = [place(before)?, place(now)?];
         let [strengths, releases] = &settings[binding.wire];

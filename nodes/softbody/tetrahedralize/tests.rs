@@ -1,6 +1,7 @@
 use super::*;
 use conformance::{Bench, BenchResult, bench, conformance};
 use numerics::shapes;
+use numerics::vector::to_f64;
 
 fn mesh(shape: &shapes::Polygons) -> Component {
     let points = shape.points.iter().map(|point| point.map(|x| x as f32)).collect();
@@ -20,12 +21,10 @@ fn tets(out: &BenchResult) -> &Component {
 }
 
 fn volume(tets: &Component, which: impl Fn(usize) -> bool) -> f64 {
-    let at = |corner: u32| tets.positions()[corner as usize].map(f64::from);
+    let at = |corner: u32| to_f64(tets.positions()[corner as usize]);
     let one = |corners: &[u32; 4]| {
         let [a, b, c, d] = corners.map(at);
-        let [b, c, d] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-        (b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0]))
-            / 6.0
+        (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
     };
     tets.tet_corners().iter().enumerate().filter(|(tet, _)| which(*tet)).map(|(_, corners)| one(corners)).sum()
 }
