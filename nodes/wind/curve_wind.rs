@@ -217,6 +217,7 @@ mod tests {
     use super::*;
     use conformance::{Bench, BenchResult, bench, conforms};
     use engine::graph::Scene;
+    use numerics::vector;
 
     /// A straight curve up from the origin, of `segments` segments and length 1.
     fn upright(segments: usize) -> Geometry {
@@ -270,9 +271,8 @@ mod tests {
             let out = calm(upright(segments)).set(MODE, Mode::ResolutionFree).cook();
             out.curves().positions()[segments]
         };
-        let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f32>().sqrt();
         let fine = tip(1024);
-        let [coarse, finer] = [8, 16].map(|segments| distance(tip(segments), fine));
+        let [coarse, finer] = [8, 16].map(|segments| vector::length(vector::sub(tip(segments), fine)));
         assert!(coarse < 1e-2, "{coarse}");
         assert!((3.0..5.0).contains(&(coarse / finer)), "order 2: {coarse} to {finer}");
     }
@@ -335,7 +335,7 @@ mod tests {
         let windy = bench(&NODE).input(CURVES, field(4)).set(SCROLL, 2.0);
         let shape = |out: &BenchResult, curve: usize| {
             let cvs = &out.curves().positions()[out.curves().runs().range(curve)];
-            cvs.iter().map(|cv| std::array::from_fn::<f32, 3, _>(|k| cv[k] - cvs[0][k])).collect::<Vec<_>>()
+            cvs.iter().map(|cv| vector::sub(*cv, cvs[0])).collect::<Vec<_>>()
         };
         let (early, late) = (windy.clone().at(10.0).cook(), windy.at(34.0).cook());
         for (a, b) in shape(&early, 0).iter().zip(shape(&late, 2)) {

@@ -172,7 +172,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
     let distance = cx.get(DISTANCE);
     let distance = if distance > 0.0 { distance } else { f64::from(cx.get(RADIUS_RANGE).high) };
     let area = cx.get(AREA).map(f64::from);
-    let [_, slow, fast] = cx.integrals(cx.frame());
+    let [_, slow, fast] = cx.integrals(cx.frame()).map(DVec3::from);
     // Gusts that start within the same frame are launched by the same wind.
     let mut known = BTreeMap::new();
     let sphere = |gust: &Gust| {
@@ -181,10 +181,9 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
             let launch = Launch::at(cx, whole);
             (Plane::new(bounds, launch.wind, distance, area), launch)
         });
-        let from = plane.at(gust.position);
-        let travelled = launch.travelled([slow, fast], gust);
+        let from = DVec3::from(plane.at(gust.position));
         Sphere {
-            centre: std::array::from_fn(|axis| from[axis] + travelled[axis]),
+            centre: (from + launch.travelled([slow, fast], gust)).into(),
             radius: gust.radius,
             strength: gust.strength,
             noise: gust.noise,
@@ -199,9 +198,9 @@ struct Launch {
     /// Its mean direction over the frame before, of length 1.
     wind: [f64; 3],
     /// ∫ speed · wind dt up to the whole frame, at the lower and the upper end of the range of speeds.
-    upto: [[f64; 3]; 2],
+    upto: [DVec3; 2],
     /// The same over only the frame before.
-    step: [[f64; 3]; 2],
+    step: [DVec3; 2],
 }
 
 /// If the mean of unit directions is shorter than this, it has no reliable direction: the wind has reversed.
@@ -209,35 +208,29 @@ const REVERSED: f64 = 0.1;
 
 impl Launch {
     fn at(cx: &FrameCx, frame: i64) -> Self {
-        let [toward, slow, fast] = cx.integrals(Frame::whole(frame));
-        let [_, slow_before, fast_before] = cx.integrals(Frame::whole(frame - 1));
+        let [toward, slow, fast] = cx.integrals(Frame::whole(frame)).map(DVec3::from);
+        let [_, slow_before, fast_before] = cx.integrals(Frame::whole(frame - 1)).map(DVec3::from);
         // Where the wind reversed within the frame before, its mean over more frames decides.
-        let mean = |frames: i64| -> [f64; 3] {
+        let mean = |frames: i64| {
             let [before] = cx.integrals(Frame::whole(frame - frames));
-            difference(toward, before).map(|x| x * cx.fps() / frames as f64)
+            (toward - DVec3::from(before)) * cx.fps() / frames as f64
         };
-        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| DVec3::from(*mean).norm() > REVERSED);
+        let wind = [1, 2, 4, 8, 16].into_iter().map(mean).find(|mean| mean.norm() > REVERSED);
         Self {
-            wind: wind.map_or_else(|| direction(cx.params()), unit_direction),
+            wind: wind.map_or_else(|| direction(cx.params()), |mean| unit_direction(mean.into())),
             upto: [slow, fast],
-            step: [difference(slow, slow_before), difference(fast, fast_before)],
+            step: [slow - slow_before, fast - fast_before],
         }
     }
 
     /// How far a gust has travelled, metres along each axis, given the integrals up to now. Within the frame in which
     /// it starts, the wind is taken to be that of the frame before: exact where it is constant, otherwise a constant
     /// offset of its start.
-    fn travelled(&self, now: [[f64; 3]; 2], gust: &Gust) -> [f64; 3] {
+    fn travelled(&self, now: [DVec3; 2], gust: &Gust) -> DVec3 {
         let share = gust.start - gust.start.floor();
-        let [slow, fast]: [[f64; 3]; 2] = std::array::from_fn(|end| {
-            std::array::from_fn(|axis| now[end][axis] - self.upto[end][axis] - share * self.step[end][axis])
-        });
-        std::array::from_fn(|axis| slow[axis] + (fast[axis] - slow[axis]) * gust.speed)
+        let [slow, fast] = [0, 1].map(|end| now[end] - self.upto[end] - self.step[end] * share);
+        slow + (fast - slow) * gust.speed
     }
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|axis| a[axis] - b[axis])
 }
 
 /// The wind's direction, of length 1.

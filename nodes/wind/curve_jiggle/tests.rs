@@ -2,6 +2,7 @@ use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
 use engine::graph::Scene;
 use engine::param::{ParamType, Source};
+use numerics::vector::{DVec3, to_f64};
 
 /// A field of upright curves of 5 CVs, 1 m long, 3 m apart.
 fn field() -> Geometry {
@@ -36,11 +37,9 @@ fn blown(frame: Frame) -> Geometry {
 /// Rolling and travelling: a rotation about a slanting axis, and a translation.
 fn rolled(t: f64, p: [f64; 3]) -> [f64; 3] {
     let (s, c) = libm::sincos(0.31 * t);
-    let n = [2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0];
-    let along = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
-    let side = [n[1] * p[2] - n[2] * p[1], n[2] * p[0] - n[0] * p[2], n[0] * p[1] - n[1] * p[0]];
-    let way = [0.1 * t, libm::sin(0.5 * t), 0.0];
-    std::array::from_fn(|k| p[k] * c + side[k] * s + n[k] * along * (1.0 - c) + way[k])
+    let (p, axis) = (DVec3::from(p), DVec3::new(2.0, -1.0, 2.0) / 3.0);
+    let travelled = DVec3::new(0.1 * t, libm::sin(0.5 * t), 0.0);
+    (p * c + axis.cross(&p) * s + axis * axis.dot(&p) * (1.0 - c) + travelled).into()
 }
 
 fn jiggled() -> Bench {
@@ -63,9 +62,7 @@ fn farthest(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
 
 /// Largest difference of a segment's length, of curves about 1 m long.
 fn length_error(a: &Component, b: &Component) -> f64 {
-    let length = |pair: &[[f32; 3]]| {
-        (0..3).map(|k| f64::from(pair[1][k]) - f64::from(pair[0][k])).map(|d| d * d).sum::<f64>().sqrt()
-    };
+    let length = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
     let curve = |range: std::ops::Range<usize>| {
         let pairs = a.positions()[range.clone()].windows(2).zip(b.positions()[range].windows(2));
         pairs.map(|(a, b)| (length(a) - length(b)).abs()).fold(0.0, f64::max)
@@ -120,12 +117,10 @@ fn lengths_and_roots_are_kept_between_frames_too() {
             let [from, to] = [frame.floor(), frame.floor().plus(1)].map(blown);
             let [from, to] = [&from, &to].map(|near| near.curves().unwrap().positions());
             let share = frame.number().fract() as f32;
-            let longest = |pair: &[[f32; 3]]| {
-                (0..3).map(|k| f64::from(pair[1][k]) - f64::from(pair[0][k])).map(|d| d * d).sum::<f64>().sqrt()
-            };
+            let length = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
             for curve in out.curves().runs().ranges() {
                 for k in curve.start..curve.end - 1 {
-                    let [a, b, c] = [from, to, out.curves().positions()].map(|points| longest(&points[k..k + 2]));
+                    let [a, b, c] = [from, to, out.curves().positions()].map(|points| length(&points[k..k + 2]));
                     assert!((c - (a + (b - a) * f64::from(share))).abs() < 1e-6, "frame {frame}");
                 }
             }

@@ -9,6 +9,7 @@
 use curves::gusts::{AXIS_ROWS, Control, ControlShape};
 use engine::prelude::*;
 use numerics::ramp::{Interpolation, Ramp};
+use numerics::vector::to_f64;
 
 pub(crate) const POINTS: Attr<i32> = Attr::point("gust_points");
 pub(crate) const SHAPE: Attr<i32> = Attr::point("gust_shape");
@@ -91,12 +92,9 @@ pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> 
         let ramp = ramp(&keys[first..first + count]).map_err(|error| {
             foreign(format!("`gust_ramp` from point {first} of wire {wire} of `controls` is not a ramp: {error}"))
         })?;
-        let centre = at[first].map(f64::from);
-        let axes = [1, 2, 3].map(|axis| {
-            let end = at[first + axis].map(f64::from);
-            [0, 1, 2].map(|k| end[k] - centre[k])
-        });
-        controls.push(Control::new(shape, centre, axes, f64::from(outers[first]), ramp, strengths[first]));
+        let centre = to_f64(at[first]);
+        let axes = [1, 2, 3].map(|axis| (to_f64(at[first + axis]) - centre).into());
+        controls.push(Control::new(shape, centre.into(), axes, f64::from(outers[first]), ramp, strengths[first]));
         first += count;
     }
     Ok(controls)
