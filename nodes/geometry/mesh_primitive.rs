@@ -110,21 +110,20 @@ mod tests {
     use super::*;
     use conformance::{bench, conforms};
     use engine::param::Choice;
+    use numerics::vector::{self, DVec3, to_f64};
 
     const SOLIDS: [Solid; 7] =
         [Solid::Box, Solid::Sphere, Solid::Cylinder, Solid::Capsule, Solid::Torus, Solid::Bowl, Solid::Plate];
 
     fn extent(mesh: &Component) -> [f32; 3] {
         let [low, high] = mesh.bounds().unwrap();
-        [0, 1, 2].map(|k| high[k] - low[k])
+        vector::sub(high, low)
     }
 
     /// Volume inside the faces, positive where they look outwards.
     fn volume(mesh: &Component) -> f64 {
-        let at = |corner: u32| mesh.positions()[corner as usize].map(f64::from);
-        let wedge = |[a, b, c]: [[f64; 3]; 3]| {
-            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-        };
+        let at = |corner: u32| to_f64(mesh.positions()[corner as usize]);
+        let wedge = |[a, b, c]: [DVec3; 3]| a.dot(&b.cross(&c));
         let fan = |face: &[u32]| (2..face.len()).map(|k| wedge([face[0], face[k - 1], face[k]].map(at))).sum::<f64>();
         mesh.faces().unwrap().iter().map(fan).sum::<f64>() / 6.0
     }

@@ -146,10 +146,7 @@ fn one_guide_per_hair_makes_clumps() {
     // Each hair then has the length of one of the guides, up to rounding.
     let guides = scattered(ball(), 20.0);
     let whole = |cvs: &[Point]| -> f64 {
-        let step = |pair: &[Point]| {
-            let along = [0, 1, 2].map(|k| f64::from(pair[1][k] - pair[0][k]));
-            along.iter().map(|x| x * x).sum::<f64>().sqrt()
-        };
+        let step = |pair: &[Point]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
         cvs.windows(2).map(step).sum()
     };
     let lengths: Vec<f64> = guides.positions().chunks(5).map(whole).collect();

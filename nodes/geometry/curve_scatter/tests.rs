@@ -2,7 +2,7 @@
 
 use super::*;
 use conformance::{Bench, BenchResult, bench, conforms};
-use numerics::vector::{self, to_f64};
+use numerics::vector::{self, DVec3, to_f64};
 
 /// A square in x and z around the origin, `size` wide, facing up.
 fn square(size: f32) -> Component {
@@ -78,13 +78,11 @@ fn roots_lie_on_the_skin_and_apart_from_each_other() {
     let out = meadow(skin.clone()).set(DENSITY, 100.0).cook();
     let cut = skin.triangles();
     let triangles = &cut.corners;
-    let at = |corner: u32| skin.positions()[corner as usize].map(f64::from);
+    let at = |corner: u32| to_f64(skin.positions()[corner as usize]);
     for root in roots(&out) {
         // Smallest distance from the planes of the triangles that the root projects into.
-        let off = triangles
-            .iter()
-            .filter_map(|corners| height(root.map(f64::from), corners.map(at)))
-            .fold(f64::INFINITY, f64::min);
+        let off =
+            triangles.iter().filter_map(|corners| height(to_f64(root), corners.map(at))).fold(f64::INFINITY, f64::min);
         assert!(off < 1e-7, "{root:?} is {off} off");
     }
     let roots = roots(&out);
@@ -96,17 +94,12 @@ fn roots_lie_on_the_skin_and_apart_from_each_other() {
 }
 
 /// Distance to the triangle's plane, if the projection is inside the triangle or just beside it.
-fn height(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
-    let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let normal = cross(sub(b, a), sub(c, a));
-    let size = dot(normal, normal);
+fn height(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let normal = (b - a).cross(&(c - a));
     let inside = [(a, b), (b, c), (c, a)]
         .iter()
-        .all(|(from, to)| dot(cross(sub(*to, *from), sub(p, *from)), normal) > -1e-6 * size);
-    inside.then(|| (dot(sub(p, a), normal) / size.sqrt()).abs())
+        .all(|(from, to)| (to - from).cross(&(p - from)).dot(&normal) > -1e-6 * normal.norm_squared());
+    inside.then(|| ((p - a).dot(&normal) / normal.norm()).abs())
 }
 
 #[test]
