@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use engine::geometry::{Column, Component, Geometry, Owner};
+use numerics::vector;
 use preview::{Layer, PictureSettings, render};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -67,8 +68,7 @@ fn read(text: &str) -> Result<Geometry, Box<dyn Error>> {
         let mut curves = Component::curves(count(&lines), at.clone())?;
         curves.set_column(Owner::Point, "along", Column::new(along.collect::<Vec<_>>()))?;
         let length = |range: std::ops::Range<usize>| -> f32 {
-            let step = |pair: &[[f32; 3]]| (0..3).map(|k| (pair[1][k] - pair[0][k]) * (pair[1][k] - pair[0][k])).sum();
-            at[range].windows(2).map(|pair| f32::sqrt(step(pair))).sum()
+            at[range].windows(2).map(|pair| vector::length(vector::sub(pair[1], pair[0]))).sum()
         };
         let lengths = curves.runs().ranges().map(length).collect::<Vec<_>>();
         curves.set_column(Owner::Element, "length", Column::new(lengths))?;

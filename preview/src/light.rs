@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use crate::raster::{self, DepthOnly, Lanes, SAMPLES, Screen, TILE};
 use crate::scene::Scene;
-use crate::vector::{mix, times, unit};
+use crate::vector::{mix, times};
 use crate::view::View;
-use numerics::vector::{Vec3, add, cross, dot, scale, sub};
+use numerics::vector::{Vec3, add, cross, dot, scale, sub, unit};
 
 /// Directions to the lights, by the camera's right, the world's up and the camera's level back.
 const KEY: Vec3 = [-0.55, 0.95, 0.62];

@@ -7,10 +7,10 @@ use crate::image::Image;
 use crate::light::Light;
 use crate::raster::{self, SAMPLES, Screen, Shader, TILE, Tile, UNCOVERED};
 use crate::scene::{self, Scene};
-use crate::vector::{finite, mix, unit};
+use crate::vector::{finite, mix};
 use crate::view::{Stage, View};
 use crate::{Layer, PictureSettings, PreviewError, text};
-use numerics::vector::{Vec3, add, scale, sub};
+use numerics::vector::{Vec3, add, scale, sub, unit};
 
 /// Bounds of an empty scene: a metre around the origin.
 const NOTHING: crate::BoundingBox = [[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]];

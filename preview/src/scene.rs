@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use crate::camera::BoundingBox;
 use crate::color::{Paint, SPEED};
 use crate::shape::{boundary, level_set, smooth};
-use crate::vector::{finite, unit};
+use crate::vector::finite;
 use crate::view::Stage;
 use crate::{Layer, PictureSettings};
-use numerics::vector::{Vec3, scale, sub};
+use numerics::vector::{Vec3, scale, sub, unit};
 
 /// A corner of a triangle, with the normal there.
 #[derive(Clone, Copy, Debug)]

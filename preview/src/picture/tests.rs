@@ -1,6 +1,7 @@
 use super::*;
 use crate::{attribute_range, bounds};
 use engine::geometry::{Column, Component, Geometry, Grid, Owner, Volume};
+use numerics::vector::length;
 
 /// Something of every kind, all within a few metres: a bent sheet, a tuft, balls, tets, a drop.
 fn still_life(scale: f32) -> Geometry {
@@ -21,10 +22,7 @@ fn still_life(scale: f32) -> Geometry {
         .with(Component::points(balls))
         .with(Component::tets(vec![[0, 1, 2, 3]], tet).unwrap());
     let grid = Grid { origin: at(0.0, 2.0, 0.0), cell: 0.125 * scale, size: [6; 3] };
-    let from_middle = |k: usize| {
-        let [x, y, z] = [k % 6, k / 6 % 6, k / 36].map(|i| i as f32 - 2.5);
-        ((x * x + y * y + z * z).sqrt() - 2.0) * grid.cell
-    };
+    let from_middle = |k: usize| (length([k % 6, k / 6 % 6, k / 36].map(|i| i as f32 - 2.5)) - 2.0) * grid.cell;
     let drop =
         Volume::new(grid, (0..216).map(from_middle).collect(), [0, 1, 2].map(|axis| vec![1.0; grid.faces(axis)]));
     all.put_volume(drop.unwrap());

@@ -6,8 +6,7 @@
 
 use rayon::prelude::*;
 
-use crate::vector::unit;
-use numerics::vector::{Vec3, add, cross, dot, sub};
+use numerics::vector::{Vec3, add, cross, dot, sub, unit};
 
 /// Cosine of the angle between triangles above which their edge is drawn sharp: 40 degrees. A sphere of 9 or more
 /// segments stays smooth, an octagonal prism shows its edges.
