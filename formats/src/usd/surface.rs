@@ -23,6 +23,7 @@ pub(super) fn surface(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use numerics::vector::{cross, dot, sub};
 
     #[test]
     fn all_faces_of_one_tet_look_outwards() {
@@ -31,11 +32,8 @@ mod tests {
         assert_eq!(faces, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]);
         for face in faces {
             let [a, b, c] = face.map(|corner| corners[corner as usize]);
-            let edge = |p: [f32; 3], q: [f32; 3]| [0, 1, 2].map(|k| q[k] - p[k]);
-            let (u, v) = (edge(a, b), edge(a, c));
-            let normal = [0, 1, 2].map(|k| u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3]);
-            let out = edge([0.25; 3], a);
-            assert!((0..3).map(|k| normal[k] * out[k]).sum::<f32>() > 0.0, "{face:?}");
+            let normal = cross(sub(b, a), sub(c, a));
+            assert!(dot(normal, sub(a, [0.25; 3])) > 0.0, "{face:?}");
         }
     }
 
