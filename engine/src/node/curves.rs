@@ -299,13 +299,12 @@ mod tests {
     #[test]
     fn frames_are_orthonormal_and_do_not_twist() {
         let curves = samples();
-        let dot = |a: Vec3, b: Vec3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let all = CurveLoop::over(&curves).map(|curve, _| curve.cvs().collect::<Vec<Cv>>()).results;
         for cv in all.iter().flatten() {
             let axes = [cv.tangent, cv.normal, cv.binormal];
             for (i, a) in axes.iter().enumerate() {
                 for (j, b) in axes.iter().enumerate() {
-                    assert!((dot(*a, *b) - f32::from(u8::from(i == j))).abs() < 1e-6, "{cv:?}");
+                    assert!((to_f64(*a).dot(&to_f64(*b)) - f64::from(u8::from(i == j))).abs() < 1e-6, "{cv:?}");
                 }
             }
         }

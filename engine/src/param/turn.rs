@@ -1,10 +1,12 @@
 //! Rotations of params: degrees about x, then y, then z; between keys they rotate about a single axis.
 
+use numerics::vector::{DQuat, DVec3, rotation, unit_quaternion};
+
 use super::value::Value;
 
 /// The unit quaternion of a rotation by `degrees` about x, then y, then z.
 pub fn euler_to_turn(degrees: [f64; 3]) -> Value {
-    Value::Turn(quaternion(degrees))
+    Value::Turn(quaternion(degrees).coords.into())
 }
 
 /// Interpolates between two keyed rotations at `share`: about a fixed axis, at constant speed, along the shorter arc.
@@ -14,62 +16,43 @@ pub(super) fn between(from: [f64; 3], to: [f64; 3], share: f64) -> Value {
     if changed <= 1 {
         return euler_to_turn(std::array::from_fn(|k| from[k] + (to[k] - from[k]) * share));
     }
-    Value::Turn(slerp(quaternion(from), quaternion(to), share))
+    Value::Turn(slerp(quaternion(from), quaternion(to), share).coords.into())
 }
 
-fn quaternion(degrees: [f64; 3]) -> [f64; 4] {
-    let [x, y, z] = degrees.map(|angle| {
-        // Whole turns are taken off first: exact, and a large angle loses nothing.
-        let half = (angle % 720.0) * (std::f64::consts::PI / 360.0);
-        (libm::sin(half), libm::cos(half))
-    });
-    let about_x = [x.0, 0.0, 0.0, x.1];
-    let about_y = [0.0, y.0, 0.0, y.1];
-    let about_z = [0.0, 0.0, z.0, z.1];
-    product(about_z, product(about_y, about_x))
+fn quaternion(degrees: [f64; 3]) -> DQuat {
+    // Whole turns are taken off first: exact, and a large angle loses nothing.
+    let [x, y, z] = degrees.map(|angle| (angle % 720.0) * (std::f64::consts::PI / 180.0));
+    rotation(DVec3::z(), z) * (rotation(DVec3::y(), y) * rotation(DVec3::x(), x))
 }
 
-/// First `b`, then `a`.
-fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-    let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
-    [
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    ]
-}
-
-fn slerp(a: [f64; 4], b: [f64; 4], share: f64) -> [f64; 4] {
-    let dot = |a: [f64; 4], b: [f64; 4]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-    let b = if dot(a, b) < 0.0 { b.map(|x| -x) } else { b };
-    // The angle from the chord keeps its digits where the two nearly agree.
-    let chord: [f64; 4] = std::array::from_fn(|k| b[k] - a[k]);
-    let angle = 2.0 * libm::asin((0.5 * dot(chord, chord).sqrt()).min(1.0));
+/// From `a` at 0 to `b` at 1. Not nalgebra's, which loses digits where the two nearly agree.
+fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
+    let (a, b) = (a.coords, b.coords);
+    let b = if a.component_mul(&b).sum() < 0.0 { -b } else { b };
+    // The angle from the chord keeps its digits.
+    let chord = b - a;
+    let angle = 2.0 * libm::asin((0.5 * chord.component_mul(&chord).sum().sqrt()).min(1.0));
     let (p, q) = if angle < 1e-9 {
         (1.0 - share, share)
     } else {
         let sine = libm::sin(angle);
         (libm::sin((1.0 - share) * angle) / sine, libm::sin(share * angle) / sine)
     };
-    let mixed: [f64; 4] = std::array::from_fn(|k| p * a[k] + q * b[k]);
-    let length = dot(mixed, mixed).sqrt();
-    mixed.map(|x| x / length)
+    let mixed = a * p + b * q;
+    unit_quaternion((mixed / mixed.component_mul(&mixed).sum().sqrt()).into())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn turned(value: Value, v: [f64; 3]) -> [f64; 3] {
+    fn turned(value: Value, v: [f64; 3]) -> DVec3 {
         let Value::Turn(q) = value else { panic!("not a rotation") };
-        let conjugate = [-q[0], -q[1], -q[2], q[3]];
-        let [x, y, z, _] = product(product(q, [v[0], v[1], v[2], 0.0]), conjugate);
-        [x, y, z]
+        unit_quaternion(q) * DVec3::from(v)
     }
 
-    fn close(a: [f64; 3], b: [f64; 3]) -> bool {
-        (0..3).all(|k| (a[k] - b[k]).abs() < 1e-12)
+    fn close(a: DVec3, b: [f64; 3]) -> bool {
+        (a - DVec3::from(b)).norm() < 1e-12
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use numerics::vector::DVec3;
+
 use super::Resolver;
 use crate::graph::Scene;
 use crate::node::{History, Integrand, Node};
@@ -38,7 +40,7 @@ impl<'a> Integrals<'a> {
 
 impl History for Integrals<'_> {
     fn integral(&self, place: usize, upto: Frame) -> [f64; 3] {
-        self.0[place].upto(upto)
+        self.0[place].upto(upto).into()
     }
 }
 
@@ -49,9 +51,9 @@ struct Integral<'a> {
     since: Frame,
     /// Whether the integrand changes with time, and its value where it does not.
     animated: bool,
-    constant: OnceLock<[f64; 3]>,
+    constant: OnceLock<DVec3>,
     /// Sums over whole frames from frame 0, forwards and backwards, grown on demand in frame order.
-    sums: [Mutex<Vec<[f64; 3]>>; 2],
+    sums: [Mutex<Vec<DVec3>>; 2],
 }
 
 impl<'a> Integral<'a> {
@@ -68,51 +70,46 @@ impl<'a> Integral<'a> {
     }
 
     /// ∫ from frame `a` to frame `b`, in the integrand's unit × frames.
-    fn over(&self, a: f64, b: f64) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (x, (_, weight)) in gauss_points(a, b).into_iter().zip(GAUSS) {
-            for (sum, value) in sum.iter_mut().zip(self.value(x)) {
-                *sum += 0.5 * (b - a) * weight * value;
-            }
-        }
-        sum
+    fn over(&self, a: f64, b: f64) -> DVec3 {
+        let terms = gauss_points(a, b).into_iter().zip(GAUSS);
+        terms.map(|(x, (_, weight))| self.value(x) * (0.5 * (b - a) * weight)).sum()
     }
 
     /// The integrand at a frame number. The key of this frame has evaluated it there before: it was no error then.
-    fn value(&self, frame: f64) -> [f64; 3] {
-        self.resolver.past(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params))
+    fn value(&self, frame: f64) -> DVec3 {
+        self.resolver.past(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params)).into()
     }
 
     /// ∫ from time 0 to `upto`, in the integrand's unit × seconds.
-    fn upto(&self, upto: Frame) -> [f64; 3] {
+    fn upto(&self, upto: Frame) -> DVec3 {
         if !self.animated {
             let value = self.constant.get_or_init(|| self.value(upto.number()));
-            return value.map(|x| x * upto.seconds(self.fps));
+            return value * upto.seconds(self.fps);
         }
         if upto < self.since {
             let (seen, held) = (self.upto(self.since), self.value(self.since.number()));
             let before = upto.seconds(self.fps) - self.since.seconds(self.fps);
-            return std::array::from_fn(|axis| seen[axis] + held[axis] * before);
+            return seen + held * before;
         }
         let backwards = upto.ticks() < 0;
         let sign = if backwards { -1.0 } else { 1.0 };
         let whole = upto.ticks().unsigned_abs() / Frame::TICKS.unsigned_abs();
         let mut sums = self.sums[usize::from(backwards)].lock().unwrap_or_else(PoisonError::into_inner);
         if sums.is_empty() {
-            sums.push([0.0; 3]);
+            sums.push(DVec3::zeros());
         }
         while sums.len() as u64 <= whole {
             let k = sums.len() as f64;
             let frame = self.over(sign * (k - 1.0), sign * k);
             let before = sums[sums.len() - 1];
-            sums.push(std::array::from_fn(|axis| before[axis] + frame[axis]));
+            sums.push(before + frame);
         }
         let mut sum = sums[whole as usize];
         drop(sums);
         if !upto.is_whole() {
             let rest = self.over(sign * whole as f64, upto.number());
-            sum = std::array::from_fn(|axis| sum[axis] + rest[axis]);
+            sum += rest;
         }
-        sum.map(|x| x / self.fps)
+        sum / self.fps
     }
 }

@@ -1,5 +1,6 @@
 //! The language against a second interpreter: random trees are printed, parsed and run, and walked.
 
+use numerics::vector::DVec3;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
@@ -198,8 +199,7 @@ fn walk(tree: &Tree, p: [f32; 3]) -> Value {
         Tree::Component(of, k) => scalar(walk(of, p).vector()[*k]),
         Tree::Call(name, arguments) => {
             let x = |k: usize| number(&arguments[k]);
-            let v = |k: usize| walk(&arguments[k], p).vector();
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let v = |k: usize| DVec3::from(walk(&arguments[k], p).vector());
             match *name {
                 "sin" => scalar(libm::sin(x(0))),
                 "abs" => scalar(x(0).abs()),
@@ -213,16 +213,13 @@ fn walk(tree: &Tree, p: [f32; 3]) -> Value {
                 "step" => scalar(if x(1) >= x(0) { 1.0 } else { 0.0 }),
                 "clamp" => scalar(minimum(maximum(x(0), x(1)), x(2))),
                 "mix" => scalar(x(0) * (1.0 - x(2)) + x(1) * x(2)),
-                "length" => scalar(dot(v(0), v(0)).sqrt()),
-                "dot" => scalar(dot(v(0), v(1))),
+                "length" => scalar(v(0).norm()),
+                "dot" => scalar(v(0).dot(&v(1))),
                 "vec" => Value::Vector([x(0), x(1), x(2)]),
-                "cross" => {
-                    let (a, b) = (v(0), v(1));
-                    Value::Vector([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-                }
+                "cross" => Value::Vector(v(0).cross(&v(1)).into()),
                 _ => {
-                    let length = dot(v(0), v(0)).sqrt();
-                    Value::Vector(v(0).map(|x| if length == 0.0 { 0.0 } else { x / length }))
+                    let length = v(0).norm();
+                    Value::Vector(v(0).map(|x| if length == 0.0 { 0.0 } else { x / length }).into())
                 }
             }
         }
