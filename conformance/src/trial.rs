@@ -11,7 +11,7 @@ use engine::cook::{Delivered, Engine, Settings, Stopped};
 use engine::error::ErrorKind;
 use engine::geometry::{ColumnType, Geometry, Kind, Name, Owner, P, Topology};
 use engine::graph::{Graph, Scene};
-use engine::key::{Hasher, Key};
+use engine::key::{ContentKey, Hasher};
 use engine::node::{Arity, AttrNames, Carries, Cook, InputSpec, LeftOut, Needs, Node, Output};
 use engine::param::{ParamSpec, Params, Source, Value};
 use engine::plan::{Plan, Request};
@@ -309,7 +309,7 @@ fn moved(geometry: &Geometry, frame: Frame) -> Geometry {
 
 impl Outcome {
     /// A hash of all results and errors, without the attributes that `ignore` names.
-    pub(crate) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> Key {
+    pub(crate) fn digest(&self, ignore: &dyn Fn(&str) -> bool) -> ContentKey {
         let mut key = Hasher::default();
         for ((output, frame), geometry) in &self.found {
             hash_geometry(key.i64(*output as i64).i64(frame.ticks()), geometry, ignore);
@@ -327,12 +327,12 @@ impl Outcome {
     }
 
     /// A hash of all results and errors.
-    pub(crate) fn whole(&self) -> Key {
+    pub(crate) fn whole(&self) -> ContentKey {
         self.digest(&|_| false)
     }
 
     /// A hash of the results at one frame, or of the errors if there are none.
-    pub(crate) fn at(&self, frame: Frame) -> Key {
+    pub(crate) fn at(&self, frame: Frame) -> ContentKey {
         let mut key = Hasher::default();
         let mut there = false;
         for ((output, _), geometry) in self.found.iter().filter(|((_, at), _)| *at == frame) {

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
-use crate::key::Key;
+use crate::key::ContentKey;
 
 /// A file whose contents are known by key. Its bytes are at hand until the store drops them, and read again then.
 #[derive(Clone, Debug)]
 pub struct File {
     path: Arc<PathBuf>,
-    key: Key,
+    key: ContentKey,
     store: Arc<Files>,
 }
 
@@ -35,7 +35,7 @@ impl File {
     }
 
     /// The key of its contents.
-    pub fn key(&self) -> Key {
+    pub fn key(&self) -> ContentKey {
         self.key
     }
 
@@ -53,12 +53,12 @@ impl File {
     }
 }
 
-type Loaded = (Arc<[u8]>, Key);
+type Loaded = (Arc<[u8]>, ContentKey);
 
 /// The files of one cook. Bytes are kept until [`Files::release`]; keys as long as the store lives.
 #[derive(Debug, Default)]
 pub struct Files {
-    keys: Mutex<BTreeMap<PathBuf, Key>>,
+    keys: Mutex<BTreeMap<PathBuf, ContentKey>>,
     bytes: Mutex<BTreeMap<PathBuf, Loaded>>,
 }
 
@@ -89,7 +89,7 @@ impl Files {
         let mut read = Vec::new();
         let file = open(path).and_then(|mut file| file.read_to_end(&mut read));
         file.map_err(|error| unreadable(path, &error))?;
-        let key = Key::of(&read);
+        let key = ContentKey::of(&read);
         let loaded = (Arc::from(read), key);
         bytes.insert(path.to_owned(), loaded.clone());
         self.keys.lock().unwrap_or_else(PoisonError::into_inner).entry(path.to_owned()).or_insert(key);

@@ -2,15 +2,15 @@
 
 /// 128 bits of a blake3 hash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Key(pub [u8; 16]);
+pub struct ContentKey(pub [u8; 16]);
 
-impl std::fmt::Display for Key {
+impl std::fmt::Display for ContentKey {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
-impl Key {
+impl ContentKey {
     /// The key of some bytes.
     pub fn of(bytes: &[u8]) -> Self {
         let mut hasher = Hasher::default();
@@ -52,13 +52,13 @@ impl Hasher {
     }
 
     /// Another key.
-    pub fn key(&mut self, key: Key) -> &mut Self {
+    pub fn key(&mut self, key: ContentKey) -> &mut Self {
         self.bytes(&key.0)
     }
 
     /// The key of all pieces; the hasher is empty afterwards and keeps its memory.
-    pub fn finish(&mut self) -> Key {
-        let mut key = Key::default();
+    pub fn finish(&mut self) -> ContentKey {
+        let mut key = ContentKey::default();
         key.0.copy_from_slice(&blake3::hash(&self.0).as_bytes()[..16]);
         self.0.clear();
         key

@@ -12,13 +12,13 @@ use std::sync::atomic::AtomicBool;
 use engine::cook::{Delivered, DiskCache, Engine, Settings};
 use engine::geometry::Geometry;
 use engine::graph::{Graph, probe};
-use engine::key::{Hasher, Key};
+use engine::key::{ContentKey, Hasher};
 use engine::node::Cook;
 use engine::plan::Request;
 use engine::time::Frame;
 
 /// For each output and frame a hash of the whole geometry.
-pub(crate) type Keys = BTreeMap<(String, Frame), Key>;
+pub(crate) type Keys = BTreeMap<(String, Frame), ContentKey>;
 
 /// graphs/NAME/NAME.json, by name.
 pub(crate) fn graphs() -> Vec<PathBuf> {
@@ -73,7 +73,7 @@ pub(crate) fn cook(graph: &Graph, frames: &[Frame], threads: usize, disk: Option
     keys
 }
 
-fn key(geometry: &Geometry) -> Key {
+fn key(geometry: &Geometry) -> ContentKey {
     let mut hasher = Hasher::default();
     for part in geometry.parts() {
         hasher.text(part.kind().name()).i64(part.element_count() as i64).i64(part.point_count() as i64);

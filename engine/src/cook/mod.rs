@@ -26,7 +26,7 @@ use crate::error::CookError;
 use crate::files::Files;
 use crate::geometry::Geometry;
 use crate::graph::Graph;
-use crate::key::Key;
+use crate::key::ContentKey;
 use crate::plan::{Plan, Request};
 use crate::time::Frame;
 use store::Store;
@@ -77,7 +77,7 @@ pub struct Engine {
     store: Mutex<Store>,
     files: Arc<Files>,
     /// What a check of a graph has cooked already, for the report of the cook that follows.
-    verified: Mutex<BTreeMap<Key, NodeReport>>,
+    verified: Mutex<BTreeMap<ContentKey, NodeReport>>,
 }
 
 impl Engine {
@@ -163,12 +163,12 @@ impl Engine {
         &self.files
     }
 
-    fn note_verified(&self, key: Key, report: &NodeReport) {
+    fn note_verified(&self, key: ContentKey, report: &NodeReport) {
         let mut verified = self.verified.lock().unwrap_or_else(PoisonError::into_inner);
         verified.entry(key).or_insert_with(|| report.clone());
     }
 
-    fn take_verified(&self, key: Key) -> Option<NodeReport> {
+    fn take_verified(&self, key: ContentKey) -> Option<NodeReport> {
         self.verified.lock().unwrap_or_else(PoisonError::into_inner).remove(&key)
     }
 

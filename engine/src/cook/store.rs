@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::geometry::Geometry;
-use crate::key::Key;
+use crate::key::ContentKey;
 
 /// The geometries of a node's outputs.
 pub(crate) type Cooked = Arc<[Arc<Geometry>]>;
@@ -22,7 +22,7 @@ struct Entry {
 /// Results by key; the least recently used go first.
 #[derive(Default)]
 pub(crate) struct Store {
-    entries: BTreeMap<Key, Entry>,
+    entries: BTreeMap<ContentKey, Entry>,
     bytes: usize,
     budget: usize,
     clock: u64,
@@ -33,18 +33,18 @@ impl Store {
         Self { budget, ..Self::default() }
     }
 
-    pub(crate) fn get(&mut self, key: Key) -> Option<(Cooked, Metrics)> {
+    pub(crate) fn get(&mut self, key: ContentKey) -> Option<(Cooked, Metrics)> {
         self.clock += 1;
         let entry = self.entries.get_mut(&key)?;
         entry.used = self.clock;
         Some((entry.cooked.clone(), entry.metrics.clone()))
     }
 
-    pub(crate) fn contains(&self, key: Key) -> bool {
+    pub(crate) fn contains(&self, key: ContentKey) -> bool {
         self.entries.contains_key(&key)
     }
 
-    pub(crate) fn keep(&mut self, key: Key, cooked: &Cooked, metrics: Metrics) {
+    pub(crate) fn keep(&mut self, key: ContentKey, cooked: &Cooked, metrics: Metrics) {
         self.clock += 1;
         let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
         let entry = Entry { cooked: cooked.clone(), metrics, bytes, used: self.clock };
@@ -60,7 +60,7 @@ impl Store {
         }
     }
 
-    pub(crate) fn drop(&mut self, key: Key) {
+    pub(crate) fn drop(&mut self, key: ContentKey) {
         if let Some(entry) = self.entries.remove(&key) {
             self.bytes -= entry.bytes;
         }
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn what_was_used_least_recently_goes_first() {
         let mut store = Store::new(2 * 12 * 10);
-        let [a, b, c] = [1, 2, 3].map(|k| Key([k; 16]));
+        let [a, b, c] = [1, 2, 3].map(|k| ContentKey([k; 16]));
         store.keep(a, &points(10), Vec::new());
         store.keep(b, &points(10), Vec::new());
         assert!(store.get(a).is_some());
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn what_is_larger_than_the_budget_is_not_kept() {
         let mut store = Store::new(100);
-        store.keep(Key::default(), &points(1000), Vec::new());
+        store.keep(ContentKey::default(), &points(1000), Vec::new());
         assert_eq!(store.bytes(), 0);
     }
 }

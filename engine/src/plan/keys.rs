@@ -11,7 +11,7 @@ use super::segments::{Anchors, ChainSegment, LEAST_SPACING, Window, segment};
 use super::{Moment, Plan, Reads};
 use crate::error::{CookError, Result};
 use crate::graph::Body;
-use crate::key::{Hasher, Key};
+use crate::key::{ContentKey, Hasher};
 use crate::node::{Cook, Node};
 use crate::param::Params;
 use crate::time::Frame;
@@ -19,11 +19,11 @@ use crate::time::Frame;
 /// What is known of a node at one frame before it cooks.
 pub(crate) struct ResolvedFrame<'g> {
     pub(crate) reads: Reads<'g>,
-    pub(crate) key: Key,
+    pub(crate) key: ContentKey,
 }
 
 type Resolved<'g> = std::result::Result<Arc<ResolvedFrame<'g>>, Arc<CookError>>;
-type KeyOrError = std::result::Result<Key, Arc<CookError>>;
+type KeyOrError = std::result::Result<ContentKey, Arc<CookError>>;
 
 /// Keys known of one node.
 #[derive(Default)]
@@ -33,9 +33,9 @@ struct NodeKeys<'g> {
     /// Of a chain's states: by segment, from its start on.
     states: BTreeMap<ChainSegment, Vec<KeyOrError>>,
     /// Of what its integrands were from frame 0 on, frame by frame.
-    history: Vec<Key>,
+    history: Vec<ContentKey>,
     /// Of what its integrands were before frame 0.
-    before: Option<Key>,
+    before: Option<ContentKey>,
     anchors: Option<Anchors>,
 }
 
@@ -128,7 +128,7 @@ impl<'p, 'g> Keys<'p, 'g> {
     }
 
     /// Completes a key by the attributes that are used of the node's result.
-    fn finish_with_live(&mut self, node: usize) -> Key {
+    fn finish_with_live(&mut self, node: usize) -> ContentKey {
         let live = &self.plan.nodes[node].live;
         let names = live.as_deref().unwrap_or_default();
         let hasher = self.hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
@@ -143,13 +143,13 @@ impl<'p, 'g> Keys<'p, 'g> {
                 keys.push((read.port, self.resolve(read.node, read.frame)?.key));
             }
             // Marks the end of a list, so that a wire moved from one input to the next changes the key.
-            keys.push((usize::MAX, Key::default()));
+            keys.push((usize::MAX, ContentKey::default()));
         }
         Ok(InputKeys(keys))
     }
 
     /// A key of the frame, the scene's clock and origin, and the history of the node's integrands.
-    fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
+    fn clock_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<ContentKey> {
         let scene = &self.plan.graph.scene;
         let resolver = &self.plan.nodes[node].resolver;
         let animated = declared.integrands[0].is_some() && resolver.history_is_animated();
@@ -167,7 +167,7 @@ impl<'p, 'g> Keys<'p, 'g> {
 
     /// A key of the integrands' values at the Gauss points of every integral that [`crate::node::FrameCx::integrals`] can
     /// give at `frame`: from the scene's start or frame 0, whichever is earlier, to `frame`. Chained frame by frame.
-    fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<Key> {
+    fn history_key(&mut self, node: usize, declared: &Node, frame: Frame) -> Result<ContentKey> {
         let resolver = &self.plan.nodes[node].resolver;
         let value = |at: f64| -> Result<Vec<f64>> {
             let params = resolver.past(at)?;
@@ -245,7 +245,7 @@ impl<'p, 'g> Keys<'p, 'g> {
         }
     }
 
-    fn next_state_key(&mut self, node: usize, frame: i64, before: Option<Key>) -> KeyOrError {
+    fn next_state_key(&mut self, node: usize, frame: i64, before: Option<ContentKey>) -> KeyOrError {
         let plan = self.plan;
         let moment = if before.is_some() { Moment::ChainStep(frame) } else { Moment::ChainStart(frame) };
         let Some(declared) = plan.graph.nodes[node].node() else { unreachable!("given geometry has no state") };
@@ -265,7 +265,7 @@ impl<'p, 'g> Keys<'p, 'g> {
 }
 
 /// Keys of the results that a node reads, each with the output it comes from.
-struct InputKeys(Vec<(usize, Key)>);
+struct InputKeys(Vec<(usize, ContentKey)>);
 
 impl InputKeys {
     fn hash(&self, hasher: &mut Hasher) {

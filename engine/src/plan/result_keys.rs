@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Keys, Plan, Request};
 use crate::error::CookError;
 use crate::graph::Graph;
-use crate::key::Key;
+use crate::key::ContentKey;
 use crate::time::Frame;
 
 /// Keys of a node's results at `frames`, found in that order by one plan that asks for all outputs of the graph.
@@ -15,7 +15,7 @@ use crate::time::Frame;
 ///
 /// # Panics
 /// Where the graph has no node with the id `node`.
-pub fn result_keys(graph: &Graph, node: &str, frames: &[Frame]) -> Result<Vec<Key>, Arc<CookError>> {
+pub fn result_keys(graph: &Graph, node: &str, frames: &[Frame]) -> Result<Vec<ContentKey>, Arc<CookError>> {
     let index = graph.nodes.iter().position(|known| &*known.id == node);
     let index = index.unwrap_or_else(|| panic!("the graph has no node `{node}`"));
     let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };

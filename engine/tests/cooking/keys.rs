@@ -1,14 +1,14 @@
 //! A key hangs on exactly what its node reads, at the times at which it reads it.
 
 use engine::graph::{Body, Scene};
-use engine::key::Key;
+use engine::key::ContentKey;
 use engine::param::{ParamType, Source};
 use engine::plan::result_keys;
 
 use crate::net::{Net, at, keyed};
 use crate::nodes::{ADD, BOUNCE, CLOCK, DRIFT, FOLLOW, FROM_START, SOURCE, SUM};
 
-fn key(net: &Net, node: &str, frame: f64) -> Key {
+fn key(net: &Net, node: &str, frame: f64) -> ContentKey {
     result_keys(&net.0, node, &[at(frame)]).unwrap_or_else(|error| panic!("{error}"))[0]
 }
 

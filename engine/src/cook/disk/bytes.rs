@@ -2,7 +2,7 @@
 
 use super::KeptMetric;
 use crate::geometry::{Geometry, Reader};
-use crate::key::Key;
+use crate::key::ContentKey;
 
 /// A geometry and the metrics of what went into it as bytes, every bit of them.
 pub(super) fn encode(geometry: &Geometry, metrics: &[KeptMetric]) -> Vec<u8> {
@@ -27,7 +27,7 @@ pub(super) fn decode(bytes: &[u8]) -> Option<(Geometry, Vec<KeptMetric>)> {
 fn metrics(reader: &mut Reader<'_>) -> Option<Vec<KeptMetric>> {
     let mut metrics = Vec::new();
     for _ in 0..reader.count()? {
-        let key = Key(reader.take(16)?.try_into().ok()?);
+        let key = ContentKey(reader.take(16)?.try_into().ok()?);
         let name = std::str::from_utf8(reader.piece()?).ok()?.to_owned();
         metrics.push((key, name, f64::from_le_bytes(reader.take(8)?.try_into().ok()?)));
     }

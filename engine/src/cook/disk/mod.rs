@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use crate::geometry::Geometry;
-use crate::key::Key;
+use crate::key::ContentKey;
 
 /// Changes whenever files of an older convect can no longer be used.
 const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 4");
@@ -32,7 +32,7 @@ pub struct DiskCache {
 }
 
 /// A metric that belongs to a finished frame: the key of the result it was published with, its name and value.
-pub(crate) type KeptMetric = (Key, String, f64);
+pub(crate) type KeptMetric = (ContentKey, String, f64);
 
 impl DiskCache {
     /// Opens a cache, making the folder where it is missing. One that another version made is emptied, and on a full disk
@@ -101,17 +101,17 @@ impl DiskCache {
         }
     }
 
-    fn path(&self, kind: &str, key: Key) -> PathBuf {
+    fn path(&self, kind: &str, key: ContentKey) -> PathBuf {
         self.folder.join(format!("{key}.{kind}"))
     }
 
     /// The state a solver was saved in under that key.
-    pub(crate) fn checkpoint(&self, key: Key) -> Option<Vec<u8>> {
+    pub(crate) fn checkpoint(&self, key: ContentKey) -> Option<Vec<u8>> {
         read_entry(&self.path("checkpoint", key), key)
     }
 
     /// Saves a solver's state, and removes older ones that need not stay.
-    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: Key, state: &[u8]) {
+    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: ContentKey, state: &[u8]) {
         let path = self.path("checkpoint", key);
         self.keep(|cache| {
             write_entry(&path, key, state)?;
@@ -128,12 +128,12 @@ impl DiskCache {
     }
 
     /// A finished frame of an output, and the metrics that were kept with it.
-    pub(crate) fn frame(&self, key: Key) -> Option<(Geometry, Vec<KeptMetric>)> {
+    pub(crate) fn frame(&self, key: ContentKey) -> Option<(Geometry, Vec<KeptMetric>)> {
         bytes::decode(&read_entry(&self.path("frame", key), key)?)
     }
 
     /// Keeps a finished frame of an output, and the metrics of what went into it.
-    pub(crate) fn save_frame(&mut self, key: Key, geometry: &Geometry, metrics: &[KeptMetric]) {
+    pub(crate) fn save_frame(&mut self, key: ContentKey, geometry: &Geometry, metrics: &[KeptMetric]) {
         let path = self.path("frame", key);
         self.keep(|cache| {
             write_entry(&path, key, &bytes::encode(geometry, metrics))?;
@@ -198,17 +198,17 @@ fn remove_if_there(path: &Path) -> io::Result<()> {
 }
 
 /// Writes an entry, in front of it a checksum of its key and itself: what was damaged or exchanged is not taken.
-fn write_entry(path: &Path, key: Key, bytes: &[u8]) -> io::Result<()> {
+fn write_entry(path: &Path, key: ContentKey, bytes: &[u8]) -> io::Result<()> {
     write_whole(path, &[checksum(key, bytes).as_bytes().as_slice(), bytes].concat())
 }
 
-fn read_entry(path: &Path, key: Key) -> Option<Vec<u8>> {
+fn read_entry(path: &Path, key: ContentKey) -> Option<Vec<u8>> {
     let bytes = fs::read(path).ok()?;
     let (sum, rest) = bytes.split_at_checked(blake3::OUT_LEN)?;
     (checksum(key, rest).as_bytes().as_slice() == sum).then(|| rest.to_vec())
 }
 
-fn checksum(key: Key, bytes: &[u8]) -> blake3::Hash {
+fn checksum(key: ContentKey, bytes: &[u8]) -> blake3::Hash {
     blake3::Hasher::new().update(&key.0).update(bytes).finalize()
 }
 
@@ -252,8 +252,8 @@ mod tests {
     fn a_file_cut_anywhere_is_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        let key = Key::of(b"a");
-        let metrics = [(Key::of(b"node"), "max_angle".to_owned(), 0.1)];
+        let key = ContentKey::of(b"a");
+        let metrics = [(ContentKey::of(b"node"), "max_angle".to_owned(), 0.1)];
         cache.save_frame(key, &sample(), &metrics);
         let path = cache.path("frame", key);
         let whole = fs::read(&path).unwrap();
@@ -268,7 +268,7 @@ mod tests {
     fn exchanged_files_are_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        let (a, b) = (Key::of(b"a"), Key::of(b"b"));
+        let (a, b) = (ContentKey::of(b"a"), ContentKey::of(b"b"));
         cache.save_frame(a, &sample(), &[]);
         fs::rename(cache.path("frame", a), cache.path("frame", b)).unwrap();
         assert!(cache.frame(b).is_none());
@@ -278,7 +278,7 @@ mod tests {
     fn the_last_two_checkpoints_and_every_eighth_stay() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        let key = |frame: i64| Key::of(&frame.to_le_bytes());
+        let key = |frame: i64| ContentKey::of(&frame.to_le_bytes());
         for frame in 1..=20 {
             cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]);
         }
@@ -291,7 +291,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), 3 * 132).unwrap();
         for frame in 0..10_i64 {
-            cache.save_checkpoint("body", frame * 8, Key::of(&frame.to_le_bytes()), &[0; 100]);
+            cache.save_checkpoint("body", frame * 8, ContentKey::of(&frame.to_le_bytes()), &[0; 100]);
         }
         let left = files(folder.path()).unwrap();
         assert!(left.len() <= 3 && !left.is_empty(), "{}", left.len());
@@ -301,11 +301,11 @@ mod tests {
     fn a_cache_of_another_version_is_not_used_and_said() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        cache.save_frame(Key::of(b"a"), &sample(), &[]);
+        cache.save_frame(ContentKey::of(b"a"), &sample(), &[]);
         fs::write(folder.path().join("version"), "convect 0.0.1 cache 0").unwrap();
         let cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
         assert!(cache.notes()[0].ends_with("was made by another version and is not used"));
-        assert!(cache.frame(Key::of(b"a")).is_none());
+        assert!(cache.frame(ContentKey::of(b"a")).is_none());
     }
 
     #[test]
@@ -313,15 +313,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().join("cache");
         let mut cache = DiskCache::open(&place, u64::MAX).unwrap();
-        cache.save_frame(Key::of(b"a"), &sample(), &[]);
+        cache.save_frame(ContentKey::of(b"a"), &sample(), &[]);
         fs::rename(&place, folder.path().join("gone")).unwrap();
         for key in [b"b", b"c"] {
-            cache.save_frame(Key::of(key), &sample(), &[]);
-            cache.save_checkpoint("body", 1, Key::of(key), &[1]);
+            cache.save_frame(ContentKey::of(key), &sample(), &[]);
+            cache.save_checkpoint("body", 1, ContentKey::of(key), &[1]);
         }
         assert_eq!(cache.notes().len(), 1, "{:?}", cache.notes());
         assert!(cache.notes()[0].contains("could not be written"), "{:?}", cache.notes());
         fs::rename(folder.path().join("gone"), &place).unwrap();
-        assert!(cache.frame(Key::of(b"a")).is_some() && cache.frame(Key::of(b"b")).is_none());
+        assert!(cache.frame(ContentKey::of(b"a")).is_some() && cache.frame(ContentKey::of(b"b")).is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Sweep;
 use crate::cook::disk::KeptMetric;
-use crate::key::Key;
+use crate::key::ContentKey;
 use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
@@ -20,7 +20,7 @@ impl Sweep<'_, '_, '_> {
     }
 
     /// The results that went into a finished frame and have metrics: node, frame, key.
-    fn measured(&mut self, output: usize, frame: Frame) -> Vec<(usize, Frame, Key)> {
+    fn measured(&mut self, output: usize, frame: Frame) -> Vec<(usize, Frame, ContentKey)> {
         let plan = self.plan;
         let mut found = Vec::new();
         for node in plan.ancestors(plan.graph.outputs[output].from.node) {
@@ -37,7 +37,7 @@ impl Sweep<'_, '_, '_> {
     /// The metrics to keep with a finished frame.
     pub(super) fn metrics_to_keep(&mut self, output: usize, frame: Frame) -> Vec<KeptMetric> {
         let measured = self.measured(output, frame).into_iter();
-        let of = |(node, at, key): (usize, Frame, Key)| {
+        let of = |(node, at, key): (usize, Frame, ContentKey)| {
             self.published(node, at).into_iter().map(move |(name, value)| (key, name.to_owned(), value))
         };
         measured.flat_map(of).collect()

@@ -25,7 +25,7 @@ use crate::clock::Stopwatch;
 use crate::error::{CookError, Error};
 use crate::geometry::Geometry;
 use crate::graph::Body;
-use crate::key::{Hasher, Key};
+use crate::key::{ContentKey, Hasher};
 use crate::node::StateBox;
 use crate::plan::{ChainSegment, Integrals, Keys, Plan, Read};
 use crate::time::Frame;
@@ -37,7 +37,7 @@ use notes::RequestedAttributes;
 type Outcome = Result<Cooked, Arc<CookError>>;
 
 /// A finished frame that must be cooked: its output, its frame, and its key where there is a disk cache.
-type Missing = (usize, Frame, Option<Key>);
+type Missing = (usize, Frame, Option<ContentKey>);
 
 /// Most frames that a chain moves in one slice, and that a slice spans where there are chains.
 const MOST_CHAIN_FRAMES: i64 = 16;
@@ -70,7 +70,7 @@ struct NodeRun<'p> {
     /// Mean wall time of a call in the last slice.
     call_time: Duration,
     /// Key of the result that is kept because later frames may have the same.
-    held: Option<Key>,
+    held: Option<ContentKey>,
     report: NodeReport,
 }
 
@@ -86,7 +86,7 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     /// Slices cooked so far.
     slices: u64,
     /// Keys of results that this cook has made or found.
-    own: BTreeSet<Key>,
+    own: BTreeSet<ContentKey>,
     requested: RequestedAttributes,
     /// Bytes of all results of the slice.
     live_bytes: usize,
@@ -281,7 +281,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     }
 
     /// The key of a finished frame; `None` where a param is refused there.
-    fn output_key(&mut self, output: usize, frame: Frame) -> Option<Key> {
+    fn output_key(&mut self, output: usize, frame: Frame) -> Option<ContentKey> {
         let plan = self.plan;
         let asked = &plan.graph.outputs[output];
         let mut hasher = Hasher::default();

@@ -13,7 +13,7 @@ use crate::cook::call::{Call, Returned};
 use crate::error::CookError;
 use crate::geometry::Geometry;
 use crate::graph::{Body, Link};
-use crate::key::Key;
+use crate::key::ContentKey;
 use crate::node::{Cook, FrameCx, History, InputData, Node, Outputs};
 use crate::plan::{Read, Reads, ResolvedFrame};
 use crate::time::Frame;
@@ -87,7 +87,7 @@ impl<'g> Sweep<'_, 'g, '_> {
         cook: impl Fn(&FrameCx) -> crate::Result<Outputs> + Sync,
     ) {
         let mut jobs: Vec<(Frame, Arc<ResolvedFrame<'g>>)> = Vec::new();
-        let mut keys: Vec<(Frame, Key)> = Vec::new();
+        let mut keys: Vec<(Frame, ContentKey)> = Vec::new();
         for frame in frames {
             let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
             keys.push((*frame, resolved.key));
@@ -106,7 +106,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             false => jobs.iter().map(one).collect(),
         };
         self.nodes[node].call_time = watch.wall() / (jobs.len().max(1) as u32);
-        let mut outcomes: Vec<(Key, Frame, Outcome)> = Vec::with_capacity(cooked.len());
+        let mut outcomes: Vec<(ContentKey, Frame, Outcome)> = Vec::with_capacity(cooked.len());
         for (key, frame, returned) in cooked {
             self.count_call(node, frame, returned.as_ref().err());
             outcomes.push((key, frame, self.record_result(node, frame, returned)));

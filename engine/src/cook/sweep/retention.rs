@@ -1,7 +1,7 @@
 //! What is kept from slice to slice and from cook to cook, and what is dropped.
 
 use super::Sweep;
-use crate::key::Key;
+use crate::key::ContentKey;
 use crate::time::Frame;
 
 /// Whole frames of a chain whose outputs a sample between frames may read again.
@@ -43,7 +43,7 @@ impl Sweep<'_, '_, '_> {
             return;
         }
         let (frame, cooked) = (*frame, cooked.clone());
-        let before: Option<Key> = run.held.replace(resolved.key);
+        let before: Option<ContentKey> = run.held.replace(resolved.key);
         self.own.insert(resolved.key);
         if let Some(before) = before {
             self.own.remove(&before);
@@ -77,7 +77,7 @@ impl Sweep<'_, '_, '_> {
 
     /// Records a result found in memory: what a check of the graph cooked counts as cooked, what an earlier cook left
     /// counts as found; what this cook keeps from slice to slice counts as neither.
-    fn record_found(&mut self, node: usize, key: Key) {
+    fn record_found(&mut self, node: usize, key: ContentKey) {
         if !self.own.insert(key) {
             return;
         }
