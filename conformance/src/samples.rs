@@ -3,10 +3,14 @@
 //! All samples of one kind and form have the same topology, whatever their seed, so that components that a node
 //! compares point by point (a rest pose, a moving skin) match.
 
-use numerics::random::Key;
+mod volume;
 
-use engine::geometry::{Column, ColumnType, Component, Geometry, Grid, Kind, Owner, Volume, fixed_type};
+use numerics::random::Key;
+use numerics::vector;
+
+use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Owner, fixed_type};
 use engine::node::{AttrDecl, Needs};
+use volume::volume;
 
 /// The number and the arrangement of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,8 +209,7 @@ fn jitter(at: Key, row: usize) -> [f32; 3] {
 
 fn settled(form: Form, at: Key, mut positions: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
     for (row, p) in positions.iter_mut().enumerate() {
-        let moved = jitter(at, row);
-        *p = form.place(std::array::from_fn(|k| p[k] + moved[k]), at.of(row as u64));
+        *p = form.place(vector::add(*p, jitter(at, row)), at.of(row as u64));
     }
     positions
 }
@@ -385,34 +388,6 @@ fn tets(form: Form, at: Key) -> Component {
     Component::tets(tets, positions).expect("corners in range")
 }
 
-/// A ball of liquid in a box, falling.
-fn volume(form: Form, seed: u64) -> Volume {
-    let n: u32 = match form {
-        Form::Empty => 0,
-        Form::Other => 5,
-        Form::Large => 24,
-        _ => 8,
-    };
-    let scale = match form {
-        Form::Huge => 1e28,
-        Form::Tiny => 1e-41,
-        _ => 1.0,
-    };
-    let cell = 0.2 * scale / n.max(1) as f32;
-    let at = Key::new(seed).of(Kind::Volume as u64);
-    let shift = if form == Form::Far { 1e6 } else { 0.0 };
-    let grid = Grid { origin: [shift - 0.1 * scale; 3], cell, size: [n; 3] };
-    let radius = 0.06 * scale * (1.0 + 0.01 * at.f32());
-    let distance = |row: usize| {
-        let n = n as usize;
-        let index = [row % n, row / n % n, row / (n * n)];
-        let squared = index.map(|i| (i as f32 + 0.5) * (cell / scale) - 0.1).iter().map(|x| x * x).sum::<f32>();
-        squared.sqrt() * scale - radius
-    };
-    let velocity = [0, 1, 2].map(|axis| vec![[0.0, -1.0, 0.1][axis] * scale * at.of(9).f32(); grid.faces(axis)]);
-    Volume::new(grid, (0..grid.cells()).map(distance).collect(), velocity).expect("as many rows as cells and faces")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -442,10 +417,8 @@ mod tests {
                 *edges.entry((*a, face[(k + 1) % face.len()])).or_insert(0) += 1;
             }
             let [a, b, c] = [0, 1, 2].map(|k| mesh.positions()[face[k] as usize]);
-            let (u, v): ([f32; 3], [f32; 3]) =
-                (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-            assert!((0..3).map(|k| normal[k] * a[k]).sum::<f32>() > 0.0, "face {face:?}");
+            let normal = vector::cross(vector::sub(b, a), vector::sub(c, a));
+            assert!(vector::dot(normal, a) > 0.0, "face {face:?}");
         }
         assert!(edges.iter().all(|((a, b), count)| *count == 1 && edges.contains_key(&(*b, *a))));
     }
@@ -454,11 +427,8 @@ mod tests {
     fn tets_are_positively_oriented() {
         let part = component(Kind::Tets, Form::Other, Key::new(3));
         for tet in part.tet_corners() {
-            let [a, b, c, d] = tet.map(|k| part.positions()[k as usize]);
-            let edge = |p: [f32; 3]| -> [f32; 3] { std::array::from_fn(|k| p[k] - a[k]) };
-            let (u, v, w) = (edge(b), edge(c), edge(d));
-            let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-            assert!((0..3).map(|k| cross[k] * w[k]).sum::<f32>() > 0.0, "{tet:?}");
+            let [a, b, c, d] = tet.map(|k| vector::to_f64(part.positions()[k as usize]));
+            assert!((b - a).cross(&(c - a)).dot(&(d - a)) > 0.0, "{tet:?}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Results are finite and nothing panics.
 
 use super::*;
+use numerics::vector;
 
 #[test]
 fn a_panic_is_found_for_any_kind_of_sample() {
@@ -53,7 +54,7 @@ fn by_share(cx: &Cx, share: fn(cvs: &[[f32; 3]], cv: usize) -> f32) -> Result<Ou
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f32>().sqrt()
+    vector::length(vector::sub(a, b))
 }
 
 #[test]

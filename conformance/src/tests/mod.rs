@@ -13,6 +13,7 @@ mod params;
 mod pass_through;
 mod ranges;
 mod suite;
+mod volumes;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
