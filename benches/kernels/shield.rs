@@ -9,6 +9,7 @@ use curves::shield::{Collider, Shield, shield_on};
 use numerics::random::Key;
 use numerics::shapes::sphere;
 use numerics::simd::Path;
+use numerics::vector;
 use std::time::Instant;
 
 const ROUNDS: usize = 20;
@@ -21,9 +22,8 @@ fn main() {
     for (curves, cvs, cone) in [(10_000, 5, 0.0), (10_000, 32, 0.0), (100_000, 5, 0.0), (10_000, 5, 0.1)] {
         // Hairs a tenth of the radius long, at random positions.
         let cv = |curve: u32, cv: u32| {
-            let [x, y, z] = [0, 1, 2].map(|axis| Key::new(1).of(u64::from(curve)).of(axis).f32() - 0.5);
-            let height = (1.0 + 0.1 * cv as f32 / (cvs - 1) as f32) / (x * x + y * y + z * z).sqrt();
-            [x * height, y * height, z * height]
+            let p = [0, 1, 2].map(|axis| Key::new(1).of(u64::from(curve)).of(axis).f32() - 0.5);
+            vector::scale(p, (1.0 + 0.1 * cv as f32 / (cvs - 1) as f32) / vector::length(p))
         };
         let starts: Vec<u32> = (0..=curves).map(|curve| curve * cvs).collect();
         let groom: Vec<[f32; 3]> = (0..curves).flat_map(|curve| (0..cvs).map(move |k| cv(curve, k))).collect();

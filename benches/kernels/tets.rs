@@ -9,6 +9,7 @@ use bodies::tets::grid::GridPoint;
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, delaunay};
 use cpu_time::{ProcessTime, ThreadTime};
 use numerics::random::Key;
+use numerics::vector::DVec3;
 use std::time::Instant;
 
 const ROUNDS: usize = 7;
@@ -26,9 +27,8 @@ fn sphere(n: u64) -> Vec<GridPoint> {
     let on_sphere = |k: u64| {
         // A sum of twelve uniform numbers is nearly normal, so the direction is nearly uniform.
         let sum = |axis: u64| (0..12).map(|j| Key::new(2).of(k).of(axis).of(j).f64()).sum::<f64>() - 6.0;
-        let p = [0, 1, 2].map(sum);
-        let length = p.iter().map(|x| x * x).sum::<f64>().sqrt();
-        p.map(|x| (8_388_608.0 + 8_388_000.0 * x / length) as i32)
+        let p = DVec3::from([0, 1, 2].map(sum));
+        p.map(|x| (8_388_608.0 + 8_388_000.0 * x / p.norm()) as i32).into()
     };
     (0..n).map(on_sphere).collect()
 }

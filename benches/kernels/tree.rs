@@ -9,6 +9,7 @@ use numerics::random::Key;
 use numerics::shapes::sphere;
 use numerics::simd::Path;
 use numerics::tree::TriangleTree;
+use numerics::vector;
 use std::time::Instant;
 
 const ROUNDS: usize = 20;
@@ -34,9 +35,8 @@ fn main() {
         let refit = fastest(|| tree.refit(&points));
         println!("{} triangles: build {build:.3} ms, refit {refit:.3} ms", triangles.len());
         let near = |i: u64| {
-            let [x, y, z] = [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).f32() - 0.5);
-            let shell = 1.02 / (x * x + y * y + z * z).sqrt();
-            [x * shell, y * shell, z * shell]
+            let p = [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).f32() - 0.5);
+            vector::scale(p, 1.02 / vector::length(p))
         };
         let from: Vec<[f32; 3]> = (0..50_000).map(near).collect();
         for path in Path::all() {

@@ -10,6 +10,7 @@
 use bodies::mass_spring::{BodySolver, FrameReport, Integrator, Material, Mesh, Pin, SoftBody, SolverFrame, State};
 use bodies::tets::cubes;
 use numerics::masked::Masked;
+use numerics::vector::DVec3;
 use std::time::Instant;
 
 const ROUNDS: usize = 3;
@@ -64,9 +65,8 @@ fn run(beam: &Beam, frames: usize, frame: &SolverFrame<'_>) -> Run {
 }
 
 fn error(run: &Run, reference: &Run) -> f64 {
-    let distance =
-        |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>();
-    let squares: f64 = run.tips.iter().zip(&reference.tips).map(distance).sum();
+    let square = |(a, b): (&[f64; 3], &[f64; 3])| (DVec3::from(*a) - DVec3::from(*b)).norm_squared();
+    let squares: f64 = run.tips.iter().zip(&reference.tips).map(square).sum();
     (squares / run.tips.len() as f64).sqrt() / SIZE[0]
 }
 

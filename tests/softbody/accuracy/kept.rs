@@ -9,12 +9,12 @@ use super::*;
 
 fn momentum(body: &SoftBody, state: &State) -> V {
     let each = state.velocities.iter().zip(body.masses());
-    each.fold([0.0; 3], |sum, (v, mass)| add(sum, *v, mass))
+    each.fold([0.0; 3], |sum, (v, mass)| plus_multiple(sum, *v, mass))
 }
 
 fn angular(body: &SoftBody, state: &State) -> V {
     let each = state.positions.iter().zip(&state.velocities).zip(body.masses());
-    each.fold([0.0; 3], |sum, ((x, v), mass)| add(sum, DVec3::from(*x).cross(&DVec3::from(*v)).into(), mass))
+    each.fold([0.0; 3], |sum, ((x, v), mass)| plus_multiple(sum, DVec3::from(*x).cross(&DVec3::from(*v)).into(), mass))
 }
 
 /// A block that rotates, stretches and moves.
@@ -24,8 +24,12 @@ fn thrown(damping: f64) -> (SoftBody, State) {
     for (index, v) in state.velocities.iter_mut().enumerate() {
         let key = Key::new(1).of(index as u64);
         let own: V = std::array::from_fn(|k| 0.2 * (key.of(k as u64).f64() - 0.5));
-        let arm = add(state.positions[index], [0.25, 0.2, 0.15], -1.0);
-        *v = add(add([0.3, -0.2, 0.5], DVec3::new(0.2, 3.0, -1.0).cross(&DVec3::from(arm)).into(), 1.0), own, 1.0);
+        let arm = plus_multiple(state.positions[index], [0.25, 0.2, 0.15], -1.0);
+        *v = plus_multiple(
+            plus_multiple([0.3, -0.2, 0.5], DVec3::new(0.2, 3.0, -1.0).cross(&DVec3::from(arm)).into(), 1.0),
+            own,
+            1.0,
+        );
     }
     (body, state)
 }
@@ -62,7 +66,7 @@ fn lost_turning(modulus: f64, steps_a_turn: f64, count: usize) -> (f64, u32) {
     let body = block([4, 3, 3], 0.1, modulus, 0.0);
     let mut state = State::at_rest(&body);
     for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
-        *x = add(*x, [0.2, 0.15, 0.15], -1.0);
+        *x = plus_multiple(*x, [0.2, 0.15, 0.15], -1.0);
         *v = DVec3::z().cross(&DVec3::from(*x)).into();
     }
     let before = angular(&body, &state);
@@ -93,7 +97,7 @@ fn fall(integrator: Integrator, fallen: f64) -> f64 {
     let gravity = [0.0, -9.81, 2.0];
     steps(&body, &mut state, &SolverFrame { gravity, volume: 1.0, integrator, ..BARE }, 24);
     let each = state.positions.iter().zip(&start.positions);
-    largest(each.map(|(after, before)| distance(after, &add(*before, gravity, fallen))))
+    largest(each.map(|(after, before)| distance(after, &plus_multiple(*before, gravity, fallen))))
 }
 
 pub(super) fn figures(effort: Effort) -> Vec<Figure> {

@@ -70,12 +70,13 @@ fn steps(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, frames: us
     (0..frames).map(|_| solver.step(body, state, frame)).collect()
 }
 
-fn add(a: V, b: V, share: f64) -> V {
-    std::array::from_fn(|k| a[k] + share * b[k])
+/// a + t·b.
+fn plus_multiple(a: V, b: V, t: f64) -> V {
+    (DVec3::from(a) + DVec3::from(b) * t).into()
 }
 
 fn mean(points: &[V]) -> V {
-    points.iter().fold([0.0; 3], |sum, p| add(sum, *p, 1.0 / points.len() as f64))
+    points.iter().fold([0.0; 3], |sum, p| plus_multiple(sum, *p, 1.0 / points.len() as f64))
 }
 
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {

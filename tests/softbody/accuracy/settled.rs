@@ -35,7 +35,7 @@ fn balance(springs: &[shapes::Spring], weights: &[V], held: &[bool], near: &[V])
         let mut slope = vec![vec![0.0; force.len()]; force.len()];
         for spring in springs {
             let [a, b] = spring.ends;
-            let way = add(x[b], x[a], -1.0);
+            let way = plus_multiple(x[b], x[a], -1.0);
             let size = DVec3::from(way).norm();
             let n = way.map(|x| x / size);
             let (pull, k) = (spring.stiffness * (size - spring.length), spring.stiffness);
@@ -56,7 +56,7 @@ fn balance(springs: &[shapes::Spring], weights: &[V], held: &[bool], near: &[V])
         }
         let step = solve(slope, force);
         for (i, place) in free.iter().enumerate() {
-            x[*place] = add(x[*place], [step[3 * i], step[3 * i + 1], step[3 * i + 2]], 1.0);
+            x[*place] = plus_multiple(x[*place], [step[3 * i], step[3 * i + 1], step[3 * i + 2]], 1.0);
         }
         if largest(step.iter().map(|x| x.abs())) < 1e-12 {
             return x;

@@ -101,8 +101,8 @@ fn pin(frame: Time) -> Geometry {
 fn within(points: &[V], p: &V) -> bool {
     let depth = |k: usize| {
         let (a, b) = (points[2 * k], points[2 * ((k + 1) % SIDES)]);
-        let out = DVec3::from(add(b, a, -1.0)).cross(&DVec3::z());
-        let from = add(*p, a, -1.0);
+        let out = DVec3::from(plus_multiple(b, a, -1.0)).cross(&DVec3::z());
+        let from = plus_multiple(*p, a, -1.0);
         -(out[0] * from[0] + out[1] * from[1]) / out.norm()
     };
     (-0.09..0.21).contains(&p[2]) && (0..SIDES).all(|k| depth(k) > 1e-7)

@@ -2,6 +2,7 @@
 
 use numerics::noise::{Field, NoiseKind};
 use numerics::random::Key;
+use numerics::vector::DVec3;
 
 use super::Figure;
 use crate::cooked::cook;
@@ -28,7 +29,7 @@ fn statistics(kind: NoiseKind) -> ([f64; 3], [f64; 3], f64) {
     let mut most = 0.0_f64;
     for away in [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 3.0], [4.0, 4.0, -4.0]] {
         let products: [f64; 9] = average(|p| {
-            let (here, there) = (at(p), at(std::array::from_fn(|k| p[k] + away[k])));
+            let (here, there) = (at(p), at((DVec3::from(p) + DVec3::from(away)).into()));
             std::array::from_fn(|pair| here[pair / 3] * there[pair % 3])
         });
         for (pair, product) in products.iter().enumerate() {

@@ -32,7 +32,7 @@ impl Change {
 
     fn of(&self, p: [f32; 3]) -> [f64; 3] {
         let p = self.turned(p.map(|x| f64::from(x) * self.scale));
-        std::array::from_fn(|k| p[k] + self.translation[k])
+        (DVec3::from(p) + DVec3::from(self.translation)).into()
     }
 
     /// The chain on a furry ball in a wind that turns, with a gust placed by hand.
