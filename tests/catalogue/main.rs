@@ -8,6 +8,7 @@ mod paths;
 mod readme;
 mod tokens;
 mod type_names;
+mod vectors;
 
 use std::fs;
 use std::path::{Path, PathBuf};

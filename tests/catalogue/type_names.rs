@@ -9,16 +9,6 @@ use super::{root, sources};
 const FOLDERS: [&str; 8] =
     ["conformance/src", "engine/src", "formats/src", "kernels", "nodes", "numerics/src", "preview/src", "src"];
 
-/// Names that several public types share, and why.
-const SHARED: [(&str, &str); 6] = [
-    ("Args", "each verb of the program has its own, and is named with it: `cook::Args`"),
-    ("Bounds", "of a param's range; of a picture, in `preview`"),
-    ("Error", "of the engine; of a picture, in `preview`"),
-    ("Frame", "of time; of a face that carries roots"),
-    ("Key", "of a result, in `engine`; of random numbers, in `numerics`"),
-    ("Settings", "of an engine; of a picture, in `preview`"),
-];
-
 /// The public types that a source declares.
 fn declared(source: &str) -> Vec<String> {
     let is_kind = |token: &Token| ["struct", "enum", "trait", "type", "union"].iter().any(|kind| token.is(kind));
@@ -40,7 +30,7 @@ fn no_two_public_types_share_a_name() {
     assert!(places.len() > 100, "the sources were not found");
     let doubled: Vec<String> = places
         .iter()
-        .filter(|(name, files)| files.len() > 1 && SHARED.iter().all(|(shared, _)| shared != name))
+        .filter(|(_, files)| files.len() > 1)
         .map(|(name, files)| format!("`{name}`: {}", files.join(", ")))
         .collect();
     assert!(doubled.is_empty(), "public types that share a name:\n  {}", doubled.join("\n  "));
