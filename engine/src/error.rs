@@ -1,9 +1,9 @@
-//! Errors of nodes: the fact alone. The engine adds node and frame, the program the rest.
+//! Errors of nodes. A node states only the fact; the engine adds node and frame, and the program the graph file.
 
 use crate::geometry::{GeometryError, Name};
 use crate::time::Frame;
 
-/// What kind of trouble a node met; the program's exit code follows from it.
+/// The kind of an error; it determines the program's exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
     /// A file could not be read.
@@ -14,33 +14,33 @@ pub enum ErrorKind {
     NotFinite,
     /// The node panicked.
     Panic,
-    /// The node broke its own declaration: a fault of convect, not of the graph.
+    /// The node violated its own declaration: a bug in convect, not a fault of the graph.
     Contract,
     /// The cook was cancelled.
     Cancelled,
 }
 
-/// A fact and perhaps a hint, both without place: `` `wind_dir` is [0, 0, 0], which has no direction ``.
+/// A fact and an optional hint, neither of which names the node: `` `wind_dir` is [0, 0, 0], which has no direction ``.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{fact}{}", hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default())]
 pub struct Error {
-    /// What kind of trouble.
+    /// Its kind.
     pub kind: ErrorKind,
-    /// What is so.
+    /// What is wrong.
     pub fact: String,
-    /// What to do about it.
+    /// How to mend it.
     pub hint: Option<String>,
-    /// The param that is to blame, where it is one.
+    /// The param that caused the error, if one did.
     pub param: Option<&'static str>,
 }
 
 impl Error {
-    /// An error of any kind.
+    /// An error of that kind.
     pub fn new(kind: ErrorKind, fact: impl Into<String>) -> Self {
         Self { kind, fact: fact.into(), hint: None, param: None }
     }
 
-    /// The node refuses what it was given.
+    /// The node refuses its input or params.
     pub fn refused(fact: impl Into<String>) -> Self {
         Self::new(ErrorKind::Refused, fact)
     }
@@ -50,19 +50,19 @@ impl Error {
         Self::new(ErrorKind::File, fact)
     }
 
-    /// The node broke its declaration.
+    /// The node violated its declaration.
     pub fn contract(fact: impl Into<String>) -> Self {
         Self::new(ErrorKind::Contract, fact)
     }
 
-    /// Of a param: in a graph file the fault stands there.
+    /// Names the param that caused the error: the fault is reported at its position in the graph file.
     #[must_use]
     pub fn of(mut self, param: &'static str) -> Self {
         self.param = Some(param);
         self
     }
 
-    /// With a hint.
+    /// Adds a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
@@ -80,11 +80,11 @@ impl From<GeometryError> for Error {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{node}` ({type_name}) at frame {frame}: {error}")]
 pub struct CookError {
-    /// Which node.
+    /// The node's id.
     pub node: Name,
     /// Its type.
     pub type_name: &'static str,
-    /// At which frame.
+    /// The frame.
     pub frame: Frame,
     /// What went wrong.
     pub error: Error,

@@ -1,4 +1,4 @@
-//! Files a graph reads. The engine reads them, so that the bytes that were hashed are the bytes a node gets.
+//! Files that a graph reads. The engine reads them, so that nodes get the same bytes that were hashed for keys.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::{Error, Result};
 use crate::key::ContentKey;
 
-/// A file whose contents are known by key. Its bytes are at hand until the store drops them, and read again then.
+/// A file identified by the hash of its contents. Its bytes stay in memory until the store releases them, and are read
+/// again when needed after that.
 #[derive(Clone, Debug)]
 pub struct File {
     path: Arc<PathBuf>,
@@ -24,12 +25,12 @@ impl PartialEq for File {
 }
 
 impl File {
-    /// Where it lies.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What follows the last dot of its name; empty where there is none.
+    /// The extension of its name without the dot; empty if there is none.
     pub fn extension(&self) -> &str {
         self.path.extension().and_then(|e| e.to_str()).unwrap_or_default()
     }
@@ -39,15 +40,15 @@ impl File {
         self.key
     }
 
-    /// Its bytes, the very ones that were hashed.
+    /// Its bytes, which are the ones that were hashed.
     ///
     /// # Errors
-    /// Where they had to be read again and have changed, or cannot be read any more.
+    /// If they had to be read again and have changed, or can no longer be read.
     pub fn bytes(&self) -> Result<Arc<[u8]>> {
         let (bytes, key) = self.store.load(&self.path)?;
         if key != self.key {
             let fact = format!("`{}` changed while the graph was cooked", self.path.display());
-            return Err(Error::file(fact).hint("cook again, once nothing writes to it"));
+            return Err(Error::file(fact).hint("cook again when no other program writes to it"));
         }
         Ok(bytes)
     }
@@ -55,7 +56,7 @@ impl File {
 
 type Loaded = (Arc<[u8]>, ContentKey);
 
-/// The files of one cook. Bytes are kept until [`Files::release`]; keys as long as the store lives.
+/// The files of one cook. Bytes are kept until [`Files::release`]; keys for the lifetime of the store.
 #[derive(Debug, Default)]
 pub struct Files {
     keys: Mutex<BTreeMap<PathBuf, ContentKey>>,
@@ -66,17 +67,17 @@ impl Files {
     /// The file at `path`.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// If it cannot be read.
     pub fn open(self: &Arc<Self>, path: &Path) -> Result<File> {
-        let known = self.keys.lock().unwrap_or_else(PoisonError::into_inner).get(path).copied();
-        let key = match known {
+        let hashed = self.keys.lock().unwrap_or_else(PoisonError::into_inner).get(path).copied();
+        let key = match hashed {
             Some(key) => key,
             None => self.load(path)?.1,
         };
         Ok(File { path: Arc::new(path.to_owned()), key, store: self.clone() })
     }
 
-    /// Drops all bytes; they are read again where someone asks, and must be the same then.
+    /// Drops all bytes. They are read again when needed, and must then be unchanged.
     pub fn release(&self) {
         self.bytes.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
@@ -97,7 +98,8 @@ impl Files {
     }
 }
 
-/// `path` with each run of `#` in its file name replaced by the frame number, as many digits at least.
+/// `path` with each run of `#` in its file name replaced by the frame number, padded with zeros to the length of the
+/// run.
 pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut numbered = String::new();
@@ -112,16 +114,17 @@ pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
     path.with_file_name(numbered + rest)
 }
 
-/// Whether that is what the program was started with, such as `/dev/stdin` and `/dev/fd/3`: it is in no folder of its own.
+/// Whether `path` is a stream that the program inherited, such as `/dev/stdin` or `/dev/fd/3`. Such a path has no
+/// folder that others could be relative to.
 pub fn is_handed_over(path: &Path) -> bool {
     path == Path::new("/dev/stdin") || path.starts_with("/dev/fd")
 }
 
-/// Opens a file to be read, without ever waiting for one: folders, pipes and devices are refused, but what is handed over
-/// has its writer already.
+/// Opens a file for reading without blocking: folders, pipes and devices are refused, except inherited streams, which
+/// already have a writer.
 ///
 /// # Errors
-/// Where it is no file, does not exist or may not be read.
+/// If it is not a file, does not exist, or reading it is not permitted.
 pub fn open(path: &Path) -> io::Result<fs::File> {
     let about = fs::metadata(path)?;
     if about.is_dir() {
@@ -133,13 +136,15 @@ pub fn open(path: &Path) -> io::Result<fs::File> {
     fs::File::open(path)
 }
 
-/// The error of a file that cannot be read, with what to do about the commonest causes.
+/// The error of a file that cannot be read, with hints for the most common causes.
 pub fn unreadable(path: &Path, error: &std::io::Error) -> Error {
     use std::io::ErrorKind as K;
     let path = path.display();
     match error.kind() {
         K::NotFound => Error::file(format!("`{path}` does not exist")).hint("paths are relative to the graph file"),
-        K::PermissionDenied => Error::file(format!("`{path}` may not be read")).hint("ask for read permission"),
+        K::PermissionDenied => {
+            Error::file(format!("no permission to read `{path}`")).hint("change the file's permissions")
+        }
         K::IsADirectory => Error::file(format!("`{path}` is a folder, expected a file")),
         _ => Error::file(format!("`{path}` could not be read: {error}")),
     }
@@ -166,13 +171,13 @@ mod tests {
         let file = files.open(&path).unwrap();
         assert_eq!(&*file.bytes().unwrap(), b"v 0 0 0");
         std::fs::write(&path, "v 1 1 1").unwrap();
-        assert_eq!(&*file.bytes().unwrap(), b"v 0 0 0", "bytes at hand are the ones that were hashed");
+        assert_eq!(&*file.bytes().unwrap(), b"v 0 0 0", "bytes in memory are the ones that were hashed");
         files.release();
         assert!(file.bytes().unwrap_err().fact.ends_with("changed while the graph was cooked"));
     }
 
     #[test]
-    fn what_cannot_be_read_says_why() {
+    fn an_unreadable_file_gives_the_reason() {
         let folder = tempfile::tempdir().unwrap();
         let files = Arc::new(Files::default());
         let error = files.open(&folder.path().join("none.obj")).unwrap_err();

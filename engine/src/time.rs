@@ -1,27 +1,28 @@
 //! Frames as fixed-point samples, so that sub-frames are exact and can be keys.
 
-/// A time on the frame axis: whole ticks of 1/5,040 frame, so halves to tenths are exact.
+/// A time on the frame axis: a whole number of ticks of 1/5,040 frame, so that all fractions from halves to tenths are
+/// exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Frame(i64);
 
-/// Why a text or number is not a frame.
+/// Why a string or number is not a frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FrameError {
     /// Not a number.
     #[error("`{0}` is not a frame number")]
     NotANumber(String),
-    /// Beyond what fits.
-    #[error("frame {0} is beyond ±{limit}", limit = Frame::LIMIT)]
+    /// Out of range.
+    #[error("frame {0} is out of range; expected a frame within ±{limit}", limit = Frame::LIMIT)]
     TooFar(f64),
-    /// Between two ticks.
+    /// Not a whole number of ticks.
     #[error("frame {0} is not a multiple of 1/5040 of a frame; the nearest is {1}")]
     BetweenTicks(f64, f64),
 }
 
 impl Frame {
-    /// Ticks a frame.
+    /// Ticks per frame.
     pub const TICKS: i64 = 5_040;
-    /// Greatest frame number, either way.
+    /// Largest absolute frame number.
     pub const LIMIT: i64 = 1_000_000_000;
 
     /// A whole frame.
@@ -37,7 +38,7 @@ impl Frame {
     /// The frame at `number`.
     ///
     /// # Errors
-    /// Where it is not finite, too far, or between two ticks.
+    /// If it is not finite, out of range, or not a whole number of ticks.
     pub fn exactly(number: f64) -> Result<Self, FrameError> {
         if !number.is_finite() {
             return Err(FrameError::NotANumber(number.to_string()));
@@ -46,7 +47,7 @@ impl Frame {
             return Err(FrameError::TooFar(number));
         }
         let nearest = Self((number * Self::TICKS as f64).round() as i64);
-        // A decimal such as 0.1 is itself rounded; anything within that rounding is meant exactly.
+        // A decimal such as 0.1 is rounded to binary; a difference of that size is ignored.
         if (nearest.number() - number).abs() > 1e-9 * number.abs().max(1.0) {
             return Err(FrameError::BetweenTicks(number, nearest.number()));
         }
@@ -83,19 +84,19 @@ impl Frame {
         Self(-(-self.0).div_euclid(Self::TICKS) * Self::TICKS)
     }
 
-    /// This plus `frames` whole frames.
+    /// This frame plus `frames` whole frames.
     #[must_use]
     pub const fn plus(self, frames: i64) -> Self {
         Self(self.0 + frames * Self::TICKS)
     }
 
-    /// This plus `ticks` ticks.
+    /// This frame plus `ticks` ticks.
     #[must_use]
     pub const fn plus_ticks(self, ticks: i64) -> Self {
         Self(self.0 + ticks)
     }
 
-    /// How the frame stands in file names: four digits, a sub-frame after `_` (`0010`, `0010_5`, `-0003`).
+    /// The frame in file names: at least four digits, and the fraction after `_` (`0010`, `0010_5`, `-0003`).
     pub fn file_label(self) -> String {
         let sign = if self.0 < 0 { "-" } else { "" };
         let text = format!("{}", self.number().abs());
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn floor_and_ceil_go_down_and_up_below_zero_too() {
+    fn floor_and_ceil_round_correctly_below_zero() {
         let at = |x: f64| Frame::exactly(x).unwrap();
         assert_eq!((at(-0.5).floor(), at(-0.5).ceil()), (at(-1.0), at(0.0)));
         assert_eq!((at(2.5).floor(), at(2.5).ceil()), (at(2.0), at(3.0)));
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_for_files_sort_and_say_the_sub_frame() {
+    fn file_labels_sort_and_include_the_fraction() {
         let label = |text: &str| text.parse::<Frame>().unwrap().file_label();
         assert_eq!(label("1"), "0001");
         assert_eq!(label("10.5"), "0010_5");
@@ -157,13 +158,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_refused() {
+    fn invalid_frames_are_refused() {
         let error = |text: &str| text.parse::<Frame>().unwrap_err().to_string();
         assert_eq!(error("ten"), "`ten` is not a frame number");
         assert_eq!(error("1e3"), "`1e3` is not a frame number");
         assert_eq!(error(""), "`` is not a frame number");
         assert_eq!(error("inf"), "`inf` is not a frame number");
-        assert_eq!(error("2000000000"), "frame 2000000000 is beyond ±1000000000");
+        assert_eq!(error("2000000000"), "frame 2000000000 is out of range; expected a frame within ±1000000000");
         assert!(
             error("0.0001").starts_with("frame 0.0001 is not a multiple of 1/5040 of a frame; the nearest is 0.000")
         );

@@ -1,4 +1,4 @@
-//! Any text as an expression and as a program: it has a value, or faults with a place say why not.
+//! Arbitrary text as an expression and as a program: it never panics, and gives a value or faults with positions.
 
 #![no_main]
 

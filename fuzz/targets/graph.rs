@@ -1,17 +1,17 @@
-//! What loading a graph promises of any bytes.
+//! Guarantees of loading a graph from arbitrary bytes.
 
 use std::path::Path;
 
 use engine::graph::fault::code;
 use engine::graph::{Body, Catalogue, Fault, Graph};
 
-/// Longest fact or hint, in characters: a message is read by people, whatever the file holds.
+/// The longest fact or hint, in characters: messages stay readable for any file.
 const LONGEST: usize = 2_000;
 
-/// Loads `bytes`, a graph behind any number of lines `--set KEY=JSON`, as if every file that it names were there.
+/// Loads `bytes`, any number of lines `--set KEY=JSON` followed by a graph, as if all files that it names existed.
 ///
 /// # Panics
-/// Where a fault is not one that a user can be shown, or what loads has no values or cannot be asked what it carries.
+/// If a fault cannot be shown to a user, or a loaded graph has params without values or outputs without components.
 pub(crate) fn check(catalogue: Catalogue, bytes: &[u8]) {
     let (set, text) = settings(bytes);
     match Graph::load_bytes(text, Path::new("scene"), catalogue, &set, &|_| Ok(())) {
@@ -23,7 +23,7 @@ pub(crate) fn check(catalogue: Catalogue, bytes: &[u8]) {
     }
 }
 
-/// Keys and values of the leading lines `--set KEY=JSON`, and the bytes behind them.
+/// The keys and values of the leading lines `--set KEY=JSON`, and the bytes after them.
 fn settings(mut bytes: &[u8]) -> (Vec<(String, String)>, &[u8]) {
     let mut set = Vec::new();
     while let Some(rest) = bytes.strip_prefix(b"--set ") {
@@ -54,18 +54,18 @@ fn check_graph(graph: &Graph) {
 fn check_fault(fault: &Fault, text: &[u8], set: &[(String, String)]) {
     assert!(code::ALL.contains(&fault.code), "{fault:?}");
     for sentence in std::iter::once(&fault.fact).chain(&fault.hint) {
-        assert!(!sentence.contains(char::is_control), "a terminal obeys {sentence:?}");
-        assert!(sentence.chars().count() <= LONGEST, "nobody reads {sentence:?}");
+        assert!(!sentence.contains(char::is_control), "control character in {sentence:?}");
+        assert!(sentence.chars().count() <= LONGEST, "too long: {sentence:?}");
     }
     let value = fault.set.as_ref().and_then(|key| set.iter().rfind(|(set, _)| **set == **key));
     assert_eq!(fault.set.is_some(), value.is_some(), "{fault:?}");
-    // One key may be set several times: only one that is set once says which value is meant.
-    let is_meant = fault.set.as_ref().is_none_or(|key| set.iter().filter(|(set, _)| **set == **key).count() == 1);
+    // If a key is set several times, a fault does not identify the value.
+    let is_unique = fault.set.as_ref().is_none_or(|key| set.iter().filter(|(set, _)| **set == **key).count() == 1);
     let text = value.map_or(String::from_utf8_lossy(text), |(_, value)| value.into());
-    assert!(!is_meant || holds(&text, fault.line, fault.column), "{fault:?}");
+    assert!(!is_unique || holds(&text, fault.line, fault.column), "{fault:?}");
 }
 
-/// Whether a text has that place, its end included.
+/// Whether a text has that position, its end included.
 fn holds(text: &str, line: u32, column: u32) -> bool {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let found = text.split('\n').nth((line as usize).wrapping_sub(1));

@@ -8,7 +8,7 @@ const SCOPE: Scope<'_> = Scope { controls: &[("gain", Width::Scalar), ("dir", Wi
 const ENV: Env<'_> =
     Env { frame: 12.5, time: 0.25, fps: 50.0, seed: 7.0, controls: &[0.5, 1.0, 0.0, -0.25, 0.1, 0.2, 0.3, 1.0] };
 
-/// Rows that programs run over: none, a few, more than one batch.
+/// Numbers of rows that programs run over: none, a few, more than one batch.
 const ROWS: [usize; 3] = [0, 3, 70];
 
 /// Evaluates `text` as an expression and runs it as a program.
@@ -35,12 +35,12 @@ fn check_fault(fault: &ExprError, text: &str) {
     assert!(line.is_some_and(|line| (1..=line.chars().count() + 1).contains(&fault.column)), "{fault:?}");
 }
 
-/// Everything that is not used made something else.
+/// An environment in which everything that is not used has another value.
 fn unused_changed(uses: &Uses, numbers: &mut Vec<f64>) -> [f64; 4] {
     let mut at = 0;
-    for (place, (_, width)) in SCOPE.controls.iter().enumerate() {
-        let kept = uses.controls.contains(&place);
-        numbers.extend(ENV.controls[at..at + width.count()].iter().map(|x| if kept { *x } else { 9.0 }));
+    for (index, (_, width)) in SCOPE.controls.iter().enumerate() {
+        let is_used = uses.controls.contains(&index);
+        numbers.extend(ENV.controls[at..at + width.count()].iter().map(|x| if is_used { *x } else { 9.0 }));
         at += width.count();
     }
     let (frame, time) = if uses.time { (ENV.frame, ENV.time) } else { (99.0, 3.0) };
@@ -81,11 +81,11 @@ fn check_program(program: &Program, rows: usize) {
     assert!(written.iter().map(|(name, _)| name).eq(program.writes()), "{:?}", program.writes());
     for (name, column) in &written {
         assert_eq!(column.len(), rows, "{name}");
-        let before = columns.iter().find(|(known, _)| known == name);
+        let before = columns.iter().find(|(other, _)| other == name);
         assert!(before.is_none_or(|(_, before)| before.kind() == column.kind()), "{name} keeps its type");
     }
-    // What is neither read nor written does not matter.
-    let named = |name: &str| program.reads().iter().chain(program.writes()).any(|known| known == name);
+    // Columns that are neither read nor written do not matter.
+    let named = |name: &str| program.reads().iter().chain(program.writes()).any(|other| other == name);
     let named: Vec<(&str, &Column)> = all.iter().copied().filter(|(name, _)| named(name)).collect();
     assert!(program.run(&ENV, &named, rows).as_ref() == Ok(&written), "the same attributes again");
 }

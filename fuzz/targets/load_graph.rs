@@ -1,4 +1,5 @@
-//! Any bytes as a graph file with some `--set`: it loads and its params have values, or faults with a place say why not.
+//! Arbitrary bytes as a graph file with some `--set`: loading never panics, and gives a graph whose params have values,
+//! or faults with positions.
 
 #![no_main]
 

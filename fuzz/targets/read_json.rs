@@ -1,4 +1,4 @@
-//! Any bytes as a .json file: they load, or an error says why; what loads can be written again and comes back.
+//! Arbitrary bytes as a .json file: reading never panics; what loads can be written and read again.
 
 #![no_main]
 

@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(refused(&code("a = 1\nb = sin(")), "line 2, column 9: expected a value, found the end");
         assert_eq!(
             refused(&code("a = envelop")),
-            "line 1, column 5: there is no attribute, control or value `envelop`; there are `P`"
+            "line 1, column 5: there is no attribute, control or `let` value `envelop`; available: `P`"
         );
         assert_eq!(refused(&code("a = 1/(P.x - 3)")), "line 1, element 2: `a` would be inf, not a finite number");
         let two = refused(&code("a = clamp(1)\nb = 2\nc = 3 +"));
@@ -354,7 +354,7 @@ mod tests {
     fn attributes_of_the_other_kind_of_row_are_refused_by_name() {
         assert_eq!(
             refused(&code("a = P.x").set(OVER, Over::Elements)),
-            "line 1, column 5: there is no attribute, control or value `P`; \
+            "line 1, column 5: there is no attribute, control or `let` value `P`; \
              `P` belongs to points, of which an element has several; set `over` to \"points\""
         );
         assert_eq!(

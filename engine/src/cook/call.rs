@@ -125,7 +125,7 @@ fn check_wires(input: &str, kind: Kind, data: &InputData) -> Result<()> {
     for wire in wires {
         let there = if kind == Kind::Volume { wire.volume().is_some() } else { wire.part(kind).is_some() };
         if !there {
-            return Err(Error::refused(format!("what comes in through `{input}` has no {kind}")));
+            return Err(Error::refused(format!("the geometry of the input `{input}` has no {kind}")));
         }
     }
     Ok(())
@@ -201,5 +201,5 @@ fn panicked(panic: &(dyn Any + Send)) -> Error {
     let said = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
     let said = said.unwrap_or("no message");
     Error::new(ErrorKind::Panic, format!("it failed unexpectedly: {said}"))
-        .hint("this is a fault of convect; please report it with the graph")
+        .hint("this is a bug in convect; please report it with the graph")
 }

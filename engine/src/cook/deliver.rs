@@ -52,7 +52,8 @@ fn add_velocity(result: &mut Geometry, [before, after]: [&Geometry; 2], seconds:
                     [a, b] if a == now && b == now => format!("the {kind} are not the same half a frame away"),
                     [a, b] => format!("the {kind} have {a} points half a frame before, {now} now and {b} after"),
                 };
-                return Err(Error::refused(fact).hint("velocities need points that stay; leave out `v` of the output"));
+                return Err(Error::refused(fact)
+                    .hint("velocities need the same points at neighbouring frames; remove `v` from the output"));
             }
         };
         let (a, b) = (before.positions(), after.positions());

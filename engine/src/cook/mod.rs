@@ -90,7 +90,7 @@ impl Engine {
             .num_threads(settings.threads)
             .thread_name(|k| format!("convect {k}"))
             .build()
-            .map_err(|error| format!("no threads to cook with: {error}"))?;
+            .map_err(|error| format!("cannot start threads: {error}"))?;
         let store = Mutex::new(Store::new(settings.memory / 2));
         Ok(Self { pool, memory: settings.memory, store, files: Arc::default(), verified: Mutex::default() })
     }

@@ -1,5 +1,5 @@
-//! What can be found out about a loaded graph before it cooks: params that do not go together, geometry that is none,
-//! params that leave their range and files that are missing at some frame.
+//! Checks of a loaded graph before it is cooked: incompatible params, invalid geometry, animated params that leave
+//! their range, and gaps in file sequences.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,17 +16,16 @@ use crate::param::{ParamSpec, Shape, Source};
 use crate::plan::{Plan, Request, Resolver};
 use crate::time::Frame;
 
-/// Frames that are looked through at most, so that a check takes no time worth speaking of: what comes later, a cook
-/// tells.
+/// Checks look at no more frames than this, so that they stay fast. Errors at later frames are reported when cooking.
 const MOST_FRAMES: usize = 10_000;
 
 impl Engine {
-    /// Faults of the params of every node together, of the geometry that sources read or have in them, and of files of a
-    /// sequence that are not there. Each source is cooked once, at the first frame, and what stands still is not cooked
-    /// again by a cook that follows.
+    /// Finds incompatible params of a node, invalid geometry in files and inline data, and missing files of a sequence.
+    /// Each source is cooked once, at the first frame; a static one is not cooked again by a cook that follows.
     ///
-    /// With `needed_by`, only what that request depends on is read, at its frames. Without, everything is looked through,
-    /// and moving params at all frames of the scene too: a cook leaves out the frames at which they are refused.
+    /// With `needed_by`, only nodes that this request depends on are checked, at its frames. Without it, all nodes are,
+    /// and animated params are evaluated at all frames of the scene. (A cook reports illegal values itself and skips
+    /// those frames.)
     pub fn verify(&self, graph: &Graph, needed_by: Option<&Request>) -> Vec<Fault> {
         let everything = Request { outputs: (0..graph.outputs.len()).collect(), frames: vec![graph.scene.start()] };
         let plan = match self.plan(graph, needed_by.unwrap_or(&everything)) {
@@ -39,40 +38,40 @@ impl Engine {
         };
         let mut faults = Vec::new();
         let mut sources = Vec::new();
-        for (place, node) in graph.nodes.iter().enumerate() {
+        for (index, node) in graph.nodes.iter().enumerate() {
             let Body::Node { node: declared, specs, params, .. } = &node.body else { continue };
             let own;
-            let resolver = match (plan.nodes[place].needed, needed_by) {
+            let resolver = match (plan.nodes[index].needed, needed_by) {
                 (false, None) => {
                     own = Resolver::new(node, graph, self.files());
                     &own
                 }
-                _ => &plan.nodes[place].resolver,
+                _ => &plan.nodes[index].resolver,
             };
             let before = faults.len();
             let reads_sequence = params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
             if resolver.is_animated() && (reads_sequence || needed_by.is_none()) {
-                let through = ThroughTime::look(resolver, &frames);
-                let missing = through.missing.map(|error| fault(graph, place, error));
+                let over_time = ParamFaults::over(resolver, &frames);
+                let missing = over_time.missing.map(|error| fault(graph, index, error));
                 faults.extend(missing.map(|fault| Fault { code: code::FILE_MISSING, ..fault }));
-                let left = through.refused.filter(|_| needed_by.is_none());
-                faults.extend(left.map(|error| fault(graph, place, error)));
+                let illegal = over_time.refused.filter(|_| needed_by.is_none());
+                faults.extend(illegal.map(|error| fault(graph, index, error)));
             }
             let error = match resolver.at(graph.scene.start()) {
-                // Told above, or at a frame that nobody asks for.
+                // Already reported above, or at a frame that is not requested.
                 Err(_) if resolver.is_animated() => None,
                 Err(error) => Some(error),
                 Ok(params) => declared.checks.and_then(|checks| checks(&params).err()),
             };
-            faults.extend(error.map(|error| fault(graph, place, error)));
-            let asked = plan.nodes[place].needed || needed_by.is_none();
-            if faults.len() == before && asked && declared.inputs.is_empty() && holds_data(specs, params) {
-                sources.push(place);
+            faults.extend(error.map(|error| fault(graph, index, error)));
+            let requested = plan.nodes[index].needed || needed_by.is_none();
+            if faults.len() == before && requested && declared.inputs.is_empty() && holds_data(specs, params) {
+                sources.push(index);
             }
         }
         let first = frames.iter().min().copied().unwrap_or(graph.scene.start());
-        for (place, error) in self.cook_sources(&plan, &sources, first) {
-            faults.push(fault(graph, place, error.error.clone()));
+        for (index, error) in self.cook_sources(&plan, &sources, first) {
+            faults.push(fault(graph, index, error.error.clone()));
         }
         faults.sort_by_key(|fault| (fault.line, fault.column));
         faults
@@ -101,7 +100,7 @@ impl Engine {
     }
 }
 
-/// Whether a source reads a file, or has geometry written into it.
+/// Whether a source reads a file or has inline geometry.
 fn holds_data(specs: &[ParamSpec], params: &[Source]) -> bool {
     let is_data = |shape| matches!(shape, Shape::Vec3s | Shape::Ints | Shape::Tets | Shape::Columns);
     specs.iter().zip(params).any(|(spec, source)| match source {
@@ -111,35 +110,35 @@ fn holds_data(specs: &[ParamSpec], params: &[Source]) -> bool {
     })
 }
 
-/// What is wrong with a node's params at some of its frames: the first of each kind, and how often.
-struct ThroughTime {
-    /// A value that is refused.
+/// The first illegal value and the first missing file of a node over all frames, with the number of further frames.
+struct ParamFaults {
+    /// An illegal value.
     refused: Option<Error>,
-    /// A file of a sequence that is not there.
+    /// A missing file of a sequence.
     missing: Option<Error>,
 }
 
-impl ThroughTime {
-    fn look(resolver: &Resolver, frames: &[Frame]) -> Self {
+impl ParamFaults {
+    fn over(resolver: &Resolver, frames: &[Frame]) -> Self {
         let mut refused: Option<(Error, Frame, usize)> = None;
         let mut missing: Option<(Error, Frame, usize)> = None;
-        let note = |found: &mut Option<(Error, Frame, usize)>, frame: Frame, error: &dyn Fn() -> Error| match found {
+        let record = |found: &mut Option<(Error, Frame, usize)>, frame: Frame, error: &dyn Fn() -> Error| match found {
             Some((_, _, more)) => *more += 1,
             None => *found = Some((error(), frame, 0)),
         };
-        // Several frames may read the same file.
-        let mut there: Option<PathBuf> = None;
+        // Consecutive frames may read the same file.
+        let mut last_found: Option<PathBuf> = None;
         for frame in frames {
             match resolver.unopened(*frame) {
-                Err(error) => note(&mut refused, *frame, &|| error.clone()),
+                Err(error) => record(&mut refused, *frame, &|| error.clone()),
                 Ok(params) => {
                     for (param, path) in resolver.sequence_files(&params) {
-                        if there.as_ref() == Some(&path) {
+                        if last_found.as_ref() == Some(&path) {
                             continue;
                         }
                         match std::fs::metadata(&path) {
-                            Ok(_) => there = Some(path),
-                            Err(error) => note(&mut missing, *frame, &|| unreadable(&path, &error).of(param)),
+                            Ok(_) => last_found = Some(path),
+                            Err(error) => record(&mut missing, *frame, &|| unreadable(&path, &error).of(param)),
                         }
                     }
                 }
@@ -157,7 +156,7 @@ impl ThroughTime {
     }
 }
 
-/// The param a fault belongs to, if it belongs to one: that of the file, where the file is the trouble.
+/// The param that a fault refers to, if any: for an error of a file, the param with its path.
 fn param_of(graph: &Graph, node: usize, error: &Error) -> Option<&'static str> {
     let Body::Node { specs, .. } = &graph.nodes[node].body else { return None };
     let file = specs.iter().find(|spec| spec.shape == Shape::File).filter(|_| error.kind == ErrorKind::File);

@@ -1,25 +1,24 @@
-//! A parsed text: nodes in one flat list, each behind the nodes it is made of.
+//! A parsed text: nodes in one flat list, each after its operands.
 //!
-//! So every pass is a loop from the first node to the last, and no depth of a text can exhaust the
-//! stack after parsing.
+//! So every pass is a loop from the first node to the last, and deep nesting cannot overflow the stack after parsing.
 
 use super::code::{Binary, Input, Unary};
-use super::error::Place;
+use super::error::Position;
 use super::functions::Function;
 
-/// Names a node by its position in the list.
+/// The index of a node in the list.
 pub(super) type NodeId = u32;
 
 /// A parsed text.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ast {
     pub(super) nodes: Vec<Node>,
-    /// Where each node's name, number or operator stands.
-    pub(super) places: Vec<Place>,
-    /// The arguments of all calls in a row.
+    /// The position of each node's name, number or operator in the text.
+    pub(super) positions: Vec<Position>,
+    /// The arguments of all calls, concatenated.
     pub(super) arguments: Vec<NodeId>,
     pub(super) statements: Vec<Statement>,
-    /// Names of attributes; nodes name them by position.
+    /// Names of attributes; nodes refer to them by index.
     pub(super) attributes: Vec<String>,
     /// Names of `let` values.
     pub(super) locals: Vec<String>,
@@ -38,7 +37,7 @@ pub(super) enum Node {
     Binary(Operator, NodeId, NodeId),
     Select(NodeId, NodeId, NodeId),
     Component(NodeId, u32),
-    /// A function and where its arguments stand in `Ast::arguments`.
+    /// A function, and the first index and number of its arguments in `Ast::arguments`.
     Call(&'static Function, u32, u32),
 }
 
@@ -47,23 +46,23 @@ pub(super) enum Node {
 pub(super) struct Operator {
     pub(super) text: &'static str,
     pub(super) op: Binary,
-    /// `a > b` is `b < a`.
+    /// Whether the operands are swapped: `a > b` is `b < a`.
     pub(super) swapped: bool,
-    /// Works component by component; comparisons and logic take scalars only.
+    /// Whether it works component by component; comparisons and logic accept only scalars.
     pub(super) on_vectors: bool,
 }
 
-/// One assignment, or the whole of an expression.
+/// One assignment, or a whole expression.
 #[derive(Clone, Debug)]
 pub(super) struct Statement {
     pub(super) target: Target,
-    /// Where the target stands.
-    pub(super) place: Place,
-    /// The node that makes the value; every node up to it belongs to this or earlier statements.
+    /// The position of the target in the text.
+    pub(super) position: Position,
+    /// The node of the value; all nodes up to it belong to this or earlier statements.
     pub(super) value: NodeId,
 }
 
-/// Where the value of a statement goes.
+/// What the value of a statement is assigned to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Target {
     /// The value of an expression.

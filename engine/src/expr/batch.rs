@@ -1,8 +1,8 @@
-//! Runs code over the rows of columns, a batch at a time, on all threads.
+//! Runs code over the rows of columns in batches, on all threads.
 //!
-//! Rows are cut into chunks of fixed size, a chunk into batches; every row is computed alone, so
-//! neither the cut nor the threads can change a bit. Values of a batch stay in the cache while its
-//! instructions run, and what is the same for all rows is computed once.
+//! Rows are split into chunks of fixed size, chunks into batches. Every row is computed independently, so the result
+//! does not depend on the split or the number of threads. The values of a batch stay in the cache while its
+//! instructions run, and values that are the same for all rows are computed once.
 
 use std::sync::Arc;
 
@@ -13,34 +13,34 @@ use super::code::Input;
 use super::lower::{Lowered, Store};
 use crate::geometry::Column;
 
-/// Rows that an instruction runs over at a time: 512 bytes a value, so that 60 values fit in 32 kB.
+/// Rows per batch: 512 bytes per value, so that 60 values fit in 32 kB.
 const BATCH: usize = 64;
-/// Rows that a thread takes at a time.
+/// Rows per task of a thread.
 const CHUNK: usize = 64 * BATCH;
 
-/// The first value that does not fit its column.
-pub(super) struct NotHeld {
+/// A value that its column cannot store.
+pub(super) struct OutOfRange {
     pub(super) store: Store,
     pub(super) row: usize,
     pub(super) value: f64,
 }
 
-/// Fills `written` (attribute and column, `rows` long) with what the code stores in them.
+/// Runs the code and stores its results in `written` (attribute and column with `rows` rows).
 ///
 /// # Errors
-/// The first value, by line and then by row, that is not finite or beyond i32.
+/// The first value, by line and then by row, that is not finite or outside i32.
 pub(super) fn run(
     lowered: &Lowered,
     env: &Env<'_>,
     sources: &[Option<&Column>],
     written: &mut [(usize, Column)],
     rows: usize,
-) -> Result<(), NotHeld> {
+) -> Result<(), OutOfRange> {
     let mut outputs = vec![0; sources.len()];
     for (output, (attribute, _)) in written.iter().enumerate() {
         outputs[*attribute] = output;
     }
-    let mut chunks: Vec<Vec<Part<'_>>> = (0..rows.div_ceil(CHUNK)).map(|_| Vec::new()).collect();
+    let mut chunks: Vec<Vec<ChunkMut<'_>>> = (0..rows.div_ceil(CHUNK)).map(|_| Vec::new()).collect();
     for (_, column) in written {
         for (chunk, part) in chunks.iter_mut().zip(parts(column)) {
             chunk.push(part);
@@ -59,7 +59,7 @@ pub(super) fn run(
         }
         values
     };
-    let chunk = |values: &mut Vec<[f64; BATCH]>, (chunk, mut parts): (usize, Vec<Part<'_>>)| {
+    let chunk = |values: &mut Vec<[f64; BATCH]>, (chunk, mut parts): (usize, Vec<ChunkMut<'_>>)| {
         let mut bad = None;
         for start in (chunk * CHUNK..rows.min((chunk + 1) * CHUNK)).step_by(BATCH) {
             let length = BATCH.min(rows - start);
@@ -80,7 +80,7 @@ pub(super) fn run(
                 let part = &mut parts[outputs[store.attribute as usize]];
                 let value = &values[store.value as usize][..length];
                 if let Some(k) = part.write(store.component as usize, start - chunk * CHUNK, value) {
-                    let found = NotHeld { store: *store, row: start + k, value: value[k] };
+                    let found = OutOfRange { store: *store, row: start + k, value: value[k] };
                     bad = first(bad, Some(found));
                 }
             }
@@ -92,8 +92,8 @@ pub(super) fn run(
 }
 
 /// The earlier of two, by line, then row, then component.
-fn first(a: Option<NotHeld>, b: Option<NotHeld>) -> Option<NotHeld> {
-    let key = |bad: &NotHeld| (bad.store.place, bad.row, bad.store.component);
+fn first(a: Option<OutOfRange>, b: Option<OutOfRange>) -> Option<OutOfRange> {
+    let key = |bad: &OutOfRange| (bad.store.position, bad.row, bad.store.component);
     a.into_iter().chain(b).min_by_key(key)
 }
 
@@ -114,19 +114,19 @@ fn read(column: &Column, component: usize, start: usize, out: &mut [f64]) {
     }
 }
 
-/// The numbers of a chunk of rows, and how many a row has.
-enum Part<'a> {
+/// The numbers of a chunk of rows, and the number of components of a row.
+enum ChunkMut<'a> {
     Single(&'a mut [f32], usize),
     Integer(&'a mut [i32], usize),
 }
 
-/// A column in chunks, for writing.
-fn parts(column: &mut Column) -> Vec<Part<'_>> {
-    fn single(numbers: &mut [f32], width: usize) -> Vec<Part<'_>> {
-        numbers.chunks_mut(CHUNK * width).map(|part| Part::Single(part, width)).collect()
+/// Splits a column into chunks for writing.
+fn parts(column: &mut Column) -> Vec<ChunkMut<'_>> {
+    fn single(numbers: &mut [f32], width: usize) -> Vec<ChunkMut<'_>> {
+        numbers.chunks_mut(CHUNK * width).map(|part| ChunkMut::Single(part, width)).collect()
     }
-    fn integer(numbers: &mut [i32], width: usize) -> Vec<Part<'_>> {
-        numbers.chunks_mut(CHUNK * width).map(|part| Part::Integer(part, width)).collect()
+    fn integer(numbers: &mut [i32], width: usize) -> Vec<ChunkMut<'_>> {
+        numbers.chunks_mut(CHUNK * width).map(|part| ChunkMut::Integer(part, width)).collect()
     }
     match column {
         Column::F1(rows) => single(Arc::make_mut(rows).as_mut_slice(), 1),
@@ -138,8 +138,9 @@ fn parts(column: &mut Column) -> Vec<Part<'_>> {
     }
 }
 
-impl Part<'_> {
-    /// Writes a component of the rows from `start` on; the first of `values` that it cannot hold.
+impl ChunkMut<'_> {
+    /// Writes a component of the rows from `start` on. Returns the index of the first of `values` that cannot be
+    /// stored.
     fn write(&mut self, component: usize, start: usize, values: &[f64]) -> Option<usize> {
         fn fill<T>(numbers: &mut [T], width: usize, from: usize, values: &[f64], to: impl Fn(f64) -> T) {
             for (number, value) in numbers[from..].iter_mut().step_by(width).zip(values) {
@@ -147,11 +148,11 @@ impl Part<'_> {
             }
         }
         match self {
-            Part::Single(numbers, width) => {
+            ChunkMut::Single(numbers, width) => {
                 fill(numbers, *width, start * *width + component, values, |x| x as f32);
                 values.iter().position(|x| !x.is_finite())
             }
-            Part::Integer(numbers, width) => {
+            ChunkMut::Integer(numbers, width) => {
                 fill(numbers, *width, start * *width + component, values, |x| x as i32);
                 let held = f64::from(i32::MIN)..=f64::from(i32::MAX);
                 values.iter().position(|x| !held.contains(x))

@@ -1,18 +1,18 @@
-//! Makes code, and no more of it than is needed.
+//! Builds code, with common subexpressions merged, constants folded and unused values removed.
 //!
-//! Promise: equal instructions stand once, those of constants are folded by the loop that would run
-//! them, what no output needs is left out, and what is the same for all elements comes first. Limit:
-//! only constants are folded; `x*0` stays, because x may be infinite.
+//! Promise: equal instructions occur once, constants are folded by the same code that runs instructions, values that no
+//! output needs are left out, and values that are the same for all elements come first. Limit: only constants are
+//! folded; `x*0` is kept, because x may be infinite.
 
 use std::collections::BTreeMap;
 
 use super::code::{Binary, Code, Id, Input, Inst, Unary};
 
-/// Collects instructions: equal ones once, those of constants as their result.
+/// Collects instructions, merging equal ones and folding constants.
 #[derive(Default)]
 pub(super) struct Builder {
     insts: Vec<Inst>,
-    known: BTreeMap<Inst, Id>,
+    ids: BTreeMap<Inst, Id>,
 }
 
 impl Builder {
@@ -53,7 +53,7 @@ impl Builder {
             return id;
         }
         let inst = self.folded(inst).map_or(inst, |value| Inst::Constant(value.to_bits()));
-        *self.known.entry(inst).or_insert_with(|| {
+        *self.ids.entry(inst).or_insert_with(|| {
             self.insts.push(inst);
             (self.insts.len() - 1) as Id
         })
@@ -66,7 +66,7 @@ impl Builder {
         }
     }
 
-    /// What a constant condition decides alone, whatever the rest is.
+    /// The result of a selection or logical operator that a constant operand determines.
     fn shortcut(&mut self, inst: Inst) -> Option<Id> {
         match inst {
             Inst::Select(condition, yes, no) => self.value(condition).map(|c| if c != 0.0 { yes } else { no }),
@@ -80,7 +80,8 @@ impl Builder {
         }
     }
 
-    /// The result of an instruction whose operands are constants; chance needs the seed.
+    /// The result of an instruction with constant operands; noise and random numbers need the seed, so they are not
+    /// folded.
     fn folded(&self, inst: Inst) -> Option<f64> {
         let mut out = [0.0];
         match inst {
@@ -91,7 +92,7 @@ impl Builder {
         Some(out[0])
     }
 
-    /// The code that makes `outputs`, and their names in it: nothing else, uniform values first.
+    /// The code that computes `outputs` and nothing else, uniform values first; and the outputs' ids in it.
     pub(super) fn finish(self, outputs: &[Id]) -> (Code, Vec<Id>) {
         let mut needed = vec![false; self.insts.len()];
         for id in outputs {
@@ -134,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_instructions_stand_once_and_constants_fold() {
+    fn equal_instructions_are_merged_and_constants_folded() {
         let mut builder = Builder::default();
         let time = builder.input(Input::Time);
         let (two, three) = (builder.constant(2.0), builder.constant(3.0));
@@ -158,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn uniform_values_stand_in_front() {
+    fn uniform_values_come_first() {
         let mut builder = Builder::default();
         let index = builder.input(Input::Index);
         let time = builder.input(Input::Time);

@@ -1,19 +1,19 @@
-//! The instructions that a text becomes, and the one loop that runs them.
+//! The instructions that a text is compiled to, and the loop that runs them.
 //!
-//! Everything is scalar: a vector is three or four values. Instruction k writes value k and reads
-//! only earlier ones, so a run is a walk over a flat list, on one number or on a batch of them: the
-//! same code, hence the same bits. What does not differ between elements stands in front.
+//! Everything is scalar: a vector is three or four values. Instruction k writes value k and reads only earlier ones, so
+//! a run is one pass over a flat list, on one number or on a batch: the same code, hence the same bits. Values that are
+//! the same for all elements come first.
 //!
-//! Promise: no instruction fails; a division by zero is an infinity or NaN, and NaN is never lost
-//! by `min`, `max` or `clamp`. Transcendental functions are those of the `libm` crate, the rest is
-//! exactly rounded, so every CPU gives the same bits. Limit: comparisons with NaN are false.
+//! Promise: no instruction fails; a division by zero is an infinity or NaN, and NaN is never lost by `min`, `max` or
+//! `clamp`. Transcendental functions are those of the `libm` crate, the others are correctly rounded, so every CPU
+//! gives the same bits. Limit: comparisons with NaN are false.
 
 use super::random;
 
-/// Names a value by the instruction that makes it.
+/// The index of a value and of the instruction that computes it.
 pub(super) type Id = u32;
 
-/// What a value comes from when it is not computed.
+/// A value that is not computed by an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Input {
     Frame,
@@ -21,7 +21,7 @@ pub(super) enum Input {
     Fps,
     Seed,
     Count,
-    /// The number at `at` of all controls' numbers in a row; `control` counts controls.
+    /// A number of a control: `at` is its index among the numbers of all controls, `control` that of the control.
     Control {
         control: u32,
         at: u32,
@@ -58,7 +58,7 @@ pub(super) enum Unary {
     Atan,
     Exp,
     Log,
-    /// To the nearest f32.
+    /// Rounds to the nearest f32.
     Single,
 }
 
@@ -183,44 +183,43 @@ impl Binary {
     }
 }
 
-/// The rest of a division rounded down: 0 or of the sign of `b`, so that `frame % 24` repeats
-/// before frame 0 as it does after.
+/// The remainder of the division rounded down: 0 or with the sign of `b`, so that `frame % 24` is periodic below frame
+/// 0 too.
 pub(super) fn modulo(a: f64, b: f64) -> f64 {
     let rest = a % b;
     if rest != 0.0 && (rest < 0.0) != (b < 0.0) { rest + b } else { rest }
 }
 
-/// `a` to the power of `b`. A square is a product: exactly rounded, and thirty times faster.
+/// `a` to the power of `b`. A square is computed as a product, which is correctly rounded and thirty times faster.
 pub(super) fn power(a: f64, b: f64) -> f64 {
     if b == 2.0 { a * a } else { libm::pow(a, b) }
 }
 
-/// Instructions, in an order in which they can run.
+/// Instructions in an executable order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Code {
     insts: Vec<Inst>,
-    /// How many of them, from the first, give the same for every element.
+    /// The number of instructions at the start whose values are the same for all elements.
     uniform: usize,
 }
 
 impl Code {
-    /// Of instructions in an order in which they can run, the first `uniform` of which give the same
-    /// for every element.
+    /// From instructions in an executable order, of which the first `uniform` give the same value for all elements.
     pub(super) fn new(insts: Vec<Inst>, uniform: usize) -> Self {
         Code { insts, uniform }
     }
 
-    /// How many values a run makes.
+    /// The number of values that a run computes.
     pub(super) fn len(&self) -> usize {
         self.insts.len()
     }
 
-    /// How many of the values, from the first, are the same for every element.
+    /// The number of values at the start that are the same for all elements.
     pub(super) fn uniform(&self) -> usize {
         self.uniform
     }
 
-    /// The value of `id` where it is a constant.
+    /// The value of `id` if it is a constant.
     pub(super) fn constant(&self, id: Id) -> Option<f64> {
         match self.insts.get(id as usize) {
             Some(Inst::Constant(bits)) => Some(f64::from_bits(*bits)),
@@ -228,7 +227,7 @@ impl Code {
         }
     }
 
-    /// Everything that a run reads.
+    /// All inputs that a run reads.
     pub(super) fn inputs(&self) -> impl Iterator<Item = Input> {
         self.insts.iter().filter_map(|inst| match inst {
             Inst::Input(input) => Some(*input),
@@ -237,8 +236,8 @@ impl Code {
         })
     }
 
-    /// Fills `values[k]` by instruction k, for k from `from` to the length of `values`.
-    /// Values before `from` are taken as they are; `load` fills what comes from outside.
+    /// Fills `values[k]` by instruction k, for k from `from` to the length of `values`. Values before `from` are used
+    /// as they are; `load` fills inputs.
     pub(super) fn run<const N: usize>(
         &self,
         values: &mut [[f64; N]],
@@ -278,7 +277,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn modulo_follows_the_divisor() {
+    fn modulo_has_the_sign_of_the_divisor() {
         assert_eq!(modulo(7.0, 3.0), 1.0);
         assert_eq!(modulo(-1.0, 24.0), 23.0);
         assert_eq!(modulo(1.0, -24.0), -23.0);

@@ -1,19 +1,19 @@
-//! What went wrong in a text, and where.
+//! Faults in a text, with their positions.
 //!
-//! Promise: every fault of a text is one of these, with the place where it was noticed. Limit: this
-//! knows the text only; the engine adds node, param and file.
+//! Promise: every fault of a text is an [`ExprError`] with the position at which it was noticed. Limit: positions are
+//! relative to the text; the engine adds node, param and file.
 
 use std::fmt;
 
-/// A place in a text; both count from 1, the column in characters.
+/// A position in a text: line, and column in characters, both from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Place {
+pub(super) struct Position {
     pub(super) line: u32,
     pub(super) column: u32,
 }
 
-impl Place {
-    pub(super) const START: Place = Place { line: 1, column: 1 };
+impl Position {
+    pub(super) const START: Position = Position { line: 1, column: 1 };
 
     pub(super) fn fault(self, fact: impl Into<String>) -> ExprError {
         ExprError { line: self.line as usize, column: self.column as usize, fact: fact.into(), hint: None }
@@ -27,9 +27,9 @@ pub struct ExprError {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What is wrong, without its place.
+    /// What is wrong, without the position.
     pub fact: String,
-    /// What to do about it.
+    /// How to mend it.
     pub hint: Option<String>,
 }
 
@@ -39,7 +39,7 @@ impl ExprError {
         self
     }
 
-    /// Proposes the candidate that `name` was probably meant to be, or else what `otherwise` says.
+    /// Adds a hint: the candidate most similar to `name`, or else what `otherwise` returns.
     pub(super) fn suggest<'a>(
         self,
         name: &str,

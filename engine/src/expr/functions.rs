@@ -1,34 +1,34 @@
-//! The functions of the language: name, how many arguments, and what each does.
+//! The functions of the language: name, number of arguments, and operation.
 //!
-//! One table: parser, checks, code and help read it. A new function is a line here, and where it is
-//! not one instruction per component an arm in `check` and in `lower`.
+//! Parser, checks and code generation use this table. A new function needs a line here, and an arm in `check` and in
+//! `lower` unless it is one instruction per component.
 
 use super::code::{Binary, Unary};
 
-/// Most arguments that any function takes.
+/// The largest number of arguments of any function.
 pub(super) const MOST_ARGUMENTS: usize = 8;
 
-/// A function as a text calls it.
+/// A function.
 #[derive(Debug, PartialEq)]
 pub(super) struct Function {
     pub(super) name: &'static str,
-    /// Fewest and most arguments.
+    /// Smallest and largest number of arguments.
     pub(super) arguments: (usize, usize),
-    pub(super) does: Does,
+    pub(super) kind: FunctionKind,
     /// How a call is written, for hints.
     pub(super) usage: &'static str,
 }
 
-/// What a function does.
+/// The operation of a function.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Does {
-    /// Component by component, a scalar stands for all components.
+pub(super) enum FunctionKind {
+    /// Works component by component; a scalar is used for all components.
     Each(Each),
-    /// Scalars, or one vector of three.
+    /// Takes scalars or one 3-vector.
     Noise,
-    /// Scalars.
+    /// Takes scalars.
     Rand,
-    /// Scalars to a vector; one scalar fills three components.
+    /// Combines scalars to a vector; one scalar fills three components.
     Vector,
     Length,
     Distance,
@@ -37,11 +37,11 @@ pub(super) enum Does {
     Normalize,
 }
 
-/// What is done with each component.
+/// The operation on each component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Each {
     Unary(Unary),
-    /// From left to right where there are more than two.
+    /// From left to right if there are more than two arguments.
     Binary(Binary),
     Scale(f64),
     Fract,
@@ -52,7 +52,7 @@ pub(super) enum Each {
     Fit,
 }
 
-/// Aligned with what `HELP` says of each.
+/// All functions, in the order of `HELP`.
 pub(super) const FUNCTIONS: &[Function] = &[
     each("sin", 1, Each::Unary(Unary::Sin), "sin(x)"),
     each("cos", 1, Each::Unary(Unary::Cos), "cos(x)"),
@@ -81,17 +81,17 @@ pub(super) const FUNCTIONS: &[Function] = &[
     each("step", 2, Each::Step, "step(edge, x)"),
     each("smoothstep", 3, Each::Smoothstep, "smoothstep(low, high, x)"),
     each("fit", 5, Each::Fit, "fit(x, from_low, from_high, to_low, to_high)"),
-    function("noise", (1, 3), Does::Noise, "noise(P)` or `noise(x, y, z)"),
-    function("rand", (1, 2), Does::Rand, "rand(i)` or `rand(i, j)"),
-    function("vec", (1, 4), Does::Vector, "vec(x, y, z)"),
-    function("length", (1, 1), Does::Length, "length(v)"),
-    function("distance", (2, 2), Does::Distance, "distance(a, b)"),
-    function("dot", (2, 2), Does::Dot, "dot(a, b)"),
-    function("cross", (2, 2), Does::Cross, "cross(a, b)"),
-    function("normalize", (1, 1), Does::Normalize, "normalize(v)"),
+    function("noise", (1, 3), FunctionKind::Noise, "noise(P)` or `noise(x, y, z)"),
+    function("rand", (1, 2), FunctionKind::Rand, "rand(i)` or `rand(i, j)"),
+    function("vec", (1, 4), FunctionKind::Vector, "vec(x, y, z)"),
+    function("length", (1, 1), FunctionKind::Length, "length(v)"),
+    function("distance", (2, 2), FunctionKind::Distance, "distance(a, b)"),
+    function("dot", (2, 2), FunctionKind::Dot, "dot(a, b)"),
+    function("cross", (2, 2), FunctionKind::Cross, "cross(a, b)"),
+    function("normalize", (1, 1), FunctionKind::Normalize, "normalize(v)"),
 ];
 
-/// What other languages call a function or a value, and what it is called here.
+/// Names from other languages, and what to write instead.
 pub(super) const FOREIGN: &[(&str, &str)] = &[
     ("lerp", "mix"),
     ("ln", "log"),
@@ -115,16 +115,16 @@ pub(super) const FOREIGN: &[(&str, &str)] = &[
     ("false", "0"),
 ];
 
-const fn function(name: &'static str, arguments: (usize, usize), does: Does, usage: &'static str) -> Function {
-    Function { name, arguments, does, usage }
+const fn function(name: &'static str, arguments: (usize, usize), kind: FunctionKind, usage: &'static str) -> Function {
+    Function { name, arguments, kind, usage }
 }
 
 const fn each(name: &'static str, arguments: usize, each: Each, usage: &'static str) -> Function {
-    function(name, (arguments, arguments), Does::Each(each), usage)
+    function(name, (arguments, arguments), FunctionKind::Each(each), usage)
 }
 
 const fn several(name: &'static str, each: Each, usage: &'static str) -> Function {
-    function(name, (2, MOST_ARGUMENTS), Does::Each(each), usage)
+    function(name, (2, MOST_ARGUMENTS), FunctionKind::Each(each), usage)
 }
 
 /// The function of that name.
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_is_sound() {
+    fn the_table_is_consistent() {
         for (k, function) in FUNCTIONS.iter().enumerate() {
             let (fewest, most) = function.arguments;
             assert!(1 <= fewest && fewest <= most && most <= MOST_ARGUMENTS, "{}", function.name);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn foreign_names_are_not_ours() {
+    fn names_of_other_languages_are_not_functions() {
         for (name, ours) in FOREIGN {
             assert!(find(name).is_none(), "{name}");
             let called = ours.split('(').next().unwrap();

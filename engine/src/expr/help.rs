@@ -1,4 +1,4 @@
-//! The reference of the language as the program prints it.
+//! The reference of the language, printed by the program.
 
 /// The expression language on one page, in plain text.
 pub const HELP: &str = "\
@@ -13,60 +13,60 @@ Attribute_Expr:  envelope = clamp(envelope*P.y, 0, 1)
 Names
   frame            frame number, with fraction between frames
   time             seconds, frame / fps
-  fps              frames a second
+  fps              frames per second
   seed             the scene's seed
   pi               3.14159...
-  controls         by their names; .x .y .z of those that are vectors
+  controls         by name; .x .y .z of vectors
   In Attribute_Expr also:
-  attributes       by their names; @name is always the attribute, whatever else has that name
-  i                number of the point or element, from 0
-  count            how many there are
+  attributes       by name; @name is always the attribute, even if something else has that name
+  i                index of the point or element, from 0
+  count            number of points or elements
 
 Values
-  Numbers and vectors of 3 or 4. .x .y .z .w, or .r .g .b .a, is one component.
-  Operators and functions work component by component; a number stands for every component.
-  Angles are radians.
+  Numbers, and vectors of 3 or 4 components: .x .y .z .w or .r .g .b .a.
+  Operators and functions work component by component; a number is used for every component.
+  Angles are in radians.
 
-Operators, from the tightest
+Operators, highest precedence first
   ^                power; 2^3^2 = 2^9, -2^2 = -4
-  - + !            signs, logical not
-  * / %            a % b is from 0 to b: -1 % 24 = 23
+  - + !            sign, logical not
+  * / %            remainder a % b has the sign of b: -1 % 24 = 23
   + -
-  < <= > >=        1 or 0, of numbers; write a < b && b < c
+  < <= > >=        1 if true, else 0; numbers only, not chained: a < b && b < c
   == !=
   &&
   ||
-  a ? b : c        b where a is not 0, else c; what is not chosen does not matter
+  a ? b : c        b if a is not 0, else c; the other value has no effect
 
 Functions
   sin cos tan asin acos atan(x)   atan2(y, x)   radians(degrees)   degrees(radians)
-  sqrt(x)   exp(x)   log(x)       log is natural; log(x)/log(2) is to base 2
+  sqrt(x)   exp(x)   log(x)       natural logarithm; base 2: log(x)/log(2)
   pow(x, y)                       x^y
   mod(x, y)                       x % y
   abs(x)   sign(x)                sign: -1, 0 or 1
   floor(x)   ceil(x)   round(x)   round: halves away from zero
   fract(x)                        x - floor(x)
   min(a, b, ...)   max(a, b, ...)
-  clamp(x, low, high)             low where x < low, high where x > high
+  clamp(x, low, high)             low if x < low, high if x > high
   mix(a, b, t)                    a at t = 0, b at t = 1
-  step(edge, x)                   0 where x < edge, else 1
-  smoothstep(low, high, x)        0 up to low, 1 from high, smooth between
-  fit(x, a, b, c, d)              from range a..b to range c..d, clamped
-  noise(P)   noise(x, y, z)       smooth, about -1..1, 0 on whole numbers; the seed chooses
-  rand(i)   rand(i, j)            from 0 up to 1, jumps with every change of i; the seed chooses
+  step(edge, x)                   0 if x < edge, else 1
+  smoothstep(low, high, x)        0 if x < low, 1 if x > high, smooth between
+  fit(x, a, b, c, d)              maps range a..b to range c..d, clamped
+  noise(P)   noise(x, y, z)       smooth noise, about -1..1, 0 at whole numbers; depends on the seed
+  rand(i)   rand(i, j)            random number, 0 <= r < 1, for i and j; depends on the seed
   vec(x, y, z)   vec(x, y, z, w)  a vector; vec(x) is vec(x, x, x)
   length(v)   distance(a, b)   dot(a, b)   cross(a, b)
-  normalize(v)                    v at length 1; 0 where v is 0
+  normalize(v)                    v scaled to length 1; 0 if v is 0
 
 Attribute_Expr
-  One assignment a line, or divided by ;. Each line sees what the lines above it made.
-  name = ...       makes or changes an attribute; name.y = ... one component of it
-  += -= *= /=      change what is there
-  let name = ...   names a value for the lines below and makes no attribute
-  ( )              between them an expression goes on over lines
-  // ...           a comment, to the end of the line
-  A new attribute is a number or a vector as its value is; one that is there keeps its type,
-  and of whole numbers it takes the nearest. A value that is not finite or too large is an error.
+  One assignment per line, or several separated by ; . Each line sees the results of those above.
+  name = ...       creates or changes an attribute; name.y = ... changes one component
+  += -= *= /=      change an existing attribute
+  let name = ...   names a value for the lines below, without creating an attribute
+  ( )              inside brackets an expression may continue on the next line
+  // ...           comment, to the end of the line
+  A new attribute has the type of its value, number or vector; an existing one keeps its type, and
+  integer attributes are rounded. A value that is not finite or too large is an error.
 ";
 
 #[cfg(test)]

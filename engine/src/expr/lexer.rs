@@ -1,17 +1,17 @@
-//! Cuts a text into tokens, one at a time.
+//! Splits a text into tokens, one at a time.
 //!
-//! Promise: any string is read in one pass and constant memory; after a fault the next call goes on behind it.
-//! Limit: names are ASCII; nothing here knows what a name means.
+//! Promise: any string is read in one pass with constant memory; after a fault the next call continues after it. Limit:
+//! names are ASCII; their meaning is not known here.
 
-use super::error::{ExprError, Place};
+use super::error::{ExprError, Position};
 use super::suggest::shortened;
 
-/// A piece of text with its place.
+/// A token with its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Token<'a> {
     pub(super) kind: TokenKind<'a>,
     pub(super) text: &'a str,
-    pub(super) place: Place,
+    pub(super) position: Position,
 }
 
 /// What a token is.
@@ -19,7 +19,7 @@ pub(super) struct Token<'a> {
 pub(super) enum TokenKind<'a> {
     Number(f64),
     Name(&'a str),
-    /// `@name`: the attribute of that name, whatever else has it.
+    /// `@name`: the attribute with that name, even if something else has the same name.
     Attribute(&'a str),
     Symbol(Symbol),
     Newline,
@@ -58,7 +58,7 @@ pub(super) enum Symbol {
     DivideAssign,
 }
 
-/// Longest first where one begins another.
+/// If one is a prefix of another, the longer comes first.
 const SYMBOLS: &[(&str, Symbol)] = &[
     ("+=", Symbol::AddAssign),
     ("-=", Symbol::SubtractAssign),
@@ -89,44 +89,44 @@ const SYMBOLS: &[(&str, Symbol)] = &[
     ("=", Symbol::Assign),
 ];
 
-/// What other languages write, and what this one writes instead.
+/// Operators from other languages, and what to write instead.
 const FOREIGN: &[(&str, &str)] = &[
-    ("**", "a power is written `^`"),
-    ("&", "a logical and is written `&&`"),
-    ("|", "a logical or is written `||`"),
-    ("[", "components are written `.x`, `.y`, `.z`, `.w`, and vectors `vec(x, y, z)`"),
-    ("{", "vectors are written `vec(x, y, z)`"),
-    ("#", "a comment begins with `//`"),
+    ("**", "write a power as `^`"),
+    ("&", "write a logical and as `&&`"),
+    ("|", "write a logical or as `||`"),
+    ("[", "write components as `.x`, `.y`, `.z`, `.w`, and vectors as `vec(x, y, z)`"),
+    ("{", "write vectors as `vec(x, y, z)`"),
+    ("#", "comments start with `//`"),
 ];
 
 /// Reads tokens from a text.
 pub(super) struct Lexer<'a> {
     rest: &'a str,
-    place: Place,
+    position: Position,
 }
 
 impl<'a> Lexer<'a> {
     pub(super) fn new(text: &'a str) -> Self {
-        Lexer { rest: text, place: Place::START }
+        Lexer { rest: text, position: Position::START }
     }
 
-    /// The next token; at the end of the text `TokenKind::End`, again and again.
+    /// The next token; at the end of the text always `TokenKind::End`.
     pub(super) fn next(&mut self) -> Result<Token<'a>, ExprError> {
         self.skip_blanks();
-        let place = self.place;
-        let token = |kind, text| Ok(Token { kind, text, place });
+        let position = self.position;
+        let token = |kind, text| Ok(Token { kind, text, position });
         let Some(first) = self.rest.chars().next() else { return token(TokenKind::End, "") };
 
         if first == '\n' {
             let text = self.take(1);
-            self.place = Place { line: place.line + 1, column: 1 };
+            self.position = Position { line: position.line + 1, column: 1 };
             return token(TokenKind::Newline, text);
         }
         if let Some(length) = number_length(self.rest) {
             let text = self.take(length);
             return match text.parse::<f64>() {
                 Ok(value) if value.is_finite() => token(TokenKind::Number(value), text),
-                _ => Err(place.fault(format!("the number `{}` is too large", shortened(text)))),
+                _ => Err(position.fault(format!("the number `{}` is too large", shortened(text)))),
             };
         }
         if let Some(length) = name_length(self.rest) {
@@ -142,7 +142,7 @@ impl<'a> Lexer<'a> {
         for (text, hint) in FOREIGN {
             if self.rest.starts_with(text) && !self.rest.starts_with("&&") && !self.rest.starts_with("||") {
                 self.take(text.len());
-                return Err(place.fault(format!("`{text}` is no operator here")).hint(*hint));
+                return Err(position.fault(format!("`{text}` is not an operator")).hint(*hint));
             }
         }
         for (text, symbol) in SYMBOLS {
@@ -151,11 +151,11 @@ impl<'a> Lexer<'a> {
             }
         }
         self.take(first.len_utf8());
-        let fault = place.fault(format!("`{}` has no meaning here", first.escape_debug()));
-        Err(if first == '@' { fault.hint("an attribute is written `@name`") } else { fault })
+        let fault = position.fault(format!("unexpected character `{}`", first.escape_debug()));
+        Err(if first == '@' { fault.hint("write an attribute as `@name`") } else { fault })
     }
 
-    /// Passes blanks and a comment, but not the end of the line.
+    /// Skips blanks and a comment, but not the end of the line.
     fn skip_blanks(&mut self) {
         let end = self.rest.find(|c: char| c == '\n' || !c.is_whitespace()).unwrap_or(self.rest.len());
         self.take(end);
@@ -168,12 +168,12 @@ impl<'a> Lexer<'a> {
     fn take(&mut self, bytes: usize) -> &'a str {
         let (taken, rest) = self.rest.split_at(bytes);
         self.rest = rest;
-        self.place.column += taken.chars().count() as u32;
+        self.position.column += taken.chars().count() as u32;
         taken
     }
 }
 
-/// Bytes of the number that `text` begins with: `2`, `2.`, `.5`, `1e-3`.
+/// The length in bytes of the number at the start of `text`: `2`, `2.`, `.5`, `1e-3`.
 fn number_length(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let digits = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -200,7 +200,7 @@ fn number_length(text: &str) -> Option<usize> {
     Some(length)
 }
 
-/// Bytes of the name that `text` begins with: `[A-Za-z_][A-Za-z0-9_]*`.
+/// The length in bytes of the name at the start of `text`: `[A-Za-z_][A-Za-z0-9_]*`.
 fn name_length(text: &str) -> Option<usize> {
     let first = text.bytes().next()?;
     (first.is_ascii_alphabetic() || first == b'_')
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_are_cut_greedily() {
+    fn tokens_are_as_long_as_possible() {
         assert_eq!(texts("a<=b"), ["a", "<=", "b"]);
         assert_eq!(texts("P.y*=.5e-1+2."), ["P", ".", "y", "*=", ".5e-1", "+", "2."]);
         assert_eq!(texts("2e+x 3e"), ["2", "e", "+", "x", "3", "e"]);
@@ -238,18 +238,18 @@ mod tests {
     }
 
     #[test]
-    fn places_count_characters_not_bytes() {
+    fn positions_count_characters_not_bytes() {
         let mut lexer = Lexer::new("// é\n\u{2003}x");
         assert_eq!(lexer.next().unwrap().kind, TokenKind::Newline);
-        assert_eq!(lexer.next().unwrap().place, Place { line: 2, column: 2 });
+        assert_eq!(lexer.next().unwrap().position, Position { line: 2, column: 2 });
     }
 
     #[test]
-    fn reading_goes_on_behind_a_fault() {
+    fn reading_continues_after_a_fault() {
         let mut lexer = Lexer::new("é ** x");
-        assert_eq!(lexer.next().unwrap_err().fact, "`é` has no meaning here");
+        assert_eq!(lexer.next().unwrap_err().fact, "unexpected character `é`");
         let power = lexer.next().unwrap_err();
-        assert_eq!((power.column, power.hint.as_deref()), (3, Some("a power is written `^`")));
+        assert_eq!((power.column, power.hint.as_deref()), (3, Some("write a power as `^`")));
         assert_eq!(lexer.next().unwrap().text, "x");
         assert_eq!(lexer.next().unwrap().kind, TokenKind::End);
         assert_eq!(lexer.next().unwrap().kind, TokenKind::End);

@@ -1,21 +1,21 @@
-//! Nodes to instructions: vectors become their components, functions become arithmetic.
+//! Compiles nodes to instructions: vectors become components, functions become arithmetic.
 //!
-//! Promise: what `check` let through with every attribute known becomes code, in one pass. Limit:
-//! no more than [`MAX_CODE`] instructions.
+//! Promise: what passed `check` with all attributes known is compiled in one pass. Limit: at most [`MAX_CODE`]
+//! instructions.
 
 use super::Width;
 use super::ast::{Ast, Node, Target};
 use super::builder::Builder;
 use super::code::{Binary, Code, Id, Input, Unary};
-use super::error::{ExprError, Place};
-use super::functions::{Does, Each, MOST_ARGUMENTS};
+use super::error::{ExprError, Position};
+use super::functions::{Each, FunctionKind, MOST_ARGUMENTS};
 use crate::geometry::ColumnType;
 
-/// Most instructions of a text: a batch of each fits in 8 MB.
+/// The largest number of instructions of a text: their batches fit in 8 MB.
 pub(super) const MAX_CODE: usize = 16384;
 
-/// The value of a node: a scalar has its one value in all four places, so that it stands for any
-/// component it is joined with.
+/// The value of a node. A scalar has its value in all four components, so that it can be combined with any component of
+/// a vector.
 #[derive(Clone, Copy)]
 struct Value {
     width: Width,
@@ -38,22 +38,22 @@ pub(super) struct Store {
     pub(super) attribute: u32,
     pub(super) component: u32,
     pub(super) value: Id,
-    /// Where the attribute is last assigned.
-    pub(super) place: Place,
+    /// The position of the last assignment to the attribute.
+    pub(super) position: Position,
 }
 
-/// The code of a text: what an expression gives is its `result`, what a program leaves its `stores`,
-/// one a component, in the order of attributes and components.
+/// The code of a text: `result` is the value of an expression, `stores` are the assignments of a program, one for each
+/// component, in the order of attributes and components.
 pub(super) struct Lowered {
     pub(super) code: Code,
     pub(super) result: Option<Id>,
     pub(super) stores: Vec<Store>,
 }
 
-/// Makes the code of `ast`, whose widths are right; `kinds` by attribute, `controls` by control.
+/// Compiles `ast`, whose widths have been checked; `kinds` by attribute, `controls` by control.
 ///
 /// # Errors
-/// When it is longer than [`MAX_CODE`].
+/// If it needs more than [`MAX_CODE`] instructions.
 pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>]) -> Result<Lowered, ExprError> {
     let mut lowering = Lowering {
         ast,
@@ -70,7 +70,7 @@ pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>])
             Target::Result => result = Some(value.ids[0]),
             Target::Local => {}
             Target::Attribute { attribute, component } => {
-                lowering.assign(attribute, component, value, statement.place);
+                lowering.assign(attribute, component, value, statement.position);
             }
         }
     }
@@ -78,9 +78,9 @@ pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>])
     let mut stores = Vec::new();
     for (attribute, written) in lowering.written.iter().enumerate() {
         for (component, written) in written.iter().enumerate() {
-            if let Some((value, place)) = *written {
+            if let Some((value, position)) = *written {
                 let (attribute, component) = (attribute as u32, component as u32);
-                stores.push(Store { attribute, component, value, place });
+                stores.push(Store { attribute, component, value, position });
             }
         }
     }
@@ -93,7 +93,7 @@ pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>])
     Ok(Lowered { code, result, stores })
 }
 
-/// Where each control's numbers begin among all controls' numbers, and how many they are.
+/// For each control the index of its first number among the numbers of all controls, and its width.
 fn offsets(controls: &[Width]) -> Vec<(u32, Width)> {
     let mut next = 0;
     let mut offset = |width: &Width| {
@@ -110,29 +110,29 @@ struct Lowering<'a> {
     kinds: &'a [Option<ColumnType>],
     code: Builder,
     values: Vec<Value>,
-    /// What each component of each attribute was last assigned, and where.
-    written: Vec<[Option<(Id, Place)>; 4]>,
+    /// The last value assigned to each component of each attribute, and the position of the assignment.
+    written: Vec<[Option<(Id, Position)>; 4]>,
 }
 
 impl Lowering<'_> {
-    /// The value of node `last`, after all nodes before it.
+    /// The value of node `last`; compiles the nodes up to it.
     fn value(&mut self, last: usize) -> Result<Value, ExprError> {
         for k in self.values.len()..=last {
             let value = self.node(&self.ast.nodes[k]);
             if self.code.len() > MAX_CODE {
-                let fact = format!("the text takes more than {MAX_CODE} instructions");
-                return Err(self.ast.places[k].fault(fact));
+                let fact = format!("the text compiles to more than {MAX_CODE} instructions");
+                return Err(self.ast.positions[k].fault(fact));
             }
             self.values.push(value);
         }
         Ok(self.values[last])
     }
 
-    /// As if the value were stored and read again: later lines see what the file will hold.
-    fn assign(&mut self, attribute: u32, component: Option<u32>, value: Value, place: Place) {
+    /// Rounds the value as if it were stored and read again, so that later lines see the stored value.
+    fn assign(&mut self, attribute: u32, component: Option<u32>, value: Value, position: Position) {
         let kind = self.kind(attribute);
         let op = if kind.is_float() { Unary::Single } else { Unary::Round };
-        let stored = value.ids.map(|id| Some((self.code.unary(op, id), place)));
+        let stored = value.ids.map(|id| Some((self.code.unary(op, id), position)));
         let written = &mut self.written[attribute as usize];
         match component {
             Some(component) => written[component as usize] = stored[0],
@@ -182,7 +182,7 @@ impl Lowering<'_> {
             Node::Call(function, first, count) => {
                 let ids = &self.ast.arguments[first as usize..][..count as usize];
                 let arguments: Vec<Value> = ids.iter().map(|id| self.values[*id as usize]).collect();
-                self.call(function.does, &arguments)
+                self.call(function.kind, &arguments)
             }
         }
     }
@@ -195,7 +195,7 @@ impl Lowering<'_> {
         Value { width, ids }
     }
 
-    /// Component by component; as wide as the widest of `values`.
+    /// Works component by component; the result has the greatest width of `values`.
     fn each(&mut self, values: &[Value], id: impl Fn(&mut Builder, [Id; MOST_ARGUMENTS]) -> Id) -> Value {
         let width = values.iter().map(|value| value.width).max().unwrap_or(Width::Scalar);
         self.gather(width, |code, k| {
@@ -207,14 +207,14 @@ impl Lowering<'_> {
         })
     }
 
-    fn call(&mut self, does: Does, arguments: &[Value]) -> Value {
+    fn call(&mut self, kind: FunctionKind, arguments: &[Value]) -> Value {
         let first = arguments[0];
-        match does {
-            Does::Each(each) => {
+        match kind {
+            FunctionKind::Each(each) => {
                 let count = arguments.len();
                 self.each(arguments, |code, ids| component(code, each, &ids[..count]))
             }
-            Does::Noise => {
+            FunctionKind::Noise => {
                 let mut at = [self.code.constant(0.0); 3];
                 if first.width == Width::Vec3 {
                     at.copy_from_slice(first.components());
@@ -225,27 +225,27 @@ impl Lowering<'_> {
                 }
                 Value::scalar(self.code.noise(at))
             }
-            Does::Rand => {
+            FunctionKind::Rand => {
                 let second = match arguments.get(1) {
                     Some(second) => second.ids[0],
                     None => self.code.constant(0.0),
                 };
                 Value::scalar(self.code.random(first.ids[0], second))
             }
-            Does::Vector => {
+            FunctionKind::Vector => {
                 let mut ids = first.ids;
                 for (id, argument) in ids.iter_mut().zip(arguments) {
                     *id = argument.ids[0];
                 }
                 Value { width: if arguments.len() == 4 { Width::Vec4 } else { Width::Vec3 }, ids }
             }
-            Does::Length => Value::scalar(self.length(first)),
-            Does::Distance => {
+            FunctionKind::Length => Value::scalar(self.length(first)),
+            FunctionKind::Distance => {
                 let between = self.each(arguments, |code, [a, b, ..]| code.binary(Binary::Subtract, a, b));
                 Value::scalar(self.length(between))
             }
-            Does::Dot => Value::scalar(self.dot(first, arguments[1])),
-            Does::Cross => {
+            FunctionKind::Dot => Value::scalar(self.dot(first, arguments[1])),
+            FunctionKind::Cross => {
                 let (a, b) = (first.ids, arguments[1].ids);
                 self.gather(Width::Vec3, |code, k| {
                     let (j, l) = ((k as usize + 1) % 3, (k as usize + 2) % 3);
@@ -254,7 +254,7 @@ impl Lowering<'_> {
                     code.binary(Binary::Subtract, plus, minus)
                 })
             }
-            Does::Normalize => {
+            FunctionKind::Normalize => {
                 let length = Value::scalar(self.length(first));
                 self.each(&[first, length], |code, [x, length, ..]| {
                     let zero = code.constant(0.0);
@@ -266,7 +266,7 @@ impl Lowering<'_> {
         }
     }
 
-    /// Products added from x on.
+    /// The sum of products, starting with x.
     fn dot(&mut self, a: Value, b: Value) -> Id {
         let products = self.each(&[a, b], |code, [a, b, ..]| code.binary(Binary::Multiply, a, b));
         let [first, rest @ ..] = products.components() else { return products.ids[0] };
@@ -327,7 +327,7 @@ fn mix(code: &mut Builder, a: Id, b: Id, t: Id) -> Id {
     code.binary(Binary::Add, from, to)
 }
 
-/// Where x is between `low` (0) and `high` (1), clamped; where they are equal, a step there.
+/// (x − low)/(high − low), clamped to 0…1; if `low` equals `high`, a step at that value.
 fn share(code: &mut Builder, x: Id, low: Id, high: Id) -> Id {
     let (zero, one) = (code.constant(0.0), code.constant(1.0));
     let above = code.binary(Binary::Subtract, x, low);

@@ -1,25 +1,23 @@
-//! The expression language: numbers of params that move, and attributes made of attributes.
+//! The expression language: animated params, and attributes computed from attributes.
 //!
-//! One language, two uses. An [`Expr`] is one number, of a param: `0.6 + 0.1*sin(2*pi*time)`. A
-//! [`Program`] is a list of assignments that runs over every point or element:
-//! `envelope = clamp(envelope*P.y, 0, 1)`. [`HELP`] is its reference for users; what it leaves open:
+//! One language, two uses. An [`Expr`] is one number of a param: `0.6 + 0.1*sin(2*pi*time)`. A [`Program`] is a list of
+//! assignments that runs over every point or element: `envelope = clamp(envelope*P.y, 0, 1)`. [`HELP`] is its reference
+//! for users; in addition:
 //!
-//! * All arithmetic is f64. A line's value is rounded to what its attribute holds (f32; or the
-//!   nearest whole number, halves away from zero), and later lines read the rounded value: two lines
-//!   are the same as two nodes.
-//! * Names are looked up in this order: the language's own, `let`, controls, attributes. An attribute
-//!   that only the data knows can so never change what a control's name means.
+//! * All arithmetic is f64. The value of a line is rounded to the type of its attribute (f32; or the nearest integer,
+//!   halves away from zero), and later lines read the rounded value: two lines give the same result as two nodes.
+//! * Names are looked up in this order: those of the language, `let`, controls, attributes. So attributes of the input
+//!   data cannot change the meaning of a control's name.
 //! * NaN: arithmetic, `min`, `max` and `clamp` keep it, comparisons with it are 0 (`!=` is 1), and as
-//!   a condition it counts as true. Nothing here refuses NaN in a param; its reader does.
-//! * `noise(x)` is `noise(x, 0, 0)`; `rand(i)` is `rand(i, 0)`. Both hang on the scene's seed.
+//!   a condition it counts as true. NaN in a param is refused by the code that reads the param, not here.
+//! * `noise(x)` is `noise(x, 0, 0)`; `rand(i)` is `rand(i, 0)`. Both depend on the scene's seed.
 //!
-//! Promise: the same text gives the same bits on every CPU and any number of threads; any string is
-//! answered by a value or by faults with line and column. Limit: a text has a greatest size and
-//! depth (`parser::MAX_TEXT`, `MAX_NODES`, `MAX_DEPTH`, `lower::MAX_CODE`), past which it is refused.
+//! Promise: the same text gives the same bits on every CPU and any number of threads; any string gives a value or
+//! faults with line and column. Limit: texts are refused beyond a maximal size and depth (`parser::MAX_TEXT`,
+//! `MAX_NODES`, `MAX_DEPTH`, `lower::MAX_CODE`).
 //!
-//! Text becomes tokens (`lexer`), nodes (`parser`, `ast`), is checked for widths (`check`), becomes
-//! scalar instructions (`lower`, `builder`, `code`) and runs on one number or on batches of rows
-//! (`batch`).
+//! A text is split into tokens (`lexer`), parsed into nodes (`parser`, `ast`), checked for widths (`check`), compiled
+//! to scalar instructions (`lower`, `builder`, `code`), and run on one number or on batches of rows (`batch`).
 
 mod ast;
 mod batch;
@@ -48,7 +46,7 @@ pub use program::{BadValue, Program, RunError};
 use crate::geometry::ColumnType;
 use code::{Code, Id, Input};
 
-/// How many numbers a value has.
+/// The number of components of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Width {
     /// One.
@@ -60,7 +58,7 @@ pub enum Width {
 }
 
 impl Width {
-    /// Numbers a value.
+    /// The number of components.
     pub fn count(self) -> usize {
         match self {
             Width::Scalar => 1,
@@ -69,7 +67,7 @@ impl Width {
         }
     }
 
-    /// Of a row of such a column.
+    /// The width of a row of a column of that type.
     pub fn of(kind: ColumnType) -> Width {
         match kind {
             ColumnType::F1 | ColumnType::I1 => Width::Scalar,
@@ -78,7 +76,7 @@ impl Width {
         }
     }
 
-    /// The f32 column of that width: what a new attribute becomes.
+    /// The f32 column type of that width, which new attributes get.
     fn single(self) -> ColumnType {
         match self {
             Width::Scalar => ColumnType::F1,
@@ -98,11 +96,11 @@ impl fmt::Display for Width {
     }
 }
 
-/// What a text may name besides the language's own names and attributes.
+/// The names that a text may use in addition to those of the language and to attributes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Scope<'a> {
-    /// Controls, in the order in which [`Env::controls`] has their numbers. One whose name is not
-    /// `[A-Za-z_][A-Za-z0-9_]*`, or is the language's own, cannot be named.
+    /// Controls, in the order of their numbers in [`Env::controls`]. A control cannot be used if its name is not
+    /// `[A-Za-z_][A-Za-z0-9_]*` or is a name of the language.
     pub controls: &'a [(&'a str, Width)],
 }
 
@@ -112,23 +110,23 @@ impl Scope<'_> {
     }
 }
 
-/// The values that the names in an expression currently have.
+/// The values of the names in an expression.
 #[derive(Clone, Copy, Debug)]
 pub struct Env<'a> {
     /// Frame number, with fraction.
     pub frame: f64,
-    /// Seconds.
+    /// Time in seconds.
     pub time: f64,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// The scene's seed, a whole number.
     pub seed: f64,
-    /// All numbers of all controls of the [`Scope`] in a row; one that is missing reads as NaN.
+    /// The numbers of all controls of the [`Scope`], concatenated; missing ones read as NaN.
     pub controls: &'a [f64],
 }
 
 impl Env<'_> {
-    /// What is the same for all elements; NaN for what is not.
+    /// The value of an input that is the same for all elements; NaN for others.
     fn input(&self, input: Input, count: f64) -> f64 {
         match input {
             Input::Frame => self.frame,
@@ -142,8 +140,8 @@ impl Env<'_> {
     }
 }
 
-/// What a text reads besides attributes. For an [`Expr`] exactly what its value hangs on after
-/// constants are folded (`0 ? time : 1` reads nothing); for a [`Program`] all that it names.
+/// What a text reads in addition to attributes. For an [`Expr`] exactly what its value depends on after constant
+/// folding (`0 ? time : 1` reads nothing); for a [`Program`] all names that occur in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Uses {
     /// `frame` or `time`.
@@ -152,24 +150,24 @@ pub struct Uses {
     pub fps: bool,
     /// `seed`, `noise` or `rand`.
     pub seed: bool,
-    /// Positions in [`Scope::controls`], rising.
+    /// Indices in [`Scope::controls`], ascending.
     pub controls: Vec<usize>,
 }
 
 impl Uses {
-    fn note(&mut self, input: Input) {
+    fn record(&mut self, input: Input) {
         match input {
             Input::Frame | Input::Time => self.time = true,
             Input::Fps => self.fps = true,
             Input::Seed => self.seed = true,
-            Input::Control { control, .. } => self.note_control(control),
+            Input::Control { control, .. } => self.record_control(control),
             Input::Count | Input::Index | Input::Attribute { .. } => {}
         }
     }
 
-    fn note_control(&mut self, control: u32) {
-        if let Err(place) = self.controls.binary_search(&(control as usize)) {
-            self.controls.insert(place, control as usize);
+    fn record_control(&mut self, control: u32) {
+        if let Err(index) = self.controls.binary_search(&(control as usize)) {
+            self.controls.insert(index, control as usize);
         }
     }
 }
@@ -183,10 +181,10 @@ pub struct Expr {
 }
 
 impl Expr {
-    /// Parses an expression and makes it ready to evaluate.
+    /// Parses and compiles an expression.
     ///
     /// # Errors
-    /// What is wrong with the text, and where.
+    /// The first fault of the text, with its position.
     ///
     /// ```
     /// use engine::expr::{Env, Expr, Scope};
@@ -206,14 +204,14 @@ impl Expr {
         check::check(&ast, &widths, &[], &mut []).map_err(|mut faults| faults.swap_remove(0))?;
         let lowered = lower::lower(&ast, &widths, &[])?;
         let mut uses = Uses::default();
-        lowered.code.inputs().for_each(|input| uses.note(input));
+        lowered.code.inputs().for_each(|input| uses.record(input));
         let result = lowered.result.unwrap_or_default();
         Ok(Expr { code: lowered.code, result, uses })
     }
 
-    /// The value; NaN or infinite where the arithmetic is.
+    /// The value, which may be NaN or infinite.
     pub fn eval(&self, env: &Env<'_>) -> f64 {
-        /// Values that need no allocation: what people write has about ten.
+        /// Up to this number of values needs no allocation; typical expressions have about ten.
         const FEW: usize = 32;
         let run = |values: &mut [[f64; 1]]| {
             self.code.run(values, 0, env.seed, |input, out| *out = [env.input(input, 1.0)]);
@@ -223,22 +221,22 @@ impl Expr {
         if length <= FEW { run(&mut [[0.0]; FEW][..length]) } else { run(&mut vec![[0.0]; length]) }
     }
 
-    /// The value where it hangs on nothing at all.
+    /// The value if it is a constant.
     pub fn constant(&self) -> Option<f64> {
         self.code.constant(self.result)
     }
 
-    /// What the value hangs on.
+    /// What the value depends on.
     pub fn uses(&self) -> &Uses {
         &self.uses
     }
 
-    /// Whether the value hangs on `frame` or `time` itself; a control that it reads may move too.
+    /// Whether the value depends on `frame` or `time` directly; controls that it reads may also be animated.
     pub fn reads_time(&self) -> bool {
         self.uses.time
     }
 
-    /// The controls that the value hangs on, as positions in [`Scope::controls`], rising.
+    /// The controls that the value depends on, as indices in [`Scope::controls`], ascending.
     pub fn controls(&self) -> &[usize] {
         &self.uses.controls
     }

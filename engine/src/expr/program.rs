@@ -1,17 +1,17 @@
-//! Programs: assignments that make attributes of attributes, for every point or element alike.
+//! Programs: assignments that compute attributes from attributes, for every point or element.
 //!
-//! Parsed once, checked as far as the well-known attributes allow, and again against the columns
-//! that are there when it runs.
+//! A program is parsed once, checked as far as well-known attributes allow, and checked again against the columns on
+//! which it runs.
 //!
-//! Promise: the same bits on any number of threads, and as if every line were a pass of its own.
-//! Limit: an element sees itself only, no neighbour and no sum over all.
+//! Promise: the same bits on any number of threads, and as if every line ran over all elements before the next. Limit:
+//! an element cannot read its neighbours or sums over all elements.
 
 use super::ast::{Ast, Node, Target};
-use super::batch::{self, NotHeld};
-use super::check::{self, Known};
+use super::batch::{self, OutOfRange};
+use super::check::{self, AttributeState};
 use super::code::Input;
 use super::error::ExprError;
-use super::functions::Does;
+use super::functions::FunctionKind;
 use super::lexer::is_name;
 use super::lower::{Lowered, lower};
 use super::{Env, Scope, Uses, Width, parser};
@@ -34,13 +34,13 @@ pub enum RunError {
     /// The program does not fit the columns.
     #[error("{0}")]
     Code(ExprError),
-    /// A value is NaN, or beyond what its column holds.
+    /// A value is NaN or out of the range of its column.
     #[error("{0}")]
     Value(BadValue),
-    /// A column does not have one row an element.
+    /// A column does not have one row per element.
     #[error("the column `{name}` has {rows} rows, not {expected}")]
     Rows {
-        /// Whose.
+        /// Its name.
         name: String,
         /// Rows it has.
         rows: usize,
@@ -49,19 +49,19 @@ pub enum RunError {
     },
 }
 
-/// A value that its attribute cannot take.
+/// A value that its attribute cannot store.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{attribute}` would be {value}, not {}", self.expected())]
 pub struct BadValue {
-    /// The attribute, with the component where it has some: `P.y`.
+    /// The attribute, with the component of a vector: `P.y`.
     pub attribute: String,
-    /// Of which point or element, from 0; the first one.
+    /// The index of the first such point or element, from 0.
     pub element: usize,
     /// The line that assigned it.
     pub line: usize,
-    /// The value, after rounding to what the attribute holds.
+    /// The value, rounded to the type of the attribute.
     pub value: f64,
-    /// Whether the attribute holds f32, else i32.
+    /// Whether the attribute is f32; else it is i32.
     pub float: bool,
 }
 
@@ -92,7 +92,7 @@ impl From<RunError> for Error {
 }
 
 impl Program {
-    /// Parses assignments, one a line. An empty text is a program that does nothing.
+    /// Parses assignments, one per line. An empty text is a program that does nothing.
     ///
     /// # Errors
     /// The first fault of every line that has one.
@@ -100,17 +100,20 @@ impl Program {
         let ast = parser::program(text, scope)?;
         let controls: Vec<(String, Width)> =
             scope.controls.iter().map(|(name, width)| ((*name).to_owned(), *width)).collect();
-        let mut attributes: Vec<Known> =
-            ast.attributes.iter().map(|name| fixed_type(name).map_or(Known::Maybe, Known::Is)).collect();
+        let mut attributes: Vec<AttributeState> = ast
+            .attributes
+            .iter()
+            .map(|name| fixed_type(name).map_or(AttributeState::Unknown, AttributeState::Typed))
+            .collect();
         check::check(&ast, &widths(&controls), &[], &mut attributes)?;
 
         let mut uses = Uses::default();
         for node in &ast.nodes {
             match node {
-                Node::Input(input) => uses.note(*input),
-                Node::Control(control) => uses.note_control(*control),
-                Node::Call(function, ..) if matches!(function.does, Does::Noise | Does::Rand) => {
-                    uses.note(Input::Seed);
+                Node::Input(input) => uses.record(*input),
+                Node::Control(control) => uses.record_control(*control),
+                Node::Call(function, ..) if matches!(function.kind, FunctionKind::Noise | FunctionKind::Rand) => {
+                    uses.record(Input::Seed);
                 }
                 _ => {}
             }
@@ -119,27 +122,27 @@ impl Program {
         Ok(Program { ast, controls, uses, reads, writes })
     }
 
-    /// What it reads besides attributes.
+    /// What it reads in addition to attributes.
     pub fn uses(&self) -> &Uses {
         &self.uses
     }
 
-    /// Attributes that it needs: read, or assigned in part, before it has assigned all of them.
+    /// Attributes that the input must have: those read, or assigned in part, before being assigned as a whole.
     pub fn reads(&self) -> &[String] {
         &self.reads
     }
 
-    /// Attributes that it makes or changes.
+    /// Attributes that it creates or changes.
     pub fn writes(&self) -> &[String] {
         &self.writes
     }
 
-    /// Runs over `rows` elements, one row of every column each, and gives the attributes it writes in
-    /// the order of [`writes`](Self::writes); an attribute that was there keeps its type.
+    /// Runs over `rows` elements, with one row per element in every column. Returns the written attributes in the order
+    /// of [`writes`](Self::writes); attributes that existed keep their type.
     ///
     /// # Errors
-    /// A name that is neither column nor control, a width that does not fit, and the first value that
-    /// is NaN or does not fit its type.
+    /// A name that is neither a column nor a control, a wrong width, or the first value that is NaN or out of the range
+    /// of its type.
     pub fn run(
         &self,
         env: &Env<'_>,
@@ -163,7 +166,7 @@ impl Program {
         let (lowered, kinds) = self.lowered(columns, &sources).map_err(RunError::Code)?;
         let mut written: Vec<(usize, Column)> = Vec::with_capacity(self.writes.len());
         for name in &self.writes {
-            let attribute = names.iter().position(|known| known == name).unwrap_or(0);
+            let attribute = names.iter().position(|attribute| attribute == name).unwrap_or(0);
             let stores = lowered.stores.iter().filter(|s| s.attribute as usize == attribute).count();
             let kind = kinds[attribute].unwrap_or(ColumnType::F1);
             let column = match sources[attribute] {
@@ -177,32 +180,32 @@ impl Program {
         Ok(self.writes.iter().cloned().zip(written.into_iter().map(|(_, column)| column)).collect())
     }
 
-    /// The code for these columns, and the type of each attribute in the end.
+    /// The code for these columns, and the final type of each attribute.
     fn lowered(
         &self,
         columns: &[(&str, &Column)],
         sources: &[Option<&Column>],
     ) -> Result<(Lowered, Vec<Option<ColumnType>>), ExprError> {
-        let known = |(name, column): (&String, &Option<&Column>)| match column {
-            Some(column) => Known::Is(column.kind()),
-            None => Known::Absent(fixed_type(name)),
+        let state = |(name, column): (&String, &Option<&Column>)| match column {
+            Some(column) => AttributeState::Typed(column.kind()),
+            None => AttributeState::Absent(fixed_type(name)),
         };
-        let mut attributes: Vec<Known> = self.ast.attributes.iter().zip(sources).map(known).collect();
+        let mut attributes: Vec<AttributeState> = self.ast.attributes.iter().zip(sources).map(state).collect();
         let controls = self.controls.iter().map(|(name, _)| name.as_str());
         let others = columns.iter().map(|(name, _)| *name).chain(controls);
-        // A file may call its attributes what no text can name.
+        // Attributes of a file may have names that are not valid in a text.
         let others: Vec<&str> = others.filter(|name| is_name(name)).collect();
         let widths = widths(&self.controls);
         check::check(&self.ast, &widths, &others, &mut attributes).map_err(|mut faults| faults.swap_remove(0))?;
-        let kind = |known: &Known| match known {
-            Known::Is(kind) => Some(*kind),
-            Known::Absent(_) | Known::Maybe => None,
+        let kind = |state: &AttributeState| match state {
+            AttributeState::Typed(kind) => Some(*kind),
+            AttributeState::Absent(_) | AttributeState::Unknown => None,
         };
         let kinds: Vec<Option<ColumnType>> = attributes.iter().map(kind).collect();
         Ok((lower(&self.ast, &widths, &kinds)?, kinds))
     }
 
-    fn bad_value(&self, bad: &NotHeld, kind: Option<ColumnType>) -> BadValue {
+    fn bad_value(&self, bad: &OutOfRange, kind: Option<ColumnType>) -> BadValue {
         let name = &self.ast.attributes[bad.store.attribute as usize];
         let attribute = match kind.map(ColumnType::width) {
             Some(3 | 4) => {
@@ -211,7 +214,7 @@ impl Program {
             _ => name.clone(),
         };
         let float = kind.is_none_or(ColumnType::is_float);
-        let line = bad.store.place.line as usize;
+        let line = bad.store.position.line as usize;
         BadValue { attribute, element: bad.row, line, value: bad.value, float }
     }
 }
@@ -220,7 +223,7 @@ fn widths(controls: &[(String, Width)]) -> Vec<Width> {
     controls.iter().map(|(_, width)| *width).collect()
 }
 
-/// Names of attributes in the order in which they are first needed, and first assigned.
+/// Names of attributes in the order of their first read, and of their first assignment.
 fn reads_and_writes(ast: &Ast) -> (Vec<String>, Vec<String>) {
     let mut whole = vec![false; ast.attributes.len()];
     let (mut reads, mut writes) = (vec![], vec![]);

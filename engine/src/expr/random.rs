@@ -1,17 +1,17 @@
-//! Chance and noise as expressions see them: numbers in, one number out, the scene's seed chooses.
+//! `rand` and `noise` of expressions: functions of numbers and of the scene's seed.
 //!
-//! Promise: a pure function of seed and arguments. Limit: `rand` looks at every bit of its
-//! arguments, so `rand(x)` of a moving `x` flickers; give it an index.
+//! Promise: pure functions of seed and arguments. Limit: `rand` depends on every bit of its arguments, so `rand(x)` of
+//! an animated `x` flickers; use it with an index.
 
 use numerics::noise::noise3;
 use numerics::random::Key;
 
-/// A number in [0, 1) for a pair of numbers.
+/// A random number in [0, 1), determined by a pair of numbers.
 pub(super) fn rand(seed: f64, a: f64, b: f64) -> f64 {
     Key::new(bits(seed)).of(bits(a)).of(bits(b)).f64()
 }
 
-/// Gradient noise, about −1…1 with mean 0; NaN where a coordinate is not finite.
+/// Gradient noise, about −1…1 with mean 0; NaN if a coordinate is not finite.
 pub(super) fn noise(seed: f64, at: [f64; 3]) -> f64 {
     if !at.iter().all(|x| x.is_finite()) {
         return f64::NAN;
@@ -19,7 +19,7 @@ pub(super) fn noise(seed: f64, at: [f64; 3]) -> f64 {
     f64::from(noise3(Key::new(bits(seed)).u32(), at))
 }
 
-/// The bits of a number; 0 and −0 are one number.
+/// The bits of a number; 0 and −0 have the same.
 fn bits(a: f64) -> u64 {
     (a + 0.0).to_bits()
 }
@@ -29,12 +29,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn zero_has_no_sign() {
+    fn the_sign_of_zero_does_not_matter() {
         assert_eq!(rand(1.0, 0.0, 0.0), rand(1.0, -0.0, -0.0));
     }
 
     #[test]
-    fn seed_and_both_arguments_count() {
+    fn seed_and_both_arguments_matter() {
         let numbers = [rand(1.0, 2.0, 3.0), rand(2.0, 2.0, 3.0), rand(1.0, 3.0, 2.0), rand(1.0, 2.0, 0.0)];
         for (k, x) in numbers.iter().enumerate() {
             assert!((0.0..1.0).contains(x));
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_moves_with_place_and_seed_and_stays_bounded() {
+    fn noise_depends_on_position_and_seed_and_is_bounded() {
         let mut largest = 0.0f64;
         for k in 0..1000 {
             let at = [0.37 * f64::from(k), 0.21 * f64::from(k), 0.5];

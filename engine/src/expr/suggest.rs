@@ -1,21 +1,19 @@
-//! Did you mean …? The known name nearest to one that is not known.
+//! Suggestions: the known name most similar to an unknown one.
 //!
-//! Promise: the same answer for the same candidates in the same order; the first of equals wins.
-//! Limit: names longer than 64 characters, and candidates after the first 1000, are not compared, so
-//! the cost stays bounded however many a file has.
+//! Promise: the same result for the same candidates in the same order; the first of equals wins. Limit: names longer
+//! than 64 characters and candidates after the first 1000 are not compared, so that the cost is bounded.
 
 use std::cmp::Reverse;
 
 use strsim::osa_distance;
 
-/// Longest name that is compared, in characters.
+/// Names with more characters are not compared.
 const LONGEST: usize = 64;
-/// Most candidates that are compared.
+/// The number of candidates that are compared.
 const MOST: usize = 1000;
 
-/// The candidate with the fewest edits from `name`, if they are no more than a third of its
-/// characters, or one; of equals the one that begins alike for longest. Case costs nothing, swapped
-/// neighbours are one edit.
+/// The candidate with the fewest edits from `name`, if there are at most a third as many edits as characters, or one.
+/// Of equals it is the one with the longest common prefix. Case is ignored; swapping two neighbours is one edit.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = folded(name)?;
     let allowed = (wanted.length / 3).max(1);
@@ -23,21 +21,21 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .into_iter()
         .take(MOST)
         .filter_map(|candidate| {
-            let known = folded(candidate)?;
-            // One letter is within one edit of every other letter; that is no likeness.
-            let alike = wanted.length > 1 || wanted == known;
-            if !alike || wanted.length.abs_diff(known.length) > allowed {
+            let candidate_folded = folded(candidate)?;
+            // Every letter is one edit from every other letter, which is not a similarity.
+            let alike = wanted.length > 1 || wanted == candidate_folded;
+            if !alike || wanted.length.abs_diff(candidate_folded.length) > allowed {
                 return None;
             }
-            let edits = osa_distance(&wanted.text, &known.text);
-            let start = wanted.text.chars().zip(known.text.chars()).take_while(|(a, b)| a == b).count();
+            let edits = osa_distance(&wanted.text, &candidate_folded.text);
+            let start = wanted.text.chars().zip(candidate_folded.text.chars()).take_while(|(a, b)| a == b).count();
             (edits <= allowed).then_some((edits, Reverse(start), candidate))
         })
         .min_by_key(|(edits, start, _)| (*edits, *start))
         .map(|(_, _, candidate)| candidate)
 }
 
-/// `` `a`, `b` ``: the names, where they are few enough to read.
+/// `` `a`, `b` ``: the names, if there are few enough to list.
 pub(super) fn listed(names: &[&str]) -> Option<String> {
     const LISTED: usize = 24;
     let names: Vec<String> = names.iter().map(|name| shortened(name)).collect();
@@ -72,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slip_finds_its_name() {
+    fn a_misspelt_name_is_found() {
         let known = ["time", "frame", "smoothstep", "envelope"];
         assert_eq!(nearest("tme", known), Some("time"));
         assert_eq!(nearest("TIME", known), Some("time"));
@@ -81,11 +79,11 @@ mod tests {
         assert_eq!(nearest("Curve_Win", ["Curve_In", "Curve_Wind"]), Some("Curve_Wind"));
         assert_eq!(nearest("smothstp", known), Some("smoothstep"));
         assert_eq!(nearest("kitten", ["sitting"]), None, "three edits");
-        assert_eq!(nearest("ÉCLAT", ["éclta"]), Some("éclta"), "a swap is one edit, case none");
+        assert_eq!(nearest("ÉCLAT", ["éclta"]), Some("éclta"), "a swap is one edit, a change of case none");
     }
 
     #[test]
-    fn what_is_like_nothing_finds_nothing() {
+    fn an_unlike_name_finds_nothing() {
         assert_eq!(nearest("zebra", ["time", "frame"]), None);
         assert_eq!(nearest("q", ["P", "N"]), None);
         assert_eq!(nearest("p", ["P", "N"]), Some("P"));

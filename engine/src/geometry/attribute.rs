@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::column::{ColumnType, Item};
 
-/// What one row of an attribute belongs to.
+/// What a row of an attribute belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Owner {
     /// A CV, vertex, particle or tet point.
@@ -57,13 +57,13 @@ impl<T: Item> Attr<T> {
     }
 }
 
-/// Positions, metres. Every component but a volume has them.
+/// Positions, metres. Every component except a volume has them.
 pub const P: Attr<[f32; 3]> = Attr::point("P");
 /// Velocity, m/s.
 pub const V: Attr<[f32; 3]> = Attr::point("v");
-/// Share of the wind a CV receives, 0…1; 1 where it is missing.
+/// Fraction of the wind that a CV receives, 0…1; 1 if the attribute is missing.
 pub const ENVELOPE: Attr<f32> = Attr::point("envelope");
-/// Share of a curve's CVs in the lee of a collider, 0…1.
+/// Fraction of a curve's CVs in the lee of a collider, 0…1.
 pub const SHIELDED: Attr<f32> = Attr::element("shielded");
 /// Width of a curve or particle, metres.
 pub const WIDTH: Attr<f32> = Attr::point("width");
@@ -77,13 +77,13 @@ pub const THICKNESS: Attr<f32> = Attr::point("thickness");
 pub const N: Attr<[f32; 3]> = Attr::point("N");
 /// Orientation, a unit quaternion x, y, z, w.
 pub const ORIENT: Attr<[f32; 4]> = Attr::point("orient");
-/// Identity of a point through time.
+/// Identity of a point over time.
 pub const ID: Attr<i32> = Attr::point("id");
 
-/// Identity of a curve through time.
+/// Identity of a curve over time.
 pub const CURVE_ID: Attr<i32> = Attr::element("curve_id");
 
-/// The type a well-known name must have; `None` for a free name.
+/// The type that a well-known name must have; `None` for other names.
 pub fn fixed_type(name: &str) -> Option<ColumnType> {
     match name {
         "P" | "v" | "uvw" | "Pref" | "N" => Some(ColumnType::F3),

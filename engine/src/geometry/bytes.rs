@@ -1,4 +1,4 @@
-//! A geometry as bytes, every bit of it, and back: for the disk cache and solver checkpoints.
+//! Lossless serialisation of a geometry, for the disk cache and solver checkpoints.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use numerics::sparse_field::{BLOCK_NODES, SparseField};
 use super::{Column, ColumnType, Component, Faces, Geometry, Grid, Kind, Owner, Runs, Table, Topology, Volume};
 
 impl Geometry {
-    /// All of it as bytes.
+    /// The whole geometry as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         encode_geometry(&mut out, self);
         out
     }
 
-    /// The inverse of [`Geometry::to_bytes`]; `None` for any other bytes.
+    /// The inverse of [`Geometry::to_bytes`]; `None` for invalid bytes.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         Reader(bytes).geometry()
     }
@@ -32,7 +32,7 @@ impl Serialize for Geometry {
 impl<'de> Deserialize<'de> for Geometry {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let bytes = Vec::<u8>::deserialize(deserializer)?;
-        Self::from_bytes(&bytes).ok_or_else(|| D::Error::custom("these bytes are no geometry"))
+        Self::from_bytes(&bytes).ok_or_else(|| D::Error::custom("the bytes are not a geometry"))
     }
 }
 
@@ -84,7 +84,7 @@ fn encode_table(out: &mut Vec<u8>, table: &Table) {
     }
 }
 
-/// The bytes not read yet; each read is `None` where they end too early.
+/// The bytes not read yet; a read returns `None` if they end too early.
 pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_was_written_is_read_back() {
+    fn geometry_round_trips_and_damaged_bytes_are_refused() {
         let mesh = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.5; 3], [1.0; 3], [-0.0, 2.0, f32::MIN]]).unwrap();
         let tets = Component::tets(vec![[0, 1, 2, 3]], vec![[1.0; 3]; 4]).unwrap();
         let geometry = Geometry::from(mesh).with(tets);

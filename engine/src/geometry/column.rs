@@ -1,7 +1,7 @@
 //! Columns and tables: named typed arrays, shared copy-on-write.
 //!
-//! A clone shares; a write copies only what others still hold. Equal addresses ([`Column::same`]) therefore prove that
-//! nothing was written, and the tests rely on it.
+//! A clone shares its arrays; a write copies an array only if it is shared. Equal addresses ([`Column::same`])
+//! therefore prove that nothing was written, which tests rely on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -121,7 +121,7 @@ impl Column {
         T::wrap(Arc::new(rows))
     }
 
-    /// What a row is.
+    /// The type of the rows.
     pub fn kind(&self) -> ColumnType {
         match self {
             Self::F1(_) => ColumnType::F1,
@@ -160,7 +160,7 @@ impl Column {
 
     /// The first row with a NaN or infinity, if any.
     pub fn first_not_finite(&self) -> Option<usize> {
-        // Whole chunks first: the sum of x·0 is 0 exactly where all x are finite, and it vectorises.
+        // Whole chunks are tested first, because that loop is vectorised.
         fn scan<const N: usize>(rows: &[[f32; N]]) -> Option<usize> {
             let bad = |row: &[f32; N]| row.iter().any(|x| !x.is_finite());
             rows.chunks(1024).enumerate().find_map(|(k, chunk)| {
@@ -191,7 +191,7 @@ impl Column {
         }
     }
 
-    /// The inverse of [`Column::to_bytes`]; `None` where the length does not fit the type.
+    /// The inverse of [`Column::to_bytes`]; `None` if the length does not fit the type.
     pub fn from_bytes(kind: ColumnType, bytes: &[u8]) -> Option<Self> {
         fn unpack<const N: usize, T: Copy + Default>(bytes: &[u8], get: impl Fn([u8; 4]) -> T) -> Option<Vec<[T; N]>> {
             let (words, rest) = bytes.as_chunks::<4>();
@@ -214,7 +214,7 @@ impl Column {
     /// Rows `rows[0], rows[1], …` of this column, in that order.
     ///
     /// # Panics
-    /// Where a row is out of range: callers index with rows of the same table.
+    /// If a row is out of range. Callers use row numbers of the same table.
     pub fn gather(&self, rows: &[u32]) -> Self {
         each!(self, a => Self::new(rows.iter().map(|&row| a[row as usize]).collect()))
     }
@@ -231,7 +231,7 @@ impl Column {
         }
     }
 
-    /// This column followed by `other`; `None` where their types differ.
+    /// This column followed by `other`; `None` if their types differ.
     pub fn concat(&self, other: &Self) -> Option<Self> {
         fn join<T: Item>(a: &[T], b: &Column) -> Option<Column> {
             T::array(b).map(|b| Column::new([a, b].concat()))
@@ -253,25 +253,25 @@ impl Table {
         Self { rows, columns: Arc::default() }
     }
 
-    /// Rows of every column.
+    /// The number of rows of every column.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The column of that name.
+    /// The column with that name.
     pub fn column(&self, name: &str) -> Option<&Column> {
         self.columns.get(name)
     }
 
-    /// The rows of that name, where they are of type `T`.
+    /// The rows of the column with that name, if they are of type `T`.
     pub fn get<T: Item>(&self, name: &str) -> Option<&[T]> {
         self.column(name).and_then(T::array).map(|a| a.as_slice())
     }
 
-    /// Puts a column under `name`, replacing what was there.
+    /// Adds a column, or replaces the one with that name.
     ///
     /// # Errors
-    /// Where the column has another number of rows.
+    /// If the column has another number of rows.
     pub fn set(&mut self, name: impl Into<Name>, column: Column) -> Result<(), GeometryError> {
         let name = name.into();
         if column.len() != self.rows {
@@ -281,7 +281,7 @@ impl Table {
         Ok(())
     }
 
-    /// The rows of that name for writing, where they are of type `T`; copied first if shared.
+    /// The rows of the column with that name for writing, if they are of type `T`; copied first if shared.
     pub fn edit<T: Item>(&mut self, name: &str) -> Option<&mut [T]> {
         let column = Arc::make_mut(&mut self.columns).get_mut(name)?;
         T::array_mut(column).map(|array| Arc::make_mut(array).as_mut_slice())
@@ -311,8 +311,8 @@ impl Table {
         Self { rows: rows.len(), columns: Arc::new(columns) }
     }
 
-    /// This table's rows, then `other`'s. Where one of them lacks a column, or has it with another type, its
-    /// rows are zero (the type is that of the first table that has it).
+    /// The rows of this table, then those of `other`. If one of them lacks a column or has it with another type, its
+    /// rows are zero (the type is that of the first table that has the column).
     pub fn concat(&self, other: &Self) -> Self {
         let mut columns = BTreeMap::new();
         for (name, column) in self.iter() {
@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn joining_tables_fills_what_one_lacks_with_zeros() {
+    fn joining_tables_fills_missing_columns_with_zeros() {
         let mut a = Table::new(1);
         a.set("mask", Column::new(vec![1.0_f32])).unwrap();
         let mut b = Table::new(2);

@@ -19,10 +19,10 @@ pub struct Component {
 }
 
 impl Component {
-    /// Polylines with `counts` CVs each; `positions` root to tip, one curve after the other.
+    /// Polylines with `counts` CVs each; `positions` from root to tip, curve by curve.
     ///
     /// # Errors
-    /// Where the counts do not add up to the positions, or a curve has no CV.
+    /// If the counts do not add up to the positions, or a curve has no CV.
     pub fn curves(counts: Vec<u32>, positions: Vec<[f32; 3]>) -> Result<Self, GeometryError> {
         if let Some(curve) = counts.iter().position(|count| *count == 0) {
             return Err(GeometryError::EmptyCurve { curve });
@@ -37,7 +37,7 @@ impl Component {
     /// Polygons with `counts` corners each; `corners` are rows of `positions`, counter-clockwise from outside.
     ///
     /// # Errors
-    /// Where the counts do not add up to the corners, a face has fewer than 3, or a corner is out of range.
+    /// If the counts do not add up to the corners, a face has fewer than 3, or a corner is out of range.
     pub fn mesh(counts: Vec<u32>, corners: Vec<u32>, positions: Vec<[f32; 3]>) -> Result<Self, GeometryError> {
         if let Some(face) = counts.iter().position(|count| *count < 3) {
             return Err(GeometryError::SmallFace { face, corners: counts[face] });
@@ -50,7 +50,7 @@ impl Component {
         Ok(Self::with(Topology::Mesh(Arc::new(Faces { runs, corners })), positions))
     }
 
-    /// Loose points.
+    /// Unconnected points.
     pub fn points(positions: Vec<[f32; 3]>) -> Self {
         Self::with(Topology::Points, positions)
     }
@@ -58,7 +58,7 @@ impl Component {
     /// Tets of four rows of `positions` each.
     ///
     /// # Errors
-    /// Where an index is out of range.
+    /// If an index is out of range.
     pub fn tets(tets: Vec<[u32; 4]>, positions: Vec<[f32; 3]>) -> Result<Self, GeometryError> {
         check_indices(tets.as_flattened(), positions.len())?;
         Ok(Self::with(Topology::Tets(Arc::new(tets)), positions))
@@ -71,10 +71,10 @@ impl Component {
         Self { topology, points, elements, once: Table::new(1), derived: Derived::default() }
     }
 
-    /// A component of the same points and topology with these tables, as a cache reads them back.
+    /// A component of a topology and its tables, as read from a cache.
     ///
     /// # Errors
-    /// Where the tables' rows do not fit the topology, or the points lack `P`.
+    /// If the tables' rows do not fit the topology, or the points lack `P`.
     pub fn from_tables(topology: Topology, tables: [Table; 3]) -> Result<Self, GeometryError> {
         let [points, elements, once] = tables;
         let rows = points.rows();
@@ -146,7 +146,7 @@ impl Component {
 
     /// Positions, metres, one row per point.
     pub fn positions(&self) -> &[[f32; 3]] {
-        self.points.get(P.name).expect("every component has `P`: its constructors and `remove` see to it")
+        self.points.get(P.name).expect("constructors add `P` and `remove` keeps it")
     }
 
     /// The table of `owner`.
@@ -168,11 +168,11 @@ impl Component {
 
     /// The type and owner of an attribute in words: `one float for each curve`.
     pub fn describe(&self, name: &str) -> Option<String> {
-        let found = self.columns().find(|(_, known, _)| ***known == *name);
+        let found = self.columns().find(|(_, column, _)| ***column == *name);
         found.map(|(owner, _, column)| self.kind().rows_text(owner, column.kind()))
     }
 
-    /// The rows of an attribute; `None` where it is absent or has another type.
+    /// The rows of an attribute; `None` if it is absent or has another type.
     pub fn get<T: Item>(&self, attr: Attr<T>) -> Option<&[T]> {
         self.table(attr.owner).get(attr.name)
     }
@@ -180,7 +180,7 @@ impl Component {
     /// Replaces an attribute's rows, or adds it.
     ///
     /// # Errors
-    /// Where the number of rows is not the owner's.
+    /// If the number of rows is not the owner's.
     pub fn set<T: Item>(&mut self, attr: Attr<T>, rows: Vec<T>) -> Result<(), GeometryError> {
         self.set_column(attr.owner, attr.name, Column::new(rows))
     }
@@ -188,7 +188,7 @@ impl Component {
     /// Replaces a column, or adds it.
     ///
     /// # Errors
-    /// Where the number of rows is not the owner's, or a well-known name gets a type that is not its own.
+    /// If the number of rows is not the owner's, or a well-known name gets another type than its own.
     pub fn set_column(&mut self, owner: Owner, name: impl Into<Name>, column: Column) -> Result<(), GeometryError> {
         let name = name.into();
         if let Some(expected) = fixed_type(&name).filter(|expected| *expected != column.kind()) {
@@ -204,13 +204,13 @@ impl Component {
         self.table_mut(attr.owner).edit(attr.name)
     }
 
-    /// A value computed from topology and positions and cached with them: the tree of a still mesh is built once for all
-    /// frames and nodes. Two threads that ask at the same time may both compute it.
+    /// A value computed from topology and positions and cached with them: the tree of a static mesh is built once for
+    /// all frames and nodes. Two threads that call this at the same time may both compute it.
     pub fn derived<T: Send + Sync + 'static>(&self, compute: impl FnOnce(&Self) -> T) -> Arc<T> {
         self.derived.get_or(|| compute(self))
     }
 
-    /// Positions are about to change: values derived from them no longer belong to this component.
+    /// Clears derived values, because positions are about to change.
     fn forget_derived(&mut self, owner: Owner, name: &str) {
         if owner == P.owner && name == P.name {
             self.derived = Derived::default();
@@ -225,17 +225,17 @@ impl Component {
         self.table_mut(owner).remove(name)
     }
 
-    /// Every attribute: owner, name, column; points first, by name.
+    /// All attributes as owner, name and column; those of points first, sorted by name.
     pub fn columns(&self) -> impl Iterator<Item = (Owner, &Name, &Column)> {
         Owner::ALL
             .into_iter()
             .flat_map(|owner| self.table(owner).iter().map(move |(name, column)| (owner, name, column)))
     }
 
-    /// Both components' points and elements, this one's first.
+    /// The points and elements of both components, those of `self` first.
     ///
     /// # Errors
-    /// Where the kinds differ or there are too many rows.
+    /// If the kinds differ or there are too many rows.
     pub fn concat(&self, other: &Self) -> Result<Self, GeometryError> {
         let offset = u32::try_from(self.point_count()).map_err(|_| GeometryError::TooMany)?;
         let shift = |index: &u32| index.checked_add(offset).ok_or(GeometryError::TooMany);
@@ -258,7 +258,7 @@ impl Component {
             }
             _ => return Err(GeometryError::Kinds { a: self.kind(), b: other.kind() }),
         };
-        // Attributes of the whole: where both have one of a name, the first's is kept.
+        // Attributes of the whole component: those of `self` take precedence.
         let mut once = self.once.clone();
         for (name, column) in other.once.iter().filter(|(name, _)| self.once.column(name).is_none()) {
             once.set(name.clone(), column.clone())?;
@@ -272,7 +272,7 @@ impl Component {
         })
     }
 
-    /// Least and greatest coordinates; `None` without points.
+    /// The smallest and largest coordinates; `None` without points.
     pub fn bounds(&self) -> Option<[[f32; 3]; 2]> {
         let (first, rest) = self.positions().split_first()?;
         Some(rest.iter().fold([*first; 2], |[low, high], p| {

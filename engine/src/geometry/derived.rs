@@ -11,8 +11,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(super) struct Derived(Arc<Mutex<Vec<Arc<dyn Any + Send + Sync>>>>);
 
 impl Derived {
-    /// The value of type `T`, computed if it is absent. Nothing is locked meanwhile: a thread waiting for work of its own
-    /// pool could deadlock. The first value stored is the one everybody gets.
+    /// The value of type `T`, computed if it is absent. No lock is held while computing: a thread that waits for work
+    /// of its own pool could deadlock. If several threads compute a value, all get the one stored first.
     pub(super) fn get_or<T: Send + Sync + 'static>(&self, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.find() {
             return value;
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(highest(&part), 2.0);
         let mut clone = part.clone();
         clone.set(ENVELOPE, vec![0.0; 2]).unwrap();
-        clone.derived::<Highest>(|_| panic!("it is there already"));
+        clone.derived::<Highest>(|_| panic!("it is cached"));
         clone.edit(P).unwrap()[1][1] = 3.0;
         assert_eq!((highest(&clone), highest(&part)), (3.0, 2.0));
         part.set(P, vec![[0.0; 3], [0.0, 5.0, 0.0]]).unwrap();
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn values_of_several_types_live_side_by_side() {
+    fn values_of_different_types_are_independent() {
         let part = Component::points(vec![[1.0, 2.0, 3.0]]);
         assert_eq!(highest(&part), 2.0);
         assert_eq!(*part.derived(|part| part.point_count()), 1);

@@ -1,6 +1,6 @@
 //! Conversion of a geometry to another unit of length.
 //!
-//! Every length and velocity is multiplied in f64 and rounded once; everything else stays, unknown attributes
+//! Every length and velocity is multiplied in f64 and rounded once; everything else is unchanged, unknown attributes
 //! included. Limit: a product may leave the range of f32.
 
 use super::{Component, Geometry, Kind, P, PREF, THICKNESS, V, WIDTH};
@@ -15,7 +15,7 @@ fn is_one(factor: f64) -> bool {
 }
 
 impl Component {
-    /// Multiplies every known length by `factor`; by 1 nothing is copied.
+    /// Multiplies every known length by `factor`. If it is 1, nothing is copied.
     pub fn scale_lengths(&mut self, factor: f64) {
         if is_one(factor) {
             return;
@@ -35,7 +35,7 @@ impl Component {
 }
 
 impl Geometry {
-    /// Multiplies every known length of every component by `factor`; by 1 nothing is copied.
+    /// Multiplies every known length of every component by `factor`. If it is 1, nothing is copied.
     pub fn scale_lengths(&mut self, factor: f64) {
         if is_one(factor) {
             return;
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_volume_grows_with_its_level_set() {
+    fn a_volume_is_scaled_with_its_level_set_and_velocity() {
         let grid = Grid { origin: [1.0; 3], cell: 0.5, size: [1; 3] };
         let mut geometry = Geometry::default();
         geometry.put_volume(Volume::new(grid, vec![-0.25], [(); 3].map(|()| vec![3.0; 2])).unwrap());

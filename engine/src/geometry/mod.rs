@@ -1,7 +1,8 @@
-//! Geometry: what flows along a graph's wires.
+//! Geometry: the data that flows along a graph's wires.
 //!
-//! Five optional components. Everything is shared copy-on-write: a node that changes positions shares everything else
-//! with its input, which tests prove by equal addresses. Positions are metres relative to the scene's origin, Y up, right-handed.
+//! Five optional components. All arrays are shared copy-on-write: a node that changes positions shares everything else
+//! with its input, which tests check by comparing addresses. Positions are metres relative to the scene's origin, Y up,
+//! right-handed.
 
 mod attribute;
 mod bytes;
@@ -28,14 +29,14 @@ pub use topology::{Faces, Runs, Topology};
 pub use triangles::Triangles;
 pub use volume::{Grid, VOLUME_FIELDS, Volume, VolumeSampler};
 
-/// Which component.
+/// The kind of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Polylines.
     Curves,
     /// Polygons.
     Mesh,
-    /// Loose points.
+    /// Unconnected points.
     Points,
     /// Tets.
     Tets,
@@ -88,7 +89,7 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// The component of that kind; `None` where it is absent, and for [`Kind::Volume`] (see [`Geometry::volume`]).
+    /// The component of that kind; `None` if it is absent, and for [`Kind::Volume`] (see [`Geometry::volume`]).
     pub fn part(&self, kind: Kind) -> Option<&Component> {
         self.parts.get(kind as usize)?.as_deref()
     }
@@ -96,12 +97,13 @@ impl Geometry {
     /// The component of that kind, which must be present.
     ///
     /// # Errors
-    /// Where it is absent. The engine refuses such a wire before a node sees it, so a node may pass the error on.
+    /// If it is absent. The engine refuses such a wire before it calls the node, so the node may just return the error.
     pub fn require(&self, kind: Kind) -> crate::Result<&Component> {
-        self.part(kind).ok_or_else(|| crate::Error::contract(format!("there is no {kind} where the input needs one")))
+        self.part(kind)
+            .ok_or_else(|| crate::Error::contract(format!("the input needs {kind}, but the geometry has none")))
     }
 
-    /// The component of that kind for writing; its tables are copied only where they are written and shared.
+    /// The component of that kind for writing; tables that are shared are copied when they are written.
     pub fn part_mut(&mut self, kind: Kind) -> Option<&mut Component> {
         self.parts.get_mut(kind as usize)?.as_mut().map(Arc::make_mut)
     }
@@ -274,15 +276,15 @@ pub enum GeometryError {
     /// Tables that do not fit a topology.
     #[error("the tables' rows do not fit the topology")]
     Tables,
-    /// A grid without a usable cell or origin.
-    #[error("a grid with cells of {cell:?} m from {origin:?}, expected finite numbers and a cell above 0")]
+    /// A grid with an invalid cell size or origin.
+    #[error("the grid has cells of {cell:?} m and origin {origin:?}, expected finite numbers and a cell size above 0")]
     Grid {
         /// Lowest corner.
         origin: [f32; 3],
         /// Edge of a cell.
         cell: f32,
     },
-    /// A field of a volume that cannot be made.
+    /// A field of a volume that cannot be built.
     #[error("`{name}`: {error}")]
     Field {
         /// Which field.
@@ -291,7 +293,7 @@ pub enum GeometryError {
         error: SparseFieldError,
     },
     /// A field of a volume that does not fit its grid.
-    #[error("`{name}` is {size:?} numbers along x, y and z, expected {expected:?}")]
+    #[error("`{name}` has {size:?} numbers along x, y and z, expected {expected:?}")]
     FieldSize {
         /// Which field.
         name: &'static str,
@@ -300,7 +302,7 @@ pub enum GeometryError {
         /// Nodes its grid has.
         expected: [u32; 3],
     },
-    /// A field of a volume with a background that is not outside, or not still.
+    /// A level set whose background is not outside, or a velocity whose background is not zero.
     #[error("the background of `{name}` is {background:?}, expected {}", if *name == VOLUME_FIELDS[0] { "a distance above 0" } else { "0" })]
     Background {
         /// Which field.
@@ -333,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_topology_is_refused_with_its_index() {
+    fn invalid_topology_is_refused_with_its_index() {
         let text = |e: GeometryError| e.to_string();
         assert_eq!(
             text(Component::curves(vec![2, 0], vec![[0.0; 3]; 2]).unwrap_err()),
@@ -354,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn a_well_known_name_keeps_its_type() {
+    fn a_well_known_name_must_have_its_type() {
         let mut c = curve();
         let error =
             c.part_mut(Kind::Curves).unwrap().set_column(Owner::Point, "N", Column::new(vec![1.0_f32; 2])).unwrap_err();

@@ -1,9 +1,9 @@
-//! Neutral values of well-known attributes: what their absence means.
+//! Neutral values of well-known attributes: the values that they have by definition if they are absent.
 
 use super::{Column, Component, Owner, P};
 
 impl Component {
-    /// The neutral column of a well-known attribute, one row per `owner`; `None` where its absence has no such value.
+    /// The neutral column of a well-known attribute, one row per `owner`; `None` if it has no neutral value.
     pub fn neutral(&self, owner: Owner, name: &str) -> Option<Column> {
         let rows = self.table(owner).rows();
         match name {

@@ -1,4 +1,4 @@
-//! Topology: how points make curves, faces and tets. Shared between frames; never edited in place.
+//! Topology: how points are connected to curves, faces and tets. Shared between frames; never edited in place.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ impl Runs {
     /// Runs of the given lengths.
     ///
     /// # Errors
-    /// Where the lengths add up to more than `u32::MAX` rows.
+    /// If the lengths add up to more than `u32::MAX` rows.
     pub fn from_counts(counts: impl IntoIterator<Item = u32>) -> Result<Self, GeometryError> {
         let mut starts = vec![0_u32];
         let mut end = 0_u32;
@@ -60,10 +60,10 @@ impl Runs {
         self.starts.windows(2).map(|pair| pair[1] - pair[0])
     }
 
-    /// These runs, then `other`'s.
+    /// These runs, then those of `other`.
     ///
     /// # Errors
-    /// Where the lengths add up to more than `u32::MAX` rows.
+    /// If the lengths add up to more than `u32::MAX` rows.
     pub fn concat(&self, other: &Self) -> Result<Self, GeometryError> {
         Self::from_counts(self.counts().chain(other.counts()))
     }
@@ -72,9 +72,9 @@ impl Runs {
 /// Polygons: the corners of each face as rows of the point table, counter-clockwise seen from outside.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Faces {
-    /// Which corners belong to which face.
+    /// The corners of each face.
     pub runs: Runs,
-    /// Point of each corner.
+    /// The point of each corner.
     pub corners: Vec<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! A mesh's polygons as triangles, concave ones too.
+//! Triangulation of a mesh's polygons, including concave ones.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use super::Component;
 /// Triangles of a mesh, in the order and winding of its faces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Triangles {
-    /// Points of each triangle.
+    /// The points of each triangle.
     pub corners: Vec<[u32; 3]>,
-    /// The face each is part of.
+    /// The face that each triangle is part of.
     pub faces: Vec<u32>,
 }
 
@@ -44,7 +44,7 @@ mod tests {
     use crate::geometry::Component;
 
     #[test]
-    fn a_concave_quad_is_cut_inside_and_a_triangle_stays() {
+    fn a_concave_quad_is_split_inside_and_a_triangle_is_kept() {
         // An arrowhead whose notch is corner 3, and a triangle beside it.
         let points = [[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [5.0, 0.0], [6.0, 0.0], [5.0, 1.0]];
         let points = points.iter().map(|[x, z]| [*x, 0.0, *z]).collect();

@@ -32,7 +32,7 @@ impl Grid {
         [0, 1, 2].map(|k| self.size[k].saturating_add(u32::from(k == axis)))
     }
 
-    /// A point, metres, in cells from the lowest corner.
+    /// Converts a point in metres to cells from the lowest corner.
     fn in_cells(&self, point: [f32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| (f64::from(point[k]) - f64::from(self.origin[k])) / f64::from(self.cell))
     }
@@ -43,14 +43,14 @@ impl Grid {
         Self { origin: [0, 1, 2].map(|k| at(k) as f32), cell: self.cell, size: [0, 1, 2].map(|k| high[k] - low[k]) }
     }
 
-    /// The numbers of the grid are finite and its cells have a size.
+    /// Checks that origin and cell size are finite and that the cell size is above 0.
     fn check(&self) -> Result<(), GeometryError> {
-        let is_sound = self.cell > 0.0 && self.cell.is_finite() && self.origin.iter().all(|x| x.is_finite());
-        is_sound.then_some(()).ok_or(GeometryError::Grid { origin: self.origin, cell: self.cell })
+        let is_valid = self.cell > 0.0 && self.cell.is_finite() && self.origin.iter().all(|x| x.is_finite());
+        is_valid.then_some(()).ok_or(GeometryError::Grid { origin: self.origin, cell: self.cell })
     }
 }
 
-/// Nodes of a box; the greatest `usize` where they are more.
+/// The number of nodes of a box, saturating at the largest `usize`.
 fn count(size: [u32; 3]) -> usize {
     size.iter().fold(1, |count: usize, n| count.saturating_mul(*n as usize))
 }
@@ -60,8 +60,8 @@ pub const VOLUME_FIELDS: [&str; 4] = ["level_set", "velocity_x", "velocity_y", "
 
 /// Level set φ (m, negative inside) at the cell centres of one grid, velocity (m/s) on the MAC faces of another.
 ///
-/// Both are sparse: where nothing is stored, φ is a distance above 0 that says no more than "outside, at least a band
-/// away", and velocity is zero. A clone shares every array.
+/// Both are sparse. Where nothing is stored, φ has a positive background value, which means outside and at least the
+/// band width away, and velocity is zero. A clone shares every array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     level_grid: Grid,
@@ -72,12 +72,12 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// A volume of dense arrays on one grid, x fastest, then y, then z. Background of the level set:
+    /// A volume of dense arrays on one grid, x fastest, then y, then z. The background of the level set is
     /// [`Volume::default_background`].
     ///
     /// # Errors
-    /// Where an array's length is not the grid's, the grid is too large for dense arrays (the message says what it would
-    /// take), or its cell is not above 0.
+    /// If the length of an array does not fit the grid, the grid is too large for dense arrays (the message contains
+    /// the size in bytes), or the cell size is not above 0.
     pub fn new(grid: Grid, level_set: Vec<f32>, velocity: [Vec<f32>; 3]) -> Result<Self, GeometryError> {
         let background = Self::default_background(&grid, level_set.iter().copied());
         Self::from_dense(grid, &level_set, background, grid, velocity.each_ref().map(Vec::as_slice))
@@ -86,7 +86,7 @@ impl Volume {
     /// A volume of dense arrays on two grids, x fastest, then y, then z; `background` is φ outside the level set's grid.
     ///
     /// # Errors
-    /// As for [`Volume::new`], and where `background` is not above 0.
+    /// As for [`Volume::new`], and if `background` is not above 0.
     pub fn from_dense(
         level_grid: Grid,
         level_set: &[f32],
@@ -110,11 +110,12 @@ impl Volume {
         Self::from_fields(level_grid, level_set, velocity_grid, velocity)
     }
 
-    /// A volume of fields: `level_set` one node per cell of `level_grid`, `velocity` one node per face of `velocity_grid`.
+    /// A volume of sparse fields: `level_set` has one node per cell of `level_grid`, `velocity` one node per face of
+    /// `velocity_grid`.
     ///
     /// # Errors
-    /// Where a field's size is not its grid's, the background of the level set is not above 0 or that of a velocity is
-    /// not 0, or a cell is not above 0.
+    /// If the size of a field does not fit its grid, the background of the level set is not above 0 or that of a
+    /// velocity is not 0, or a cell size is not above 0.
     pub fn from_fields(
         level_grid: Grid,
         level_set: SparseField,
@@ -138,14 +139,14 @@ impl Volume {
         Ok(volume)
     }
 
-    /// The background of a level set where nothing says it: its greatest finite value, at least half a cell, so that
-    /// liquid that fills its grid ends at the grid's border.
+    /// The background of a level set that does not specify one: its largest finite value, at least half a cell, so that
+    /// a liquid that fills its grid ends at the border of the grid.
     pub fn default_background(grid: &Grid, level_set: impl IntoIterator<Item = f32>) -> f32 {
         let least = (0.5 * grid.cell).max(f32::from_bits(1));
         level_set.into_iter().filter(|x| x.is_finite()).fold(least, f32::max)
     }
 
-    /// This volume with every length in it, speeds included, put through `length`.
+    /// This volume with `length` applied to every length and velocity.
     pub(super) fn with_lengths(&self, length: impl Fn(f32) -> f32 + Sync) -> Self {
         let mut volume = self.clone();
         for grid in [&mut volume.level_grid, &mut volume.velocity_grid] {
@@ -182,25 +183,26 @@ impl Volume {
         [(a, &self.level_set), (b, x), (c, y), (d, z)]
     }
 
-    /// A reader of φ and velocity at any points.
+    /// A sampler of φ and velocity at arbitrary points.
     pub fn sampler(&self) -> VolumeSampler<'_> {
         let velocity = self.velocity.each_ref().map(SparseField::cursor);
         VolumeSampler { volume: self, level_set: self.level_set.cursor(), velocity }
     }
 
-    /// The volume on the smallest grids that hold its liquid: of the level set the cells with φ below `band`, of the
-    /// velocity those within `reach` of a liquid cell along each axis (both metres). The new origins are rounded to `f32`.
+    /// The volume cropped to its liquid: the grid of the level set to the cells with φ below `band`, that of the
+    /// velocity to the cells within `reach` of a liquid cell along each axis (both in metres). The new origins are
+    /// rounded to `f32`.
     ///
     /// # Errors
     /// None for a volume whose numbers are finite.
     pub fn cropped(&self, band: f32, reach: f32) -> Result<Self, GeometryError> {
         let band = band.min(self.level_set.background());
-        let near = self.level_set.bounds(|phi| phi < band).unwrap_or_default();
-        let level_grid = self.level_grid.cropped(near);
-        let level_set = self.level_set.cropped(near[0], level_grid.size).map_err(in_field(VOLUME_FIELDS[0]))?;
+        let cells = self.level_set.bounds(|phi| phi < band).unwrap_or_default();
+        let level_grid = self.level_grid.cropped(cells);
+        let level_set = self.level_set.cropped(cells[0], level_grid.size).map_err(in_field(VOLUME_FIELDS[0]))?;
         let moving = self.level_set.bounds(|phi| phi < 0.0).map_or_else(Default::default, |liquid| {
             let Grid { origin, cell, size } = self.velocity_grid;
-            // Cells of the velocity's grid that the liquid's box, grown by `reach`, overlaps.
+            // The cells of the velocity grid that overlap the bounds of the liquid enlarged by `reach`.
             [0, 1].map(|end| {
                 [0, 1, 2].map(|k| {
                     let edge = f64::from(self.level_grid.cell) * f64::from(liquid[end][k]);
@@ -208,7 +210,7 @@ impl Volume {
                     let reach = f64::from(reach) / f64::from(cell);
                     let at = edge / f64::from(cell);
                     let at = if end == 0 { (at - reach).floor() } else { (at + reach).ceil() };
-                    // A float beyond the range of u32 becomes its nearest end.
+                    // The conversion to u32 saturates.
                     (at as u32).min(size[k])
                 })
             })
@@ -224,12 +226,12 @@ impl Volume {
         Ok(volume)
     }
 
-    /// Attributes of the whole.
+    /// Attributes of the whole volume.
     pub fn once(&self) -> &Table {
         &self.once
     }
 
-    /// Attributes of the whole, for writing.
+    /// Attributes of the whole volume, for writing.
     pub fn once_mut(&mut self) -> &mut Table {
         &mut self.once
     }
@@ -239,7 +241,7 @@ fn in_field(name: &'static str) -> impl Fn(SparseFieldError) -> GeometryError {
     move |error| GeometryError::Field { name, error }
 }
 
-/// Reads a volume at points; fast where each point is near the one before.
+/// Samples a volume at points; fast if each point is near the previous one.
 #[derive(Clone, Debug)]
 pub struct VolumeSampler<'a> {
     volume: &'a Volume,

@@ -12,7 +12,7 @@ impl Catalogue {
         self.0.iter().flat_map(|family| family.iter().copied())
     }
 
-    /// The type of that name.
+    /// The node type with that name.
     pub fn get(self, name: &str) -> Option<&'static Node> {
         self.nodes().find(|node| node.name == name)
     }

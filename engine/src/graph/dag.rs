@@ -10,29 +10,31 @@ use petgraph::{Incoming, Outgoing};
 
 use super::Graph;
 
-/// Nodes by index and the wires between them; several wires between the same two nodes are one edge. Before its cycles
-/// are refused, a graph file may give one that is not acyclic.
+/// Nodes by index and the wires between them; several wires between the same two nodes are one edge. While a graph file
+/// is being loaded it may still contain cycles.
 pub(crate) struct Dag(DiGraph<(), ()>);
 
-/// Nodes by index, each after all its sources; and the cycles that leave nodes without a position.
+/// A topological order of the nodes, and the cycles that prevent some of them from having a position in it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Order {
-    /// The lowest index first where several could be next. Nodes of cycles, and those that depend on them, are missing.
+    /// Indices of nodes, each after all its sources. Where several could be next, the lowest index is first. Nodes on
+    /// cycles, and those that depend on them, are left out.
     pub(super) nodes: Vec<usize>,
-    /// One shortest cycle of each strongly connected component, from its lowest node, each node a source of the next and
-    /// the last of the first; components in the order of their lowest nodes.
+    /// For each strongly connected component the shortest cycle through its lowest node, starting there: each node is a
+    /// source of the next, and the last of the first. Sorted by their lowest nodes.
     pub(super) cycles: Vec<Vec<usize>>,
 }
 
 impl Dag {
-    /// From the sources of each node.
+    /// Builds the graph from the sources of each node.
     pub(super) fn new(sources: &[Vec<usize>]) -> Self {
         let edges = sources.iter().map(Vec::len).sum();
         let mut dag = DiGraph::with_capacity(sources.len(), edges);
         for _ in 0..sources.len() {
             dag.add_node(());
         }
-        // petgraph lists the neighbours of a node latest edge first: added backwards, they come in ascending order.
+        // petgraph lists the neighbours of a node with the latest edge first: edges added in descending order come out
+        // ascending.
         for (node, sources) in sources.iter().enumerate().rev() {
             let mut sources = sources.clone();
             sources.sort_unstable_by_key(|source| Reverse(*source));
@@ -50,17 +52,17 @@ impl Dag {
         Self::new(&graph.nodes.iter().map(sources).collect::<Vec<_>>())
     }
 
-    /// The nodes that read `node`, each once, lowest first.
+    /// The nodes that read `node`, without repetition, ascending.
     pub(crate) fn readers(&self, node: usize) -> impl Iterator<Item = usize> {
         self.0.neighbors_directed(NodeIndex::new(node), Outgoing).map(NodeIndex::index)
     }
 
-    /// The nodes that `node` reads, each once, lowest first.
+    /// The nodes that `node` reads, without repetition, ascending.
     pub(crate) fn sources(&self, node: usize) -> impl Iterator<Item = usize> {
         self.0.neighbors_directed(NodeIndex::new(node), Incoming).map(NodeIndex::index)
     }
 
-    /// By node: whether it is one of `nodes` or one of them depends on it.
+    /// For each node, whether it is one of `nodes` or an ancestor of one.
     pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> Vec<bool> {
         let reversed = Reversed(&self.0);
         let mut search = Dfs::empty(reversed);
@@ -96,7 +98,7 @@ impl Dag {
         for (number, component) in components.iter().enumerate() {
             component.iter().for_each(|node| component_of[node.index()] = number);
         }
-        // Components share no node, so one table serves them all.
+        // Components are disjoint, so one table serves all searches.
         let mut reached_from = vec![None; self.0.node_count()];
         let starts = components.iter().filter_map(|component| component.iter().min());
         let mut cycles: Vec<Vec<usize>> =
@@ -149,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_and_sources_come_once_and_ascending() {
+    fn readers_and_sources_are_unique_and_ascending() {
         let dag = dag(&[&[], &[], &[1, 0, 1], &[1], &[2, 1]]);
         assert_eq!(dag.readers(1).collect::<Vec<_>>(), [2, 3, 4]);
         assert_eq!(dag.sources(2).collect::<Vec<_>>(), [0, 1]);

@@ -1,51 +1,51 @@
-//! Faults: what is wrong with a graph file, each with its place, its fact and what to do about it.
+//! Faults: errors in a graph file, each with its position, the fact, and a hint on how to mend it.
 //!
-//! Promise: [`Fault::code`] is one of [`code::ALL`] for every fault that a load gives, and stays what it is from
-//! version to version, so scripts may ask for it. Limit: the wording of facts and hints may change.
+//! Promise: [`Fault::code`] of every fault found by a load is one of [`code::ALL`], and codes do not change between
+//! versions, so scripts may test them. Limit: the wording of facts and hints may change.
 
 use std::fmt;
 
 use serde_json::{Value, json};
 
-/// Whose fault it is; the program's exit code follows from it.
+/// What is at fault; it determines the program's exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FaultClass {
     /// A file that the graph names cannot be read.
     File,
-    /// The graph itself is wrong.
+    /// The graph itself.
     Graph,
 }
 
-/// One thing that is wrong.
+/// One error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Its kind, one of [`code::ALL`].
     pub code: &'static str,
-    /// Line, from 1; 0 where the graph was not read from a text.
+    /// Line, from 1; 0 if the graph was not read from a text.
     pub line: u32,
-    /// Column in characters, from 1; 0 where the graph was not read from a text.
+    /// Column in characters, from 1; 0 if the graph was not read from a text.
     pub column: u32,
     /// JSON path: `nodes.wind.params.wind_dir`. Empty for the file as a whole.
     pub path: String,
-    /// What is so.
+    /// What is wrong.
     pub fact: String,
-    /// What to do about it.
+    /// How to mend it.
     pub hint: Option<String>,
-    /// Whose fault it is.
+    /// What is at fault: a file or the graph.
     pub class: FaultClass,
-    /// The key of the `--set` whose value is wrong; line and column are then places in that value.
+    /// The key of the `--set` whose value is wrong; line and column are then positions in that value.
     pub set: Option<Box<str>>,
 }
 
 impl Fault {
-    /// With a hint.
+    /// Adds a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
         self
     }
 
-    /// The fault of a file that cannot be read.
+    /// Marks it as the fault of a file that cannot be read.
     #[must_use]
     pub(super) fn of_file(mut self) -> Self {
         self.class = FaultClass::File;
@@ -62,7 +62,7 @@ impl Fault {
         }
     }
 
-    /// The object that `--json` prints in a list. Faults of a `--set` have its key as `set` besides.
+    /// The object that `--json` prints in a list. Faults of a `--set` also have its key as `set`.
     pub fn to_json(&self) -> Value {
         let mut fault = json!({
             "code": self.code, "line": self.line, "column": self.column,
@@ -74,13 +74,13 @@ impl Fault {
         fault
     }
 
-    /// What faults are sorted by: those of the file first, each by its place.
+    /// The sort key: faults of the file before those of `--set`, each by position.
     pub(super) fn order(&self) -> (bool, Option<&str>, u32, u32, &str) {
         (self.set.is_some(), self.set.as_deref(), self.line, self.column, &self.path)
     }
 }
 
-/// Shows place, path, fact and hint, without the file's name.
+/// Shows position, path, fact and hint, without the file's name.
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.line > 0 {
@@ -109,31 +109,31 @@ pub mod code {
     codes! {
         /// Bytes that are not UTF-8.
         ENCODING = "encoding";
-        /// Nothing in the file.
+        /// An empty file.
         EMPTY = "empty-file";
-        /// Not JSON with comments and trailing commas.
+        /// Invalid JSON (comments and trailing commas are allowed).
         SYNTAX = "syntax";
-        /// The text ends too early.
+        /// The text ends inside an object, list, string or comment.
         TRUNCATED = "truncated";
-        /// Lists and objects deeper than any graph needs.
+        /// Lists and objects nested too deeply.
         NESTING = "nesting";
-        /// A key that stands twice in an object.
+        /// A key that appears twice in an object.
         DUPLICATE_KEY = "duplicate-key";
-        /// A key that means nothing there.
+        /// A key that is not known there.
         UNKNOWN_KEY = "unknown-key";
-        /// A required key that is not there.
+        /// A required key that is missing.
         MISSING_KEY = "missing-key";
-        /// A text where a number belongs, and the like.
+        /// A value of the wrong JSON type, such as a string for a number.
         WRONG_KIND = "wrong-kind";
-        /// A graph of another format number.
+        /// An unsupported format number.
         FORMAT = "format-number";
-        /// Frames, frame rate or seed that cannot be.
+        /// Invalid frames, frame rate or seed.
         SCENE = "scene";
-        /// An id or name with other characters than ids have.
+        /// An id or name with characters that are not allowed.
         BAD_NAME = "bad-name";
-        /// A control with a name that expressions read as something else.
+        /// A control whose name is reserved in expressions.
         RESERVED_NAME = "reserved-name";
-        /// No such type of node.
+        /// No such node type.
         UNKNOWN_TYPE = "unknown-type";
         /// The type has no such param.
         UNKNOWN_PARAM = "unknown-param";
@@ -145,39 +145,39 @@ pub mod code {
         UNKNOWN_PORT = "unknown-port";
         /// No such control.
         UNKNOWN_CONTROL = "unknown-control";
-        /// A `--set` of what is not there.
+        /// A `--set` of a node or control that does not exist.
         UNKNOWN_SET = "unknown-set";
-        /// A number that is not finite, or too large for what holds it.
+        /// A number that is not finite, or too large for its type.
         NUMBER_SIZE = "number-size";
-        /// A value outside the hard range, or never legal.
+        /// A value outside the hard range, or otherwise not allowed.
         ILLEGAL_VALUE = "illegal-value";
-        /// A word that is none of the options.
+        /// A word that is not one of the options.
         UNKNOWN_WORD = "unknown-word";
-        /// An object that is no form of a param, or is two.
+        /// An object that sets a param in no known form, or in two.
         PARAM_FORM = "param-form";
-        /// A moving value where the param stands still.
+        /// An animated value for a param that cannot be animated.
         NOT_ANIMATED = "not-animated";
-        /// No key at all.
+        /// An empty list of keyframes.
         KEYFRAMES_EMPTY = "keyframes-empty";
-        /// A key before the one above it.
+        /// Keyframes that are not in the order of their frames.
         KEYFRAMES_UNORDERED = "keyframes-unordered";
-        /// Two keys at one frame.
+        /// Two keyframes at one frame.
         KEYFRAMES_DOUBLED = "keyframes-doubled";
-        /// Keys that make no ramp.
+        /// Invalid ramp keys.
         RAMP = "ramp";
-        /// A text that is no expression.
+        /// An invalid expression.
         EXPRESSION = "expression";
         /// A required input without a wire.
         MISSING_INPUT = "missing-input";
-        /// More wires than the input takes.
+        /// More wires than the input accepts.
         TOO_MANY_WIRES = "too-many-wires";
-        /// Nodes that wait for each other.
+        /// Nodes that depend on each other.
         CYCLE = "cycle";
-        /// A wire that lacks what the input needs.
+        /// A wire that lacks the component that the input needs.
         WRONG_COMPONENT = "wrong-component";
-        /// Nothing to cook.
+        /// A graph without outputs.
         NO_OUTPUTS = "no-outputs";
-        /// A file that is not there.
+        /// A file that does not exist.
         FILE_MISSING = "file-missing";
         /// A file that cannot be read.
         FILE_UNREADABLE = "file-unreadable";
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_terminal_shows_file_place_path_fact_and_hint() {
+    fn a_terminal_shows_file_position_path_fact_and_hint() {
         let expected = "graph.json:12:7: nodes.wind.params.amplitude: `amplitude` is -1; expected at least 0";
         assert_eq!(fault().in_file("graph.json"), expected);
         let set = Fault { line: 1, column: 1, set: Some("wind.amplitude".into()), hint: None, ..fault() };
@@ -221,9 +221,9 @@ mod tests {
 
     #[test]
     fn codes_are_kebab_case_and_unique() {
-        for (place, code) in code::ALL.iter().enumerate() {
+        for (index, code) in code::ALL.iter().enumerate() {
             assert!(code.bytes().all(|b| b.is_ascii_lowercase() || b == b'-'), "{code}");
-            assert!(!code::ALL[..place].contains(code), "{code}");
+            assert!(!code::ALL[..index].contains(code), "{code}");
         }
     }
 }

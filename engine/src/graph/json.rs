@@ -1,5 +1,4 @@
-//! JSON with its place: a value, the text it stands in and its path, and the readers that say what was found and what
-//! was expected.
+//! JSON values with their source text and path, and readers whose faults name what was found and what was expected.
 //!
 //! Promise: every number that is read is finite. Limit: whole numbers beyond ±2⁶³ are refused.
 
@@ -13,26 +12,27 @@ use super::fault::{Fault, code};
 use super::text::Text;
 use crate::expr::suggest::nearest;
 
-/// A JSON value, where it stands, and its path.
+/// A JSON value, the text that it is part of, and its path.
 #[derive(Clone)]
 pub(super) struct Json<'a> {
     pub(super) value: &'a Value<'a>,
     pub(super) text: &'a Text<'a>,
-    /// Path of the innermost object or of the outermost list; the items within follow.
+    /// Path without the list indices in `items`.
     base: Rc<str>,
-    /// Places in lists within lists, outermost first. Lists of a million items are read without making a path of each.
+    /// Indices in nested lists, outermost first. They become a path only in a fault, so a list of a million items makes
+    /// no million strings.
     items: [u32; NESTED],
     depth: usize,
 }
 
-/// Lists within lists whose paths are made only when asked for. A vector in a key of keyframes has three.
+/// Depth of nested lists whose indices are kept in `items`. A vector in a keyframe has three.
 const NESTED: usize = 4;
 
 /// A member of an object.
 #[derive(Clone)]
 pub(super) struct Entry<'a> {
     pub(super) name: &'a str,
-    /// Where its name stands.
+    /// Where its name is in the text.
     pub(super) key: Range,
     pub(super) json: Json<'a>,
 }
@@ -42,9 +42,9 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
-/// The path of member `name` of what stands at `path`.
+/// The path of member `name` of the object at `path`.
 pub(super) fn member_path(path: &str, name: &str) -> String {
-    // A dollar sign starts `$schema` and reads well as it is.
+    // `$schema` needs no quotes.
     match (is_name(name.strip_prefix('$').unwrap_or(name)), path.is_empty()) {
         (true, true) => name.to_owned(),
         (true, false) => format!("{path}.{name}"),
@@ -52,19 +52,19 @@ pub(super) fn member_path(path: &str, name: &str) -> String {
     }
 }
 
-/// Whether `name` is made as ids are: `[A-Za-z_][A-Za-z0-9_-]*`.
+/// Whether `name` is a valid id: `[A-Za-z_][A-Za-z0-9_-]*`.
 pub(super) fn is_name(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
 }
 
-/// A user's text as messages show it: short, and without characters that a terminal obeys.
+/// A user's text as messages show it: shortened, and with control characters escaped.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 60;
     let mut short = String::new();
     for c in text.chars().take(LONGEST) {
         match c {
-            // They harm no terminal, and a path or a pattern full of them would be unreadable escaped.
+            // Harmless to a terminal, and escaped they would make paths unreadable.
             '\\' | '"' | '\'' => short.push(c),
             _ => short.extend(c.escape_debug()),
         }
@@ -75,7 +75,7 @@ pub(super) fn shown(text: &str) -> String {
     short
 }
 
-/// `did you mean …?` where a candidate is near, else the list of them where it is short, else nothing.
+/// `did you mean …?` if a candidate is similar, else the candidates if they are few, else `None`.
 pub(super) fn did_you_mean<'n>(
     name: &str,
     candidates: impl IntoIterator<Item = &'n str>,
@@ -88,7 +88,7 @@ pub(super) fn did_you_mean<'n>(
         None if candidates.is_empty() => Some(format!("there are no {what}")),
         None if candidates.len() <= LISTED => {
             let names: Vec<String> = candidates.into_iter().map(shown).collect();
-            Some(format!("{what} are `{}`", names.join("`, `")))
+            Some(format!("{what}: `{}`", names.join("`, `")))
         }
         None => None,
     }
@@ -100,14 +100,14 @@ impl<'a> Entry<'a> {
         self.json.text.fault(self.key.start, &self.json.path(), code, fact)
     }
 
-    /// The entry that a `--set` makes, its place being the value.
+    /// The entry that a `--set` makes; its position is that of the value.
     pub(super) fn of_set(name: &'a str, json: Json<'a>) -> Self {
         Self { name, key: json.value.range(), json }
     }
 }
 
 impl<'a> Json<'a> {
-    /// The value that a whole text holds.
+    /// The root value of a text.
     pub(super) fn root(value: &'a Value<'a>, text: &'a Text<'a>) -> Self {
         Self::with_path(value, text, "")
     }
@@ -118,27 +118,27 @@ impl<'a> Json<'a> {
 
     /// Its path.
     pub(super) fn path(&self) -> String {
-        let items = self.items[..self.depth].iter().map(|place| format!("[{place}]"));
+        let items = self.items[..self.depth].iter().map(|index| format!("[{index}]"));
         std::iter::once(self.base.to_string()).chain(items).collect()
     }
 
-    /// The same value read from elsewhere.
+    /// The same value under another path.
     pub(super) fn at_path(&self, path: &str) -> Self {
         Self::with_path(self.value, self.text, path)
     }
 
-    /// Item `place` of this list.
-    pub(super) fn item(&self, value: &'a Value<'a>, place: usize) -> Self {
+    /// Item `index` of this list.
+    pub(super) fn item(&self, value: &'a Value<'a>, index: usize) -> Self {
         let mut item = match self.depth < NESTED {
             true => Self { value, ..self.clone() },
             false => Self::with_path(value, self.text, &self.path()),
         };
-        item.items[item.depth] = place as u32;
+        item.items[item.depth] = index as u32;
         item.depth += 1;
         item
     }
 
-    /// A fault of this value.
+    /// A fault at the start of this value.
     pub(super) fn fault(&self, code: &'static str, fact: impl Into<String>) -> Fault {
         self.fault_at(self.value.start(), code, fact)
     }
@@ -148,11 +148,11 @@ impl<'a> Json<'a> {
         self.text.fault(offset, &self.path(), code, fact)
     }
 
-    /// The fault of a value of another kind than expected.
+    /// The fault of a value of the wrong type.
     pub(super) fn unexpected(&self, expected: &str) -> Fault {
         let fault = self.fault(code::WRONG_KIND, format!("found {}, expected {expected}", self.found()));
         match self.value {
-            Value::NullKeyword(_) if self.depth == 0 => fault.hint("leave the key out where nothing is to be set"),
+            Value::NullKeyword(_) if self.depth == 0 => fault.hint("instead of `null`, leave the key out"),
             _ => fault,
         }
     }
@@ -160,7 +160,7 @@ impl<'a> Json<'a> {
     /// What this value is, in words.
     fn found(&self) -> String {
         match self.value {
-            Value::StringLit(text) => format!("the text \"{}\"", shown(&text.value)),
+            Value::StringLit(text) => format!("the string \"{}\"", shown(&text.value)),
             Value::NumberLit(number) => format!("the number {}", shown(number.value)),
             Value::BooleanLit(word) => format!("`{}`", word.value),
             Value::NullKeyword(_) => "`null`".into(),
@@ -170,10 +170,10 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The members of an object, each name once.
+    /// The members of an object, without duplicates.
     ///
     /// # Errors
-    /// Where this is no object. A name that stands twice is put to `faults`, and the first counts.
+    /// If this is not an object. A duplicate key is added to `faults`, and its first value is used.
     pub(super) fn members(&self, expected: &str, faults: &mut Vec<Fault>) -> Result<Vec<Entry<'a>>, Fault> {
         let Value::Object(object) = self.value else { return Err(self.unexpected(expected)) };
         let mut firsts: BTreeMap<&str, usize> = BTreeMap::new();
@@ -185,8 +185,8 @@ impl<'a> Json<'a> {
             let entry = Entry { name, key, json };
             match firsts.get(name) {
                 Some(first) => {
-                    let line = self.text.place(*first).line;
-                    let fact = format!("`{}` stands here a second time, the first is on line {line}", shown(name));
+                    let line = self.text.position(*first).line;
+                    let fact = format!("duplicate key `{}`, first set on line {line}", shown(name));
                     faults.push(entry.fault(code::DUPLICATE_KEY, fact).hint("keep one of them"));
                 }
                 None => {
@@ -203,7 +203,7 @@ impl<'a> Json<'a> {
         matches!(self.value, Value::Object(_))
     }
 
-    /// The values of a list.
+    /// The values of a list; `None` for anything else.
     pub(super) fn elements(&self) -> Option<&'a [Value<'a>]> {
         match self.value {
             Value::Array(list) => Some(&list.elements),
@@ -211,7 +211,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The text of a string.
+    /// The content of a string; `None` for anything else.
     pub(super) fn string(&self) -> Option<&'a str> {
         match self.value {
             Value::StringLit(text) => Some(&text.value),
@@ -231,7 +231,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// A whole number; 3.0 is one.
+    /// A whole number; 3.0 counts as one.
     pub(super) fn whole(&self, expected: &str) -> Result<i64, Fault> {
         let x = self.number(expected)?;
         let Value::NumberLit(number) = self.value else { return Err(self.unexpected(expected)) };
@@ -252,7 +252,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The byte of the text at which character `skip` of this string stands, escapes counted as what they stand for.
+    /// The byte offset in the text of character `skip` of this string; an escape sequence counts as one character.
     pub(super) fn offset_in_string(&self, skip: usize) -> usize {
         let range = self.value.range();
         let inner = &self.text.content[range.start + 1..range.end.saturating_sub(1).max(range.start + 1)];
@@ -270,7 +270,7 @@ impl<'a> Json<'a> {
     }
 }
 
-/// The whole number that a JSON number is, digit by digit: `300`, `300.0`, `3e2`, `1e18`.
+/// The exact value of a JSON number that is whole: `300`, `300.0`, `3e2`, `1e18`.
 fn exact_whole(text: &str) -> Option<i64> {
     let (plain, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let (whole, fraction) = plain.split_once('.').unwrap_or((plain, ""));
@@ -286,32 +286,32 @@ fn exact_whole(text: &str) -> Option<i64> {
     }
 }
 
-/// Puts a fault for every entry whose name is none of `known`; `what` names the known ones: `keys of a node`.
+/// Adds a fault for every entry whose name is not in `known`; `what` describes those: `keys of a node`.
 pub(super) fn refuse_unknown(entries: &[Entry<'_>], known: &[&str], what: &str, faults: &mut Vec<Fault>) {
     for entry in entries.iter().filter(|entry| !known.contains(&entry.name)) {
-        let fact = format!("the key `{}` means nothing here", shown(entry.name));
+        let fact = format!("unknown key `{}`", shown(entry.name));
         let hint = did_you_mean(entry.name, known.iter().copied(), what);
         faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_KEY, fact) });
     }
 }
 
-/// Whether a key that is not known is most likely meant to be `key`, so that there is no need to say that it is missing.
+/// Whether one of the unknown keys is probably a misspelling of `key`, so that `key` need not be reported as missing.
 pub(super) fn is_misspelt<'k>(entries: &[Entry<'_>], known: impl Iterator<Item = &'k str> + Clone, key: &str) -> bool {
     let unknown = entries.iter().filter(|entry| !known.clone().any(|known| known == entry.name));
     unknown.into_iter().any(|entry| nearest(entry.name, known.clone()) == Some(key))
 }
 
-/// The value of the entry of that name.
+/// The entry with that name.
 pub(super) fn find<'e, 'a>(entries: &'e [Entry<'a>], name: &str) -> Option<&'e Entry<'a>> {
     entries.iter().find(|entry| entry.name == name)
 }
 
-/// The index of a text among `words`; `what` says what they are in the fault of a text that is not among them.
+/// The index of a string among `words`; `what` describes them in the fault of a string that is not among them.
 pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize, Fault> {
     let listed = || words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
     let Some(word) = json.string() else { return Err(json.unexpected(&format!("one of {}", listed()))) };
     words.iter().position(|known| *known == word).ok_or_else(|| {
-        let fault = json.fault(code::UNKNOWN_WORD, format!("there is no {what} \"{}\"", shown(word)));
+        let fault = json.fault(code::UNKNOWN_WORD, format!("unknown {what} \"{}\"", shown(word)));
         match nearest(word, words.iter().copied()) {
             Some(near) => fault.hint(format!("did you mean \"{near}\"?")),
             None => fault.hint(format!("expected one of {}", listed())),
@@ -319,7 +319,7 @@ pub(super) fn word(json: &Json<'_>, what: &str, words: &[&str]) -> Result<usize,
     })
 }
 
-/// Keeps what was read, or records its fault.
+/// The value that was read; a fault is recorded in `faults`.
 pub(super) fn keep<T>(read: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     read.map_err(|fault| faults.push(fault)).ok()
 }
@@ -329,7 +329,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_numbers_are_exact_however_they_are_written() {
+    fn whole_numbers_are_exact_in_every_notation() {
         let wholes = ["3", "-3.0", "3e2", "1.5E1", "1e18", "9.223372036854775807e18", "30e-1", "0e99999", "-0"];
         let expected = [3, -3, 300, 15, 1_000_000_000_000_000_000, i64::MAX, 3, 0, 0];
         assert_eq!(wholes.map(exact_whole), expected.map(Some));
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shown_is_readable_and_harmless() {
+    fn shown_text_is_readable_and_has_no_control_characters() {
         assert_eq!(shown(r#"C:\fur\"a"'s.obj"#), r#"C:\fur\"a"'s.obj"#);
         assert_eq!(shown("\u{1b}[2J\n\u{202e}"), r"\u{1b}[2J\n\u{202e}");
     }

@@ -1,11 +1,11 @@
-//! Graphs: nodes of a catalogue, wired and with their params set, and what is to come out.
+//! Graphs: nodes of a catalogue with their params and wires, and the outputs to write.
 
 mod catalogue;
 mod dag;
 pub mod fault;
 mod json;
 mod load;
-mod places;
+mod positions;
 mod schema;
 mod syntax;
 mod text;
@@ -23,21 +23,21 @@ pub use catalogue::Catalogue;
 pub(crate) use dag::Dag;
 pub use fault::{Fault, FaultClass};
 pub use load::{FileProbe, probe};
-pub use places::{Part, Places};
+pub use positions::{Part, Positions};
 pub use schema::schema;
 
-/// What holds for the whole graph.
+/// Settings of the whole graph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// First frame.
     pub first: i64,
-    /// Last frame, itself included.
+    /// Last frame, inclusive.
     pub last: i64,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// Mixed into every node's seed.
     pub seed: i64,
-    /// Where positions are relative to, metres.
+    /// The point that positions are relative to, in metres.
     pub origin: [f64; 3],
 }
 
@@ -48,7 +48,7 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// What expressions know of it.
+    /// What expressions read of the scene.
     pub fn clock(&self) -> Clock {
         Clock { fps: self.fps, seed: self.seed }
     }
@@ -67,9 +67,9 @@ impl Scene {
 /// One end of a wire: an output of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Link {
-    /// Place of the node in [`Graph::nodes`].
+    /// Index of the node in [`Graph::nodes`].
     pub node: usize,
-    /// Place of the output in the node's declaration.
+    /// Index of the output in the node's declaration.
     pub port: usize,
 }
 
@@ -87,11 +87,11 @@ pub enum Body {
         /// Wires of each input.
         inputs: Vec<Vec<Link>>,
     },
-    /// Geometry given by the program that holds the graph, a function of the frame. One output.
+    /// Geometry supplied by the calling program as a function of the frame. One output.
     Given {
         /// The function.
         at: Arc<dyn Fn(Frame) -> Geometry + Send + Sync>,
-        /// Whether it changes with the frame.
+        /// Whether the geometry changes with the frame.
         moves: bool,
     },
 }
@@ -105,36 +105,37 @@ pub struct GraphNode {
     pub body: Body,
 }
 
-/// Something that is to come out.
+/// An output to write.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraphOutput {
-    /// Its name, and its file's.
+    /// Its name, which is also the name of its file.
     pub name: Name,
-    /// Where it comes from.
+    /// The node output that is written.
     pub from: Link,
-    /// The attributes to write; all where `None`.
+    /// The attributes to write; `None` for all.
     pub attributes: Option<Vec<Name>>,
-    /// Whether velocities are to be written.
+    /// Whether to write velocities.
     pub v: bool,
 }
 
-/// A graph that was checked: ids and names are unique, wires fit and make no cycle, params are in range.
+/// A checked graph: ids and names are unique, wires connect compatible ports without a cycle, params are in range.
 #[derive(Clone, Default)]
 pub struct Graph {
-    /// What holds for the whole.
+    /// Settings of the whole graph.
     pub scene: Scene,
-    /// The nodes, each after all it is wired to.
+    /// The nodes, each after all nodes that it reads.
     pub nodes: Vec<GraphNode>,
-    /// What is to come out, in the order of the file.
+    /// The outputs to write, in the order of the file.
     pub outputs: Vec<GraphOutput>,
-    /// The folder that relative paths start from.
+    /// The folder that relative paths are resolved against.
     pub folder: PathBuf,
-    /// Where its parts stand in the file.
-    pub places: Places,
+    /// Line and column of its parts in the graph file.
+    pub positions: Positions,
 }
 
 impl Graph {
-    /// The files the nodes read at some frames, as the params name them; numbered ones at the whole frames.
+    /// The files that the nodes read at `frames`. A numbered file is listed for the whole frame at or before each
+    /// frame.
     pub fn files(&self, frames: &[Frame]) -> Vec<PathBuf> {
         let mut files = Vec::new();
         for node in &self.nodes {
@@ -152,15 +153,15 @@ impl Graph {
         files
     }
 
-    /// The components that come out at an output of a node, as its declaration says; nothing of given geometry.
+    /// The components that a node's output carries, according to its declaration; empty for [`Body::Given`].
     pub fn carries(&self, link: Link) -> Vec<Kind> {
         let mut carried: Vec<Vec<Vec<Kind>>> = Vec::with_capacity(link.node + 1);
         for node in &self.nodes[..=link.node] {
             let outputs = node.node().map_or(&[][..], |declared| declared.outputs);
             let of_input = |name: &str| {
                 let inputs = node.node().map_or(&[][..], |declared| declared.inputs);
-                let place = inputs.iter().position(|input| input.spec().name == name);
-                let links = place.map_or(&[][..], |place| &node.inputs()[place]);
+                let index = inputs.iter().position(|input| input.spec().name == name);
+                let links = index.map_or(&[][..], |index| &node.inputs()[index]);
                 let mut kinds: Vec<Kind> =
                     links.iter().flat_map(|link| carried[link.node][link.port].clone()).collect();
                 kinds.sort_unstable();
@@ -182,7 +183,7 @@ impl Graph {
 }
 
 impl GraphNode {
-    /// The declaration, where there is one.
+    /// The declaration of the node type; `None` for [`Body::Given`].
     pub fn node(&self) -> Option<&'static Node> {
         match &self.body {
             Body::Node { node, .. } => Some(node),
@@ -198,7 +199,7 @@ impl GraphNode {
         }
     }
 
-    /// The type's name; `given` where the program gives the geometry.
+    /// The name of the node type; `given` for [`Body::Given`].
     pub fn type_name(&self) -> &'static str {
         self.node().map_or("given", |node| node.name)
     }

@@ -1,7 +1,7 @@
-//! From a text to JSON: comments and trailing commas are read, nothing else of JSON5.
+//! Parses JSON. Comments and trailing commas are allowed, other extensions of JSON5 are not.
 //!
-//! Promise: any text gives a value or the first fault in it, with its place; no depth of nesting overflows the stack.
-//! Limit: lists and objects nest [`DEEPEST`] deep at most; after a fault of syntax nothing further is looked for.
+//! Promise: any text gives a value or its first fault with a position; deep nesting does not overflow the stack.
+//! Limit: lists and objects nest at most [`DEEPEST`] deep, and only the first syntax fault is reported.
 
 use jsonc_parser::ast::Value;
 use jsonc_parser::errors::{ParseError, ParseErrorKind};
@@ -14,7 +14,7 @@ use super::text::Text;
 /// Deepest nesting of lists and objects. A graph needs eight.
 pub(super) const DEEPEST: usize = 64;
 
-/// What other languages call numbers that are not finite.
+/// Spellings of non-finite numbers in other languages.
 const NOT_FINITE: [&str; 5] = ["NaN", "nan", "Infinity", "inf", "Inf"];
 
 const STRICT: ParseOptions = ParseOptions {
@@ -30,27 +30,28 @@ const STRICT: ParseOptions = ParseOptions {
     allow_extended_string_escapes: false,
 };
 
-/// The value that a text holds.
+/// Parses a text.
 ///
 /// # Errors
-/// The first fault of its syntax.
+/// The first syntax fault.
 pub(super) fn parse<'a>(text: &'a Text<'_>) -> Result<Value<'a>, Fault> {
     let end = brackets(text)?;
     let parsed = parse_to_ast(text.content, &CollectOptions::default(), &STRICT);
     match (parsed, end) {
-        (Ok(parsed), _) => parsed.value.ok_or_else(|| nothing(text)),
+        (Ok(parsed), _) => parsed.value.ok_or_else(|| empty(text)),
         (Err(error), Some(end)) if ends_early(text, &error) => Err(end),
         (Err(error), _) => Err(explain(text, &error)),
     }
 }
 
-/// Whether the parser missed only the rest of the text: what it stumbles over before the end is a cause of its own.
+/// Whether the error is that the text ends too early. An error before the end has another cause, which is reported
+/// instead.
 fn ends_early(text: &Text<'_>, error: &ParseError) -> bool {
     matches!(error.kind(), ParseErrorKind::UnterminatedArray | ParseErrorKind::UnterminatedObject)
         || error.range().start >= text.content.trim_end().len()
 }
 
-fn nothing(text: &Text<'_>) -> Fault {
+fn empty(text: &Text<'_>) -> Fault {
     let fault = text.fault(0, "", code::EMPTY, format!("{} is empty", text.noun()));
     match text.set {
         Some(key) => fault.hint(format!("write `{0}=` and the value, such as `{0}=1`", shown(key))),
@@ -58,8 +59,8 @@ fn nothing(text: &Text<'_>) -> Fault {
     }
 }
 
-/// Walks brackets, texts and comments without a stack of calls: the fault of what nests too deep or never ends, or, as
-/// the value, the fault of brackets that are still open at the end.
+/// Checks brackets, strings and comments without recursion. The error is the fault of nesting that is too deep or of a
+/// string or comment that does not end; the value is the fault of a bracket that is still open at the end.
 fn brackets(text: &Text<'_>) -> Result<Option<Fault>, Fault> {
     let bytes = text.content.as_bytes();
     let syntax = |at: usize, fact: &str| text.fault(at, "", code::SYNTAX, fact);
@@ -68,17 +69,17 @@ fn brackets(text: &Text<'_>) -> Result<Option<Fault>, Fault> {
     while let Some(&byte) = bytes.get(at) {
         match (byte, bytes.get(at + 1)) {
             (b'{' | b'[', _) if open.len() == DEEPEST => {
-                let fact = format!("lists and objects are more than {DEEPEST} deep");
+                let fact = format!("lists and objects are nested more than {DEEPEST} deep");
                 return Err(text.fault(at, "", code::NESTING, fact).hint("a graph needs fewer than ten levels"));
             }
             (b'{' | b'[', _) => open.push(at),
             (b'}' | b']', _) => match open.pop() {
                 // `]` is `[` + 2, `}` is `{` + 2.
                 Some(start) if bytes[start] + 2 != byte => {
-                    let place = text.place(start);
+                    let opened = text.position(start);
                     let fact = format!(
                         "`{}` closes the `{}` of line {}, column {}",
-                        byte as char, bytes[start] as char, place.line, place.column
+                        byte as char, bytes[start] as char, opened.line, opened.column
                     );
                     return Err(syntax(at, &fact).hint(format!("expected `{}`", (bytes[start] + 2) as char)));
                 }
@@ -87,13 +88,15 @@ fn brackets(text: &Text<'_>) -> Result<Option<Fault>, Fault> {
             (b'"', _) => match string_end(bytes, at) {
                 Ok(end) => at = end,
                 Err(Unclosed::Line) => {
-                    let fault = syntax(at, "the text that opens here does not close on its line");
-                    return Err(fault.hint(r#"close it with `"`; a line break in a text is written `\n`"#));
+                    let fault = syntax(at, "the string that starts here does not end on its line");
+                    return Err(fault.hint(r#"end it with `"`; a line break in a string is written `\n`"#));
                 }
-                Err(Unclosed::File) => return Err(truncated(text, "text", at)),
-                Err(Unclosed::Control(place)) => {
-                    let fault = syntax(place, &format!("a text holds the control character {:#04x}", bytes[place]));
-                    return Err(fault.hint(r"a tab is written `\t`, others `\u0000` with their number"));
+                Err(Unclosed::File) => return Err(truncated(text, "string", at)),
+                Err(Unclosed::Control(at)) => {
+                    let fault = syntax(at, &format!("a string contains the control character {:#04x}", bytes[at]));
+                    return Err(fault.hint(
+                        r"write a tab as `\t` and other control characters as `\u` with four hexadecimal digits",
+                    ));
                 }
             },
             (b'/', Some(b'/')) => {
@@ -116,14 +119,14 @@ enum Unclosed {
     Control(usize),
 }
 
-/// The byte of the quote that ends the text whose opening quote is at `start`.
+/// The offset of the quote that ends the string whose opening quote is at `start`.
 fn string_end(bytes: &[u8], start: usize) -> Result<usize, Unclosed> {
     let mut at = start + 1;
     loop {
         match bytes.get(at) {
             None => return Err(Unclosed::File),
             Some(b'"') => return Ok(at),
-            // A quote after a backslash does not end the text; what else may follow is the parser's to judge.
+            // An escaped quote does not end the string; other escapes are checked by the parser.
             Some(b'\\') if matches!(bytes.get(at + 1), Some(b'"' | b'\\')) => at += 2,
             Some(b'\n' | b'\r') => return Err(Unclosed::Line),
             Some(0..0x20) => return Err(Unclosed::Control(at)),
@@ -132,15 +135,15 @@ fn string_end(bytes: &[u8], start: usize) -> Result<usize, Unclosed> {
     }
 }
 
-/// The fault of a text that ends inside what opened at `start`.
+/// The fault of a text that ends inside the `what` that starts at `start`.
 fn truncated(text: &Text<'_>, what: &str, start: usize) -> Fault {
-    let place = text.place(start);
+    let opened = text.position(start);
     let fact =
-        format!("{} ends inside the {what} that opens on line {}, column {}", text.noun(), place.line, place.column);
+        format!("{} ends inside the {what} that starts at line {}, column {}", text.noun(), opened.line, opened.column);
     text.fault(text.content.trim_end().len(), "", code::TRUNCATED, fact).hint("is the rest missing?")
 }
 
-/// What the parser stumbled over, in our words.
+/// The parser's error as a fault in our words.
 fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
     use ParseErrorKind as K;
     let start = error.range().start;
@@ -149,19 +152,19 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
     let is_word = matches!(error.kind(), K::UnexpectedWord | K::UnexpectedToken) && !word.is_empty();
     let (fact, hint): (String, Option<&str>) = match error.kind() {
         _ if NOT_FINITE.contains(&word.trim_start_matches(['-', '+'])) => {
-            (format!("`{word}` is no number that a graph can hold"), Some("expected a finite number"))
+            (format!("`{word}` is not allowed"), Some("numbers must be finite"))
         }
-        _ if is_word => (format!("found `{word}`, expected a value"), Some(r#"a text stands between `"`"#)),
+        _ if is_word => (format!("found `{word}`, expected a value"), Some(r#"write strings in double quotes"#)),
         K::SingleQuotedStringsNotAllowed => {
-            ("found `'`, expected a value or a key".into(), Some(r#"a text stands between `"`"#))
+            ("found `'`, expected a value or a key".into(), Some(r#"write strings in double quotes"#))
         }
         K::ExpectedStringObjectProperty => {
-            (format!("the key `{word}` has no quotes"), Some(r#"keys stand between `"`"#))
+            (format!("the key `{word}` has no quotes"), Some(r#"write keys in double quotes"#))
         }
         K::ExpectedColonAfterObjectKey => ("expected `:` after the key".into(), None),
         K::ExpectedObjectValue => ("expected a value after `:`".into(), None),
         K::ExpectedComma if rest.starts_with(|c: char| c.is_ascii_digit()) => {
-            ("a number has a leading zero".into(), Some("write it without the zero"))
+            ("a number has a leading zero".into(), Some("leave the zero out"))
         }
         K::ExpectedComma => ("expected `,`".into(), None),
         K::UnexpectedTokenInObject => match rest.chars().next() {
@@ -169,15 +172,15 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
             _ => ("expected `,`, a key or `}`".into(), None),
         },
         K::MultipleRootJsonValues => {
-            (format!("{} goes on after its value has ended", text.noun()), Some("is there a bracket too many?"))
+            (format!("{} continues after the end of its value", text.noun()), Some("is there one bracket too many?"))
         }
         K::HexadecimalNumbersNotAllowed => (format!("`{word}` is hexadecimal"), Some("numbers are decimal")),
-        K::UnaryPlusNumbersNotAllowed => ("a number starts with `+`".into(), Some("write it without")),
+        K::UnaryPlusNumbersNotAllowed => ("a number starts with `+`".into(), Some("leave the `+` out")),
         K::BareDecimalPointNumbersNotAllowed => {
-            ("a number has no digit on one side of its point".into(), Some("write 0.5 and 5.0, not .5 and 5."))
+            ("a number has no digit before or after its decimal point".into(), Some("write 0.5 and 5.0, not .5 and 5."))
         }
         K::ExpectedDigit | K::ExpectedDigitFollowingNegativeSign | K::ExpectedPlusMinusOrDigitInNumberLiteral => {
-            ("a number is not complete, expected a digit".into(), None)
+            ("a number is incomplete, expected a digit".into(), None)
         }
         K::String(kind) => (string_fact(kind).into(), Some(r#"`\` itself is written `\\`"#)),
         K::UnexpectedCloseBrace => ("found `}`, expected a value".into(), None),
@@ -188,9 +191,8 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
     };
     let fault = text.fault(start, "", code::SYNTAX, fact);
     match text.set {
-        Some(key) if is_word => {
-            fault.hint(format!(r#"a text needs quotes that the shell leaves: '{}="{word}"'"#, shown(key)))
-        }
+        Some(key) if is_word => fault
+            .hint(format!(r#"a string needs double quotes that the shell must not remove: '{}="{word}"'"#, shown(key))),
         _ => Fault { hint: hint.map(Into::into), ..fault },
     }
 }
@@ -198,13 +200,13 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
 fn string_fact(kind: &ParseStringErrorKind) -> &'static str {
     match kind {
         ParseStringErrorKind::ExpectedFourHexDigits => r"expected four hexadecimal digits after `\u`",
-        ParseStringErrorKind::InvalidUnicodeEscapeSequence(_) => r"a `\u` is half of a surrogate pair",
-        ParseStringErrorKind::UnterminatedStringLiteral => "a text is not closed",
-        _ => r#"a text has a `\` that starts nothing known"#,
+        ParseStringErrorKind::InvalidUnicodeEscapeSequence(_) => r"a `\u` escape is half of a surrogate pair",
+        ParseStringErrorKind::UnterminatedStringLiteral => "a string is not closed",
+        _ => r#"a string has an unknown `\` escape"#,
     }
 }
 
-/// The word at the start of `rest`, as far as it is worth showing, and without characters that a terminal obeys.
+/// The word at the start of `rest`, shortened, and with control characters escaped.
 fn word(rest: &str) -> String {
     let word = rest.chars().take_while(|c| !c.is_whitespace() && !r#"{}[],:"'/"#.contains(*c));
     word.take(40).flat_map(char::escape_debug).collect()
@@ -224,28 +226,28 @@ mod tests {
     }
 
     #[test]
-    fn nothing_else_of_json5_is_read() {
+    fn other_extensions_of_json5_are_refused() {
         for (content, expected) in [
-            ("{a: 1}", "1:2: the key `a` has no quotes; keys stand between `\"`"),
-            ("['a']", "1:2: found `'`, expected a value or a key; a text stands between `\"`"),
+            ("{a: 1}", "1:2: the key `a` has no quotes; write keys in double quotes"),
+            ("['a']", "1:2: found `'`, expected a value or a key; write strings in double quotes"),
             ("[0x10]", "1:2: `0x10` is hexadecimal; numbers are decimal"),
-            ("[+1]", "1:2: a number starts with `+`; write it without"),
-            ("[.5]", "1:2: a number has no digit on one side of its point; write 0.5 and 5.0, not .5 and 5."),
-            ("[5.]", "1:2: a number has no digit on one side of its point; write 0.5 and 5.0, not .5 and 5."),
-            ("[01]", "1:3: a number has a leading zero; write it without the zero"),
+            ("[+1]", "1:2: a number starts with `+`; leave the `+` out"),
+            ("[.5]", "1:2: a number has no digit before or after its decimal point; write 0.5 and 5.0, not .5 and 5."),
+            ("[5.]", "1:2: a number has no digit before or after its decimal point; write 0.5 and 5.0, not .5 and 5."),
+            ("[01]", "1:3: a number has a leading zero; leave the zero out"),
             ("[1 2]", "1:3: expected `,`"),
-            ("[NaN]", "1:2: `NaN` is no number that a graph can hold; expected a finite number"),
-            ("[a\0b\u{1b}]", r#"1:2: found `a\0b\u{1b}`, expected a value; a text stands between `"`"#),
-            ("[-Infinity]", "1:2: `-Infinity` is no number that a graph can hold; expected a finite number"),
-            (r#"["\x41"]"#, r"1:3: a text has a `\` that starts nothing known; `\` itself is written `\\`"),
-            (r#"["\ud800"]"#, r"1:3: a `\u` is half of a surrogate pair; `\` itself is written `\\`"),
+            ("[NaN]", "1:2: `NaN` is not allowed; numbers must be finite"),
+            ("[a\0b\u{1b}]", r#"1:2: found `a\0b\u{1b}`, expected a value; write strings in double quotes"#),
+            ("[-Infinity]", "1:2: `-Infinity` is not allowed; numbers must be finite"),
+            (r#"["\x41"]"#, r"1:3: a string has an unknown `\` escape; `\` itself is written `\\`"),
+            (r#"["\ud800"]"#, r"1:3: a `\u` escape is half of a surrogate pair; `\` itself is written `\\`"),
             (
                 "[\"a\nb\"]",
-                r#"1:2: the text that opens here does not close on its line; close it with `"`; a line break in a text is written `\n`"#,
+                r#"1:2: the string that starts here does not end on its line; end it with `"`; a line break in a string is written `\n`"#,
             ),
             (
                 "[\"a\tb\"]",
-                r"1:4: a text holds the control character 0x09; a tab is written `\t`, others `\u0000` with their number",
+                r"1:4: a string contains the control character 0x09; write a tab as `\t` and other control characters as `\u` with four hexadecimal digits",
             ),
         ] {
             assert_eq!(fault(content), expected);
@@ -253,31 +255,31 @@ mod tests {
     }
 
     #[test]
-    fn what_ends_too_early_says_what_was_open() {
+    fn a_truncated_text_names_what_was_open() {
         let ends = |what: &str| format!("the file ends inside the {what}; is the rest missing?");
-        assert_eq!(fault("{\n  \"a\": [1,\n"), format!("2:11: {}", ends("list that opens on line 2, column 8")));
-        assert_eq!(fault("{\"a\""), format!("1:5: {}", ends("object that opens on line 1, column 1")));
-        assert_eq!(fault("{\"a"), format!("1:4: {}", ends("text that opens on line 1, column 2")));
-        assert_eq!(fault("{ /* "), format!("1:5: {}", ends("comment that opens on line 1, column 3")));
+        assert_eq!(fault("{\n  \"a\": [1,\n"), format!("2:11: {}", ends("list that starts at line 2, column 8")));
+        assert_eq!(fault("{\"a\""), format!("1:5: {}", ends("object that starts at line 1, column 1")));
+        assert_eq!(fault("{\"a"), format!("1:4: {}", ends("string that starts at line 1, column 2")));
+        assert_eq!(fault("{ /* "), format!("1:5: {}", ends("comment that starts at line 1, column 3")));
         assert_eq!(fault("{\"a\": 1]"), "1:8: `]` closes the `{` of line 1, column 1; expected `}`");
-        assert_eq!(fault("{}}"), "1:3: the file goes on after its value has ended; is there a bracket too many?");
+        assert_eq!(fault("{}}"), "1:3: the file continues after the end of its value; is there one bracket too many?");
     }
 
     #[test]
-    fn any_depth_is_answered_without_a_stack() {
+    fn deep_nesting_does_not_overflow_the_stack() {
         let deep = |depth: usize| "[".repeat(depth) + &"]".repeat(depth);
         assert!(parse(&Text::new(&deep(DEEPEST), None)).is_ok());
-        let expected = "1:65: lists and objects are more than 64 deep; a graph needs fewer than ten levels";
+        let expected = "1:65: lists and objects are nested more than 64 deep; a graph needs fewer than ten levels";
         assert_eq!(fault(&deep(DEEPEST + 1)), expected);
         assert_eq!(fault(&deep(100_000)), expected);
         assert_eq!(
             fault(&"{\"a\":".repeat(100_000)),
-            "1:321: lists and objects are more than 64 deep; a graph needs fewer than ten levels"
+            "1:321: lists and objects are nested more than 64 deep; a graph needs fewer than ten levels"
         );
     }
 
     #[test]
-    fn an_empty_text_is_said_to_be_empty() {
+    fn an_empty_text_is_reported_as_empty() {
         for content in ["", " \n", "// nothing\n"] {
             assert!(fault(content).contains("the file is empty"), "{content:?}");
         }

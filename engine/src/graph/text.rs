@@ -1,12 +1,13 @@
-//! Texts that JSON is read from, and the places in them.
+//! Source texts of JSON, and the conversion of byte offsets to lines and columns.
 //!
-//! Promise: a place costs about the same wherever it is, in a file of one line too. Lines end at `\n`, `\r\n` or `\r`.
+//! Promise: finding a position takes about the same time anywhere in a file, also if it is one long line. Lines end
+//! at `\n`, `\r\n` or `\r`.
 
 use super::fault::{Fault, FaultClass, code};
 
-/// A place in a text: line and column in characters, both from 1.
+/// A position in a text: line, and column in characters, both from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct Position {
     pub(super) line: u32,
     pub(super) column: u32,
 }
@@ -16,32 +17,32 @@ pub(super) struct Text<'a> {
     pub(super) content: &'a str,
     /// The key of the `--set`.
     pub(super) set: Option<&'a str>,
-    /// Places of known bytes, rising.
-    marks: Vec<(usize, Place)>,
+    /// Byte offsets about [`STRIDE`] apart with their positions, ascending.
+    marks: Vec<(usize, Position)>,
 }
 
-/// Bytes between marks: few enough to walk, many enough to keep the table small.
+/// Bytes between marks: few enough to scan quickly, many enough to keep the table small.
 const STRIDE: usize = 512;
 
 impl<'a> Text<'a> {
     pub(super) fn new(content: &'a str, set: Option<&'a str>) -> Self {
         let mut marks = Vec::with_capacity(content.len() / STRIDE + 1);
         let mut next = 0;
-        for (offset, place) in places(content, Place { line: 1, column: 1 }) {
+        for (offset, position) in positions(content, Position { line: 1, column: 1 }) {
             if offset >= next {
-                marks.push((offset, place));
+                marks.push((offset, position));
                 next = offset + STRIDE;
             }
         }
         Self { content, set, marks }
     }
 
-    /// The place of the character that starts at byte `offset`, or of the end.
-    pub(super) fn place(&self, offset: usize) -> Place {
+    /// The position of the character that starts at byte `offset`, or of the end of the text.
+    pub(super) fn position(&self, offset: usize) -> Position {
         let mark = self.marks.partition_point(|(at, _)| *at <= offset).saturating_sub(1);
-        let (start, place) = self.marks[mark];
-        let walked = places(&self.content[start..], place);
-        walked.take_while(|(at, _)| start + at <= offset).last().map_or(place, |(_, place)| place)
+        let (start, position) = self.marks[mark];
+        let walked = positions(&self.content[start..], position);
+        walked.take_while(|(at, _)| start + at <= offset).last().map_or(position, |(_, position)| position)
     }
 
     /// What this text is called in messages.
@@ -51,7 +52,7 @@ impl<'a> Text<'a> {
 
     /// A fault at byte `offset`.
     pub(super) fn fault(&self, offset: usize, path: &str, code: &'static str, fact: impl Into<String>) -> Fault {
-        let Place { line, column } = self.place(offset);
+        let Position { line, column } = self.position(offset);
         Fault {
             code,
             line,
@@ -65,23 +66,23 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Byte and place of every character, and of the end.
-fn places(content: &str, start: Place) -> impl Iterator<Item = (usize, Place)> {
-    let mut place = start;
+/// Byte offset and position of every character and of the end.
+fn positions(content: &str, start: Position) -> impl Iterator<Item = (usize, Position)> {
+    let mut position = start;
     let end = std::iter::once((content.len(), '\0'));
     content.char_indices().chain(end).map(move |(offset, c)| {
-        let here = place;
+        let here = position;
         let ends_line = c == '\n' || c == '\r' && content.as_bytes().get(offset + 1) != Some(&b'\n');
-        place = match ends_line {
-            true => Place { line: place.line + 1, column: 1 },
-            false => Place { line: place.line, column: place.column + 1 },
+        position = match ends_line {
+            true => Position { line: position.line + 1, column: 1 },
+            false => Position { line: position.line, column: position.column + 1 },
         };
         (offset, here)
     })
 }
 
-/// How files begin that are packed, and what they are called.
-const PACKED: [(&[u8], &str); 5] = [
+/// First bytes of compressed files, and the names of their formats.
+const COMPRESSED: [(&[u8], &str); 5] = [
     (b"\x1f\x8b", "gzip"),
     (b"PK\x03\x04", "zip"),
     (b"\x28\xb5\x2f\xfd", "zstd"),
@@ -89,18 +90,18 @@ const PACKED: [(&[u8], &str); 5] = [
     (b"BZh", "bzip2"),
 ];
 
-/// The text of a file's bytes: UTF-8, a byte order mark before it is left out.
+/// Decodes a file: UTF-8, with or without a byte order mark, which is removed.
 ///
 /// # Errors
-/// Where the bytes are something else.
+/// If the bytes are not UTF-8.
 pub(super) fn decode(bytes: &[u8]) -> Result<&str, Fault> {
     let whole = |fact: &str| Text::new("", None).fault(0, "", code::ENCODING, fact).hint("save it as UTF-8");
-    if let Some((_, name)) = PACKED.iter().find(|(start, _)| bytes.starts_with(start)) {
-        let fact = format!("the file looks like {name}, expected a text");
-        return Err(Text::new("", None).fault(0, "", code::ENCODING, fact).hint("unpack it first"));
+    if let Some((_, name)) = COMPRESSED.iter().find(|(start, _)| bytes.starts_with(start)) {
+        let fact = format!("the file looks like {name}, expected a text file");
+        return Err(Text::new("", None).fault(0, "", code::ENCODING, fact).hint("decompress it first"));
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    // In UTF-16, either way round, one of the first two bytes of `{` or a blank is zero.
+    // In UTF-16 of either byte order, one of the first two bytes of `{` or a blank is zero.
     if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, _, ..] | [_, 0, ..]) {
         return Err(whole("the file is UTF-16 or binary, expected UTF-8"));
     }
@@ -117,31 +118,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_count_lines_and_characters_whatever_ends_a_line() {
+    fn positions_count_lines_and_characters_with_any_line_ending() {
         let text = Text::new("aé\nb\r\nc\rd", None);
-        let at = |offset| (text.place(offset).line, text.place(offset).column);
+        let at = |offset| (text.position(offset).line, text.position(offset).column);
         assert_eq!((at(0), at(1), at(3), at(4)), ((1, 1), (1, 2), (1, 3), (2, 1)));
         assert_eq!((at(7), at(9), at(10)), ((3, 1), (4, 1), (4, 2)));
     }
 
     #[test]
-    fn places_far_into_a_long_line_agree_with_counting() {
+    fn positions_in_a_long_line_are_exact() {
         let content = "é".repeat(5_000) + "\n" + &"x".repeat(3_000);
         let text = Text::new(&content, None);
-        assert_eq!(text.place(9_000), Place { line: 1, column: 4_501 });
-        assert_eq!(text.place(10_001 + 2_999), Place { line: 2, column: 3_000 });
-        assert_eq!(text.place(content.len()), Place { line: 2, column: 3_001 });
+        assert_eq!(text.position(9_000), Position { line: 1, column: 4_501 });
+        assert_eq!(text.position(10_001 + 2_999), Position { line: 2, column: 3_000 });
+        assert_eq!(text.position(content.len()), Position { line: 2, column: 3_001 });
     }
 
     #[test]
-    fn packed_files_are_called_by_their_name() {
+    fn compressed_files_are_recognised() {
         let fault = decode(b"\x1f\x8b\x08\0\0\0\0\0").unwrap_err();
-        assert_eq!(fault.to_string(), "1:1: the file looks like gzip, expected a text; unpack it first");
-        assert_eq!(decode(b"PK\x03\x04").unwrap_err().fact, "the file looks like zip, expected a text");
+        assert_eq!(fault.to_string(), "1:1: the file looks like gzip, expected a text file; decompress it first");
+        assert_eq!(decode(b"PK\x03\x04").unwrap_err().fact, "the file looks like zip, expected a text file");
     }
 
     #[test]
-    fn bytes_that_are_not_utf_8_are_placed() {
+    fn a_fault_of_encoding_has_a_position() {
         assert_eq!(decode("\u{feff}{}".as_bytes()), Ok("{}"));
         let fault = decode(b"{\n \xff}").unwrap_err();
         assert_eq!((fault.line, fault.column), (2, 2));

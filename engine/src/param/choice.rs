@@ -1,4 +1,4 @@
-//! Params that are one of a few words.
+//! Params whose value is one of a few words.
 
 /// One option of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,9 +9,9 @@ pub struct ChoiceOption {
     pub help: &'static str,
 }
 
-/// The words of a param and the values they stand for; made by [`crate::choice!`].
+/// The words of a param and the values that they stand for; implemented by [`crate::choice!`].
 pub trait Choice: 'static {
-    /// What a node gets: an enum of its own, or one of its kernel.
+    /// The type that a node gets: an enum of the node, or one of its kernel.
     type Value: Copy + PartialEq + Send + Sync + 'static;
     /// Its options, in order.
     const OPTIONS: &'static [ChoiceOption];

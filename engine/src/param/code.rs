@@ -16,7 +16,7 @@ pub struct Code {
 }
 
 impl Code {
-    /// The code of a text without controls.
+    /// Code without controls in scope.
     pub fn new(text: &str) -> Self {
         let program = Program::parse(text, &Scope::default());
         Self { text: text.into(), program: Arc::new(program), numbers: Arc::from([]) }
@@ -52,7 +52,7 @@ impl Code {
 
     pub(super) fn add_to<'h>(&self, key: &'h mut Hasher) -> &'h mut Hasher {
         let key = key.text(&self.text).i64(self.reads().len() as i64);
-        // A name that no control had may be an attribute's: which ones are controls is part of what the text says.
+        // A name that is not a control is an attribute, so the set of controls changes the meaning of the text.
         let key = self.reads().iter().fold(key, |key, control| key.i64(*control as i64));
         self.numbers.iter().fold(key.i64(self.numbers.len() as i64), |key, x| key.f64(*x))
     }

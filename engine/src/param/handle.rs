@@ -1,5 +1,5 @@
-//! Typed handles of params. A handle alone declares a param's name, default, ranges, unit and help; help, schema,
-//! validation and conformance derive from it.
+//! Typed handles of params. A handle declares a param's name, default, ranges, unit and help in one place; help,
+//! schema, validation and conformance tests are derived from it.
 
 use super::code::Code;
 use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
@@ -11,17 +11,17 @@ use crate::geometry::{Column, Name};
 use numerics::ramp::{Interpolation, Ramp};
 use std::sync::Arc;
 
-/// A type a param can have.
+/// A type that a param can have.
 pub trait ParamType: 'static {
-    /// What a node gets: for most types the type itself.
+    /// The type that a node gets: for most types the type itself.
     type Value: Clone;
-    /// How a default is written in a constant.
+    /// The type of a default in a constant.
     type Default: Copy + Send + Sync + 'static;
-    /// Which JSON it is read from.
+    /// How it is written in JSON.
     fn shape() -> Shape;
     /// The default as an erased value.
     fn erase_default(default: Self::Default) -> Value;
-    /// The typed value; `None` where the erased value is of another type.
+    /// The typed value; `None` if the erased value is of another type.
     fn typed(value: &Value) -> Option<Self::Value>;
     /// The erased value.
     fn erase(value: Self::Value) -> Value;
@@ -45,7 +45,7 @@ impl<T: ParamType> Copy for Param<T> {}
 
 /// A param of any type.
 pub trait ParamDecl: Sync {
-    /// Its name, kind, default, ranges, unit and help.
+    /// Its name, shape, default, ranges, unit and help.
     fn spec(&self) -> ParamSpec;
 }
 
@@ -227,12 +227,12 @@ impl<T: Choice> ParamType for T {
         }
     }
     fn erase(value: T::Value) -> Value {
-        let index = T::VALUES.iter().position(|known| *known == value);
-        Value::Choice(index.expect("a choice lists every value that its node names"))
+        let index = T::VALUES.iter().position(|listed| *listed == value);
+        Value::Choice(index.expect("a choice lists every value that its node uses"))
     }
 }
 
-/// The f64 that prints like the f32: a default of 0.3 is shown as 0.3, and reads back as the same f32.
+/// The f64 that prints like the f32: a default of 0.3 is shown as 0.3 and converts back to the same f32.
 fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
 }
@@ -272,7 +272,7 @@ impl Param<i64> {
 }
 
 impl Param<bool> {
-    /// Yes or no.
+    /// `true` or `false`.
     pub const fn bool(name: &'static str, default: bool, help: &'static str) -> Self {
         Self::new(name, default, help)
     }
@@ -335,7 +335,7 @@ impl Param<Seed> {
 }
 
 impl Param<Name> {
-    /// A text.
+    /// A string.
     pub const fn text(name: &'static str, default: &'static str, help: &'static str) -> Self {
         Self::new(name, default, help)
     }
@@ -349,14 +349,14 @@ impl Param<Code> {
 }
 
 impl Param<Arc<Vec<Name>>> {
-    /// A list of texts.
+    /// A list of strings.
     pub const fn texts(name: &'static str, default: &'static [&'static str], help: &'static str) -> Self {
         Self::new(name, default, help)
     }
 }
 
 impl Param<Option<File>> {
-    /// A file, relative to the graph file; `####` stands for the frame number. None by default.
+    /// A file, relative to the graph file; runs of `#` are replaced by the frame number. None by default.
     pub const fn file(name: &'static str, help: &'static str) -> Self {
         Self::new(name, (), help).fixed()
     }
@@ -370,7 +370,7 @@ impl Param<Maskable> {
 }
 
 impl Param<Arc<Ramp>> {
-    /// A curve over 0…1, straight between its keys.
+    /// A curve over 0…1, linear between its keys.
     pub const fn ramp(name: &'static str, keys: &'static [[f32; 2]], help: &'static str) -> Self {
         Self::new(name, RampDefault { keys, interpolation: Interpolation::Linear }, help)
     }
@@ -396,7 +396,7 @@ impl<T: Choice> Param<T> {
 }
 
 impl<T: ParamType<Default = ()>> Param<T> {
-    /// Data written into the graph file, empty by default.
+    /// Inline data of the graph file, empty by default.
     pub const fn inline(name: &'static str, help: &'static str) -> Self {
         Self::new(name, (), help).fixed()
     }

@@ -1,4 +1,4 @@
-//! Params: what an artist sets on a node.
+//! Params: the values that an artist sets on a node.
 //!
 //! A node declares typed handles ([`Param`]) through [`crate::params!`]; the engine keeps erased [`Value`]s, resolved
 //! from a [`Source`] (a literal, keyframes or an expression) at each time they are read.
@@ -25,7 +25,7 @@ pub use turn::euler_to_turn;
 pub use unit::Unit;
 pub use value::{Maskable, Seed, Span, Turn, Value};
 
-/// Which params of a node were ever read.
+/// Which params of a node have been read.
 #[derive(Debug, Default)]
 pub(crate) struct ReadLog(Box<[AtomicBool]>);
 
@@ -44,19 +44,18 @@ pub struct Params {
 }
 
 impl Params {
-    /// Params with a value for each of `specs`, none of them read yet: for calling functions of a declaration outside a
-    /// cook.
+    /// Params with a value for each of `specs`, for calling functions of a declaration outside a cook.
     ///
     /// # Panics
-    /// Where there are not as many values as specs.
+    /// If the numbers of values and specs differ.
     pub fn new(specs: Arc<[ParamSpec]>, values: Vec<Value>) -> Self {
         assert_eq!(specs.len(), values.len(), "a value for each param");
         let log = Arc::new(ReadLog::new(specs.len()));
         Self { specs, values: values.into(), log }
     }
 
-    /// Whether the param at `index` of the declaration was ever read. Shared by clones, and by all that one plan
-    /// resolved for one node, at whatever frame.
+    /// Whether the param at `index` of the declaration has been read. Clones share this, and so do all params that one
+    /// plan resolves for a node, at any frame.
     pub fn was_read(&self, index: usize) -> bool {
         self.log.0.get(index).is_some_and(|read| read.load(Ordering::Relaxed))
     }
@@ -64,16 +63,16 @@ impl Params {
     /// The value of a param.
     ///
     /// # Panics
-    /// Where the node does not declare the handle. `params!` makes that hard; the engine turns it into an error that
-    /// names node and frame, and the conformance suite fails.
+    /// If the node does not declare the handle. The engine turns the panic into an error with node and frame, and the
+    /// conformance suite fails.
     pub fn get<T: ParamType>(&self, param: Param<T>) -> T::Value {
-        let place =
+        let index =
             self.specs.iter().position(|spec| std::ptr::eq(spec.name, param.name()) || spec.name == param.name());
-        let place = place.unwrap_or_else(|| panic!("it reads the param `{}`, which it does not declare", param.name()));
-        if let Some(read) = self.log.0.get(place) {
+        let index = index.unwrap_or_else(|| panic!("it reads the param `{}`, which it does not declare", param.name()));
+        if let Some(read) = self.log.0.get(index) {
             read.store(true, Ordering::Relaxed);
         }
-        T::typed(&self.values[place])
+        T::typed(&self.values[index])
             .unwrap_or_else(|| panic!("it reads the param `{}` as another type than it declares", param.name()))
     }
 }

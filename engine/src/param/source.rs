@@ -1,4 +1,4 @@
-//! Where a param's value comes from: a literal, keyframes, or expressions; evaluated at any time.
+//! Sources of a param's value: a literal, keyframes, or expressions, which can be evaluated at any time.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,30 +16,30 @@ use crate::geometry::Name;
 /// What expressions can read of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// The scene's seed.
     pub seed: i64,
 }
 
-/// One key: its frame and its value. Rotations are kept as degrees, so that whole turns are not lost.
+/// One key: its frame and its value. Rotations are kept in degrees, so that whole turns are not lost.
 pub type Keyframe = (f64, Value);
 
-/// Values at frames, held before the first and after the last.
+/// Values at frames, constant before the first and after the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframes {
     /// At least one, frames strictly increasing.
     pub keys: Vec<Keyframe>,
-    /// The interpolation between keys. Words, booleans and texts are always held.
+    /// The interpolation between keys. Choices, booleans and strings are constant until the next key.
     pub interpolation: Interpolation,
 }
 
-/// Where a value comes from.
+/// Where a value comes from, and how to evaluate it.
 #[derive(Clone, Debug)]
 pub enum Source {
     /// The same at all times.
     Constant(Value),
-    /// Keyed.
+    /// Keyframes.
     Keys(Arc<Keyframes>, Shape),
     /// One expression for each number of the shape, and the controls (numbers and vectors) that they may use.
     Exprs(Arc<Vec<Expr>>, Shape, Arc<Vec<Source>>),
@@ -47,11 +47,12 @@ pub enum Source {
     Code(CodeSource),
     /// The current frame, rounded down.
     CurrentFrame,
-    /// A file; `####` in its path stands for the frame number when `numbered`. Opened when the params are resolved.
+    /// A file, opened when the params are resolved. If `numbered`, runs of `#` in its path are replaced by the frame
+    /// number.
     File {
         /// Its path.
         path: Arc<Path>,
-        /// Whether a run of `#` in the path stands for the frame.
+        /// Whether the path contains runs of `#`.
         numbered: bool,
     },
     /// A number from a source, scaled by a point attribute.
@@ -70,7 +71,7 @@ impl Source {
             }),
             Self::Code(code) => code.is_animated(),
             Self::CurrentFrame => true,
-            // A numbered path follows the node's `frame`, which is animated or not by itself.
+            // A numbered path depends on the node's param `frame`, which is checked on its own.
             Self::File { .. } => false,
             Self::Masked(value, _) => value.is_animated(),
         }
@@ -113,14 +114,14 @@ impl Source {
     }
 }
 
-/// The numbers of all controls, one after the other, as expressions read them; 0 for controls that are not `read`.
+/// The numbers of all controls, concatenated, as expressions read them; 0 for controls that are not `read`.
 pub(super) fn control_numbers(controls: &[Source], frame: f64, clock: Clock, read: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut numbers = Vec::new();
-    for (place, control) in controls.iter().enumerate() {
+    for (index, control) in controls.iter().enumerate() {
         match control.at(frame, clock) {
-            Value::Vec3(v) if read(place) => numbers.extend(v),
+            Value::Vec3(v) if read(index) => numbers.extend(v),
             Value::Vec3(_) => numbers.extend([0.0; 3]),
-            value => numbers.push(if read(place) { value.number() } else { 0.0 }),
+            value => numbers.push(if read(index) { value.number() } else { 0.0 }),
         }
     }
     numbers
@@ -179,7 +180,7 @@ impl Keyframes {
     }
 }
 
-/// Interpolates from `a` to `b` at `share`, number by number; values that cannot be interpolated hold `a`.
+/// Interpolates from `a` to `b` at `share`, component by component; values that cannot be interpolated stay `a`.
 fn blend(a: &Value, b: &Value, share: f64) -> Value {
     let mix = |a: f64, b: f64| a + (b - a) * share;
     fn each<const N: usize>(a: [f64; N], b: [f64; N], mix: impl Fn(f64, f64) -> f64) -> [f64; N] {
@@ -206,7 +207,7 @@ fn blend(a: &Value, b: &Value, share: f64) -> Value {
                 .iter()
                 .zip(b.keys())
                 .map(|(a, b)| each(a.map(f64::from), b.map(f64::from), mix).map(|x| x as f32));
-            // Keys that rounding puts on one spot leave the ramp as it was.
+            // If rounding makes two keys coincide, keep the first ramp.
             Ramp::new(keys.collect(), a.interpolation())
                 .map_or_else(|_| Value::Ramp(a.clone()), |ramp| Value::Ramp(Arc::new(ramp)))
         }
@@ -214,7 +215,7 @@ fn blend(a: &Value, b: &Value, share: f64) -> Value {
     }
 }
 
-/// Where code comes from: its program, and the controls it may read.
+/// The source of code: its program, and the controls that it may read.
 #[derive(Clone, Debug)]
 pub struct CodeSource {
     text: Name,
@@ -223,7 +224,7 @@ pub struct CodeSource {
 }
 
 impl CodeSource {
-    /// The source of a text that was parsed with `controls` in scope.
+    /// A source for a text that was parsed with `controls` in scope.
     pub(crate) fn new(text: &str, program: Program, controls: Arc<Vec<Source>>) -> Self {
         Self { text: text.into(), program: Arc::new(Ok(program)), controls }
     }
@@ -232,9 +233,9 @@ impl CodeSource {
         self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
     }
 
-    /// Whether a control that it reads moves. The clock that the code itself reads is the node's to declare.
+    /// Whether a control that it reads is animated. Whether the code reads the clock is declared by the node.
     pub(super) fn is_animated(&self) -> bool {
-        self.controls.iter().enumerate().any(|(place, control)| self.reads(place) && control.is_animated())
+        self.controls.iter().enumerate().any(|(index, control)| self.reads(index) && control.is_animated())
     }
 
     pub(super) fn at(&self, frame: f64, clock: Clock) -> Code {
@@ -255,14 +256,14 @@ mod tests {
     }
 
     #[test]
-    fn keyframes_hold_beyond_their_ends_and_run_straight_between() {
+    fn keyframes_are_constant_beyond_their_ends_and_linear_between() {
         let source = keyed(&[(1.0, 0.0), (25.0, 1.0)], Interpolation::Linear);
         let at = |frame: f64| source.at(frame, CLOCK).number();
         assert_eq!((at(-5.0), at(1.0), at(13.0), at(25.0), at(99.0)), (0.0, 0.0, 0.5, 1.0, 1.0));
     }
 
     #[test]
-    fn smooth_is_a_smoothstep_and_constant_holds() {
+    fn smooth_is_a_smoothstep_and_constant_keeps_the_previous_key() {
         let keys = [(0.0, 0.0), (4.0, 1.0)];
         let at = |interpolation| keyed(&keys, interpolation).at(1.0, CLOCK).number();
         assert_eq!(at(Interpolation::Smooth), 0.15625); // 3/16 − 2/64
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_of_one_value_are_not_an_animation() {
+    fn keyframes_with_one_value_are_not_animated() {
         assert!(!keyed(&[(1.0, 2.0), (9.0, 2.0)], Interpolation::Linear).is_animated());
         assert!(keyed(&[(1.0, 2.0), (9.0, 3.0)], Interpolation::Linear).is_animated());
     }

@@ -1,11 +1,11 @@
-//! The specification of a param of any type, as help, schema and validation read it.
+//! The specification of a param of any type, used by help, schema and validation.
 
 use super::Params;
 use super::choice::ChoiceOption;
 use super::unit::Unit;
 use super::value::Value;
 
-/// Which JSON a param is read from.
+/// The JSON form of a param.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A number.
@@ -30,9 +30,9 @@ pub enum Shape {
     Choice(&'static [ChoiceOption]),
     /// `{"ramp": [[x, y], …]}`
     Ramp,
-    /// A text.
+    /// A string.
     Text,
-    /// Texts.
+    /// Strings.
     Texts,
     /// A path.
     File,
@@ -46,12 +46,12 @@ pub enum Shape {
     Tets,
     /// `{"name": [numbers], …}`
     Columns,
-    /// Assignments, a text.
+    /// A string of assignments.
     Code,
 }
 
 impl Shape {
-    /// What a value of this shape looks like, for help and faults.
+    /// How a value of this shape is written, for help and faults.
     pub fn describe(self) -> String {
         match self {
             Self::Float => "a number".into(),
@@ -61,25 +61,25 @@ impl Shape {
             Self::Vec3 => "a vector [x, y, z]".into(),
             Self::Int3 => "three whole numbers [x, y, z]".into(),
             Self::Span => "a range [a, b]".into(),
-            Self::Turn => "degrees [x, y, z]".into(),
+            Self::Turn => "angles [x, y, z] in degrees".into(),
             Self::Choice(options) => {
                 let words: Vec<String> = options.iter().map(|option| format!("\"{}\"", option.word)).collect();
                 format!("one of {}", words.join(", "))
             }
             Self::Ramp => "a ramp {\"ramp\": [[x, y], …]}".into(),
-            Self::Text => "a text".into(),
-            Self::Texts => "a list of texts".into(),
+            Self::Text => "a string".into(),
+            Self::Texts => "a list of strings".into(),
             Self::File => "a path".into(),
             Self::Masked => "a number, or {\"value\": …, \"attribute\": \"…\"}".into(),
             Self::Vec3s => "a list of vectors [[x, y, z], …]".into(),
             Self::Ints => "a list of whole numbers".into(),
             Self::Tets => "a list of tets [[a, b, c, d], …]".into(),
             Self::Columns => "attributes {\"name\": [numbers], …}".into(),
-            Self::Code => "assignments, a text".into(),
+            Self::Code => "a string of assignments".into(),
         }
     }
 
-    /// How many expressions `{"expr": …}` takes for it; `None` where no expression gives such a value.
+    /// The number of expressions that `{"expr": …}` takes for this shape; `None` if it cannot be an expression.
     pub fn expressions(self) -> Option<usize> {
         match self {
             Self::Float | Self::Int | Self::Bool | Self::Masked | Self::Seed => Some(1),
@@ -90,7 +90,7 @@ impl Shape {
     }
 }
 
-/// A hard range: what is outside is refused.
+/// A hard range: values outside are refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// The least value.
@@ -124,7 +124,7 @@ impl std::fmt::Display for Bounds {
     }
 }
 
-/// What a handle declares besides name, default and help.
+/// What a handle declares in addition to name, default and help.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Unit of the number.
@@ -174,25 +174,25 @@ impl Facts {
 pub struct ParamSpec {
     /// Name in graph files.
     pub name: &'static str,
-    /// What it does to the picture.
+    /// What it does.
     pub help: &'static str,
-    /// Which JSON it is read from.
+    /// How it is written in JSON.
     pub shape: Shape,
     /// Value if the graph does not set it.
     pub default: Value,
-    /// Unit, ranges, times.
+    /// Unit, ranges and use.
     pub facts: Facts,
 }
 
 impl ParamSpec {
-    /// Why `value` is refused: fact and hint; `None` if it is allowed. Expects a value of this shape.
+    /// The fact and hint of a fault if `value` is refused; `None` if it is allowed. Expects a value of this shape.
     pub fn refuses(&self, value: &Value) -> Option<(String, String)> {
         let (name, hard) = (self.name, self.facts.hard);
         let range = || format!("expected {hard}{}", self.unit_text());
         let outside = |shown: String| Some((format!("`{name}` is {shown}"), range()));
         let is_whole = matches!(self.shape, Shape::Int | Shape::Int3 | Shape::Seed);
         if is_whole && matches!(value, Value::Float(_) | Value::Vec3(_)) {
-            let hint = format!("expected {}; floor(…), ceil(…) or round(…) makes one", self.shape.describe());
+            let hint = format!("expected {}; floor(…), ceil(…) and round(…) give whole numbers", self.shape.describe());
             return Some((format!("`{name}` is {value}"), hint));
         }
         let numbers: &[f64] = match value {
@@ -209,24 +209,25 @@ impl ParamSpec {
             }
             _ => return None,
         };
-        // A rotation is already a quaternion here: its components need only be finite.
+        // A rotation is a quaternion here, whose components need only be finite.
         let hard = if matches!(value, Value::Turn(_)) { Bounds::ALL } else { hard };
         if !numbers.iter().all(|x| hard.hold(*x)) {
             return outside(value.to_string());
         }
         match value {
             Value::Span([a, b]) if a > b => {
-                Some((format!("`{name}` is [{a}, {b}], which runs backwards"), "write the smaller number first".into()))
+                let fact = format!("`{name}` is [{a}, {b}], whose lower end is greater than its upper end");
+                Some((fact, "write the smaller number first".into()))
             }
             Value::Vec3(v) if self.facts.direction && v.iter().all(|x| x.abs() < f64::MIN_POSITIVE) => Some((
                 format!("`{name}` is {value}, which has no direction"),
-                "give a vector that is not zero, such as [1, 0, 0]".into(),
+                "use a vector that is not zero, such as [1, 0, 0]".into(),
             )),
             _ => None,
         }
     }
 
-    /// ` m/s`, or nothing for a plain number.
+    /// The unit with a space before it, ` m/s`; empty for a plain number.
     pub fn unit_text(&self) -> String {
         match self.facts.unit {
             Unit::None => String::new(),
@@ -243,7 +244,7 @@ impl ParamSpec {
             Unset::Default => {}
         }
         match (&self.default, self.shape) {
-            (Value::Choice(place), Shape::Choice(options)) => options[*place].word.into(),
+            (Value::Choice(index), Shape::Choice(options)) => options[*index].word.into(),
             (Value::Turn(_), _) => "[0, 0, 0]".into(),
             (Value::Nothing | Value::Vec3s(_) | Value::Ints(_) | Value::Tets(_) | Value::Columns(_), _) => {
                 "none".into()

@@ -46,7 +46,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// The unit's sign; empty for a plain number.
+    /// The unit's symbol; empty for a plain number.
     pub fn sign(self) -> &'static str {
         match self {
             Self::None => "",

@@ -1,4 +1,4 @@
-//! Values of params: what a node gets, and the erased form that the engine keeps.
+//! Values of params: the types that nodes get, and the type-erased form that the engine keeps.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::files::File;
 use crate::geometry::{Column, Name};
 use crate::key::Hasher;
 
-/// A range a…b from which a node draws, both ends included.
+/// A range a…b from which a node draws, inclusive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     /// The lower end.
@@ -19,7 +19,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// The value at `share` (0…1) between low and high.
+    /// Linear interpolation: `low` at 0, `high` at 1.
     pub fn at(self, share: f32) -> f32 {
         self.low + (self.high - self.low) * share
     }
@@ -51,7 +51,7 @@ pub enum Value {
     Float(f64),
     /// A whole number.
     Int(i64),
-    /// Yes or no.
+    /// `true` or `false`.
     Bool(bool),
     /// Two numbers.
     Vec2([f64; 2]),
@@ -67,13 +67,13 @@ pub enum Value {
     Choice(usize),
     /// A curve over 0…1.
     Ramp(Arc<Ramp>),
-    /// A text.
+    /// A string.
     Text(Name),
-    /// Texts.
+    /// Strings.
     Texts(Arc<Vec<Name>>),
-    /// A file, opened; `None` where no file is named.
+    /// An opened file; `None` if no file is set.
     File(Option<File>),
-    /// A number an attribute may scale.
+    /// A number that an attribute may scale.
     Masked(f64, Option<Name>),
     /// Vectors.
     Vec3s(Arc<Vec<[f32; 3]>>),
@@ -88,7 +88,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Adds this value to a key.
+    /// Adds this value to a hash.
     pub fn add_to(&self, key: &mut Hasher) {
         match self {
             Self::Nothing => key.tag(20),

@@ -1,4 +1,4 @@
-//! Integrals over time of what a node's params were, kept from frame to frame.
+//! Integrals over time of functions of a node's params, accumulated from frame to frame.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -9,7 +9,7 @@ use crate::graph::Scene;
 use crate::node::{History, Integrand, Node};
 use crate::time::Frame;
 
-/// Places and weights of 4-point Gauss quadrature on −1…1 (Abramowitz & Stegun, table 25.4): exact to degree 7.
+/// Nodes and weights of 4-point Gauss quadrature on −1…1 (Abramowitz & Stegun, table 25.4): exact to degree 7.
 const GAUSS: [(f64, f64); 4] = [
     (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
     (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
@@ -17,13 +17,13 @@ const GAUSS: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// The four places between `a` and `b`, in order.
+/// The four quadrature nodes between `a` and `b`, ascending.
 pub(crate) fn gauss_points(a: f64, b: f64) -> [f64; 4] {
     GAUSS.map(|(x, _)| 0.5 * (a + b) + 0.5 * (b - a) * x)
 }
 
-/// The first frame whose params integrals see: time 0, or the scene's start where that is earlier. Before it they are
-/// taken to have held, so that what started earlier moves too, and no key hangs on a past without end.
+/// The first frame at which integrals evaluate params: frame 0, or the scene's start if that is earlier. Before it
+/// params are taken as constant, so that integrals have values there too and keys depend on a bounded past.
 pub(crate) fn history_start(scene: &Scene) -> i64 {
     scene.first.min(0)
 }
@@ -39,8 +39,8 @@ impl<'a> Integrals<'a> {
 }
 
 impl History for Integrals<'_> {
-    fn integral(&self, place: usize, upto: Frame) -> [f64; 3] {
-        self.0[place].upto(upto).into()
+    fn integral(&self, index: usize, upto: Frame) -> [f64; 3] {
+        self.0[index].upto(upto).into()
     }
 }
 
@@ -49,7 +49,7 @@ struct Integral<'a> {
     integrand: Integrand,
     fps: f64,
     since: Frame,
-    /// Whether the integrand changes with time, and its value where it does not.
+    /// Whether the integrand changes with time, and its value if it does not.
     animated: bool,
     constant: OnceLock<DVec3>,
     /// Sums over whole frames from frame 0, forwards and backwards, grown on demand in frame order.
@@ -75,7 +75,8 @@ impl<'a> Integral<'a> {
         terms.map(|(x, (_, weight))| self.value(x) * (0.5 * (b - a) * weight)).sum()
     }
 
-    /// The integrand at a frame number. The key of this frame has evaluated it there before: it was no error then.
+    /// The integrand at a frame number. Params there are legal, because the key of the current frame has evaluated them
+    /// before.
     fn value(&self, frame: f64) -> DVec3 {
         self.resolver.past(frame).map_or([f64::NAN; 3], |params| (self.integrand)(&params)).into()
     }

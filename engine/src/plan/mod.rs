@@ -116,8 +116,8 @@ impl<'g> Plan<'g> {
         let Some(frame) = self.request.frames.iter().find(|frame| !frame.is_whole()) else { return Ok(()) };
         for output in self.request.outputs.iter().map(|output| &self.graph.outputs[*output]) {
             if self.nodes[output.from.node].has_solver {
-                let fact = format!("output `{}` comes from a solver, which knows whole frames only", output.name);
-                let error = Error::refused(fact).hint("ask for whole frames");
+                let fact = format!("output `{}` comes from a solver, which has only whole frames", output.name);
+                let error = Error::refused(fact).hint("request whole frames");
                 return Err(Arc::new(self.error(output.from.node, *frame, error)));
             }
         }

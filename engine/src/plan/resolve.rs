@@ -1,4 +1,5 @@
-//! A node's params at any time: sources evaluated, ranges checked, files opened, what is not read put to its default.
+//! A node's params at any time: evaluates sources, checks ranges, opens files, and replaces params that are not read by
+//! their defaults.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ pub(crate) struct Resolver {
     files: Arc<Files>,
     clock: Clock,
     animated: bool,
-    /// The params, where they are the same at all times.
+    /// The params, if they are the same at all times.
     constant: Option<Result<Params>>,
 }
 
@@ -25,9 +26,9 @@ impl Resolver {
     pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         let mut resolver = Self::lazy(node, graph, files);
         let start = graph.scene.start();
-        // A param that is not read does not make a node move, whatever it does.
+        // An animated param that is not read does not make the node animated.
         resolver.animated = match resolver.evaluate(start.number(), false) {
-            Ok(params) => (0..resolver.sources.len()).any(|place| resolver.moves(place, &params)),
+            Ok(params) => (0..resolver.sources.len()).any(|index| resolver.is_param_animated(index, &params)),
             Err(_) => resolver.sources.iter().any(Source::is_animated),
         };
         if !resolver.animated {
@@ -36,7 +37,8 @@ impl Resolver {
         resolver
     }
 
-    /// The resolver of a node that nothing asked depends on: it looks at params and files only where someone asks.
+    /// The resolver of a node on which no requested output depends: params are evaluated and files opened only on
+    /// request.
     pub(crate) fn lazy(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         let (specs, sources) = match &node.body {
             Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
@@ -53,14 +55,14 @@ impl Resolver {
         }
     }
 
-    fn moves(&self, place: usize, params: &Params) -> bool {
-        self.sources[place].is_animated() && self.is_read(place, params)
+    fn is_param_animated(&self, index: usize, params: &Params) -> bool {
+        self.sources[index].is_animated() && self.is_read(index, params)
     }
 
-    /// Whether the node reads the param, given the others. A param that is the current frame unless set says which file
-    /// of a sequence is meant: without a sequence it means nothing.
-    fn is_read(&self, place: usize, params: &Params) -> bool {
-        let facts = &self.specs[place].facts;
+    /// Whether the node reads the param, given the others. A param whose default is the current frame selects a file of
+    /// a sequence, so it is not read without a sequence.
+    fn is_read(&self, index: usize, params: &Params) -> bool {
+        let facts = &self.specs[index].facts;
         let sequence = || self.sources.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
         facts.when.is_none_or(|when| when(params)) && (facts.unset != Unset::CurrentFrame || sequence())
     }
@@ -70,7 +72,7 @@ impl Resolver {
         self.animated
     }
 
-    /// Whether any param read over all times changes with time.
+    /// Whether any param with `history` changes with time.
     pub(crate) fn history_is_animated(&self) -> bool {
         self.specs.iter().zip(&self.sources).any(|(spec, source)| spec.facts.history && source.is_animated())
     }
@@ -83,18 +85,18 @@ impl Resolver {
         }
     }
 
-    /// The params at a frame number with any fraction, as integrals over time need them: a param that is read over all
-    /// times counts there too where the others say that it is not read.
+    /// The params at a frame number with any fraction, for integrals over time. Params with `history` keep their value
+    /// here even if others make them unread.
     pub(crate) fn past(&self, frame: f64) -> Result<Params> {
         self.evaluate(frame, true)
     }
 
-    /// The params at `frame`, its files not opened: cheap enough to be asked for every frame of a scene.
+    /// The params at `frame` without opening files: cheap enough for every frame of a scene.
     pub(crate) fn unopened(&self, frame: Frame) -> Result<Params> {
         self.values(frame.number(), false)
     }
 
-    /// The numbered files of a sequence that `params` mean.
+    /// The files of sequences that `params` select, with the names of their params.
     pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = (&'static str, PathBuf)> {
         let frame = self.file_frame(params);
         self.specs.iter().zip(&self.sources).filter_map(move |(spec, source)| match source {
@@ -111,7 +113,7 @@ impl Resolver {
         let mut values = Vec::with_capacity(self.sources.len());
         for (spec, source) in self.specs.iter().zip(&self.sources) {
             let value = source.at(frame, self.clock);
-            // Integrals over the past read those params alone: what the others were then refuses nothing now.
+            // Integrals over the past read only these; illegal past values of the others do not matter.
             let matters = !past || spec.facts.history || spec.facts.fixed;
             if let Some((fact, hint)) = spec.refuses(&value).filter(|_| matters) {
                 return Err(Error::refused(fact).hint(hint).of(spec.name));
@@ -123,13 +125,13 @@ impl Resolver {
     }
 
     fn without_unread(&self, mut params: Params, past: bool) -> Params {
-        let in_past = |place: usize| past && self.specs[place].facts.history;
-        let unread = (0..self.specs.len()).filter(|place| !in_past(*place) && !self.is_read(*place, &params));
+        let in_past = |index: usize| past && self.specs[index].facts.history;
+        let unread = (0..self.specs.len()).filter(|index| !in_past(*index) && !self.is_read(*index, &params));
         let unread: Vec<usize> = unread.collect();
         if !unread.is_empty() {
             let mut values = params.values.to_vec();
-            for place in unread {
-                values[place] = self.specs[place].default.clone();
+            for index in unread {
+                values[index] = self.specs[index].default.clone();
             }
             params.values = values.into();
         }
@@ -137,17 +139,17 @@ impl Resolver {
     }
 
     fn with_files(&self, mut params: Params) -> Result<Params> {
-        let paths = self.sources.iter().enumerate().filter_map(|(place, source)| match source {
-            Source::File { path, numbered } => Some((place, path, *numbered)),
+        let paths = self.sources.iter().enumerate().filter_map(|(index, source)| match source {
+            Source::File { path, numbered } => Some((index, path, *numbered)),
             _ => None,
         });
         let mut values: Option<Vec<Value>> = None;
-        for (place, path, numbered) in paths {
+        for (index, path, numbered) in paths {
             let file = match numbered {
                 false => self.files.open(path)?,
                 true => self.files.open(&numbered_path(path, self.file_frame(&params)))?,
             };
-            values.get_or_insert_with(|| params.values.to_vec())[place] = Value::File(Some(file));
+            values.get_or_insert_with(|| params.values.to_vec())[index] = Value::File(Some(file));
         }
         if let Some(values) = values {
             params.values = values.into();
@@ -155,10 +157,10 @@ impl Resolver {
         Ok(params)
     }
 
-    /// The number that `####` stands for: the node's own `frame`.
+    /// The frame number that replaces `####`: the node's param `frame`.
     fn file_frame(&self, params: &Params) -> i64 {
-        let place = self.specs.iter().position(|spec| spec.name == "frame");
-        match place.map(|place| &params.values[place]) {
+        let index = self.specs.iter().position(|spec| spec.name == "frame");
+        match index.map(|index| &params.values[index]) {
             Some(Value::Int(frame)) => *frame,
             _ => 0,
         }

@@ -1,4 +1,4 @@
-//! Killed at any moment, a cook resumes, and its final files have the bits of a cook that was left alone.
+//! A cook that is killed at any moment can be resumed, and its files have the same bits as without interruption.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,20 +11,20 @@ use engine::cook::{Delivered, DiskCache};
 use engine::plan::Request;
 use numerics::random;
 
+use crate::builder::{bits, engine};
 use crate::checkpoints::solver;
-use crate::net::{bits, engine};
 
-/// Where the child process is to work; it does nothing where this is not set.
+/// The environment variable with the folder of the child process, which does nothing if it is not set.
 const FOLDER: &str = "CONVECT_TEST_KILLED";
 
-/// How often the child is killed.
+/// Number of times that the child is killed.
 const KILLS: usize = 50;
 
-/// The child: cooks with a cache, and writes a file a frame.
+/// The child: cooks with a cache and writes one file per frame.
 #[test]
 fn child() {
     let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) else { return };
-    let net = solver();
+    let graph = solver();
     let mut disk = DiskCache::open(&folder.join("cache"), u64::MAX).expect("a cache");
     let mut sink = |finished: &[Delivered]| -> std::io::Result<()> {
         for one in finished {
@@ -34,8 +34,8 @@ fn child() {
         }
         Ok(())
     };
-    let request = Request::everything(&net.0);
-    let cooked = engine(2, 1 << 30).cook(&net.0, &request, Some(&mut disk), &AtomicBool::new(false), &mut sink);
+    let request = Request::everything(&graph.0);
+    let cooked = engine(2, 1 << 30).cook(&graph.0, &request, Some(&mut disk), &AtomicBool::new(false), &mut sink);
     cooked.unwrap_or_else(|stopped| panic!("{stopped:?}"));
     fs::write(folder.join("done"), "").expect("a file");
 }
@@ -57,8 +57,8 @@ fn written(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 #[test]
 fn a_cook_killed_at_random_moments_ends_with_the_same_bits() {
-    let net = solver();
-    let whole = net.cook(1..=60).bits();
+    let graph = solver();
+    let whole = graph.cook(1..=60).bits();
     let check = |folder: &Path, complete: bool| {
         let written = written(folder);
         assert!(!complete || written.len() == 60, "{} files", written.len());

@@ -1,12 +1,12 @@
-//! Planning and cooking, tried with small nodes whose results can be worked by hand.
+//! Tests of planning and cooking, with small nodes whose results can be computed by hand.
 
+mod builder;
 mod checkpoints;
 mod faults;
 mod integrals;
 mod keys;
 mod killed;
 mod memory;
-mod net;
 mod nodes;
 mod once;
 mod overhead;

@@ -1,4 +1,4 @@
-//! Small nodes, each for one thing the engine promises. All of them move points along x.
+//! Small nodes, each for one property of the engine. All of them move points along x.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -10,24 +10,24 @@ use engine::param::{Clock, Param, Params, Unit};
 use engine::{Error, Result, inputs, params};
 use serde::{Deserialize, Serialize};
 
-/// Counts calls of the nodes whose `probe` is its number.
+/// Records the calls of the nodes whose param `probe` is its number.
 pub(crate) struct Probe(i64);
 
 static CALLS: Mutex<BTreeMap<i64, Vec<Call>>> = Mutex::new(BTreeMap::new());
 
-/// What a node noted of a call.
+/// A recorded call.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Call {
-    /// Which of its functions: `cook`, `start`, `step`, `output`.
+    /// The function that was called: `cook`, `start`, `step` or `output`.
     pub(crate) part: &'static str,
-    /// The frame, where the node may know it.
+    /// The frame, if the node can read it.
     pub(crate) frame: Option<f64>,
     /// Times at which an input was sampled.
     pub(crate) samples: Vec<f64>,
 }
 
 impl Probe {
-    /// A probe of its own number, so that tests side by side do not count each other.
+    /// A probe with a unique number, so that tests that run in parallel do not count each other's calls.
     pub(crate) fn new() -> Self {
         let mut calls = CALLS.lock().unwrap_or_else(PoisonError::into_inner);
         let number = calls.len() as i64 + 1;
@@ -35,7 +35,7 @@ impl Probe {
         Self(number)
     }
 
-    /// What `probe` is to be set to.
+    /// The value for the param `probe`.
     pub(crate) fn number(&self) -> i64 {
         self.0
     }
@@ -54,7 +54,7 @@ impl Probe {
     }
 }
 
-fn note(cx: &Cx, part: &'static str, frame: Option<f64>, samples: Vec<f64>) {
+fn record(cx: &Cx, part: &'static str, frame: Option<f64>, samples: Vec<f64>) {
     let mut calls = CALLS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(calls) = calls.get_mut(&cx.get(PROBE)) {
         calls.push(Call { part, frame, samples });
@@ -66,7 +66,7 @@ const AMOUNT: Param<f32> = Param::float("amount", 1.0, "How far.").unit(Unit::Me
 const POINTS: Input = Input::one("points", engine::geometry::Kind::Points, "Points to move.");
 const OUT: Output = Output::new("points", &[engine::geometry::Kind::Points], "The points, moved.");
 
-/// The input's points, x changed.
+/// The input's points with x changed.
 fn moved(input: &Geometry, change: impl Fn(f32) -> f32) -> Result<Geometry> {
     let mut geometry = input.clone();
     if let Some(points) = geometry.part_mut(engine::geometry::Kind::Points) {
@@ -91,9 +91,9 @@ params! { SOURCE_PARAMS:
 pub(crate) static SOURCE: Node = Node::new(
     "Source",
     1,
-    "Points on a spot.",
+    "Points at one position.",
     Cook::Pure(|cx| {
-        note(cx, "cook", None, Vec::new());
+        record(cx, "cook", None, Vec::new());
         Ok(OUT.with(Geometry::from(Component::points(vec![[cx.get(SOURCE_AMOUNT), 0.0, 0.0]; cx.get(COUNT) as usize]))))
     }),
 )
@@ -108,13 +108,13 @@ params! { ADD_PARAMS:
 }
 inputs! { ADD_INPUTS: ADD_POINTS: Input = POINTS; }
 
-/// Adds `amount`, and `more` where it is to be read.
+/// Adds `amount`, and `more` if `twice` is set.
 pub(crate) static ADD: Node = Node::new(
     "Add",
     1,
     "Moves points.",
     Cook::Pure(|cx| {
-        note(cx, "cook", None, Vec::new());
+        record(cx, "cook", None, Vec::new());
         let more = if cx.get(TWICE) { cx.get(MORE) } else { 0.0 };
         let amount = cx.get(ADD_AMOUNT) + more;
         Ok(OUT.with(moved(cx.input(ADD_POINTS), |x| x + amount)?))
@@ -134,7 +134,7 @@ pub(crate) static SUM: Node = Node::new(
     1,
     "Adds points up.",
     Cook::Pure(|cx| {
-        note(cx, "cook", None, Vec::new());
+        record(cx, "cook", None, Vec::new());
         let sum = cx.input(SUM_POINTS).iter().map(|wire| first_x(wire)).sum::<f32>();
         Ok(OUT.with(Geometry::from(Component::points(vec![[sum, 0.0, 0.0]]))))
     }),
@@ -153,14 +153,14 @@ inputs! { CLOCK_INPUTS: CLOCK_POINTS: Input = POINTS; }
 
 const HEIGHT: Metric = Metric::new("height", Unit::Metres, "How far the first point is.");
 
-/// Adds `amount` × frame; at 0 it does not look at the clock.
+/// Adds `amount` × frame. If `amount` is 0, it does not read the clock.
 pub(crate) static CLOCK: Node = Node::new(
     "Clock",
     1,
     "Moves points with the clock.",
     Cook::Frame {
         cook: |cx| {
-            note(cx, "cook", Some(cx.frame().number()), Vec::new());
+            record(cx, "cook", Some(cx.frame().number()), Vec::new());
             let amount = cx.get(CLOCK_AMOUNT) * cx.frame().number() as f32;
             let geometry = moved(cx.input(CLOCK_POINTS), |x| x + amount)?;
             cx.publish(HEIGHT, f64::from(first_x(&geometry)));
@@ -177,7 +177,7 @@ pub(crate) static CLOCK: Node = Node::new(
 
 params! { DRIFT_PARAMS:
     SPEED: Param<f32> = Param::float("speed", 1.0, "How fast.").unit(Unit::MetresPerSecond).history();
-    UPTO: Param<f32> = Param::float("upto", 0.0, "Frames before this one up to which it drifts.");
+    UPTO: Param<f32> = Param::float("upto", 0.0, "Number of frames before the current one at which the integral ends.");
 }
 inputs! { DRIFT_INPUTS: DRIFT_POINTS: Input = POINTS; }
 
@@ -189,8 +189,8 @@ pub(crate) static DRIFT: Node = Node::new(
     Cook::Frame {
         cook: |cx| {
             let upto = cx.frame().plus(-(cx.get(UPTO) as i64));
-            let way = cx.integral(upto)[0] as f32;
-            Ok(OUT.with(moved(cx.input(DRIFT_POINTS), |x| x + way)?))
+            let displacement = cx.integral(upto)[0] as f32;
+            Ok(OUT.with(moved(cx.input(DRIFT_POINTS), |x| x + displacement)?))
         },
         reads_clock: |_| true,
     },
@@ -203,7 +203,7 @@ pub(crate) static DRIFT: Node = Node::new(
 
 params! { SPREAD_PARAMS:
     SPREAD_SPEED: Param<f32> = Param::float("speed", 1.0, "How fast.").unit(Unit::MetresPerSecond).history();
-    SHARE: Param<f32> = Param::float("share", 1.0, "How much of it.").at_least(0.0);
+    SHARE: Param<f32> = Param::float("share", 1.0, "Factor of the displacement.").at_least(0.0);
 }
 inputs! { SPREAD_INPUTS: SPREAD_POINTS: Input = POINTS; }
 
@@ -214,9 +214,9 @@ pub(crate) static SPREAD: Node = Node::new(
     "Moves points at a keyed speed and at its square.",
     Cook::Frame {
         cook: |cx| {
-            let [way, square] = cx.integrals(cx.frame());
-            let way = cx.get(SHARE) * (way[0] + square[1]) as f32;
-            Ok(OUT.with(moved(cx.input(SPREAD_POINTS), |x| x + way)?))
+            let [linear, square] = cx.integrals(cx.frame());
+            let displacement = cx.get(SHARE) * (linear[0] + square[1]) as f32;
+            Ok(OUT.with(moved(cx.input(SPREAD_POINTS), |x| x + displacement)?))
         },
         reads_clock: |_| true,
     },
@@ -243,7 +243,7 @@ pub(crate) static FROM_START: Node = Node::new(
     1,
     "Motion since the start.",
     Cook::Pure(|cx| {
-        note(cx, "cook", None, Vec::new());
+        record(cx, "cook", None, Vec::new());
         let rest = first_x(cx.at_start(REST));
         Ok(OUT.with(moved(cx.input(FROM_POINTS), |x| x - rest)?))
     }),
@@ -254,7 +254,7 @@ pub(crate) static FROM_START: Node = Node::new(
 .writes(&[&P]);
 
 params! { FAIL_PARAMS:
-    HOW: Param<i64> = Param::int("how", 0, "0: not; 1: panics; 2: gives NaN; 3: refuses; 4: returns nothing.");
+    HOW: Param<i64> = Param::int("how", 0, "0: succeeds; 1: panics; 2: returns NaN; 3: refuses; 4: returns no output.");
     WHEN: Param<i64> = Param::int("at", 3, "At which frame.");
 }
 inputs! { FAIL_INPUTS: FAIL_POINTS: Input = POINTS; }
@@ -290,16 +290,16 @@ pub(crate) static FAIL: Node = Node::new(
 .outputs(&[&OUT])
 .writes(&[&P]);
 
-/// An attribute that a node makes only where someone takes it.
+/// An attribute that is only needed if something downstream reads it.
 pub(crate) const DUST: Attr<f32> = Attr::point("dust");
-const WANTED: Metric = Metric::new("wanted", Unit::None, "1 where someone takes `dust`.");
+const WANTED: Metric = Metric::new("wanted", Unit::None, "1 if something downstream reads `dust`.");
 inputs! { DUSTY_INPUTS: DUSTY_POINTS: Input = POINTS; }
 
 /// Writes `dust`.
 pub(crate) static DUSTY: Node = Node::new(
     "Dusty",
     1,
-    "Makes dust.",
+    "Writes `dust`.",
     Cook::Pure(|cx| {
         cx.publish(WANTED, f64::from(u8::from(cx.wants(DUST))));
         let mut geometry = cx.input(DUSTY_POINTS).clone();
@@ -318,15 +318,15 @@ pub(crate) static DUSTY: Node = Node::new(
 // ——— window ———
 
 params! { FOLLOW_PARAMS:
-    FRAMES: Param<i64> = Param::int("frames", 8, "How far it looks back.").unit(Unit::Frames).at_least(0.0);
-    PREROLL: Param<i64> = Param::int("preroll", 0, "Frames before the scene's first that it has seen.").unit(Unit::Frames)
+    FRAMES: Param<i64> = Param::int("frames", 8, "Length of the window.").unit(Unit::Frames).at_least(0.0);
+    PREROLL: Param<i64> = Param::int("preroll", 0, "Frames before the scene's first that it reads.").unit(Unit::Frames)
         .at_least(0.0);
-    RATE: Param<f32> = Param::float("rate", 0.5, "Share of the way made a frame.").within(0.0, 1.0);
+    RATE: Param<f32> = Param::float("rate", 0.5, "Fraction of the distance covered per frame.").within(0.0, 1.0);
     FOLLOW_PROBE: Param<i64> = PROBE;
 }
 inputs! { FOLLOW_INPUTS:
     FOLLOW_POINTS: Input = POINTS;
-    ANCHOR: Input<Opt> = Input::optional("anchor", engine::geometry::Kind::Points, "What it is relative to.")
+    ANCHOR: Input<Opt> = Input::optional("anchor", engine::geometry::Kind::Points, "Points that the result is relative to.")
         .read_at(|_| Times::START);
 }
 
@@ -338,13 +338,13 @@ struct Follow {
 
 impl Chain for Follow {
     fn start(cx: &FrameCx) -> Result<Self> {
-        note(cx, "start", Some(cx.frame().number()), Vec::new());
+        record(cx, "start", Some(cx.frame().number()), Vec::new());
         let anchor = cx.at_start(ANCHOR).map_or(0.0, first_x);
         Ok(Self { xs: cx.part(FOLLOW_POINTS).positions().iter().map(|p| p[0]).collect(), anchor })
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
-        note(cx, "step", Some(cx.frame().number()), Vec::new());
+        record(cx, "step", Some(cx.frame().number()), Vec::new());
         let rate = cx.get(RATE);
         for (x, goal) in self.xs.iter_mut().zip(cx.part(FOLLOW_POINTS).positions()) {
             *x += (goal[0] - *x) * rate;
@@ -353,7 +353,7 @@ impl Chain for Follow {
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
-        note(cx, "output", Some(cx.frame().number()), Vec::new());
+        record(cx, "output", Some(cx.frame().number()), Vec::new());
         let mut geometry = cx.input(FOLLOW_POINTS).clone();
         let points = geometry.part_mut(engine::geometry::Kind::Points).expect("the engine checks what an input needs");
         points.set(P, self.xs.iter().map(|x| [*x - self.anchor, 0.0, 0.0]).collect())?;
@@ -365,38 +365,39 @@ fn past(params: &Params, _: Clock) -> Past {
     Past { frames: params.get(FRAMES) as u32, preroll: params.get(PREROLL) as u32 }
 }
 
-/// Follows its input, half of the way a frame.
+/// Follows its input, by half of the distance per frame.
 const FOLLOW_NODE: Node = Node::new("Follow", 1, "Points that lag.", Cook::window::<Follow>(past))
     .inputs(FOLLOW_INPUTS)
     .params(FOLLOW_PARAMS)
     .outputs(&[&OUT])
     .writes(&[&P]);
 
-/// Follows its input, half of the way a frame.
+/// Follows its input, by half of the distance per frame.
 pub(crate) static FOLLOW: Node = FOLLOW_NODE;
 
-/// The same, and between frames on the straight line between its neighbours.
-pub(crate) static MENDED: Node = Node { name: "Mended", ..FOLLOW_NODE }.mends_between(|[from, to], share, between| {
-    let straight = first_x(from) + (first_x(to) - first_x(from)) * share;
-    *between = moved(between, |_| straight).expect("as many rows as before");
-});
+/// The same, with linear interpolation between frames.
+pub(crate) static CORRECTED: Node =
+    Node { name: "Corrected", ..FOLLOW_NODE }.mends_between(|[from, to], share, between| {
+        let straight = first_x(from) + (first_x(to) - first_x(from)) * share;
+        *between = moved(between, |_| straight).expect("as many rows as before");
+    });
 
 // ——— solver ———
 
-/// Where no start is set.
+/// The value of a start that is not set.
 const UNSET: i64 = -1_000_000;
 
 params! { BOUNCE_PARAMS:
-    START: Param<i64> = Param::int("start_frame", UNSET, "Where it starts; the scene's first frame if left out.").fixed();
-    GRAVITY: Param<f32> = Param::float("gravity", -9.81, "How fast it falls.").unit(Unit::MetresPerSecondSquared);
+    START: Param<i64> = Param::int("start_frame", UNSET, "The start frame; the scene's first frame if left out.").fixed();
+    GRAVITY: Param<f32> = Param::float("gravity", -9.81, "Acceleration.").unit(Unit::MetresPerSecondSquared);
     SAMPLES: Param<i64> = Param::int("samples", 4, "Times within a step at which the floor is read.").within(1.0, 8.0);
     BOUNCE_PROBE: Param<i64> = PROBE;
 }
 inputs! { BOUNCE_INPUTS:
-    DROPPED: Input = Input::one("points", engine::geometry::Kind::Points, "Where points start.").read_at(|_| Times::START);
-    FLOOR: Input<Opt> = Input::optional("floor", engine::geometry::Kind::Points, "How high the floor is.")
+    DROPPED: Input = Input::one("points", engine::geometry::Kind::Points, "Positions at the start.").read_at(|_| Times::START);
+    FLOOR: Input<Opt> = Input::optional("floor", engine::geometry::Kind::Points, "Height of the floor.")
         .read_at(|params| Times::within_step(params.get(SAMPLES) as u8));
-    PUSH: Input<Opt> = Input::optional("push", engine::geometry::Kind::Points, "What is added each frame.");
+    PUSH: Input<Opt> = Input::optional("push", engine::geometry::Kind::Points, "Displacement per frame.");
 }
 
 /// Points that fall along x and bounce off a floor.
@@ -408,7 +409,7 @@ struct Bounce {
 
 impl Chain for Bounce {
     fn start(cx: &FrameCx) -> Result<Self> {
-        note(cx, "start", Some(cx.frame().number()), Vec::new());
+        record(cx, "start", Some(cx.frame().number()), Vec::new());
         let dropped = cx.at_start(DROPPED).points().expect("the engine checks what an input needs");
         let x: Vec<f64> = dropped.positions().iter().map(|p| f64::from(p[0])).collect();
         Ok(Self { v: vec![0.0; x.len()], x })
@@ -416,7 +417,7 @@ impl Chain for Bounce {
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
         let samples = cx.samples(FLOOR);
-        note(cx, "step", Some(cx.frame().number()), samples.iter().map(|(frame, _)| frame.number()).collect());
+        record(cx, "step", Some(cx.frame().number()), samples.iter().map(|(frame, _)| frame.number()).collect());
         let push = cx.input(PUSH).map_or(0.0, |push| f64::from(first_x(push)));
         let steps = samples.len().saturating_sub(1).max(1);
         let dt = cx.dt() / steps as f64;
@@ -435,7 +436,7 @@ impl Chain for Bounce {
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
-        note(cx, "output", Some(cx.frame().number()), Vec::new());
+        record(cx, "output", Some(cx.frame().number()), Vec::new());
         Ok(OUT.with(Geometry::from(Component::points(self.x.iter().map(|x| [*x as f32, 0.0, 0.0]).collect()))))
     }
 }

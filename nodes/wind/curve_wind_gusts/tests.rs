@@ -325,7 +325,7 @@ fn ranges_below_0_and_backwards_are_refused() {
     assert_eq!(fact(RADIUS_RANGE, -1.0, 1.0), "`radius_range` is [-1, 1]; expected at least 0 m");
     assert_eq!(
         fact(SPEED_RANGE, 3.0, 1.0),
-        "`speed_range` is [3, 1], which runs backwards; write the smaller number first"
+        "`speed_range` is [3, 1], whose lower end is greater than its upper end; write the smaller number first"
     );
     assert!(fact(LIFE_RANGE, -5.0, 5.0).contains("expected 0…1000000000 frames"));
     assert!(fact(RADIUS_NOISE_RANGE, 0.0, 1.5).contains("expected 0…1"));

@@ -88,7 +88,7 @@ impl DiskCache {
             io::ErrorKind::StorageFull => "the disk is full".to_owned(),
             _ => error.to_string(),
         };
-        self.notes.push(format!("the cache `{folder}` could not be written: {why}; the cook goes on without it"));
+        self.notes.push(format!("the cache `{folder}` could not be written: {why}; cooking continues without it"));
         self.is_broken = true;
     }
 

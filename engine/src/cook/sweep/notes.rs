@@ -55,7 +55,9 @@ impl Sweep<'_, '_, '_> {
                 let output = &self.plan.graph.outputs[*output].name;
                 let near = nearest(name, self.requested.unused.iter().map(|name| &**name));
                 let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-                self.report.notes.push(format!("output `{output}` asks for `{name}`, which no frame of it has{hint}"));
+                self.report
+                    .notes
+                    .push(format!("output `{output}` requests the attribute `{name}`, which it has at no frame{hint}"));
             }
         }
     }

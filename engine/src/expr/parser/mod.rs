@@ -1,8 +1,8 @@
-//! Text to nodes, by operator precedence (Pratt).
+//! Parses a text into nodes by operator precedence (Pratt).
 //!
-//! Promise: any string ends in nodes or in faults with their places, never in a panic; time is
-//! linear in the text and the stack is bounded by [`MAX_DEPTH`]. A program reports the first fault
-//! of every line, up to [`MAX_FAULTS`]. Limit: widths are not known here; `check` looks at them.
+//! Promise: any string gives nodes or faults with positions, never a panic; time is linear in the length of the text
+//! and the stack is bounded by [`MAX_DEPTH`]. A program reports the first fault of every line, up to [`MAX_FAULTS`].
+//! Limit: widths are not checked here but in `check`.
 
 mod names;
 mod operators;
@@ -13,42 +13,42 @@ use std::collections::BTreeMap;
 use super::Scope;
 use super::ast::{Ast, COMPONENTS, Node, NodeId, Statement, Target};
 use super::code::Unary;
-use super::error::{ExprError, Place};
+use super::error::{ExprError, Position};
 use super::functions;
 use super::lexer::{Lexer, Symbol, Token, TokenKind};
 pub use names::RESERVED;
 use names::{check_count, unexpected};
-use operators::{CONDITION, EQUALITY, LOOSEST, ORDER, POWER, Power, SIGN, infix, is_assignment};
+use operators::{CONDITION, EQUALITY, LOWEST, ORDER, POWER, Precedence, SIGN, infix, is_assignment};
 
 /// Longest text, in bytes.
 pub(super) const MAX_TEXT: usize = 1 << 20;
-/// Most numbers, names, operators and calls in a text.
+/// The largest number of numbers, names, operators and calls in a text.
 pub(super) const MAX_NODES: usize = 4096;
-/// Deepest nesting of brackets, signs, powers and conditions. A level takes some hundred bytes of
-/// stack; people write about ten.
+/// Deepest nesting of brackets, signs, powers and conditions. A level takes some hundred bytes of stack; typical texts
+/// have about ten.
 pub(super) const MAX_DEPTH: usize = 200;
-/// Most faults that a program reports.
+/// The largest number of faults that a program reports.
 pub(super) const MAX_FAULTS: usize = 50;
 
 /// Parses an expression: no attributes, one value.
 pub(super) fn expression(text: &str, scope: &Scope<'_>) -> Result<Ast, ExprError> {
     let mut parser = Parser::new(text, scope, Language::Expression)?;
-    // A newline in an expression is a blank, as between brackets.
+    // In an expression a newline is a blank, as between brackets.
     parser.open = 1;
     if parser.peek()?.kind == TokenKind::End {
-        return Err(Place::START.fault("the expression is empty"));
+        return Err(Position::START.fault("the expression is empty"));
     }
-    let value = parser.expression(LOOSEST)?;
+    let value = parser.expression(LOWEST)?;
     let end = parser.next()?;
     if end.kind != TokenKind::End {
         return Err(unexpected(&end, "an operator or the end"));
     }
-    let place = Place::START;
-    parser.ast.statements.push(Statement { target: Target::Result, place, value });
+    let position = Position::START;
+    parser.ast.statements.push(Statement { target: Target::Result, position, value });
     Ok(parser.ast)
 }
 
-/// Parses a program: assignments, one a line or divided by `;`.
+/// Parses a program: assignments, one per line or separated by `;`.
 pub(super) fn program(text: &str, scope: &Scope<'_>) -> Result<Ast, Vec<ExprError>> {
     let mut parser = Parser::new(text, scope, Language::Program).map_err(|fault| vec![fault])?;
     let mut faults = Vec::new();
@@ -77,11 +77,11 @@ enum Language {
 struct Parser<'a> {
     lexer: Lexer<'a>,
     peeked: Option<Token<'a>>,
-    /// The last token taken ended a line.
+    /// Whether the last token taken ended a line.
     line_ended: bool,
     scope: &'a Scope<'a>,
     language: Language,
-    /// Brackets around the next token; between them a newline is a blank.
+    /// Open brackets at the next token; inside brackets a newline is a blank.
     open: usize,
     depth: usize,
     ast: Ast,
@@ -93,7 +93,7 @@ impl<'a> Parser<'a> {
     fn new(text: &'a str, scope: &'a Scope<'a>, language: Language) -> Result<Self, ExprError> {
         if text.len() > MAX_TEXT {
             let fact = format!("the text has {} bytes, more than {MAX_TEXT}", text.len());
-            return Err(Place::START.fault(fact));
+            return Err(Position::START.fault(fact));
         }
         Ok(Parser {
             lexer: Lexer::new(text),
@@ -142,19 +142,19 @@ impl<'a> Parser<'a> {
         Ok(found)
     }
 
-    /// Passes the `)` that belongs to `opened`.
+    /// Consumes the `)` that closes `opened`.
     fn close(&mut self, opened: &Token<'a>, expected: &str) -> Result<(), ExprError> {
         let token = self.next()?;
         if token.kind != TokenKind::Symbol(Symbol::Close) {
-            let Place { line, column } = opened.place;
-            let here = if line == token.place.line {
+            let Position { line, column } = opened.position;
+            let here = if line == token.position.line {
                 format!("column {column}")
             } else {
                 format!("line {line}, column {column}")
             };
             let fault = unexpected(&token, expected);
             return Err(match fault.hint {
-                None => fault.hint(format!("the `(` at {here} is still open")),
+                None => fault.hint(format!("the `(` at {here} is not closed")),
                 Some(_) => fault,
             });
         }
@@ -162,13 +162,13 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    fn push(&mut self, node: Node, place: Place) -> Result<NodeId, ExprError> {
+    fn push(&mut self, node: Node, position: Position) -> Result<NodeId, ExprError> {
         if self.ast.nodes.len() >= MAX_NODES {
             let fact = format!("the text has more than {MAX_NODES} numbers, names and operators");
-            return Err(place.fault(fact));
+            return Err(position.fault(fact));
         }
         self.ast.nodes.push(node);
-        self.ast.places.push(place);
+        self.ast.positions.push(position);
         Ok((self.ast.nodes.len() - 1) as NodeId)
     }
 
@@ -180,13 +180,13 @@ impl<'a> Parser<'a> {
         })
     }
 
-    /// An expression whose operators all hold at least as tightly as `loosest`.
-    fn expression(&mut self, loosest: Power) -> Result<NodeId, ExprError> {
-        let start = self.peek()?.place;
+    /// Parses an expression of operators with at least the precedence `lowest`.
+    fn expression(&mut self, lowest: Precedence) -> Result<NodeId, ExprError> {
+        let start = self.peek()?.position;
         if self.depth == MAX_DEPTH {
             let fault = start.fault(format!("nested deeper than {MAX_DEPTH} levels"));
             return Err(match self.language {
-                Language::Program => fault.hint("name its parts with `let`"),
+                Language::Program => fault.hint("split it with `let`"),
                 Language::Expression => fault,
             });
         }
@@ -196,25 +196,25 @@ impl<'a> Parser<'a> {
         loop {
             let token = self.peek()?;
             let TokenKind::Symbol(symbol) = token.kind else { break };
-            if symbol == Symbol::Question && CONDITION >= loosest {
+            if symbol == Symbol::Question && CONDITION >= lowest {
                 left = self.condition(left)?;
                 continue;
             }
-            let Some((power, operator)) = infix(symbol) else { break };
-            if power < loosest || is_assignment(symbol) {
+            let Some((precedence, operator)) = infix(symbol) else { break };
+            if precedence < lowest || is_assignment(symbol) {
                 break;
             }
-            if power == EQUALITY || power == ORDER {
-                if compared == Some(power) {
-                    let fault = token.place.fault("comparisons cannot be chained");
+            if precedence == EQUALITY || precedence == ORDER {
+                if compared == Some(precedence) {
+                    let fault = token.position.fault("comparisons cannot be chained");
                     return Err(fault.hint("write `a < b && b < c`"));
                 }
-                compared = Some(power);
+                compared = Some(precedence);
             }
             self.next()?;
-            // `^` takes its right side first, and a sign in it: 2^-3^2 = 2^(-(3^2)).
-            let right = self.expression(if power == POWER { SIGN } else { power + 1 })?;
-            left = self.push(Node::Binary(operator, left, right), token.place)?;
+            // `^` is right-associative, and its exponent may have a sign: 2^-3^2 = 2^(-(3^2)).
+            let right = self.expression(if precedence == POWER { SIGN } else { precedence + 1 })?;
+            left = self.push(Node::Binary(operator, left, right), token.position)?;
         }
         self.depth -= 1;
         Ok(left)
@@ -223,20 +223,20 @@ impl<'a> Parser<'a> {
     /// The rest of `condition ? yes : no`, from the `?`.
     fn condition(&mut self, condition: NodeId) -> Result<NodeId, ExprError> {
         let question = self.next()?;
-        let yes = self.expression(LOOSEST)?;
+        let yes = self.expression(LOWEST)?;
         let colon = self.next()?;
         if colon.kind != TokenKind::Symbol(Symbol::Colon) {
             let fault = unexpected(&colon, "`:`");
-            return Err(fault.hint("a choice is written `condition ? yes : no`"));
+            return Err(fault.hint("write `condition ? yes : no`"));
         }
         let no = self.expression(CONDITION)?;
-        self.push(Node::Select(condition, yes, no), question.place)
+        self.push(Node::Select(condition, yes, no), question.position)
     }
 
-    /// What stands between operators, with its signs before and components behind.
+    /// Parses an operand with its signs and component accesses.
     fn operand(&mut self) -> Result<NodeId, ExprError> {
         if let Some(opened) = self.open(Symbol::Open)? {
-            let inner = self.expression(LOOSEST)?;
+            let inner = self.expression(LOWEST)?;
             self.close(&opened, "an operator or `)`")?;
             return self.components(inner);
         }
@@ -246,23 +246,23 @@ impl<'a> Parser<'a> {
             TokenKind::Symbol(Symbol::Minus) => Node::Unary(Unary::Negate, self.expression(SIGN)?),
             TokenKind::Symbol(Symbol::Not) => Node::Unary(Unary::Not, self.expression(SIGN)?),
             TokenKind::Number(value) => Node::Number(value),
-            TokenKind::Attribute(name) => self.attribute_node(name, token.place)?,
+            TokenKind::Attribute(name) => self.attribute_node(name, token.position)?,
             TokenKind::Name(name) => match self.open(Symbol::Open)? {
-                Some(opened) => self.call(name, token.place, &opened)?,
-                None => self.named(name, token.place)?,
+                Some(opened) => self.call(name, token.position, &opened)?,
+                None => self.named(name, token.position)?,
             },
             _ => return Err(unexpected(&token, "a value")),
         };
         let is_signed = matches!(node, Node::Unary(..));
-        let id = self.push(node, token.place)?;
+        let id = self.push(node, token.position)?;
         if is_signed { Ok(id) } else { self.components(id) }
     }
 
-    /// The `.x` behind an operand, as often as there is one.
+    /// Parses any number of `.x` after an operand.
     fn components(&mut self, mut of: NodeId) -> Result<NodeId, ExprError> {
         while let Some(dot) = self.next_if(Symbol::Dot)? {
             let component = self.component_name()?;
-            of = self.push(Node::Component(of, component), dot.place)?;
+            of = self.push(Node::Component(of, component), dot.position)?;
         }
         Ok(of)
     }
@@ -271,8 +271,8 @@ impl<'a> Parser<'a> {
         let token = self.next()?;
         if let TokenKind::Name(name) = token.kind {
             let colours = ["r", "g", "b", "a"];
-            let is_it = |k: &usize| COMPONENTS[*k] == name || colours[*k] == name;
-            if let Some(k) = (0..COMPONENTS.len()).find(is_it) {
+            let matches = |k: &usize| COMPONENTS[*k] == name || colours[*k] == name;
+            if let Some(k) = (0..COMPONENTS.len()).find(matches) {
                 return Ok(k as u32);
             }
         }
@@ -280,20 +280,20 @@ impl<'a> Parser<'a> {
         Err(unexpected(&token, "a component").hint(hint))
     }
 
-    /// A call, from behind its `(`.
-    fn call(&mut self, name: &str, place: Place, opened: &Token<'a>) -> Result<Node, ExprError> {
+    /// Parses a call after its `(`.
+    fn call(&mut self, name: &str, position: Position, opened: &Token<'a>) -> Result<Node, ExprError> {
         let Some(function) = functions::find(name) else {
-            return Err(self.unknown_function(name, place));
+            return Err(self.unknown_function(name, position));
         };
         let mut arguments = Vec::new();
         if self.peek()?.kind != TokenKind::Symbol(Symbol::Close) {
-            arguments.push(self.expression(LOOSEST)?);
+            arguments.push(self.expression(LOWEST)?);
             while self.next_if(Symbol::Comma)?.is_some() {
-                arguments.push(self.expression(LOOSEST)?);
+                arguments.push(self.expression(LOWEST)?);
             }
         }
         self.close(opened, "`,` or `)`")?;
-        check_count(function, arguments.len(), place)?;
+        check_count(function, arguments.len(), position)?;
         let first = self.ast.arguments.len() as u32;
         self.ast.arguments.extend_from_slice(&arguments);
         Ok(Node::Call(function, first, arguments.len() as u32))

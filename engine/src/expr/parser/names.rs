@@ -1,20 +1,21 @@
-//! Names: what they mean, and what is said where they mean nothing.
+//! Resolves names, and reports unknown ones.
 
 use super::super::ast::Node;
 use super::super::code::Input;
-use super::super::error::{ExprError, Place};
+use super::super::error::{ExprError, Position};
 use super::super::functions::{self, FOREIGN, FUNCTIONS, Function};
 use super::super::lexer::{Symbol, Token, TokenKind, is_name};
 use super::super::suggest::{listed, shortened};
 use super::{Language, Parser};
 use crate::geometry::fixed_type;
 
-/// Names with a meaning of their own in the language, which neither controls nor `let` nor plain attributes take.
+/// Names with a fixed meaning in the language, which controls and `let` values must not have and which attributes can
+/// only have with `@`.
 pub const RESERVED: [&str; 8] = ["frame", "time", "fps", "seed", "pi", "i", "count", "let"];
 
 impl<'a> Parser<'a> {
-    /// What a bare name means: the language's own names before `let`, controls, attributes.
-    pub(super) fn named(&mut self, name: &'a str, place: Place) -> Result<Node, ExprError> {
+    /// Resolves a name: names of the language first, then `let`, controls, attributes.
+    pub(super) fn named(&mut self, name: &'a str, position: Position) -> Result<Node, ExprError> {
         let in_program = self.language == Language::Program;
         Ok(match name {
             "frame" => Node::Input(Input::Frame),
@@ -30,53 +31,55 @@ impl<'a> Parser<'a> {
                 } else if let Some(control) = self.scope.control(name) {
                     Node::Control(control as u32)
                 } else if let Some(function) = functions::find(name) {
-                    let fault = place.fault(format!("`{name}` is a function"));
+                    let fault = position.fault(format!("`{name}` is a function"));
                     return Err(fault.hint(format!("write `{}`", function.usage)));
                 } else if in_program && name != "let" {
                     Node::Attribute(self.attribute(name))
                 } else {
-                    return Err(self.unknown_name(name, place));
+                    return Err(self.unknown_name(name, position));
                 }
             }
         })
     }
 
-    pub(super) fn attribute_node(&mut self, name: &'a str, place: Place) -> Result<Node, ExprError> {
+    pub(super) fn attribute_node(&mut self, name: &'a str, position: Position) -> Result<Node, ExprError> {
         if self.language == Language::Program {
             return Ok(Node::Attribute(self.attribute(name)));
         }
-        let fault = place.fault(format!("the attribute `{}` cannot be read here", shortened(name)));
-        Err(fault.hint("attributes are read by Attribute_Expr; a param may be masked by one"))
+        let fault = position.fault(format!("the attribute `{}` cannot be read here", shortened(name)));
+        Err(fault.hint(
+            "only Attribute_Expr reads attributes; a param can be masked by one: {\"value\": …, \"attribute\": \"…\"}",
+        ))
     }
 
-    fn unknown_name(&self, name: &str, place: Place) -> ExprError {
+    fn unknown_name(&self, name: &str, position: Position) -> ExprError {
         let own = RESERVED[..5].iter().copied();
         let controls = self.scope.controls.iter().map(|(name, _)| *name).filter(|name| is_name(name));
         let candidates: Vec<&str> = own.chain(controls).collect();
-        let listed = || listed(&candidates).map(|names| format!("known are {names}"));
-        let fault = place.fault(format!("the name `{}` is not known", shortened(name)));
+        let listed = || listed(&candidates).map(|names| format!("known names: {names}"));
+        let fault = position.fault(format!("unknown name `{}`", shortened(name)));
         if matches!(name, "i" | "count") || fixed_type(name).is_some() {
-            return fault.hint("attributes, `i` and `count` are known in Attribute_Expr only");
+            return fault.hint("attributes, `i` and `count` can only be used in Attribute_Expr");
         }
         foreign(fault, name, candidates.iter().copied(), listed)
     }
 
-    pub(super) fn unknown_function(&self, name: &str, place: Place) -> ExprError {
+    pub(super) fn unknown_function(&self, name: &str, position: Position) -> ExprError {
         let is_value = RESERVED.contains(&name)
             || self.locals.contains_key(name)
             || self.scope.control(name).is_some()
             || self.attributes.contains_key(name);
         if is_value {
             let name = shortened(name);
-            let fault = place.fault(format!("`{name}` is a value, not a function"));
-            return fault.hint(format!("multiplication is written `{name}*(…)`"));
+            let fault = position.fault(format!("`{name}` is a value, not a function"));
+            return fault.hint(format!("to multiply, write `{name}*(…)`"));
         }
-        let fault = place.fault(format!("there is no function `{}`", shortened(name)));
+        let fault = position.fault(format!("there is no function `{}`", shortened(name)));
         foreign(fault, name, FUNCTIONS.iter().map(|function| function.name), || None)
     }
 }
 
-/// Adds what a name of another language is called here, or the nearest name that is known.
+/// Adds a hint: the equivalent of a name of another language, or the most similar known name.
 fn foreign<'n>(
     fault: ExprError,
     name: &str,
@@ -84,12 +87,12 @@ fn foreign<'n>(
     otherwise: impl FnOnce() -> Option<String>,
 ) -> ExprError {
     match FOREIGN.iter().find(|(theirs, _)| *theirs == name) {
-        Some((_, ours)) => fault.hint(format!("it is written `{ours}`")),
+        Some((_, ours)) => fault.hint(format!("write `{ours}`")),
         None => fault.suggest(name, candidates, otherwise),
     }
 }
 
-pub(super) fn check_count(function: &Function, given: usize, place: Place) -> Result<(), ExprError> {
+pub(super) fn check_count(function: &Function, given: usize, position: Position) -> Result<(), ExprError> {
     let (fewest, most) = function.arguments;
     if (fewest..=most).contains(&given) {
         return Ok(());
@@ -99,7 +102,7 @@ pub(super) fn check_count(function: &Function, given: usize, place: Place) -> Re
         _ if fewest == most => format!("{fewest} arguments"),
         _ => format!("{fewest} to {most} arguments"),
     };
-    let fault = place.fault(format!("`{}` takes {wanted}, not {given}", function.name));
+    let fault = position.fault(format!("`{}` takes {wanted}, not {given}", function.name));
     Err(fault.hint(format!("write `{}`", function.usage)))
 }
 
@@ -109,16 +112,16 @@ pub(super) fn unexpected(token: &Token<'_>, expected: &str) -> ExprError {
         TokenKind::Newline => "the end of the line".to_owned(),
         _ => format!("`{}`", shortened(token.text)),
     };
-    let fault = token.place.fault(format!("expected {expected}, found {found}"));
+    let fault = token.position.fault(format!("expected {expected}, found {found}"));
     let after_value = expected.starts_with("an operator");
     match token.kind {
-        TokenKind::Symbol(Symbol::Assign) => fault.hint("`==` compares"),
+        TokenKind::Symbol(Symbol::Assign) => fault.hint("to compare, write `==`"),
         TokenKind::Number(_) | TokenKind::Name(_) | TokenKind::Attribute(_) | TokenKind::Symbol(Symbol::Open)
             if after_value =>
         {
-            fault.hint("multiplication is written `*`")
+            fault.hint("to multiply, write `*`")
         }
-        TokenKind::Newline => fault.hint("an expression goes on over lines between `(` and `)`"),
+        TokenKind::Newline => fault.hint("to continue on the next line, enclose the expression in `(` and `)`"),
         _ => fault,
     }
 }

@@ -1,19 +1,19 @@
-//! The operators: how tightly each holds, and what it does.
+//! The binary operators: precedence and operation.
 
 use super::super::ast::Operator;
 use super::super::code::Binary;
 use super::super::lexer::Symbol;
 
-/// How tightly an operator holds its operands, loosest first.
-pub(super) type Power = u8;
-pub(super) const LOOSEST: Power = 0;
-pub(super) const CONDITION: Power = 1;
-pub(super) const EQUALITY: Power = 4;
-pub(super) const ORDER: Power = 5;
-pub(super) const SIGN: Power = 8;
-pub(super) const POWER: Power = 9;
+/// The precedence of an operator; a higher one binds more tightly.
+pub(super) type Precedence = u8;
+pub(super) const LOWEST: Precedence = 0;
+pub(super) const CONDITION: Precedence = 1;
+pub(super) const EQUALITY: Precedence = 4;
+pub(super) const ORDER: Precedence = 5;
+pub(super) const SIGN: Precedence = 8;
+pub(super) const POWER: Precedence = 9;
 
-pub(super) fn infix(symbol: Symbol) -> Option<(Power, Operator)> {
+pub(super) fn infix(symbol: Symbol) -> Option<(Precedence, Operator)> {
     let arithmetic = |op, text| Operator { text, op, swapped: false, on_vectors: true };
     let logic = |op, text| Operator { text, op, swapped: false, on_vectors: false };
     let swapped = |op, text| Operator { text, op, swapped: true, on_vectors: false };

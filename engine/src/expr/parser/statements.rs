@@ -1,12 +1,12 @@
-//! Assignments: what a line of a program may be.
+//! Parses the assignments of a program.
 
 use super::super::ast::{Node, NodeId, Statement, Target};
-use super::super::error::{ExprError, Place};
+use super::super::error::{ExprError, Position};
 use super::super::functions;
 use super::super::lexer::{Symbol, Token, TokenKind};
 use super::Parser;
 use super::names::{RESERVED, unexpected};
-use super::operators::{LOOSEST, infix, is_assignment};
+use super::operators::{LOWEST, infix, is_assignment};
 
 /// The target of a statement while its value is parsed.
 #[derive(Clone, Copy)]
@@ -16,7 +16,7 @@ enum Assigned<'a> {
 }
 
 impl<'a> Parser<'a> {
-    /// One statement with the end of its line; false at the end of the text.
+    /// Parses one statement and the end of its line; false at the end of the text.
     pub(super) fn statement(&mut self) -> Result<bool, ExprError> {
         let end = |token: &Token<'_>| {
             let semicolon = TokenKind::Symbol(Symbol::Semicolon);
@@ -33,7 +33,7 @@ impl<'a> Parser<'a> {
                 let TokenKind::Name(text) = name.kind else {
                     return Err(unexpected(&name, "a name after `let`"));
                 };
-                self.check_free(text, name.place)?;
+                self.check_free(text, name.position)?;
                 let assign = self.next()?;
                 if assign.kind != TokenKind::Symbol(Symbol::Assign) {
                     return Err(unexpected(&assign, "`=`"));
@@ -48,24 +48,24 @@ impl<'a> Parser<'a> {
                 let assign = self.next()?;
                 if !matches!(assign.kind, TokenKind::Symbol(symbol) if is_assignment(symbol)) {
                     let fault = unexpected(&assign, "`=`");
-                    return Err(fault.hint("a line assigns to an attribute: `name = expression`"));
+                    return Err(fault.hint("a line is an assignment: `name = expression`"));
                 }
                 if first.kind == TokenKind::Name(text) {
-                    self.check_assignable(text, first.place)?;
+                    self.check_assignable(text, first.position)?;
                 }
                 (Assigned::Attribute(self.attribute(text), component), assign)
             }
             _ => {
                 let fault = unexpected(&first, "the name of an attribute");
-                return Err(fault.hint("a line assigns to an attribute: `name = expression`"));
+                return Err(fault.hint("a line is an assignment: `name = expression`"));
             }
         };
 
         let value = match (target, assign.kind) {
             (Assigned::Attribute(attribute, component), TokenKind::Symbol(symbol)) if symbol != Symbol::Assign => {
-                self.updated(attribute, component, symbol, first.place, assign.place)?
+                self.updated(attribute, component, symbol, first.position, assign.position)?
             }
-            _ => self.expression(LOOSEST)?,
+            _ => self.expression(LOWEST)?,
         };
         let last = self.next()?;
         if !end(&last) && last.kind != TokenKind::End {
@@ -81,7 +81,7 @@ impl<'a> Parser<'a> {
                 Target::Local
             }
         };
-        self.ast.statements.push(Statement { target, place: first.place, value });
+        self.ast.statements.push(Statement { target, position: first.position, value });
         Ok(true)
     }
 
@@ -91,25 +91,25 @@ impl<'a> Parser<'a> {
         attribute: u32,
         component: Option<u32>,
         symbol: Symbol,
-        target: Place,
-        place: Place,
+        target: Position,
+        position: Position,
     ) -> Result<NodeId, ExprError> {
         let mut old = self.push(Node::Attribute(attribute), target)?;
         if let Some(component) = component {
             old = self.push(Node::Component(old, component), target)?;
         }
-        let change = self.expression(LOOSEST)?;
+        let change = self.expression(LOWEST)?;
         match infix(symbol) {
-            Some((_, operator)) => self.push(Node::Binary(operator, old, change), place),
+            Some((_, operator)) => self.push(Node::Binary(operator, old, change), position),
             None => Ok(change),
         }
     }
 
-    /// Goes on behind a fault: at the next line.
+    /// Continues after a fault at the next line.
     pub(super) fn recover(&mut self) {
         let parsed = self.ast.statements.last().map_or(0, |last| last.value as usize + 1);
         self.ast.nodes.truncate(parsed);
-        self.ast.places.truncate(parsed);
+        self.ast.positions.truncate(parsed);
         (self.open, self.depth) = (0, 0);
         let stop = |kind| matches!(kind, TokenKind::Newline | TokenKind::End);
         while !self.line_ended && !matches!(self.peek(), Ok(token) if stop(token.kind)) {
@@ -117,10 +117,10 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Refuses a name that means something else than a value of the text's own.
-    fn check_free(&self, name: &str, place: Place) -> Result<(), ExprError> {
+    /// Refuses a name that is reserved, a function or a control.
+    fn check_free(&self, name: &str, position: Position) -> Result<(), ExprError> {
         let fact = if RESERVED.contains(&name) {
-            format!("`{name}` has a meaning of its own and cannot be assigned")
+            format!("`{name}` is reserved and cannot be assigned")
         } else if functions::find(name).is_some() {
             format!("`{name}` is a function and cannot be assigned")
         } else if self.scope.control(name).is_some() {
@@ -128,15 +128,15 @@ impl<'a> Parser<'a> {
         } else {
             return Ok(());
         };
-        Err(place.fault(fact))
+        Err(position.fault(fact))
     }
 
-    fn check_assignable(&self, name: &str, place: Place) -> Result<(), ExprError> {
-        let attribute = format!("an attribute of that name is written `@{name}`");
-        self.check_free(name, place).map_err(|fault| fault.hint(attribute.as_str()))?;
+    fn check_assignable(&self, name: &str, position: Position) -> Result<(), ExprError> {
+        let attribute = format!("for an attribute with that name, write `@{name}`");
+        self.check_free(name, position).map_err(|fault| fault.hint(attribute.as_str()))?;
         if self.locals.contains_key(name) {
-            let fault = place.fault(format!("`{name}` is a `let` value and cannot be assigned"));
-            return Err(fault.hint(format!("write `let {name} = …` again, or {attribute}")));
+            let fault = position.fault(format!("`{name}` is a `let` value and cannot be assigned"));
+            return Err(fault.hint(format!("to redefine it, write `let {name} = …`; {attribute}")));
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What is refused, where, and what is proposed.
+//! Faults of expressions: positions, facts and hints.
 
 use super::super::parser::{MAX_DEPTH, MAX_NODES, MAX_TEXT};
 use super::*;
@@ -12,25 +12,26 @@ fn check(text: &str, column: usize, fact: &str, hint: Option<&str>) {
 }
 
 #[test]
-fn unknown_names_are_answered_with_near_ones() {
-    check("1 + tme", 5, "the name `tme` is not known", Some("did you mean `time`?"));
-    check("strenght", 1, "the name `strenght` is not known", Some("did you mean `strength`?"));
+fn similar_names_are_suggested_for_unknown_ones() {
+    check("1 + tme", 5, "unknown name `tme`", Some("did you mean `time`?"));
+    check("strenght", 1, "unknown name `strenght`", Some("did you mean `strength`?"));
     check("sine(1)", 1, "there is no function `sine`", Some("did you mean `sin`?"));
-    check("lerp(1, 2, 0)", 1, "there is no function `lerp`", Some("it is written `mix`"));
-    check("true", 1, "the name `true` is not known", Some("it is written `1`"));
-    let known = "known are `frame`, `time`, `fps`, `seed`, `pi`, `strength`, `wind`";
-    let there = Some("attributes, `i` and `count` are known in Attribute_Expr only");
-    check("P.x", 1, "the name `P` is not known", there);
-    check("2*i", 3, "the name `i` is not known", there);
-    check("zebra", 1, "the name `zebra` is not known", Some(known));
-    let masks = "attributes are read by Attribute_Expr; a param may be masked by one";
+    check("lerp(1, 2, 0)", 1, "there is no function `lerp`", Some("write `mix`"));
+    check("true", 1, "unknown name `true`", Some("write `1`"));
+    let known = "known names: `frame`, `time`, `fps`, `seed`, `pi`, `strength`, `wind`";
+    let attributes = Some("attributes, `i` and `count` can only be used in Attribute_Expr");
+    check("P.x", 1, "unknown name `P`", attributes);
+    check("2*i", 3, "unknown name `i`", attributes);
+    check("zebra", 1, "unknown name `zebra`", Some(known));
+    let masks =
+        "only Attribute_Expr reads attributes; a param can be masked by one: {\"value\": …, \"attribute\": \"…\"}";
     check("@P.x", 1, "the attribute `P` cannot be read here", Some(masks));
 }
 
 #[test]
-fn functions_and_values_are_not_taken_for_each_other() {
+fn functions_and_values_are_distinguished() {
     check("2*sin", 3, "`sin` is a function", Some("write `sin(x)`"));
-    let times = Some("multiplication is written `time*(…)`");
+    let times = Some("to multiply, write `time*(…)`");
     check("time(2)", 1, "`time` is a value, not a function", times);
     let write = Some("write `clamp(x, low, high)`");
     check("1 + clamp(1, 2)", 5, "`clamp` takes 3 arguments, not 2", write);
@@ -40,30 +41,30 @@ fn functions_and_values_are_not_taken_for_each_other() {
 }
 
 #[test]
-fn texts_that_stop_early_or_go_on_are_refused() {
+fn incomplete_texts_and_trailing_tokens_are_refused() {
     check("", 1, "the expression is empty", None);
     check(" // nothing", 1, "the expression is empty", None);
     check("1 +", 4, "expected a value, found the end", None);
-    check("(1 + 2", 7, "expected an operator or `)`, found the end", Some("the `(` at column 1 is still open"));
+    check("(1 + 2", 7, "expected an operator or `)`, found the end", Some("the `(` at column 1 is not closed"));
     check("1)", 2, "expected an operator or the end, found `)`", None);
-    let times = Some("multiplication is written `*`");
+    let times = Some("to multiply, write `*`");
     check("2 pi", 3, "expected an operator or the end, found `pi`", times);
     check("2(3)", 2, "expected an operator or the end, found `(`", times);
-    check("1 = 1", 3, "expected an operator or the end, found `=`", Some("`==` compares"));
-    check("1 ? 2", 6, "expected `:`, found the end", Some("a choice is written `condition ? yes : no`"));
-    check("min(1 2)", 7, "expected `,` or `)`, found `2`", Some("the `(` at column 4 is still open"));
+    check("1 = 1", 3, "expected an operator or the end, found `=`", Some("to compare, write `==`"));
+    check("1 ? 2", 6, "expected `:`, found the end", Some("write `condition ? yes : no`"));
+    check("min(1 2)", 7, "expected `,` or `)`, found `2`", Some("the `(` at column 4 is not closed"));
     check("*2", 1, "expected a value, found `*`", None);
-    check("2**3", 2, "`**` is no operator here", Some("a power is written `^`"));
-    check("1 & 1", 3, "`&` is no operator here", Some("a logical and is written `&&`"));
-    check("“1”", 1, "`“` has no meaning here", None);
-    check("é + $", 1, "`é` has no meaning here", None);
+    check("2**3", 2, "`**` is not an operator", Some("write a power as `^`"));
+    check("1 & 1", 3, "`&` is not an operator", Some("write a logical and as `&&`"));
+    check("“1”", 1, "unexpected character `“`", None);
+    check("é + $", 1, "unexpected character `é`", None);
     check("0 < time < 1", 10, "comparisons cannot be chained", Some("write `a < b && b < c`"));
     check("1e999", 1, "the number `1e999` is too large", None);
 }
 
 #[test]
 fn widths_must_fit() {
-    let part = Some("take a component, such as `.x`; a vector is three expressions");
+    let part = Some("take a component, such as `.x`; a vector param needs three expressions");
     check("wind", 1, "expected a scalar, found a 3-vector", part);
     let part = Some("take a component, such as `.x`, or `length(v)`");
     check("wind < 1", 6, "`<` takes scalars, not a 3-vector", part);
@@ -72,8 +73,8 @@ fn widths_must_fit() {
     check("rand(wind)", 1, "`rand` takes scalars, not a 3-vector", part);
     check("noise(wind, 1)", 1, "`noise` takes scalars, not a 3-vector", part);
     check("vec(wind).x", 1, "`vec` takes scalars, not a 3-vector", part);
-    check("(wind + vec(1, 2, 3, 4)).x", 7, "`+` cannot join a 3-vector and a 4-vector", None);
-    check("dot(wind, 1)", 1, "`dot` cannot join a 3-vector and a scalar", None);
+    check("(wind + vec(1, 2, 3, 4)).x", 7, "`+` cannot combine a 3-vector and a 4-vector", None);
+    check("dot(wind, 1)", 1, "`dot` cannot combine a 3-vector and a scalar", None);
     check("cross(wind, 1).x", 1, "`cross` takes 3-vectors, not a scalar", None);
     check("time.x", 5, "a scalar has no components", None);
     check("wind.w", 5, "a 3-vector has no component `.w`", None);
@@ -90,7 +91,7 @@ fn columns_count_characters() {
 }
 
 #[test]
-fn any_depth_is_answered() {
+fn any_depth_of_nesting_is_handled() {
     let deep = 100_000;
     for text in [
         "(".repeat(deep),
@@ -118,7 +119,7 @@ fn the_deepest_text_needs_little_stack() {
 }
 
 #[test]
-fn any_size_is_answered() {
+fn any_size_is_handled() {
     let long = format!("1{}", "+1".repeat(MAX_NODES / 2 - 1));
     assert_eq!(eval(&long), MAX_NODES as f64 / 2.0);
     let fact = format!("the text has more than {MAX_NODES} numbers, names and operators");
@@ -128,8 +129,8 @@ fn any_size_is_answered() {
 }
 
 #[test]
-fn code_that_grows_past_its_limit_is_refused() {
+fn code_with_too_many_instructions_is_refused() {
     let terms: Vec<String> = (0..650).map(|k| format!("normalize(normalize(wind*{k}.5))")).collect();
     let found = fault(&format!("({}).x", terms.join("+")));
-    assert_eq!(found.fact, "the text takes more than 16384 instructions");
+    assert_eq!(found.fact, "the text compiles to more than 16384 instructions");
 }

@@ -1,4 +1,4 @@
-//! Tests of the language as a whole: values, faults, programs, and against a second interpreter.
+//! Tests of the whole language: values, faults, programs, and comparison with a second interpreter.
 
 mod faults;
 mod programs;
@@ -7,7 +7,7 @@ mod values;
 
 use super::*;
 
-/// Frame 36 of 24 a second, `strength` 0.75, `wind` (1, 2, 3).
+/// Frame 36 at 24 frames per second, `strength` 0.75, `wind` (1, 2, 3).
 const ENV: Env<'_> = Env { frame: 36.0, time: 1.5, fps: 24.0, seed: 7.0, controls: &[0.75, 1.0, 2.0, 3.0] };
 
 const SCOPE: Scope<'_> = Scope { controls: &[("strength", Width::Scalar), ("wind", Width::Vec3)] };

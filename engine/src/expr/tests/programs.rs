@@ -18,7 +18,7 @@ fn run(text: &str, columns: &[(&str, &Column)]) -> Result<Vec<(String, Column)>,
     program.run(&ENV, columns, rows)
 }
 
-/// The columns that a program over three points at x = 1, 2, 3, y = 0.5 leaves.
+/// The columns written by a program that runs over three points at x = 1, 2, 3, y = 0.5.
 fn run_on_p(text: &str) -> Result<Vec<(String, Column)>, RunError> {
     run(text, &[("P", &f3(&[[1.0, 0.5, 0.0], [2.0, 0.5, 0.0], [3.0, 0.5, 0.0]]))])
 }
@@ -36,7 +36,7 @@ fn faults(text: &str) -> Vec<(usize, usize, String)> {
 }
 
 #[test]
-fn the_line_of_the_manual_runs() {
+fn the_example_of_the_manual_runs() {
     let envelope = f1(&[1.0, 0.5, 8.0]);
     let p = f3(&[[0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 0.0]]);
     let found = run("envelope = clamp(envelope*P.y, 0, 1)", &[("envelope", &envelope), ("P", &p)]);
@@ -52,14 +52,14 @@ fn a_new_attribute_is_as_wide_as_its_value() {
 }
 
 #[test]
-fn one_component_is_changed_alone() {
+fn single_components_can_be_changed() {
     check("P.z = P.x", &[("P", f3(&[[1.0, 0.5, 1.0], [2.0, 0.5, 2.0], [3.0, 0.5, 3.0]]))]);
     check("P.y += i; P.x *= 2", &[("P", f3(&[[2.0, 0.5, 0.0], [4.0, 1.5, 0.0], [6.0, 2.5, 0.0]]))]);
     check("P -= vec(1, 0.5, 0)", &[("P", f3(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]))]);
 }
 
 #[test]
-fn later_lines_see_what_earlier_ones_made() {
+fn later_lines_see_the_results_of_earlier_ones() {
     check("a = 1\na = a + i; b = a", &[("a", f1(&[1.0, 2.0, 3.0])), ("b", f1(&[1.0, 2.0, 3.0]))]);
     check("a = P\na.x = 0\nP.x = a.x + a.y", &[("a", f3(&[[0.0, 0.5, 0.0]; 3])), ("P", f3(&[[0.5, 0.5, 0.0]; 3]))]);
 }
@@ -71,7 +71,7 @@ fn later_lines_see_the_rounded_value() {
 }
 
 #[test]
-fn let_names_a_value_and_makes_no_attribute() {
+fn let_names_a_value_without_creating_an_attribute() {
     check("let h = P.y*2\nlet h = h + i\na = h", &[("a", f1(&[1.0, 2.0, 3.0]))]);
     check("let P = 7; a = P + @P.x", &[("a", f1(&[8.0, 9.0, 10.0]))]);
     check("let exact = 0.1; a = exact == 0.1", &[("a", f1(&[1.0; 3]))]);
@@ -88,14 +88,14 @@ fn an_attribute_keeps_its_type() {
 }
 
 #[test]
-fn at_names_the_attribute_that_another_name_hides() {
+fn at_refers_to_an_attribute_hidden_by_another_name() {
     let time = f1(&[10.0, 20.0]);
     let found = run("@time = @time + time + strength", &[("time", &time)]).unwrap();
     assert_eq!(found, [("time".to_owned(), f1(&[12.25, 22.25]))]);
 }
 
 #[test]
-fn controls_go_before_attributes_of_their_name() {
+fn controls_hide_attributes_of_the_same_name() {
     let strength = f1(&[5.0]);
     let found = run("a = strength; b = @strength", &[("strength", &strength)]).unwrap();
     assert_eq!(found, [("a".to_owned(), f1(&[0.75])), ("b".to_owned(), f1(&[5.0]))]);
@@ -108,13 +108,13 @@ fn lines_comments_and_brackets_are_read() {
 }
 
 #[test]
-fn no_rows_make_empty_columns() {
+fn without_rows_columns_are_empty() {
     let found = run("a = P.x", &[("P", &f3(&[]))]).unwrap();
     assert_eq!(found, [("a".to_owned(), f1(&[]))]);
 }
 
 #[test]
-fn input_columns_stay_what_they_are() {
+fn input_columns_are_not_changed() {
     let p = f3(&[[1.0, 2.0, 3.0]]);
     let held = p.clone();
     run("P.x = 9", &[("P", &p)]).unwrap();
@@ -134,12 +134,12 @@ fn reads_and_writes_are_known_before_running() {
 }
 
 #[test]
-fn every_line_reports_its_fault() {
+fn every_line_reports_its_first_fault() {
     let text = "a = 1 +\nb = 2\nP = 3\nc = clamp(1)\n time = 1\nd = (1\ne = 2\nv.w = 1";
     let found = faults(text);
     let lines: Vec<(usize, usize)> = found.iter().map(|(line, column, _)| (*line, *column)).collect();
     assert_eq!(lines, [(1, 8), (4, 5), (5, 2), (7, 1)]);
-    assert_eq!(found[2].2, "`time` has a meaning of its own and cannot be assigned");
+    assert_eq!(found[2].2, "`time` is reserved and cannot be assigned");
     assert_eq!(faults("a = 1\n\n$ = 1; é\n b = $").len(), 2);
     assert_eq!(faults(&"$\n".repeat(100_000)).len(), MAX_FAULTS);
     let widths = faults("b = 2\nP = 3\nv.w = 1\nlet x = P.x.x\na = vec(P)");
@@ -148,7 +148,7 @@ fn every_line_reports_its_fault() {
 }
 
 #[test]
-fn what_is_no_assignment_is_refused() {
+fn invalid_assignments_are_refused() {
     for (text, column, fact) in [
         ("P.x", 4, "expected `=`, found the end"),
         ("sin(1)", 4, "expected `=`, found `(`"),
@@ -162,18 +162,18 @@ fn what_is_no_assignment_is_refused() {
         ("let = 1", 5, "expected a name after `let`, found `=`"),
         ("a == 1", 3, "expected `=`, found `==`"),
         ("a = b = 1", 7, "expected an operator or the end of the line, found `=`"),
-        ("P = 1", 1, "`P` is a 3-vector, its value a scalar"),
-        ("envelope = P", 1, "`envelope` is a scalar, its value a 3-vector"),
-        ("P.x = P", 1, "`P.x` is a scalar, its value a 3-vector"),
+        ("P = 1", 1, "cannot assign a scalar to `P`, which is a 3-vector"),
+        ("envelope = P", 1, "cannot assign a 3-vector to `envelope`, which is a scalar"),
+        ("P.x = P", 1, "cannot assign a 3-vector to `P.x`, which is a scalar"),
         ("a = 1; a.x = 1", 8, "a scalar has no components"),
-        ("a = orient*P", 11, "`*` cannot join a 4-vector and a 3-vector"),
+        ("a = orient*P", 11, "`*` cannot combine a 4-vector and a 3-vector"),
     ] {
         assert_eq!(faults(text), [(1, column, fact.to_owned())], "{text}");
     }
 }
 
 #[test]
-fn what_only_the_columns_show_is_refused_when_it_runs() {
+fn faults_that_depend_on_the_columns_are_found_when_running() {
     let code = |text: &str, columns: &[(&str, &Column)]| match run(text, columns) {
         Err(RunError::Code(fault)) => fault,
         other => panic!("{text}: {other:?}"),
@@ -182,20 +182,20 @@ fn what_only_the_columns_show_is_refused_when_it_runs() {
     let columns = [("P", &p), ("mask", &mask)];
     let fault = code("a = 1\nb = msk*2", &columns);
     assert_eq!((fault.line, fault.column), (2, 5));
-    assert_eq!(fault.fact, "there is no attribute, control or value `msk`");
+    assert_eq!(fault.fact, "there is no attribute, control or `let` value `msk`");
     assert_eq!(fault.hint.as_deref(), Some("did you mean `mask`?"));
     let fault = code("let height = 1; b = hieght", &columns);
     assert_eq!(fault.hint.as_deref(), Some("did you mean `height`?"));
     let fault = code("b = zebra", &columns);
-    assert_eq!(fault.hint.as_deref(), Some("there are `P`, `mask`, `strength`, `wind`"));
+    assert_eq!(fault.hint.as_deref(), Some("available: `P`, `mask`, `strength`, `wind`"));
     assert_eq!(code("b = mask.x", &columns).fact, "a scalar has no components");
-    assert_eq!(code("mask = P", &columns).fact, "`mask` is a scalar, its value a 3-vector");
-    assert_eq!(code("v.x = 1", &columns).fact, "there is no attribute `v` yet");
-    assert_eq!(code("a = envelope", &columns).fact, "there is no attribute, control or value `envelope`");
+    assert_eq!(code("mask = P", &columns).fact, "cannot assign a 3-vector to `mask`, which is a scalar");
+    assert_eq!(code("v.x = 1", &columns).fact, "the attribute `v` does not exist yet");
+    assert_eq!(code("a = envelope", &columns).fact, "there is no attribute, control or `let` value `envelope`");
 }
 
 #[test]
-fn the_first_value_that_does_not_fit_is_named() {
+fn the_first_value_out_of_range_is_reported() {
     let value = |text: &str| match run_on_p(text) {
         Err(RunError::Value(bad)) => bad,
         other => panic!("{text}: {other:?}"),
@@ -212,7 +212,7 @@ fn the_first_value_that_does_not_fit_is_named() {
 }
 
 #[test]
-fn a_bad_value_that_is_replaced_does_no_harm() {
+fn a_value_that_is_overwritten_may_be_out_of_range() {
     check("a = 1/0\na = P.x", &[("a", f1(&[1.0, 2.0, 3.0]))]);
     check("a = P.x > 1 ? 1/(P.x - 1) : 0", &[("a", f1(&[0.0, 1.0, 0.5]))]);
 }
@@ -225,14 +225,14 @@ fn a_column_of_another_length_is_refused() {
 }
 
 #[test]
-fn errors_become_those_of_a_node() {
+fn errors_convert_to_those_of_a_node() {
     let bad = crate::Error::from(run_on_p("a = 1/(P.x - 1)").unwrap_err());
     assert_eq!(bad.kind, crate::ErrorKind::NotFinite);
     assert_eq!(bad.fact, "line 1, element 0: `a` would be inf, not a finite number");
     let code = crate::Error::from(run_on_p("a = tme").unwrap_err());
     assert_eq!(
         code.to_string(),
-        "line 1, column 5: there is no attribute, control or value `tme`; did you mean `time`?"
+        "line 1, column 5: there is no attribute, control or `let` value `tme`; did you mean `time`?"
     );
 }
 
@@ -252,14 +252,14 @@ fn any_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn the_first_bad_value_is_the_same_on_any_number_of_threads() {
+fn the_reported_value_is_the_same_on_any_number_of_threads() {
     let rows = 50_000;
     let x = Column::new((0..rows).map(|k| k as f32).collect::<Vec<f32>>());
     let program = Program::parse("a = 1/(x - 40000)\nb = 1/(x - 12345)\nc = 0", &SCOPE).unwrap();
     for threads in [1, 2, 7] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let Err(RunError::Value(bad)) = pool.install(|| program.run(&ENV, &[("x", &x)], rows)) else {
-            panic!("a division by zero went through");
+            panic!("the division by zero was not noticed");
         };
         assert_eq!((bad.attribute.as_str(), bad.element), ("a", 40_000));
     }

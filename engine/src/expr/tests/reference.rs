@@ -1,4 +1,5 @@
-//! The language against a second interpreter: random trees are printed, parsed and run, and walked.
+//! Compares the language with a second interpreter: random trees are printed, parsed and run, and also evaluated
+//! directly.
 
 use numerics::vector::DVec3;
 use proptest::prelude::*;
@@ -8,7 +9,7 @@ use super::super::code::{modulo, power};
 use super::*;
 use crate::geometry::Column;
 
-/// A tree as a child would evaluate it. Vectors are three wide.
+/// An expression tree that is evaluated recursively. Vectors have three components.
 #[derive(Clone, Debug)]
 enum Tree {
     Number(f64),
@@ -71,8 +72,8 @@ fn vector(scalar: impl Strategy<Value = Tree> + Clone + 'static) -> BoxedStrateg
     .boxed()
 }
 
-/// As tightly as C holds it; 9 for what needs no brackets anywhere.
-fn strength(tree: &Tree) -> u8 {
+/// The precedence in C; 9 and 10 for what is never bracketed.
+fn precedence(tree: &Tree) -> u8 {
     match tree {
         Tree::Choice(_) => 1,
         Tree::Binary(op, _) => match *op {
@@ -89,11 +90,11 @@ fn strength(tree: &Tree) -> u8 {
     }
 }
 
-/// With brackets only where they are needed, so that precedence is what is tested.
+/// Prints a tree with brackets only where they are needed, so that precedence is tested.
 fn print(tree: &Tree) -> String {
-    let held = |tree: &Tree, by: u8| {
+    let bracketed = |tree: &Tree, by: u8| {
         let text = print(tree);
-        if strength(tree) < by { format!("({text})") } else { text }
+        if precedence(tree) < by { format!("({text})") } else { text }
     };
     match tree {
         Tree::Number(value) => format!("{value:?}"),
@@ -101,29 +102,29 @@ fn print(tree: &Tree) -> String {
         Tree::Control => "strength".to_owned(),
         Tree::Px(k) => format!("P.{}", ["x", "y", "z"][*k]),
         Tree::P => "P".to_owned(),
-        Tree::Unary(op, a) => format!("{op}{}", held(a, 8)),
+        Tree::Unary(op, a) => format!("{op}{}", bracketed(a, 8)),
         Tree::Binary(op, pair) => {
-            let own = strength(tree);
+            let own = precedence(tree);
             let [a, b] = &**pair;
             match *op {
-                // From the right, and a sign may stand in the exponent.
-                "^" => format!("{}^{}", held(a, 10), held(b, 8)),
+                // Right-associative, and the exponent may have a sign.
+                "^" => format!("{}^{}", bracketed(a, 10), bracketed(b, 8)),
                 // Comparisons do not chain.
                 "==" | "!=" | "<" | "<=" | ">" | ">=" => {
-                    format!("{} {op} {}", held(a, own + 1), held(b, own + 1))
+                    format!("{} {op} {}", bracketed(a, own + 1), bracketed(b, own + 1))
                 }
-                _ => format!("{} {op} {}", held(a, own), held(b, own + 1)),
+                _ => format!("{} {op} {}", bracketed(a, own), bracketed(b, own + 1)),
             }
         }
         Tree::Choice(parts) => {
             let [a, b, c] = &**parts;
-            format!("{} ? {} : {}", held(a, 2), print(b), held(c, 1))
+            format!("{} ? {} : {}", bracketed(a, 2), print(b), bracketed(c, 1))
         }
         Tree::Call(name, arguments) => {
             let arguments: Vec<String> = arguments.iter().map(print).collect();
             format!("{name}({})", arguments.join(", "))
         }
-        Tree::Component(of, k) => format!("{}.{}", held(of, 10), ["x", "y", "z"][*k]),
+        Tree::Component(of, k) => format!("{}.{}", bracketed(of, 10), ["x", "y", "z"][*k]),
     }
 }
 
@@ -226,13 +227,13 @@ fn walk(tree: &Tree, p: [f32; 3]) -> Value {
     }
 }
 
-/// What an f32 column would hold, or `None` where it would not hold it.
+/// The value in an f32 column; `None` if it is out of range.
 fn stored(value: f64) -> Option<f32> {
     (value as f32).is_finite().then_some(value as f32)
 }
 
 #[test]
-fn random_trees_are_worth_what_a_second_interpreter_says() {
+fn random_trees_have_the_value_of_a_second_interpreter() {
     let config = ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() };
     let p = Column::new(P_ROWS.to_vec());
     TestRunner::new(config)
@@ -263,7 +264,7 @@ fn random_trees_are_worth_what_a_second_interpreter_says() {
 #[test]
 fn one_number_and_a_batch_have_the_same_bits() {
     let config = ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() };
-    // A param has no attributes: a control stands for them.
+    // A param cannot read attributes, so a control takes the role of `P`.
     let controls = [("strength", Width::Scalar), ("P", Width::Vec3)];
     let scope = Scope { controls: &controls };
     TestRunner::new(config)
@@ -284,14 +285,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_bytes_are_answered(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let text = String::from_utf8_lossy(&bytes);
         let _ = Expr::parse(&text, &SCOPE);
         let _ = Program::parse(&text, &SCOPE);
     }
 
     #[test]
-    fn any_tokens_are_answered(
+    fn arbitrary_tokens_never_panic(
         words in prop::collection::vec(
             prop::sample::select(vec![
                 "P", ".x", ".w", "time", "let", "a", "=", "+=", "(", ")", ",", "+", "-", "*", "^", "?",

@@ -1,11 +1,11 @@
-//! What expressions are worth, by hand.
+//! Values of expressions, compared with values computed by hand.
 
 use std::f64::consts::PI;
 
 use super::*;
 
 #[test]
-fn operators_hold_as_in_c() {
+fn operators_have_the_precedence_of_c() {
     for (text, value) in [
         ("1 + 2*3", 7.0),
         ("(1 + 2)*3", 9.0),
@@ -32,7 +32,7 @@ fn operators_hold_as_in_c() {
 }
 
 #[test]
-fn power_holds_tighter_than_a_sign_and_from_the_right() {
+fn power_binds_tighter_than_a_sign_and_is_right_associative() {
     for (text, value) in [
         ("-2^2", -4.0),
         ("(-2)^2", 4.0),
@@ -67,12 +67,12 @@ fn numbers_are_read_in_every_form() {
 }
 
 #[test]
-fn blanks_lines_and_comments_mean_nothing() {
+fn blanks_line_breaks_and_comments_are_ignored() {
     assert_eq!(eval(" 1\n\t+ // one\r\n2 "), 3.0);
 }
 
 #[test]
-fn functions_by_hand() {
+fn functions_have_the_expected_values() {
     for (text, value) in [
         ("sin(0) + cos(0) + tan(0)", 1.0),
         ("asin(1)", PI / 2.0),
@@ -157,7 +157,7 @@ fn functions_work_component_by_component() {
 }
 
 #[test]
-fn a_choice_does_not_mind_what_is_not_chosen() {
+fn a_selection_ignores_the_other_value() {
     assert_eq!(eval("time == 0 ? 1/0 : 2"), 2.0);
     assert_eq!(eval("time ? 2 : 0/0"), 2.0);
     assert_eq!(eval("time == 0 && 1/0"), 0.0);
@@ -166,7 +166,7 @@ fn a_choice_does_not_mind_what_is_not_chosen() {
 }
 
 #[test]
-fn nan_and_infinity_are_values_and_do_not_get_lost() {
+fn nan_and_infinity_propagate() {
     assert_eq!(eval("1/0"), f64::INFINITY);
     for text in ["0/0", "sqrt(-1)", "log(-1)", "1 % 0", "min(0/0, 1)", "clamp(0/0, 0, 1)", "max(1, 0/0)"] {
         assert!(eval(text).is_nan(), "{text}");
@@ -182,7 +182,7 @@ fn transcendental_functions_are_those_of_libm() {
 }
 
 #[test]
-fn chance_follows_index_and_seed() {
+fn rand_depends_on_index_and_seed() {
     assert_eq!(eval("rand(3)"), eval("rand(3, 0)"));
     assert_ne!(eval("rand(3)"), eval("rand(4)"));
     assert_ne!(eval("rand(3, 4)"), eval("rand(4, 3)"));
@@ -193,7 +193,7 @@ fn chance_follows_index_and_seed() {
 }
 
 #[test]
-fn noise_takes_a_place_in_three_forms() {
+fn noise_takes_coordinates_in_three_forms() {
     assert_eq!(eval("noise(wind*0.3)"), eval("noise(0.3, 0.6, wind.z*0.3)"));
     assert_eq!(eval("noise(0.3)"), eval("noise(0.3, 0)"));
     assert_eq!(eval("noise(0.3)"), eval("noise(0.3, 0, 0)"));
@@ -201,7 +201,7 @@ fn noise_takes_a_place_in_three_forms() {
 }
 
 #[test]
-fn constants_are_known_and_folded() {
+fn constants_are_folded() {
     let constant = |text: &str| Expr::parse(text, &SCOPE).unwrap().constant();
     assert_eq!(constant("2*pi + sin(0)"), Some(2.0 * PI));
     assert_eq!(constant("1 ? 2 : time"), Some(2.0));
@@ -210,7 +210,7 @@ fn constants_are_known_and_folded() {
 }
 
 #[test]
-fn what_an_expression_hangs_on_is_known() {
+fn uses_are_exactly_what_the_value_depends_on() {
     let uses = |text: &str| Expr::parse(text, &SCOPE).unwrap().uses().clone();
     assert_eq!(uses("1 + 2"), Uses::default());
     assert_eq!(uses("frame/24"), Uses { time: true, ..Uses::default() });
@@ -227,7 +227,7 @@ fn a_control_without_a_number_reads_as_nan() {
 }
 
 #[test]
-fn more_values_than_fit_on_the_stack_are_no_trouble() {
+fn more_values_than_fit_on_the_stack_are_allocated() {
     let text: Vec<String> = (0..500).map(|k| format!("sin(time*{k})")).collect();
     let sum = (0..500).fold(0.0, |sum, k| sum + libm::sin(1.5 * f64::from(k)));
     assert_eq!(eval(&text.join(" + ")), sum);

@@ -5,7 +5,7 @@ use crate::geometry::Geometry;
 
 const UNIT: Grid = Grid { origin: [0.0; 3], cell: 1.0, size: [1; 3] };
 
-/// A ball of radius 5 about the middle of 64³ cells of 1 m, band 3, falling; velocity on cells of 2 m.
+/// A falling ball of radius 5 in the centre of 64³ cells of 1 m, band 3; velocity on cells of 2 m.
 fn drop() -> Volume {
     let level_grid = Grid { origin: [-32.0; 3], cell: 1.0, size: [64; 3] };
     let velocity_grid = Grid { origin: [-32.0; 3], cell: 2.0, size: [32; 3] };
@@ -35,7 +35,7 @@ fn arrays_fit_their_grid() {
 }
 
 #[test]
-fn hostile_grids_are_refused_with_what_is_wrong() {
+fn invalid_grids_are_refused_with_the_reason() {
     let none = || [(); 3].map(|()| Vec::new());
     let refused = |grid: Grid| Volume::new(grid, Vec::new(), none()).unwrap_err().to_string();
     assert_eq!(
@@ -49,9 +49,9 @@ fn hostile_grids_are_refused_with_what_is_wrong() {
     );
     for cell in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let text = refused(Grid { cell, size: [0; 3], ..UNIT });
-        assert!(text.ends_with("expected finite numbers and a cell above 0"), "{text}");
+        assert!(text.ends_with("expected finite numbers and a cell size above 0"), "{text}");
     }
-    assert!(refused(Grid { origin: [0.0, f32::NAN, 0.0], size: [0; 3], ..UNIT }).starts_with("a grid with cells of"));
+    assert!(refused(Grid { origin: [0.0, f32::NAN, 0.0], size: [0; 3], ..UNIT }).starts_with("the grid has cells of"));
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn fields_fit_their_grids_and_have_the_background_of_their_kind() {
     let faces = || [0, 1, 2].map(|axis| field(UNIT.faces_size(axis), 0.0));
     let text = |level_set, velocity| Volume::from_fields(UNIT, level_set, UNIT, velocity).unwrap_err().to_string();
     assert!(Volume::from_fields(UNIT, field([1; 3], 1.0), UNIT, faces()).is_ok());
-    let size = "`level_set` is [2, 1, 1] numbers along x, y and z, expected [1, 1, 1]";
+    let size = "`level_set` has [2, 1, 1] numbers along x, y and z, expected [1, 1, 1]";
     assert_eq!(text(field([2, 1, 1], 1.0), faces()), size);
     for background in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert!(text(field([1; 3], background), faces()).ends_with("expected a distance above 0"), "{background}");
@@ -70,7 +70,7 @@ fn fields_fit_their_grids_and_have_the_background_of_their_kind() {
 }
 
 #[test]
-fn memory_follows_the_liquid() {
+fn memory_is_proportional_to_the_liquid() {
     let bytes = |volume: Volume| {
         let mut geometry = Geometry::default();
         geometry.put_volume(volume);
@@ -83,7 +83,7 @@ fn memory_follows_the_liquid() {
 }
 
 #[test]
-fn a_scaled_volume_shares_where_its_blocks_lie_and_a_clone_everything() {
+fn a_scaled_volume_shares_its_block_index_and_a_clone_everything() {
     let volume = drop();
     let scaled = volume.with_lengths(|x| 0.5 * x);
     let [blocks, values] = volume.level_set().arrays();

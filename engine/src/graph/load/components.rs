@@ -1,4 +1,4 @@
-//! Which components flow along the wires, and whether they are what the inputs need.
+//! Which components each wire carries, and whether the inputs get the components that they need.
 
 use super::Draft;
 use super::wires::Wire;
@@ -9,11 +9,11 @@ use crate::graph::fault::{Fault, code};
 use crate::graph::json::shown;
 use crate::node::{Carries, Needs};
 
-/// What each output of each node carries; `None` where a fault upstream leaves that open.
+/// The components of each output of each node; `None` if a fault upstream makes them unknown.
 pub(super) struct Components(Vec<Vec<Option<Vec<Kind>>>>);
 
 impl Components {
-    /// Follows components from node to node.
+    /// Propagates components from node to node.
     pub(super) fn along(drafts: &[Draft<'_>], order: &Order) -> Self {
         let mut components = Self(vec![Vec::new(); drafts.len()]);
         for node in &order.nodes {
@@ -28,16 +28,16 @@ impl Components {
         components
     }
 
-    /// What comes out at the other end of a wire.
+    /// The components of an output; `None` if they are unknown.
     pub(super) fn of(&self, node: usize, port: Option<usize>) -> Option<&[Kind]> {
         self.0[node].get(port?)?.as_deref()
     }
 
-    /// What all wires of an input carry together.
+    /// All components that the wires of an input carry.
     fn of_input(&self, draft: &Draft<'_>, input: &str) -> Option<Vec<Kind>> {
-        let place = draft.inputs.iter().position(|spec| spec.name == input)?;
+        let index = draft.inputs.iter().position(|spec| spec.name == input)?;
         let mut kinds = Vec::new();
-        for wire in draft.wires.get(place)? {
+        for wire in draft.wires.get(index)? {
             kinds.extend(self.of(wire.node, wire.port)?);
         }
         kinds.sort_unstable();
@@ -45,7 +45,7 @@ impl Components {
         Some(kinds)
     }
 
-    /// Puts a fault for each wire that lacks the component its input needs.
+    /// Adds a fault for each wire that lacks the component that its input needs.
     pub(super) fn refuse_misfits(&self, drafts: &[Draft<'_>], catalogue: Catalogue, faults: &mut Vec<Fault>) {
         for draft in drafts {
             for (input, wires) in draft.inputs.iter().zip(&draft.wires) {
@@ -54,8 +54,12 @@ impl Components {
                     let Some(kinds) = self.of(wire.node, wire.port) else { continue };
                     if !input.needs.hold(kinds) {
                         let link = wire.json.string().unwrap_or_default();
-                        let fact =
-                            format!("`{}` carries {}, `{}` needs {kind}", shown(link), listed(kinds), input.name);
+                        let fact = format!(
+                            "`{}` carries {}, but the input `{}` needs {kind}",
+                            shown(link),
+                            listed(kinds),
+                            input.name
+                        );
                         let hint = self.provider(wire, kind, drafts, catalogue);
                         faults.push(Fault { hint, ..wire.json.fault(code::WRONG_COMPONENT, fact) });
                     }
@@ -64,7 +68,7 @@ impl Components {
         }
     }
 
-    /// Who has what a wire lacks: another output of the same node, else types of the catalogue.
+    /// A hint at what provides a missing component: another output of the same node, else node types of the catalogue.
     fn provider(&self, wire: &Wire<'_>, kind: Kind, drafts: &[Draft<'_>], catalogue: Catalogue) -> Option<String> {
         const NAMED: usize = 5;
         let source = &drafts[wire.node];
@@ -83,7 +87,7 @@ impl Components {
             .map(|node| node.name)
             .take(NAMED)
             .collect();
-        (!types.is_empty()).then(|| format!("types that give {kind} are `{}`", types.join("`, `")))
+        (!types.is_empty()).then(|| format!("node types that output {kind}: `{}`", types.join("`, `")))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Controls: values with a name, read by params as if they stood there, and by expressions as numbers and vectors.
+//! Controls: named values, which params can refer to and expressions read as numbers and vectors.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::param::{Keyframes, Shape, Source, Value};
 /// The controls of a graph.
 pub(super) struct Controls<'a> {
     all: Vec<Control<'a>>,
-    /// Names and widths of those that expressions may name.
+    /// Names and widths of the controls that expressions may read.
     pub(super) scope: Vec<(&'a str, Width)>,
     /// Their sources, in the same order.
     pub(super) sources: Arc<Vec<Source>>,
@@ -22,35 +22,40 @@ pub(super) struct Controls<'a> {
 struct Control<'a> {
     name: &'a str,
     json: Json<'a>,
-    sound: bool,
-    /// Whether it is in the scope of expressions.
+    is_valid: bool,
+    /// Whether expressions may read it.
     is_numeric: bool,
 }
 
-/// What a name finds among the controls.
-pub(super) enum Found<'c, 'a> {
+/// The result of looking up a control by name.
+pub(super) enum Lookup<'c, 'a> {
     /// Its value.
     Value(&'c Json<'a>),
-    /// It is there and has a fault that is known.
+    /// It exists and its fault is already reported.
     Faulty,
-    /// It is not there.
+    /// It does not exist.
     Nothing,
 }
 
 impl<'a> Controls<'a> {
-    /// Reads the controls as far as that needs no reader: what a reader makes of a literal is its own to check.
+    /// Reads what can be checked without knowing which params read a control; literals are checked again by each of
+    /// those.
     pub(super) fn read(entries: &[Entry<'a>], faults: &mut Vec<Fault>) -> Self {
         let (mut all, mut scope, mut sources) = (Vec::new(), Vec::new(), Vec::new());
         for entry in entries {
             let Entry { name, json, .. } = entry;
             let before = faults.len();
             if RESERVED.contains(name) {
-                let fact = format!("`{name}` has a meaning of its own in expressions, so no control can be called so");
-                faults.push(entry.fault(code::RESERVED_NAME, fact).hint(format!("call it `my_{name}`, for example")));
+                let fact = format!("the name `{name}` is reserved in expressions");
+                faults.push(
+                    entry
+                        .fault(code::RESERVED_NAME, fact)
+                        .hint(format!("rename the control, for example to `my_{name}`")),
+                );
             }
             let numeric = numeric(json, faults);
-            let (sound, is_numeric) = (faults.len() == before, numeric.is_some());
-            all.push(Control { name, json: json.clone(), sound, is_numeric });
+            let (is_valid, is_numeric) = (faults.len() == before, numeric.is_some());
+            all.push(Control { name, json: json.clone(), is_valid, is_numeric });
             if let Some((width, source)) = numeric {
                 scope.push((*name, width));
                 sources.push(source);
@@ -60,11 +65,11 @@ impl<'a> Controls<'a> {
     }
 
     /// Looks a name up.
-    pub(super) fn get(&self, name: &str) -> Found<'_, 'a> {
+    pub(super) fn get(&self, name: &str) -> Lookup<'_, 'a> {
         match self.all.iter().find(|control| control.name == name) {
-            Some(control) if control.sound => Found::Value(&control.json),
-            Some(_) => Found::Faulty,
-            None => Found::Nothing,
+            Some(control) if control.is_valid => Lookup::Value(&control.json),
+            Some(_) => Lookup::Faulty,
+            None => Lookup::Nothing,
         }
     }
 
@@ -73,14 +78,15 @@ impl<'a> Controls<'a> {
         self.all.iter().map(|control| control.name)
     }
 
-    /// The control in a text's fact that is there and that expressions cannot name, because it is no number or vector.
+    /// The control named in `fact` that exists but that expressions cannot read, because it is neither a number nor a
+    /// vector.
     pub(super) fn unreadable_in(&self, fact: &str) -> Option<&'a str> {
         let unreadable = self.all.iter().filter(|control| !control.is_numeric).map(|control| control.name);
         unreadable.into_iter().find(|name| fact.contains(&format!("`{name}`")))
     }
 }
 
-/// The control as expressions read it: a scalar or a vector. `None` where it is something else, or has a fault.
+/// The control as expressions read it: a scalar or a vector. `None` if it is something else or has a fault.
 fn numeric<'a>(json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<(Width, Source)> {
     let Ast::Object(_) = json.value else {
         if matches!(json.value, Ast::NullKeyword(_)) {
@@ -95,11 +101,11 @@ fn numeric<'a>(json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<(Width, Sourc
         return None;
     }
     let Some(list) = find(&entries, "keyframes") else {
-        let fault = json.fault(code::PARAM_FORM, "a control cannot be such an object");
-        faults.push(fault.hint("a control is a literal, a ramp or keyframes"));
+        let fault = json.fault(code::PARAM_FORM, "the object is not a value that a control can have");
+        faults.push(fault.hint("expected a literal, or an object with `keyframes` or `ramp`"));
         return None;
     };
-    refuse_unknown(&entries, &["keyframes", "interpolation"], "keys beside `keyframes`", faults);
+    refuse_unknown(&entries, &["keyframes", "interpolation"], "allowed keys", faults);
     let Keys { keys, interpolation } = keys(&list.json, find(&entries, "interpolation"), faults)?;
     let values: Vec<Option<Value>> = keys.iter().map(|(_, json)| number_or_vector(json, faults)).collect();
     let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
@@ -116,16 +122,16 @@ fn width(value: &Value) -> Width {
     if matches!(value, Value::Vec3(_)) { Width::Vec3 } else { Width::Scalar }
 }
 
-/// A number, yes or no, or a vector of three numbers; `None` for anything else, which is no fault by itself.
+/// A number, a boolean or a vector of three numbers; `None` for anything else, which is not a fault by itself.
 fn number_or_vector(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<Value> {
     match json.value {
         Ast::NumberLit(_) => Some(Value::Float(keep(json.number("a number"), faults)?)),
         Ast::BooleanLit(word) => Some(Value::Bool(word.value)),
         Ast::Array(list) if list.elements.len() == 3 => {
             let mut vector = [0.0; 3];
-            for (place, item) in list.elements.iter().enumerate() {
+            for (index, item) in list.elements.iter().enumerate() {
                 let Ast::NumberLit(_) = item else { return None };
-                vector[place] = keep(json.item(item, place).number("a number"), faults)?;
+                vector[index] = keep(json.item(item, index).number("a number"), faults)?;
             }
             Some(Value::Vec3(vector))
         }

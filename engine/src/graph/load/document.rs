@@ -1,28 +1,28 @@
-//! The parts of a graph file: which keys there are, and which there must be. What the parts say is read elsewhere.
+//! The structure of a graph file: known and required keys. The values are read elsewhere.
 
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{
     Entry, Json, did_you_mean, find, is_misspelt, is_name, keep, member_path, refuse_unknown, shown,
 };
 
-/// The number of the format that is read.
+/// The format number that this version reads.
 const FORMAT: i64 = 1;
 
-/// A graph file in parts.
+/// The parts of a graph file.
 pub(super) struct Document<'a> {
     pub(super) scene: Option<Json<'a>>,
     pub(super) controls: Vec<Entry<'a>>,
     pub(super) nodes: Vec<NodeText<'a>>,
-    /// Whether `nodes` holds all nodes that the file means: not where the key is missing or no object.
+    /// Whether `nodes` is complete. It is not if the key is missing or its value is not an object.
     pub(super) nodes_are_known: bool,
     pub(super) outputs: Option<Json<'a>>,
 }
 
-/// A node in parts.
+/// The parts of a node.
 pub(super) struct NodeText<'a> {
-    /// Its id and the whole of it.
+    /// Its id and its whole value.
     pub(super) entry: Entry<'a>,
-    /// The value of its `type`, which may be no text.
+    /// The value of its `type`, which may be of the wrong JSON type.
     pub(super) kind: Option<Json<'a>>,
     pub(super) inputs: Vec<Entry<'a>>,
     pub(super) params: Vec<Entry<'a>>,
@@ -33,7 +33,7 @@ pub(super) fn missing(json: &Json<'_>, key: &str, hint: &str) -> Fault {
     json.fault(code::MISSING_KEY, format!("the key `{key}` is missing")).hint(hint)
 }
 
-/// Looks a required key up, among `known` ones; puts a fault where it is neither there nor misspelt.
+/// Looks up a required key. Adds a fault if it is missing, unless an unknown key looks like a misspelling of it.
 fn required<'a>(
     json: &Json<'a>,
     entries: &[Entry<'a>],
@@ -49,16 +49,18 @@ fn required<'a>(
     found
 }
 
-/// Puts a fault for a name that is not made as names are.
+/// Adds a fault if a name is not valid.
 pub(super) fn check_name(entry: &Entry<'_>, what: &str, faults: &mut Vec<Fault>) {
     if !is_name(entry.name) {
-        let fault = entry.fault(code::BAD_NAME, format!("\"{}\" cannot be the name of {what}", shown(entry.name)));
-        faults.push(fault.hint("names are made of letters, digits, `_` and `-`, and start with a letter or `_`"));
+        let fault = entry.fault(code::BAD_NAME, format!("\"{}\" is not a valid name for {what}", shown(entry.name)));
+        faults.push(
+            fault.hint("use letters a-z and A-Z, digits, `_` and `-`; the first character must be a letter or `_`"),
+        );
     }
 }
 
 impl<'a> Document<'a> {
-    /// The parts of the file whose whole value is `root`; `None` where it is not a graph of this format at all.
+    /// The parts of the file whose value is `root`; `None` if it is not a graph of this format.
     pub(super) fn read(root: &Json<'a>, faults: &mut Vec<Fault>) -> Option<Self> {
         const KEYS: [&str; 6] = ["convect", "scene", "controls", "nodes", "outputs", "$schema"];
         let members = root.members("an object {\"convect\": 1, \"nodes\": {…}, \"outputs\": {…}}", faults);
@@ -69,11 +71,14 @@ impl<'a> Document<'a> {
         if let Some((number, json)) = number
             && number != FORMAT
         {
-            let fault =
-                json.fault(code::FORMAT, format!("the file has format {number}, this convect reads format {FORMAT}"));
-            // Whatever else such a file says may mean something else.
+            let fault = json.fault(
+                code::FORMAT,
+                format!("the graph has format {number}, this version of convect reads format {FORMAT}"),
+            );
+            // In another format everything else may have another meaning.
             faults.clear();
-            let hint = if number > FORMAT { "a newer convect wrote it" } else { "write \"convect\": 1" };
+            let hint =
+                if number > FORMAT { "it was made for a newer version of convect" } else { "write \"convect\": 1" };
             faults.push(fault.hint(hint));
             return None;
         }
@@ -83,18 +88,18 @@ impl<'a> Document<'a> {
         if let Some(schema) = part("$schema")
             && schema.string().is_none()
         {
-            faults.push(schema.unexpected("a text"));
+            faults.push(schema.unexpected("a string"));
         }
         let controls = named(part("controls").as_ref(), "controls {\"name\": value, …}", "a control", faults);
         let nodes = required("nodes", "nodes are written \"nodes\": {\"id\": {\"type\": \"…\"}, …}", faults);
         let nodes_are_known = nodes.as_ref().is_some_and(Json::is_object);
         let nodes = named(nodes.as_ref(), "nodes {\"id\": {\"type\": \"…\"}, …}", "a node", faults);
-        let outputs = required("outputs", "name what is to come out: \"outputs\": {\"name\": \"node\"}", faults);
+        let outputs = required("outputs", "name at least one output: \"outputs\": {\"name\": \"node\"}", faults);
         let nodes = nodes.into_iter().map(|entry| NodeText::read(entry, faults)).collect();
         Some(Self { scene: part("scene"), controls, nodes, nodes_are_known, outputs })
     }
 
-    /// Replaces or adds what a `--set` sets, whose key is its text's.
+    /// Applies a `--set`: replaces a control, or replaces or adds a param. The key is that of the value's text.
     pub(super) fn set(&mut self, value: Json<'a>, faults: &mut Vec<Fault>) {
         let key = value.text.set.unwrap_or_default();
         let Some((id, param)) = key.split_once('.') else {
@@ -105,7 +110,7 @@ impl<'a> Document<'a> {
                     let fault = value.fault(code::UNKNOWN_SET, format!("there is no control `{}`", shown(key)));
                     let names = self.controls.iter().map(|control| control.name);
                     let hint = match self.nodes.iter().any(|node| node.entry.name == key) {
-                        true => Some(format!("a param of the node is set with `{}.param=…`", shown(key))),
+                        true => Some(format!("`{0}` is a node; set one of its params with `{0}.param=…`", shown(key))),
                         false => did_you_mean(key, names, "controls"),
                     };
                     faults.push(Fault { hint, ..fault });
@@ -125,7 +130,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The members of an object of things with names; none where it is absent or something else.
+/// The members of an object whose keys are names; empty if it is absent or not an object.
 fn named<'a>(json: Option<&Json<'a>>, expected: &str, what: &str, faults: &mut Vec<Fault>) -> Vec<Entry<'a>> {
     let Some(members) = json.map(|json| json.members(expected, faults)) else { return Vec::new() };
     let entries = keep(members, faults).unwrap_or_default();

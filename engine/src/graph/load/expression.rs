@@ -1,5 +1,5 @@
-//! `{"expr": …}`: as many expressions as a param has numbers. What hangs on no time becomes a constant at once. And
-//! code, which is assignments in the same language.
+//! `{"expr": …}`, with one expression for each component of the param, and code, which is assignments in the same
+//! language. Expressions that do not depend on time become constants.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, keep, shown};
 use crate::param::{CodeSource, ParamSpec, Shape, Source, Value};
 
-/// The source that a param's expressions make; constant where they hang on no time. `None` after a fault, and for a shape
-/// that no expression gives.
+/// The source for a param's expressions, constant if they do not depend on time. `None` after a fault, and for a shape
+/// that cannot be an expression.
 pub(super) fn read(
     spec: &ParamSpec,
     json: &Json<'_>,
@@ -24,7 +24,7 @@ pub(super) fn read(
     let exprs: Vec<Expr> = parsed.into_iter().collect::<Option<_>>()?;
 
     let frame = scene.first as f64;
-    let mut sound = true;
+    let mut valid = true;
     for (text, expr) in texts.iter().zip(&exprs) {
         let number = Source::Exprs(Arc::new(vec![expr.clone()]), Shape::Float, controls.sources.clone());
         if let (false, Value::Float(x)) = (number.is_animated(), number.at(frame, scene.clock()))
@@ -32,15 +32,15 @@ pub(super) fn read(
         {
             let fault = text.fault(code::ILLEGAL_VALUE, format!("the value of the expression is {x}"));
             faults.push(fault.hint("expected a finite number"));
-            sound = false;
+            valid = false;
         }
     }
     let source = Source::Exprs(Arc::new(exprs), spec.shape, controls.sources.clone());
     let source = if source.is_animated() { source } else { Source::Constant(source.at(frame, scene.clock())) };
-    sound.then_some(source)
+    valid.then_some(source)
 }
 
-/// The source that code makes: a text of assignments, with the controls in scope. `None` after a fault.
+/// The source for code: assignments, with the controls in scope. `None` after a fault.
 pub(super) fn code(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fault>) -> Option<Source> {
     let Some(text) = json.string() else {
         faults.push(json.unexpected(&Shape::Code.describe()));
@@ -55,11 +55,11 @@ pub(super) fn code(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fa
     }
 }
 
-/// The expressions as they stand in the file.
+/// The JSON strings of the expressions.
 fn texts<'a>(json: &Json<'a>, count: usize, faults: &mut Vec<Fault>) -> Option<Vec<Json<'a>>> {
     if count == 1 {
         if json.string().is_none() {
-            faults.push(json.unexpected("an expression, a text"));
+            faults.push(json.unexpected("an expression in quotes"));
         }
         return json.string().map(|_| vec![json.clone()]);
     }
@@ -68,10 +68,10 @@ fn texts<'a>(json: &Json<'a>, count: usize, faults: &mut Vec<Fault>) -> Option<V
         faults.push(json.unexpected(&format!("{count} expressions [{expressions}]")));
         return None;
     };
-    let texts: Vec<Json<'a>> = items.iter().enumerate().map(|(place, item)| json.item(item, place)).collect();
+    let texts: Vec<Json<'a>> = items.iter().enumerate().map(|(index, item)| json.item(item, index)).collect();
     let no_text = |text: &&Json<'a>| text.string().is_none();
     let before = faults.len();
-    faults.extend(texts.iter().filter(no_text).map(|text| text.unexpected("an expression, a text")));
+    faults.extend(texts.iter().filter(no_text).map(|text| text.unexpected("an expression in quotes")));
     (faults.len() == before).then_some(texts)
 }
 
@@ -81,7 +81,7 @@ fn parse(json: &Json<'_>, controls: &Controls<'_>, faults: &mut Vec<Fault>) -> O
     keep(parsed.map_err(|error| explain(json, text, "expression", controls, error)), faults)
 }
 
-/// The fault of a text that is no expression or code (`noun`), at the character where it goes wrong.
+/// The fault of an invalid expression or code (`noun`), at the character where the error is.
 fn explain(json: &Json<'_>, text: &str, noun: &str, controls: &Controls<'_>, error: ExprError) -> Fault {
     let ExprError { line, column, fact, hint } = error;
     let skipped: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(|line| line.chars().count()).sum();
@@ -89,12 +89,13 @@ fn explain(json: &Json<'_>, text: &str, noun: &str, controls: &Controls<'_>, err
     if text.trim().is_empty() {
         return Fault { hint, ..json.fault(code::EXPRESSION, fact) };
     }
-    let place = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
+    let position = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
     let hint = match controls.unreadable_in(&fact) {
-        Some(name) => {
-            Some(format!("the control `{}` is no number or vector, which is what expressions read", shown(name)))
-        }
+        Some(name) => Some(format!(
+            "the control `{}` is neither a number nor a vector, so expressions cannot read it",
+            shown(name)
+        )),
         None => hint,
     };
-    Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {place} of the {noun}")) }
+    Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {position} of the {noun}")) }
 }

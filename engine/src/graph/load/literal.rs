@@ -1,6 +1,6 @@
-//! Literals: JSON that says a value outright, by the shape of the param.
+//! Literals: JSON values without keyframes or expressions, read according to the shape of the param.
 //!
-//! Rotations come out as degrees and seeds as written; [`super::param`] makes of them what nodes get.
+//! Rotations are returned in degrees and seeds as written; [`super::param`] converts them to what nodes get.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, counted, keep, shown, word};
 use crate::param::{Shape, Value};
 
-/// The value of that shape; `None` where it has a fault. Files are not literals: see [`super::param`].
+/// The value, or `None` after a fault. Files are not literals: see [`super::param`].
 pub(super) fn literal(shape: Shape, json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<Value> {
     let expected = shape.describe();
     let number = |json: &Json<'_>| single(json, "a number");
@@ -30,8 +30,8 @@ pub(super) fn literal(shape: Shape, json: &Json<'_>, faults: &mut Vec<Fault>) ->
             let words: Vec<&str> = options.iter().map(|option| option.word).collect();
             Value::Choice(keep(word(json, "option", &words), faults)?)
         }
-        Shape::Text => Value::Text(keep(text(json, "a text"), faults)?),
-        Shape::Texts => Value::Texts(Arc::new(list(json, &expected, |item| text(item, "a text"), faults)?)),
+        Shape::Text => Value::Text(keep(text(json, "a string"), faults)?),
+        Shape::Texts => Value::Texts(Arc::new(list(json, &expected, |item| text(item, "a string"), faults)?)),
         Shape::Ramp => Value::Ramp(Arc::new(ramp(json, Interpolation::Linear, faults)?)),
         Shape::Vec3s => {
             let rows =
@@ -43,16 +43,16 @@ pub(super) fn literal(shape: Shape, json: &Json<'_>, faults: &mut Vec<Fault>) ->
             Value::Tets(Arc::new(list(json, &expected, |item| row(item, "a tet [a, b, c, d]", corner), faults)?))
         }
         Shape::Columns => Value::Columns(Arc::new(columns(json, &expected, faults)?)),
-        // `param` has read them.
+        // `param` reads these itself.
         Shape::File | Shape::Code => return None,
     })
 }
 
-/// A number that single precision can hold: what geometry is made of.
+/// A number within the range of single precision, which geometry uses.
 fn single(json: &Json<'_>, expected: &str) -> Result<f64, Fault> {
     let x = json.number(expected)?;
     if x.abs() > f64::from(f32::MAX) {
-        let fault = json.fault(code::NUMBER_SIZE, format!("{x:e} is too large for geometry"));
+        let fault = json.fault(code::NUMBER_SIZE, format!("{x:e} is too large for single precision"));
         return Err(fault.hint("expected a number within ±3.4e38"));
     }
     Ok(x)
@@ -68,16 +68,16 @@ fn integer(json: &Json<'_>) -> Result<i32, Fault> {
 }
 
 fn corner(json: &Json<'_>) -> Result<u32, Fault> {
-    let whole = json.whole("the number of a point, from 0")?;
+    let whole = json.whole("the index of a point, from 0")?;
     whole.try_into().map_err(|_| too_large(json, whole, "0…4294967295"))
 }
 
 fn too_large(json: &Json<'_>, whole: i64, range: &str) -> Fault {
-    json.fault(code::NUMBER_SIZE, format!("the whole number {whole} does not fit"))
-        .hint(format!("expected one within {range}"))
+    json.fault(code::NUMBER_SIZE, format!("the whole number {whole} is out of range"))
+        .hint(format!("expected a whole number within {range}"))
 }
 
-/// `N` items, with a fault for each that is wrong.
+/// `N` items, with a fault for each invalid one.
 fn tuple<T: Copy + Default, const N: usize>(
     json: &Json<'_>,
     expected: &str,
@@ -94,14 +94,14 @@ fn tuple<T: Copy + Default, const N: usize>(
         return None;
     };
     let mut values = [T::default(); N];
-    let mut sound = true;
-    for (place, item) in items.iter().enumerate() {
-        match keep(read(&json.item(item, place)), faults) {
-            Some(value) => values[place] = value,
-            None => sound = false,
+    let mut valid = true;
+    for (index, item) in items.iter().enumerate() {
+        match keep(read(&json.item(item, index)), faults) {
+            Some(value) => values[index] = value,
+            None => valid = false,
         }
     }
-    sound.then_some(values)
+    valid.then_some(values)
 }
 
 /// `N` items, or the first fault: for lists too long to report each.
@@ -112,8 +112,8 @@ fn row<T: Copy + Default, const N: usize>(
 ) -> Result<[T; N], Fault> {
     let items = json.elements().filter(|items| items.len() == N).ok_or_else(|| json.unexpected(expected))?;
     let mut values = [T::default(); N];
-    for (place, item) in items.iter().enumerate() {
-        values[place] = read(&json.item(item, place))?;
+    for (index, item) in items.iter().enumerate() {
+        values[index] = read(&json.item(item, index))?;
     }
     Ok(values)
 }
@@ -129,7 +129,7 @@ fn list<T>(
         faults.push(json.unexpected(expected));
         return None;
     };
-    keep(items.iter().enumerate().map(|(place, item)| read(&json.item(item, place))).collect(), faults)
+    keep(items.iter().enumerate().map(|(index, item)| read(&json.item(item, index))).collect(), faults)
 }
 
 /// A ramp of keys `[[x, y], …]`.
@@ -140,14 +140,14 @@ pub(super) fn ramp(json: &Json<'_>, interpolation: Interpolation, faults: &mut V
         let (RampError::OutOfRange { key, .. } | RampError::Unordered { key, .. }) = error else {
             return json.fault(code::RAMP, "the ramp has no key").hint("write at least one [x, y]");
         };
-        let place = json.elements().and_then(|keys| Some(json.item(keys.get(key)?, key)));
-        let at = place.as_ref().unwrap_or(json);
+        let item = json.elements().and_then(|keys| Some(json.item(keys.get(key)?, key)));
+        let at = item.as_ref().unwrap_or(json);
         match error {
             RampError::Unordered { x, before, .. } if x == before => {
-                at.fault(code::RAMP, format!("two keys of the ramp are at {x}")).hint("keep one of them")
+                at.fault(code::RAMP, format!("two keys of the ramp are at x = {x}")).hint("remove one of them")
             }
             RampError::Unordered { x, before, .. } => {
-                let fact = format!("the ramp's key at {x} stands after the key at {before}");
+                let fact = format!("the ramp's key at x = {x} comes after the key at x = {before}");
                 at.fault(code::RAMP, fact).hint("order the keys by x")
             }
             _ => at.fault(code::RAMP, "a key of the ramp is too large").hint("expected numbers within ±1e30"),
@@ -156,13 +156,13 @@ pub(super) fn ramp(json: &Json<'_>, interpolation: Interpolation, faults: &mut V
     keep(read, faults)
 }
 
-/// Named attributes, each a list of numbers or of vectors of 3 or 4. Well-known names have their fixed type; others are
-/// whole where every number is written without `.` and `e`, as in geometry files.
+/// Named attributes, each a list of numbers or of vectors of 3 or 4 components. Well-known names have their fixed type;
+/// others are integers if every number is written without `.` and `e`, as in geometry files.
 fn columns(json: &Json<'_>, expected: &str, faults: &mut Vec<Fault>) -> Option<Vec<(Name, Column)>> {
     let members = json.members(expected, faults);
     let entries = keep(members, faults)?;
     let columns = entries.iter().map(|entry| Some((entry.name.into(), keep(column(entry.name, &entry.json), faults)?)));
-    // Collected first, so that the faults of all columns are found.
+    // Collected first, so that the faults of all columns are reported.
     columns.collect::<Vec<_>>().into_iter().collect()
 }
 
@@ -172,7 +172,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
     let kind = match fixed_type(name) {
         Some(kind) if rows.is_empty() || kind.width() == width => kind,
         Some(kind) => {
-            let fault = json.fault(code::WRONG_KIND, format!("`{name}` has {} a row", counted(width, "number")));
+            let fault = json.fault(code::WRONG_KIND, format!("`{name}` has {} per row", counted(width, "number")));
             return Err(fault.hint(format!("expected {}", counted(kind.width(), "number"))));
         }
         None => match (width, rows.iter().all(is_whole)) {
@@ -191,7 +191,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
     let single = |item: &Json<'_>| single(item, "a number").map(|x| x as f32);
     fn rows_of<T>(json: &Json<'_>, read: impl Fn(&Json<'_>) -> Result<T, Fault>) -> Result<Vec<T>, Fault> {
         let rows = json.elements().unwrap_or_default();
-        rows.iter().enumerate().map(|(place, row)| read(&json.item(row, place))).collect()
+        rows.iter().enumerate().map(|(index, row)| read(&json.item(row, index))).collect()
     }
     Ok(match kind {
         ColumnType::F1 => Column::new(rows_of(json, single)?),
@@ -203,7 +203,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
     })
 }
 
-/// Whether all numbers of a row are written as whole numbers.
+/// Whether all numbers of a row are written as integers.
 fn is_whole(row: &Ast<'_>) -> bool {
     match row {
         Ast::NumberLit(number) => !number.value.contains(['.', 'e', 'E']),

@@ -1,12 +1,12 @@
-//! From a graph file to a checked [`Graph`], or to all its faults at once.
+//! Loads a graph file: a checked [`Graph`], or all faults at once.
 //!
-//! The text becomes JSON, JSON a document of named parts (`document`), its controls are looked through (`control`),
-//! params become sources (`param`, `literal`, `keyframes`, `expression`), wires are followed (`wires`, `dag`,
-//! `components`) and outputs checked (`outputs`). Each step goes on after a fault with what is still sound, and says
-//! nothing of what only follows from an earlier fault.
+//! The text is parsed as JSON and split into named parts (`document`). Then controls are read (`control`), params
+//! become sources (`param`, `literal`, `keyframes`, `expression`), wires are resolved (`wires`, `dag`, `components`)
+//! and outputs checked (`outputs`). Each step continues after a fault with what is still valid, and does not report
+//! what merely follows from an earlier fault.
 //!
-//! Promise: a graph that loads holds what [`Graph`] promises; any bytes are answered by a graph or by faults in the order
-//! of the file. Limit: what files hold is not looked at, only that they can be read.
+//! Promise: a graph that loads satisfies what [`Graph`] promises; any bytes give a graph or faults in the order of the
+//! file. Limit: the files that a graph names are opened but their content is not checked.
 
 mod components;
 mod control;
@@ -33,27 +33,27 @@ use self::wires::Wire;
 use super::dag::{Dag, Order};
 use super::fault::{Fault, code};
 use super::json::{Json, did_you_mean, shown};
-use super::places::Places;
+use super::positions::Positions;
 use super::syntax::parse;
 use super::text::{Text, decode};
 use super::{Body, Catalogue, Graph, GraphNode, GraphOutput, Link};
 use crate::node::{InputSpec, Node};
 use crate::param::{ParamSpec, Source};
 
-/// Asks whether the file at a path can be read: [`probe`], or a stand-in of a test.
+/// Checks whether the file at a path can be read: [`probe`], or a substitute in a test.
 pub type FileProbe = dyn Fn(&Path) -> std::io::Result<()>;
 
-/// Whether the file at `path` can be read, without reading it.
+/// Checks that the file at `path` can be opened.
 ///
 /// # Errors
-/// Where it does not exist, is no file or may not be read.
+/// If it does not exist, is not a file, or reading it is not permitted.
 pub fn probe(path: &Path) -> std::io::Result<()> {
     crate::files::open(path).map(drop)
 }
 
 impl Graph {
-    /// The graph that a file's text says. Paths in it start at `folder`; `set` replaces params (`node.param`) and controls
-    /// by JSON, as `--set` does.
+    /// Loads a graph from the text of its file. Relative paths are resolved against `folder`; `set` replaces params
+    /// (`node.param`) and controls by JSON values, as `--set` does.
     ///
     /// # Errors
     /// All faults, in the order of the file, then those of `set`.
@@ -78,7 +78,7 @@ impl Graph {
     /// [`Graph::load`] of a file's bytes: UTF-8, with or without a byte order mark.
     ///
     /// # Errors
-    /// As [`Graph::load`], and where the bytes are no text.
+    /// As [`Graph::load`], and if the bytes are not UTF-8.
     pub fn load_bytes(
         bytes: &[u8],
         folder: &Path,
@@ -90,7 +90,7 @@ impl Graph {
     }
 }
 
-/// A node as far as it could be read.
+/// A node as far as it is valid.
 struct Draft<'a> {
     text: NodeText<'a>,
     node: Option<&'static Node>,
@@ -101,7 +101,7 @@ struct Draft<'a> {
     wires: Vec<Vec<Wire<'a>>>,
 }
 
-/// The graph, where enough of it is sound to go through to the end; sound at all only where there are no faults.
+/// The graph, or `None` if faults make it impossible to continue. Only to be used if there are no faults.
 fn load(
     text: &str,
     folder: &Path,
@@ -113,9 +113,9 @@ fn load(
     let text = Text::new(text.strip_prefix('\u{feff}').unwrap_or(text), None);
     let set_texts: Vec<Text<'_>> = set.iter().map(|(key, value)| Text::new(value, Some(key))).collect();
     let set_values: Vec<_> = set_texts.iter().map(|text| parse(text).map_err(|fault| faults.push(fault))).collect();
-    let value = parse(&text).map_err(|fault| faults.push(fault)).ok()?;
+    let root = parse(&text).map_err(|fault| faults.push(fault)).ok()?;
 
-    let mut document = Document::read(&Json::root(&value, &text), faults)?;
+    let mut document = Document::read(&Json::root(&root, &text), faults)?;
     for (text, value) in set_texts.iter().zip(&set_values) {
         if let Ok(value) = value {
             document.set(Json::root(value, text), faults);
@@ -143,12 +143,12 @@ fn load(
     }
     let outputs = outputs?;
 
-    let places = places(&drafts, document.outputs.as_ref());
+    let positions = positions(&drafts, document.outputs.as_ref());
     let (nodes, outputs) = assemble(drafts, &order, outputs)?;
-    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), places })
+    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions })
 }
 
-/// Reads a node's type and params. Nodes of a type share its `specs`.
+/// Reads a node's type and params. Nodes of one type share their `specs`.
 fn draft<'a>(
     text: NodeText<'a>,
     catalogue: Catalogue,
@@ -160,7 +160,7 @@ fn draft<'a>(
         let node = catalogue.get(name);
         if node.is_none() {
             let hint =
-                did_you_mean(name, catalogue.names(), "types").or(Some("`convect nodes` lists the types".into()));
+                did_you_mean(name, catalogue.names(), "node types").or(Some("`convect nodes` lists the types".into()));
             let fault = kind.fault(code::UNKNOWN_TYPE, format!("there is no node type `{}`", shown(name)));
             reader.faults.push(Fault { hint, ..fault });
         }
@@ -176,24 +176,24 @@ fn draft<'a>(
     Draft { text, node, specs, inputs, params, wires: Vec::new() }
 }
 
-/// Where nodes, what they set, and outputs stand.
-fn places(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Places {
-    let mut places = Places::default();
+/// The positions of nodes, of the params and inputs that they set, and of outputs.
+fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
+    let mut positions = Positions::default();
     for draft in drafts {
         let id = &draft.text.entry;
-        places.note(id.json.path(), id.json.text, id.key.start);
+        positions.record(id.json.path(), id.json.text, id.key.start);
         for entry in draft.text.params.iter().chain(&draft.text.inputs) {
-            places.note(entry.json.path(), entry.json.text, entry.json.value.start());
+            positions.record(entry.json.path(), entry.json.text, entry.json.value.start());
         }
     }
     let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok());
     for output in members.into_iter().flatten() {
-        places.note(output.json.path(), output.json.text, output.key.start);
+        positions.record(output.json.path(), output.json.text, output.key.start);
     }
-    places
+    positions
 }
 
-/// Puts the nodes in their order; `None` where one of them has a fault.
+/// Sorts the nodes topologically; `None` if one of them has a fault.
 fn assemble(
     drafts: Vec<Draft<'_>>,
     order: &Order,
@@ -202,17 +202,17 @@ fn assemble(
     if order.nodes.len() != drafts.len() {
         return None;
     }
-    let mut place = vec![0; drafts.len()];
-    order.nodes.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+    let mut index = vec![0; drafts.len()];
+    order.nodes.iter().enumerate().for_each(|(new, old)| index[*old] = new);
     let mut nodes: Vec<Option<GraphNode>> = drafts.iter().map(|_| None).collect();
     for (old, draft) in drafts.into_iter().enumerate() {
-        let link = |wire: &Wire<'_>| Some(Link { node: place[wire.node], port: wire.port? });
+        let link = |wire: &Wire<'_>| Some(Link { node: index[wire.node], port: wire.port? });
         let inputs: Option<Vec<Vec<Link>>> = draft.wires.iter().map(|wires| wires.iter().map(link).collect()).collect();
         let body = Body::Node { node: draft.node?, specs: draft.specs, params: draft.params, inputs: inputs? };
-        nodes[place[old]] = Some(GraphNode { id: draft.text.entry.name.into(), body });
+        nodes[index[old]] = Some(GraphNode { id: draft.text.entry.name.into(), body });
     }
     let outputs = outputs.into_iter().map(|output| {
-        let from = Link { node: place[output.node], port: output.port? };
+        let from = Link { node: index[output.node], port: output.port? };
         Some(GraphOutput { name: output.name, from, attributes: output.attributes, v: output.v })
     });
     Some((nodes.into_iter().collect::<Option<_>>()?, outputs.collect::<Option<_>>()?))

@@ -1,4 +1,4 @@
-//! Outputs: what is to come out, which attributes of it, and whether with velocities.
+//! Outputs: which node outputs are written, with which attributes, and whether with velocities.
 
 use super::Draft as NodeDraft;
 use super::document::{check_name, missing};
@@ -7,7 +7,7 @@ use crate::geometry::Name;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
 
-/// An output as far as it could be read.
+/// An output as far as it is valid.
 pub(super) struct Draft {
     pub(super) name: Name,
     pub(super) node: usize,
@@ -16,7 +16,7 @@ pub(super) struct Draft {
     pub(super) v: bool,
 }
 
-/// Reads the outputs; `None` where there is nothing to read.
+/// Reads the outputs; `None` if the key is missing or its value is not an object.
 pub(super) fn read<'a>(
     json: Option<&Json<'a>>,
     drafts: &[NodeDraft<'a>],
@@ -27,7 +27,7 @@ pub(super) fn read<'a>(
     let entries = keep(members, faults)?;
     if entries.is_empty() {
         let fault = json.fault(code::NO_OUTPUTS, "there are no outputs, so nothing would be cooked");
-        faults.push(fault.hint("name what is to come out: {\"name\": \"node\"}"));
+        faults.push(fault.hint("name at least one output: {\"name\": \"node\"}"));
     }
     let nodes = Nodes::of(drafts);
     Some(entries.iter().filter_map(|entry| output(entry, &nodes, faults)).collect())
@@ -37,7 +37,7 @@ fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>)
     check_name(entry, "an output", faults);
     let name: Name = entry.name.into();
     if entry.json.string().is_some() {
-        let Wire { node, port, .. } = nodes.follow(&entry.json, faults)?;
+        let Wire { node, port, .. } = nodes.resolve(&entry.json, faults)?;
         return Some(Draft { name, node, port, attributes: None, v: false });
     }
     let members = entry.json.members("a node \"id\", or {\"from\": \"id\", \"attributes\": […], \"v\": true}", faults);
@@ -46,10 +46,10 @@ fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>)
     let attributes = find(&entries, "attributes").map(|entry| attributes(&entry.json, faults));
     let v = find(&entries, "v").is_some_and(|entry| keep(entry.json.bool(), faults).unwrap_or(false));
     let Some(from) = find(&entries, "from") else {
-        faults.push(missing(&entry.json, "from", "it names the node: {\"from\": \"id\"}"));
+        faults.push(missing(&entry.json, "from", "`from` names the node: {\"from\": \"id\"}"));
         return None;
     };
-    let Wire { node, port, .. } = nodes.follow(&from.json, faults)?;
+    let Wire { node, port, .. } = nodes.resolve(&from.json, faults)?;
     Some(Draft { name, node, port, attributes: attributes.flatten(), v })
 }
 
@@ -59,8 +59,8 @@ fn attributes(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Name>> {
         return None;
     };
     let mut names: Vec<Name> = Vec::with_capacity(items.len());
-    for (place, item) in items.iter().enumerate() {
-        let json = json.item(item, place);
+    for (index, item) in items.iter().enumerate() {
+        let json = json.item(item, index);
         match json.string() {
             Some(name) if !name.is_empty() => names.push(name.into()),
             _ => faults.push(json.unexpected("the name of an attribute")),

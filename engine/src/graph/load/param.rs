@@ -1,4 +1,4 @@
-//! Params: which form a value is written in, and the source it makes.
+//! Params: the form in which a value is written, and the source made from it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +9,7 @@ use jsonc_parser::ast::Value as Ast;
 use jsonc_parser::common::Ranged;
 
 use super::FileProbe;
-use super::control::{Controls, Found};
+use super::control::{Controls, Lookup};
 use super::document::missing;
 use super::expression;
 use super::keyframes::{Keys, interpolation, keys};
@@ -23,7 +23,7 @@ use crate::node::Node;
 use crate::param::{Keyframes, ParamSpec, Shape, Source, Unset, Value, euler_to_turn};
 use numerics::ramp::Interpolation;
 
-/// Keys of which an object has one: the form it is written in.
+/// The forms of a value that is an object: it has exactly one of these keys.
 const FORMS: [&str; 5] = ["keyframes", "expr", "control", "ramp", "value"];
 
 /// Reads params.
@@ -33,21 +33,21 @@ pub(super) struct Reader<'a, 'r> {
     pub(super) folder: &'r Path,
     pub(super) files: &'r FileProbe,
     pub(super) faults: &'r mut Vec<Fault>,
-    /// What controls came to, by control, type of node and param, or the first fault. Nodes of a type share what they
-    /// read: a value of its own for each would let a small file ask for any amount of memory.
+    /// Sources read from controls, or their first fault, by control, node type and param. Nodes of one type share them:
+    /// with a copy for each node, a small file could require any amount of memory.
     pub(super) read: BTreeMap<(&'a str, &'static str, &'static str), Result<Source, Fault>>,
     /// The type of the node whose params are read.
     pub(super) kind: &'static str,
 }
 
-/// Where a value stands: not every form may stand everywhere.
+/// Where a value is written; it determines the forms that are allowed.
 #[derive(Clone, Copy, PartialEq)]
 enum Within {
-    /// In a param: any.
+    /// In a param: all forms.
     Param,
     /// In a control: literals, keyframes and ramps.
     Control,
-    /// In a mask's `value`: any but another mask.
+    /// In a mask's `value`: all but another mask.
     Mask,
     /// In a key: literals and ramps.
     Key,
@@ -61,19 +61,19 @@ impl<'a> Reader<'a, '_> {
             let fact = format!("`{}` has no param `{}`", node.name, shown(entry.name));
             let hint = match node.inputs.iter().any(|input| input.spec().name == entry.name) {
                 true => Some("it is an input; write it under `inputs`".into()),
-                false => did_you_mean(entry.name, specs.iter().map(|spec| spec.name), "its params"),
+                false => did_you_mean(entry.name, specs.iter().map(|spec| spec.name), "params"),
             };
             self.faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_PARAM, fact) });
         }
         let source = |spec: &ParamSpec| match find(entries, spec.name) {
-            // After a fault the default stands in, so that the rest is looked through.
+            // After a fault the default is used, so that the rest can be checked.
             Some(entry) => self.source(spec, &entry.json).unwrap_or_else(|| self.unset(spec)),
             None => self.unset(spec),
         };
         specs.iter().map(source).collect()
     }
 
-    /// Where the graph says nothing.
+    /// The source of a param that the graph does not set.
     fn unset(&self, spec: &ParamSpec) -> Source {
         match (spec.facts.unset, spec.shape) {
             (Unset::CurrentFrame, _) => Source::CurrentFrame,
@@ -83,12 +83,15 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// What the file says.
+    /// The source of a param that the graph sets.
     fn source(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Source> {
         let source = self.written(spec, json, Within::Param)?;
         if spec.facts.fixed && source.is_animated() {
             let fault = json.fault(code::NOT_ANIMATED, format!("`{}` cannot be animated", spec.name));
-            self.faults.push(fault.hint(format!("expected {} that is the same at all frames", spec.shape.describe())));
+            self.faults.push(fault.hint(format!(
+                "expected {}, without keyframes and without expressions of time",
+                spec.shape.describe()
+            )));
             return None;
         }
         Some(source)
@@ -115,7 +118,7 @@ impl<'a> Reader<'a, '_> {
         Some(Source::Constant(self.finished(spec.shape, value)))
     }
 
-    /// The value, unless the declaration refuses it.
+    /// The value; a fault if the declaration does not allow it.
     fn legal(&mut self, spec: &ParamSpec, json: &Json<'a>, value: Value) -> Option<Value> {
         match spec.refuses(&value) {
             None => Some(value),
@@ -126,7 +129,7 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// What a node gets for a value as it is written: rotations are turned from degrees, seeds mixed with the scene's.
+    /// Converts a value as written to what nodes get: rotations from degrees, seeds mixed with the scene's.
     fn finished(&self, shape: Shape, value: Value) -> Value {
         match (shape, value) {
             (Shape::Turn, Value::Vec3(degrees)) => euler_to_turn(degrees),
@@ -135,7 +138,7 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// An object in one of its forms.
+    /// The source of an object in one of the forms.
     fn form(&mut self, spec: &ParamSpec, json: &Json<'a>, within: Within) -> Option<Source> {
         let members = json.members("", self.faults);
         let entries = keep(members, self.faults)?;
@@ -159,7 +162,8 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// The one member that says the value, and nothing that does not belong beside it.
+    /// The one member that sets the value; a fault if there is none or more than one, or if other keys do not belong
+    /// beside it.
     fn form_among<'e>(
         &mut self,
         spec: &ParamSpec,
@@ -171,8 +175,8 @@ impl<'a> Reader<'a, '_> {
         let form = match forms[..] {
             [form] => form,
             [] => {
-                let fault = json.fault(code::PARAM_FORM, "the object says no value");
-                let forms: Vec<&str> = FORMS.into_iter().filter(|form| may_be(spec.shape, form, within)).collect();
+                let fault = json.fault(code::PARAM_FORM, "the object does not set a value");
+                let forms: Vec<&str> = FORMS.into_iter().filter(|form| accepts(spec.shape, form, within)).collect();
                 let near = entries.iter().find_map(|entry| nearest(entry.name, forms.iter().copied()));
                 self.faults.push(match near {
                     Some(near) => fault.hint(format!("did you mean `{near}`?")),
@@ -184,25 +188,25 @@ impl<'a> Reader<'a, '_> {
                 return None;
             }
             [first, second, ..] => {
-                let fact = format!("`{}` stands beside `{}`, and both say the value", second.name, first.name);
-                self.faults.push(second.fault(code::PARAM_FORM, fact).hint("keep one of them"));
+                let fact = format!("both `{}` and `{}` set the value", first.name, second.name);
+                self.faults.push(second.fault(code::PARAM_FORM, fact).hint("remove one of them"));
                 return None;
             }
         };
-        if !may_be(spec.shape, form.name, within) {
-            let fault = form.fault(code::PARAM_FORM, format!("`{}` cannot be written as `{}`", spec.name, form.name));
+        if !accepts(spec.shape, form.name, within) {
+            let fault = form.fault(code::PARAM_FORM, format!("`{}` cannot be set by `{}`", spec.name, form.name));
             self.faults.push(match spec.shape {
-                Shape::File => fault.hint("expected a path; `####` in it stands for the frame"),
+                Shape::File => fault.hint("expected a path, in which `####` is replaced by the frame number"),
                 shape => fault.hint(format!("expected {}", shape.describe())),
             });
             return None;
         }
-        if may_be(spec.shape, "value", within)
+        if accepts(spec.shape, "value", within)
             && form.name != "value"
             && let Some(attribute) = find(entries, "attribute")
         {
-            let fact = format!("`attribute` stands beside `{}`", form.name);
-            let hint = format!("a mask is written {{\"value\": {{\"{}\": …}}, \"attribute\": \"…\"}}", form.name);
+            let fact = format!("`attribute` cannot be combined with `{}`", form.name);
+            let hint = format!("write a mask as {{\"value\": {{\"{}\": …}}, \"attribute\": \"…\"}}", form.name);
             self.faults.push(attribute.fault(code::PARAM_FORM, fact).hint(hint));
             return None;
         }
@@ -212,17 +216,17 @@ impl<'a> Reader<'a, '_> {
             _ => None,
         };
         let known: Vec<&str> = std::iter::once(form.name).chain(partner).collect();
-        refuse_unknown(entries, &known, "keys here", self.faults);
+        refuse_unknown(entries, &known, "allowed keys", self.faults);
         Some(form)
     }
 
-    /// Keyframes. Where all have one value it is a constant.
+    /// Keyframes. If all have the same value, the source is constant.
     fn keyed(&mut self, spec: &ParamSpec, json: &Json<'a>, between: Option<&Entry<'a>>) -> Option<Source> {
         let Keys { keys, interpolation } = keys(json, between, self.faults)?;
         let values: Vec<Option<(f64, Value)>> =
             keys.iter().map(|(frame, json)| Some((*frame, self.key(spec, json)?))).collect();
         let keys: Vec<(f64, Value)> = values.into_iter().collect::<Option<_>>()?;
-        // There is nothing between two seeds; a mixed one says nothing of its neighbours.
+        // Seeds cannot be interpolated.
         let interpolation = if spec.shape == Shape::Seed { Interpolation::Constant } else { interpolation };
         let source = Source::Keys(Arc::new(Keyframes { keys, interpolation }), spec.shape);
         match source.is_animated() {
@@ -231,7 +235,7 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// The value of one key. Rotations stay degrees, so that whole turns between keys are made.
+    /// The value of one key. Rotations stay in degrees, so that keys can be more than a full turn apart.
     fn key(&mut self, spec: &ParamSpec, json: &Json<'a>) -> Option<Value> {
         if spec.shape == Shape::Ramp && json.is_object() {
             return match self.form(spec, json, Within::Key)? {
@@ -244,7 +248,7 @@ impl<'a> Reader<'a, '_> {
         Some(if spec.shape == Shape::Seed { self.finished(spec.shape, value) } else { value })
     }
 
-    /// A number that an attribute scales.
+    /// A number scaled by an attribute.
     fn mask(
         &mut self,
         spec: &ParamSpec,
@@ -254,7 +258,7 @@ impl<'a> Reader<'a, '_> {
     ) -> Option<Source> {
         let source = self.written(spec, value, Within::Mask);
         let Some(attribute) = attribute else {
-            self.faults.push(missing(json, "attribute", "without a mask, write the value alone"));
+            self.faults.push(missing(json, "attribute", "add it, or write the value without the object"));
             return None;
         };
         let Some(name) = attribute.json.string().filter(|name| !name.is_empty()) else {
@@ -267,14 +271,14 @@ impl<'a> Reader<'a, '_> {
         })
     }
 
-    /// A control's value, read as if it stood here.
+    /// The value of a control, read as if it were written here.
     fn controlled(&mut self, spec: &ParamSpec, name: &Json<'a>, reader: &Json<'a>) -> Option<Source> {
         let Some(text) = name.string() else {
             self.faults.push(name.unexpected("the name of a control"));
             return None;
         };
         match self.controls.get(text) {
-            Found::Value(value) => {
+            Lookup::Value(value) => {
                 let key = (text, self.kind, spec.name);
                 match self.read.get(&key) {
                     Some(Ok(source)) => return Some(source.clone()),
@@ -297,8 +301,8 @@ impl<'a> Reader<'a, '_> {
                 self.read.insert(key, read);
                 source
             }
-            Found::Faulty => None,
-            Found::Nothing => {
+            Lookup::Faulty => None,
+            Lookup::Nothing => {
                 let fault = name.fault(code::UNKNOWN_CONTROL, format!("there is no control `{}`", shown(text)));
                 let hint = did_you_mean(text, self.controls.names(), "controls");
                 self.faults.push(Fault { hint, ..fault });
@@ -307,16 +311,15 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// A path. One without `#` must be readable now; a numbered one is looked for frame by frame.
+    /// A path. A file without `#` must be readable at load; numbered files are opened at their frames.
     fn file(&mut self, json: &Json<'a>) -> Option<Source> {
         let Some(text) = json.string() else {
             self.faults.push(json.unexpected("a path, relative to the graph file"));
             return None;
         };
         if text.is_empty() {
-            self.faults.push(
-                json.fault(code::ILLEGAL_VALUE, "the path is empty").hint("leave the key out where there is no file"),
-            );
+            self.faults
+                .push(json.fault(code::ILLEGAL_VALUE, "the path is empty").hint("to read no file, leave the key out"));
             return None;
         }
         let (path, numbered) = (self.folder.join(text), text.contains('#'));
@@ -331,8 +334,8 @@ impl<'a> Reader<'a, '_> {
     }
 }
 
-/// Whether a param of that shape may be written in a form there.
-fn may_be(shape: Shape, form: &str, within: Within) -> bool {
+/// Whether a param of that shape accepts a form there.
+fn accepts(shape: Shape, form: &str, within: Within) -> bool {
     match form {
         "keyframes" => !matches!(shape, Shape::File | Shape::Code) && within != Within::Key,
         "ramp" => shape == Shape::Ramp,
@@ -342,17 +345,17 @@ fn may_be(shape: Shape, form: &str, within: Within) -> bool {
     }
 }
 
-/// The fault of ramp keys without the object around them.
+/// The fault of ramp keys that are not in an object.
 fn bare_ramp(json: &Json<'_>) -> Fault {
     let fault = json.unexpected(&Shape::Ramp.describe());
     let range = json.value.range();
     match &json.text.content[range.start..range.end] {
         text if json.elements().is_none() => {
-            fault.hint(format!("a ramp of one value is written {{\"ramp\": [[0, {}]]}}", shown(text)))
+            fault.hint(format!("write a constant ramp as {{\"ramp\": [[0, {}]]}}", shown(text)))
         }
         text if text.len() <= 60 && !text.contains(char::is_control) => {
             fault.hint(format!("write {{\"ramp\": {text}}}"))
         }
-        _ => fault.hint("write {\"ramp\": …} around it"),
+        _ => fault.hint("put the keys into an object: {\"ramp\": …}"),
     }
 }

@@ -1,11 +1,11 @@
-//! What holds for the whole graph: frames, frame rate, seed, origin.
+//! Settings of the whole graph: frames, frame rate, seed, origin.
 
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, keep, refuse_unknown};
 use crate::time::Frame;
 
-/// Reads `scene`; what it leaves out or has wrong is as [`Scene::default`] says.
+/// Reads `scene`; [`Scene::default`] provides what is missing or has a fault.
 pub(super) fn read(json: Option<&Json<'_>>, faults: &mut Vec<Fault>) -> Scene {
     let mut scene = Scene::default();
     let Some(members) = json.map(|json| json.members("an object {\"frames\": [1, 48], \"fps\": 24}", faults)) else {
@@ -31,16 +31,16 @@ pub(super) fn read(json: Option<&Json<'_>>, faults: &mut Vec<Fault>) -> Scene {
 }
 
 fn frames(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<[i64; 2]> {
-    const EXPECTED: &str = "two whole frames [first, last]";
+    const EXPECTED: &str = "two whole frame numbers [first, last]";
     let Some([first, last]) = json.elements() else {
         faults.push(json.unexpected(EXPECTED));
         return None;
     };
-    let mut frame = |value, place| {
-        let json = json.item(value, place);
-        let frame = keep(json.whole("a whole frame"), faults)?;
+    let mut frame = |value, index| {
+        let json = json.item(value, index);
+        let frame = keep(json.whole("a whole frame number"), faults)?;
         if frame.unsigned_abs() > Frame::LIMIT.unsigned_abs() {
-            let fault = json.fault(code::SCENE, format!("frame {frame} is beyond what convect counts"));
+            let fault = json.fault(code::SCENE, format!("frame {frame} is out of range"));
             faults.push(fault.hint(format!("expected a frame within ±{}", Frame::LIMIT)));
             return None;
         }
@@ -49,7 +49,7 @@ fn frames(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<[i64; 2]> {
     let (first, last) = (frame(first, 0), frame(last, 1));
     let (first, last) = (first?, last?);
     if first > last {
-        let fault = json.fault(code::SCENE, format!("the frames [{first}, {last}] run backwards"));
+        let fault = json.fault(code::SCENE, format!("the first frame, {first}, is after the last, {last}"));
         faults.push(fault.hint(format!("write [{last}, {first}]")));
         return None;
     }
@@ -57,15 +57,15 @@ fn frames(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<[i64; 2]> {
 }
 
 fn fps(json: &Json<'_>) -> Result<f64, Fault> {
-    let fps = json.number("frames a second, a number")?;
-    // Beyond these, a frame's length in seconds is not a number any more.
+    let fps = json.number("a number of frames per second")?;
+    // Outside these limits the duration of a frame overflows.
     const LEAST: f64 = 1e-6;
     const MOST: f64 = 1e6;
     match (LEAST..=MOST).contains(&fps) {
         true => Ok(fps),
         false => {
             let fault = json.fault(code::SCENE, format!("`fps` is {fps}"));
-            Err(fault.hint(format!("expected {LEAST}…{MOST} frames a second, such as 24")))
+            Err(fault.hint(format!("expected {LEAST}…{MOST} frames per second, such as 24")))
         }
     }
 }
@@ -76,8 +76,8 @@ fn origin(json: &Json<'_>, faults: &mut Vec<Fault>) -> Option<[f64; 3]> {
         return None;
     };
     let mut origin = [0.0; 3];
-    for (place, value) in values.iter().enumerate() {
-        origin[place] = keep(json.item(value, place).number("a number"), faults)?;
+    for (index, value) in values.iter().enumerate() {
+        origin[index] = keep(json.item(value, index).number("a number"), faults)?;
     }
     Some(origin)
 }

@@ -1,8 +1,8 @@
-//! The JSON Schema of graph files, for editors: derived from a catalogue, so that it says what `check` says.
+//! The JSON Schema of graph files, for editors. It is derived from a catalogue, so that it agrees with `check`.
 //!
-//! Promise: a graph that loads is valid under the schema, but for keyframes of one value on a param that cannot be
-//! animated. Limit: what spans several places is beyond a schema (wires to nodes that are not there, cycles, order of
-//! keys, expressions, files), and comments are the editor's to read.
+//! Promise: a graph that loads is valid under the schema, except for keyframes with a single value on a param that
+//! cannot be animated. Limit: a schema cannot check relations between parts (wires to missing nodes, cycles, order of
+//! keys), expressions and files; whether comments are accepted depends on the editor.
 
 mod param;
 
@@ -14,9 +14,9 @@ use crate::expr::RESERVED;
 use crate::node::{Arity, InputSpec, Node};
 use crate::time::Frame;
 
-/// What ids and names are made of.
+/// The pattern of ids and names.
 const NAME: &str = "^[A-Za-z_][A-Za-z0-9_-]*$";
-/// An id, perhaps with an output.
+/// The pattern of an id with an optional output.
 const LINK: &str = "^[A-Za-z_][A-Za-z0-9_-]*(\\.[A-Za-z0-9_]+)?$";
 
 /// The schema (draft 2020-12) of graphs whose nodes are of the catalogue's types.
@@ -28,16 +28,16 @@ pub fn schema(catalogue: Catalogue) -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "convect graph",
-        "description": "Nodes that make geometry move, how they are wired, and what is to come out.",
+        "description": "Nodes that make geometry move, their wires, and the outputs to write.",
         "type": "object",
         "required": ["convect", "nodes", "outputs"],
         "additionalProperties": false,
         "properties": {
             "$schema": {"type": "string"},
-            "convect": described(json!({"const": 1}), "The number of the format."),
+            "convect": described(json!({"const": 1}), "The format number."),
             "scene": scene(),
             "controls": {
-                "description": "Values with a name, which params and expressions read.",
+                "description": "Named values, which params and expressions read.",
                 "type": "object",
                 "propertyNames": {"pattern": NAME, "not": {"enum": RESERVED}},
                 "additionalProperties": {"$ref": "#/$defs/control-value"},
@@ -49,7 +49,7 @@ pub fn schema(catalogue: Catalogue) -> Value {
                 "additionalProperties": {"$ref": "#/$defs/node"},
             },
             "outputs": {
-                "description": "What is to come out, by the name of its file.",
+                "description": "The outputs to write, by the name of their file.",
                 "type": "object",
                 "minProperties": 1,
                 "propertyNames": {"pattern": NAME},
@@ -60,11 +60,11 @@ pub fn schema(catalogue: Catalogue) -> Value {
     })
 }
 
-/// What holds for the whole graph.
+/// Settings of the whole graph.
 fn scene() -> Value {
     let frame = json!({"type": "integer", "minimum": -Frame::LIMIT, "maximum": Frame::LIMIT});
     json!({
-        "description": "What holds for the whole graph.",
+        "description": "Settings of the whole graph.",
         "type": "object",
         "additionalProperties": false,
         "properties": {
@@ -72,17 +72,17 @@ fn scene() -> Value {
                 "description": "First and last frame.",
                 "type": "array", "items": frame, "minItems": 2, "maxItems": 2, "default": [1, 1],
             },
-            "fps": {"description": "Frames a second.", "type": "number", "exclusiveMinimum": 0, "default": 24},
+            "fps": {"description": "Frames per second.", "type": "number", "exclusiveMinimum": 0, "default": 24},
             "seed": {"description": "Mixed into every node's seed.", "type": "integer", "default": 0},
             "origin": {
-                "description": "Where positions are relative to, in metres.",
+                "description": "The point that positions are relative to, in metres.",
                 "type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3, "default": [0, 0, 0],
             },
         },
     })
 }
 
-/// Definitions that are the same for all catalogues. No node type starts with a small letter.
+/// Definitions that all catalogues share. Their names start with a small letter, so no node type has the same name.
 fn shared_definitions() -> Map<String, Value> {
     let expression = json!({"type": "string", "minLength": 1});
     let expressions = |count: usize| {
@@ -95,21 +95,21 @@ fn shared_definitions() -> Map<String, Value> {
     let pair = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});
     let interpolation = json!({
         "oneOf": [
-            {"const": "linear", "description": "Straight from key to key."},
-            {"const": "smooth", "description": "A smoothstep from key to key."},
-            {"const": "constant", "description": "Holds until the next key."},
+            {"const": "linear", "description": "Straight lines between keys."},
+            {"const": "smooth", "description": "A smoothstep between keys."},
+            {"const": "constant", "description": "Constant until the next key."},
         ],
         "default": "linear",
     });
     let key = param::key(&json!(true));
     let list = json!({
-        "link": {"description": "A node, or an output of it.", "type": "string", "pattern": LINK},
+        "link": {"description": "A node, or one of its outputs.", "type": "string", "pattern": LINK},
         "expressions-1": expressions(1),
         "expressions-2": expressions(2),
         "expressions-3": expressions(3),
         "control": param::form("control", json!({"type": "string", "pattern": NAME}), "The control's value.", &[]),
         "interpolation": interpolation,
-        "ramp-keys": {"description": "[[x, y], …], x rising.", "type": "array", "items": pair, "minItems": 1},
+        "ramp-keys": {"description": "[[x, y], …], x increasing.", "type": "array", "items": pair, "minItems": 1},
         "ramp": param::form("ramp", json!({"$ref": "#/$defs/ramp-keys"}), "A curve over 0…1.", &["interpolation"]),
         "control-value": any_of(vec![
             json!({"type": ["number", "string", "boolean", "array"]}),
@@ -125,7 +125,7 @@ fn shared_definitions() -> Map<String, Value> {
                 "properties": {
                     "from": {"$ref": "#/$defs/link"},
                     "attributes": {
-                        "description": "The attributes to write; all where this is left out.",
+                        "description": "The attributes to write; all if left out.",
                         "type": "array", "items": {"type": "string", "minLength": 1},
                     },
                     "v": {"description": "Whether to write velocities.", "type": "boolean", "default": false},
@@ -139,7 +139,7 @@ fn shared_definitions() -> Map<String, Value> {
     }
 }
 
-/// The definitions, and that of a node of any type: its `type` says which of them holds.
+/// The definitions, and that of a node of any type, which selects one of them by the node's `type`.
 fn with_node(mut definitions: Map<String, Value>, catalogue: Catalogue) -> Map<String, Value> {
     let types: Vec<Value> =
         catalogue.nodes().map(|node| json!({"const": node.name, "description": node.summary()})).collect();

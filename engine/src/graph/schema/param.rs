@@ -1,4 +1,4 @@
-//! The schema of one param: its literals with their ranges, and the forms that may stand instead.
+//! The schema of one param: its literals with their ranges, and the other forms of its value.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -13,12 +13,12 @@ pub(super) fn described(mut schema: Json, text: &str) -> Json {
     schema
 }
 
-/// The schema of what one of these accepts.
+/// A schema that accepts what one of `schemas` accepts.
 pub(super) fn any_of(mut schemas: Vec<Json>) -> Json {
     if schemas.len() == 1 { schemas.swap_remove(0) } else { json!({"anyOf": schemas}) }
 }
 
-/// An object that says a value by one key, and the keys that may stand beside it.
+/// An object that sets a value by the key `key`, with optional keys beside it.
 pub(super) fn form(key: &str, value: Json, help: &str, beside: &[&str]) -> Json {
     let mut properties = Map::from_iter([(key.to_owned(), value)]);
     properties.extend(beside.iter().map(|name| ((*name).to_owned(), json!({"$ref": format!("#/$defs/{name}")}))));
@@ -34,14 +34,14 @@ pub(super) fn key(value: &Json) -> Json {
 /// Keyframes, given the schema of a key.
 pub(super) fn keyframes(key: &Json) -> Json {
     let list =
-        json!({"description": "[[frame, value], …], frames rising.", "type": "array", "items": key, "minItems": 1});
+        json!({"description": "[[frame, value], …], frames increasing.", "type": "array", "items": key, "minItems": 1});
     form("keyframes", list, "", &["interpolation"])
 }
 
 /// The schema of a param.
 pub(super) fn param(spec: &ParamSpec) -> Json {
     let literal = literal(spec);
-    // Attributes are an object themselves: no form can be told from them.
+    // Attributes are an object themselves, so it could not be distinguished from a form.
     let schema = match spec.shape {
         Shape::Columns => literal,
         _ => any_of(with_forms(spec, literal)),
@@ -53,7 +53,7 @@ pub(super) fn param(spec: &ParamSpec) -> Json {
     schema
 }
 
-/// The literal and the forms that may stand instead of it.
+/// The literal and the other forms of the value.
 fn with_forms(spec: &ParamSpec, literal: Json) -> Vec<Json> {
     let mut moving = Vec::new();
     if !spec.facts.fixed && !matches!(spec.shape, Shape::File | Shape::Code) {
@@ -71,7 +71,7 @@ fn with_forms(spec: &ParamSpec, literal: Json) -> Vec<Json> {
     forms.append(&mut moving);
     if spec.shape == Shape::Masked {
         let mask = json!({
-            "description": "A number that a point attribute scales.",
+            "description": "A number scaled by a point attribute.",
             "type": "object",
             "required": ["value", "attribute"],
             "additionalProperties": false,
@@ -82,10 +82,10 @@ fn with_forms(spec: &ParamSpec, literal: Json) -> Vec<Json> {
     forms
 }
 
-/// Help, unit, usual range, and a default that is no value.
+/// Help, unit, usual range, and a default that depends on the scene.
 fn help(spec: &ParamSpec) -> String {
     let mut text = spec.help.to_owned();
-    // A frame is a place, not an amount.
+    // A frame number is not an amount.
     if !matches!(spec.facts.unit, Unit::None | Unit::Frame) {
         text += &format!(" In {}.", spec.facts.unit.sign());
     }
@@ -93,12 +93,12 @@ fn help(spec: &ParamSpec) -> String {
         text += &format!(" Usually {low}…{high}.");
     }
     if spec.facts.unset != Unset::Default {
-        text += &format!(" Unless set: {}.", spec.default_text());
+        text += &format!(" Default: {}.", spec.default_text());
     }
     text
 }
 
-/// A value written outright.
+/// The schema of a literal.
 fn literal(spec: &ParamSpec) -> Json {
     let number = || ranged("number", spec.facts.hard);
     let whole = || ranged("integer", spec.facts.hard);
@@ -149,7 +149,7 @@ fn ranged(kind: &str, bounds: Bounds) -> Json {
     schema
 }
 
-/// The default as a graph file would say it; `None` where it says nothing.
+/// The default as written in a graph file; `None` if it cannot be written.
 fn default(spec: &ParamSpec) -> Option<Json> {
     let numbers = |values: &[f64]| Json::from_iter(values.iter().copied().map(number));
     let texts = |texts: &[Name]| Json::from_iter(texts.iter().map(|text| text.to_string()));
@@ -160,9 +160,9 @@ fn default(spec: &ParamSpec) -> Option<Json> {
         (Value::Vec2(v) | Value::Span(v), _) => numbers(v),
         (Value::Vec3(v), _) => numbers(v),
         (Value::Int3(v), _) => json!(v),
-        // The only default of a rotation is none.
+        // The default of a rotation is always the identity.
         (Value::Turn(_), _) => json!([0, 0, 0]),
-        (Value::Choice(place), Shape::Choice(options)) => json!(options.get(*place)?.word),
+        (Value::Choice(index), Shape::Choice(options)) => json!(options.get(*index)?.word),
         (Value::Text(text), _) => json!(&**text),
         (Value::Texts(list), _) => texts(list),
         (Value::Code(code), _) => json!(code.text()),
@@ -183,13 +183,13 @@ fn interpolation_word(interpolation: numerics::ramp::Interpolation) -> &'static 
     }
 }
 
-/// Whole numbers without a point.
+/// A number; whole ones are written without a decimal point.
 fn number(x: f64) -> Json {
     const EXACT: f64 = 9_007_199_254_740_992.0;
     if x.fract() == 0.0 && x.abs() < EXACT { json!(x as i64) } else { json!(x) }
 }
 
-/// The f64 that prints as the f32 does.
+/// The f64 that prints like the f32.
 fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
 }

@@ -1,7 +1,8 @@
-//! Stored messages: broken graphs with all their faults, as a user sees them, in `faults.txt`.
+//! Stored messages: invalid graphs with all their faults as a user sees them, in `faults.txt`.
 //!
-//! A case is `=== name`, lines `--set KEY=JSON` where there are some, the graph, `---`, and the faults: code, then the
-//! message. `BLESS=1 cargo test -p engine stored_messages` writes what is, to be read before it is committed.
+//! A case is `=== name`, optional lines `--set KEY=JSON`, the graph, `---`, and the faults: code, then the message.
+//! `BLESS=1 cargo test -p engine stored_messages` stores the current messages; read the difference before committing
+//! it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -20,11 +21,11 @@ pub(super) struct Case<'a> {
 
 pub(super) fn cases() -> Vec<Case<'static>> {
     let cases = STORED.split("=== ").skip(1).map(|case| {
-        let (name, rest) = case.split_once('\n').expect("a name and a line's end");
+        let (name, rest) = case.split_once('\n').expect("a name and a line break");
         let (mut graph, expected) = rest.split_once("---\n").expect("a graph and its faults");
         let mut set = Vec::new();
         while let Some(line) = graph.strip_prefix("--set ") {
-            let (line, rest) = line.split_once('\n').expect("a line's end");
+            let (line, rest) = line.split_once('\n').expect("a line break");
             set.push(line.split_once('=').expect("a key and a value"));
             graph = rest;
         }
@@ -43,7 +44,7 @@ impl Case<'_> {
 }
 
 #[test]
-fn stored_messages_are_what_broken_graphs_give() {
+fn stored_messages_are_those_of_invalid_graphs() {
     let mut blessed = STORED.split("=== ").next().unwrap_or_default().to_owned();
     let mut changed = Vec::new();
     for case in cases() {
@@ -63,20 +64,20 @@ fn stored_messages_are_what_broken_graphs_give() {
 }
 
 #[test]
-fn every_case_of_the_table_has_a_fault_and_every_kind_of_fault_a_case() {
+fn every_case_has_a_fault_and_every_kind_of_fault_has_a_case() {
     let mut seen = BTreeSet::new();
     for case in cases() {
         assert!(!case.expected.is_empty(), "{}", case.name);
         seen.extend(case.expected.lines().filter_map(|line| Some(line.split_once(": ")?.0)));
     }
-    // Bytes that are no text cannot stand in a table of text.
+    // Bytes that are not UTF-8 cannot be stored in a text file.
     let mut known: BTreeSet<&str> = code::ALL.iter().copied().collect();
     known.remove(code::ENCODING);
     assert_eq!(seen, known);
 }
 
 #[test]
-fn messages_keep_to_their_style() {
+fn messages_follow_the_style() {
     for case in cases() {
         for fault in load_with(case.graph, &case.set).err().unwrap_or_default() {
             for sentence in std::iter::once(&fault.fact).chain(&fault.hint) {
@@ -90,7 +91,7 @@ fn messages_keep_to_their_style() {
 }
 
 #[test]
-fn only_files_that_cannot_be_read_are_faults_of_files() {
+fn only_unreadable_files_are_faults_of_class_file() {
     for case in cases() {
         for fault in load_with(case.graph, &case.set).err().unwrap_or_default() {
             let is_file = [code::FILE_MISSING, code::FILE_UNREADABLE].contains(&fault.code);
@@ -100,7 +101,7 @@ fn only_files_that_cannot_be_read_are_faults_of_files() {
 }
 
 #[test]
-fn faults_found_after_the_load_are_placed_too() {
+fn faults_found_after_the_load_have_positions_too() {
     use super::super::{Fault, Part};
     let text = "{\"convect\": 1,\n\"nodes\": {\"fur\": {\"type\": \"Curve_In\",\n  \"params\": {\"file\": \"a.obj\"}}},\n\"outputs\": {\"fur\": \"fur\"}}";
     let graph = good(text);
@@ -109,12 +110,16 @@ fn faults_found_after_the_load_are_placed_too() {
         (line, column, path)
     };
     assert_eq!(at(&graph, Part::Param("fur", "file")), (3, 22, "nodes.fur.params.file".into()));
-    assert_eq!(at(&graph, Part::Param("fur", "scale")), (2, 11, "nodes.fur.params.scale".into()), "not set: the node");
+    assert_eq!(
+        at(&graph, Part::Param("fur", "scale")),
+        (2, 11, "nodes.fur.params.scale".into()),
+        "not set: position of the node"
+    );
     assert_eq!(at(&graph, Part::Node("fur")), (2, 11, "nodes.fur".into()));
     assert_eq!(at(&graph, Part::Output("fur")), (4, 13, "outputs.fur".into()));
     assert_eq!(at(&graph, Part::Node("other")), (0, 0, "nodes.other".into()));
 
     let graph = load_with(text, &[("fur.file", "\"b.obj\"")]).expect("a graph without faults");
-    let fault = graph.fault_at(Part::Param("fur", "file"), code::FILE_UNREADABLE, FaultClass::File, "it is no obj");
-    assert_eq!(fault.in_file("graph.json"), "--set fur.file:1:1: nodes.fur.params.file: it is no obj");
+    let fault = graph.fault_at(Part::Param("fur", "file"), code::FILE_UNREADABLE, FaultClass::File, "not an obj");
+    assert_eq!(fault.in_file("graph.json"), "--set fur.file:1:1: nodes.fur.params.file: not an obj");
 }

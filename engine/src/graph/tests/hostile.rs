@@ -1,4 +1,4 @@
-//! Texts that nobody means: none may panic, overflow the stack or take long.
+//! Hostile texts: none may cause a panic, a stack overflow or a long run.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::super::Graph;
 use super::super::fault::code;
 use super::{CATALOGUE, load, probe};
 
-/// Something of everything, for mutations to start from.
+/// A graph with every construct, from which mutations start.
 pub(super) const WHOLE: &str = r#"{ // every form
   "convect": 1, "$schema": "graph.schema.json",
   "scene": { "frames": [1, 48], "fps": 24, "seed": 7, "origin": [1e6, 0, 0] },
@@ -32,7 +32,7 @@ pub(super) const WHOLE: &str = r#"{ // every form
 }"#;
 
 #[test]
-fn a_file_of_nothing_but_one_bracket_is_answered() {
+fn a_file_of_a_single_token_is_refused() {
     for text in
         ["[", "{", "]", "}", "\"", "/*", "//", "-", ",", ":", "\\", "\u{0}", "null", "{}", "[]", "1e999", "\u{feff}"]
     {
@@ -41,7 +41,7 @@ fn a_file_of_nothing_but_one_bracket_is_answered() {
 }
 
 #[test]
-fn a_depth_of_100_000_is_one_fault() {
+fn nesting_100_000_deep_is_one_fault() {
     for (open, close) in [("[", "]"), ("{\"a\":", "}"), ("{\"convect\":1,\"nodes\":{\"a\":{\"params\":", "")] {
         let faults = load(&(open.repeat(100_000) + &close.repeat(100_000))).err().unwrap_or_default();
         assert_eq!(faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [code::NESTING]);
@@ -49,7 +49,7 @@ fn a_depth_of_100_000_is_one_fault() {
 }
 
 #[test]
-fn every_beginning_of_a_graph_is_answered() {
+fn every_truncation_of_a_graph_is_refused() {
     for (end, _) in WHOLE.char_indices() {
         assert!(load(&WHOLE[..end]).is_err(), "{end}");
     }
@@ -65,7 +65,7 @@ fn a_graph_of_ten_thousand_nodes_loads() {
 }
 
 #[test]
-fn thousands_of_faults_among_thousands_of_names_are_answered() {
+fn thousands_of_faults_among_thousands_of_names_are_reported() {
     let mut text = String::from(r#"{"convect": 1, "outputs": {"end": "n1"}, "controls": {"end": 1"#);
     (0..2_000).for_each(|n| text += &format!(r#", "c{n}": 1"#));
     text += r#"}, "nodes": {"n": {"type": "Curve_In"}"#;
@@ -77,7 +77,7 @@ fn thousands_of_faults_among_thousands_of_names_are_answered() {
 }
 
 #[test]
-fn nodes_of_a_type_share_what_they_read_of_a_control() {
+fn nodes_of_one_type_share_the_source_read_from_a_control() {
     use crate::graph::Body;
     use crate::param::{Source, Value};
     let mut text =
@@ -104,14 +104,14 @@ fn nodes_of_a_type_share_what_they_read_of_a_control() {
     let faults = load(&text.replace("[[0, 0, 0]]", "[1, 2]")).err().unwrap_or_default();
     let paths: Vec<&str> = faults.iter().map(|fault| &*fault.path).collect();
     let first = "nodes.n0.params.offsets[0]";
-    assert_eq!(paths, [first, "nodes.n1.params.offsets", "nodes.n2.params.offsets"], "each of them says so");
+    assert_eq!(paths, [first, "nodes.n1.params.offsets", "nodes.n2.params.offsets"], "each node reports it");
 }
 
 #[test]
-fn what_a_terminal_obeys_reaches_no_message() {
+fn messages_contain_no_control_characters() {
     let broken = [
         ("{\"convect\": 1, \"outputs\"\u{1b}[2J: {}}", "a key"),
-        (r#"{"convect": 1, "nodes": {"\u001b[2J": {"type": "Curve_In"}}, "outputs": {"a": "b"}}"#, "a node to propose"),
+        (r#"{"convect": 1, "nodes": {"\u001b[2J": {"type": "Curve_In"}}, "outputs": {"a": "b"}}"#, "a suggested node"),
         (
             r#"{"convect": 1, "controls": {"\u001b": "x"}, "outputs": {"a": "a"}, "nodes": {"a": {"type": "Every_Shape",
             "params": {"float": {"control": "\u001b"}, "double": {"expr": "x"}}}}}"#,
@@ -125,15 +125,15 @@ fn what_a_terminal_obeys_reaches_no_message() {
     ];
     for (text, what) in broken {
         let faults = load(text).err().unwrap_or_default();
-        let obeyed = |fault: &crate::graph::Fault| fault.to_string().contains(char::is_control);
-        assert!(!faults.is_empty() && !faults.iter().any(obeyed), "{what}: {faults:?}");
+        let has_control_character = |fault: &crate::graph::Fault| fault.to_string().contains(char::is_control);
+        assert!(!faults.is_empty() && !faults.iter().any(has_control_character), "{what}: {faults:?}");
     }
     let faults = super::load_with(WHOLE, &[("\u{1b}[2J", ""), ("\u{1b}[2J", "word")]).err().unwrap_or_default();
     assert!(!faults.iter().any(|fault| fault.to_string().contains(char::is_control)), "{faults:?}");
 }
 
 #[test]
-fn a_circle_of_thousands_names_a_few() {
+fn a_cycle_of_thousands_of_nodes_is_shortened() {
     let nodes = (0..5_000).map(|n| {
         let next = (n + 1) % 5_000;
         format!(r#""n{n}": {{"type": "Curve_Wind", "inputs": {{"curves": "n{next}"}}}}"#)
@@ -141,12 +141,13 @@ fn a_circle_of_thousands_names_a_few() {
     let nodes = nodes.collect::<Vec<_>>().join(", ");
     let text = format!(r#"{{"convect": 1, "outputs": {{"end": "n0"}}, "nodes": {{{nodes}}}}}"#);
     let faults = load(&text).err().unwrap_or_default();
-    let few = "the wires go round: n0 → n4999 → n4998 → n4997 → n4996 → n4995 → … → n5 → n4 → n3 → n2 → n1 → n0";
-    assert_eq!(faults.iter().map(|fault| &*fault.fact).collect::<Vec<_>>(), [few]);
+    let shortened =
+        "the wires form a cycle: n0 → n4999 → n4998 → n4997 → n4996 → n4995 → … → n5 → n4 → n3 → n2 → n1 → n0";
+    assert_eq!(faults.iter().map(|fault| &*fault.fact).collect::<Vec<_>>(), [shortened]);
 }
 
 #[test]
-fn bytes_that_are_no_text_are_said_to_be() {
+fn bytes_that_are_not_utf_8_are_refused() {
     for bytes in [&b"\xff\xfe{\0}\0"[..], b"{\"a\": \"\xc3\x28\"}", b"\x1f\x8b\x08\x00", b"\0\0\0\0"] {
         let faults = Graph::load_bytes(bytes, Path::new(""), CATALOGUE, &[], &probe).err().unwrap_or_default();
         assert_eq!(faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [code::ENCODING], "{bytes:?}");
@@ -157,20 +158,20 @@ fn bytes_that_are_no_text_are_said_to_be() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_answered(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn arbitrary_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         let _ = Graph::load_bytes(&bytes, Path::new(""), CATALOGUE, &[], &probe);
     }
 
     #[test]
-    fn any_json_like_text_is_answered(text in r#"[\[\]{}:,"\\ \n/*a-z0-9.eE+-]{0,80}"#, key in "[a-z.]{0,6}") {
+    fn arbitrary_json_like_texts_never_panic(text in r#"[\[\]{}:,"\\ \n/*a-z0-9.eE+-]{0,80}"#, key in "[a-z.]{0,6}") {
         let _ = load(&text);
         let set = [(key, text.clone()), ("wind.amplitude".into(), text)];
         let _ = Graph::load(WHOLE, Path::new(""), CATALOGUE, &set, &probe);
     }
 
     #[test]
-    fn any_change_of_a_graph_is_answered(changes in proptest::collection::vec((0..WHOLE.len(), 0..40_usize, any::<u8>()), 1..4)) {
-        // What is put in its place: a piece of the graph itself, or any byte.
+    fn arbitrary_changes_of_a_graph_never_panic(changes in proptest::collection::vec((0..WHOLE.len(), 0..40_usize, any::<u8>()), 1..4)) {
+        // The replacement is a piece of the graph itself or an arbitrary byte.
         let mut bytes = WHOLE.as_bytes().to_vec();
         for (at, length, byte) in changes {
             let at = at.min(bytes.len());

@@ -1,5 +1,4 @@
-//! Tests of loading: graphs that load and what becomes of them, the stored messages of those that do not, hostile texts,
-//! and the schema.
+//! Tests of loading: valid graphs and their sources, stored messages of invalid graphs, hostile texts, and the schema.
 
 mod catalogue;
 mod faults;
@@ -13,7 +12,8 @@ use std::path::Path;
 use super::{Fault, Graph};
 use catalogue::CATALOGUE;
 
-/// Files as the tests have them: what is called so is missing, locked or a folder; all else can be read.
+/// The files of the tests: those named `missing`, `locked`, `folder` and `broken` fail in that way, all others can be
+/// read.
 fn probe(path: &Path) -> io::Result<()> {
     match path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default() {
         "missing" => Err(io::ErrorKind::NotFound.into()),
@@ -24,7 +24,7 @@ fn probe(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Loads a graph that lies in the folder `scene`.
+/// Loads a graph whose file is in the folder `scene`.
 fn load_with(text: &str, set: &[(&str, &str)]) -> Result<Graph, Vec<Fault>> {
     let set: Vec<(String, String)> = set.iter().map(|(key, value)| ((*key).into(), (*value).into())).collect();
     Graph::load(text, Path::new("scene"), CATALOGUE, &set, &probe)
@@ -34,7 +34,7 @@ fn load(text: &str) -> Result<Graph, Vec<Fault>> {
     load_with(text, &[])
 }
 
-/// Loads a graph that has no fault, and that the schema accepts.
+/// Loads a graph that must be free of faults and valid under the schema.
 fn good(text: &str) -> Graph {
     assert_eq!(schema::refused(text), Vec::<String>::new());
     load(text).unwrap_or_else(|faults| panic!("{faults:#?}"))

@@ -1,4 +1,4 @@
-//! The schema against graphs: it accepts what loads and refuses what a schema can refuse.
+//! The schema: it accepts every graph that loads and refuses the faults that a schema can express.
 
 use std::sync::LazyLock;
 
@@ -14,9 +14,9 @@ use super::CATALOGUE;
 use super::faults::cases;
 
 static VALIDATOR: LazyLock<Validator> =
-    LazyLock::new(|| jsonschema::draft202012::new(&schema(CATALOGUE)).expect("the schema is a schema"));
+    LazyLock::new(|| jsonschema::draft202012::new(&schema(CATALOGUE)).expect("the schema is valid"));
 
-/// The plain JSON of a text with comments; the first of doubled keys counts.
+/// Plain JSON of JSON with comments; of duplicate keys the first counts.
 fn plain(value: &Ast<'_>) -> Value {
     match value {
         Ast::StringLit(text) => json!(text.value),
@@ -31,7 +31,7 @@ fn plain(value: &Ast<'_>) -> Value {
     }
 }
 
-/// What the schema finds wrong with a text of JSON.
+/// The schema's errors for a JSON text.
 pub(super) fn refused(text: &str) -> Vec<String> {
     let text = Text::new(text, None);
     let value = plain(&parse(&text).expect("JSON with comments"));
@@ -39,12 +39,12 @@ pub(super) fn refused(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_schema_is_a_schema() {
+fn the_schema_is_a_valid_schema() {
     assert!(jsonschema::draft202012::meta::is_valid(&schema(CATALOGUE)));
 }
 
 #[test]
-fn the_schema_refuses_what_a_schema_can() {
+fn the_schema_refuses_the_faults_that_a_schema_can_express() {
     let seen = [
         code::UNKNOWN_KEY,
         code::MISSING_KEY,
@@ -63,12 +63,12 @@ fn the_schema_refuses_what_a_schema_can() {
         code::WRONG_KIND,
         code::ILLEGAL_VALUE,
     ];
-    // Values of expressions, what reads a control, and the order of a range's ends are beyond it.
+    // A schema cannot check values of expressions, the params that read a control, and the order of a range's ends.
     let beyond = [
-        "a range that runs backwards",
-        "expressions of constant illegal values",
-        "a control that does not fit its readers",
-        "expressions that are not whole where a whole number belongs",
+        "a range with its ends reversed",
+        "constant expressions with illegal values",
+        "a control that does not fit the params that read it",
+        "expressions that are not whole for integer params",
     ];
     for case in cases().iter().filter(|case| case.set.is_empty() && !beyond.contains(&case.name)) {
         let codes = case.expected.lines().filter_map(|line| Some(line.split_once(": ")?.0));
@@ -79,7 +79,7 @@ fn the_schema_refuses_what_a_schema_can() {
 }
 
 #[test]
-fn a_param_says_help_unit_range_and_default() {
+fn a_param_has_help_unit_range_and_default() {
     let schema = schema(CATALOGUE);
     let wind = &schema["$defs"]["Curve_Wind"]["properties"]["params"]["properties"];
     assert_eq!(wind["frequency"]["description"], "How fine the noise is. In 1/m.");
@@ -90,7 +90,7 @@ fn a_param_says_help_unit_range_and_default() {
     assert_eq!(wind["noise"]["default"], "perlin");
     assert_eq!(wind["ramp_rotate"]["default"], json!({"ramp": [[0, 1]], "interpolation": "linear"}));
     let reader = &schema["$defs"]["Curve_In"]["properties"]["params"]["properties"];
-    assert_eq!(reader["frame"]["description"], "Which frame of the files. Unless set: the current frame.");
+    assert_eq!(reader["frame"]["description"], "Which frame of the files. Default: the current frame.");
     assert_eq!(reader["frame"]["default"], Value::Null);
     let shapes = &schema["$defs"]["Every_Shape"]["properties"]["params"]["properties"];
     assert_eq!(shapes["float"]["description"], "A number. Usually 0…1.");

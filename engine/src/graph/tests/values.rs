@@ -1,4 +1,4 @@
-//! What becomes of graphs without a fault: order, wires, and the sources of params.
+//! Valid graphs: order of nodes, wires, and the sources of params.
 
 use std::io::ErrorKind;
 
@@ -7,7 +7,7 @@ use super::{good, load_with};
 use crate::geometry::Column;
 use crate::param::{Source, Value, euler_to_turn};
 
-/// A graph of one node of every shape, with these params; `controls` are its controls.
+/// A graph of one `Every_Shape` node with these params and controls.
 fn shapes(controls: &str, params: &str) -> Graph {
     good(&format!(
         r#"{{"convect": 1, "scene": {{"frames": [10, 20], "seed": 7}}, "controls": {{{controls}}},
@@ -35,7 +35,7 @@ fn at(graph: &Graph, param: &str, frame: f64) -> Value {
 }
 
 #[test]
-fn the_least_graph_has_the_documented_defaults() {
+fn a_minimal_graph_has_the_documented_defaults() {
     let graph = good(r#"{"convect": 1, "nodes": {"a": {"type": "Mesh_In"}}, "outputs": {"a": "a"}}"#);
     assert_eq!(graph.scene, Scene { first: 1, last: 1, fps: 24.0, seed: 0, origin: [0.0; 3] });
     assert!(matches!(source(&graph, "a", "frame"), Source::CurrentFrame));
@@ -43,7 +43,7 @@ fn the_least_graph_has_the_documented_defaults() {
 }
 
 #[test]
-fn nodes_stand_after_what_they_are_wired_to_and_links_follow() {
+fn nodes_are_sorted_after_their_sources_and_links_are_renumbered() {
     let graph = good(
         r#"{"convect": 1, "outputs": {"o": {"from": "soft.tets", "attributes": ["P"], "v": true}}, "nodes": {
             "soft": {"type": "Softbody", "inputs": {"bodies": ["b", "a.mesh"]}},
@@ -92,7 +92,7 @@ fn literals_of_every_shape_are_read() {
     }
     let Value::Columns(columns) = constant(&graph, "columns") else { panic!() };
     assert_eq!(columns[0], ("mask".into(), Column::new(vec![1.0_f32, 0.5])));
-    assert_eq!(columns[1], ("id2".into(), Column::new(vec![1, 2])), "written whole, it is whole");
+    assert_eq!(columns[1], ("id2".into(), Column::new(vec![1, 2])), "numbers without a point are integers");
     assert_eq!(columns[2], ("width".into(), Column::new(vec![1.0_f32])), "a well-known name has its type");
     assert_eq!(columns[3], ("Cd".into(), Column::new(vec![[1, 0, 0]])));
     assert_eq!(columns[4], ("q".into(), Column::new(vec![[0.0_f32, 0.0, 0.0, 1.0]])));
@@ -108,14 +108,14 @@ fn keyframes_of_every_kind_of_value_are_read() {
     );
     assert_eq!(at(&graph, "float", 5.0), Value::Float(0.5));
     assert_eq!(at(&graph, "vec3", 9.0), Value::Vec3([0.0; 3]));
-    assert_eq!(at(&graph, "rotate", 2.5), euler_to_turn([0.0, 180.0, 0.0]), "whole turns are made");
+    assert_eq!(at(&graph, "rotate", 2.5), euler_to_turn([0.0, 180.0, 0.0]), "whole turns are kept");
     assert_eq!((at(&graph, "choice", 9.9), at(&graph, "choice", 10.0)), (Value::Choice(0), Value::Choice(1)));
     let Value::Ramp(ramp) = at(&graph, "falloff", 5.0) else { panic!() };
     assert_eq!(ramp.keys(), [[0.0, 0.5]]);
 }
 
 #[test]
-fn keys_of_one_value_do_not_move() {
+fn keyframes_with_one_value_are_constant() {
     let text = r#"{"convect": 1, "nodes": {"all": {"type": "Every_Shape", "params": {
         "fixed": {"keyframes": [[0, 2], [10, 2]]}}}}, "outputs": {"a": "all"}}"#;
     let graph = load_with(text, &[]).unwrap_or_else(|faults| panic!("{faults:#?}"));
@@ -123,7 +123,7 @@ fn keys_of_one_value_do_not_move() {
 }
 
 #[test]
-fn expressions_that_hang_on_no_time_are_constants() {
+fn expressions_without_time_are_constants() {
     let graph = shapes(
         r#""gain": 2, "dir": [1, 2, 3], "on": true, "moving": {"keyframes": [[10, 0], [20, 10]]}"#,
         r#""float": {"expr": "gain*dir.y + on"}, "int": {"expr": "floor(7/2)"}, "vec3": {"expr": ["dir.x", "fps", "0"]},
@@ -134,11 +134,11 @@ fn expressions_that_hang_on_no_time_are_constants() {
     assert_eq!(constant(&graph, "vec3"), Value::Vec3([1.0, 24.0, 0.0]));
     assert_eq!(constant(&graph, "rotate"), euler_to_turn([0.0, 90.0, 0.0]));
     assert_eq!(constant(&graph, "fixed"), Value::Float(2.0));
-    assert_eq!(at(&graph, "double", 12.0), Value::Float(2.5), "2 keyed, and 12 frames are half a second");
+    assert_eq!(at(&graph, "double", 12.0), Value::Float(2.5), "2 from the keyframes, and frame 12 is at 0.5 s");
 }
 
 #[test]
-fn controls_are_read_as_if_they_stood_in_the_param() {
+fn a_control_is_read_like_a_value_in_the_param() {
     let graph = shapes(
         r#""x": 3, "word": "perlin", "turn": {"keyframes": [[0, [0, 0, 0]], [10, [90, 0, 0]]]}, "soft": {"ramp": [[0, 0], [1, 1]]}"#,
         r#""float": {"control": "x"}, "int": {"control": "x"}, "choice": {"control": "word"}, "rotate": {"control": "turn"},
@@ -151,13 +151,13 @@ fn controls_are_read_as_if_they_stood_in_the_param() {
 }
 
 #[test]
-fn masks_keep_a_moving_value_moving() {
+fn a_masked_value_can_be_animated() {
     let graph = shapes("", r#""masked": {"value": {"keyframes": [[0, 0], [10, 1]]}, "attribute": "mask"}"#);
     assert_eq!(at(&graph, "masked", 5.0), Value::Masked(0.5, Some("mask".into())));
 }
 
 #[test]
-fn seeds_are_mixed_with_the_scenes_and_keyed_ones_hold() {
+fn seeds_are_mixed_with_the_scenes_and_keyframed_seeds_are_not_interpolated() {
     let Value::Int(three) = constant(&shapes("", r#""seed": 3"#), "seed") else { panic!() };
     let Value::Int(unset) = constant(&shapes("", ""), "seed") else { panic!() };
     let Value::Int(zero) = constant(&shapes("", r#""seed": 0"#), "seed") else { panic!() };
@@ -169,7 +169,7 @@ fn seeds_are_mixed_with_the_scenes_and_keyed_ones_hold() {
 }
 
 #[test]
-fn paths_start_at_the_folder_and_numbered_ones_are_looked_for_later() {
+fn paths_are_relative_to_the_folder_and_numbered_files_are_not_probed() {
     let text = r#"{"convect": 1, "outputs": {"o": "a"}, "nodes": {
         "a": {"type": "Mesh_In", "params": {"file": "sub/a.obj"}}, "b": {"type": "Mesh_In", "params": {"file": "missing.####.obj"}}}}"#;
     let graph = good(text);
@@ -182,7 +182,7 @@ fn paths_start_at_the_folder_and_numbered_ones_are_looked_for_later() {
 }
 
 #[test]
-fn unset_starts_are_the_scenes_first_frame() {
+fn a_start_that_is_not_set_is_the_scenes_first_frame() {
     let graph = good(
         r#"{"convect": 1, "scene": {"frames": [-5, 9]}, "outputs": {"o": "s"}, "nodes": {"s": {"type": "Softbody", "inputs": {"bodies": []}}}}"#,
     );
@@ -191,7 +191,7 @@ fn unset_starts_are_the_scenes_first_frame() {
 }
 
 #[test]
-fn sets_replace_add_and_mend() {
+fn sets_replace_add_and_correct_values() {
     let text = r#"{"convect": 1, "controls": {"x": 1}, "outputs": {"o": "all"}, "nodes": {
         "all": {"type": "Every_Shape", "params": {"float": {"control": "x"}, "span": [2, 1]}}}}"#;
     let graph = load_with(text, &[("x", "4"), ("all.span", "[1, 2]"), ("all.int", "{\"expr\": \"x\"}")]);
@@ -201,7 +201,7 @@ fn sets_replace_add_and_mend() {
 }
 
 #[test]
-fn the_probe_tells_files_from_folders_and_from_nothing() {
+fn the_probe_distinguishes_files_folders_and_missing_files() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let file = folder.path().join("a.obj");
     let kind = |path| probe(path).map_err(|error| error.kind());
@@ -212,7 +212,7 @@ fn the_probe_tells_files_from_folders_and_from_nothing() {
 }
 
 #[test]
-fn code_may_name_the_controls_and_moves_with_those_that_it_reads() {
+fn code_reads_controls_and_is_animated_if_they_are() {
     let code = |controls: &str, code: &str| {
         let graph = shapes(controls, &format!(r#""code": "{code}""#));
         let source = source(&graph, "all", "code");
@@ -222,5 +222,5 @@ fn code_may_name_the_controls_and_moves_with_those_that_it_reads() {
     let controls = r#""gain": {"keyframes": [[0, 0], [10, 1]]}, "dir": [1, 2, 3], "word": "perlin""#;
     assert_eq!(code(controls, "a = gain*P.y"), (true, vec![0.5, 0.0, 0.0, 0.0], true));
     assert_eq!(code(controls, "a = dir.z"), (false, vec![0.0, 1.0, 2.0, 3.0], true));
-    assert_eq!(code("", "a = gain*P.y"), (false, vec![], true), "what is no control is an attribute");
+    assert_eq!(code("", "a = gain*P.y"), (false, vec![], true), "a name that is not a control is an attribute");
 }

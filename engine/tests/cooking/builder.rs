@@ -1,4 +1,4 @@
-//! Builds graphs by hand, cooks them, and looks at what came out.
+//! Builds graphs in code, cooks them, and gives access to the results.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,45 +7,51 @@ use std::sync::{Arc, Once};
 
 use engine::cook::{Delivered, DiskCache, Engine, NodeReport, Report, Settings};
 use engine::geometry::{Component, Geometry};
-use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Places, Scene};
+use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Positions, Scene};
 use engine::node::Node;
 use engine::param::{Keyframes, ParamType, Source};
 use engine::plan::Request;
 use engine::time::Frame;
 use numerics::ramp::Interpolation;
 
-/// A graph that grows.
+/// A graph under construction.
 #[derive(Clone)]
-pub(crate) struct Net(pub(crate) Graph);
+pub(crate) struct TestGraph(pub(crate) Graph);
 
-/// A node that is being added.
-pub(crate) struct Adding<'n> {
-    net: &'n mut Net,
+/// A node under construction.
+pub(crate) struct NodeBuilder<'n> {
+    graph: &'n mut TestGraph,
     id: &'static str,
     node: &'static Node,
     params: Vec<Source>,
     inputs: Vec<Vec<Link>>,
 }
 
-impl Net {
-    /// A graph over these frames, 24 of them a second.
+impl TestGraph {
+    /// A graph with these frames, at 24 frames per second.
     pub(crate) fn new(first: i64, last: i64) -> Self {
         let scene = Scene { first, last, ..Scene::default() };
-        Self(Graph { scene, nodes: Vec::new(), outputs: Vec::new(), folder: PathBuf::new(), places: Places::default() })
+        Self(Graph {
+            scene,
+            nodes: Vec::new(),
+            outputs: Vec::new(),
+            folder: PathBuf::new(),
+            positions: Positions::default(),
+        })
     }
 
-    pub(crate) fn add(&mut self, id: &'static str, node: &'static Node) -> Adding<'_> {
+    pub(crate) fn add(&mut self, id: &'static str, node: &'static Node) -> NodeBuilder<'_> {
         let params = node.param_specs().iter().map(|spec| Source::Constant(spec.default.clone())).collect();
         let inputs = vec![Vec::new(); node.inputs.len()];
-        Adding { net: self, id, node, params, inputs }
+        NodeBuilder { graph: self, id, node, params, inputs }
     }
 
-    /// Geometry that the test gives, another at every frame.
+    /// Adds geometry supplied by the test that depends on the frame.
     pub(crate) fn given(&mut self, id: &'static str, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Link {
         self.push(id, Body::Given { at: Arc::new(at), moves: true })
     }
 
-    /// Geometry that the test gives, the same at all frames.
+    /// Adds geometry supplied by the test that is the same at all frames.
     pub(crate) fn still(&mut self, id: &'static str, geometry: Geometry) -> Link {
         self.push(id, Body::Given { at: Arc::new(move |_| geometry.clone()), moves: false })
     }
@@ -55,27 +61,27 @@ impl Net {
         Link { node: self.0.nodes.len() - 1, port: 0 }
     }
 
-    /// An output of that name's node, under its id.
+    /// Adds an output, named after its node.
     pub(crate) fn output(&mut self, from: Link) -> &mut GraphOutput {
         let name = self.0.nodes[from.node].id.clone();
         self.0.outputs.push(GraphOutput { name, from, attributes: None, v: false });
         self.0.outputs.last_mut().expect("just pushed")
     }
 
-    /// This graph with another source for a param.
+    /// This graph with a param replaced.
     #[must_use]
     pub(crate) fn with(mut self, id: &str, param: &str, source: Source) -> Self {
-        let place = self.place(id);
-        let Body::Node { node, params, .. } = &mut self.0.nodes[place].body else { panic!("`{id}` is given") };
-        params[param_place(node, param)] = source;
+        let index = self.index(id);
+        let Body::Node { node, params, .. } = &mut self.0.nodes[index].body else { panic!("`{id}` is given") };
+        params[param_index(node, param)] = source;
         self
     }
 
-    pub(crate) fn place(&self, id: &str) -> usize {
+    pub(crate) fn index(&self, id: &str) -> usize {
         self.0.nodes.iter().position(|node| &*node.id == id).unwrap_or_else(|| panic!("no node `{id}`"))
     }
 
-    /// Cooks whole frames of all outputs, in an engine of its own.
+    /// Cooks whole frames of all outputs in a new engine.
     pub(crate) fn cook(&self, frames: impl IntoIterator<Item = i64>) -> Cooked {
         self.cook_in(&engine(2, 1 << 30), frames)
     }
@@ -85,7 +91,7 @@ impl Net {
         self.cook_with(engine, &frames, None)
     }
 
-    /// Cooks frames, between whole ones too, of all outputs.
+    /// Cooks frames of all outputs, including fractional ones.
     pub(crate) fn cook_with(&self, engine: &Engine, frames: &[Frame], disk: Option<&mut DiskCache>) -> Cooked {
         let request = Request { outputs: (0..self.0.outputs.len()).collect(), frames: frames.to_vec() };
         let mut found = BTreeMap::new();
@@ -100,7 +106,7 @@ impl Net {
     }
 }
 
-impl<'n> Adding<'n> {
+impl<'n> NodeBuilder<'n> {
     pub(crate) fn set<T: ParamType<Value = T>>(self, param: &str, value: T) -> Self {
         self.source(param, Source::Constant(T::erase(value)))
     }
@@ -110,36 +116,36 @@ impl<'n> Adding<'n> {
     }
 
     pub(crate) fn source(mut self, param: &str, source: Source) -> Self {
-        self.params[param_place(self.node, param)] = source;
+        self.params[param_index(self.node, param)] = source;
         self
     }
 
     pub(crate) fn wire(mut self, input: &str, link: Link) -> Self {
-        let place = self.node.input_specs().iter().position(|spec| spec.name == input);
-        self.inputs[place.unwrap_or_else(|| panic!("no input `{input}`"))].push(link);
+        let index = self.node.input_specs().iter().position(|spec| spec.name == input);
+        self.inputs[index.unwrap_or_else(|| panic!("no input `{input}`"))].push(link);
         self
     }
 
     pub(crate) fn done(self) -> Link {
-        let Self { net, id, node, params, inputs } = self;
-        net.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs })
+        let Self { graph, id, node, params, inputs } = self;
+        graph.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs })
     }
 
-    /// The same, with an output.
+    /// Adds the node and an output of it.
     pub(crate) fn out(self) -> Link {
-        let Self { net, id, node, params, inputs } = self;
-        let link = net.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs });
-        net.output(link);
+        let Self { graph, id, node, params, inputs } = self;
+        let link = graph.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs });
+        graph.output(link);
         link
     }
 }
 
-fn param_place(node: &Node, param: &str) -> usize {
-    let place = node.param_specs().iter().position(|spec| spec.name == param);
-    place.unwrap_or_else(|| panic!("{} has no param `{param}`", node.name))
+fn param_index(node: &Node, param: &str) -> usize {
+    let index = node.param_specs().iter().position(|spec| spec.name == param);
+    index.unwrap_or_else(|| panic!("{} has no param `{param}`", node.name))
 }
 
-/// Numbers keyed, straight from key to key.
+/// Keyframes of numbers with linear interpolation.
 pub(crate) fn keyed(keys: &[(f64, f32)]) -> Source {
     let keys = keys.iter().map(|(frame, number)| (*frame, f32::erase(*number))).collect();
     Source::Keys(Arc::new(Keyframes { keys, interpolation: Interpolation::Linear }), f32::shape())
@@ -149,7 +155,7 @@ pub(crate) fn engine(threads: usize, memory: usize) -> Engine {
     Engine::new(&Settings { threads, memory }).expect("threads")
 }
 
-/// Runs what panics on purpose; from then on panics of threads that cook are not printed, those of tests are.
+/// Runs `work`, which panics on purpose. From then on panics of cooking threads are not printed; those of tests are.
 pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -172,7 +178,7 @@ pub(crate) fn row(xs: &[f32]) -> Geometry {
     Component::points(xs.iter().map(|x| [*x, 0.0, 0.0]).collect()).into()
 }
 
-/// What a cook delivered.
+/// The results of a cook.
 pub(crate) struct Cooked {
     pub(crate) found: BTreeMap<(usize, Frame), Arc<Geometry>>,
     pub(crate) report: Report,
@@ -180,7 +186,7 @@ pub(crate) struct Cooked {
 }
 
 impl Cooked {
-    /// What the first output delivered at a frame.
+    /// The geometry of the first output at a frame.
     pub(crate) fn geometry(&self, frame: f64) -> &Geometry {
         self.found.get(&(0, at(frame))).unwrap_or_else(|| panic!("no frame {frame}: {:?}", self.report.errors))
     }
@@ -190,33 +196,33 @@ impl Cooked {
         self.geometry(frame).points().expect("points").positions()[0][0]
     }
 
-    /// x of the first output's first point at all frames that were delivered, oldest first.
+    /// x of the first output's first point at all delivered frames, ascending.
     pub(crate) fn xs(&self) -> Vec<f32> {
         let first = self.found.keys().filter(|(output, _)| *output == 0);
         first.map(|(_, frame)| self.x(frame.number())).collect()
     }
 
-    /// Bits of all that was delivered.
+    /// The bits of all delivered geometry.
     pub(crate) fn bits(&self) -> BTreeMap<(usize, Frame), Vec<u8>> {
-        self.found.iter().map(|(place, geometry)| (*place, bits(geometry))).collect()
+        self.found.iter().map(|(index, geometry)| (*index, bits(geometry))).collect()
     }
 
     pub(crate) fn node(&self, id: &str) -> &NodeReport {
-        let place = self.ids.iter().position(|known| known == id).unwrap_or_else(|| panic!("no node `{id}`"));
-        &self.report.nodes[place]
+        let index = self.ids.iter().position(|other| other == id).unwrap_or_else(|| panic!("no node `{id}`"));
+        &self.report.nodes[index]
     }
 
     pub(crate) fn cooks(&self, id: &str) -> u64 {
         self.node(id).cooks
     }
 
-    /// The first error, as a terminal shows it.
+    /// The first error as shown on a terminal.
     pub(crate) fn error(&self) -> String {
         self.report.errors.first().expect("an error").1.to_string()
     }
 }
 
-/// All numbers of a geometry of points and curves, bit by bit.
+/// The bits of a geometry of points and curves.
 pub(crate) fn bits(geometry: &Geometry) -> Vec<u8> {
     let mut bits = Vec::new();
     for part in geometry.parts() {
