@@ -1,4 +1,4 @@
-//! Writes USD samples with everything that is hard on a writer, or measures how fast writing is.
+//! Writes USD samples that cover the difficult cases of a writer, or measures the speed of writing.
 //!
 //! `usd_sample DIR` writes `NAME.usda`, `NAME.usdc` and, as the expected values, `NAME.0001.json` … with floats as the
 //! hexadecimal digits of their bits: `tools/usd_check.py DIR/*.usd?` compares them. `usd_sample --speed DIR` prints size
@@ -18,7 +18,7 @@ const FPS: f64 = 24.0;
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
-/// Frame numbers and what they hold.
+/// Frame numbers and their geometry.
 type Frames = Vec<(f64, Geometry)>;
 
 fn main() -> Outcome {
@@ -71,7 +71,7 @@ fn write(folder: &Path, name: &str, origin: [f64; 3], frames: &Frames) -> Outcom
     Ok(())
 }
 
-/// A number that depends on all three, the same on every machine; every bit pattern can come out.
+/// A hash of three numbers, the same on every machine; every bit pattern can occur.
 fn hash(a: u32, b: u32, c: u32) -> u32 {
     let mut x = a.wrapping_mul(0x9e37_79b9) ^ b.wrapping_mul(0x85eb_ca6b) ^ c.wrapping_mul(0xc2b2_ae35);
     for _ in 0..3 {
@@ -97,7 +97,7 @@ fn integers(count: usize, salt: u32, frame: u32) -> Vec<i32> {
     (0..count as u32).map(|i| hash(i, salt, frame).cast_signed()).collect()
 }
 
-/// What text and compression like to lose.
+/// Floats that text and compression tend to lose.
 fn odd_floats(count: usize) -> Vec<f32> {
     let odd = [
         -0.0,
@@ -118,7 +118,7 @@ fn odd_floats(count: usize) -> Vec<f32> {
     odd.into_iter().cycle().take(count).collect()
 }
 
-/// A row of attributes that belong to `owner`, moving and still ones of every type.
+/// Adds animated and static attributes of every type.
 fn add_attributes(part: &mut Component, frame: u32) -> Outcome {
     for owner in Owner::ALL {
         let rows = part.table(owner).rows();
@@ -135,7 +135,7 @@ fn add_attributes(part: &mut Component, frame: u32) -> Outcome {
     Ok(())
 }
 
-/// Types that Blender has no word for, and warns of on curves and meshes.
+/// Adds attributes of types that Blender does not have and warns about on curves and meshes.
 fn add_wide_integers(part: &mut Component, frame: u32) -> Outcome {
     let rows = part.point_count();
     let wide = |salt| integers(rows * 4, salt, frame);
@@ -175,7 +175,7 @@ fn mesh(frame: u32) -> Outcome<Component> {
     Ok(part)
 }
 
-/// Quads of a `w` × `h` grid, the first cut into two triangles.
+/// Quads of a `w` × `h` grid, the first split into two triangles.
 fn grid(w: u32, h: u32) -> (Vec<u32>, Vec<u32>) {
     let corner = |x: u32, y: u32| y * (w + 1) + x;
     let quads = (0..w * h).map(|i| (i % w, i / w));
@@ -215,7 +215,7 @@ fn all(frame: u32) -> Outcome<Geometry> {
     Ok(Geometry::from(curves(frame)?).with(mesh(frame)?).with(points(1, 9)?).with(tets(frame)?))
 }
 
-/// A mesh that grows, then turns its faces with nothing else changed; curves that lose CVs.
+/// A mesh that grows, then reverses its faces with nothing else changed; curves that lose CVs.
 fn changing(frame: u32) -> Outcome<Geometry> {
     let size = [1, 2, 5, 5, 5, 3][frame as usize - 1];
     let (counts, mut corners) = grid(size, size);
@@ -233,7 +233,7 @@ fn changing(frame: u32) -> Outcome<Geometry> {
     Ok(Geometry::from(skin).with(fur))
 }
 
-/// Components and attributes that are not always there, under names that USD would refuse.
+/// Components and attributes that are missing in some frames, with names that are not valid in USD.
 fn come_and_go() -> Outcome<Frames> {
     let names = ["a-b", "a_b", "größe", "2nd", "x:indices", "None", "def", "timeSamples", "quote\"\n", "curve_id"];
     let mut fur = curves(1)?;
@@ -255,7 +255,7 @@ fn come_and_go() -> Outcome<Frames> {
     ])
 }
 
-/// Long enough for every coding and for blocks on the way to the file.
+/// Arrays that are long enough for every encoding and for several blocks.
 fn large(frame: u32) -> Outcome<Geometry> {
     let (counts, corners) = grid(200, 150);
     let vertices = 201 * 151;
@@ -276,7 +276,7 @@ fn large(frame: u32) -> Outcome<Geometry> {
     Ok(Geometry::from(skin).with(fur).with(loose))
 }
 
-/// Components without a point, then with some, or nothing at all.
+/// Components without points, then with some, or none at all.
 fn nothing(some: bool) -> Outcome<Geometry> {
     if some {
         return Ok(Geometry::from(Component::points(vec![[1.0; 3]])).with(curves(1)?));
@@ -286,7 +286,7 @@ fn nothing(some: bool) -> Outcome<Geometry> {
     Ok(Geometry::from(mesh).with(Component::points(vec![])).with(Component::tets(vec![], vec![])?))
 }
 
-/// The json form with floats as bits, and an empty array where it has no row.
+/// The json form with floats as bits, and an empty array for no rows.
 fn expected(frame: f64, geometry: &Geometry) -> Value {
     let mut out = Map::new();
     out.insert("frame".into(), json!(frame));

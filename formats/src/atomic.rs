@@ -1,9 +1,9 @@
-//! Files that appear complete or not at all.
+//! Atomic file writing: a file appears under its name complete or not at all.
 //!
-//! An [`AtomicFile`] is written hidden beside its final name and takes that name only once it is complete and on disk,
-//! so a killed program leaves no half-written file under a final name. Its temporaries are removed by [`sweep`]: one
-//! belongs to a live process as long as that process holds its lock or has its process number. Limit: the file system's
-//! rename must replace a file in one step, as that of every local one does.
+//! An [`AtomicFile`] is written to a hidden temporary file in the same folder and renamed once it is complete and on
+//! disk, so a killed program leaves no partial file under a final name. [`sweep`] removes temporaries of dead
+//! processes; one belongs to a live process as long as that process holds its lock or has its process number. Limit:
+//! the file system's rename must replace a file atomically, as on all local file systems.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
@@ -11,7 +11,7 @@ use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Between the final name and the process number in a temporary's name.
+/// Separates the final name and the process number in the name of a temporary.
 const MARK: &str = ".tmp-";
 
 /// A file that takes its final name when it is committed; dropped without that, it is removed.
@@ -24,10 +24,10 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Starts a file that will be `path`, in an existing folder. A file of that name stays until the commit.
+    /// Starts writing a file at `path`, whose folder must exist. An existing file at `path` is kept until the commit.
     ///
     /// # Errors
-    /// Where `path` is something other than a file, or its folder cannot be written to.
+    /// If `path` exists and is not a file, or its folder cannot be written to.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, FileError> {
         let path = path.into();
         match Self::beside(&path) {
@@ -51,7 +51,7 @@ impl AtomicFile {
                     let _ = file.try_lock();
                     return Ok((file, Temporary { path, kept: false }));
                 }
-                // Left by an earlier process of our number: the next name is free sooner or later.
+                // Left by an earlier process with the same number: try the next name.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -63,7 +63,7 @@ impl AtomicFile {
         &self.path
     }
 
-    /// An error met while writing to this file, with the file's final name.
+    /// An I/O error of this file, with its final name.
     pub fn failed(&self, source: io::Error) -> FileError {
         FileError { path: self.path.clone(), action: "written", source }
     }
@@ -71,7 +71,7 @@ impl AtomicFile {
     /// Syncs the file to disk and renames it to its final name.
     ///
     /// # Errors
-    /// Where the last bytes cannot be written or the name cannot be taken; nothing is left behind then.
+    /// If the last bytes cannot be written or the file cannot be renamed; it is removed then.
     pub fn commit(self) -> Result<(), FileError> {
         let Self { path, mut file, mut temporary } = self;
         let mut finish = || {
@@ -111,13 +111,13 @@ struct Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.kept {
-            // Nothing can be done about a failure here; a later sweep tries again.
+            // A failure here is not fatal: a later sweep tries again.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// `.NAME.tmp-PID-COUNT`, another one at each call.
+/// `.NAME.tmp-PID-COUNT`, a new one for each call.
 fn temporary_name(name: &OsStr) -> OsString {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -135,8 +135,7 @@ fn owner_of(name: &str) -> Option<u32> {
     (!name.is_empty() && digits(owner) && digits(count)).then(|| owner.parse().ok()).flatten()
 }
 
-/// The rename itself is durable only once its folder is; folders cannot be opened everywhere, and then the system
-/// sees to it.
+/// A rename is durable only after its folder is synced. Where folders cannot be opened, this is left to the system.
 fn sync_folder_of(path: &Path) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match File::open(folder).and_then(|folder| folder.sync_all()) {
@@ -145,10 +144,10 @@ fn sync_folder_of(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes the temporaries that dead processes left in `folder` and says how many.
+/// Removes the temporaries that dead processes left in `folder`, and returns their number.
 ///
 /// # Errors
-/// Where the folder cannot be listed or a stale temporary cannot be removed.
+/// If the folder cannot be listed or a stale temporary cannot be removed.
 pub fn sweep(folder: &Path) -> Result<usize, FileError> {
     let failed = |source| FileError { path: folder.to_path_buf(), action: "swept", source };
     let mut swept = 0;
@@ -161,7 +160,7 @@ pub fn sweep(folder: &Path) -> Result<usize, FileError> {
         }
         match fs::remove_file(&path) {
             Ok(()) => swept += 1,
-            // Another process sweeps too.
+            // Another process has removed it.
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(source) => return Err(FileError { path, action: "removed", source }),
         }
@@ -169,9 +168,9 @@ pub fn sweep(folder: &Path) -> Result<usize, FileError> {
     Ok(swept)
 }
 
-/// Whether no live process owns a temporary: by its lock, which works across containers too; by its process number
-/// between creation and locking, and on file systems without locks. Our own number proves nothing: it may be that of an
-/// earlier process.
+/// Whether no live process owns a temporary. The lock decides, also across containers; the process number decides
+/// between creation and locking, and on file systems without locks. Our own number proves nothing, because an earlier
+/// process may have had it.
 fn is_stale(path: &Path, owner: u32) -> bool {
     let locks = match File::open(path).map(|file| file.try_lock()) {
         Ok(Ok(())) => true,
@@ -206,16 +205,16 @@ impl FileError {
         &self.path
     }
 
-    /// What kind of fault it is.
+    /// The kind of the I/O error.
     pub fn kind(&self) -> ErrorKind {
         self.source.kind()
     }
 
-    /// What to do about it, where that is known.
+    /// How to mend it, if known.
     pub fn hint(&self) -> Option<&'static str> {
         match self.source.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Some("free some space, or write to another disk"),
-            ErrorKind::NotFound | ErrorKind::NotADirectory => Some("check the path, or make the folder first"),
+            ErrorKind::NotFound | ErrorKind::NotADirectory => Some("check the path, or create the folder first"),
             ErrorKind::IsADirectory => Some("give the path of a file"),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
                 Some("choose a folder you may write to, or change its permissions")
@@ -234,7 +233,7 @@ fn cause(error: &io::Error) -> String {
         ErrorKind::IsADirectory => "it is a folder".into(),
         ErrorKind::NotADirectory => "a part of the path is not a folder".into(),
         ErrorKind::NotFound => "no such file or folder".into(),
-        ErrorKind::AlreadyExists => "a file of that name is in the way".into(),
+        ErrorKind::AlreadyExists => "a file with that name already exists".into(),
         ErrorKind::InvalidFilename => "the name is too long or not allowed".into(),
         _ => error.to_string(),
     }
@@ -252,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_committed_file_is_alone_under_its_name() {
+    fn a_committed_file_leaves_no_temporary() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fur.0001.obj");
         let mut file = AtomicFile::create(&path).unwrap();
@@ -267,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropped_file_leaves_what_was_there() {
+    fn a_dropped_file_keeps_the_existing_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fur.usda");
         fs::write(&path, "old").unwrap();
@@ -290,18 +289,21 @@ mod tests {
         fs::create_dir(&path).unwrap();
         let error = file.commit().unwrap_err();
         assert_eq!(error.to_string(), format!("`{}` could not be written: it is a folder", path.display()));
-        assert_eq!(names(folder.path()), ["fur.usda"], "the folder in the way, no temporary");
+        assert_eq!(names(folder.path()), ["fur.usda"], "the folder remains, but no temporary");
     }
 
     #[test]
-    fn what_cannot_be_a_file_is_refused_at_once() {
+    fn an_impossible_path_is_refused_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let text = |path: &Path| AtomicFile::create(path).unwrap_err().to_string();
         let here = folder.path().display().to_string();
         assert_eq!(text(folder.path()), format!("`{here}` could not be created: it is a folder"));
         let missing = folder.path().join("no/fur.obj");
         assert_eq!(text(&missing), format!("`{}` could not be created: no such file or folder", missing.display()));
-        assert_eq!(AtomicFile::create(&missing).unwrap_err().hint(), Some("check the path, or make the folder first"));
+        assert_eq!(
+            AtomicFile::create(&missing).unwrap_err().hint(),
+            Some("check the path, or create the folder first")
+        );
         fs::write(folder.path().join("file"), "").unwrap();
         let inside = folder.path().join("file/fur.obj");
         assert!(text(&inside).ends_with("could not be created: a part of the path is not a folder"));
@@ -309,7 +311,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_device_is_not_replaced_and_a_full_disk_is_named() {
+    fn a_device_is_not_replaced_and_a_full_disk_is_reported() {
         let error = AtomicFile::create("/dev/full").unwrap_err();
         assert_eq!(error.to_string(), "`/dev/full` could not be created: it is a device or a pipe, not a file");
         let source = File::create("/dev/full").unwrap().write(b"x").unwrap_err();
@@ -319,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_takes_only_what_the_dead_left() {
+    fn a_sweep_removes_only_temporaries_of_dead_processes() {
         let folder = tempfile::tempdir().unwrap();
         let mine = AtomicFile::create(folder.path().join("mine.obj")).unwrap();
         let own = std::process::id();
@@ -330,7 +332,7 @@ mod tests {
         }
         assert_eq!(sweep(folder.path()).unwrap(), 2);
         for name in kept {
-            assert!(folder.path().join(name).exists(), "{name} is nobody's temporary");
+            assert!(folder.path().join(name).exists(), "{name} is not a temporary");
         }
         mine.commit().unwrap();
         assert_eq!(names(folder.path()).len(), kept.len() + 1);
@@ -346,7 +348,7 @@ mod tests {
         let path = folder.path().join(".a.obj.tmp-4294967294-0");
         let file = File::create(&path).unwrap();
         file.try_lock().unwrap();
-        assert_eq!(sweep(folder.path()).unwrap(), 0, "somebody holds its lock");
+        assert_eq!(sweep(folder.path()).unwrap(), 0, "its lock is held");
         drop(file);
         assert_eq!(sweep(folder.path()).unwrap(), 1);
     }

@@ -1,4 +1,4 @@
-//! Why a geometry could not be read or written: where, the fact, what to do.
+//! Errors of reading and writing geometry: position, fact and hint.
 
 use std::io;
 
@@ -30,24 +30,24 @@ impl std::fmt::Display for FilePosition {
     }
 }
 
-/// Why a geometry could not be read or written. The caller knows the path and says it.
+/// Why a geometry could not be read or written. The caller adds the path.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
     /// The file holds something that is not geometry in this format.
     #[error("{position}{fact}")]
     Content {
-        /// Where.
+        /// Where it is.
         position: FilePosition,
         /// What was found, and what was expected.
         fact: String,
-        /// What to do about it, as a sentence of its own.
+        /// How to mend it.
         hint: Option<&'static str>,
     },
     /// No format has this name or extension.
     #[error("`{name}` is not a geometry format, expected one of {}", names(&Format::ALL))]
     Unknown {
-        /// The name or ending.
+        /// The name or extension.
         name: String,
     },
     /// USD is written, not read.
@@ -77,7 +77,7 @@ pub enum FormatError {
         /// The first such row, from 0.
         row: usize,
     },
-    /// Two components of a file share a table and disagree on a type.
+    /// Two components share a table of the file, but have different types for an attribute.
     #[error("`{name}` has different types on {first} and {second}, and ply has one table for both")]
     TypesDiffer {
         /// The attribute.
@@ -106,12 +106,12 @@ impl FormatError {
         Self::Content { position, fact: fact.into(), hint: None }
     }
 
-    /// The same, with what to do about it.
+    /// The same with a hint.
     pub(crate) fn with_hint(position: FilePosition, fact: impl Into<String>, hint: &'static str) -> Self {
         Self::Content { position, fact: fact.into(), hint: Some(hint) }
     }
 
-    /// What to do about it, where that is known: a sentence of its own.
+    /// How to mend it, if known.
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Content { hint, .. } => hint.map(str::to_owned),
@@ -121,14 +121,14 @@ impl FormatError {
             Self::CannotHold { kind, .. } => Some(format!("formats that can: {}", names(&Format::holding([*kind])))),
             Self::NotFinite { .. } => Some("a NaN or infinity comes from the node that made this attribute".into()),
             Self::TypesDiffer { .. } => {
-                Some("use json, write the components to files of their own, or rename one".into())
+                Some("use json, write each component to its own file, or rename one of the attributes".into())
             }
             _ => None,
         }
     }
 }
 
-/// A geometry that does not fit together, found when the whole file is read.
+/// An inconsistent geometry, found after the whole file has been read.
 impl From<GeometryError> for FormatError {
     fn from(error: GeometryError) -> Self {
         Self::at(FilePosition::File, error.to_string())

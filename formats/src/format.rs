@@ -1,4 +1,4 @@
-//! The file formats convect knows, by name and by extension, and what each can hold.
+//! The file formats of convect, by name and by extension, and what each can hold.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -40,7 +40,7 @@ impl Format {
     /// The format of a file, by its extension in any case; `.usd` means usdc.
     ///
     /// # Errors
-    /// Where the extension is missing or unknown.
+    /// If the extension is missing or unknown.
     pub fn of_path(path: &Path) -> Result<Self, FormatError> {
         let ending = path.extension().unwrap_or(path.as_os_str()).to_string_lossy().to_lowercase();
         if ending == "usd" { Ok(Self::Usdc) } else { ending.parse() }
@@ -66,7 +66,7 @@ impl Format {
         matches!(self, Self::Usdc | Self::Usda)
     }
 
-    /// Whether [`read`](crate::read) takes it.
+    /// Whether [`read`](crate::read) can read it.
     pub fn is_read(self) -> bool {
         !self.is_sequence()
     }

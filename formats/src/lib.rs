@@ -1,10 +1,11 @@
 //! Geometry files: obj, ply and json in and out, USD out.
 //!
-//! [`read`] takes the bytes of a file and gives a geometry with every component the file has; [`write()`] gives them
-//! back bit for bit, as far as the format holds them (each format's module says what it drops). Readers never panic,
-//! their memory is a small multiple of the file's size, whatever counts it declares, and their time is linear in it.
+//! [`read`] converts the bytes of a file to a geometry with all components of the file; [`write()`] writes a geometry
+//! so that it reads back bit for bit, as far as the format can store it (the module of each format says what it drops).
+//! Readers never panic, their memory is a small multiple of the file's size, whatever counts the file declares, and
+//! their time is linear in it.
 //!
-//! Readers take coordinates unchanged: none of these formats declares its unit or axes.
+//! Readers do not change coordinates: none of these formats declares its unit or axes.
 
 pub mod atomic;
 mod error;
@@ -37,7 +38,7 @@ pub struct FrameStamp {
 /// The geometry in the bytes of a file, with every component the file has.
 ///
 /// # Errors
-/// Where the bytes are not a file of that format, and for USD, which is only written.
+/// If the bytes are not a file of that format, and for USD, which is only written.
 pub fn read(format: Format, bytes: &[u8]) -> Result<Geometry, FormatError> {
     match format {
         Format::Obj => obj::read(text::opened(format, bytes)?),
@@ -50,8 +51,8 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<Geometry, FormatError> {
 /// Writes one frame of a geometry as a file of that format. The same geometry gives the same bytes.
 ///
 /// # Errors
-/// Where the format cannot hold a component or keeps all frames in one file (see [`usd`]), where a number is not
-/// finite, or where the bytes cannot be written.
+/// If the format cannot hold a component or keeps all frames in one file (see [`usd`]), a number is not finite, or the
+/// bytes cannot be written.
 pub fn write(format: Format, geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let FrameStamp { frame, seconds } = *stamp;
     if !(frame.is_finite() && seconds.is_finite()) {

@@ -1,15 +1,15 @@
-//! What a format cannot store of a geometry, by name, for a note to the user.
+//! The names of what a format cannot store of a geometry, for a note to the user.
 //!
-//! Promise: names exactly what convect's own reader of the format does not get back, as a test checks. Limit: what other
-//! programs ignore in a file is not known here.
+//! Promise: names exactly what convect's own reader of the format does not read back, as a test checks. Limit: what
+//! other programs ignore in a file is not known here.
 
 use engine::geometry::{Component, Geometry, Kind, N, Name, Owner, P, UVW};
 
 use crate::Format;
 use crate::obj::CD;
 
-/// Names of what a file of that format will lack of `geometry`: `` `envelope` of curves ``, `the curves
-/// without a point`. Components that the format cannot hold at all are refused elsewhere.
+/// What a file of that format does not store of `geometry`: `` `envelope` of curves ``, `the curves without a point`.
+/// Components that the format cannot hold at all are refused elsewhere.
 pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
     let holds: fn(&Component, Owner, &Name, [bool; 2]) -> bool = match format {
         Format::Usdc | Format::Usda | Format::Json => return Vec::new(),
@@ -28,7 +28,7 @@ pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
             lost.push(format!("the {kind} without a point"));
             continue;
         }
-        // Columns without rows lose nothing: points have no elements.
+        // Nothing is lost of a column without rows; for example, points have no elements.
         let columns = part.columns().filter(|(_, _, column)| !column.is_empty());
         let columns = columns.filter(|(owner, name, _)| !holds(part, *owner, name, in_step));
         lost.extend(columns.map(|(_, name, _)| format!("`{name}` of {kind}")));
@@ -36,17 +36,17 @@ pub fn lost(format: Format, geometry: &Geometry) -> Vec<String> {
     lost
 }
 
-/// Whether an OBJ file holds that attribute. Its `l` names no normals, its `p` neither those nor `uvw`: they come back
-/// only `in_step`, where every vertex of the file has one.
+/// Whether an OBJ file stores that attribute. An `l` line cannot reference normals, a `p` line neither normals nor
+/// `uvw`: they are read back only if every vertex of the file has one (`normals`, `textures`).
 fn obj_holds(part: &Component, owner: Owner, name: &Name, [normals, textures]: [bool; 2]) -> bool {
     let kind = part.kind();
-    let has_place = match &**name {
+    let is_stored = match &**name {
         name if name == P.name || name == CD => true,
         name if name == N.name => kind == Kind::Mesh || normals,
         name if name == UVW.name => kind != Kind::Points || textures,
         _ => false,
     };
-    has_place && owner == Owner::Point && has_vectors(part, name)
+    is_stored && owner == Owner::Point && has_vectors(part, name)
 }
 
 fn has_vectors(part: &Component, name: &str) -> bool {
@@ -94,24 +94,24 @@ mod tests {
     }
 
     #[test]
-    fn exactly_what_does_not_come_back_is_named() {
+    fn exactly_what_is_not_read_back_is_named() {
         let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
         for (sample, geometry) in samples().iter().enumerate() {
             for format in [Format::Obj, Format::Ply, Format::Json] {
                 let mut bytes = Vec::new();
                 crate::write(format, geometry, &stamp, &mut bytes).unwrap();
                 let back = crate::read(format, &bytes).unwrap();
-                let mut gone = Vec::new();
+                let mut missing = Vec::new();
                 for part in geometry.parts() {
                     let Some(back) = back.part(part.kind()) else {
-                        gone.push(format!("the {} without a point", part.kind()));
+                        missing.push(format!("the {} without a point", part.kind()));
                         continue;
                     };
                     let columns = part.columns().filter(|(owner, name, _)| back.table(*owner).column(name).is_none());
                     let columns = columns.filter(|(_, _, column)| !column.is_empty());
-                    gone.extend(columns.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
+                    missing.extend(columns.map(|(_, name, _)| format!("`{name}` of {}", part.kind())));
                 }
-                assert_eq!(lost(format, geometry), gone, "{format} of sample {sample}");
+                assert_eq!(lost(format, geometry), missing, "{format} of sample {sample}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! A buffer that formats numbers and text.
 //!
-//! Floats are written in their shortest form that reads back as the same f32, always with a `.` or an `e`; integers
-//! never have one. Writes only fill a buffer; [`Out::pour`], called once per row, empties it when it is full.
+//! Floats are written in the shortest form that reads back as the same f32, always with a `.` or an `e`; integers never
+//! contain one. Writes only fill a buffer; [`Out::pour`], called once per row, writes it out when it is full.
 
 use std::io::{self, Write};
 
@@ -14,7 +14,7 @@ pub(crate) struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// Bytes after which the buffer is poured out.
+    /// Number of bytes from which the buffer is written out.
     const FULL: usize = 1 << 16;
 
     pub(crate) fn new(sink: &'a mut dyn Write) -> Self {
@@ -35,7 +35,7 @@ impl<'a> Out<'a> {
         self.buffer.extend_from_slice(self.float.format_finite(number).as_bytes());
     }
 
-    /// A finite number, without a fraction where it is whole.
+    /// A finite number, without a fraction if it is whole.
     pub(crate) fn double(&mut self, number: f64) {
         let text = self.float.format_finite(number);
         self.buffer.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes());
@@ -77,7 +77,7 @@ mod tests {
             assert_eq!(text(x), expected);
         }
         assert_eq!(text(f32::MAX), "3.4028235e+38");
-        // Steps through all exponents and many fractions, with bits that are no pattern.
+        // Covers all exponents and many fractions with irregular bits.
         for x in (0..u32::MAX).step_by(65_521).map(f32::from_bits).filter(|x| x.is_finite()) {
             let text = text(x);
             assert!(text.contains(['.', 'e']), "{text}");

@@ -4,7 +4,7 @@ use engine::geometry::Name;
 
 use crate::{FilePosition, Format, FormatError};
 
-/// First bytes of files that often have a wrong extension, what they are, and what to do.
+/// First bytes of other file types that often have a wrong extension, their names, and hints.
 const FOREIGN: [(&[u8], &str, &str); 17] = [
     (b"\xff\xfe", UTF_16, AS_UTF_8),
     (b"\xfe\xff", UTF_16, AS_UTF_8),
@@ -26,22 +26,18 @@ const FOREIGN: [(&[u8], &str, &str); 17] = [
 ];
 const UTF_16: &str = "UTF-16 text";
 const AS_UTF_8: &str = "save it as UTF-8";
-const UNPACK: &str = "unpack it first";
+const UNPACK: &str = "decompress it first";
 const CONVERT: &str = "convert it to obj, ply or json first";
 
 /// The bytes of a file of `format`, without a UTF-8 byte order mark.
 ///
 /// # Errors
-/// Where the file is empty or its first bytes are those of another type of file.
+/// If the file is empty or its first bytes are those of another file type.
 pub(crate) fn opened(format: Format, bytes: &[u8]) -> Result<&[u8], FormatError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let fact = |what: &str| format!("this is {what}, expected {format}");
     if bytes.is_empty() {
-        return Err(FormatError::with_hint(
-            FilePosition::File,
-            "the file is empty",
-            "write it again: nothing reached the disk",
-        ));
+        return Err(FormatError::with_hint(FilePosition::File, "the file is empty", "write the file again"));
     }
     if let Some((_, what, hint)) = FOREIGN.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
         return Err(FormatError::with_hint(FilePosition::File, fact(what), hint));
@@ -56,13 +52,13 @@ pub(crate) fn opened(format: Format, bytes: &[u8]) -> Result<&[u8], FormatError>
         _ => format,
     };
     if other != format {
-        let hint = "give the file the ending of its format";
+        let hint = "rename the file with the extension of its format";
         return Err(FormatError::with_hint(FilePosition::File, fact(&format!("a {other} file")), hint));
     }
     Ok(bytes)
 }
 
-/// The byte that ends lines: a line feed, or a carriage return where the text has none of those.
+/// The byte that ends lines: a line feed, or a carriage return if the text contains no line feed.
 pub(crate) fn line_end(text: &[u8]) -> u8 {
     if text.contains(&b'\n') { b'\n' } else { b'\r' }
 }
@@ -85,7 +81,7 @@ impl<'a> Lines<'a> {
         self.number
     }
 
-    /// What is not read yet.
+    /// The bytes not read yet.
     pub(crate) fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -123,12 +119,12 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// The nearest f32 of a decimal; infinite or NaN where the field says so or is too large; `None` where it is not a number.
+/// The nearest f32 of a decimal number; infinite if it is too large, NaN for `nan`; `None` if it is not a number.
 pub(crate) fn float(field: &[u8]) -> Option<f32> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// A field as a message shows it: what can be printed, shortened.
+/// A field as messages show it: shortened, with control characters escaped.
 pub(crate) fn shown(field: &[u8]) -> String {
     const LONGEST: usize = 40;
     let cut = &field[..field.len().min(LONGEST)];
@@ -141,7 +137,7 @@ pub(crate) fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// `name` with as many underscores appended as it takes for `taken` to be false.
+/// `name`, with underscores appended until `taken` is false.
 pub(crate) fn free_name(name: &str, taken: impl Fn(&str) -> bool) -> Name {
     let mut name = name.to_owned();
     while taken(&name) {
@@ -155,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_end_as_the_text_ends_them() {
+    fn line_endings_are_detected() {
         let lines = |text: &'static [u8]| Lines::new(text, 1, line_end(text)).collect::<Vec<_>>();
         assert_eq!(lines(b"a\nb"), [&b"a"[..], b"b"]);
         assert_eq!(lines(b"a\r\n\r\nb\r\n"), [&b"a\r"[..], b"\r", b"b\r"]);
@@ -170,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_is_shown_short_and_printable() {
+    fn a_shown_field_is_short_and_printable() {
         assert_eq!(shown(b"1,5"), "`1,5`");
         assert_eq!(shown(b"a\0\xff"), "`a\\0\u{fffd}`");
         assert_eq!(shown(&[b'7'; 50]), format!("`{}…`", "7".repeat(40)));

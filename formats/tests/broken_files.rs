@@ -1,6 +1,6 @@
-//! Damaged files and files of something else: an error that says so, never a panic.
+//! Damaged files and files of other types: an error with the reason, never a panic.
 
-#![allow(clippy::unwrap_used, reason = "a value that is not there fails the test")]
+#![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
 use formats::{Format, FrameStamp, read, write};
 use proptest::prelude::*;
@@ -57,7 +57,7 @@ const JSON: &str = r#"{"frame": 1, "time": 0.5,
   "velocity_z": []}}
 "#;
 
-/// A small file of each format, and the binary one that convect writes of it.
+/// A small file of each format, and the binary file that convect writes from it.
 fn samples() -> Vec<(Format, Vec<u8>)> {
     let mut samples: Vec<(Format, Vec<u8>)> = READ.into_iter().zip([OBJ, PLY, JSON].map(Vec::from)).collect();
     let geometry = read(Format::Obj, OBJ.as_bytes()).unwrap();
@@ -73,41 +73,41 @@ fn fault(format: Format, bytes: &[u8]) -> (String, Option<String>) {
 }
 
 #[test]
-fn the_samples_themselves_load() {
+fn the_undamaged_samples_load() {
     for (format, bytes) in samples() {
         assert!(read(format, &bytes).is_ok(), "{format}");
     }
 }
 
 #[test]
-fn a_file_cut_anywhere_loads_or_is_refused() {
+fn a_truncated_file_loads_or_is_refused() {
     for (format, bytes) in samples() {
         let refused = (0..bytes.len()).filter(|length| read(format, &bytes[..*length]).is_err()).count();
-        // Text that ends between two numbers or lines cannot always be told from a shorter file.
+        // Text that ends between two numbers or lines may be indistinguishable from a shorter file.
         let most = if format == Format::Obj { bytes.len() / 4 } else { bytes.len() * 9 / 10 };
         assert!(refused >= most, "{format}: {refused} of {}", bytes.len());
     }
 }
 
 #[test]
-fn a_file_of_something_else_is_named() {
+fn files_of_other_types_are_recognised() {
     let utf_16 =
         |text: &str, mark: &[u8]| [mark, &text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>()].concat();
     for format in READ {
-        let said = |what: &str| format!("this is {what}, expected {format}");
+        let expected = |what: &str| format!("this is {what}, expected {format}");
         let text = Some("save it as UTF-8".to_owned());
-        assert_eq!(fault(format, &utf_16("v 0 0 0", b"\xff\xfe")), (said("UTF-16 text"), text.clone()));
-        assert_eq!(fault(format, &utf_16("v 0 0 0", b"")), (said("UTF-16 text"), text.clone()));
+        assert_eq!(fault(format, &utf_16("v 0 0 0", b"\xff\xfe")), (expected("UTF-16 text"), text.clone()));
+        assert_eq!(fault(format, &utf_16("v 0 0 0", b"")), (expected("UTF-16 text"), text.clone()));
         let big: Vec<u8> = "ply\n".encode_utf16().flat_map(u16::to_be_bytes).collect();
-        assert_eq!(fault(format, &big), (said("UTF-16 text"), text.clone()));
-        assert_eq!(fault(format, &[b"\xfe\xff", big.as_slice()].concat()), (said("UTF-16 text"), text));
-        let unpack = Some("unpack it first".to_owned());
-        assert_eq!(fault(format, b"\x1f\x8b\x08\x00"), (said("gzip data"), unpack.clone()));
-        assert_eq!(fault(format, b"PK\x03\x04"), (said("a zip archive"), unpack));
+        assert_eq!(fault(format, &big), (expected("UTF-16 text"), text.clone()));
+        assert_eq!(fault(format, &[b"\xfe\xff", big.as_slice()].concat()), (expected("UTF-16 text"), text));
+        let decompress = Some("decompress it first".to_owned());
+        assert_eq!(fault(format, b"\x1f\x8b\x08\x00"), (expected("gzip data"), decompress.clone()));
+        assert_eq!(fault(format, b"PK\x03\x04"), (expected("a zip archive"), decompress));
         let convert = Some("convert it to obj, ply or json first".to_owned());
-        assert_eq!(fault(format, b"PXR-USDC\0"), (said("a USD file"), convert.clone()));
-        assert_eq!(fault(format, b"#usda 1.0\n"), (said("a USD file"), convert));
-        assert_eq!(fault(format, b"<!DOCTYPE html>").0, said("a web page"));
+        assert_eq!(fault(format, b"PXR-USDC\0"), (expected("a USD file"), convert.clone()));
+        assert_eq!(fault(format, b"#usda 1.0\n"), (expected("a USD file"), convert));
+        assert_eq!(fault(format, b"<!DOCTYPE html>").0, expected("a web page"));
         assert_eq!(fault(format, b"").0, "the file is empty");
     }
     assert_eq!(fault(Format::Obj, b"ply\nformat ascii 1.0\n").0, "this is a ply file, expected obj");
@@ -143,7 +143,7 @@ proptest! {
                 _ => bytes.insert(place, byte),
             }
         }
-        // Whatever it says, it says; and what loads can be written again.
+        // Any error is accepted; what loads can be written again.
         if let Ok(geometry) = read(format, &bytes) {
             let stamp = FrameStamp { frame: 1.0, seconds: 0.0 };
             prop_assert!(write(Format::Json, &geometry, &stamp, &mut Vec::new()).is_ok());

@@ -1,6 +1,6 @@
-//! The fuzz targets' corpora, replayed: what a fuzzer once met stays met.
+//! Replays the corpora of the fuzz targets, as a regression test.
 
-#![allow(clippy::unwrap_used, reason = "a value that is not there fails the test")]
+#![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
 use std::path::Path;
 

@@ -1,6 +1,6 @@
-//! What a format holds comes back bit for bit, over random geometry.
+//! What a format can hold is read back bit for bit, for random geometry.
 
-#![allow(clippy::unwrap_used, reason = "a value that is not there fails the test")]
+#![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
 use engine::geometry::{Column, Component, Geometry, Grid, Item, Kind, Owner, Volume, fixed_type};
 use formats::{Format, FrameStamp, read, write};
@@ -8,7 +8,7 @@ use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 
-/// Any f32 but NaN and the infinities, extremes and both zeros included.
+/// Any finite f32, extremes and both zeros included.
 fn number() -> impl Strategy<Value = f32> {
     prop_oneof![
         any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |x| x.is_finite()),
@@ -32,7 +32,7 @@ fn column(rows: usize) -> impl Strategy<Value = Column> {
     ]
 }
 
-/// Names that mean something to a format, that need escapes, and plain ones.
+/// Names with a meaning in a format, names that need escapes, and plain ones.
 fn name() -> impl Strategy<Value = String> {
     const KNOWN: [&str; 17] = [
         "mask",
@@ -56,7 +56,7 @@ fn name() -> impl Strategy<Value = String> {
     prop_oneof![proptest::sample::select(KNOWN.as_slice()).prop_map(str::to_owned), "[a-z_.%\" ]{0,4}"]
 }
 
-/// Sets random attributes where their type is legal.
+/// Sets random attributes whose type is allowed.
 fn with_attributes(component: Component) -> impl Strategy<Value = Component> {
     let counts = [component.point_count(), component.element_count(), 1];
     let tables = counts.map(|rows| vec((name(), column(rows)), 0..4));
@@ -107,7 +107,7 @@ fn tets() -> impl Strategy<Value = Component> {
         .prop_flat_map(with_attributes)
 }
 
-/// A grid of its own for the level set and for the velocity, and any background.
+/// A volume with separate grids for level set and velocity, and any background.
 fn volume() -> impl Strategy<Value = Volume> {
     let grid = || {
         (proptest::array::uniform3(number()), 1e-6..1e6_f32, proptest::array::uniform3(0..4_u32))
@@ -158,7 +158,7 @@ fn comes_back(format: Format, geometry: &Geometry) -> Result<(), TestCaseError> 
     let mut bytes = Vec::new();
     write(format, geometry, &FrameStamp { frame: 1.25, seconds: 0.1 }, &mut bytes).unwrap();
     let found = read(format, &bytes).map_err(|error| TestCaseError::fail(error.to_string()))?;
-    // `==` on floats calls 0 and -0 equal; bits do not.
+    // `==` treats 0 and -0 as equal; their bits differ.
     for (found, expected) in found.parts().zip(geometry.parts()) {
         for ((_, _, found), (_, name, expected)) in found.columns().zip(expected.columns()) {
             prop_assert_eq!(found.to_bytes(), expected.to_bytes(), "{}", name);
@@ -190,7 +190,7 @@ proptest! {
     }
 
     #[test]
-    fn ply_holds_one_component_but_for_what_is_said_once(
+    fn ply_holds_one_component_except_attributes_of_the_whole(
         component in prop_oneof![curves(), mesh(), points()]
     ) {
         let keep = |owner: Owner, _: &str, _: &Column| owner != Owner::Once;
@@ -234,7 +234,7 @@ proptest! {
 }
 
 #[test]
-fn a_mesh_without_a_face_stays_one_in_ply_and_is_points_in_obj() {
+fn a_mesh_without_a_face_is_a_mesh_in_ply_and_points_in_obj() {
     let geometry: Geometry = Component::mesh(Vec::new(), Vec::new(), vec![[1.0; 3]]).unwrap().into();
     let back = |format| {
         let mut bytes = Vec::new();
@@ -246,7 +246,7 @@ fn a_mesh_without_a_face_stays_one_in_ply_and_is_points_in_obj() {
 }
 
 #[test]
-fn what_a_format_cannot_hold_is_refused() {
+fn components_that_a_format_cannot_hold_are_refused() {
     let tets: Geometry = Component::tets(Vec::new(), Vec::new()).unwrap().into();
     let fault = |format, geometry: &Geometry| {
         write(format, geometry, &FrameStamp { frame: 1.0, seconds: 0.0 }, &mut Vec::new()).unwrap_err()

@@ -1,4 +1,4 @@
-//! convect's json form: everything a geometry holds, read by scripts and tests.
+//! convect's json format: it stores everything of a geometry and is easy to read by scripts and tests.
 //!
 //! ```json
 //! {"frame": 1, "time": 0.041666666666666664,
@@ -12,10 +12,10 @@
 //! well known as float (`"envelope": [1, 1]`). A column without rows has the type of its well-known name, else float.
 //! `frame` and `time` may be missing. Any other key is a fault, and so is a duplicate key.
 //!
-//! A volume is written as the dense arrays of its box, x fastest, then y, then z. Where its velocity has a grid of its own,
-//! that grid is `velocity_origin`, `velocity_cell` and `velocity_size`; each of them that is missing is that of the level
-//! set. `background` is φ where nothing is stored; where it is missing it is the greatest value of `level_set`, at least
-//! half a cell. More than 2³¹ − 1 numbers in one array are refused, read or written.
+//! A volume is written as the dense arrays of its box, x fastest, then y, then z. If its velocity has another grid,
+//! that is `velocity_origin`, `velocity_cell` and `velocity_size`; those of the level set are used for missing ones.
+//! `background` is φ where nothing is stored; if it is missing, it is the largest value of `level_set`, at least half a
+//! cell. More than 2³¹ − 1 numbers in one array are refused when reading and writing.
 
 mod numbers;
 mod part;
@@ -29,7 +29,7 @@ use engine::geometry::{Kind, Owner};
 pub(crate) use read::read;
 pub(crate) use write::write;
 
-/// The key of an owner's table; `None` where a component of that kind has none.
+/// The key of an owner's table; `None` if components of that kind have none.
 fn table_key(kind: Kind, owner: Owner) -> Option<&'static str> {
     match owner {
         Owner::Point => (kind != Kind::Volume).then_some("point_attributes"),

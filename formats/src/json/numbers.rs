@@ -1,7 +1,7 @@
-//! A list of numbers, or of rows of numbers, whose type is known only once it is read.
+//! A list of numbers or of rows of numbers, whose type is determined while reading.
 //!
-//! Each item is taken as its raw text, which serde has checked to be json, and turned into an f32 or i32 in one step:
-//! via f64 some f32 would come back one bit off.
+//! Each item is read as raw text, which serde has validated as json, and converted to f32 or i32 directly: a conversion
+//! via f64 would change the last bit of some f32.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 
 use crate::text::{counted, shown};
 
-/// The numbers of a column, row after row.
+/// The numbers of a column, row by row.
 #[derive(Default)]
 pub(super) struct Numbers {
     /// Numbers per row; 0 before the first row.
@@ -43,7 +43,7 @@ impl Numbers {
     /// The rows of three floats.
     ///
     /// # Errors
-    /// Where rows have another width; names it.
+    /// If rows have another width, which the error names.
     pub(super) fn triples(self) -> Result<Vec<[f32; 3]>, String> {
         match self.width {
             0 | 3 => Ok(self.flat().as_chunks::<3>().0.to_vec()),
@@ -54,7 +54,7 @@ impl Numbers {
     /// Bare floats.
     ///
     /// # Errors
-    /// Where rows have another width; names it.
+    /// If rows have another width, which the error names.
     pub(super) fn singles(self) -> Result<Vec<f32>, String> {
         match self.width {
             0 | 1 => Ok(self.flat()),
@@ -102,7 +102,7 @@ impl Numbers {
         }
         self.wholes.push(text.parse().map_err(|_| {
             if text.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit()) {
-                format!("{text} does not fit a 32-bit whole number; a float is written {text}.0")
+                format!("{text} is out of range for a 32-bit integer; write it as {text}.0 to make it a float")
             } else {
                 not_a_number(text)
             }
@@ -118,7 +118,7 @@ fn as_floats(wholes: Vec<i32>) -> Vec<f32> {
 /// The nearest f32 of the text of a json value.
 ///
 /// # Errors
-/// Where the value is not a number, or out of the range of f32.
+/// If the value is not a number, or out of the range of f32.
 pub(super) fn float(text: &str) -> Result<f32, String> {
     let number: f32 = text.parse().map_err(|_| not_a_number(text))?;
     if number.is_finite() { Ok(number) } else { Err(format!("{text} is out of range, expected at most 3.4e38")) }

@@ -5,7 +5,7 @@ use engine::geometry::{Component, Geometry, Grid, Kind, Name, Owner, P, VOLUME_F
 use super::numbers::Numbers;
 use crate::text::counted;
 
-/// An attribute before its type is settled.
+/// An attribute before its type is determined.
 pub(super) type NamedNumbers = (Name, Numbers);
 
 /// The values of a component's keys.
@@ -19,7 +19,7 @@ pub(super) struct Part {
     pub(super) tables: [Vec<NamedNumbers>; 3],
     /// The grid of a volume's level set.
     pub(super) grid: GridKeys,
-    /// The grid of its velocity, where it is another.
+    /// The grid of its velocity, if it has another.
     pub(super) velocity_grid: GridKeys,
     pub(super) background: Option<f32>,
     /// In the order of [`VOLUME_FIELDS`].
@@ -35,34 +35,34 @@ pub(super) struct GridKeys {
 }
 
 impl GridKeys {
-    /// The grid; what is missing is that of `other`.
+    /// The grid, with missing values from `other`.
     ///
     /// # Errors
-    /// Where a key is missing and there is no other grid, or a value is not allowed. `prefix` stands before each key.
+    /// If a key is missing and there is no other grid, or a value is not allowed. `prefix` precedes each key.
     fn grid(self, prefix: &str, other: Option<Grid>) -> Result<Grid, String> {
         let key = |key: &str| format!("{prefix}{key}");
         let origin = match (self.origin, other) {
             (None, Some(other)) => other.origin,
             (origin, _) => {
-                let origin = there(origin, &key("origin"))?.singles()?;
+                let origin = required(origin, &key("origin"))?.singles()?;
                 let count = counted(origin.len(), "number");
                 origin.try_into().map_err(|_| format!("`{}` has {count}, expected 3", key("origin")))?
             }
         };
-        let cell = there(self.cell.or(other.map(|other| other.cell)), &key("cell"))?;
+        let cell = required(self.cell.or(other.map(|other| other.cell)), &key("cell"))?;
         if cell <= 0.0 {
             return Err(format!("`{}` is {cell}, expected more than 0", key("cell")));
         }
-        let size = there(self.size.or(other.map(|other| other.size)), &key("size"))?;
+        let size = required(self.size.or(other.map(|other| other.size)), &key("size"))?;
         Ok(Grid { origin, cell, size })
     }
 }
 
 impl Part {
-    /// Builds the component of that kind and puts it into `geometry`.
+    /// Builds the component and adds it to `geometry`.
     ///
     /// # Errors
-    /// Where a key is missing or the values do not fit together.
+    /// If a key is missing or the values are inconsistent.
     pub(super) fn put_into(self, geometry: &mut Geometry, kind: Kind) -> Result<(), String> {
         match kind {
             Kind::Volume => geometry.put_volume(self.volume()?),
@@ -72,14 +72,16 @@ impl Part {
     }
 
     fn component(self, kind: Kind) -> Result<Component, String> {
-        let positions = there(self.points, "points")?.triples().map_err(|fact| format!("`points`: {fact}"))?;
-        let made = match kind {
-            Kind::Curves => Component::curves(there(self.counts, "counts")?, positions),
-            Kind::Mesh => Component::mesh(there(self.counts, "counts")?, there(self.corners, "indices")?, positions),
-            Kind::Tets => Component::tets(there(self.tets, "indices")?, positions),
+        let positions = required(self.points, "points")?.triples().map_err(|fact| format!("`points`: {fact}"))?;
+        let built = match kind {
+            Kind::Curves => Component::curves(required(self.counts, "counts")?, positions),
+            Kind::Mesh => {
+                Component::mesh(required(self.counts, "counts")?, required(self.corners, "indices")?, positions)
+            }
+            Kind::Tets => Component::tets(required(self.tets, "indices")?, positions),
             Kind::Points | Kind::Volume => Ok(Component::points(positions)),
         };
-        let mut component = made.map_err(|error| error.to_string())?;
+        let mut component = built.map_err(|error| error.to_string())?;
         for (owner, table) in Owner::ALL.into_iter().zip(self.tables) {
             for (name, numbers) in table {
                 if owner == Owner::Point && &*name == P.name {
@@ -97,7 +99,7 @@ impl Part {
         let velocity_grid = self.velocity_grid.grid("velocity_", Some(grid))?;
         let mut arrays = [const { Vec::new() }; 4];
         for ((array, name), numbers) in arrays.iter_mut().zip(VOLUME_FIELDS).zip(self.fields) {
-            *array = there(numbers, name)?.singles().map_err(|fact| format!("`{name}`: {fact}"))?;
+            *array = required(numbers, name)?.singles().map_err(|fact| format!("`{name}`: {fact}"))?;
         }
         let [level_set, velocity @ ..] = arrays.each_ref().map(Vec::as_slice);
         let default = || Volume::default_background(&grid, level_set.iter().copied());
@@ -113,6 +115,6 @@ impl Part {
     }
 }
 
-fn there<T>(value: Option<T>, key: &str) -> Result<T, String> {
+fn required<T>(value: Option<T>, key: &str) -> Result<T, String> {
     value.ok_or_else(|| format!("`{key}` is missing"))
 }

@@ -17,10 +17,10 @@ use crate::{FilePosition, FormatError};
 /// The geometry of a json file.
 ///
 /// # Errors
-/// With line and column: where the text is not json, or not a geometry in it.
+/// With line and column: if the text is not json, or not a geometry.
 pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
-        let fact = "a byte that is not UTF-8 text";
+        let fact = "a byte is not valid UTF-8";
         FormatError::with_hint(FilePosition::Byte(error.valid_up_to()), fact, "save the file as UTF-8")
     })?;
     let mut json = serde_json::Deserializer::from_str(text);
@@ -28,7 +28,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     geometry.map_err(|error| {
         let full = error.to_string();
         let fact = full.rsplit_once(" at line ").map_or(full.as_str(), |(fact, _)| fact).to_owned();
-        let hint = error.is_eof().then_some("the file ends too early: write it again");
+        let hint = error.is_eof().then_some("the file is truncated: write it again");
         FormatError::Content { position: FilePosition::Column(error.line(), error.column()), fact, hint }
     })
 }

@@ -1,4 +1,4 @@
-//! Json by hand: what is written, odd files that load, broken ones and what is said about them.
+//! Json: the text that is written, unusual files that load, invalid files and their errors.
 
 use engine::geometry::{Attr, Column, Component, ENVELOPE, Geometry, Grid, ID, Kind, Owner, SparseField, Volume};
 
@@ -64,7 +64,7 @@ const EVERYTHING: &str = r#"{"frame": 12, "time": 0.5,
 "#;
 
 #[test]
-fn the_text_that_is_written_is_this_and_comes_back() {
+fn the_written_text_is_as_expected_and_reads_back() {
     assert_eq!(written(&everything(), 12.0), EVERYTHING);
     assert_eq!(read(EVERYTHING), everything());
     let sign = read(EVERYTHING).curves().unwrap().positions()[0][1].to_bits();
@@ -81,7 +81,7 @@ fn a_whole_frame_has_no_fraction() {
 }
 
 #[test]
-fn the_type_shows_in_the_text() {
+fn types_can_be_recognised_in_the_text() {
     let column = |rows: &str, name: &str| {
         let text =
             format!(r#"{{"points": {{"points": [[0, 0, 0], [1, 1, 1]], "point_attributes": {{"{name}": {rows}}}}}}}"#);
@@ -96,13 +96,13 @@ fn the_type_shows_in_the_text() {
         column("[[1,2,3,4],[5,6,7,8.5]]", "mask"),
         Column::new(vec![[1.0_f32, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.5]])
     );
-    // The f64 nearest to this lies exactly between two f32, and rounds the other way.
+    // The f64 nearest to this lies exactly between two f32, and rounds in the other direction.
     let between = "1.00000005960464478";
     assert_eq!(column(&format!("[{between}, 0.0]"), "mask"), Column::new(vec![between.parse::<f32>().unwrap(), 0.0]));
 }
 
 #[test]
-fn a_column_without_a_row_becomes_what_its_name_wants_or_float() {
+fn a_column_without_rows_has_the_type_of_its_name_or_float() {
     let geometry = read(r#"{"points": {"points": [], "point_attributes": {"id": [], "v": [], "mask": []}}}"#);
     let table = geometry.points().unwrap().table(Owner::Point);
     assert_eq!(table.column("id"), Some(&Column::new(Vec::<i32>::new())));
@@ -111,7 +111,7 @@ fn a_column_without_a_row_becomes_what_its_name_wants_or_float() {
 }
 
 #[test]
-fn odd_text_is_the_same_geometry() {
+fn unusual_text_gives_the_same_geometry() {
     let plain: Geometry = Component::curves(vec![1], vec![[1.0, 2.0, 3.0]]).unwrap().into();
     for odd in [
         r#"{"curves":{"counts":[1],"points":[[1.0,2.0,3.0]]}}"#,
@@ -125,7 +125,7 @@ fn odd_text_is_the_same_geometry() {
 }
 
 #[test]
-fn a_broken_file_is_named_with_line_column_and_what_is_wrong() {
+fn an_invalid_file_is_reported_with_line_column_and_reason() {
     let keys = "`frame`, `time`, `curves`, `mesh`, `points`, `tets`, `volume`";
     for (text, expected) in [
         (
@@ -163,7 +163,7 @@ fn a_broken_file_is_named_with_line_column_and_what_is_wrong() {
         ("{\"points\": {\"points\": [[NaN, 2, 3]]}}", "line 1, column 25: expected value"),
         (
             "{\"points\": {\"points\": [], \"attributes\": {\"a\": [3000000000]}}}",
-            "line 1, column 58: `a`, row 0: 3000000000 does not fit a 32-bit whole number; a float is written 3000000000.0",
+            "line 1, column 58: `a`, row 0: 3000000000 is out of range for a 32-bit integer; write it as 3000000000.0 to make it a float",
         ),
         (
             "{\"points\": {\"points\": [], \"attributes\": {\"a\": [1, 2]}}}",
@@ -207,13 +207,13 @@ fn a_broken_file_is_named_with_line_column_and_what_is_wrong() {
     ] {
         assert_eq!(fault(text), expected, "{text}");
     }
-    assert_eq!(fault(b"{\"\xff\": 1}"), "byte 2: a byte that is not UTF-8 text");
+    assert_eq!(fault(b"{\"\xff\": 1}"), "byte 2: a byte is not valid UTF-8");
     let deep = format!("{{\"points\": {{\"points\": {}", "[".repeat(100_000));
     assert!(fault(deep).ends_with("EOF while parsing a list"), "and no stack overflow");
 }
 
 #[test]
-fn a_broken_volume_is_named_with_what_is_wrong() {
+fn an_invalid_volume_is_refused_with_the_reason() {
     let volume = |size: &str, cell: &str, level_set: &str| {
         let arrays = format!(r#""level_set": {level_set}, "velocity_x": [], "velocity_y": [], "velocity_z": []"#);
         let text = format!(r#"{{"volume": {{"origin": [0, 0, 0], "cell": {cell}, "size": {size}, {arrays}}}}}"#);
@@ -255,7 +255,7 @@ fn two_grids() -> Geometry {
 }
 
 #[test]
-fn a_grid_of_the_velocity_and_a_background_are_written_where_they_differ() {
+fn a_grid_of_the_velocity_and_a_background_are_written_if_they_differ() {
     let text = written(&two_grids(), 1.0);
     let body = text.split_once(",\n").unwrap().1;
     let expected = r#" "volume": {"origin": [0.0, 0.5, 0.0], "cell": 0.1, "size": [3, 1, 1],
@@ -275,7 +275,7 @@ fn a_grid_of_the_velocity_and_a_background_are_written_where_they_differ() {
     geometry.put_volume(volume);
     assert_eq!(written(&geometry, 1.0), far);
     let same_corner = text.replace(r#""velocity_origin": [0.0, 0.5, 0.0], "#, "");
-    assert_eq!(read(&same_corner), two_grids(), "a key that is missing is the level set's");
+    assert_eq!(read(&same_corner), two_grids(), "missing keys are those of the level set");
 }
 
 #[test]
@@ -291,7 +291,7 @@ fn a_volume_too_large_for_dense_arrays_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn what_is_not_finite_is_refused_on_the_way_out() {
+fn numbers_that_are_not_finite_are_not_written() {
     let fault = |geometry: &Geometry, frame: f64| {
         let stamp = FrameStamp { frame, seconds: 0.0 };
         crate::write(Format::Json, geometry, &stamp, &mut Vec::new()).unwrap_err().to_string()

@@ -13,7 +13,7 @@ use crate::{FormatError, FrameStamp};
 /// Writes `geometry` as json; its numbers are finite.
 ///
 /// # Errors
-/// Where the bytes cannot be written, or a volume's box is too large for dense arrays.
+/// If the bytes cannot be written, or a volume's box is too large for dense arrays.
 pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let mut out = Out::new(sink);
     out.text("{\"frame\": ");
@@ -23,8 +23,8 @@ pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Writ
     for part in geometry.parts() {
         component(part, &mut out)?;
     }
-    if let Some(there) = geometry.volume() {
-        volume(there, &mut out)?;
+    if let Some(found) = geometry.volume() {
+        volume(found, &mut out)?;
     }
     out.text("}\n");
     out.finish()?;
@@ -97,7 +97,7 @@ fn volume(volume: &Volume, out: &mut Out) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// The keys of a grid, each with `prefix` before it.
+/// The keys of a grid, each preceded by `prefix`.
 fn grid(prefix: &str, grid: Grid, out: &mut Out) {
     out.text(&format!("\"{prefix}origin\": "));
     row(&grid.origin, |x, out| out.float(x), out);
@@ -107,7 +107,7 @@ fn grid(prefix: &str, grid: Grid, out: &mut Out) {
     row(&grid.size, |n, out| out.whole(n), out);
 }
 
-/// The columns of a table by name; without the positions, which have a key of their own.
+/// The columns of a table by name, without the positions, which have their own key.
 fn table(key: &str, table: &Table, has_positions: bool, out: &mut Out) -> Result<(), FormatError> {
     out.text("\"");
     out.text(key);

@@ -9,7 +9,7 @@ use crate::{FilePosition, FormatError};
 /// An omitted reference.
 const NONE: u32 = u32::MAX;
 
-/// Statements without curves, faces or points.
+/// Statements that are ignored: they define no curves, faces or points.
 const IGNORED: [&[u8]; 34] = [
     b"g",
     b"s",
@@ -50,7 +50,7 @@ const IGNORED: [&[u8]; 34] = [
 /// The geometry of an OBJ file.
 ///
 /// # Errors
-/// With the line: where a statement is incomplete, is not finite, or names a vertex that is not there.
+/// With the line: if a statement is incomplete, is not finite, or references a vertex that does not exist.
 pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     let mut statements = Statements::default();
     let mut lines = Lines::new(bytes, 1, line_end(bytes));
@@ -63,7 +63,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     statements.geometry()
 }
 
-/// `line` and those it continues on, in one.
+/// `line` joined with its continuation lines.
 fn continued<'a>(line: &'a [u8], lines: &mut Lines, joined: &'a mut Vec<u8>) -> &'a [u8] {
     let Some(start) = open_end(line) else { return line };
     joined.clear();
@@ -81,7 +81,8 @@ fn continued<'a>(line: &'a [u8], lines: &mut Lines, joined: &'a mut Vec<u8>) -> 
     joined
 }
 
-/// The line before a `\` at its end. Not in comments: Windows paths there may end with one.
+/// The line without the `\` at its end, if there is one. Comments are not continued, because they may contain Windows
+/// paths.
 fn open_end(line: &[u8]) -> Option<&[u8]> {
     let open = line.trim_ascii_end().strip_suffix(b"\\")?;
     (!line.trim_ascii_start().starts_with(b"#")).then_some(open)
@@ -92,16 +93,17 @@ fn open_end(line: &[u8]) -> Option<&[u8]> {
 struct Statements {
     line: usize,
     positions: Vec<[f32; 3]>,
-    /// At most as long as `positions`: the last may have none; NaN for others without one.
+    /// Not longer than `positions`; NaN for vertices without a colour, or missing at the end.
     colours: Vec<[f32; 3]>,
     textures: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
     curves: Elements,
     faces: Elements,
     points: Elements,
-    /// The greatest index of `v`, `vt` and `vn`, and its line: they may come later, so the end tells whether it holds.
+    /// The largest index of `v`, `vt` and `vn`, with its line. It can be checked only at the end, because vertices may
+    /// follow their references.
     highest: [(u32, usize); 3],
-    /// The first statement that is not OBJ's.
+    /// The first unknown statement.
     unknown: Option<(usize, String)>,
 }
 
@@ -110,7 +112,7 @@ struct Statements {
 struct Elements {
     counts: Vec<u32>,
     vertices: Vec<u32>,
-    /// As long as `vertices`, or shorter where the last have none.
+    /// Not longer than `vertices`; [`NONE`] for vertices without one, or missing at the end.
     textures: Vec<u32>,
     normals: Vec<u32>,
 }
@@ -138,7 +140,7 @@ impl Statements {
         match fields.next() {
             Some(b"v") => self.vertex(fields),
             Some(b"vt") => {
-                // One number is a 1D texture's, two are the usual.
+                // One number for a 1D texture, usually two.
                 let [u, v, w] = row(fields, "vt", 1)?;
                 self.textures.push([u, v, w]);
                 Ok(())
@@ -167,7 +169,7 @@ impl Statements {
             if !number.is_finite() {
                 return Err(format!("{} is not a finite number", shown(field)));
             }
-            // A number too many is counted, not stored.
+            // Superfluous numbers are counted but not stored.
             if let Some(slot) = numbers.get_mut(count) {
                 *slot = number;
             }
@@ -208,7 +210,7 @@ impl Statements {
         Ok(())
     }
 
-    /// The rows that `v`, `v/vt`, `v//vn` or `v/vt/vn` names, from 0; [`NONE`] for what it leaves out.
+    /// The rows that `v`, `v/vt`, `v//vn` or `v/vt/vn` references, from 0; [`NONE`] for omitted parts.
     fn reference(&mut self, field: &[u8]) -> Result<[u32; 3], String> {
         let counts = [self.positions.len(), self.textures.len(), self.normals.len()];
         let mut rows = [NONE; 3];
@@ -222,7 +224,7 @@ impl Statements {
             let index = std::str::from_utf8(part).ok().and_then(|text| text.parse::<i64>().ok());
             let index = index.ok_or_else(|| format!("{} is not a vertex index", shown(field)))?;
             let row = match index {
-                0 => return Err(format!("{} names 0, but indices count from 1", shown(field))),
+                0 => return Err(format!("{} has the index 0, but indices start at 1", shown(field))),
                 1.. => index - 1,
                 // Saturates at values that are refused anyway.
                 _ => index.saturating_add(i64::try_from(counts[k]).unwrap_or(i64::MAX)),
@@ -273,12 +275,12 @@ impl Statements {
         Ok(geometry)
     }
 
-    /// Curves take their CVs in the order their lines name them, a vertex that two lines share twice.
+    /// The CVs of curves are in the order of the `l` lines; a vertex in two lines becomes two CVs.
     fn curve_component(&self) -> Result<Component, FormatError> {
         let Elements { counts, vertices, textures, .. } = &self.curves;
         let curves = Component::curves(counts.clone(), self.positions_of(vertices))?;
         let mut curves = self.with_attributes(curves, &self.curves, vertices)?;
-        // A line may name another texture row at each CV, where one row a vertex would be ambiguous.
+        // A vertex in two lines may have different texture coordinates in each.
         if textures.len() == vertices.len()
             && let Some(rows) = textures.iter().map(|row| self.textures.get(*row as usize).copied()).collect()
         {
@@ -291,7 +293,7 @@ impl Statements {
         picked.iter().map(|vertex| self.positions[*vertex as usize]).collect()
     }
 
-    /// The vertices that `elements` name, in file order.
+    /// The vertices that `elements` reference, in file order.
     fn named(&self, elements: &Elements) -> Vec<u32> {
         let mut named = vec![false; self.positions.len()];
         for vertex in &elements.vertices {
@@ -319,8 +321,8 @@ impl Statements {
         Ok(component)
     }
 
-    /// The value of each picked vertex, where every one has exactly one: as many values as vertices and no reference
-    /// that pairs them otherwise, or all references of a vertex to the same value.
+    /// The value of each picked vertex, if each has exactly one: there are as many values as vertices and all
+    /// references have equal indices, or all references of a vertex are to the same value.
     fn one_each(
         &self,
         elements: &Elements,
@@ -351,7 +353,7 @@ impl Statements {
     }
 }
 
-/// Some files have NaN normals for faces without area: such an attribute is dropped.
+/// Sets an attribute, or drops it if it is not finite: some files have NaN normals for faces without area.
 fn set_if_finite(component: &mut Component, name: &'static str, rows: Vec<[f32; 3]>) -> Result<(), GeometryError> {
     let column = Column::new(rows);
     if column.first_not_finite().is_none() { component.set_column(Owner::Point, name, column) } else { Ok(()) }
@@ -370,7 +372,7 @@ fn number(field: &[u8]) -> Result<f32, String> {
     float(field).ok_or_else(|| format!("{} is not a number", shown(field)))
 }
 
-/// Up to three numbers, at least `least`; what is missing is 0 and what is more is ignored.
+/// Three numbers, of which `least` are required; missing ones are 0 and superfluous ones are ignored.
 fn row<'a>(fields: impl Iterator<Item = &'a [u8]>, what: &str, least: usize) -> Result<[f32; 3], String> {
     let mut row = [0.0; 3];
     let mut count = 0;

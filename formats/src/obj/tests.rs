@@ -1,4 +1,4 @@
-//! OBJ by hand: odd files that load, broken ones and what is said about them, the text that is written.
+//! OBJ: unusual files that load, invalid files and their errors, and the text that is written.
 
 use engine::geometry::{Attr, Column, Component, Geometry, N, Owner, P, UVW};
 
@@ -55,14 +55,14 @@ fn polygons_stay_polygons_concave_or_not() {
 }
 
 #[test]
-fn vertices_alone_or_named_are_points_in_file_order() {
+fn vertices_and_p_lines_are_points_in_file_order() {
     for text in ["v 3 0 0\nv 1 0 0\nv 2 0 0\n", "v 3 0 0\nv 1 0 0\nv 2 0 0\np 3 1\np 2\n"] {
         assert_eq!(xs(read(text).points()), [3.0, 1.0, 2.0]);
     }
 }
 
 #[test]
-fn with_several_kinds_each_takes_what_it_names() {
+fn with_several_kinds_each_component_has_the_vertices_it_references() {
     let text = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nv 5 0 0\nl 5 4\nf 6 2 3\np 3 1 3\n";
     let geometry = read(text);
     assert_eq!(xs(geometry.curves()), [4.0, 3.0]);
@@ -72,12 +72,12 @@ fn with_several_kinds_each_takes_what_it_names() {
 }
 
 #[test]
-fn with_one_kind_unnamed_vertices_stay() {
+fn with_one_kind_unreferenced_vertices_are_kept() {
     assert_eq!(read(format!("{TRIANGLE}v 9 9 9\nf 1 2 3\n")).mesh().unwrap().point_count(), 4);
 }
 
 #[test]
-fn odd_text_is_the_same_geometry() {
+fn unusual_text_gives_the_same_geometry() {
     let plain = read(format!("{TRIANGLE}f 1 2 3\n"));
     for odd in [
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3",
@@ -107,7 +107,7 @@ fn a_line_may_be_long() {
 }
 
 #[test]
-fn colours_come_along_where_every_vertex_has_one() {
+fn colours_are_read_if_every_vertex_has_one() {
     let coloured = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0 0.5\nv 0 1 0 0 0 0.25\n";
     let geometry = read(format!("{coloured}f 1 2 3\n"));
     let colours: &[[f32; 3]] = &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.25]];
@@ -120,7 +120,7 @@ fn colours_come_along_where_every_vertex_has_one() {
 }
 
 #[test]
-fn normals_and_texture_coordinates_come_along_where_unambiguous() {
+fn normals_and_texture_coordinates_are_read_if_unambiguous() {
     let both = "vt 0.5 1\nvt 0 0\nvn 0 0 1\n";
     let geometry = read(format!("{TRIANGLE}{both}f 1/2/1 2/2/1 3/1/1\n"));
     let mesh = geometry.mesh().unwrap();
@@ -142,7 +142,7 @@ fn a_vertex_that_curves_share_has_texture_coordinates_in_each() {
 }
 
 #[test]
-fn comments_alone_are_empty_geometry_and_an_empty_file_is_a_fault() {
+fn a_file_of_comments_is_empty_geometry_and_an_empty_file_is_refused() {
     for text in ["# nothing\n", "\n", "o a\ng b\n", "mtllib a.mtl"] {
         assert_eq!(read(text), Geometry::default());
     }
@@ -151,7 +151,7 @@ fn comments_alone_are_empty_geometry_and_an_empty_file_is_a_fault() {
 }
 
 #[test]
-fn a_broken_line_is_named_with_what_is_wrong() {
+fn an_invalid_line_is_reported_with_the_reason() {
     for (text, expected) in [
         ("v 0 0\n", "line 1: `v` has 2 numbers, expected 3, 4, 6 or 7"),
         ("v 0 0 0\nv\n", "line 2: `v` has 0 numbers, expected 3, 4, 6 or 7"),
@@ -170,7 +170,7 @@ fn a_broken_line_is_named_with_what_is_wrong() {
         ("v 0 0 0\nf 1 1 2\n", "line 2: `v` index 2 is out of range: expected 1 to 1, or -1 to -1"),
         ("v 0 0 0\nl 1 -2\n", "line 2: `v` index -2 is out of range: expected 1 to 1, or -1 to -1"),
         ("l 1\n", "line 1: `v` index 1 is out of range: there are none"),
-        ("v 0 0 0\np 0\n", "line 2: `0` names 0, but indices count from 1"),
+        ("v 0 0 0\np 0\n", "line 2: `0` has the index 0, but indices start at 1"),
         ("v 0 0 0\np 4294967296\n", "line 2: `v` index 4294967296 is out of range: expected 1 to 1, or -1 to -1"),
         ("v 0 0 0\np 99999999999999999999\n", "line 2: `99999999999999999999` is not a vertex index"),
         (
@@ -192,7 +192,7 @@ fn a_broken_line_is_named_with_what_is_wrong() {
 }
 
 #[test]
-fn the_text_that_is_written_is_this() {
+fn the_written_text_is_as_expected() {
     let mut curves = Component::curves(vec![2, 1], vec![[0.0; 3], [0.1, -0.0, 1e-7], [1.0, 2.0, 3.0]]).unwrap();
     curves.set(UVW, vec![[0.5, 0.0, 0.0]; 3]).unwrap();
     let mut mesh = Component::mesh(vec![3], vec![0, 2, 1], vec![[0.0; 3]; 3]).unwrap();

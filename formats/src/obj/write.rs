@@ -11,7 +11,7 @@ use crate::{FormatError, FrameStamp};
 /// Writes `geometry` as an OBJ file; its numbers are finite.
 ///
 /// # Errors
-/// Where the bytes cannot be written.
+/// If the bytes cannot be written.
 pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let mut out = Out::new(sink);
     out.text("# convect, frame ");
@@ -57,7 +57,7 @@ fn object(component: &Component, first: &mut First, out: &mut Out) -> Result<(),
             out.pour()?;
         }
     }
-    // OBJ's `l` names texture rows but no normals, its `p` neither.
+    // An `l` line can reference texture coordinates but no normals, a `p` line neither.
     let corner = |point: usize, with_normal: bool, out: &mut Out| {
         out.text(" ");
         out.whole(first.vertex + point);

@@ -13,13 +13,13 @@ use crate::text::free_name;
 /// Attributes by name.
 pub(super) type Columns = BTreeMap<Name, Column>;
 
-/// Three properties with names of their own that make one attribute.
+/// Attributes made of three properties with special names.
 pub(super) const TRIPLES: [(&str, [&str; 3]); 3] =
     [(P.name, ["x", "y", "z"]), (N.name, ["nx", "ny", "nz"]), (CD, ["red", "green", "blue"])];
-/// Two that make texture coordinates; the third is 0.
+/// Pairs of properties that make texture coordinates; the third component is 0.
 const TEXTURES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
-/// The attributes that an element's properties make; one `Cells` per property.
+/// The attributes of an element's properties; one `Cells` per property.
 pub(super) fn columns(properties: &[Property], cells: Vec<Cells>) -> Columns {
     let mut scalars = Scalars(BTreeMap::new());
     for (property, cells) in properties.iter().zip(cells) {
@@ -57,7 +57,7 @@ pub(super) fn columns(properties: &[Property], cells: Vec<Cells>) -> Columns {
     columns
 }
 
-/// The properties that are not part of an attribute yet: floats or whole numbers, by name.
+/// The properties that are not yet part of an attribute: floats or integers, by name.
 struct Scalars<'a>(BTreeMap<&'a str, (Scalar, Cells)>);
 
 impl Scalars<'_> {
@@ -81,7 +81,8 @@ impl Scalars<'_> {
         }
     }
 
-    /// Takes `base.0 base.1 base.2`, and `base.3` where it is there, out as one column, where they are of one kind.
+    /// Removes `base.0 base.1 base.2`, and `base.3` if it exists, and returns them as one column, if they have the same
+    /// type.
     fn wide(&mut self, base: &str) -> Option<Column> {
         let names = [0, 1, 2, 3].map(|part| format!("{base}.{part}"));
         let width = names.iter().take_while(|name| self.0.contains_key(name.as_str())).count();
@@ -118,13 +119,13 @@ fn rows4<T: Copy>(a: &[T], b: &[T], c: &[T], d: &[T]) -> Vec<[T; 4]> {
     rows3(a, b, c).into_iter().zip(d).map(|([a, b, c], d)| [a, b, c, *d]).collect()
 }
 
-/// Stores a column under `name`, or under the next free name where that is taken or has another type.
+/// Stores a column under `name`, or under the next free name if that is taken or has another type.
 fn insert(columns: &mut Columns, name: &str, column: Column) {
     let column = match (fixed_type(name), column) {
         (Some(ColumnType::F1), Column::I1(rows)) => Column::new(rows.iter().map(|n| *n as f32).collect()),
         (_, column) => column,
     };
-    let wanted = |name: &str| fixed_type(name).is_some_and(|kind| kind != column.kind());
-    let name = free_name(name, |name| wanted(name) || columns.contains_key(name));
+    let conflicts = |name: &str| fixed_type(name).is_some_and(|kind| kind != column.kind());
+    let name = free_name(name, |name| conflicts(name) || columns.contains_key(name));
     columns.insert(name, column);
 }

@@ -1,4 +1,4 @@
-//! The data of a PLY file, element by element, whatever its encoding.
+//! The data of a PLY file, element by element, in any encoding.
 //!
 //! Before an element is read, its declared rows are checked against the remaining bytes: nothing is allocated for rows
 //! that the file cannot hold.
@@ -32,7 +32,7 @@ pub(super) enum Cells {
     },
 }
 
-/// The data behind a header.
+/// The data after the header.
 pub(super) enum Body<'a> {
     Ascii(Ascii<'a>),
     Binary(Binary<'a>),
@@ -56,7 +56,7 @@ impl<'a> Body<'a> {
     /// Reads the rows of the next element; one list of cells per property.
     ///
     /// # Errors
-    /// With line or byte: where the data ends early, or a number is malformed, not finite or out of range.
+    /// With line or byte: if the data ends early, or a number is malformed, not finite or out of range.
     pub(super) fn element(
         &mut self,
         element: &Element,
@@ -93,21 +93,21 @@ fn rows<S: Source>(
     element: &Element,
     keep: &[Keep],
 ) -> Result<Vec<Cells>, FormatError> {
-    // Rows without a property take no byte, whatever their number.
+    // Rows without properties have no bytes.
     if element.properties.is_empty() {
         return Ok(Vec::new());
     }
     let needed = element.rows.checked_mul(element.least_bytes(encoding));
-    // The last line of a text need not end.
+    // The last line of a text may lack its line end.
     let left = source.left() + usize::from(encoding == Encoding::Ascii);
     if needed.is_none_or(|needed| needed > left) {
         let fact = format!(
-            "`{}` has {}, more than the {} behind the header can hold",
+            "`{}` has {}, more than fit in the {} after the header",
             element.name,
             counted(element.rows, "row"),
             counted(source.left(), "byte"),
         );
-        let hint = "the file is cut off, or its header is damaged: write it again";
+        let hint = "the file is truncated or its header is damaged: write it again";
         return Err(FormatError::with_hint(FilePosition::Line(element.line), fact, hint));
     }
     let mut cells: Vec<Cells> =
@@ -152,7 +152,7 @@ fn take<S: Source>(source: &mut S, property: &Property, cells: &mut Cells) -> Re
             (Cells::Floats(values), Number::Float(x)) if x.is_finite() => values.push(x),
             (Cells::Floats(_), Number::Float(x)) => return Err(format!("{x} is not a finite number")),
             (Cells::Floats(values), Number::Whole(n)) => values.push(n as f32),
-            // Bits are kept: packed colours are a common use of the upper half.
+            // Bits are kept, because packed colours often use the upper half of the range.
             (Cells::Wholes(values), Number::Whole(n)) => values.push(n as i32),
             (Cells::Wholes(_), Number::Float(x)) => return Err(format!("{x} is not a whole number")),
             (Cells::Indices { items, rows, .. }, number) => items.push(index(number, *rows)?),
@@ -163,7 +163,7 @@ fn take<S: Source>(source: &mut S, property: &Property, cells: &mut Cells) -> Re
 }
 
 fn index(number: Number, rows: usize) -> Result<u32, String> {
-    let Number::Whole(n) = number else { return Err("an index of a floating type, expected a whole one".into()) };
+    let Number::Whole(n) = number else { return Err("an index has a floating-point type, expected an integer".into()) };
     let index = u32::try_from(n).ok().filter(|index| (*index as usize) < rows);
     index.ok_or_else(|| format!("index {n} is out of range: `vertex` has {}, counted from 0", counted(rows, "row")))
 }
@@ -199,7 +199,7 @@ impl Source for Ascii<'_> {
         match whole {
             Some(n) if (i64::from(i32::MIN)..=i64::from(u32::MAX)).contains(&n) => Ok(Number::Whole(n)),
             Some(_) => Err(format!("{} does not fit 32 bits", shown(field))),
-            // Some programs write `255.0` into whole columns.
+            // Some programs write `255.0` into integer columns.
             None => match float(field) {
                 Some(x) if x as i32 as f32 == x => Ok(Number::Whole(i64::from(x as i32))),
                 Some(_) => Err(format!("{} is not a whole number", shown(field))),
@@ -210,7 +210,7 @@ impl Source for Ascii<'_> {
 
     fn end_row(&mut self) -> Result<(), String> {
         match self.fields.next() {
-            Some(field) => Err(format!("{} is more than the row's properties", shown(field))),
+            Some(field) => Err(format!("{} follows the last property of the row", shown(field))),
             None => Ok(()),
         }
     }
@@ -219,7 +219,7 @@ impl Source for Ascii<'_> {
 /// Binary data, packed without gaps.
 pub(super) struct Binary<'a> {
     data: &'a [u8],
-    /// Of the data in the file.
+    /// Offset of the data in the file.
     start: usize,
     next: usize,
     big_endian: bool,

@@ -1,13 +1,13 @@
-//! Loose edges joined into polylines.
+//! Joins edges to polylines.
 
-/// The polylines that `edges` make: how many CVs each has, and their vertices one after the other.
+/// Joins `edges` to polylines: returns the number of CVs of each, and their vertices, concatenated.
 ///
-/// A polyline continues through every vertex with exactly two edges and ends at any other. Polylines are in the order of
-/// their first edges in the list, which give their directions. A ring starts with its first edge and ends on its first
-/// vertex again. An edge from a vertex to itself has no length and is left out. Time and memory are linear.
+/// A polyline continues through every vertex with exactly two edges and ends at any other. Polylines are in the order
+/// of their first edges in the list, which give their directions. A closed polyline starts with its first edge and ends
+/// at its first vertex. An edge from a vertex to itself is left out. Time and memory are linear.
 pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) {
     let mut degree = vec![0_u32; vertices];
-    // At a vertex with two edges the xor of their numbers and one of them is the other.
+    // The xor of the numbers of a vertex's edges: for two edges, xor with one of them gives the other.
     let mut both = vec![0_u32; vertices];
     for (number, [a, b]) in (0_u32..).zip(edges).filter(|(_, [a, b])| a != b) {
         for vertex in [*a as usize, *b as usize] {
@@ -16,7 +16,7 @@ pub(super) fn join(edges: &[[u32; 2]], vertices: usize) -> (Vec<u32>, Vec<u32>) 
         }
     }
     let mut used = vec![false; edges.len()];
-    // The vertex after `vertex`, which edge `from` led to, and the edge that leads there.
+    // The vertex after `vertex` when coming along the edge `from`, and the edge that leads there.
     let onward = |vertex: u32, from: u32, used: &mut [bool]| {
         if degree[vertex as usize] != 2 {
             return None;
@@ -67,26 +67,26 @@ mod tests {
     }
 
     #[test]
-    fn edges_in_any_order_join_along_the_first() {
+    fn unordered_edges_are_joined_in_the_direction_of_the_first() {
         assert_eq!(polylines(&[[0, 1], [1, 2], [2, 3]]), [[0, 1, 2, 3]]);
         assert_eq!(polylines(&[[2, 1], [3, 2], [0, 1]]), [[3, 2, 1, 0]]);
         assert_eq!(polylines(&[[4, 5], [0, 1], [6, 5]]), [vec![4, 5, 6], vec![0, 1]]);
     }
 
     #[test]
-    fn a_fork_ends_the_polylines_that_meet_there() {
+    fn polylines_end_at_a_fork() {
         assert_eq!(polylines(&[[0, 1], [1, 2], [1, 3], [3, 4]]), [vec![0, 1], vec![1, 2], vec![1, 3, 4]]);
     }
 
     #[test]
-    fn a_ring_closes_on_its_first_vertex() {
+    fn a_closed_polyline_ends_at_its_first_vertex() {
         assert_eq!(polylines(&[[0, 1], [1, 2], [2, 0]]), [[0, 1, 2, 0]]);
         assert_eq!(polylines(&[[0, 1], [0, 1]]), [[0, 1, 0]], "two edges between the same vertices are a ring too");
         assert_eq!(polylines(&[[0, 1], [1, 2], [2, 0], [0, 3]]), [vec![0, 1, 2, 0], vec![0, 3]], "a ring on a stem");
     }
 
     #[test]
-    fn an_edge_without_length_is_left_out() {
+    fn an_edge_from_a_vertex_to_itself_is_left_out() {
         assert_eq!(polylines(&[[0, 0], [0, 1], [1, 1], [1, 2]]), [[0, 1, 2]]);
         assert!(polylines(&[[3, 3]]).is_empty());
         assert!(polylines(&[]).is_empty());

@@ -1,4 +1,4 @@
-//! The text in front of a PLY file's data: which elements there are, how many, of what.
+//! The header of a PLY file: its elements, their numbers of rows and their properties.
 
 use std::collections::BTreeSet;
 
@@ -62,7 +62,7 @@ pub(super) struct Element {
     pub(super) name: String,
     pub(super) rows: usize,
     pub(super) properties: Vec<Property>,
-    /// Of its declaration.
+    /// The line of its declaration.
     pub(super) line: usize,
 }
 
@@ -93,7 +93,7 @@ pub(super) struct Header {
 /// Reads the header of `file`.
 ///
 /// # Errors
-/// With the line, where it is not a PLY header.
+/// With the line, if it is not a PLY header.
 pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
     // Line ends are those of the first line: binary data may hold any byte.
     let start = &file[..file.len().min(5)];
@@ -157,7 +157,7 @@ pub(super) fn read(file: &[u8]) -> Result<Header, FormatError> {
             [word, ..] => return fail(format!("{} is not a PLY header line", shown(word))),
         }
     }
-    let hint = "the file ends too early: write it again";
+    let hint = "the file is truncated: write it again";
     Err(FormatError::with_hint(FilePosition::Line(lines.number()), "the header has no `end_header`", hint))
 }
 
@@ -181,7 +181,7 @@ fn property(words: &[&[u8]]) -> Result<Property, String> {
         [b"list", count, item, name] => {
             let [count, item] = [scalar(count)?, scalar(item)?];
             if count.is_float() {
-                return Err("a list's count is a floating type, expected a whole one".into());
+                return Err("the count of a list has a floating-point type, expected an integer".into());
             }
             (Shape::List { count, item }, name)
         }

@@ -1,8 +1,8 @@
 //! Attribute names as PLY properties.
 //!
-//! A property's name has no white space, `name.0` is the first number of a wide attribute, and some names mean
-//! something of their own. A name that would break one of these is written with `%` and two hexadecimal digits for a
-//! byte, as in a web address, and comes back as it was.
+//! A property name has no white space, `name.0` is the first component of a vector attribute, and some names have a
+//! special meaning. Names that conflict with these rules are written with `%` and two hexadecimal digits for a byte, as
+//! in a URL, and are decoded when read.
 
 /// Property names that are read as something other than a scalar attribute of that name.
 const TAKEN: [&str; 21] = [
@@ -35,9 +35,9 @@ pub(super) fn property(attribute: &str, part: usize, width: usize) -> String {
     if width > 1 { format!("{name}.{part}") } else { name }
 }
 
-/// The attribute name of a property of that width, without its number; unchanged where convect cannot have written it.
+/// The attribute name of a property of that width, without its number; unchanged if convect cannot have written it.
 pub(super) fn attribute(property: &str, width: usize) -> String {
-    // Only names as we write them are decoded, so two properties never mean the same attribute.
+    // Only names in the form that convect writes are decoded, so two properties never become the same attribute.
     decoded(property).filter(|name| encoded(name, width) == property).unwrap_or_else(|| property.to_owned())
 }
 
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_comes_back() {
+    fn names_round_trip() {
         for name in ["mask", "x", "v", "", "a b", "wind.0", "50%", "größe", "\n", "primvars:mask", "%41", "%"] {
             let scalar = property(name, 0, 1);
             assert_eq!(attribute(&scalar, 1), name);
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(property("x", 0, 1), "%78");
         assert_eq!(property("v", 1, 3), "v.1");
         for foreign in ["100%", "%41", "%2e", "%GG"] {
-            assert_eq!(attribute(foreign, 1), foreign, "not one of ours");
+            assert_eq!(attribute(foreign, 1), foreign, "not written by convect");
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::{FilePosition, FormatError};
 /// The geometry of a PLY file.
 ///
 /// # Errors
-/// With the line or byte: where the header is invalid, the data ends early, an index is out of range, or a number is not
+/// With line or byte: if the header is invalid, the data ends early, an index is out of range, or a number is not
 /// finite.
 pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     let header = header::read(bytes)?;
@@ -24,17 +24,17 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Geometry, FormatError> {
     file.geometry(vertices)
 }
 
-/// What the elements hold.
+/// The contents of the elements.
 #[derive(Default)]
 struct Elements {
     points: Columns,
-    /// The component of each vertex, where the file says so: the number of a [`Kind`].
+    /// The component of each vertex, if the file has it: the number of a [`Kind`].
     owners: Option<Vec<i32>>,
     face_counts: Vec<u32>,
     corners: Vec<u32>,
     faces: Columns,
     edges: Vec<[u32; 2]>,
-    /// CVs of each curve, where the file says so.
+    /// CVs of each curve, if the file has them.
     curve_counts: Option<Vec<u32>>,
     curves: Columns,
 }
@@ -114,7 +114,7 @@ impl Elements {
         }
     }
 
-    /// Components as [`super::write`] marks them.
+    /// Components as marked by [`super::write`].
     fn owned(&self, owners: &[i32]) -> Result<Geometry, FormatError> {
         let mut vertices = [const { Vec::new() }; 3];
         for (vertex, owner) in (0_u32..).zip(owners) {
@@ -141,7 +141,7 @@ impl Elements {
         Ok(geometry)
     }
 
-    /// Components of a file by any other program.
+    /// Components of a file that another program wrote.
     fn inferred(&self, vertices: usize) -> Result<Geometry, FormatError> {
         let all = || (0_u32..).take(vertices).collect::<Vec<u32>>();
         let has_faces = !self.face_counts.is_empty();
@@ -181,7 +181,7 @@ impl Elements {
         let corners = self.corners.iter().map(index).collect::<Option<Vec<u32>>>().ok_or_else(|| {
             FormatError::at(
                 FilePosition::File,
-                format!("a face has a vertex that `{COMPONENT}` gives to another component"),
+                format!("a face uses a vertex that `{COMPONENT}` assigns to another component"),
             )
         })?;
         self.component(picked, &self.faces, |p| Component::mesh(self.face_counts.clone(), corners, p))

@@ -1,4 +1,4 @@
-//! PLY by hand: odd files that load, broken ones and what is said about them, the bytes that are written.
+//! PLY: unusual files that load, invalid files and their errors, and the bytes that are written.
 
 use engine::geometry::{Attr, Column, Component, ENVELOPE, Geometry, N, Owner, SHIELDED, UVW, V};
 
@@ -72,7 +72,7 @@ fn data_may_start_with_the_bytes_of_a_line_end() {
 }
 
 #[test]
-fn odd_text_is_the_same_geometry() {
+fn unusual_text_gives_the_same_geometry() {
     let elements = format!("{}element face 1\n{FACE}", vertex(3, XYZ));
     for odd in [
         ascii(&elements, "0 0 0\n1 0 0\n0 1 0.5\n3 0 1 2"),
@@ -105,7 +105,7 @@ fn odd_text_is_the_same_geometry() {
 }
 
 #[test]
-fn known_properties_make_known_attributes() {
+fn well_known_properties_become_well_known_attributes() {
     let text = ascii(
         &vertex(
             1,
@@ -125,7 +125,7 @@ fn known_properties_make_known_attributes() {
 }
 
 #[test]
-fn other_scalars_keep_their_type_and_are_renamed_where_a_known_name_clashes() {
+fn other_scalars_keep_their_type_and_are_renamed_if_a_well_known_name_conflicts() {
     let properties = "float quality,uint rgba,char c,int width,float v,float id,float w.0,float w.1,float w.2,int u";
     let geometry = read(ascii(&vertex(1, &format!("{XYZ},{properties}")), "0 0 0 0.5 4278190335 -1 2 3 1.5 4 5 6 7\n"));
     for (name, expected) in [
@@ -140,7 +140,7 @@ fn other_scalars_keep_their_type_and_are_renamed_where_a_known_name_clashes() {
     }
     assert_eq!(column(&geometry, "uvw"), Some(Column::new(vec![[7.0_f32, 3.0, 0.0]])), "`u v` are texture coordinates");
     let lone = read(ascii(&vertex(1, &format!("{XYZ},float v")), "0 0 0 3\n"));
-    assert_eq!(column(&lone, "v_"), Some(Column::new(vec![3.0_f32])), "a scalar `v` is no velocity");
+    assert_eq!(column(&lone, "v_"), Some(Column::new(vec![3.0_f32])), "a scalar `v` is not a velocity");
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn faces_carry_their_attributes() {
 }
 
 #[test]
-fn edges_are_curves_and_with_faces_each_takes_its_own() {
+fn edges_are_curves_and_beside_faces_each_component_has_its_own_vertices() {
     let edges = "property int vertex1\nproperty int vertex2\n";
     let alone = ascii(
         &format!("{}element edge 3\n{edges}", vertex(5, XYZ)),
@@ -176,7 +176,7 @@ fn edges_are_curves_and_with_faces_each_takes_its_own() {
 }
 
 #[test]
-fn a_file_without_vertices_is_empty_geometry_and_an_empty_file_a_fault() {
+fn a_file_without_vertices_is_empty_geometry_and_an_empty_file_is_refused() {
     assert_eq!(read(ascii("", "")), Geometry::default());
     assert_eq!(read(ascii(&vertex(0, XYZ), "")), Geometry::default());
     assert_eq!(read(ascii("element vertex 0\nelement face 0\n", "")), Geometry::default());
@@ -186,7 +186,7 @@ fn a_file_without_vertices_is_empty_geometry_and_an_empty_file_a_fault() {
 }
 
 #[test]
-fn a_broken_header_is_named_with_its_line() {
+fn an_invalid_header_is_reported_with_its_line() {
     for (text, expected) in [
         ("plywood\n", "line 1: `plywood` is not a PLY header line"),
         ("PLY\n", "line 1: a PLY file starts with a line `ply`"),
@@ -212,7 +212,7 @@ fn a_broken_header_is_named_with_its_line() {
         ),
         (
             "ply\nelement vertex 1\nproperty list float int x\n",
-            "line 3: a list's count is a floating type, expected a whole one",
+            "line 3: the count of a list has a floating-point type, expected an integer",
         ),
     ] {
         assert_eq!(fault(text), expected, "{text}");
@@ -220,7 +220,7 @@ fn a_broken_header_is_named_with_its_line() {
 }
 
 #[test]
-fn a_header_of_many_elements_and_properties_takes_no_time() {
+fn a_header_with_many_elements_and_properties_is_read_quickly() {
     let elements: String = (0..40_000).map(|k| format!("element e{k} 0\nproperty int a\n")).collect();
     let properties: String = (0..40_000).map(|k| format!(",int p{k}")).collect();
     let text = ascii(&format!("{elements}{}", vertex(0, &format!("{XYZ}{properties}"))), "");
@@ -228,7 +228,7 @@ fn a_header_of_many_elements_and_properties_takes_no_time() {
 }
 
 #[test]
-fn broken_data_is_reported_with_its_position() {
+fn invalid_data_is_reported_with_its_position() {
     let faces = format!("{}element face 1\n{FACE}", vertex(1, XYZ));
     let edges = format!("{}element edge 1\nproperty int vertex1\nproperty int vertex2\n", vertex(1, XYZ));
     for (elements, rows, expected) in [
@@ -243,20 +243,20 @@ fn broken_data_is_reported_with_its_position() {
             "0 0 0\n1\n",
             "line 7: element `edge` has no property `vertex2`",
         ),
-        (vertex(2, XYZ), "0 0 0\n", "line 3: `vertex` has 2 rows, more than the 6 bytes behind the header can hold"),
+        (vertex(2, XYZ), "0 0 0\n", "line 3: `vertex` has 2 rows, more than fit in the 6 bytes after the header"),
         (
             vertex(4_000_000_000, XYZ),
             "0 0 0\n",
-            "line 3: `vertex` has 4000000000 rows, more than the 6 bytes behind the header can hold",
+            "line 3: `vertex` has 4000000000 rows, more than fit in the 6 bytes after the header",
         ),
         (
             vertex(usize::MAX, XYZ),
             "0 0 0\n",
-            "line 3: `vertex` has 18446744073709551615 rows, more than the 6 bytes behind the header can hold",
+            "line 3: `vertex` has 18446744073709551615 rows, more than fit in the 6 bytes after the header",
         ),
         (vertex(2, XYZ), "0.000000 0 0\n", "line 8: `vertex` 1: the file ends"),
         (vertex(1, XYZ), "0 0   \n", "line 8: `vertex` 0: `z`: the line ends"),
-        (vertex(1, XYZ), "0 0 0 0\n", "line 8: `vertex` 0: `0` is more than the row's properties"),
+        (vertex(1, XYZ), "0 0 0 0\n", "line 8: `vertex` 0: `0` follows the last property of the row"),
         (vertex(1, XYZ), "0 x 0\n", "line 8: `vertex` 0: `y`: `x` is not a number"),
         (vertex(1, XYZ), "0 0 nan\n", "line 8: `vertex` 0: `z`: NaN is not a finite number"),
         (vertex(1, XYZ), "0 0 1e39\n", "line 8: `vertex` 0: `z`: inf is not a finite number"),
@@ -305,7 +305,7 @@ fn broken_data_is_reported_with_its_position() {
             format!("ply\nformat binary_little_endian 1.0\n{}element face 1\n{FACE}end_header\n", vertex(rows, XYZ));
         fault([head.as_bytes(), bytes].concat())
     };
-    assert_eq!(binary(2, &[0; 23]), "line 3: `vertex` has 2 rows, more than the 23 bytes behind the header can hold");
+    assert_eq!(binary(2, &[0; 23]), "line 3: `vertex` has 2 rows, more than fit in the 23 bytes after the header");
     assert_eq!(
         binary(1, &[[0; 12].as_slice(), &[255, 0, 0, 0, 0]].concat()),
         "byte 186: `face` 0: `vertex_indices`: the file ends"
@@ -313,7 +313,7 @@ fn broken_data_is_reported_with_its_position() {
 }
 
 #[test]
-fn the_bytes_that_are_written_are_these() {
+fn the_written_bytes_are_as_expected() {
     let mut curves = Component::curves(vec![2, 1], vec![[0.0; 3], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]]).unwrap();
     curves.set(ENVELOPE, vec![1.0, 0.5, 0.25]).unwrap();
     curves.set(V, vec![[0.0; 3]; 3]).unwrap();
@@ -341,7 +341,7 @@ fn the_bytes_that_are_written_are_these() {
 }
 
 #[test]
-fn colours_that_are_bytes_are_written_as_bytes() {
+fn colours_are_written_as_bytes_if_lossless() {
     let colours: Attr<[f32; 3]> = Attr::point(CD);
     let mut points = Component::points(vec![[0.0; 3]]);
     points.set(colours, vec![[1.0, 51.0 / 255.0, 0.0]]).unwrap();
@@ -355,7 +355,7 @@ fn colours_that_are_bytes_are_written_as_bytes() {
 }
 
 #[test]
-fn components_that_disagree_on_a_type_are_refused() {
+fn components_with_different_types_of_an_attribute_are_refused() {
     let mut curves = Component::curves(vec![1], vec![[0.0; 3]]).unwrap();
     curves.set_column(Owner::Point, "mask", Column::new(vec![1])).unwrap();
     let mut points = Component::points(vec![[0.0; 3]]);

@@ -15,12 +15,12 @@ use crate::{FormatError, FrameStamp};
 /// Writes `geometry` as a PLY file; its numbers are finite.
 ///
 /// # Errors
-/// Where components give an attribute different types, or the bytes cannot be written.
+/// If components have an attribute with different types, or the bytes cannot be written.
 pub(crate) fn write(geometry: &Geometry, stamp: &FrameStamp, sink: &mut dyn Write) -> Result<(), FormatError> {
     let parts: Vec<&Component> = geometry.parts().filter(|part| part.point_count() > 0).collect();
     let points = shared_columns(&parts)?;
     let vertices: usize = parts.iter().map(|part| part.point_count()).sum();
-    // Indices are `int`, which every program reads.
+    // Indices are `int`, which every program can read.
     i32::try_from(vertices).map_err(|_| GeometryError::TooMany)?;
     let faces = geometry.mesh().filter(|mesh| mesh.element_count() > 0);
     let curves = geometry.curves().filter(|curves| curves.element_count() > 0);
@@ -117,7 +117,7 @@ fn declare(element: &str, rows: usize, out: &mut Out) {
     out.text("\n");
 }
 
-/// The point attributes of all parts, positions first; every part gets all of them.
+/// The point attributes of all parts, positions first; every part is written with all of them.
 fn shared_columns(parts: &[&Component]) -> Result<Vec<(Name, ColumnType)>, FormatError> {
     let mut columns: BTreeMap<Name, (ColumnType, Kind)> = BTreeMap::new();
     for part in parts {
@@ -137,7 +137,7 @@ fn shared_columns(parts: &[&Component]) -> Result<Vec<(Name, ColumnType)>, Forma
 struct Field {
     name: Name,
     kind: ColumnType,
-    /// A colour whose every number is that many 255ths.
+    /// Whether it is a colour whose numbers are all multiples of 1/255.
     as_bytes: bool,
 }
 
@@ -172,7 +172,7 @@ impl Field {
         }
     }
 
-    /// The row of a column of this field; zeros where there is none.
+    /// The row of a column of this field; zeros if there is no column.
     fn put(&self, column: Option<&Column>, row: usize, out: &mut Out) {
         let mut floats = |numbers: &[f32]| {
             for x in numbers {

@@ -1,7 +1,7 @@
-//! The two codings of a crate file: `chunk` around a section's bytes, `ints` for 32-bit numbers.
+//! The two encodings of a crate file: `chunk` for the bytes of a section, `ints` for 32-bit integers.
 //!
-//! Readers expect LZ4 in a chunk, but a legal LZ4 block may be one run of literals, so no compressor is needed: a chunk
-//! is a little longer than its bytes, and `ints` is short by itself where neighbours differ by small or equal steps.
+//! Readers expect LZ4 in a chunk, but a valid LZ4 block may be one run of literals, so no compressor is needed: a chunk
+//! is a little longer than its bytes, and `ints` is compact if neighbours differ by small or equal steps.
 
 /// `bytes` as one chunk: a zero byte, then an LZ4 block of literals only.
 pub(super) fn chunk(bytes: &[u8]) -> Vec<u8> {
@@ -20,7 +20,7 @@ pub(super) fn chunk(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// `values` coded: the length of the chunk that follows (u64), then a chunk of steps from each value to the next. The
+/// Encodes `values`: the length of the chunk that follows (u64), then a chunk of steps from each value to the next. The
 /// number of values is not stored. `values` must not be empty.
 pub(super) fn ints(values: impl Iterator<Item = i32> + Clone) -> Vec<u8> {
     let chunk = chunk(&steps(values));
@@ -30,8 +30,8 @@ pub(super) fn ints(values: impl Iterator<Item = i32> + Clone) -> Vec<u8> {
     out
 }
 
-/// The commonest step (i32); for each value two bits that say how its step is written, four to a byte from the low end;
-/// the steps that are not the commonest, each in as few bytes as it needs of 1, 2 and 4.
+/// The most common step (i32); for each value two bits for the encoding of its step, four to a byte from the low end;
+/// then all other steps, each in the smallest of 1, 2 and 4 bytes.
 fn steps(values: impl Iterator<Item = i32> + Clone) -> Vec<u8> {
     let differences = || {
         values.clone().scan(0_i32, |before, value| {
@@ -63,10 +63,11 @@ fn steps(values: impl Iterator<Item = i32> + Clone) -> Vec<u8> {
     [&common.to_le_bytes()[..], &classes, &tail].concat()
 }
 
-/// Steps looked at to find the commonest: any choice is legal, so a long array need not be sorted as a whole.
+/// The number of steps examined to find the most common one. Any choice is valid, so a long array need not be sorted as
+/// a whole.
 const SAMPLED: usize = 1 << 16;
 
-/// The number that occurs most often, the least of equals; 0 for none.
+/// The number that occurs most often, the smallest of equals; 0 for an empty list.
 fn commonest(mut numbers: Vec<i32>) -> i32 {
     numbers.sort_unstable();
     let runs = numbers.chunk_by(|a, b| a == b).map(|run| (run.len(), std::cmp::Reverse(run[0])));
@@ -96,7 +97,7 @@ pub(super) mod tests {
         bytes[at..].to_vec()
     }
 
-    /// Reads `count` coded integers and says how many bytes they took.
+    /// Decodes `count` integers; returns them and the number of bytes read.
     pub(in super::super) fn unints(bytes: &[u8], count: usize) -> (Vec<i32>, usize) {
         let length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
         let codes = unchunk(&bytes[8..8 + length]);
@@ -131,7 +132,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn steps_are_coded_as_worked_by_hand() {
+    fn steps_are_encoded_as_computed_by_hand() {
         let values = [123, 124, 125, 100_125, 100_125, 100_126, 100_126];
         let expected = [1, 0, 0, 0, 0xc1, 0x11, 0x7b, 0xa0, 0x86, 0x01, 0, 0, 0];
         assert_eq!(steps(values.into_iter()), expected);
@@ -149,13 +150,13 @@ pub(super) mod tests {
 
     proptest! {
         #[test]
-        fn any_integers_come_back(values in lengths().prop_flat_map(|n| prop::collection::vec(any::<i32>(), n))) {
+        fn arbitrary_integers_round_trip(values in lengths().prop_flat_map(|n| prop::collection::vec(any::<i32>(), n))) {
             let coded = ints(values.iter().copied());
             prop_assert_eq!(unints(&coded, values.len()), (values, coded.len()));
         }
 
         #[test]
-        fn steps_of_every_width_come_back(
+        fn steps_of_every_width_round_trip(
             steps in prop::collection::vec(prop_oneof![Just(3), -200..200, -70_000..70_000, any::<i32>()], 1..300)
         ) {
             let sum = |total: &mut i32, step: i32| { *total = total.wrapping_add(step); Some(*total) };
@@ -166,7 +167,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_ends_of_the_range_and_a_long_array_come_back() {
+    fn the_ends_of_the_range_and_a_long_array_round_trip() {
         let ends = vec![i32::MIN, i32::MAX, i32::MIN, 0, -1, i32::MAX, 127, -128, 128, 32_767, -32_768, 32_768];
         let long: Vec<i32> =
             (0..70_000_u32).map(|i| i.wrapping_mul(i).wrapping_mul(2_654_435_761).cast_signed()).collect();

@@ -1,15 +1,15 @@
 //! `extent`: the box around a prim as USD computes it.
 //!
-//! Equal bit for bit to `ComputeExtentFromPlugins` of usd-core 26.11, without points and with NaN too. This fixes the
-//! order of comparisons and the different paddings: curves grow on all sides by half their greatest width, points each by
-//! half its own.
+//! Bitwise equal to `ComputeExtentFromPlugins` of usd-core 26.11, also without points and with NaN. This determines the
+//! order of comparisons and the padding: curves are padded on all sides by half their largest width, each point by half
+//! its own.
 
 use engine::geometry::Kind;
 
-/// The box of no points: everything is inside out.
+/// The box of no points, which is inverted.
 pub(super) const EMPTY: [[f32; 3]; 2] = [[f32::MAX; 3], [f32::MIN; 3]];
 
-/// Least and greatest corner of `points` (metres), padded for `widths` (one per point) where `kind` has them.
+/// The lowest and highest corner of `points` (metres), padded by `widths` (one per point) if `kind` has them.
 pub(super) fn extent(kind: Kind, points: &[[f32; 3]], widths: Option<&[f32]>) -> [[f32; 3]; 2] {
     match (kind, widths) {
         (Kind::Points, Some(widths)) => points.iter().zip(widths).fold(EMPTY, |bounds, (point, width)| {
@@ -19,7 +19,7 @@ pub(super) fn extent(kind: Kind, points: &[[f32; 3]], widths: Option<&[f32]>) ->
         (Kind::Curves, widths) => {
             let greatest = widths.and_then(|w| w.iter().copied().reduce(|a, b| if a < b { b } else { a }));
             let half = greatest.unwrap_or(0.0) / 2.0;
-            // Without widths too: it turns a greatest −0.0 into 0.0, as USD does.
+            // Also without widths: it turns a maximum of −0.0 into 0.0, as USD does.
             let [low, high] = points.iter().copied().fold(EMPTY, grown);
             [low.map(|x| x - half), high.map(|x| x + half)]
         }
@@ -27,7 +27,7 @@ pub(super) fn extent(kind: Kind, points: &[[f32; 3]], widths: Option<&[f32]>) ->
     }
 }
 
-/// `bounds` grown to hold `point`; a NaN coordinate changes nothing.
+/// `bounds` extended to contain `point`; a NaN coordinate changes nothing.
 fn grown([low, high]: [[f32; 3]; 2], point: [f32; 3]) -> [[f32; 3]; 2] {
     let least = |k: usize| if point[k] < low[k] { point[k] } else { low[k] };
     let greatest = |k: usize| if point[k] > high[k] { point[k] } else { high[k] };
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_grow_by_half_their_greatest_width_and_points_by_half_their_own() {
+    fn curves_are_padded_by_half_their_largest_width_and_points_by_half_their_own() {
         assert_eq!(extent(Kind::Mesh, &ROW, None), [[0.0; 3], [10.0, 0.0, 0.0]]);
         let widths = Some(&[5.0, 1.0][..]);
         assert_eq!(extent(Kind::Curves, &ROW, widths), [[-2.5; 3], [12.5, 2.5, 2.5]]);
@@ -55,7 +55,7 @@ mod tests {
 
     /// Expected values: results of usd-core 26.11.
     #[test]
-    fn odd_values_give_what_usd_gives() {
+    fn special_values_give_the_same_as_usd() {
         let zeros = [[-0.0, 0.0, 0.0], [0.0, -0.0, 0.0]];
         let minus = (-0.0_f32).to_bits();
         assert_eq!(bits(extent(Kind::Mesh, &zeros, None)), [[minus, 0, 0], [minus, 0, 0]]);

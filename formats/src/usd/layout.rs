@@ -1,17 +1,18 @@
-//! Which prim and attribute each array of a geometry becomes, for both flavours.
+//! The prim and attribute of each array of a geometry, for both file formats.
 //!
-//! | of a component | becomes |
+//! | attribute of a component | in USD |
 //! |---|---|
-//! | `P`, `v`, `N` a point | `points`, `velocities` (m/s), `normals` |
-//! | `width` a point | `widths` on curves and points |
-//! | `id` a point | `ids` (int64) on points |
+//! | `P`, `v`, `N` per point | `points`, `velocities` (m/s), `normals` |
+//! | `width` per point | `widths` on curves and points |
+//! | `id` per point | `ids` (int64) on points |
 //! | `id` of curves | `primvars:curve_id`: curves have no `ids`, and Blender drops a primvar called `id` there |
-//! | any other NAME | `primvars:NAME`; one row per point is `vertex`, an element `uniform`, once `constant` |
-//! | topology | counts and indices, of tets also their surface |
+//! | any other NAME | `primvars:NAME`; `vertex` per point, `uniform` per element, `constant` once |
+//! | topology | counts and indices; for tets also their surface |
 //!
-//! Types follow what readers make of them. `uvw` is a plain `float3[]`, as Blender cuts `texCoord3f[]` to two numbers on
-//! curves and skips it on meshes. `orient` is a `quatf[]`: Blender and Houdini know it, and USD turns it between samples.
-//! Any other four floats are a `color4f[]`, which Blender reads where it warns of `float4[]`. `Pref` is a `point3f[]`.
+//! Types are chosen for the programs that read them. `uvw` is a plain `float3[]`, because Blender reduces
+//! `texCoord3f[]` to two components on curves and ignores it on meshes. `orient` is a `quatf[]`: Blender and Houdini
+//! read it, and USD interpolates it as a rotation. Any other four floats are a `color4f[]`, which Blender reads, while
+//! it warns about `float4[]`. `Pref` is a `point3f[]`.
 
 use engine::geometry::{Column, ColumnType, Component, ID, Kind, N, Name, ORIENT, Owner, P, PREF, Topology, V, WIDTH};
 
@@ -19,7 +20,7 @@ use super::extent::{EMPTY, extent};
 use super::stage::{Interpolation, UsdType};
 use super::surface::surface;
 
-/// What an attribute is filled from. Their order is that in files.
+/// The source of an attribute's values. The order of the variants is that in files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Source {
     /// Counts or indices.
@@ -40,19 +41,19 @@ pub(super) enum TopologyArray {
     SurfaceIndices,
 }
 
-/// The name an attribute asks for.
+/// The name that an attribute should get.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wanted<'a> {
-    /// A schema's: it has it.
+pub(super) enum TargetName<'a> {
+    /// A name of the schema, used as it is.
     Schema(&'static str),
-    /// A primvar's, without the prefix, to be made an identifier that no other primvar has; `own` is the attribute's.
+    /// The name of a primvar without the prefix, to be made a unique identifier; `own` is the name of the attribute.
     Primvar { name: &'a str, own: &'a str },
 }
 
 /// How a source is declared in USD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Declaration<'a> {
-    pub(super) wanted: Wanted<'a>,
+    pub(super) target: TargetName<'a>,
     pub(super) kind: UsdType,
     pub(super) interpolation: Option<Interpolation>,
 }
@@ -61,18 +62,18 @@ pub(super) struct Declaration<'a> {
 pub(super) fn prim(kind: Kind) -> (&'static str, &'static [(&'static str, &'static str)]) {
     match kind {
         Kind::Curves => ("BasisCurves", &[("type", "linear"), ("wrap", "nonperiodic")]),
-        // Else readers subdivide it and drop its normals.
+        // Otherwise readers subdivide the mesh and drop its normals.
         Kind::Mesh => ("Mesh", &[("subdivisionScheme", "none")]),
         Kind::Points => ("Points", &[]),
         Kind::Tets => ("TetMesh", &[]),
-        // Refused before it gets here.
+        // Refused by the recorder.
         Kind::Volume => ("Volume", &[]),
     }
 }
 
 /// How `source` of a component of kind `kind`, with rows of type `rows`, is declared.
 pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declaration<'_> {
-    let schema = |name, kind| Declaration { wanted: Wanted::Schema(name), kind, interpolation: None };
+    let schema = |name, kind| Declaration { target: TargetName::Schema(name), kind, interpolation: None };
     let (owner, name) = match source {
         Source::Topology(TopologyArray::CurveCounts) => return schema("curveVertexCounts", UsdType::Int),
         Source::Topology(TopologyArray::FaceCounts) => return schema("faceVertexCounts", UsdType::Int),
@@ -101,9 +102,11 @@ pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declarat
             _ => {}
         }
     }
-    let wanted =
-        Wanted::Primvar { name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name }, own: name };
-    Declaration { wanted, kind: primvar_type(name, rows), interpolation }
+    let target = TargetName::Primvar {
+        name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name },
+        own: name,
+    };
+    Declaration { target, kind: primvar_type(name, rows), interpolation }
 }
 
 fn primvar_type(name: &str, rows: ColumnType) -> UsdType {
@@ -121,14 +124,14 @@ fn primvar_type(name: &str, rows: ColumnType) -> UsdType {
     }
 }
 
-/// Whether `source` shares its sample times with the other of these: USD moves points along velocities only where both
-/// have the same.
-pub(super) fn moves(source: &Source) -> bool {
+/// Whether `source` is one of points and velocities, which must have the same sample times: otherwise USD does not move
+/// points along velocities.
+pub(super) fn is_motion(source: &Source) -> bool {
     matches!(source, Source::Attribute(Owner::Point, name) if **name == *P.name || **name == *V.name)
 }
 
-/// What `source` holds in a frame without its component: no rows, or an inside-out box. `None` for attributes of the
-/// whole, which always have a row.
+/// The value of `source` in a frame without its component: no rows, or an inverted box. `None` for attributes of the
+/// whole component, which always have a row.
 pub(super) fn absent(source: &Source, rows: ColumnType) -> Option<Column> {
     match source {
         Source::Attribute(Owner::Once, _) => None,
@@ -137,7 +140,7 @@ pub(super) fn absent(source: &Source, rows: ColumnType) -> Option<Column> {
     }
 }
 
-/// Arrays a component does not hold as such, kept while what they came from is shared.
+/// Arrays derived from a component, cached as long as their source is shared.
 #[derive(Debug, Default)]
 pub(super) struct Derived {
     topology: Option<(Topology, Vec<(Source, Column)>)>,
@@ -145,7 +148,7 @@ pub(super) struct Derived {
 }
 
 impl Derived {
-    /// All arrays that go to the file for `component`.
+    /// All arrays to write for `component`.
     pub(super) fn arrays(&mut self, component: &Component) -> Vec<(Source, Column)> {
         let mut arrays = self.topology(component.topology()).to_vec();
         arrays.push((Source::Extent, self.extent(component)));
@@ -187,7 +190,7 @@ fn attribute(owner: Owner, name: &Name) -> Source {
 }
 
 fn topology_arrays(topology: &Topology) -> Vec<(Source, Column)> {
-    // Below 2³¹: the recorder has looked.
+    // Below 2³¹, as the recorder has checked.
     let ints = |numbers: &mut dyn Iterator<Item = u32>| Column::new(numbers.map(u32::cast_signed).collect());
     let arrays = match topology {
         Topology::Curves(runs) => vec![(TopologyArray::CurveCounts, ints(&mut runs.counts()))],
@@ -213,10 +216,10 @@ mod tests {
 
     fn declared(kind: Kind, owner: Owner, name: &str, rows: ColumnType) -> String {
         let source = attribute(owner, &name.into());
-        let Declaration { wanted, kind, interpolation } = declare(kind, &source, rows);
-        let name = match wanted {
-            Wanted::Schema(name) => name.to_owned(),
-            Wanted::Primvar { name, .. } => format!("primvars:{name}"),
+        let Declaration { target, kind, interpolation } = declare(kind, &source, rows);
+        let name = match target {
+            TargetName::Schema(name) => name.to_owned(),
+            TargetName::Primvar { name, .. } => format!("primvars:{name}"),
         };
         format!("{} {name} {}", kind.name(), interpolation.map_or("-", Interpolation::token))
     }
@@ -240,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_else_is_a_primvar_of_its_owner() {
+    fn other_attributes_are_primvars_with_the_interpolation_of_their_owner() {
         use ColumnType::{F1, F3, F4, I1, I3, I4};
         for (owner, name, rows, expected) in [
             (Owner::Element, "shielded", F1, "float[] primvars:shielded uniform"),
@@ -260,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn derived_arrays_are_made_once_while_their_sources_are_shared() {
+    fn derived_arrays_are_cached_while_their_sources_are_shared() {
         let first = Component::curves(vec![2, 1], vec![[0.0; 3]; 3]).unwrap();
         let mut moved = first.clone();
         moved.edit(P).unwrap()[2] = [1.0, 2.0, 3.0];
@@ -270,11 +273,11 @@ mod tests {
             arrays.into_iter().find(|(source, _)| *source == wanted).unwrap().1
         };
         let counts = || Source::Topology(TopologyArray::CurveCounts);
-        let known = find(&first, counts());
-        assert_eq!(known, Column::new(vec![2, 1]));
+        let first_counts = find(&first, counts());
+        assert_eq!(first_counts, Column::new(vec![2, 1]));
         let box_of_first = find(&first, Source::Extent);
         assert!(find(&first, Source::Extent).same(&box_of_first));
-        assert!(find(&moved, counts()).same(&known));
+        assert!(find(&moved, counts()).same(&first_counts));
         assert_eq!(find(&moved, Source::Extent), Column::new(vec![[0.0; 3], [1.0, 2.0, 3.0]]));
     }
 }

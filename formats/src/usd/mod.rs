@@ -1,23 +1,23 @@
 //! USD files, `.usda` (text) and `.usdc` (crate 0.8.0), written without Pixar's library.
 //!
-//! A [`UsdWriter`] takes one geometry per frame and keeps no more than one in memory, beside 8 bytes per attribute and
-//! frame. An array that equals its attribute's last one, by address or else bit for bit, is stored once; what never
-//! changes becomes a default instead of time samples. Both flavours are written from one description of the stage
-//! (`layout` says which array becomes which attribute, `stage` what a flavour is told), and every f32 and i32 comes
-//! back bit for bit, but a NaN's payload from text. The limits: a volume is refused, a USD attribute has one type
-//! through all frames, and nothing is readable before [`UsdWriter::finish`].
+//! A [`UsdWriter`] is given one geometry per frame and keeps only the last one in memory, plus 8 bytes per attribute
+//! and frame. An array that equals the previous one of its attribute, by address or bit for bit, is stored once; what
+//! never changes is written as a default value instead of time samples. Both file formats are written from one
+//! description of the stage (`layout` maps arrays to attributes, `stage` is the description), and every f32 and i32 is
+//! read back bit for bit, except the payload of a NaN in text. Limits: a volume is refused, a USD attribute has one
+//! type in all frames, and nothing is readable before [`UsdWriter::finish`].
 //!
-//! What a reader finds, for an output called NAME:
-//! * `/NAME` (Xform, the default prim; moved to the scene's origin where it has one) with `curves` (BasisCurves, linear),
-//!   `mesh`, `points` and `tets` under it; metres, Y up, time code = frame.
-//! * A frame without a component has one with no points and no elements; a frame without an attribute that other frames
-//!   have holds a value block. Empty arrays rather than blocks for a component, because a reader that keeps its last
-//!   value at a block would keep showing what is gone.
-//! * `velocities` have samples wherever `points` have, even if they never change: USD uses them only then.
+//! The content of a file, for an output called NAME:
+//! * `/NAME` (Xform, the default prim; translated to the scene's origin if it has one) with `curves` (BasisCurves,
+//!   linear), `mesh`, `points` and `tets` under it; metres, Y up, time code = frame.
+//! * In a frame without a component its arrays are empty; in a frame without an attribute that other frames have, it is
+//!   a value block. Components are not blocked, because a reader that keeps the last value at a block would keep showing
+//!   them.
+//! * `velocities` have samples at the same times as `points`, even if they never change: USD uses them only then.
 //! * An attribute or output whose name is not an ASCII identifier gets one (`names`), with its own as `displayName`.
 //!
-//! Blender 4.5 reads all of it, and warns only of `int3` and `int4` attributes of curves and meshes, types it does not
-//! have.
+//! Blender 4.5 reads all of it, and warns only about `int3` and `int4` attributes of curves and meshes, types that it
+//! does not have.
 
 mod coding;
 mod extent;
@@ -39,16 +39,16 @@ use crate::atomic::{AtomicFile, FileError};
 use recorder::{Header, Recorder};
 use stage::Encoder;
 
-/// Which of the two file formats.
+/// The two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Flavour {
-    /// Text: for reading and for tools; about ten characters per number.
+    /// Text, for people and tools; about ten characters per number.
     Usda,
     /// Binary: four bytes per number, read without copying.
     Usdc,
 }
 
-/// What a finished file holds.
+/// Statistics of a finished file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// Length of the file.
@@ -57,11 +57,12 @@ pub struct Summary {
     pub frames: usize,
     /// Arrays that were stored.
     pub stored: u64,
-    /// Arrays that were not, as they equalled their attribute's last.
+    /// Arrays that were not stored, because they equalled the previous ones of their attributes.
     pub shared: u64,
 }
 
-/// A USD file being written: one geometry per frame, then [`UsdWriter::finish`]. Dropped before that, it leaves nothing.
+/// A USD file being written: one geometry per frame, then [`UsdWriter::finish`]. Dropped before that, it leaves
+/// nothing.
 pub struct UsdWriter {
     path: PathBuf,
     recorder: Recorder<AtomicFile>,
@@ -70,11 +71,11 @@ pub struct UsdWriter {
 impl UsdWriter {
     /// Starts the file at `path`, which appears only when it is finished.
     ///
-    /// `name` is the output's name, `fps` the frames (and time codes) per second, `origin` the scene's in metres, to
-    /// which positions are relative.
+    /// `name` is the output's name, `fps` the frames (and time codes) per second, and `origin` the scene's origin in
+    /// metres, to which positions are relative.
     ///
     /// # Errors
-    /// Where the file cannot be created, or `fps` is not a positive number.
+    /// If the file cannot be created, or `fps` is not a positive number.
     pub fn create(
         path: impl Into<PathBuf>,
         flavour: Flavour,
@@ -100,17 +101,16 @@ impl UsdWriter {
     /// Adds a frame. Time codes are frame numbers, whole or not, each greater than the one before.
     ///
     /// # Errors
-    /// Where the file cannot be written, the frame does not follow the last one, the geometry has a volume, or an attribute changed its
-    /// type. After a refused frame the writer is as it was before; after a failed write it only fails.
+    /// If the file cannot be written, the frame does not follow the last one, the geometry has a volume, or an
+    /// attribute changed its type. A refused frame does not change the writer; after a failed write all calls fail.
     pub fn frame(&mut self, time_code: f64, geometry: &Geometry) -> Result<(), UsdError> {
         self.recorder.frame(time_code, geometry).map_err(|fault| located(&self.path, fault))
     }
 
-    /// Writes what describes the arrays, syncs the file to disk and renames it. A file without frames is valid: an
-    /// empty `/NAME`.
+    /// Writes the structure, syncs the file to disk and renames it. A file without frames is valid: an empty `/NAME`.
     ///
     /// # Errors
-    /// Where the file cannot be written, or an earlier write failed; nothing is left behind then.
+    /// If the file cannot be written, or an earlier write failed; the file is removed then.
     pub fn finish(self) -> Result<Summary, UsdError> {
         let Self { path, recorder } = self;
         let (mut file, counts) = recorder.finish().map_err(|fault| located(&path, fault))?;
@@ -139,15 +139,15 @@ fn located(path: &Path, fault: recorder::Fault) -> UsdError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UsdError {
-    /// The file system said no.
+    /// An error of the file system.
     #[error(transparent)]
     File(#[from] FileError),
-    /// What was given cannot be put into a USD file.
+    /// The data cannot be stored in a USD file.
     #[error("`{}` could not be written: {fault}", path.display())]
     Refused {
         /// The file.
         path: PathBuf,
-        /// What cannot be put into it.
+        /// The reason.
         fault: UsdFault,
     },
 }
@@ -156,19 +156,19 @@ pub enum UsdError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UsdFault {
-    /// Frames per second that are none.
+    /// An invalid number of frames per second.
     #[error("`fps` is {fps}, expected a positive number")]
     Fps {
-        /// What was given.
+        /// The value.
         fps: f64,
     },
-    /// A frame number that is none.
+    /// An invalid frame number.
     #[error("the frame number is {time}, expected a finite number")]
     Time {
-        /// What was given.
+        /// The value.
         time: f64,
     },
-    /// A frame that does not come after the last one.
+    /// A frame that does not follow the last one.
     #[error("frame {time} follows frame {last}, expected frames in ascending order")]
     Order {
         /// The frame.
@@ -182,7 +182,7 @@ pub enum UsdFault {
         /// The frame.
         time: f64,
     },
-    /// More points or corners than an `int` counts.
+    /// More points or corners than an `int` can count.
     #[error("`{kind}` has {rows} points or corners at frame {time}, expected at most 2,147,483,647")]
     TooMany {
         /// Component.
@@ -192,7 +192,7 @@ pub enum UsdFault {
         /// The frame.
         time: f64,
     },
-    /// An attribute with another type than in the frames before.
+    /// An attribute with another type than in previous frames.
     #[error(
         "`{name}` of `{kind}` is {found} at frame {time} and was {expected} before; a USD attribute has one type in all frames"
     )]

@@ -1,7 +1,7 @@
-//! From frames to tracks: each attribute's values through time, stored once while they stay the same.
+//! Collects frames into tracks: the values of each attribute over time, stored once while they do not change.
 //!
-//! Memory: the arrays of the last frame (shared with other holders), a handle of 8 bytes per attribute and frame.
-//! A refused frame changes nothing; after a failed write every call fails.
+//! Memory: the arrays of the last frame (shared with other owners), and a handle of 8 bytes per attribute and frame. A
+//! refused frame changes nothing; after a failed write all calls fail.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -9,7 +9,7 @@ use std::io;
 use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Topology};
 
 use super::UsdFault;
-use super::layout::{self, Derived, Source, Wanted};
+use super::layout::{self, Derived, Source, TargetName};
 use super::names;
 use super::stage::{Attribute, Encoder, Handle, Prim, Stage, Values, same_bits};
 
@@ -45,7 +45,7 @@ pub(super) struct Counts {
 pub(super) struct Recorder<W> {
     header: Header,
     times: Vec<f64>,
-    /// Which of the four components each frame had, in the order of [`Kind::ALL`].
+    /// The components of each frame, in the order of [`Kind::ALL`].
     present: Vec<[bool; 4]>,
     derived: [Derived; 4],
     tracks: BTreeMap<(Kind, Source), Track>,
@@ -53,7 +53,7 @@ pub(super) struct Recorder<W> {
     failed: bool,
 }
 
-/// The encoder, and how often it was used or not.
+/// The encoder, with counts of stored and of shared arrays.
 struct Store<W> {
     encoder: Box<dyn Encoder<W>>,
     stored: u64,
@@ -147,8 +147,8 @@ impl<W> Recorder<W> {
             }
             for (owner, name, column) in part.columns() {
                 let key = (kind, Source::Attribute(owner, name.clone()));
-                let known = self.tracks.get(&key).map(|track| track.rows);
-                if let Some(expected) = known.filter(|known| *known != column.kind()) {
+                let previous = self.tracks.get(&key).map(|track| track.rows);
+                if let Some(expected) = previous.filter(|previous| *previous != column.kind()) {
                     return Err(UsdFault::Type { name: name.clone(), kind, found: column.kind(), expected, time });
                 }
             }
@@ -180,7 +180,7 @@ fn rows_to_index(part: &Component) -> usize {
 }
 
 impl Track {
-    /// The next frame's value.
+    /// Records the value of the next frame.
     fn record<W>(&mut self, kind: Kind, source: &Source, column: Column, store: &mut Store<W>) -> io::Result<()> {
         let handle = match &self.last {
             Some((last, handle)) if same_bits(last, &column) => {
@@ -197,7 +197,7 @@ impl Track {
         Ok(())
     }
 
-    /// The next frame has no such value; `present` says whether it has the component.
+    /// Records that the next frame has no such value; `present` is whether it has the component.
     fn record_absence<W>(
         &mut self,
         kind: Kind,
@@ -221,11 +221,11 @@ impl Track {
 
 /// A component's tracks as a prim.
 fn prim(kind: Kind, tracks: Vec<(Source, Track)>) -> Prim {
-    let moving = tracks.iter().any(|(source, track)| layout::moves(source) && track.changes());
+    let moving = tracks.iter().any(|(source, track)| layout::is_motion(source) && track.changes());
     let names = attribute_names(kind, &tracks);
     let attribute = |((source, track), (name, display_name)): ((Source, Track), (String, Option<String>))| {
         let declaration = layout::declare(kind, &source, track.rows);
-        let sampled = track.changes() || (moving && layout::moves(&source));
+        let sampled = track.changes() || (moving && layout::is_motion(&source));
         let values = match track.samples.first() {
             Some(first) if !sampled => Values::Default(*first),
             _ => Values::Samples(track.samples),
@@ -236,20 +236,20 @@ fn prim(kind: Kind, tracks: Vec<(Source, Track)>) -> Prim {
     Prim { name: kind.name(), schema, tokens, attributes: tracks.into_iter().zip(names).map(attribute).collect() }
 }
 
-/// For each track the USD name, and the attribute's own name where it differs.
+/// For each track the USD name, and the name of the attribute if it differs.
 fn attribute_names(kind: Kind, tracks: &[(Source, Track)]) -> Vec<(String, Option<String>)> {
-    let wanted = || tracks.iter().map(|(source, track)| layout::declare(kind, source, track.rows).wanted);
-    let primvars: Vec<&str> = wanted()
-        .filter_map(|wanted| match wanted {
-            Wanted::Primvar { name, .. } => Some(name),
-            Wanted::Schema(_) => None,
+    let targets = || tracks.iter().map(|(source, track)| layout::declare(kind, source, track.rows).target);
+    let primvars: Vec<&str> = targets()
+        .filter_map(|target| match target {
+            TargetName::Primvar { name, .. } => Some(name),
+            TargetName::Schema(_) => None,
         })
         .collect();
     let mut identifiers = names::distinct(&primvars).into_iter();
-    wanted()
-        .map(|wanted| match wanted {
-            Wanted::Schema(name) => (name.to_owned(), None),
-            Wanted::Primvar { name, own } => {
+    targets()
+        .map(|target| match target {
+            TargetName::Schema(name) => (name.to_owned(), None),
+            TargetName::Primvar { name, own } => {
                 let name = identifiers.next().unwrap_or_else(|| names::identifier(name));
                 (format!("primvars:{name}"), (name != own).then(|| own.to_owned()))
             }

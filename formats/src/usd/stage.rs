@@ -1,28 +1,28 @@
-//! Input of both flavours: arrays while frames arrive, and at the end the structure that refers to them.
+//! The input of both encoders: arrays as frames arrive, and at the end the structure that refers to them.
 //!
-//! An [`Encoder`] stores an array and returns a [`Handle`]; a [`Stage`] names each handle's prim, attribute and time.
-//! Nothing here knows a geometry, and nothing of a file format beyond USD's own type names.
+//! An [`Encoder`] stores an array and returns a [`Handle`]; a [`Stage`] assigns each handle to a prim, attribute and
+//! time. This module does not depend on geometry, nor on a file format except for USD's type names.
 
 use std::io;
 
 use engine::geometry::Column;
 
-/// A flavour: turns arrays and structure into a file on `W`.
+/// Encodes arrays and structure as a file written to `W`.
 pub(super) trait Encoder<W>: Send {
     /// Stores an array as a value of type `kind`. The rows have the width and number type of `kind`; for
     /// [`UsdType::Int64`] they are i32.
     fn store(&mut self, kind: UsdType, rows: &Column) -> io::Result<Handle>;
 
-    /// Writes the structure and hands the file back, complete but not yet on disk.
+    /// Writes the structure and returns the file, complete but not yet synced.
     fn finish(self: Box<Self>, stage: &Stage) -> io::Result<W>;
 }
 
-/// A stored array, as its encoder knows it.
+/// Identifies a stored array for its encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Handle(pub(super) u64);
 
 impl Handle {
-    /// "No value here": a frame that lacks the attribute.
+    /// No value: a frame that lacks the attribute.
     pub(super) const BLOCK: Self = Self(u64::MAX);
 }
 
@@ -31,7 +31,7 @@ impl Handle {
 pub(super) struct Stage {
     /// Name of the one root prim, an identifier.
     pub(super) name: String,
-    /// The original name, where it differs.
+    /// The original name, if it differs.
     pub(super) display_name: Option<String>,
     /// Frames and time codes per second.
     pub(super) fps: f64,
@@ -44,7 +44,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Stage metadata with numbers, first to last time code where there is one.
+    /// Numeric stage metadata, including first and last time code if there are frames.
     pub(super) fn numbers(&self) -> Vec<(&'static str, f64)> {
         let span = self.times.first().zip(self.times.last());
         let mut numbers = vec![("metersPerUnit", 1.0), ("timeCodesPerSecond", self.fps), ("framesPerSecond", self.fps)];
@@ -52,7 +52,7 @@ impl Stage {
         numbers
     }
 
-    /// Whether the root prim is moved.
+    /// Whether the root prim is translated.
     pub(super) fn is_moved(&self) -> bool {
         self.origin != [0.0; 3]
     }
@@ -76,11 +76,11 @@ pub(super) struct Prim {
 pub(super) struct Attribute {
     /// Its name, `primvars:` included.
     pub(super) name: String,
-    /// The original name, where it differs.
+    /// The original name, if it differs.
     pub(super) display_name: Option<String>,
     /// Its type.
     pub(super) kind: UsdType,
-    /// What a row belongs to, where the schema does not say.
+    /// What a row belongs to, if the schema does not define it.
     pub(super) interpolation: Option<Interpolation>,
     /// Its values.
     pub(super) values: Values,
@@ -89,9 +89,9 @@ pub(super) struct Attribute {
 /// One value for all times, or one per time code.
 #[derive(Debug, PartialEq)]
 pub(super) enum Values {
-    /// The same always.
+    /// One constant value.
     Default(Handle),
-    /// As many as the stage has times.
+    /// One per time code of the stage.
     Samples(Vec<Handle>),
 }
 
@@ -107,7 +107,7 @@ pub(super) enum Interpolation {
 }
 
 impl Interpolation {
-    /// USD's word.
+    /// USD's token.
     pub(super) fn token(self) -> &'static str {
         match self {
             Self::Vertex => "vertex",
@@ -117,7 +117,7 @@ impl Interpolation {
     }
 }
 
-/// Array types, roles told apart.
+/// Array types, distinguished by role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum UsdType {
     Float,
@@ -153,13 +153,13 @@ impl UsdType {
     }
 }
 
-/// The numbers of a column, row after row.
+/// The numbers of a column, row by row.
 pub(super) enum Numbers<'a> {
     Floats(&'a [f32]),
     Ints(&'a [i32]),
 }
 
-/// The numbers of `column`, row after row.
+/// The numbers of `column`, row by row.
 pub(super) fn numbers(column: &Column) -> Numbers<'_> {
     match column {
         Column::F1(rows) => Numbers::Floats(rows),
@@ -181,7 +181,7 @@ pub(super) fn same_bits(a: &Column, b: &Column) -> bool {
     }
     match (numbers(a), numbers(b)) {
         (Numbers::Floats(a), Numbers::Floats(b)) => {
-            // In blocks without a branch, which vectorise; the first that differs ends it.
+            // In blocks without branches, which are vectorised; stops at the first block that differs.
             let differ = |(a, b): (&[f32], &[f32])| {
                 a.iter().zip(b).fold(0, |bits, (x, y)| bits | (x.to_bits() ^ y.to_bits())) != 0
             };
@@ -192,7 +192,7 @@ pub(super) fn same_bits(a: &Column, b: &Column) -> bool {
     }
 }
 
-/// Numbers compared between two looks at the result.
+/// Numbers compared per block.
 const COMPARED: usize = 256;
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! The sections of a crate file: a tree of specs as tables that refer to each other by number.
 //!
-//! Tokens are names, fields are (name, value) pairs, field sets are what specs have; equal ones are stored once. The tree
+//! Tokens are names, fields are (name, value) pairs, field sets belong to specs; equal ones are stored once. The tree
 //! itself is a list of paths, depth first, with jumps. The limit: one tree per file, written when it is complete.
 
 use std::collections::BTreeMap;
 
 use super::coding::{chunk, ints};
 
-/// What a spec is, by its number in the file.
+/// The type of a spec, with its number in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SpecType {
     Attribute = 1,
@@ -38,21 +38,21 @@ impl Spec {
         self.fields.push((name, value));
     }
 
-    /// Paths from here down, this one included.
+    /// The number of paths in this subtree, itself included.
     fn paths(&self) -> usize {
         1 + self.children.iter().map(Self::paths).sum::<usize>()
     }
 }
 
-/// The tables in the making.
+/// The tables under construction.
 #[derive(Debug)]
 pub(super) struct Structure {
     tokens: Numbered<String>,
-    /// Tokens that are strings' text.
+    /// Indices of the tokens that are used as strings.
     strings: Numbered<u32>,
     fields: Numbered<(u32, u64)>,
     sets: BTreeMap<Vec<u32>, u32>,
-    /// All sets one after the other, each with an [`END`].
+    /// All field sets, concatenated, each followed by [`END`].
     set_list: Vec<u32>,
     paths: Vec<Path>,
 }
@@ -71,7 +71,7 @@ struct Path {
 impl Default for Structure {
     fn default() -> Self {
         let mut tokens = Numbered::default();
-        // Properties are told from prims by the sign of their token, and 0 has none: nothing may be called by token 0.
+        // Properties are distinguished from prims by the sign of their token, so token 0 must not be used as a name.
         tokens.number(String::new());
         Self {
             tokens,
@@ -96,7 +96,7 @@ impl Structure {
         self.strings.number(token)
     }
 
-    /// Name and bytes of each section, in the order of the file.
+    /// The name and bytes of each section, in file order.
     pub(super) fn sections(mut self, root: &Spec) -> [(&'static str, Vec<u8>); 6] {
         self.add(root, false);
         let Self { tokens, strings, fields, set_list, paths, .. } = self;
@@ -134,7 +134,7 @@ impl Structure {
         ]
     }
 
-    /// Adds a spec and all below it; `sibling` says whether another one of the same parent follows.
+    /// Adds a spec and its children; `sibling` is whether another child of the same parent follows.
     fn add(&mut self, spec: &Spec, sibling: bool) {
         let token = self.token(&spec.name).cast_signed();
         let element = if spec.kind == SpecType::Attribute { -token } else { token };
@@ -169,7 +169,7 @@ impl Structure {
     }
 }
 
-/// Values in the order they came, each once.
+/// Distinct values in the order of their first occurrence.
 #[derive(Debug)]
 struct Numbered<T> {
     list: Vec<T>,
@@ -197,7 +197,7 @@ fn count(n: usize) -> [u8; 8] {
     (n as u64).to_le_bytes()
 }
 
-/// Bytes with their length before them.
+/// Bytes preceded by their length.
 fn sized(bytes: &[u8]) -> Vec<u8> {
     [&count(bytes.len())[..], bytes].concat()
 }
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_are_as_worked_by_hand() {
+    fn paths_are_as_computed_by_hand() {
         let attribute = |name| spec(name, SpecType::Attribute, vec![]);
         let b = spec("b", SpecType::Prim, vec![]);
         let a = spec("a", SpecType::Prim, vec![attribute("x"), attribute("y"), b]);
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn strings_are_numbered_apart_from_tokens() {
+    fn strings_and_tokens_are_numbered_separately() {
         let mut structure = Structure::default();
         assert_eq!(structure.token("x"), 1);
         assert_eq!((structure.string("a-b"), structure.string("x"), structure.string("a-b")), (0, 1, 0));
@@ -269,7 +269,7 @@ mod tests {
         assert_eq!(sections[1].1, [2, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0]);
     }
 
-    /// Every path from the jumps, as a reader builds them.
+    /// Rebuilds all paths from the jumps, as a reader does.
     fn rebuilt(tokens: &[String], elements: &[i32], jumps: &[i32]) -> Vec<String> {
         fn walk(mut at: usize, parent: &str, file: (&[String], &[i32], &[i32]), paths: &mut Vec<String>) {
             let (tokens, elements, jumps) = file;
@@ -313,7 +313,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_tree_is_found_again_by_its_jumps(tree in trees()) {
+        fn arbitrary_trees_are_rebuilt_from_their_jumps(tree in trees()) {
             let sections = Structure::default().sections(&tree);
             let paths = lists(&sections[4].1, 2, 3);
             let mut expected = Vec::new();

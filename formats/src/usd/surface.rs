@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn a_face_between_two_tets_is_no_surface() {
+    fn a_face_between_two_tets_is_not_on_the_surface() {
         let faces = surface(&[[0, 1, 2, 3], [1, 2, 3, 4]]);
         assert_eq!(faces.len(), 6);
         assert!(!faces.iter().any(|face| face.iter().all(|corner| [1, 2, 3].contains(corner))));

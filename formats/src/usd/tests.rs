@@ -1,4 +1,4 @@
-//! Whole files, without USD at hand: text compared, sizes, what is left on disk.
+//! Tests of whole files without the USD library: text, sizes, and files left on disk.
 
 use std::fs;
 use std::io::Cursor;
@@ -35,7 +35,7 @@ fn text_of(name: &str, origin: [f64; 3], frames: &[(f64, Geometry)]) -> String {
 }
 
 #[test]
-fn a_small_scene_is_this_text() {
+fn a_small_scene_gives_the_expected_text() {
     let mut moved = fur();
     moved.edit(P).unwrap()[4] = [f32::NAN, 2.0, 1.0];
     moved.remove(Owner::Element, "shielded");
@@ -89,7 +89,7 @@ def Xform "fur_2" (
 }
 
 #[test]
-fn no_frame_and_no_component_are_files_too() {
+fn files_without_frames_or_components_are_valid() {
     let expected = "#usda 1.0\n(\n    defaultPrim = \"fur\"\n    metersPerUnit = 1\n    timeCodesPerSecond = 24\n    \
         framesPerSecond = 24\n    upAxis = \"Y\"\n)\n\ndef Xform \"fur\"\n{\n}\n";
     assert_eq!(text_of("fur", [0.0; 3], &[]), expected);
@@ -115,7 +115,7 @@ fn a_frame_costs_its_changing_arrays_and_one_handle_per_attribute() {
 }
 
 #[test]
-fn both_flavours_give_the_same_bytes_again() {
+fn writing_twice_gives_the_same_bytes() {
     let frames = [(1.0, fur().into()), (2.0, Geometry::default()), (2.25, fur().into())];
     for flavour in [Flavour::Usda, Flavour::Usdc] {
         let bytes = write_to(flavour, "fur", [0.0; 3], &frames);
@@ -124,7 +124,7 @@ fn both_flavours_give_the_same_bytes_again() {
 }
 
 #[test]
-fn a_file_appears_when_it_is_finished_and_alone() {
+fn a_file_appears_when_it_is_finished_without_temporaries() {
     let folder = tempfile::tempdir().unwrap();
     let visible = || -> Vec<String> {
         let names = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());

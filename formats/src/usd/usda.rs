@@ -1,8 +1,8 @@
 //! `.usda`: USD as text.
 //!
-//! An attribute's samples stand together in the file, but come frame by frame: their text waits in a spool and is copied
-//! once at the end, so memory stays at one array. Every number is the shortest text that reads back as the same bits;
-//! only a NaN loses its payload.
+//! The samples of an attribute are contiguous in the file but arrive frame by frame. Their text is stored in a
+//! temporary spool file and copied at the end, so that memory is limited to one array. Every number is the shortest
+//! text that reads back as the same bits; only a NaN loses its payload.
 
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
@@ -10,7 +10,7 @@ use engine::geometry::Column;
 
 use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, Stage, UsdType, Values, numbers};
 
-/// Of the buffers before the file and the spool, bytes.
+/// Size in bytes of the buffers of the file and the spool.
 const BUFFER: usize = 1 << 18;
 
 /// Writes text to `W`; `S` is the spool.
@@ -82,7 +82,7 @@ fn put_prim(file: &mut impl Write, spool: &mut (impl Read + Seek), prim: &Prim, 
     writeln!(file, "    }}")
 }
 
-/// Metadata of a sampled attribute stands on a declaration of its own.
+/// A sampled attribute has its metadata in a separate declaration.
 fn put_attribute(
     file: &mut impl Write,
     spool: &mut (impl Read + Seek),
@@ -91,7 +91,7 @@ fn put_attribute(
 ) -> io::Result<()> {
     let Attribute { name, display_name, kind, interpolation, values } = attribute;
     let display_name = display_name.iter().map(|name| format!("displayName = {}", quoted(name)));
-    let interpolation = interpolation.iter().map(|known| format!("interpolation = \"{}\"", known.token()));
+    let interpolation = interpolation.iter().map(|one| format!("interpolation = \"{}\"", one.token()));
     let lines: Vec<String> = display_name.chain(interpolation).collect();
     let declared = format!("        {} {name}", kind.name());
     match values {
@@ -115,7 +115,7 @@ fn put_attribute(
     }
 }
 
-/// ` (…)` with a line each at `depth`; nothing for no lines.
+/// ` (…)` with one line each, indented by `depth`; empty without lines.
 fn metadata(depth: usize, lines: Vec<String>) -> String {
     let indent = "    ".repeat(depth);
     let body: String = lines.iter().map(|line| format!("{indent}    {line}\n")).collect();
@@ -158,7 +158,7 @@ fn put_array(text: &mut Vec<u8>, kind: UsdType, rows: &Column) {
     text.push(b'[');
     match numbers(rows) {
         Numbers::Floats(floats) if kind == UsdType::Quat => {
-            // Text has the real part first.
+            // In text the real part comes first.
             let real_first: Vec<f32> = floats.as_chunks().0.iter().flat_map(|&[x, y, z, w]| [w, x, y, z]).collect();
             put_rows(text, width, &real_first, put_float);
         }
@@ -192,7 +192,7 @@ fn decimal(x: f64) -> String {
     usd_spelling(zmij::Buffer::new().format(x)).to_owned()
 }
 
-/// USD knows `nan`, and needs no `.0`.
+/// USD writes NaN as `nan` and needs no `.0`.
 fn usd_spelling(number: &str) -> &str {
     if number == "NaN" { "nan" } else { number.strip_suffix(".0").unwrap_or(number) }
 }
@@ -217,21 +217,21 @@ mod tests {
     }
 
     #[test]
-    fn any_float_reads_back_with_its_bits() {
+    fn arbitrary_floats_read_back_bit_for_bit() {
         let mut bits = 1_u32;
         for _ in 0..200_000 {
             bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let x = f32::from_bits(bits);
             let mut text = Vec::new();
             put_float(&mut text, x);
-            // By way of f64, as USD reads it.
+            // Via f64, as USD reads it.
             let read = std::str::from_utf8(&text).unwrap().parse::<f64>().unwrap() as f32;
             assert!(read.to_bits() == bits || (read.is_nan() && x.is_nan()), "{x:e}");
         }
     }
 
     #[test]
-    fn rows_stand_in_brackets_and_a_quaternion_starts_with_its_real_part() {
+    fn rows_are_in_brackets_and_a_quaternion_starts_with_its_real_part() {
         assert_eq!(text(UsdType::Int, Column::new(vec![3, -1])), "[3, -1]");
         assert_eq!(text(UsdType::Int64, Column::new(vec![i32::MIN])), "[-2147483648]");
         assert_eq!(
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_string_stays_on_its_line() {
+    fn a_string_is_written_on_one_line() {
         assert_eq!(quoted("a\"b\\c\nö\u{1}"), r#""a\"b\\c\nö\x01""#);
     }
 }

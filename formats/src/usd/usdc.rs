@@ -1,8 +1,9 @@
 //! `.usdc`: USD as a crate file, version 0.8.0.
 //!
 //! Header, values, sections, table of contents. Values are written as they arrive and referred to by 8-byte reps; the
-//! sections, which describe the tree of prims and attributes, follow at the end, and last the header. Until then no
-//! reader accepts the file. 0.8.0 is what USD itself writes and all versions read without a warning.
+//! sections, which describe the tree of prims and attributes, follow at the end, and the header is written last. Until
+//! then no reader accepts the file. Version 0.8.0 is what USD itself writes and what all its versions read without a
+//! warning.
 
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -42,13 +43,13 @@ mod id {
     pub(super) const VALUE_BLOCK: u64 = 51;
 }
 
-/// An int array is coded from this length on; readers take shorter ones as raw whatever their rep says.
+/// Int arrays of at least this length are encoded; readers treat shorter ones as raw regardless of their rep.
 const CODED_FROM: usize = 16;
 
-/// And up to this one: a chunk holds less than 2 GB.
+/// Int arrays above this length are not encoded, because a chunk holds less than 2 GB.
 const CODED_TO: usize = 1 << 28;
 
-/// Bytes of a block of numbers converted at once.
+/// Size in bytes of a block of numbers that is converted at once.
 const BLOCK: usize = 1 << 16;
 
 /// Writes a crate file to `W`.
@@ -71,7 +72,7 @@ impl<W: Write> Writer<W> {
         self.file.write_all(bytes)
     }
 
-    /// Fills up to a multiple of 8, where readers use an array without copying it, and says where that is.
+    /// Pads to a multiple of 8, so that readers can use an array without copying it, and returns the offset.
     fn align(&mut self) -> io::Result<u64> {
         let gap = self.at.next_multiple_of(8) - self.at;
         self.put(&[0; 8][..gap as usize])?;
@@ -130,7 +131,7 @@ impl<W: Write> Writer<W> {
         Ok(rep(id::DOUBLE_VECTOR) | at)
     }
 
-    /// The two 8s say that what follows, times and values, comes 8 bytes on: it does, as a rep each.
+    /// The two 8s are the offsets to the times and to the values, each of which is one rep.
     fn samples(&mut self, times: u64, values: &[Handle]) -> io::Result<u64> {
         let at = self.at;
         self.put_numbers(&[8, times, 8, values.len() as u64], u64::to_le_bytes)?;
@@ -247,7 +248,7 @@ impl<W: Write + Seek> Writer<W> {
             spec.field("displayName", self.string(name));
         }
         if let Some(interpolation) = interpolation {
-            // A token: as a string it would print alike and not be found.
+            // This must be a token: as a string it would print the same but not be found.
             spec.field("interpolation", self.token(interpolation.token()));
         }
         match values {
@@ -257,7 +258,7 @@ impl<W: Write + Seek> Writer<W> {
         Ok(spec)
     }
 
-    /// Adds what readers list a spec's properties and prims by.
+    /// Adds the fields by which readers list a spec's properties and prims.
     fn list_children(&mut self, spec: &mut Spec) -> io::Result<()> {
         for child in &mut spec.children {
             self.list_children(child)?;
@@ -351,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_are_coded_from_sixteen_on_where_that_is_shorter() {
+    fn sixteen_or_more_integers_are_encoded_if_that_is_shorter() {
         let (rep, bytes) = stored(UsdType::Int, Column::new(vec![5; 16]));
         assert_eq!(rep & COMPRESSED, COMPRESSED);
         assert_eq!((u64_at(&bytes, 0), unints(&bytes[8..], 16).0), (16, vec![5; 16]));
@@ -363,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn doubles_are_inlined_where_a_float_holds_them() {
+    fn doubles_are_inlined_if_a_float_is_exact() {
         let mut writer = writer();
         assert_eq!(writer.double(24.0).unwrap(), 0x4009_0000_41c0_0000);
         assert_eq!(writer.double(-0.0).unwrap(), 0x4009_0000_8000_0000);
@@ -371,9 +372,10 @@ mod tests {
         assert_eq!(writer.file.into_inner()[HEADER..], 0.1_f64.to_le_bytes());
     }
 
-    /// The worked file: `/a` (Xform) with `float x = 1.5` and `float y` sampled at 1 and 2, `/a/b` and `/c` (Scope).
+    /// The file computed by hand: `/a` (Xform) with `float x = 1.5` and `float y` sampled at 1 and 2, `/a/b` and `/c`
+    /// (Scope).
     #[test]
-    fn a_small_file_has_the_length_it_should_have() {
+    fn a_small_file_has_the_expected_length() {
         let mut writer = writer();
         let times = writer.times(&[1.0, 2.0]).unwrap();
         let float = |x: f32| rep(id::FLOAT) | INLINED | u64::from(x.to_bits());
@@ -389,7 +391,7 @@ mod tests {
         writer.list_children(&mut root).unwrap();
         writer.close(&root).unwrap();
         let bytes = writer.file.into_inner();
-        // One less than the 880 of the file it was worked from: tokens are numbered in another order.
+        // One less than the 880 of the reference file, because tokens are numbered in another order.
         assert_eq!(bytes.len(), 879);
         assert_eq!(bytes[..16], *b"PXR-USDC\0\x08\0\0\0\0\0\0");
         let contents = u64_at(&bytes, 16) as usize;

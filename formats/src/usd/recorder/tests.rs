@@ -1,4 +1,4 @@
-//! What becomes a default, a sample, an empty array or a block; what is refused.
+//! Which values become defaults, samples, empty arrays or blocks, and what is refused.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use engine::geometry::{Grid, ID, N, Owner, P, V, Volume, WIDTH};
 use super::*;
 use crate::usd::stage::UsdType;
 
-/// Stores nothing: a handle is the number of its array. Gives the stage back as lines.
+/// An encoder that stores nothing: a handle is the number of its array. Returns the stage as lines.
 #[derive(Default)]
 struct Listing {
     rows: Vec<usize>,
@@ -61,14 +61,14 @@ fn curve(x: f32) -> Component {
 }
 
 #[test]
-fn what_stays_the_same_is_stored_once_and_has_no_samples() {
+fn unchanged_values_are_stored_once_without_samples() {
     let (lines, counts) = recorded(&[curve(0.0).into(), curve(0.0).into(), curve(0.0).into()]);
     assert_eq!(lines, ["curves.curveVertexCounts: 1", "curves.extent: 2", "curves.points: 2"]);
     assert_eq!(counts, Counts { frames: 3, stored: 3, shared: 6 });
     let (lines, counts) = recorded(&[curve(0.0).into(), curve(0.0).into(), curve(-0.0).into()]);
     assert_eq!(lines[0], "curves.curveVertexCounts: 1");
     assert_eq!(lines[2], "curves.points = 2 2 2", "a sign is a change, and then every frame has a sample");
-    assert_eq!(counts.stored, 4, "the extent is that of 0 either way");
+    assert_eq!(counts.stored, 4, "the extent of 0 and of -0 is the same");
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_frame_without_the_component_has_no_rows_and_one_without_the_attribute_no_va
 }
 
 #[test]
-fn velocities_are_sampled_with_the_points_they_move() {
+fn velocities_have_the_same_samples_as_points() {
     let with_v = |x: f32, v: f32| {
         let mut part = curve(x);
         part.set(V, vec![[v, 0.0, 0.0]; 2]).unwrap();
@@ -134,7 +134,7 @@ fn names_become_distinct_identifiers_and_are_kept_as_display_names() {
 }
 
 #[test]
-fn a_refused_frame_says_why_and_changes_nothing() {
+fn a_refused_frame_gives_a_reason_and_changes_nothing() {
     let mut recorder = recorder();
     let mut refused = |time: f64, geometry: Geometry| recorder.frame(time, &geometry).unwrap_err().to_string();
     assert_eq!(refused(f64::NAN, curve(0.0).into()), "the frame number is NaN, expected a finite number");
