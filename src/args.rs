@@ -1,19 +1,19 @@
-//! Values of the command line: frames, sizes, settings.
+//! Types of command-line values: frames, sizes, settings.
 
 use std::str::FromStr;
 
 use engine::graph::Scene;
 use engine::time::Frame;
 
-/// Frames asked for: `1-48`, `1-48x2`, `10`, `10.5`, `1-2x0.25`, and several of these with commas between.
+/// Requested frames: `1-48`, `1-48x2`, `10`, `10.5`, `1-2x0.25`, and several of these separated by commas.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames(Vec<Frame>);
 
-/// More frames than this are taken for a typing error.
+/// More frames than this are assumed to be a typing error.
 const MOST_FRAMES: i64 = 10_000_000;
 
 impl Frames {
-    /// The frames, ascending, each once.
+    /// The frames, ascending, without repetition.
     pub fn frames(&self) -> Vec<Frame> {
         self.0.clone()
     }
@@ -44,7 +44,7 @@ fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
         Some((range, step)) => (range, Some(step)),
         None => (part, None),
     };
-    // A minus at the very start belongs to the number.
+    // A minus at the start is a sign.
     let dash = range.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at);
     let Some(dash) = dash else {
         if step.is_some() {
@@ -59,7 +59,7 @@ fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
         return Err(format!("the step in `{part}` is {step}, expected more than 0"));
     }
     if last < first {
-        return Err(format!("`{part}` runs backwards; write {last}-{first}, the frames are cooked in order"));
+        return Err(format!("`{part}` ends before it starts; write {last}-{first}"));
     }
     let count = (last.ticks() - first.ticks()) / step.ticks() + 1;
     if count > MOST_FRAMES {
@@ -110,7 +110,7 @@ impl FromStr for Setting {
     }
 }
 
-/// Half of the machine's memory, or 1 GiB where that cannot be known.
+/// Half of the machine's memory, or 1 GiB if that is unknown.
 pub fn half_of_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let total = text
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_steps_and_sub_frames() {
+    fn ranges_steps_and_fractions() {
         assert_eq!(numbers("1-4"), [1.0, 2.0, 3.0, 4.0]);
         assert_eq!(numbers("1-6x2"), [1.0, 3.0, 5.0]);
         assert_eq!(numbers("10.5"), [10.5]);
@@ -138,9 +138,9 @@ mod tests {
     }
 
     #[test]
-    fn an_invalid_frame_range_says_what_to_write() {
+    fn errors_of_frame_ranges_have_hints() {
         let error = |text: &str| text.parse::<Frames>().unwrap_err();
-        assert_eq!(error("5-1"), "`5-1` runs backwards; write 1-5, the frames are cooked in order");
+        assert_eq!(error("5-1"), "`5-1` ends before it starts; write 1-5");
         assert_eq!(error("1-5x0"), "the step in `1-5x0` is 0, expected more than 0");
         assert_eq!(error("5x2"), "`5x2` has a step but no range; write 1-48x2");
         assert_eq!(error("a"), "`a` is not a frame number; write 1-48, 1-48x2 or 10.5");

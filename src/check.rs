@@ -11,15 +11,15 @@ use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
 use crate::load;
 
-/// What `check` takes.
+/// The arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArgs {
     /// The graph file
     graph: PathBuf,
-    /// Override a param or control: node.param=JSON or control=JSON; repeatable
+    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
-    /// Also check that this format can hold the outputs: usdc, usda, obj, ply, json
+    /// Also check that this format can hold the outputs
     #[arg(long, value_name = "FORMAT", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
     format: Option<String>,
     /// Print the faults as JSON
@@ -27,14 +27,14 @@ pub struct CheckArgs {
     json: bool,
 }
 
-/// Checks. Faults go to stderr, as JSON to stdout.
+/// Checks a graph. Faults are printed to stderr, or as JSON to stdout.
 ///
 /// # Errors
-/// Where there is a fault.
+/// If there is a fault.
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let engine = load::engine(0, 1 << 30)?;
     let format: Option<Format> = args.format.as_deref().and_then(|name| name.parse().ok());
-    let found = load::sound_graph(&args.graph, &args.set, &engine, format)?;
+    let found = load::checked_graph(&args.graph, &args.set, &engine, format)?;
     let faults = found.err().unwrap_or_default();
     if args.json {
         let list: Vec<Value> = faults.iter().map(Fault::to_json).collect();

@@ -1,4 +1,4 @@
-//! `convect completions`: completions for a shell.
+//! `convect completions`: completion scripts for shells.
 
 use std::io::Write as _;
 
@@ -6,17 +6,17 @@ use clap_complete::Shell;
 
 use crate::failure::Failure;
 
-/// What `completions` takes.
+/// The arguments of `completions`.
 #[derive(Debug, clap::Args)]
 pub struct CompletionsArgs {
-    /// bash, elvish, fish, powershell or zsh
+    /// The shell
     shell: Shell,
 }
 
-/// Prints them.
+/// Prints the completion script.
 ///
 /// # Errors
-/// Where stdout cannot be written.
+/// If stdout cannot be written.
 pub fn run<C: clap::CommandFactory>(args: &CompletionsArgs) -> Result<(), Failure> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut C::command(), "convect", &mut text);

@@ -1,4 +1,4 @@
-//! `convect convert`: geometry files from one format to another, one or a numbered sequence.
+//! `convect convert`: converts a geometry file or a numbered sequence to another format.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,21 +15,21 @@ use crate::failure::{Exit, Failure, cancelled_by_signal};
 use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
 use crate::output::{failed, usd_failed, write_whole};
 
-/// What `convert` takes.
+/// The arguments of `convert`.
 #[derive(Debug, clap::Args)]
 pub struct ConvertArgs {
     /// An obj, ply or json file, or a numbered sequence: fur.####.json
     from: PathBuf,
-    /// The file to write; its extension sets the format. A sequence becomes one usdc or usda file, or one file per
+    /// The file to write; its extension selects the format. A sequence becomes one usdc or usda file, or one file per
     /// frame: fur.####.ply
     to: PathBuf,
-    /// Factor for lengths and velocities: 0.01 for a file in centimetres
+    /// Factor for lengths and velocities, such as 0.01 for a file in centimetres
     #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
     scale: f64,
     /// Frames per second, for the time in usdc, usda and json files
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = positive)]
     fps: f64,
-    /// Print errors only
+    /// Print only errors
     #[arg(short, long)]
     quiet: bool,
 }
@@ -39,10 +39,10 @@ fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("`{text}` is not a number above 0"))
 }
 
-/// Converts.
+/// Converts geometry files.
 ///
 /// # Errors
-/// Where a file cannot be read or written, or the format cannot hold what is in it.
+/// If a file cannot be read or written, or the format cannot hold its geometry.
 pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let command_line = |line: String| Failure::new(Exit::CommandLine, line);
     let format =
@@ -54,7 +54,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let to = Numbered::of(&args.to)?;
     if to.is_none() && !format.is_sequence() && files.len() > 1 {
         let (stem, ending) = (stem_and_frame(&args.to).0, format.name());
-        let line = format!("{} files cannot become one {format} file; write {stem}.####.{ending}", files.len());
+        let line = format!("cannot convert {} files to one {format} file; write {stem}.####.{ending}", files.len());
         return Err(command_line(line));
     }
     if folder_of(&args.to).is_dir() {
@@ -62,9 +62,9 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     }
     let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_signal() };
     let written = match &to {
-        Some(to) => conversion.file_a_frame(&files, |frame| to.at(frame), to.stem())?,
+        Some(to) => conversion.file_per_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
-        None => conversion.file_a_frame(&files, |_| args.to.clone(), "")?,
+        None => conversion.file_per_frame(&files, |_| args.to.clone(), "")?,
     };
     if !args.quiet {
         print_summary(&written);
@@ -72,7 +72,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was written, on stderr.
+/// Prints what was written to stderr.
 fn print_summary(written: &Written) {
     let files = match written.files.as_slice() {
         [] => return,
@@ -82,7 +82,7 @@ fn print_summary(written: &Written) {
     let s = if written.frames == 1 { "" } else { "s" };
     crate::say!("wrote {files}: {} frame{s}, {}", written.frames, indicatif::HumanBytes(written.bytes));
     if !written.lost.is_empty() {
-        crate::say!("note: left out {}, which the format cannot hold", written.lost.join(", "));
+        crate::say!("note: written without {}, which the format cannot hold", written.lost.join(", "));
     }
 }
 
@@ -100,12 +100,12 @@ struct Conversion {
     format: Format,
     scale: f64,
     fps: f64,
-    /// Whether someone pressed Ctrl-C.
+    /// Set by Ctrl-C.
     cancel: Arc<AtomicBool>,
 }
 
 impl Conversion {
-    /// All frames in one file. Several are read at once and written in order.
+    /// Writes all frames to one file. Several are read in parallel and written in order.
     fn one_file(&self, files: &[(Frame, PathBuf)], to: &Path, name: &str) -> Result<Written, Failure> {
         let flavour = if self.format == Format::Usda { Flavour::Usda } else { Flavour::Usdc };
         let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
@@ -119,8 +119,8 @@ impl Conversion {
         Ok(Written { files: vec![to.to_owned()], frames: files.len(), bytes, lost: Vec::new() })
     }
 
-    /// A file a frame, at the path that `to` gives for it.
-    fn file_a_frame(
+    /// Writes one file per frame, at the path given by `to`.
+    fn file_per_frame(
         &self,
         files: &[(Frame, PathBuf)],
         to: impl Fn(Frame) -> PathBuf + Sync,
@@ -155,7 +155,7 @@ impl Conversion {
         Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost })
     }
 
-    /// Reads a file as it will be written, unless someone pressed Ctrl-C.
+    /// Reads a file and scales it; fails after Ctrl-C.
     fn read(&self, path: &Path) -> Result<Geometry, Failure> {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Failure::new(Exit::Interrupted, "interrupted; the files written so far are complete"));
@@ -171,7 +171,7 @@ impl Conversion {
         });
         match overflowing {
             Some(what) => {
-                let fact = format!("{what} times {:?} is out of the range of f32", self.scale);
+                let fact = format!("{what} scaled by {:?} is out of the range of f32", self.scale);
                 Err(Failure::file(format!("`{}`: {fact}", path.display())))
             }
             None => Ok(geometry),

@@ -19,12 +19,12 @@ use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
 use crate::{load, report};
 
-/// What `cook` takes.
+/// The arguments of `cook`.
 #[derive(Debug, clap::Args)]
 pub struct CookArgs {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5, or a list of these: 1-4,10,20-24 [default: the scene's frames]
+    /// Frames to cook: 1-48, 1-48x2 (every second), 10, 10.5, or a list: 1-4,10,20-24 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
     /// Cook only this output; repeatable
@@ -33,42 +33,42 @@ pub struct CookArgs {
     /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// usdc and usda: one file with all frames; obj, ply and json: one file per frame
+    /// File format: usdc and usda have all frames in one file; obj, ply and json have one file per frame
     #[arg(long, value_name = "FORMAT", default_value = "usdc", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
     format: String,
-    /// Override a param or control: node.param=JSON or control=JSON; repeatable
+    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
     /// Number of threads [default: the machine's]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Memory for results; never changes them [default: half of the machine's]
+    /// Memory for intermediate results, such as 8G; does not affect the output [default: half of the machine's]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
-    /// Keep finished frames and solver checkpoints in this folder; a killed cook resumes from them
+    /// Keep finished frames and solver checkpoints in this folder; an interrupted cook resumes from them
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Limit of the cache's size; the oldest files are deleted first
+    /// Maximum size of the cache; the oldest files are deleted first
     #[arg(long, value_name = "SIZE", requires = "cache")]
     cache_limit: Option<Size>,
-    /// Write a report as JSON: time, memory and metrics of each node
+    /// Write a report to this file as JSON: time, memory and metrics of each node
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Print the time of each node and what it left out
+    /// Print the time of each node, and what it left out and why
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
-    /// Print errors only
+    /// Print only errors
     #[arg(short, long)]
     quiet: bool,
-    // Last: its heading would go on over what follows.
+    // Last, because its heading would apply to the options that follow.
     #[command(flatten)]
     pictures: pictures::PictureArgs,
 }
 
-/// Cooks.
+/// Cooks a graph.
 ///
 /// # Errors
-/// Where the graph is wrong, a file cannot be written, a node cannot cook, or someone interrupted it.
+/// If the graph has faults, a file cannot be written, a node cannot cook, or the cook is interrupted.
 pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
@@ -115,7 +115,7 @@ fn cook(
     let mut inputs = graph.files(&request.frames);
     inputs.push(args.graph.clone());
     writers.refuse_to_overwrite(&inputs, &request.frames)?;
-    // Before the cook, so that a path that cannot be written costs no cooking.
+    // Before the cook, so that an invalid path is reported at once.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let cancel = cancelled_by_signal();
     let progress = progress(args, request);
@@ -137,8 +137,8 @@ fn cook(
         Stopped::Sink(failure) => failure,
     })?;
     let watch = Stopwatch::start();
-    let spoiled: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
-    let written = writers.finish(&spoiled)?;
+    let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
+    let written = writers.finish(&incomplete)?;
     report.notes.extend(left_out(graph, &written, format));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write())?;
     writing += watch.wall();
@@ -161,17 +161,17 @@ fn cook(
     outcome(graph, &report, &written)
 }
 
-/// A note for each output of which the format could not hold everything.
+/// A note for each output that the format could not store completely.
 fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<String> {
     let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
     let note = |(output, written): &(usize, Written)| {
         let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
-        format!("output `{name}` was written without {lost}: {format} cannot hold it; usdc and json can")
+        format!("output `{name}` was written without {lost}, which {format} cannot hold; usdc and json can")
     };
     lossy.map(note).collect()
 }
 
-/// What was written and how fast, on stderr.
+/// Prints what was written, and the speed, to stderr.
 fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbose: bool) {
     for (_, written) in written {
         if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
@@ -190,7 +190,7 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
     if !frames.is_empty() && seconds > 0.0 {
         let rate = frames.len() as f64 / seconds;
         crate::say!(
-            "cooked {} frame{} in {seconds:.2} s ({rate:.0} a second)",
+            "cooked {} frame{} in {seconds:.2} s ({rate:.0} per second)",
             frames.len(),
             if frames.len() == 1 { "" } else { "s" }
         );
@@ -204,7 +204,7 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
     }
 }
 
-/// The errors of nodes, and the exit code they mean.
+/// The errors of nodes and the exit code.
 fn outcome(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let mut exit = None;

@@ -13,18 +13,18 @@ use crate::failure::{Failure, exit_of_error};
 use crate::load;
 use crate::report::NOT_NEEDED;
 
-/// What `explain` takes.
+/// The arguments of `explain`.
 #[derive(Debug, clap::Args)]
 pub struct ExplainArgs {
     /// The graph file
     graph: PathBuf,
-    /// Frames: 1-48, 1-48x2, 10, 10.5, or a list of these: 1-4,10,20-24 [default: the scene's frames]
+    /// Frames to plan: 1-48, 1-48x2 (every second), 10, 10.5, or a list: 1-4,10,20-24 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
-    /// Only this output; repeatable
+    /// Explain only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// Override a param or control: node.param=JSON or control=JSON; repeatable
+    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
     #[arg(long, value_name = "KEY=JSON")]
     set: Vec<Setting>,
     /// Print the plan as JSON
@@ -35,7 +35,7 @@ pub struct ExplainArgs {
 /// Prints the plan.
 ///
 /// # Errors
-/// Where the graph is wrong.
+/// If the graph has faults.
 pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let engine = load::engine(0, 1 << 30)?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
@@ -70,7 +70,7 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
         return;
     }
     let _ = match (node.varies, node.cooks) {
-        (false, 1) if frames > 1 => writeln!(text, "cooked once: the same in all frames"),
+        (false, 1) if frames > 1 => writeln!(text, "cooked once, the same at all frames"),
         (_, 1) => writeln!(text, "cooked once"),
         (_, n) => match node.window {
             Some(Window { frames: back, every }) => {

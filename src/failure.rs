@@ -1,4 +1,4 @@
-//! How the program ends: exit codes, and the messages that go with them.
+//! Exit codes and failure messages.
 
 use std::io;
 use std::process::ExitCode;
@@ -11,17 +11,17 @@ use engine::graph::{Fault, FaultClass};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Exit codes, as documented for scripts. Where two apply, the lower one is used.
+/// Exit codes, as documented for scripts. If two apply, the lower one is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Exit {
-    /// Done; for `diff`: the same.
+    /// Success; for `diff`: no difference.
     Done = 0,
-    /// A file could not be read or written; for `diff`: they differ.
+    /// A file could not be read or written; for `diff`: the files differ.
     File = 1,
-    /// The command line is wrong; for `diff`: trouble.
+    /// The command line is wrong; for `diff`: an error.
     CommandLine = 2,
-    /// The graph is wrong.
+    /// The graph has faults.
     Graph = 3,
     /// A node could not cook.
     Cook = 4,
@@ -35,12 +35,12 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Why the program ends early: a code, and lines for stderr.
+/// Why the program fails: an exit code, and lines for stderr.
 #[derive(Debug)]
 pub struct Failure {
     /// The exit code.
     pub exit: Exit,
-    /// Lines for stderr; none where the failure was already reported.
+    /// Lines for stderr; empty if the failure was already reported.
     pub lines: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ impl Failure {
 }
 
 impl From<io::Error> for Failure {
-    /// For stdout: a reader that closed it early is not an error.
+    /// An error of stdout. A reader that closes it early is not a failure.
     fn from(error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::reported(Exit::Done),
@@ -71,7 +71,7 @@ impl From<io::Error> for Failure {
     }
 }
 
-/// The exit code of some faults.
+/// The exit code for a list of faults.
 pub fn exit_of_faults(faults: &[Fault]) -> Exit {
     let code = |fault: &Fault| match fault.class {
         FaultClass::File => Exit::File,
@@ -80,7 +80,7 @@ pub fn exit_of_faults(faults: &[Fault]) -> Exit {
     faults.iter().map(code).min().unwrap_or(Exit::Done)
 }
 
-/// The exit code of a node's error.
+/// The exit code for a node's error.
 pub fn exit_of_error(error: &CookError) -> Exit {
     match error.error.kind {
         ErrorKind::File => Exit::File,
@@ -89,12 +89,13 @@ pub fn exit_of_error(error: &CookError) -> Exit {
     }
 }
 
-/// A flag that Ctrl-C and SIGTERM set; a second one ends the program at once. SIGHUP is left alone, for `nohup`.
+/// A flag that is set by Ctrl-C and SIGTERM; a second signal ends the program at once. SIGHUP is not handled, because
+/// of `nohup`.
 pub fn cancelled_by_signal() -> Arc<AtomicBool> {
     let cancel = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // In this order, so that it is the signal before which decides. Without a handler a signal still ends the program,
-        // only less politely.
+        // In this order, so that the first signal only sets the flag. If a handler cannot be registered, the signal
+        // ends the program without cleaning up.
         let _ = flag::register_conditional_shutdown(signal, Exit::Interrupted as i32, cancel.clone());
         let _ = flag::register(signal, cancel.clone());
     }

@@ -1,7 +1,7 @@
 //! Geometry files named on the command line, and the frame numbers in their names.
 //!
-//! What [`read`] gives was read to its end; a run of `#` in a [`Numbered`] name stands for the frame, as it does in a
-//! graph. The limit: a file is read whole, and USD is not read at all.
+//! A run of `#` in a [`Numbered`] name is replaced by the frame number, as in a graph. Limit: files are read as a
+//! whole, and USD is not read.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -17,18 +17,18 @@ use crate::failure::{Exit, Failure};
 /// A geometry file that was read.
 #[derive(Debug)]
 pub struct GeometryFile {
-    /// Its format, by its ending.
+    /// Its format, by its extension.
     pub format: Format,
     /// Its size.
     pub bytes: u64,
-    /// What it holds.
+    /// Its geometry.
     pub geometry: Geometry,
 }
 
 /// Reads the file at `path`.
 ///
 /// # Errors
-/// Where it cannot be read or is not what its ending says.
+/// If it cannot be read or is not a file of the format of its extension.
 pub fn read(path: &Path) -> Result<GeometryFile, Failure> {
     let unread = |error: io::Error| Failure::file(FileError::new(path, "read", error).to_string());
     let mut file = engine::files::open(path).map_err(unread)?;
@@ -48,7 +48,8 @@ pub fn refused(path: &Path, error: &formats::FormatError) -> Failure {
     Failure::file(format!("`{}`: {error}{hint}", path.display()))
 }
 
-/// A path with a run of `#` in its file name: the frame, with as many digits at least.
+/// A path with a run of `#` in its file name, which is replaced by the frame number, padded with zeros to the length of
+/// the run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Numbered {
     path: PathBuf,
@@ -58,10 +59,10 @@ pub struct Numbered {
 }
 
 impl Numbered {
-    /// `path` as a numbered one; `None` where its name has no `#`.
+    /// Parses a numbered path; `None` if its name has no `#`.
     ///
     /// # Errors
-    /// Where the name has several runs of `#`.
+    /// If the name has several runs of `#`.
     pub fn of(path: &Path) -> Result<Option<Self>, Failure> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let Some(start) = name.find('#') else { return Ok(None) };
@@ -84,10 +85,10 @@ impl Numbered {
         self.path.with_file_name(format!("{}{sign}{whole:0>digits$}{point}{fraction}{}", self.before, self.after))
     }
 
-    /// The files that are there, frames ascending.
+    /// The existing files, frames ascending.
     ///
     /// # Errors
-    /// Where the folder cannot be listed, or there is no such file.
+    /// If the folder cannot be listed, or there is no such file.
     pub fn find(&self) -> Result<Vec<(Frame, PathBuf)>, Failure> {
         let folder = folder_of(&self.path);
         let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
@@ -105,26 +106,27 @@ impl Numbered {
         Ok(found)
     }
 
-    /// The frame of a file of that name; `None` where it is none of these. Each frame has one name.
+    /// The frame of the file with that name; `None` if it is not part of the sequence. Each frame has exactly one name.
     fn frame_in(&self, name: &str) -> Option<Frame> {
         let label = name.strip_prefix(&*self.before)?.strip_suffix(&*self.after)?;
         let frame = parse_label(label)?;
         (self.at(frame).file_name()?.to_str()? == name).then_some(frame)
     }
 
-    /// The name without the frame, and without what separates it: `fur` of `fur.####.json`.
+    /// The name without the frame and the separator before it: `fur` of `fur.####.json`.
     pub fn stem(&self) -> &str {
         self.before.trim_end_matches(SEPARATORS)
     }
 }
 
-/// What may stand between a name and its frame.
+/// Separators between a name and its frame.
 const SEPARATORS: [char; 3] = ['.', '_', '-'];
 
-/// A file's name without ending and frame, and its frame where the name ends on one: (`fur`, 12) of `fur.0012.json`.
+/// The name of a file without extension and frame, and its frame if the name ends with one: (`fur`, 12) of
+/// `fur.0012.json`.
 pub fn stem_and_frame(path: &Path) -> (String, Option<Frame>) {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    // A sub-frame has a separator inside (`fur.0010_5`), so a dot is looked for first.
+    // A fractional frame contains a separator (`fur.0010_5`), so the dot is tried first.
     for separator in ['.', '_'] {
         if let Some((name, label)) = stem.rsplit_once(separator)
             && let Some(frame) = parse_label(label)
@@ -140,7 +142,7 @@ fn parse_label(label: &str) -> Option<Frame> {
     if label.contains('.') { None } else { label.replacen('_', ".", 1).parse().ok() }
 }
 
-/// The folder a path lies in.
+/// The folder of a path.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -158,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_hashes_is_the_frame_with_as_many_digits_at_least() {
+    fn a_run_of_hashes_is_the_frame_padded_to_its_length() {
         let at = |path: &str, number: f64| numbered(path).at(frame(number)).display().to_string();
         assert_eq!(at("in/fur.####.json", 7.0), "in/fur.0007.json");
         assert_eq!(at("fur.####.json", 10.5), "fur.0010_5.json");
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_one_name_of_a_frame_is_its_file() {
+    fn a_frame_has_exactly_one_name() {
         let frame_in = |name: &str| numbered("fur.####.json").frame_in(name).map(Frame::number);
         assert_eq!(frame_in("fur.0007.json"), Some(7.0));
         assert_eq!(frame_in("fur.0010_5.json"), Some(10.5));
@@ -182,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn the_frame_of_a_name_is_the_number_it_ends_on() {
+    fn the_frame_of_a_name_is_the_number_at_its_end() {
         let of = |path: &str| {
             let (stem, frame) = stem_and_frame(Path::new(path));
             (stem, frame.map(Frame::number))
@@ -197,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_a_sequence_come_by_frame() {
+    fn files_of_a_sequence_are_sorted_by_frame() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.0010.obj", "a.0002.obj", "a.0002_5.obj", "a.obj", "b.0001.obj"] {
             fs::write(folder.path().join(name), "").unwrap();

@@ -1,7 +1,7 @@
 //! convect: evaluates node graphs that make geometry move, and writes geometry that any other program opens.
 //!
-//! This crate is the program: the catalogue of all nodes, and one file per verb. The engine knows no node; the nodes know no
-//! file but those they read; what writes files is here and in `formats`.
+//! This crate is the program: the catalogue of all nodes, and one file per subcommand. The engine does not depend on
+//! nodes, and nodes do not write files; files are written here and in `formats`.
 
 /// Writes a line to stderr; a closed stderr is ignored.
 #[macro_export]

@@ -12,32 +12,32 @@ use crate::CATALOGUE;
 use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
 
-/// Larger graph files are refused: they hold something else, or geometry that belongs in files of its own.
+/// Larger graph files are refused: they are something else, or contain geometry that should be in separate files.
 const LARGEST_GRAPH: u64 = 256 << 20;
 
 /// The graph at `path`, with some params and controls overridden.
 ///
 /// # Errors
-/// Where the file cannot be read, or its faults.
+/// If the file cannot be read. Faults of the graph are in the inner result.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     let mut bytes = Vec::new();
     let file = engine::files::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
     if bytes.len() as u64 > LARGEST_GRAPH {
         let fact = format!("the graph `{}` is larger than {} MiB", path.display(), LARGEST_GRAPH >> 20);
-        return Err(Failure::file(format!("{fact}; store geometry in files of its own")));
+        return Err(Failure::file(format!("{fact}; store geometry in separate files")));
     }
     let folder = path.parent().filter(|_| !is_handed_over(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
     Ok(Graph::load_bytes(&bytes, &folder, CATALOGUE, &set, &probe))
 }
 
-/// The graph at `path`, sound as far as can be known before it cooks: params that go together, files that are geometry,
-/// outputs that `format` can hold.
+/// The graph at `path`, checked as far as possible before cooking: compatible params, valid geometry files, outputs
+/// that `format` can hold.
 ///
 /// # Errors
-/// Where it cannot be read or is wrong; all faults at once.
-pub fn sound_graph(
+/// If the file cannot be read. All faults of the graph are in the inner result.
+pub fn checked_graph(
     path: &Path,
     set: &[Setting],
     engine: &Engine,
@@ -61,7 +61,7 @@ pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fa
     for output in outputs.iter().map(|index| &graph.outputs[*index]) {
         let kinds = graph.carries(output.from);
         if let Some(kind) = kinds.iter().find(|kind| !format.holds(**kind)) {
-            let fact = format!("`{}` has {kind}, which {format} cannot hold", output.name);
+            let fact = format!("`{}` has the component {kind}, which {format} cannot hold", output.name);
             let able: Vec<&str> = Format::holding(kinds.iter().copied()).iter().map(|format| format.name()).collect();
             let fault = graph.fault_at(Part::Output(&output.name), "output-format", FaultClass::Graph, fact);
             faults.push(fault.hint(format!("use --format {}", able.join(" or "))));
@@ -70,7 +70,7 @@ pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fa
     faults
 }
 
-/// The failure of some faults, a line each.
+/// The failure for a list of faults, with one line each.
 pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
     let file = path.display().to_string();
     let mut lines: Vec<String> = faults.iter().map(|fault| fault.in_file(&file)).collect();
@@ -80,20 +80,20 @@ pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
     Failure { exit: exit_of_faults(faults), lines }
 }
 
-/// An engine for this command.
+/// An engine with these settings.
 ///
 /// # Errors
-/// Where the system gives no threads, or `CONVECT_SIMD` is not a path.
+/// If threads cannot be started, or `CONVECT_SIMD` is not a valid name.
 pub fn engine(threads: usize, memory: usize) -> Result<Engine, Failure> {
     use crate::failure::Exit;
     numerics::simd::Path::from_environment().map_err(|error| Failure::new(Exit::CommandLine, error.to_string()))?;
     Engine::new(&Settings { threads, memory }).map_err(|error| Failure::new(Exit::Cook, error))
 }
 
-/// Indices of the outputs with these names; all of them where none is given.
+/// The indices of the outputs with these names; all if `names` is empty.
 ///
 /// # Errors
-/// Where the graph has no output of a name.
+/// If the graph has no output with one of the names.
 pub fn outputs(graph: &Graph, names: &[String]) -> Result<Vec<usize>, Failure> {
     use crate::failure::Exit;
     if names.is_empty() {
@@ -102,8 +102,11 @@ pub fn outputs(graph: &Graph, names: &[String]) -> Result<Vec<usize>, Failure> {
     let mut indices = Vec::new();
     for name in names {
         let index = graph.outputs.iter().position(|output| *output.name == **name).ok_or_else(|| {
-            let known: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
-            Failure::new(Exit::CommandLine, format!("the graph has no output `{name}`; it has {}", known.join(", ")))
+            let outputs: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
+            Failure::new(
+                Exit::CommandLine,
+                format!("the graph has no output `{name}`; outputs: {}", outputs.join(", ")),
+            )
         })?;
         indices.push(index);
     }

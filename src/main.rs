@@ -1,4 +1,4 @@
-//! The command line: its verbs, and how it ends.
+//! The command line: its subcommands and exit codes.
 
 use std::process::ExitCode;
 
@@ -7,8 +7,8 @@ use convect::failure::{Exit, Failure};
 use convect::say;
 use convect::{check, completions, convert, cook, diff, explain, nodes, schema, stats};
 
-/// Keeps the pages of large arrays from frame to frame: the system's allocator hands them back at once, and taking
-/// them anew costs a third of a frame of a million curves.
+/// Keeps the pages of large arrays between frames. The system's allocator returns them at once, and requesting them
+/// again costs a third of the time of a frame of a million curves.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -20,7 +20,7 @@ enum Verb {
     Cook(Box<cook::CookArgs>),
     /// Report every fault of a graph, without cooking it
     Check(check::CheckArgs),
-    /// Show what a cook would do: which nodes, how often, what is left out and why
+    /// Show what a cook would do: nodes, number of calls, what is left out and why
     Explain(explain::ExplainArgs),
     /// List the nodes, or print the help of one
     Nodes(nodes::NodesArgs),
@@ -41,7 +41,7 @@ fn main() -> ExitCode {
     let verb = match Verb::try_parse() {
         Ok(verb) => verb,
         Err(error) => {
-            // Help and version end well; all else is a wrong command line.
+            // Help and version are not errors.
             let exit = if error.use_stderr() { Exit::CommandLine } else { Exit::Done };
             let _ = error.print();
             return exit.into();
@@ -73,7 +73,8 @@ fn run(verb: &Verb) -> Result<(), Failure> {
     }
 }
 
-/// A node's panic becomes an error that names node and frame; where in the code is shown only if RUST_BACKTRACE is set.
+/// Panics of nodes are reported as errors with node and frame; their position in the code is printed only if
+/// RUST_BACKTRACE is set.
 fn quiet_panics() {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|_| {}));

@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 use crate::CATALOGUE;
 use crate::failure::{Exit, Failure};
 
-/// What `nodes` takes.
+/// The arguments of `nodes`.
 #[derive(Debug, clap::Args)]
 pub struct NodesArgs {
-    /// Node type whose inputs, params, outputs and metrics to print
+    /// Node type to describe: its inputs, params, outputs and metrics
     name: Option<String>,
     /// Print as JSON
     #[arg(long)]
@@ -23,7 +23,7 @@ pub struct NodesArgs {
 /// Prints the list of nodes, or one node's help.
 ///
 /// # Errors
-/// Where there is no node of that name.
+/// If there is no such node type.
 pub fn run(args: &NodesArgs) -> Result<(), Failure> {
     let mut stdout = std::io::stdout();
     let chosen: Vec<&Node> = match &args.name {
@@ -45,8 +45,8 @@ pub fn run(args: &NodesArgs) -> Result<(), Failure> {
 
 fn unknown(name: &str) -> Failure {
     let near = nearest(name, CATALOGUE.names());
-    let hint = near.map_or("`convect nodes` lists them".to_owned(), |near| format!("did you mean `{near}`?"));
-    Failure::new(Exit::CommandLine, format!("there is no node `{name}`; {hint}"))
+    let hint = near.map_or("`convect nodes` lists the node types".to_owned(), |near| format!("did you mean `{near}`?"));
+    Failure::new(Exit::CommandLine, format!("there is no node type `{name}`; {hint}"))
 }
 
 fn to_json(node: &Node) -> Value {

@@ -1,6 +1,6 @@
-//! Numbers as people and scripts want to read them.
+//! Formatting of numbers for people and scripts.
 
-/// Six digits, in the shortest form.
+/// Six significant digits in the shortest form.
 pub fn short(number: f64) -> String {
     let rounded: f64 = format!("{number:.5e}").parse().unwrap_or(number);
     let text = format!("{rounded:?}");
@@ -17,13 +17,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_shown_with_six_digits_and_no_needless_zero() {
+    fn numbers_have_six_digits_and_no_trailing_zero() {
         let shown: Vec<String> = [5.0, 1.0 / 3.0, -0.0, 1e-7, 123_456_789.0, 0.1, f64::NAN].map(short).into();
         assert_eq!(shown, ["5", "0.333333", "-0", "1e-7", "123457000", "0.1", "NaN"]);
     }
 
     #[test]
-    fn an_f32_is_the_decimal_that_its_file_says() {
+    fn an_f32_becomes_the_decimal_in_its_file() {
         assert_eq!([0.1, f32::MAX, -0.0].map(decimal), [0.1, 3.402_823_5e38, -0.0]);
     }
 }

@@ -19,7 +19,7 @@ use crate::failure::Failure;
 pub struct Written {
     /// Files, in the order of frames.
     pub files: Vec<PathBuf>,
-    /// Their bytes.
+    /// Their size in bytes.
     pub bytes: u64,
     /// Frames in them.
     pub frames: Vec<Frame>,
@@ -30,7 +30,7 @@ pub struct Written {
 enum Target {
     /// All frames in one file. Open from the first frame on.
     Sequence { flavour: Flavour, writer: Option<Box<UsdWriter>> },
-    /// A file a frame.
+    /// One file per frame.
     PerFrame,
 }
 
@@ -43,12 +43,12 @@ pub struct Writers<'g> {
 }
 
 impl<'g> Writers<'g> {
-    /// Writers of some outputs into `folder`, which is made where it is missing. Temporaries of killed cooks are swept.
+    /// Writers for `outputs` into `folder`, which is created if it is missing. Temporaries of killed cooks are removed.
     ///
     /// # Errors
-    /// Where the folder cannot be made or written to.
+    /// If the folder cannot be created or written to.
     pub fn new(graph: &'g Graph, outputs: &[usize], folder: &Path, format: Format) -> Result<Self, Failure> {
-        fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "made", error)))?;
+        fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "created", error)))?;
         sweep(folder).map_err(|error| failed(&error))?;
         let target = || match format {
             Format::Usdc => Target::Sequence { flavour: Flavour::Usdc, writer: None },
@@ -59,10 +59,10 @@ impl<'g> Writers<'g> {
         Ok(Self { graph, folder: folder.to_owned(), format, outputs })
     }
 
-    /// Refuses to write over the graph or a file it reads: the next cook would read its own result.
+    /// Refuses to overwrite the graph or a file that it reads, because the next cook would read its own result.
     ///
     /// # Errors
-    /// Where one of `frames` would overwrite one of `inputs`.
+    /// If one of `frames` would overwrite one of `inputs`.
     pub fn refuse_to_overwrite(&self, inputs: &[PathBuf], frames: &[Frame]) -> Result<(), Failure> {
         let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
         for (output, target, _) in &self.outputs {
@@ -86,7 +86,7 @@ impl<'g> Writers<'g> {
     /// Writes finished frames.
     ///
     /// # Errors
-    /// Where a file cannot be written.
+    /// If a file cannot be written.
     pub fn take(&mut self, finished: &[Delivered]) -> Result<(), Failure> {
         let (graph, folder, format) = (self.graph, &self.folder, self.format);
         for (output, target, written) in &mut self.outputs {
@@ -126,16 +126,16 @@ impl<'g> Writers<'g> {
         Ok(())
     }
 
-    /// Finishes files that hold all frames, but for outputs in `spoiled`: a sequence with frames missing would be taken
-    /// for a whole one. What was written, by index of the output.
+    /// Finishes files with all frames, except those of outputs in `incomplete`: a file with missing frames could be
+    /// mistaken for a complete one. Returns what was written, by index of the output.
     ///
     /// # Errors
-    /// Where a file cannot be finished.
-    pub fn finish(self, spoiled: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
+    /// If a file cannot be finished.
+    pub fn finish(self, incomplete: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
         let mut all = Vec::new();
         for (output, target, mut written) in self.outputs {
             if let Target::Sequence { writer: Some(writer), .. } = target {
-                if spoiled.contains(&output) {
+                if incomplete.contains(&output) {
                     written.frames.clear();
                 } else {
                     let name = &self.graph.outputs[output].name;
@@ -165,10 +165,10 @@ fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) ->
     Ok((path, bytes.len() as u64))
 }
 
-/// Writes a whole file at once, or nothing.
+/// Writes a whole file atomically.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     fill(AtomicFile::create(path).map_err(|error| failed(&error))?, bytes)
 }
@@ -176,7 +176,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// Writes the bytes of a file and renames it to its final name.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// If it cannot be written.
 pub fn fill(mut file: AtomicFile, bytes: &[u8]) -> Result<(), Failure> {
     file.write_all(bytes).map_err(|error| failed(&file.failed(error)))?;
     file.commit().map_err(|error| failed(&error))
@@ -190,7 +190,7 @@ pub fn failed(error: &FileError) -> Failure {
     }
 }
 
-/// The failure of a USD file, with its hint where the file system is to blame.
+/// The failure of a USD file, with a hint for errors of the file system.
 pub fn usd_failed(error: UsdError) -> Failure {
     match error {
         UsdError::File(error) => failed(&error),

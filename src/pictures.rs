@@ -1,4 +1,4 @@
-//! Pictures of a cook: a contact sheet, or a PNG a frame; outputs side by side.
+//! Pictures of a cook: a contact sheet, or one PNG per frame, with outputs side by side.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,31 +15,31 @@ use crate::args::Frames;
 use crate::failure::{Exit, Failure};
 use crate::output::write_whole;
 
-/// What `cook` takes for pictures.
+/// The arguments of `cook` for pictures.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Pictures")]
-// A group would have the name of the one around it.
+// Otherwise this group and the enclosing one would have the same name.
 #[group(skip)]
 pub struct PictureArgs {
     /// Draw a contact sheet of six frames, DIR/preview.png
     #[arg(long)]
     preview: bool,
-    /// Draw these frames instead, one PNG each: DIR/preview.0024.png
+    /// Draw these frames instead of a contact sheet, one PNG each: DIR/preview.0024.png
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     preview_frames: Option<Frames>,
     /// Width and height of a panel in pixels [default: 640x480]
     #[arg(long, value_name = "WxH")]
     preview_size: Option<String>,
-    /// Camera: eye=1,2,3 target=0,0,0 fov=35 [default: frames everything drawn]
+    /// Camera: eye=1,2,3 target=0,0,0 fov=35 [default: shows everything drawn]
     #[arg(long, value_name = "CAMERA")]
     camera: Option<String>,
-    /// Attribute to show as colour
+    /// Numeric attribute to show as colour
     #[arg(long, value_name = "ATTRIBUTE")]
     color_by: Option<String>,
 }
 
 impl PictureArgs {
-    /// Each of them does, so that none is given in vain.
+    /// Any of these options requests pictures, so that none is silently ignored.
     fn asks_for_pictures(&self) -> bool {
         self.preview
             || self.preview_frames.is_some()
@@ -66,18 +66,18 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// What is to be drawn, if anything.
+    /// What to draw; `None` if no pictures are requested.
     ///
     /// # Errors
-    /// Where size or camera make no sense, or a frame is asked that is not cooked.
+    /// If the size or the camera is invalid, or a frame to draw is not cooked.
     pub fn new(args: &PictureArgs, graph: &Graph, request: &Request, folder: &Path) -> Result<Option<Self>, Failure> {
         if !args.asks_for_pictures() {
             return Ok(None);
         }
         let wrong = |text: String| Failure::new(Exit::CommandLine, text);
-        let asked = args.preview_size.as_deref().unwrap_or("640x480");
+        let text = args.preview_size.as_deref().unwrap_or("640x480");
         let (width, height) =
-            size(asked).ok_or_else(|| wrong(format!("`{asked}` is not a size in pixels; write 640x480")))?;
+            size(text).ok_or_else(|| wrong(format!("`{text}` is not a size in pixels; write 640x480")))?;
         let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let frames = match &args.preview_frames {
@@ -94,27 +94,25 @@ impl Pictures {
         Ok(Some(Self { names, frames, sheet, settings, folder: folder.to_owned(), kept: BTreeMap::new() }))
     }
 
-    /// Keeps the frames that are to be drawn.
+    /// Keeps the frames to draw.
     pub fn take(&mut self, finished: &[Delivered]) {
         for one in finished.iter().filter(|one| self.frames.contains(&one.frame)) {
             self.kept.insert((one.frame, one.output), one.geometry.clone());
         }
     }
 
-    /// Draws and writes; the files' names.
+    /// Draws and writes the pictures; returns their paths.
     ///
     /// # Errors
-    /// Where a picture cannot be drawn or written.
+    /// If a picture cannot be drawn or written.
     pub fn write(mut self) -> Result<Vec<PathBuf>, Failure> {
         if self.kept.is_empty() {
             return Ok(Vec::new());
         }
         let names = self.frame_all();
         if let (Some(name), None) = (&self.settings.color_by, self.settings.range) {
-            crate::say!(
-                "note: no output has a numeric attribute `{name}` to colour by; available: {}",
-                names.join(", ")
-            );
+            let available = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            crate::say!("note: no output has a numeric attribute `{name}` to colour by; available: {available}");
         }
         let drawn: Vec<Frame> =
             self.frames.iter().copied().filter(|frame| self.kept.keys().any(|(at, _)| at == frame)).collect();
@@ -137,7 +135,7 @@ impl Pictures {
         each.collect()
     }
 
-    /// One camera and one range of colours for all panels. Names of the attributes there are.
+    /// Sets one camera and one range of colours for all panels. Returns the names of the existing attributes.
     fn frame_all(&mut self) -> Vec<String> {
         let layers: Vec<Layer<'_>> = self.kept.values().map(|geometry| Layer::new("", geometry)).collect();
         let all = layers.iter().map(|layer| bounds(std::slice::from_ref(layer))).fold(None, union);
@@ -156,7 +154,7 @@ impl Pictures {
     }
 }
 
-/// `WxH`, of a picture that can be made.
+/// Parses `WxH`; `None` if it is invalid or too large.
 fn size(text: &str) -> Option<(usize, usize)> {
     let (width, height) = text.split_once('x')?;
     let (width, height): (usize, usize) = (width.parse().ok()?, height.parse().ok()?);
@@ -175,7 +173,7 @@ fn save(image: &Image, path: PathBuf) -> Result<PathBuf, Failure> {
     Ok(path)
 }
 
-/// Frames of a contact sheet, evenly spread, first and last among them.
+/// The frames of a contact sheet: evenly spaced, including the first and the last.
 fn spread(frames: &[Frame]) -> Vec<Frame> {
     if frames.len() <= SHEET_FRAMES {
         return frames.to_vec();

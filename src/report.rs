@@ -9,17 +9,17 @@ use serde_json::{Map, Value, json};
 
 use crate::output::Written;
 
-/// What a report contains besides what the engine measured.
+/// What a report contains in addition to the engine's measurements.
 pub struct Cooked<'a> {
     /// The graph's path.
     pub graph_path: String,
     /// The graph.
     pub graph: &'a Graph,
-    /// Frames asked.
+    /// Requested frames.
     pub frames: &'a [Frame],
     /// What was written, by index of the output.
     pub written: &'a [(usize, Written)],
-    /// Threads that cooked.
+    /// Number of threads.
     pub threads: usize,
     /// Wall time of writing.
     pub writing: Duration,
@@ -108,14 +108,14 @@ fn node_to_json(node: &NodeReport) -> Value {
     })
 }
 
-/// Why a node that nothing depends on is left out.
+/// Why a node without dependents is left out.
 pub const NOT_NEEDED: &str = "no requested output depends on it";
 
 fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// A frame as a number: whole where it is.
+/// A frame as a number, an integer if it is whole.
 fn number(frame: Frame) -> Value {
     if frame.is_whole() { json!(frame.floor_number()) } else { json!(frame.number()) }
 }

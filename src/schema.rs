@@ -1,4 +1,4 @@
-//! `convect schema`: a JSON Schema of graph files, for editors.
+//! `convect schema`: the JSON Schema of graph files, for editors.
 
 use std::io::Write as _;
 
@@ -8,7 +8,7 @@ use crate::failure::Failure;
 /// Prints the schema.
 ///
 /// # Errors
-/// Where stdout cannot be written.
+/// If stdout cannot be written.
 pub fn run() -> Result<(), Failure> {
     let schema = engine::graph::schema(CATALOGUE);
     writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&schema).unwrap_or_default())?;

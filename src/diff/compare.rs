@@ -1,9 +1,8 @@
-//! The differences of two geometries: what one of them lacks, and how far apart the rest is.
+//! Compares two geometries: what one of them lacks, and how much the rest differs.
 //!
-//! Without a tolerance numbers are the same where their bits are. With one, floats are the same where they are at
-//! most that far apart (and where both are NaN), and whole numbers where they are equal: ids have no tolerance.
-//! Rows are compared in their order; where the numbers of rows differ, only the counts are reported. Differences are f64,
-//! summed in the order of the rows.
+//! Without a tolerance numbers are the same if their bits are. With one, floats are the same if they differ by at most
+//! the tolerance or are both NaN; integers must be equal. Rows are compared in order; if the numbers of rows differ,
+//! only the counts are reported. Differences are f64, summed in the order of the rows.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -19,21 +18,21 @@ pub(super) enum Side {
     B,
 }
 
-/// Something that is not the same bit for bit.
+/// A difference of bits.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Finding {
     pub(super) kind: Kind,
-    pub(super) what: What,
+    pub(super) what: FindingKind,
 }
 
-/// What was found.
+/// The kind of a difference.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum FindingKind {
     /// Only this side has the component.
     Component(Side),
     /// Numbers of points or elements.
     Count { of: &'static str, counts: [usize; 2] },
-    /// The same number of elements, `differing` of which have other points.
+    /// The same number of elements, of which `differing` have different points.
     Topology { of: &'static str, differing: usize, elements: usize, first: usize },
     /// The grids of two volumes: of the level set, of the velocity, or of both.
     Grid { of: &'static str, grids: [Grid; 2] },
@@ -45,14 +44,14 @@ pub(super) enum What {
     Values(AttributePath, Values),
 }
 
-/// Which attribute. One without an owner is a field of a volume.
+/// Identifies an attribute. Without an owner it is a field of a volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct AttributePath {
     pub(super) owner: Option<Owner>,
     pub(super) name: Name,
 }
 
-/// How two columns of as many rows differ.
+/// The difference of two columns with the same number of rows.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Values {
     pub(super) kind: ColumnType,
@@ -62,39 +61,39 @@ pub(super) struct Values {
     pub(super) differing: usize,
     /// Pairs without a finite difference.
     pub(super) not_finite: usize,
-    /// Greatest absolute difference, and its row; of the finite ones.
+    /// Largest finite absolute difference, and its row.
     pub(super) largest: f64,
     pub(super) largest_row: usize,
-    /// Mean absolute difference of all finite ones, zeros included.
+    /// Mean of all finite absolute differences, including zeros.
     pub(super) mean: f64,
     /// The first number that is not the same.
-    pub(super) first: Option<First>,
+    pub(super) first: Option<FirstDifference>,
 }
 
 /// A number that is not the same: its row, its position in the row, and both values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct First {
+pub(super) struct FirstDifference {
     pub(super) row: usize,
     pub(super) lane: usize,
     pub(super) values: [f64; 2],
 }
 
 impl Finding {
-    /// Whether this makes the two geometries differ; else it is a difference within the tolerance.
+    /// Whether the geometries differ by this; else it is a difference within the tolerance.
     pub(super) fn differs(&self) -> bool {
-        !matches!(&self.what, What::Values(_, values) if values.differing == 0)
+        !matches!(&self.what, FindingKind::Values(_, values) if values.differing == 0)
     }
 }
 
-/// All that is not the same bit for bit, component by component. `tolerance` is a length or another attribute's unit.
+/// All differences of bits, component by component. `tolerance` is a length or another attribute's unit.
 pub(super) fn compare(a: &Geometry, b: &Geometry, tolerance: Option<f64>) -> Vec<Finding> {
     let mut findings = Findings { tolerance, kind: Kind::Curves, found: Vec::new() };
     for kind in Kind::ALL {
         findings.kind = kind;
-        let has = |geometry: &Geometry| geometry.kinds().any(|there| there == kind);
+        let has = |geometry: &Geometry| geometry.kinds().any(|found| found == kind);
         match (has(a), has(b)) {
-            (true, false) => findings.add(What::Component(Side::A)),
-            (false, true) => findings.add(What::Component(Side::B)),
+            (true, false) => findings.add(FindingKind::Component(Side::A)),
+            (false, true) => findings.add(FindingKind::Component(Side::B)),
             _ => {}
         }
         if let (Some(a), Some(b)) = (a.part(kind), b.part(kind)) {
@@ -107,16 +106,16 @@ pub(super) fn compare(a: &Geometry, b: &Geometry, tolerance: Option<f64>) -> Vec
     findings.found
 }
 
-/// What was found so far.
+/// Collects differences.
 struct Findings {
     tolerance: Option<f64>,
-    /// The component at hand.
+    /// The current component.
     kind: Kind,
     found: Vec<Finding>,
 }
 
 impl Findings {
-    fn add(&mut self, what: What) {
+    fn add(&mut self, what: FindingKind) {
         self.found.push(Finding { kind: self.kind, what });
     }
 
@@ -135,7 +134,7 @@ impl Findings {
 
     fn count(&mut self, of: &'static str, a: usize, b: usize) {
         if a != b {
-            self.add(What::Count { of, counts: [a, b] });
+            self.add(FindingKind::Count { of, counts: [a, b] });
         }
     }
 
@@ -151,7 +150,7 @@ impl Findings {
         }
         let mut differing = a.zip(b).enumerate().filter(|(_, (a, b))| a != b).map(|(index, _)| index);
         if let Some(first) = differing.next() {
-            self.add(What::Topology { of, differing: 1 + differing.count(), elements, first });
+            self.add(FindingKind::Topology { of, differing: 1 + differing.count(), elements, first });
         }
     }
 
@@ -161,14 +160,14 @@ impl Findings {
             let attribute = AttributePath { owner: Some(owner), name: name.clone() };
             match (a.column(name), b.column(name)) {
                 (Some(a), Some(b)) => self.columns(attribute, a, b),
-                (Some(_), None) => self.add(What::Attribute(attribute, Side::A)),
-                (None, _) => self.add(What::Attribute(attribute, Side::B)),
+                (Some(_), None) => self.add(FindingKind::Attribute(attribute, Side::A)),
+                (None, _) => self.add(FindingKind::Attribute(attribute, Side::B)),
             }
         }
     }
 
     fn columns(&mut self, attribute: AttributePath, a: &Column, b: &Column) {
-        // Formats need not say the type of a column without rows.
+        // Formats need not store the type of a column without rows.
         if a.len() != b.len() || a.is_empty() {
             return;
         }
@@ -180,10 +179,10 @@ impl Findings {
             (Column::I1(a), Column::I1(b)) => values(a.as_chunks::<1>().0, b.as_chunks().0, kind, None),
             (Column::I3(a), Column::I3(b)) => values(a, b, kind, None),
             (Column::I4(a), Column::I4(b)) => values(a, b, kind, None),
-            _ => return self.add(What::Type(attribute, [kind, b.kind()])),
+            _ => return self.add(FindingKind::Type(attribute, [kind, b.kind()])),
         };
         if let Some(values) = values {
-            self.add(What::Values(attribute, values));
+            self.add(FindingKind::Values(attribute, values));
         }
     }
 
@@ -196,9 +195,9 @@ impl Findings {
             vec![("level set", grids(Volume::level_grid)), ("velocity", grids(Volume::velocity_grid))]
         };
         for (of, grids) in all.into_iter().filter(|(_, [a, b])| a != b) {
-            self.add(What::Grid { of, grids });
+            self.add(FindingKind::Grid { of, grids });
         }
-        // A volume that was read from a file fits dense arrays: it came from some.
+        // A volume that was read from a file fits in dense arrays.
         let dense = |field: &SparseField| Column::new(field.to_dense().unwrap_or_default());
         for ((name, a), (_, b)) in a.fields().into_iter().zip(b.fields()) {
             self.columns(AttributePath { owner: None, name: name.into() }, &dense(a), &dense(b));
@@ -233,7 +232,7 @@ impl Number for i32 {
     }
 }
 
-/// How `a` and `b`, of as many rows, differ; `None` where all bits are the same.
+/// The difference of `a` and `b`, which have the same number of rows; `None` if all bits are the same.
 fn values<const N: usize, T: Number>(
     a: &[[T; N]],
     b: &[[T; N]],
@@ -263,7 +262,7 @@ fn values<const N: usize, T: Number>(
         let both_nan = values.iter().all(|x| x.is_nan());
         if !tolerance.is_some_and(|tolerance| distance <= tolerance || both_nan) {
             found.differing += 1;
-            found.first.get_or_insert(First { row, lane, values });
+            found.first.get_or_insert(FirstDifference { row, lane, values });
         }
     }
     found.mean = NonZeroUsize::new(numbers - found.not_finite).map_or(0.0, |finite| sum / finite.get() as f64);
@@ -281,13 +280,13 @@ mod tests {
 
     fn only_values(a: &Geometry, b: &Geometry, tolerance: Option<f64>) -> Values {
         match compare(a, b, tolerance).as_slice() {
-            [Finding { what: What::Values(_, values), .. }] => values.clone(),
+            [Finding { what: FindingKind::Values(_, values), .. }] => values.clone(),
             found => panic!("{found:?}"),
         }
     }
 
     #[test]
-    fn the_same_bits_are_the_same_even_where_they_are_not_numbers() {
+    fn equal_bits_are_the_same_also_for_nan() {
         let odd = points(&[[f32::NAN, f32::INFINITY, -0.0]]);
         assert_eq!(compare(&odd, &odd.clone(), None), []);
     }
@@ -299,7 +298,7 @@ mod tests {
         let values = only_values(&a, &b, None);
         assert_eq!((values.numbers, values.differing, values.largest, values.largest_row), (9, 2, 1.0, 2));
         assert_eq!(values.mean, 1.5 / 9.0);
-        assert_eq!(values.first, Some(First { row: 1, lane: 1, values: [2.0, 2.5] }));
+        assert_eq!(values.first, Some(FirstDifference { row: 1, lane: 1, values: [2.0, 2.5] }));
     }
 
     #[test]
@@ -311,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn signs_of_zero_differ_in_bits_and_in_nothing_else() {
+    fn signs_of_zero_differ_only_in_bits() {
         let (a, b) = (points(&[[0.0; 3]]), points(&[[0.0, -0.0, 0.0]]));
         assert_eq!(only_values(&a, &b, None).differing, 1);
         assert_eq!(only_values(&a, &b, Some(0.0)).differing, 0);
@@ -339,17 +338,17 @@ mod tests {
     }
 
     #[test]
-    fn what_one_side_lacks_is_named() {
+    fn a_missing_component_or_attribute_is_reported() {
         let mut curves = Component::curves(vec![1], vec![[0.0; 3]]).unwrap();
         let bare = Geometry::from(curves.clone());
         curves.set(ENVELOPE, vec![1.0]).unwrap();
-        let whats = |a: &Geometry, b: &Geometry| -> Vec<What> {
+        let whats = |a: &Geometry, b: &Geometry| -> Vec<FindingKind> {
             compare(a, b, None).into_iter().map(|finding| finding.what).collect()
         };
         let envelope = AttributePath { owner: Some(Owner::Point), name: "envelope".into() };
-        assert_eq!(whats(&curves.clone().into(), &bare), [What::Attribute(envelope.clone(), Side::A)]);
-        assert_eq!(whats(&bare, &curves.into()), [What::Attribute(envelope, Side::B)]);
-        assert_eq!(whats(&bare, &Geometry::default()), [What::Component(Side::A)]);
+        assert_eq!(whats(&curves.clone().into(), &bare), [FindingKind::Attribute(envelope.clone(), Side::A)]);
+        assert_eq!(whats(&bare, &curves.into()), [FindingKind::Attribute(envelope, Side::B)]);
+        assert_eq!(whats(&bare, &Geometry::default()), [FindingKind::Component(Side::A)]);
     }
 
     #[test]
@@ -358,21 +357,21 @@ mod tests {
             let points = counts.iter().sum::<u32>() as usize;
             Geometry::from(Component::curves(counts.to_vec(), vec![[0.0; 3]; points]).unwrap())
         };
-        let whats = |a: &[u32], b: &[u32]| -> Vec<What> {
+        let whats = |a: &[u32], b: &[u32]| -> Vec<FindingKind> {
             compare(&curves(a), &curves(b), None).into_iter().map(|finding| finding.what).collect()
         };
         assert_eq!(
             whats(&[2, 3], &[2, 3, 1]),
-            [What::Count { of: "points", counts: [5, 6] }, What::Count { of: "curves", counts: [2, 3] }]
+            [FindingKind::Count { of: "points", counts: [5, 6] }, FindingKind::Count { of: "curves", counts: [2, 3] }]
         );
         assert_eq!(
             whats(&[2, 3, 1], &[2, 1, 3]),
-            [What::Topology { of: "curves", differing: 2, elements: 3, first: 1 }]
+            [FindingKind::Topology { of: "curves", differing: 2, elements: 3, first: 1 }]
         );
     }
 
     #[test]
-    fn a_type_that_rows_do_not_show_is_no_difference() {
+    fn types_of_columns_without_rows_are_not_compared() {
         let with = |column: Column, rows: usize| {
             let mut points = Component::points(vec![[0.0; 3]; rows]);
             points.set_column(Owner::Point, "mask", column).unwrap();
@@ -381,7 +380,7 @@ mod tests {
         assert_eq!(compare(&with(Column::new::<i32>(vec![]), 0), &with(Column::new::<f32>(vec![]), 0), None), []);
         let found = compare(&with(Column::new(vec![1]), 1), &with(Column::new(vec![1.0_f32]), 1), None);
         let attribute = AttributePath { owner: Some(Owner::Point), name: "mask".into() };
-        assert_eq!(found[0].what, What::Type(attribute, [ColumnType::I1, ColumnType::F1]));
+        assert_eq!(found[0].what, FindingKind::Type(attribute, [ColumnType::I1, ColumnType::F1]));
     }
 
     #[test]
@@ -394,7 +393,7 @@ mod tests {
         };
         assert_eq!(compare(&volume(0.5, 1.0), &volume(0.5, 1.0), None), []);
         let found = compare(&volume(0.5, 1.0), &volume(0.25, 2.0), None);
-        assert!(matches!(found[0].what, What::Grid { of: "grid", .. }));
-        assert!(matches!(&found[1].what, What::Values(attribute, _) if &*attribute.name == "level_set"));
+        assert!(matches!(found[0].what, FindingKind::Grid { of: "grid", .. }));
+        assert!(matches!(&found[1].what, FindingKind::Values(attribute, _) if &*attribute.name == "level_set"));
     }
 }

@@ -1,4 +1,4 @@
-//! `convect diff`: whether two geometries are the same, and how far they are apart where they are not.
+//! `convect diff`: whether two geometries are the same, and how much they differ.
 
 mod compare;
 mod pairs;
@@ -14,15 +14,15 @@ use crate::geometry_file::read;
 use compare::{Finding, compare};
 use pairs::{Pair, pairs};
 
-/// What `diff` takes.
+/// The arguments of `diff`.
 #[derive(Debug, clap::Args)]
 pub struct DiffArgs {
     /// An obj, ply or json file, a folder of them, or a numbered sequence: fur.####.json
     a: PathBuf,
-    /// What to compare it with; the formats may differ
+    /// The file, folder or sequence to compare it with; the formats may differ
     b: PathBuf,
-    /// Floats that differ by at most this are the same, in the attribute's unit (metres for `P`); without it every bit
-    /// counts. Integers are always compared exactly
+    /// Floats that differ by at most this are the same, in the attribute's unit (metres for `P`); without it all bits
+    /// are compared. Integers are always compared exactly
     #[arg(long, value_name = "T", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Print as JSON
@@ -32,10 +32,10 @@ pub struct DiffArgs {
 
 fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| format!("`{text}` is not a tolerance, expected a number of at least 0"))
+    number.ok_or_else(|| format!("`{text}` is not a tolerance, expected a number that is 0 or greater"))
 }
 
-/// Two files, and what of them is not the same.
+/// Two files and their differences.
 struct Compared {
     pair: Pair,
     findings: Vec<Finding>,
@@ -47,12 +47,12 @@ impl Compared {
     }
 }
 
-/// Compares, and prints what differs.
+/// Compares, and prints the differences.
 ///
 /// # Errors
-/// With [`Exit::File`] where something differs, with [`Exit::CommandLine`] for any trouble.
+/// With [`Exit::File`] if something differs, with [`Exit::CommandLine`] for any error.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
-    let trouble = |failure: Failure| Failure { exit: Exit::CommandLine, ..failure };
+    let as_error = |failure: Failure| Failure { exit: Exit::CommandLine, ..failure };
     let compared = |pair: Pair| -> Result<Compared, Failure> {
         let findings = match (&pair.a, &pair.b) {
             (Some(a), Some(b)) => compare(&read(a)?.geometry, &read(b)?.geometry, args.tolerance),
@@ -60,9 +60,9 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         };
         Ok(Compared { pair, findings })
     };
-    let all: Vec<_> = pairs(&args.a, &args.b).map_err(trouble)?.into_par_iter().map(compared).collect();
-    // In the order of the pairs, so that of several errors the same one is always reported.
-    let all = all.into_iter().collect::<Result<Vec<_>, _>>().map_err(trouble)?;
+    let all: Vec<_> = pairs(&args.a, &args.b).map_err(as_error)?.into_par_iter().map(compared).collect();
+    // In the order of the pairs, so that always the same of several errors is reported.
+    let all = all.into_iter().collect::<Result<Vec<_>, _>>().map_err(as_error)?;
     let text = match args.json {
         true => show::json(&all, args.tolerance),
         false => show::text(&all, args.tolerance),
@@ -72,7 +72,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     if let Err(error) = written.as_ref().map_err(std::io::Error::kind)
         && error != ErrorKind::BrokenPipe
     {
-        return written.map_err(|error| trouble(error.into()));
+        return written.map_err(|error| as_error(error.into()));
     }
     if all.iter().any(Compared::differs) { Err(Failure::reported(Exit::File)) } else { Ok(()) }
 }

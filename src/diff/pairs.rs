@@ -1,5 +1,4 @@
-//! Which files of A are compared with which of B: two files, two folders, file by file, or two numbered sequences frame
-//! by frame.
+//! Pairs the files to compare: two files, two folders by file name, or two numbered sequences by frame.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,17 +9,17 @@ use formats::atomic::FileError;
 use crate::failure::{Exit, Failure};
 use crate::geometry_file::Numbered;
 
-/// Files that belong together; one of them may be missing on its side.
+/// Two files to compare; one of them may be missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Pair {
     pub(super) a: Option<PathBuf>,
     pub(super) b: Option<PathBuf>,
 }
 
-/// The pairs of `a` and `b`, by name or frame; at least one.
+/// The pairs of `a` and `b`, by name or frame; not empty.
 ///
 /// # Errors
-/// Where one is a folder or a sequence and the other is not, where one cannot be listed, or where there is no file.
+/// If one is a folder or a sequence and the other is not, one cannot be listed, or there is no file.
 pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
     match (Numbered::of(a)?, Numbered::of(b)?) {
         (Some(a), Some(b)) => return Ok(joined(a.find()?, b.find()?)),
@@ -43,11 +42,15 @@ pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
 }
 
 fn not_a_pair(one: &Path, other: &Path, what: &str) -> Failure {
-    let line = format!("`{}` is {what} and `{}` is not; give two of the same kind", one.display(), other.display());
+    let line = format!(
+        "`{}` is {what} and `{}` is not; compare two files, two folders or two sequences",
+        one.display(),
+        other.display()
+    );
     Failure::new(Exit::CommandLine, line)
 }
 
-/// Both sides' files by key, in its order.
+/// The files of both sides, paired and sorted by key.
 fn joined<K: Ord>(a: Vec<(K, PathBuf)>, b: Vec<(K, PathBuf)>) -> Vec<Pair> {
     let mut pairs: BTreeMap<K, Pair> = BTreeMap::new();
     for (key, path) in a {
@@ -59,7 +62,7 @@ fn joined<K: Ord>(a: Vec<(K, PathBuf)>, b: Vec<(K, PathBuf)>) -> Vec<Pair> {
     pairs.into_values().collect()
 }
 
-/// The geometry files in a folder by name; hidden ones are temporary.
+/// The geometry files in a folder by name, without hidden ones, which are temporary.
 fn geometry_files(folder: &Path) -> Result<Vec<(String, PathBuf)>, Failure> {
     let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
     let mut files = Vec::new();
@@ -111,7 +114,10 @@ mod tests {
     fn a_folder_and_a_file_are_not_compared() {
         let a = folder(&["fur.json"]);
         let error = pairs(a.path(), &a.path().join("fur.json")).unwrap_err();
-        assert!(error.lines[0].ends_with("fur.json` is not; give two of the same kind"), "{error:?}");
+        assert!(
+            error.lines[0].ends_with("fur.json` is not; compare two files, two folders or two sequences"),
+            "{error:?}"
+        );
         assert!(pairs(&folder(&[]).path().join("a.#.json"), a.path()).is_err());
         let error = pairs(folder(&["a.txt"]).path(), folder(&[]).path()).unwrap_err();
         assert!(error.lines[0].ends_with("has a geometry file"), "{error:?}");

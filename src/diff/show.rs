@@ -1,4 +1,4 @@
-//! What differs as text and as JSON.
+//! Differences as text and as JSON.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -7,10 +7,10 @@ use engine::geometry::{ColumnType, Kind, Owner};
 use serde_json::{Value, json};
 
 use super::Compared;
-use super::compare::{AttributePath, Finding, Side, Values, What};
+use super::compare::{AttributePath, Finding, FindingKind, Side, Values};
 use crate::numbers::{decimal, short};
 
-/// JSON: `same`, and a list of pairs with what was found, differences within the tolerance included.
+/// JSON: `same`, and a list of pairs with their findings, including differences within the tolerance.
 pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
     let path = |path: &Option<PathBuf>| json!(path.as_ref().map(|path| path.display().to_string()));
     let pairs: Vec<Value> = all
@@ -28,29 +28,31 @@ pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
 fn finding_json(finding: &Finding) -> Value {
     let mut object = json!({"component": finding.kind.name(), "same": !finding.differs()});
     let mut put = |key: &str, value: Value| object[key] = value;
-    if let What::Attribute(attribute, _) | What::Type(attribute, _) | What::Values(attribute, _) = &finding.what {
+    if let FindingKind::Attribute(attribute, _) | FindingKind::Type(attribute, _) | FindingKind::Values(attribute, _) =
+        &finding.what
+    {
         put("attribute", json!(*attribute.name));
         put("of", json!(row_name(finding.kind, attribute.owner)));
     }
     match &finding.what {
-        What::Component(side) | What::Attribute(_, side) => put("only_in", json!(side_name(*side))),
-        What::Count { of, counts } => {
+        FindingKind::Component(side) | FindingKind::Attribute(_, side) => put("only_in", json!(side_name(*side))),
+        FindingKind::Count { of, counts } => {
             put("of", json!(of));
             put("counts", json!(counts));
         }
-        What::Topology { of, differing, elements, first } => {
+        FindingKind::Topology { of, differing, elements, first } => {
             put("of", json!(of));
             put("differing", json!(differing));
             put("elements", json!(elements));
             put("first", json!(first));
         }
-        What::Grid { of, grids } => {
+        FindingKind::Grid { of, grids } => {
             put("of", json!(of));
             let grid = |k: usize| json!({"origin": grids[k].origin, "cell": grids[k].cell, "size": grids[k].size});
             put("grids", json!([grid(0), grid(1)]));
         }
-        What::Type(_, types) => put("types", json!(types.map(|kind| kind.to_string()))),
-        What::Values(_, values) => {
+        FindingKind::Type(_, types) => put("types", json!(types.map(|kind| kind.to_string()))),
+        FindingKind::Values(_, values) => {
             put("numbers", json!(values.numbers));
             put("differing", json!(values.differing));
             put("not_finite", json!(values.not_finite));
@@ -86,7 +88,7 @@ fn row_name(kind: Kind, owner: Option<Owner>) -> &'static str {
     }
 }
 
-/// Text: a line a finding that makes a difference, and the verdict.
+/// Text: one line for each difference, and the verdict.
 pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
     let mut text = String::new();
     for one in all {
@@ -113,14 +115,16 @@ pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
     text
 }
 
-/// How far apart what counts as the same is, where it is.
+/// The largest difference within the tolerance.
 fn largest_difference(all: &[Compared]) -> String {
     let largest = all.iter().flat_map(|one| &one.findings).filter_map(|finding| match &finding.what {
-        What::Values(attribute, values) => Some((values.largest, attribute, finding.kind)),
+        FindingKind::Values(attribute, values) => Some((values.largest, attribute, finding.kind)),
         _ => None,
     });
     match largest.max_by(|(a, ..), (b, ..)| a.total_cmp(b)) {
-        Some((largest, attribute, kind)) => format!("; `{}` of {kind} is {} apart", attribute.name, short(largest)),
+        Some((largest, attribute, kind)) => {
+            format!("; `{}` of {kind} differs by at most {}", attribute.name, short(largest))
+        }
         None => ", bit for bit".to_owned(),
     }
 }
@@ -128,21 +132,21 @@ fn largest_difference(all: &[Compared]) -> String {
 fn line(finding: &Finding, a: &str, b: &str) -> String {
     let side = |side: Side| if side == Side::A { a } else { b };
     match &finding.what {
-        What::Component(there) => format!("only in {}", side(*there)),
-        What::Attribute(attribute, there) => format!("`{}`: only in {}", attribute.name, side(*there)),
-        What::Count { of, counts: [a, b] } => format!("{a} {of} and {b}"),
-        What::Topology { of, differing, elements, first } => {
-            format!("{differing} of {elements} {of} have other points; the first is {first}")
+        FindingKind::Component(found) => format!("only in {}", side(*found)),
+        FindingKind::Attribute(attribute, found) => format!("`{}`: only in {}", attribute.name, side(*found)),
+        FindingKind::Count { of, counts: [a, b] } => format!("{a} {of} and {b}"),
+        FindingKind::Topology { of, differing, elements, first } => {
+            format!("{differing} of {elements} {of} have different points; the first is {first}")
         }
-        What::Grid { of, grids: [a, b] } => {
+        FindingKind::Grid { of, grids: [a, b] } => {
             let grid = |grid: &engine::geometry::Grid| {
                 let [x, y, z] = grid.size;
                 format!("{x} × {y} × {z} cells of {} m from {:?}", grid.cell, grid.origin)
             };
             format!("{of}: {} and {}", grid(a), grid(b))
         }
-        What::Type(attribute, [a, b]) => format!("`{}`: {a} and {b}", attribute.name),
-        What::Values(attribute, values) => values_line(finding.kind, attribute, values),
+        FindingKind::Type(attribute, [a, b]) => format!("`{}`: {a} and {b}", attribute.name),
+        FindingKind::Values(attribute, values) => values_line(finding.kind, attribute, values),
     }
 }
 
@@ -169,7 +173,7 @@ fn values_line(kind: Kind, attribute: &AttributePath, values: &Values) -> String
     line
 }
 
-/// A number in the shortest form that is it.
+/// A number in its shortest exact form.
 fn shown(value: f64, kind: ColumnType) -> String {
     if kind.is_float() { format!("{:?}", value as f32) } else { value.to_string() }
 }

@@ -1,7 +1,7 @@
 //! Measurements of a geometry: counts, bounds, lengths, areas, volumes, and the range of every attribute.
 //!
 //! Sums are f64 in the order of the rows, so the same file gives the same digits everywhere. NaN and infinity are
-//! counted and excluded from all else.
+//! counted and otherwise ignored.
 
 use engine::geometry::{
     Column, ColumnType, Component, Geometry, Grid, Kind, Name, Owner, SparseField, Table, Topology, Volume,
@@ -10,7 +10,7 @@ use numerics::vector::to_f64;
 
 use super::surface::{SurfaceStats, tet_volume};
 
-/// Least, greatest and sum of one or more numbers.
+/// Minimum, maximum and sum of one or more numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spread {
     count: usize,
@@ -20,7 +20,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Of the finite ones of `numbers`; `None` without any.
+    /// The spread of the finite `numbers`; `None` if there are none.
     pub(super) fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         numbers.into_iter().filter(|x| x.is_finite()).fold(None, |spread, x| {
             let so_far = spread.unwrap_or(Self { count: 0, min: x, max: x, sum: 0.0 });
@@ -42,7 +42,7 @@ pub(super) struct AttributeStats {
     pub(super) rows: usize,
     /// NaN and infinities.
     pub(super) not_finite: usize,
-    /// One for each component of a row; `None` without a finite one.
+    /// One for each component of a row; `None` without finite numbers.
     pub(super) spreads: Vec<Option<Spread>>,
 }
 
@@ -100,7 +100,7 @@ pub(super) struct PartStats {
 /// A volume.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct VolumeStats {
-    /// Of the level set, and of the velocity unless it has one of its own.
+    /// The grid of the level set, and of the velocity unless `velocity_grid` is set.
     pub(super) grid: Grid,
     pub(super) velocity_grid: Option<Grid>,
     /// Cells whose centre is inside.
@@ -161,7 +161,7 @@ fn polyline_length(cvs: &[[f32; 3]]) -> f64 {
 }
 
 fn volume(volume: &Volume) -> VolumeStats {
-    // A volume that was read from a file fits dense arrays: it came from some.
+    // A volume that was read from a file fits in dense arrays.
     let field = |(name, field): (&str, &SparseField)| {
         AttributeStats::of(&name.into(), &Column::new(field.to_dense().unwrap_or_default()))
     };
@@ -227,8 +227,8 @@ mod tests {
     #[test]
     fn a_volume_counts_its_inside() {
         let grid = Grid { origin: [0.0; 3], cell: 0.5, size: [2, 1, 1] };
-        let made = Volume::new(grid, vec![-0.1, 0.0], [vec![1.0; 3], vec![0.0; 4], vec![0.0; 4]]).unwrap();
-        let stats = volume(&made);
+        let cells = Volume::new(grid, vec![-0.1, 0.0], [vec![1.0; 3], vec![0.0; 4], vec![0.0; 4]]).unwrap();
+        let stats = volume(&cells);
         assert_eq!((stats.inside, stats.fields.len(), stats.fields[1].rows), (1, 4, 3));
     }
 }

@@ -1,4 +1,4 @@
-//! `convect stats`: what a geometry file holds, in numbers that a pipeline can assert on.
+//! `convect stats`: measurements of a geometry file, which a pipeline can assert on.
 
 mod measure;
 mod show;
@@ -10,20 +10,20 @@ use std::path::PathBuf;
 use crate::failure::Failure;
 use crate::geometry_file::read;
 
-/// What `stats` takes.
+/// The arguments of `stats`.
 #[derive(Debug, clap::Args)]
 pub struct StatsArgs {
     /// An obj, ply or json file
     file: PathBuf,
-    /// Print as JSON, with all digits (text is rounded to six)
+    /// Print as JSON, with all digits (text has six)
     #[arg(long)]
     json: bool,
 }
 
-/// Prints the numbers.
+/// Prints the measurements.
 ///
 /// # Errors
-/// Where the file cannot be read or stdout cannot be written.
+/// If the file cannot be read or stdout cannot be written.
 pub fn run(args: &StatsArgs) -> Result<(), Failure> {
     let file = read(&args.file)?;
     let stats = measure::stats(&file.geometry);

@@ -77,7 +77,7 @@ fn attributes_json(attributes: &[AttributeStats]) -> Value {
     attributes.iter().map(|one| (one.name.to_string(), attribute_json(one))).collect::<Map<_, _>>().into()
 }
 
-/// Least, greatest and mean: numbers for scalar attributes, else lists.
+/// Minimum, maximum and mean: numbers for scalar attributes, else lists.
 fn attribute_json(attribute: &AttributeStats) -> Value {
     let each = |number: &dyn Fn(&Spread) -> f64| match attribute.spreads.as_slice() {
         [one] => json!(one.as_ref().map(number)),
@@ -191,7 +191,7 @@ fn attributes_text(owner: &str, attributes: &[AttributeStats], text: &mut String
         };
         let mut facts = format!("{owner} {}, ", attribute.kind);
         let _ = match attribute.rows {
-            0 => write!(facts, "no row"),
+            0 => write!(facts, "no rows"),
             _ => write!(facts, "{} to {}, mean {}", each(&|x| x.min), each(&|x| x.max), each(&Spread::mean)),
         };
         if attribute.not_finite > 0 {

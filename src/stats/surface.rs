@@ -1,8 +1,8 @@
 //! Totals over the polygons of a mesh: edges, area and volume.
 //!
-//! Exact up to f64 rounding, summed in the order of the faces. The area of a polygon is the length of its vector area:
-//! the true area where the polygon is planar, convex or not. The volume is that of the polygons as fans about their first
-//! corners; it is defined for closed surfaces only.
+//! Exact up to f64 rounding, summed in the order of the faces. The area of a polygon is the length of its vector area,
+//! which is exact for planar polygons, convex or not. The volume is computed with polygons as triangle fans about their
+//! first corners, and only for closed surfaces.
 
 use engine::geometry::Faces;
 use numerics::vector::{DVec3, to_f64};
@@ -10,11 +10,11 @@ use numerics::vector::{DVec3, to_f64};
 /// Edges, area and volume.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SurfaceStats {
-    /// Corners a face.
+    /// Corners of each face.
     pub(super) corners: Vec<u32>,
-    /// Edges, each counted once, whatever the number of its faces.
+    /// Number of distinct edges.
     pub(super) edges: usize,
-    /// Edges of one face: the rim of an open mesh.
+    /// Edges of one face: the boundary of an open mesh.
     pub(super) boundary: usize,
     /// Edges of two faces.
     pub(super) manifold: usize,
@@ -24,13 +24,13 @@ pub(super) struct SurfaceStats {
     pub(super) flipped: usize,
     /// m².
     pub(super) area: f64,
-    /// m³, positive where faces are counter-clockwise seen from outside; `None` where the surface is not closed: where some
-    /// edge is not used equally often in both directions.
+    /// m³, positive if faces are counter-clockwise seen from outside; `None` if the surface is not closed, that is, if
+    /// an edge is not used equally often in both directions.
     pub(super) volume: Option<f64>,
 }
 
 impl SurfaceStats {
-    /// Of `faces` between `positions`.
+    /// Measures `faces` with these `positions`.
     pub(super) fn of(faces: &Faces, positions: &[[f32; 3]]) -> Self {
         let mut edges = directed_edges(faces);
         edges.sort_unstable();
@@ -58,7 +58,7 @@ impl SurfaceStats {
                 _ => surface.non_manifold += 1,
             }
         }
-        // Relative to a point of the mesh: far from the origin the products would cancel.
+        // Relative to a point of the mesh, to avoid cancellation far from the origin.
         let about = positions.first().copied().map_or(DVec3::zeros(), to_f64);
         let point = |corner: u32| to_f64(positions[corner as usize]) - about;
         let mut volume = 0.0;
@@ -85,7 +85,7 @@ struct Edge {
     ascends: bool,
 }
 
-/// The edges of all faces. A corner that is repeated makes none.
+/// The edges of all faces. Repeated corners make no edge.
 fn directed_edges(faces: &Faces) -> Vec<Edge> {
     let mut edges = Vec::with_capacity(faces.corners.len());
     for face in faces.iter() {
@@ -116,7 +116,7 @@ mod tests {
         SurfaceStats::of(mesh.faces().unwrap(), mesh.positions())
     }
 
-    /// A cube of edge 2 about `x`, six quads that look outwards.
+    /// A cube with edges of 2 centred at `x`, with six quads facing outwards.
     fn cube(x: f32) -> (Vec<&'static [u32]>, Vec<[f32; 3]>) {
         let corner = |k: u32| [x + [-1.0, 1.0][k as usize & 1], [-1.0, 1.0][k as usize >> 1 & 1], k as f32 / 4.0];
         let positions = (0..8).map(corner).map(|[x, y, z]| [x, y, if z < 1.0 { -1.0 } else { 1.0 }]).collect();
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_has_its_area_and_volume_near_and_far_from_zero() {
+    fn the_area_and_volume_of_a_cube_are_exact_near_and_far_from_zero() {
         for x in [0.0, 4096.0] {
             let (faces, positions) = cube(x);
             let cube = surface(&faces, &positions);
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_that_look_inwards_have_a_negative_volume() {
+    fn faces_that_point_inwards_have_a_negative_volume() {
         let (faces, positions) = cube(0.0);
         let inside_out: Vec<Vec<u32>> = faces.iter().map(|face| face.iter().rev().copied().collect()).collect();
         let inside_out: Vec<&[u32]> = inside_out.iter().map(Vec::as_slice).collect();
@@ -149,7 +149,7 @@ mod tests {
         faces.pop();
         let open = surface(&faces, &positions);
         assert_eq!((open.volume, open.boundary, open.area), (None, 4, 20.0));
-        assert_eq!(surface(&[], &positions).volume, None, "no face encloses nothing");
+        assert_eq!(surface(&[], &positions).volume, None, "without faces nothing is enclosed");
     }
 
     #[test]
@@ -160,13 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn a_polygon_with_a_notch_has_its_true_area() {
+    fn the_area_of_a_concave_polygon_is_exact() {
         let arrow = [[0.0, 0.0, 0.0], [2.0, -2.0, 0.0], [1.0, 0.0, 0.0], [2.0, 2.0, 0.0]];
         assert_eq!(surface(&[&[1, 2, 3, 0]], &arrow).area, 2.0);
     }
 
     #[test]
-    fn a_tet_is_positive_where_its_faces_look_outwards() {
+    fn a_tet_with_faces_that_point_outwards_has_a_positive_volume() {
         let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let [a, b, c, d] = corners;
         assert_eq!((tet_volume(corners), tet_volume([a, c, b, d])), (1.0 / 6.0, -1.0 / 6.0));

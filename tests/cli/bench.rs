@@ -1,4 +1,4 @@
-//! A folder that contains a scene, in which the program is run.
+//! A temporary folder with a scene, in which the program is run.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-/// Grass in a breeze; its output `still` is the grass itself.
+/// Grass in wind; the output `still` is the grass at rest.
 pub(crate) const GRAPH: &str = r#"// grass.json
 {
   "convect": 1,
@@ -25,7 +25,7 @@ pub(crate) const GRAPH: &str = r#"// grass.json
 }
 "#;
 
-/// The wind's direction is zero at frame 2, which fails; the output `still` does not depend on it.
+/// The wind direction is zero at frame 2, which is an error; the output `still` does not depend on it.
 pub(crate) const CALM_AT_2: &str = r#"{
   "convect": 1,
   "scene": { "frames": [1, 3] },
@@ -39,13 +39,13 @@ pub(crate) const CALM_AT_2: &str = r#"{
   "outputs": { "grass": "wind", "still": "blades" }
 }"#;
 
-/// A folder of its own for one test.
+/// A temporary folder for one test.
 pub(crate) struct Bench {
     folder: tempfile::TempDir,
 }
 
 impl Bench {
-    /// With `g.json`, the grass, and `grass.obj`, its 60 blades.
+    /// Contains the graph [`GRAPH`] as `g.json`, and 60 blades as `grass.obj`.
     pub(crate) fn new() -> Self {
         let bench = Self { folder: tempfile::tempdir().unwrap() };
         bench.write("g.json", GRAPH);
@@ -53,7 +53,7 @@ impl Bench {
         bench
     }
 
-    /// With a graph in place of the grass.
+    /// With another graph as `g.json`.
     pub(crate) fn with_graph(graph: &str) -> Self {
         let bench = Self::new();
         bench.write("g.json", graph);
@@ -70,7 +70,7 @@ impl Bench {
         fs::write(path, text).unwrap();
     }
 
-    /// A command that runs the program here.
+    /// A command that runs the program in the folder.
     pub(crate) fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_convect"));
         command.args(args).current_dir(self.folder.path()).stdin(Stdio::null());
@@ -82,25 +82,25 @@ impl Bench {
         Ran::of(&self.command(args).output().unwrap())
     }
 
-    /// Runs a command that must succeed, and returns stdout.
+    /// Runs the program, which must succeed; returns stdout.
     pub(crate) fn done(&self, args: &[&str]) -> String {
         let ran = self.run(args);
         assert_eq!(ran.code, Some(0), "{args:?}: {}", ran.stderr);
         ran.stdout
     }
 
-    /// The same for JSON on stdout.
+    /// The same, with stdout parsed as JSON.
     pub(crate) fn json(&self, args: &[&str]) -> Value {
         let text = self.done(args);
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{args:?}: {error} in {text}"))
     }
 
-    /// Names in a folder, hidden ones too, in order.
+    /// File names in a folder, including hidden ones, sorted.
     pub(crate) fn names(&self, folder: &str) -> Vec<String> {
         names(&self.path(folder))
     }
 
-    /// Every file in a folder.
+    /// All files in a folder.
     pub(crate) fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
         let file = |name: String| {
             let bytes = fs::read(self.path(folder).join(&name)).unwrap();
@@ -114,7 +114,7 @@ impl Bench {
     }
 }
 
-/// Names in a folder, sorted, with hidden ones; empty if there is no folder.
+/// File names in a folder, including hidden ones, sorted; empty if the folder does not exist.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -122,7 +122,7 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// How a run ended.
+/// The result of a run.
 #[derive(Debug)]
 pub(crate) struct Ran {
     /// `None` if a signal ended the process.
@@ -142,7 +142,7 @@ impl Ran {
     }
 }
 
-/// An obj file with upright curves of five CVs, 0.25 tall and 0.125 apart.
+/// An obj file of upright curves with five CVs, 0.25 m tall and 0.125 m apart.
 pub(crate) fn blades(count: usize) -> String {
     let mut text = String::new();
     for blade in 0..count {

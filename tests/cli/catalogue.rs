@@ -26,14 +26,14 @@ fn every_node_is_listed_and_has_a_help_page() {
 }
 
 #[test]
-fn a_sound_graph_has_no_faults() {
+fn a_valid_graph_has_no_faults() {
     let bench = Bench::new();
     assert_eq!(bench.done(&["check", "g.json"]), "");
     assert_eq!(bench.json(&["check", "g.json", "--json"]), json!([]));
 }
 
 #[test]
-fn faults_as_json_go_to_stdout_alone() {
+fn faults_as_json_are_printed_only_to_stdout() {
     let bench = Bench::with_graph(&CALM_AT_2.replace("\"wind_dir\"", "\"wind_dirr\""));
     let ran = bench.run(&["check", "g.json", "--json"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), ""));
@@ -68,8 +68,8 @@ fn explain_shows_how_far_back_a_window_reads_and_its_cost() {
                "jiggle": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" }, "params": { "frequency": 12 } } },
              "outputs": { "hair": "jiggle" } }"#,
     );
-    // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors; for each but the first, 9 earlier
-    // frames are run.
+    // ln((1 + 1.3·1.05)·1000) ÷ (0.3·2π·12) = 0.344 s: 9 frames. Eleven anchors, each but the first with 9 steps before
+    // it.
     let text = bench.done(&["explain", "g.json"]);
     assert!(text.contains("186 steps for 96 frames: window of 9 frames, restarted every 9"), "{text}");
     let plan = bench.json(&["explain", "g.json", "--json"]);

@@ -1,4 +1,4 @@
-//! What `check` finds without cooking: geometry written into the graph, files of a sequence, params that move.
+//! Faults that `check` finds without cooking: inline geometry, files of a sequence, animated params.
 
 use crate::bench::{Bench, CALM_AT_2, Ran};
 
@@ -6,8 +6,8 @@ fn check(bench: &Bench) -> Ran {
     bench.run(&["check", "g.json"])
 }
 
-/// The message of `check` for one node with these params.
-fn said(kind: &str, params: &str) -> (Option<i32>, String) {
+/// The exit code and first message of `check` for one node with these params.
+fn checked(kind: &str, params: &str) -> (Option<i32>, String) {
     let graph = format!(
         r#"{{"convect": 1, "nodes": {{"a": {{"type": "{kind}", "params": {{{params}}}}}}}, "outputs": {{"o": "a"}}}}"#
     );
@@ -17,7 +17,7 @@ fn said(kind: &str, params: &str) -> (Option<i32>, String) {
 }
 
 #[test]
-fn geometry_written_into_the_graph_is_checked() {
+fn inline_geometry_is_checked() {
     let curve = r#""points": [[0, 0, 0], [0, 1, 0]]"#;
     let square = r#""points": [[0, 0, 0], [1, 0, 0], [1, 0, 1]]"#;
     let tet = r#""points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"#;
@@ -60,13 +60,13 @@ fn geometry_written_into_the_graph_is_checked() {
             "nodes.a.params.attributes: `id` has 3 rows, expected 2",
         ),
     ] {
-        assert_eq!(said(kind, &params), (Some(3), expected.to_owned()), "{kind} {params}");
+        assert_eq!(checked(kind, &params), (Some(3), expected.to_owned()), "{kind} {params}");
     }
-    assert_eq!(said("Tet_In", &format!(r#"{tet}, "tets": [[0, 1, 2, 3]]"#)).0, Some(0));
+    assert_eq!(checked("Tet_In", &format!(r#"{tet}, "tets": [[0, 1, 2, 3]]"#)).0, Some(0));
 }
 
 #[test]
-fn a_gap_in_a_sequence_is_found_before_anything_cooks() {
+fn a_gap_in_a_sequence_is_found_before_cooking() {
     let graph = r#"{"convect": 1, "scene": {"frames": [1, 6]},
 "nodes": {"a": {"type": "Curve_In", "params": {"file": "in.####.obj"}}}, "outputs": {"o": "a"}}"#;
     let bench = Bench::with_graph(graph);
@@ -84,20 +84,20 @@ fn a_gap_in_a_sequence_is_found_before_anything_cooks() {
 }
 
 #[test]
-fn params_that_leave_their_range_at_some_frame_are_found() {
+fn animated_params_that_leave_their_range_are_found() {
     let bench = Bench::with_graph(CALM_AT_2);
     let ran = check(&bench);
     let expected = "g.json:8:31: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction, \
-                    at frame 2; give a vector that is not zero, such as [1, 0, 0]\n";
+                    at frame 2; use a vector that is not zero, such as [1, 0, 0]\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), expected));
-    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1"]).code, Some(0), "a cook checks its own frames only");
+    assert_eq!(bench.run(&["cook", "g.json", "--frames", "1"]).code, Some(0), "a cook checks only its frames");
 
     let graph = CALM_AT_2.replace(r#""keyframes": [[1, [1, 0, 0]], [3, [-1, 0, 0]]]"#, r#""expr": ["1", "0", "0"]"#);
     let octaves =
         graph.replace(r#""params": { "wind_dir""#, r#""params": { "octaves": {"expr": "frame/2"}, "wind_dir""#);
     let ran = check(&Bench::with_graph(&octaves));
     let line = "nodes.wind.params.octaves: `octaves` is 0.5, at frame 1 and at 1 more frame; expected a whole number; \
-                floor(…), ceil(…) or round(…) makes one\n";
+                floor(…), ceil(…) and round(…) give whole numbers\n";
     assert!(ran.stderr.ends_with(line), "{}", ran.stderr);
     let floored = octaves.replace("frame/2", "1 + floor(frame/2)");
     assert_eq!(check(&Bench::with_graph(&floored)).stderr, "");
@@ -137,5 +137,8 @@ fn a_graph_from_stdin_has_paths_relative_to_the_working_directory() {
 fn a_compressed_graph_is_recognised_and_refused() {
     let bench = Bench::new();
     std::fs::write(bench.path("g.json"), b"\x1f\x8b\x08\0\0\0\0\0\0\x03").unwrap();
-    assert_eq!(check(&bench).stderr, "g.json:1:1: the file looks like gzip, expected a text; unpack it first\n");
+    assert_eq!(
+        check(&bench).stderr,
+        "g.json:1:1: the file looks like gzip, expected a text file; decompress it first\n"
+    );
 }

@@ -1,4 +1,4 @@
-//! `convert`: one file, and sequences.
+//! `convert`: single files and sequences.
 
 use serde_json::json;
 
@@ -20,7 +20,7 @@ fn data_that_a_format_drops_is_noted() {
     let bench = Bench::new();
     bench.write("a.json", r#"{"points": {"points": [[0, 0, 0]], "point_attributes": {"heat": [1.5]}}}"#);
     let ran = bench.run(&["convert", "a.json", "a.obj"]);
-    assert_eq!(ran.stderr.lines().nth(1), Some("note: left out `heat` of points, which the format cannot hold"));
+    assert_eq!(ran.stderr.lines().nth(1), Some("note: written without `heat` of points, which the format cannot hold"));
     assert_eq!(bench.run(&["convert", "a.json", "a.obj", "--quiet"]).stderr, "");
 }
 
@@ -64,7 +64,10 @@ fn a_sequence_becomes_one_file_or_one_file_per_frame() {
     bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
     bench.done(&["cook", "g.json", "--format", "usdc", "--output", "grass", "--out", "usd"]);
     bench.done(&["convert", "out/grass.####.json", "grass.usdc"]);
-    assert!(bench.files("usd")["grass.usdc"] == std::fs::read(bench.path("grass.usdc")).unwrap(), "as cook writes it");
+    assert!(
+        bench.files("usd")["grass.usdc"] == std::fs::read(bench.path("grass.usdc")).unwrap(),
+        "the same as written by cook"
+    );
     std::fs::create_dir(bench.path("ply")).unwrap();
     bench.done(&["convert", "out/grass.####.json", "ply/g_##.ply"]);
     assert_eq!(bench.names("ply"), ["g_01.ply", "g_02.ply", "g_03.ply", "g_04.ply"]);
@@ -79,14 +82,14 @@ fn a_sequence_without_a_valid_target_or_files_is_refused() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
     let ran = bench.run(&["convert", "out/grass.####.json", "all.ply"]);
-    let line = "4 files cannot become one ply file; write all.####.ply\n";
+    let line = "cannot convert 4 files to one ply file; write all.####.ply\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), line));
     let ran = bench.run(&["convert", "out/fur.####.json", "fur.usdc"]);
     let line = "no file matches `out/fur.####.json`\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
     let ran = bench.run(&["convert", "out/grass.####.json", "none/grass.####.ply"]);
     let line = "`none/grass.0001.ply` could not be created: no such file or folder; \
-                check the path, or make the folder first\n";
+                check the path, or create the folder first\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
 }
 
@@ -103,7 +106,7 @@ fn conversion_scales_lengths() {
     let expected = json!({"v": [[2.0, 0.0, 0.0]], "width": [0.1], "heat": [3.5]});
     assert_eq!((&points["points"], &points["point_attributes"]), (&json!([[1.0, 0.0, 0.5]]), &expected));
     let ran = bench.run(&["convert", "a.json", "c.usdc", "--scale", "1e37"]);
-    let line = "`a.json`: `P` of points times 1e37 is out of the range of f32\n";
+    let line = "`a.json`: `P` of points scaled by 1e37 is out of the range of f32\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
 }
 

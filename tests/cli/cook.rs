@@ -1,4 +1,4 @@
-//! `cook` without errors: files and their names, frames, settings, the report.
+//! Successful cooks: files and their names, frames, settings, the report.
 
 use std::fs;
 
@@ -13,7 +13,7 @@ fn cooked(args: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn all_outputs_are_written_as_usdc_into_out_and_nothing_else() {
+fn by_default_all_outputs_are_written_as_usdc_to_out() {
     let bench = Bench::new();
     let ran = bench.run(&["cook", "g.json"]);
     assert_eq!((ran.code, ran.stdout.as_str()), (Some(0), ""), "stdout carries data only");
@@ -33,7 +33,7 @@ fn every_format_has_its_files() {
 }
 
 #[test]
-fn frames_are_ranges_steps_and_sub_frames() {
+fn frames_are_ranges_steps_and_fractions() {
     let files = |frames: &str| cooked(&["--format", "json", "--frames", frames]).join(" ").replace(".json", "");
     assert_eq!(files("3"), "grass.0003");
     assert_eq!(files("1-4x2"), "grass.0001 grass.0003");
@@ -54,14 +54,14 @@ fn a_json_file_contains_its_frame_and_time() {
 }
 
 #[test]
-fn outputs_are_chosen_by_name_and_folders_are_made() {
+fn outputs_are_selected_by_name_and_folders_are_created() {
     let bench = Bench::new();
     bench.done(&["cook", "g.json", "--output", "still", "--out", "a/b", "--format", "obj", "--frames", "1"]);
     assert_eq!(bench.names("a/b"), ["still.0001.obj"]);
 }
 
 #[test]
-fn quiet_prints_nothing_and_verbose_prints_more() {
+fn quiet_prints_nothing_and_verbose_more() {
     let bench = Bench::new();
     assert_eq!(bench.run(&["cook", "g.json", "-q"]).stderr, "");
     assert!(bench.run(&["cook", "g.json", "-v"]).stderr.contains("wind (Curve_Wind): 4 cooked"));
@@ -158,5 +158,5 @@ fn curves_on_a_moving_skin_have_velocities() {
     );
     bench.done(&["cook", "g.json", "--format", "json"]);
     let v = bench.read_json("out/o.0002.json")["curves"]["point_attributes"]["v"][0].clone();
-    assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m per frame at 10 frames per second: {v}");
+    assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m per frame, 10 frames per second: {v}");
 }

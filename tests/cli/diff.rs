@@ -1,4 +1,4 @@
-//! `diff`: exit code 0 the same, 1 different, 2 errors.
+//! `diff`: exit code 0 for the same, 1 for different, 2 for an error.
 
 use serde_json::json;
 
@@ -51,7 +51,7 @@ fn differences_are_counted_measured_and_located() {
 #[test]
 fn differences_within_the_tolerance_pass_and_are_still_reported() {
     let bench = bench();
-    let same = "the same within 0.5; `P` of points is 0.5 apart\n";
+    let same = "the same within 0.5; `P` of points differs by at most 0.5\n";
     assert_eq!(ran(&bench, &["a.json", "b.json", "--tolerance", "0.5"]), (Some(0), same.into()));
     assert_eq!(ran(&bench, &["a.json", "b.json", "--tolerance", "0.4"]).0, Some(1));
     let json = bench.json(&["diff", "a.json", "b.json", "--tolerance", "0.5", "--json"]);
@@ -59,7 +59,7 @@ fn differences_within_the_tolerance_pass_and_are_still_reported() {
 }
 
 #[test]
-fn counts_components_and_attributes_of_one_side_are_reported() {
+fn counts_and_components_and_attributes_of_one_side_are_reported() {
     let bench = bench();
     bench.write(
         "c.json",
@@ -84,7 +84,7 @@ fn folders_are_compared_file_by_file() {
 }
 
 #[test]
-fn two_cooks_are_compared_frame_by_frame_whatever_their_format() {
+fn two_cooks_are_compared_frame_by_frame_in_any_format() {
     let bench = Bench::new();
     for format in ["json", "ply"] {
         bench.done(&["cook", "g.json", "--format", format, "--out", format, "--output", "grass"]);

@@ -1,4 +1,4 @@
-//! Exit codes: 0 success, 1 file, 2 command line, 3 graph, 4 cook; the lowest if there are faults of several classes.
+//! Exit codes: 0 success, 1 file, 2 command line, 3 graph, 4 cook; of several classes the lowest.
 
 use std::fs;
 
@@ -111,7 +111,7 @@ fn a_node_that_fails_at_a_frame_exits_with_4_and_affects_only_its_output() {
     assert_eq!(
         (ran.code, bench.names("usd")),
         (Some(4), vec!["still.usdc".into()]),
-        "an incomplete USD file is not written"
+        "a sequence is complete or absent"
     );
     assert_eq!(bench.run(&["cook", "g.json", "--frames", "1,3", "--out", "usd"]).code, Some(0));
 }

@@ -1,8 +1,8 @@
-//! The built program as users run it, each time in a folder of its own.
+//! Tests of the built program, run in temporary folders.
 //!
-//! Every run through [`bench`] also checks that no panic or backtrace is shown.
+//! Every run through [`bench`] also checks that no panic message or backtrace is printed.
 
-#![allow(clippy::unwrap_used, reason = "a value that is not there fails the test")]
+#![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
 mod bench;
 mod catalogue;

@@ -1,5 +1,5 @@
-//! Complete error output as users see it. The engine's tests check the wording of each fault; these check that all
-//! faults are printed at once, with position and hint, and nothing else.
+//! Complete messages on stderr. The wording of each fault is tested in the engine; these tests check that the program
+//! prints all faults at once, with position and hint, and nothing else.
 
 use crate::bench::{Bench, CALM_AT_2};
 
@@ -11,9 +11,9 @@ fn stderr(graph: &str, args: &[&str]) -> String {
 }
 
 #[test]
-fn the_message_for_a_truncated_file_names_the_open_object() {
+fn the_message_for_a_truncated_file_names_what_was_open() {
     let expected =
-        "g.json:1:26: the file ends inside the object that opens on line 1, column 25; is the rest missing?\n";
+        "g.json:1:26: the file ends inside the object that starts at line 1, column 25; is the rest missing?\n";
     assert_eq!(stderr(r#"{"convect": 1, "nodes": {"#, &["check", "g.json"]), expected);
 }
 
@@ -31,13 +31,13 @@ fn all_faults_are_reported_at_once_each_with_position_and_hint() {
     let expected = r#"g.json:4:54: nodes.fur.params.file: `fur.obj` does not exist; paths are relative to the graph file
 g.json:5:59: nodes.wind.inputs.curves: there is no node `furr`; did you mean `fur`?
 g.json:6:27: nodes.wind.params.amplitud: `Curve_Wind` has no param `amplitud`; did you mean `amplitude`?
-g.json:6:54: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction; give a vector that is not zero, such as [1, 0, 0]
-g.json:6:75: nodes.wind.params.scroll: found the text "fast", expected a number
+g.json:6:54: nodes.wind.params.wind_dir: `wind_dir` is [0, 0, 0], which has no direction; use a vector that is not zero, such as [1, 0, 0]
+g.json:6:75: nodes.wind.params.scroll: found the string "fast", expected a number
 g.json:8:21: outputs.o: there is no node `wnd`; did you mean `wind`?
 6 faults
 "#;
     assert_eq!(stderr(graph, &["check", "g.json"]), expected);
-    assert_eq!(stderr(graph, &["cook", "g.json"]), expected, "cook and check say the same");
+    assert_eq!(stderr(graph, &["cook", "g.json"]), expected, "cook and check print the same");
 }
 
 #[test]
@@ -45,8 +45,8 @@ fn a_cycle_is_reported_node_by_node() {
     let graph = r#"{"convect": 1, "nodes": {
   "a": {"type": "Curve_Wind", "inputs": {"curves": "b"}}, "b": {"type": "Curve_Wind", "inputs": {"curves": "a"}}},
   "outputs": {"o": "a"}}"#;
-    let expected = "g.json:2:52: nodes.a.inputs.curves: the wires go round: a → b → a; geometry flows one way; \
-                    take out a wire of the circle\n";
+    let expected =
+        "g.json:2:52: nodes.a.inputs.curves: the wires form a cycle: a → b → a; remove one wire of the cycle\n";
     assert_eq!(stderr(graph, &["check", "g.json"]), expected);
 }
 
@@ -61,7 +61,7 @@ fn a_broken_file_is_reported_with_its_line() {
 #[test]
 fn a_failed_node_is_reported_with_its_frame_and_its_output() {
     let expected = "`wind` (Curve_Wind) at frame 2: `wind_dir` is [0, 0, 0], which has no direction; \
-                    give a vector that is not zero, such as [1, 0, 0]\n";
+                    use a vector that is not zero, such as [1, 0, 0]\n";
     let cook = |format| stderr(CALM_AT_2, &["cook", "g.json", "-q", "--format", format]);
     assert_eq!(cook("json"), format!("{expected}output `grass` lacks the frames that failed\n"));
     assert_eq!(cook("usdc"), format!("{expected}output `grass` was not written\n"));
@@ -76,7 +76,7 @@ fn a_wrong_set_is_reported_by_its_key() {
     );
     assert_eq!(
         stderr(graph, &["cook", "g.json", "--set", "wind.noise=perlin"]),
-        "--set wind.noise:1:1: found `perlin`, expected a value; a text needs quotes that the shell leaves: \
+        "--set wind.noise:1:1: found `perlin`, expected a value; a string needs double quotes that the shell must not remove: \
          'wind.noise=\"perlin\"'\n"
     );
 }
@@ -87,11 +87,11 @@ fn an_obstacle_to_writing_a_file_is_reported() {
     assert_eq!(stderr(graph, &["cook", "none.json"]), "the graph `none.json` does not exist\n");
     assert_eq!(
         stderr(graph, &["cook", "g.json", "--output", "fur"]),
-        "the graph has no output `fur`; it has `grass`, `still`\n"
+        "the graph has no output `fur`; outputs: `grass`, `still`\n"
     );
     assert_eq!(
         stderr(graph, &["cook", "g.json", "--out", "g.json"]),
-        "`g.json` could not be made: a file of that name is in the way\n"
+        "`g.json` could not be created: a file with that name already exists\n"
     );
     assert_eq!(stderr(graph, &["stats", "shot.usdc"]), "`shot.usdc` could not be read: no such file or folder\n");
 }

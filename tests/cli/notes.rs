@@ -4,16 +4,16 @@ use serde_json::Value;
 
 use crate::bench::{Bench, GRAPH};
 
-/// The notes of a cook, which are the same on stderr and in the report.
+/// The notes of a cook, which must be the same on stderr and in the report.
 fn notes(bench: &Bench, args: &[&str]) -> Vec<String> {
     let ran = bench.run(&[&["cook", "g.json", "--report", "report.json"], args].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let told: Vec<String> =
+    let printed: Vec<String> =
         ran.stderr.lines().filter_map(|line| line.strip_prefix("note: ").map(str::to_owned)).collect();
     let report = bench.read_json("report.json");
     let list = report["total"]["notes"].as_array().unwrap();
-    assert_eq!(list.iter().map(|note| note.as_str().unwrap()).collect::<Vec<_>>(), told);
-    told
+    assert_eq!(list.iter().map(|note| note.as_str().unwrap()).collect::<Vec<_>>(), printed);
+    printed
 }
 
 /// Two curves with these params, bent by wind.
@@ -42,19 +42,20 @@ fn a_requested_attribute_that_no_frame_has_is_noted() {
     let attributes = r#""attributes": {"clumps": [0.0, 1.0, 2.0, 3.0], "gain": [0.0, 1.0, 2.0, 3.0]}"#;
     let bench = two_curves(attributes, r#"{"from": "wind", "attributes": ["P", "clump", "gain", "zebra"]}"#);
     let expected = [
-        "output `o` asks for `clump`, which no frame of it has; did you mean `clumps`?",
-        "output `o` asks for `zebra`, which no frame of it has",
+        "output `o` requests the attribute `clump`, which it has at no frame; did you mean `clumps`?",
+        "output `o` requests the attribute `zebra`, which it has at no frame",
     ];
     assert_eq!(notes(&bench, &[]), expected);
     assert_eq!(notes(&bench, &["--cache", "cache"]), expected);
-    assert_eq!(notes(&bench, &["--cache", "cache"])[1], expected[1], "and for frames on disk");
+    assert_eq!(notes(&bench, &["--cache", "cache"])[1], expected[1], "also for frames from disk");
 }
 
 #[test]
 fn data_that_a_format_drops_is_noted_once_per_output() {
     let bench = two_curves(r#""attributes": {"gain": [0.0, 1.0, 2.0, 3.0]}, "width": 0.1"#, r#""wind""#);
-    let expected =
-        ["output `o` was written without `gain` of curves, `width` of curves: obj cannot hold it; usdc and json can"];
+    let expected = [
+        "output `o` was written without `gain` of curves, `width` of curves, which obj cannot hold; usdc and json can",
+    ];
     assert_eq!(notes(&bench, &["--format", "obj"]), expected);
     for format in ["ply", "json", "usdc"] {
         assert_eq!(notes(&bench, &["--format", format]), [""; 0], "{format}");
@@ -62,7 +63,8 @@ fn data_that_a_format_drops_is_noted_once_per_output() {
     let bench = Bench::with_graph(
         r#"{"convect": 1, "nodes": {"none": {"type": "Curve_In", "params": {"points": []}}}, "outputs": {"o": "none"}}"#,
     );
-    let expected = ["output `o` was written without the curves without a point: ply cannot hold it; usdc and json can"];
+    let expected =
+        ["output `o` was written without the curves without a point, which ply cannot hold; usdc and json can"];
     assert_eq!(notes(&bench, &["--format", "ply"]), expected);
 }
 

@@ -1,4 +1,4 @@
-//! The same bits for any number of threads, order of frames, amount of memory, cache and CPU.
+//! Results have the same bits for any number of threads, order of frames, memory, cache and CPU.
 
 use std::collections::BTreeMap;
 use std::process::Stdio;
@@ -7,17 +7,17 @@ use crate::bench::Bench;
 
 const COOK: [&str; 4] = ["cook", "g.json", "--format", "json"];
 
-/// A whole cook, forward, and its files.
+/// The files of a cook of all frames in order.
 fn forward(bench: &Bench) -> BTreeMap<String, Vec<u8>> {
     bench.done(&[&COOK[..], &["--out", "forward"]].concat());
     let files = bench.files("forward");
     assert_eq!(files.len(), 8, "4 frames of 2 outputs");
-    assert_ne!(files["grass.0001.json"][20..], files["grass.0002.json"][20..], "the wind blows");
+    assert_ne!(files["grass.0001.json"][20..], files["grass.0002.json"][20..], "the frames differ");
     files
 }
 
 #[test]
-fn threads_and_memory_change_nothing() {
+fn threads_and_memory_do_not_change_results() {
     let bench = Bench::new();
     let expected = forward(&bench);
     for args in [["--threads", "1"], ["--threads", "2"], ["--threads", "7"], ["--memory", "1M"], ["--memory", "0"]] {
@@ -45,7 +45,7 @@ fn frames_cooked_alone_in_halves_and_in_steps_have_the_same_bits() {
 }
 
 #[test]
-fn a_cache_cold_or_warm_changes_nothing() {
+fn a_cold_or_warm_cache_does_not_change_results() {
     let bench = Bench::new();
     let expected = forward(&bench);
     for (out, frames) in [("cold", "1-2"), ("half", "1-4"), ("warm", "1-4")] {
@@ -57,7 +57,7 @@ fn a_cache_cold_or_warm_changes_nothing() {
         bench.write(&format!("cache/{name}"), "broken");
     }
     bench.done(&[&COOK[..], &["--cache", "cache", "--out", "broken"]].concat());
-    assert!(bench.files("broken") == expected, "a broken cache is ignored");
+    assert!(bench.files("broken") == expected, "an invalid cache is ignored");
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! `stats`, over the formats it reads.
+//! `stats`, for all formats that it reads.
 
 use serde_json::json;
 
 use crate::bench::Bench;
 
-/// A unit cube, one corner at 0.
+/// A unit cube with one corner at the origin.
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
@@ -81,7 +81,7 @@ fn tets_volumes_and_points_are_measured_too() {
 }
 
 #[test]
-fn a_file_without_geometry_says_so() {
+fn a_file_without_geometry_is_reported_as_such() {
     let bench = Bench::new();
     bench.write("empty.json", "{}");
     assert_eq!(bench.done(&["stats", "empty.json"]), "empty.json: json, 2 bytes\nno components\n");

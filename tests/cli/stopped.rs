@@ -1,4 +1,4 @@
-//! Cooks that are cut short: by Ctrl-C, a kill, a full disk, a closed pipe or little memory.
+//! Interrupted cooks: Ctrl-C, a kill, a full disk, a closed pipe, little memory.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::bench::{Bench, Ran, names};
 
-/// Many more frames than any test waits for.
+/// More frames than any test waits for.
 const LONG: &str = "1-1000000";
 
 fn signal(name: &str, child: &Child) {
@@ -15,7 +15,7 @@ fn signal(name: &str, child: &Child) {
     assert!(status.success());
 }
 
-/// Waits until `folder` holds at least `count` files, hidden ones too.
+/// Waits until `folder` contains at least `count` files, including hidden ones.
 fn wait_for(count: usize, folder: &Path) {
     for _ in 0..12_000 {
         if names(folder).len() >= count {
@@ -35,7 +35,7 @@ fn ended(child: Child) -> Ran {
 }
 
 #[test]
-fn ctrl_c_leaves_complete_frames_and_no_temporary_files() {
+fn ctrl_c_leaves_complete_frames_and_no_temporary() {
     let bench = Bench::new();
     let args = ["cook", "g.json", "--frames", LONG, "--format", "json", "--output", "grass", "--report", "report.json"];
     let child = start(&bench, &args);
@@ -45,9 +45,9 @@ fn ctrl_c_leaves_complete_frames_and_no_temporary_files() {
     assert_eq!(ran.code, Some(130), "{}", ran.stderr);
     let files = bench.names("out");
     let expected: Vec<String> = (1..=files.len()).map(|frame| format!("grass.{frame:04}.json")).collect();
-    assert_eq!(files, expected, "frames without a gap, and nothing hidden");
-    for (place, name) in files.iter().enumerate() {
-        assert_eq!(bench.read_json(&format!("out/{name}"))["frame"], place + 1);
+    assert_eq!(files, expected, "frames without gaps, and no hidden files");
+    for (index, name) in files.iter().enumerate() {
+        assert_eq!(bench.read_json(&format!("out/{name}"))["frame"], index + 1);
     }
     assert!(
         ran.stderr.contains(&format!("interrupted; {} complete frames were written", files.len())),
@@ -72,11 +72,11 @@ fn sigterm_acts_like_ctrl_c_and_nohup_survives_its_terminal() {
     assert_eq!(ran.code, Some(130), "{}", ran.stderr);
     let files = bench.names("out");
     let expected: Vec<String> = (1..=files.len()).map(|frame| format!("grass.{frame:04}.json")).collect();
-    assert_eq!(files, expected, "frames without a gap, and nothing hidden");
+    assert_eq!(files, expected, "frames without gaps, and no hidden files");
 }
 
 #[test]
-fn ctrl_c_finishes_a_sequence_with_the_frames_it_has() {
+fn ctrl_c_finishes_a_sequence_with_the_frames_cooked_so_far() {
     let bench = Bench::new();
     let child = start(&bench, &["cook", "g.json", "--frames", LONG, "--format", "usda", "--output", "grass"]);
     wait_for(1, &bench.path("out"));
@@ -160,7 +160,7 @@ fn a_closed_pipe_on_stdout_is_not_an_error() {
     }
 }
 
-/// A file system of 64 kB, unmounted on drop.
+/// A file system of 64 kB, unmounted when dropped.
 struct TinyDisk<'a>(&'a Path);
 
 impl<'a> TinyDisk<'a> {
@@ -212,7 +212,7 @@ fn a_full_disk_under_the_cache_is_reported_once_and_does_not_stop_the_cook() {
     for _ in 0..2 {
         let ran = bench.run(&args);
         assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-        let note = "note: the cache `disk` could not be written: the disk is full; the cook goes on without it\n";
+        let note = "note: the cache `disk` could not be written: the disk is full; cooking continues without it\n";
         assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
         assert_eq!(bench.names("out").len(), 40);
         assert!(bench.names("disk").iter().all(|name| !name.ends_with(".part")), "{:?}", bench.names("disk"));
@@ -220,7 +220,7 @@ fn a_full_disk_under_the_cache_is_reported_once_and_does_not_stop_the_cook() {
     fs::write(disk.join("filler"), vec![0; 1 << 16]).unwrap_err();
     let ran = bench.run(&[&args[..7], &["disk/new", "--output", "grass"]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    assert!(ran.stderr.contains("the disk is full; the cook goes on without it"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the disk is full; cooking continues without it"), "{}", ran.stderr);
 }
 
 #[test]
