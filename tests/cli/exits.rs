@@ -111,7 +111,7 @@ fn a_node_that_fails_at_a_frame_exits_with_4_and_affects_only_its_output() {
     assert_eq!(
         (ran.code, bench.names("usd")),
         (Some(4), vec!["still.usdc".into()]),
-        "a sequence is complete or absent"
+        "an incomplete USD file is not written"
     );
     assert_eq!(bench.run(&["cook", "g.json", "--frames", "1,3", "--out", "usd"]).code, Some(0));
 }
