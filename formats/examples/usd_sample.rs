@@ -64,9 +64,9 @@ fn write(folder: &Path, name: &str, origin: [f64; 3], frames: &Frames) -> Outcom
         }
         writer.finish()?;
     }
-    for (place, (frame, geometry)) in frames.iter().enumerate() {
+    for (index, (frame, geometry)) in frames.iter().enumerate() {
         let text = expected(*frame, geometry).to_string();
-        fs::write(folder.join(format!("{name}.{:04}.json", place + 1)), text)?;
+        fs::write(folder.join(format!("{name}.{:04}.json", index + 1)), text)?;
     }
     Ok(())
 }

@@ -71,7 +71,7 @@ pub(crate) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Lines of `text`, the first of which has number `first`.
+    /// Lines of `text`, numbered from `first`.
     pub(crate) fn new(text: &'a [u8], first: usize, end: u8) -> Self {
         Self { rest: text, end, number: first - 1 }
     }

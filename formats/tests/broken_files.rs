@@ -135,12 +135,12 @@ proptest! {
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3_u8), 1..8),
     ) {
         let (format, mut bytes) = samples().swap_remove(sample);
-        for (place, byte, kind) in changes {
-            let place = place.index(bytes.len());
+        for (index, byte, kind) in changes {
+            let index = index.index(bytes.len());
             match kind {
-                0 => bytes[place] = byte,
-                1 => bytes[place] ^= 1 << (byte % 8),
-                _ => bytes.insert(place, byte),
+                0 => bytes[index] = byte,
+                1 => bytes[index] ^= 1 << (byte % 8),
+                _ => bytes.insert(index, byte),
             }
         }
         // Any error is accepted; what loads can be written again.
@@ -153,7 +153,7 @@ proptest! {
     #[test]
     fn changed_digits_and_words_never_panic(
         sample in 0..3_usize,
-        place in any::<prop::sample::Index>(),
+        index in any::<prop::sample::Index>(),
         word in prop::sample::select(vec![
             "-1", "4294967295", "18446744073709551616", "1e400", "nan", "", "\\", "#", "element face 9\n", "[", "/",
         ]),
@@ -161,9 +161,9 @@ proptest! {
         let (format, bytes) = samples().swap_remove(sample);
         let text = String::from_utf8(bytes).unwrap();
         let mut words: Vec<&str> = text.split_inclusive([' ', '\n', ',']).collect();
-        let place = place.index(words.len());
-        let changed = format!("{word}{}", words[place].chars().next_back().unwrap_or(' '));
-        words[place] = &changed;
+        let index = index.index(words.len());
+        let changed = format!("{word}{}", words[index].chars().next_back().unwrap_or(' '));
+        words[index] = &changed;
         let _ = read(format, words.concat().as_bytes());
     }
 }

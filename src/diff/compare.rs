@@ -32,7 +32,7 @@ pub(super) enum FindingKind {
     Component(Side),
     /// Numbers of points or elements.
     Count { of: &'static str, counts: [usize; 2] },
-    /// The same number of elements, of which `differing` have different points.
+    /// The same number of elements, but `differing` of them have different points.
     Topology { of: &'static str, differing: usize, elements: usize, first: usize },
     /// The grids of two volumes: of the level set, of the velocity, or of both.
     Grid { of: &'static str, grids: [Grid; 2] },

@@ -150,7 +150,7 @@ fn a_folder_without_permission_exits_with_1() {
     }
     let ran = bench.run(&["cook", "g.json", "--out", "locked"]);
     assert_eq!(ran.code, Some(1));
-    assert!(ran.stderr.contains("permission denied; choose a place you may write to"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("permission denied; choose a folder you may write to"), "{}", ran.stderr);
 }
 
 #[cfg(target_os = "linux")]

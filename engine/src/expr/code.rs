@@ -204,7 +204,7 @@ pub(super) struct Code {
 }
 
 impl Code {
-    /// From instructions in an executable order, of which the first `uniform` give the same value for all elements.
+    /// From instructions in an executable order. The first `uniform` of them give the same value for all elements.
     pub(super) fn new(insts: Vec<Inst>, uniform: usize) -> Self {
         Code { insts, uniform }
     }

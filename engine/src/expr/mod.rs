@@ -140,8 +140,8 @@ impl Env<'_> {
     }
 }
 
-/// What a text reads in addition to attributes. For an [`Expr`] exactly what its value depends on after constant
-/// folding (`0 ? time : 1` reads nothing); for a [`Program`] all names that occur in it.
+/// What a text reads in addition to attributes. For an [`Expr`]: what its value depends on after constant
+/// folding (`0 ? time : 1` reads nothing). For a [`Program`]: all names that occur in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Uses {
     /// `frame` or `time`.

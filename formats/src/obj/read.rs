@@ -372,7 +372,7 @@ fn number(field: &[u8]) -> Result<f32, String> {
     float(field).ok_or_else(|| format!("{} is not a number", shown(field)))
 }
 
-/// Three numbers, of which `least` are required; missing ones are 0 and superfluous ones are ignored.
+/// Three numbers. The first `least` are required, other missing ones are 0, and superfluous ones are ignored.
 fn row<'a>(fields: impl Iterator<Item = &'a [u8]>, what: &str, least: usize) -> Result<[f32; 3], String> {
     let mut row = [0.0; 3];
     let mut count = 0;

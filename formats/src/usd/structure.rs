@@ -100,7 +100,7 @@ impl Structure {
     pub(super) fn sections(mut self, root: &Spec) -> [(&'static str, Vec<u8>); 6] {
         self.add(root, false);
         let Self { tokens, strings, fields, set_list, paths, .. } = self;
-        let places = || 0..paths.len() as i32;
+        let indices = || 0..paths.len() as i32;
         let text: Vec<u8> = tokens.list.iter().flat_map(|token| token.bytes().chain([0])).collect();
         let values: Vec<u8> = fields.list.iter().flat_map(|(_, value)| value.to_le_bytes()).collect();
         let names = fields.list.iter().map(|(name, _)| name.cast_signed());
@@ -115,7 +115,7 @@ impl Structure {
                 [
                     &count(paths.len())[..],
                     &count(paths.len()),
-                    &ints(places()),
+                    &ints(indices()),
                     &ints(paths.iter().map(|path| path.element)),
                     &ints(paths.iter().map(|path| path.jump)),
                 ]
@@ -125,7 +125,7 @@ impl Structure {
                 "SPECS",
                 [
                     &count(paths.len())[..],
-                    &ints(places()),
+                    &ints(indices()),
                     &ints(paths.iter().map(|path| path.set.cast_signed())),
                     &ints(paths.iter().map(|path| path.kind as i32)),
                 ]

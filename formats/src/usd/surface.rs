@@ -15,9 +15,9 @@ pub(super) fn surface(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
         .collect();
     shared.sort_unstable();
     let alone = shared.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
-    let mut places: Vec<usize> = alone.map(|same| same[0].1).collect();
-    places.sort_unstable();
-    places.into_iter().map(face).collect()
+    let mut indices: Vec<usize> = alone.map(|same| same[0].1).collect();
+    indices.sort_unstable();
+    indices.into_iter().map(face).collect()
 }
 
 #[cfg(test)]

@@ -131,7 +131,7 @@ impl<W: Write> Writer<W> {
         Ok(rep(id::DOUBLE_VECTOR) | at)
     }
 
-    /// The two 8s are the offsets to the times and to the values, each of which is one rep.
+    /// Each 8 is an offset from its own start: the rep of the times, and the number of values, follow directly after it.
     fn samples(&mut self, times: u64, values: &[Handle]) -> io::Result<u64> {
         let at = self.at;
         self.put_numbers(&[8, times, 8, values.len() as u64], u64::to_le_bytes)?;
