@@ -54,7 +54,7 @@ pub struct CookArgs {
     /// Write a report to this file as JSON: time, memory and metrics of each node
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Print the time of each node, and what it left out and why
+    /// Print the time of each node, and which of its steps were left out and why
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
     /// Print only errors

@@ -28,7 +28,7 @@ pub struct Error {
     pub kind: ErrorKind,
     /// What is wrong.
     pub fact: String,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
     /// The param that caused the error, if one did.
     pub param: Option<&'static str>,

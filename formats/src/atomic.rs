@@ -210,7 +210,7 @@ impl FileError {
         self.source.kind()
     }
 
-    /// How to mend it, if known.
+    /// How to fix it, if known.
     pub fn hint(&self) -> Option<&'static str> {
         match self.source.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Some("free some space, or write to another disk"),

@@ -41,7 +41,7 @@ pub enum FormatError {
         position: FilePosition,
         /// What was found, and what was expected.
         fact: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: Option<&'static str>,
     },
     /// No format has this name or extension.
@@ -111,7 +111,7 @@ impl FormatError {
         Self::Content { position, fact: fact.into(), hint: Some(hint) }
     }
 
-    /// How to mend it, if known.
+    /// How to fix it, if known.
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Content { hint, .. } => hint.map(str::to_owned),

@@ -29,7 +29,7 @@ pub struct ExprError {
     pub column: usize,
     /// What is wrong, without the position.
     pub fact: String,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
 }
 

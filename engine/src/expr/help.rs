@@ -1,4 +1,4 @@
-//! The reference of the language, printed by the program.
+//! The reference of the language for users.
 
 /// The expression language on one page, in plain text.
 pub const HELP: &str = "\

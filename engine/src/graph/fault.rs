@@ -1,4 +1,4 @@
-//! Faults: errors in a graph file, each with its position, the fact, and a hint on how to mend it.
+//! Faults: errors in a graph file, each with its position, the fact, and a hint on how to fix it.
 //!
 //! Promise: [`Fault::code`] of every fault found by a load is one of [`code::ALL`], and codes do not change between
 //! versions, so scripts may test them. Limit: the wording of facts and hints may change.
@@ -29,7 +29,7 @@ pub struct Fault {
     pub path: String,
     /// What is wrong.
     pub fact: String,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
     /// What is at fault: a file or the graph.
     pub class: FaultClass,

@@ -90,7 +90,7 @@ fn types_can_be_recognised_in_the_text() {
     assert_eq!(column("[1, 2]", "mask"), Column::new(vec![1, 2]));
     assert_eq!(column("[1, 2.0]", "mask"), Column::new(vec![1.0_f32, 2.0]));
     assert_eq!(column("[1e0, 2]", "mask"), Column::new(vec![1.0_f32, 2.0]));
-    assert_eq!(column("[1, 2]", "envelope"), Column::new(vec![1.0_f32, 2.0]), "its name wants floats");
+    assert_eq!(column("[1, 2]", "envelope"), Column::new(vec![1.0_f32, 2.0]), "the name is well known as float");
     assert_eq!(column("[[1,2,3],[ 4 , 5 , 6 ]]", "mask"), Column::new(vec![[1, 2, 3], [4, 5, 6]]));
     assert_eq!(
         column("[[1,2,3,4],[5,6,7,8.5]]", "mask"),

@@ -76,7 +76,7 @@ fn unusual_text_gives_the_same_geometry() {
     let elements = format!("{}element face 1\n{FACE}", vertex(3, XYZ));
     for odd in [
         ascii(&elements, "0 0 0\n1 0 0\n0 1 0.5\n3 0 1 2"),
-        ascii(&elements, "\n  0\t0   0 \n\n1 0 0\n 0 1 0.5\n\n3  0 1 2 \n\n trailing words are not ours\n"),
+        ascii(&elements, "\n  0\t0   0 \n\n1 0 0\n 0 1 0.5\n\n3  0 1 2 \n\n trailing words are ignored\n"),
         ascii(&elements, "0 0 0\n1 0 0\n0 1 0.5\n3 0 1 2\n").replace('\n', "\r\n"),
         ascii(&elements, "0 0 0\n1 0 0\n0 1 0.5\n3 0 1 2\n").replace('\n', "\r"),
         ascii(&format!("comment by hand\n\nobj_info x\n{elements}"), "0 0 0\n1.0 0 0\n0 1e0 .5\n3 0 1 2\n"),

@@ -250,7 +250,7 @@ mod tests {
             sections.each_ref().map(|(name, _)| *name),
             ["TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"]
         );
-        assert_eq!(tokens(&sections[0].1)[0], "", "token 0 names nothing but the root");
+        assert_eq!(tokens(&sections[0].1)[0], "", "token 0 is the name of the root only");
         let paths = lists(&sections[4].1, 2, 3);
         assert_eq!(paths[0], [0, 1, 2, 3, 4, 5]);
         assert_eq!(paths[1], [0, a, -x, -y, b, c]);

@@ -176,5 +176,5 @@ fn errors_name_the_file() {
     );
     assert_eq!(geometry.kinds().collect::<Vec<_>>(), [Kind::Volume]);
     writer.frame(1.0, &fur().into()).unwrap();
-    assert!(writer.finish().is_ok(), "a refused frame spoils nothing");
+    assert!(writer.finish().is_ok(), "a refused frame does not damage the file");
 }

@@ -348,7 +348,7 @@ mod tests {
         assert_eq!(rep, 0x8005_0000_0000_0058);
         assert_eq!(bytes[8..], [0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff]);
         let (rep, bytes) = stored(UsdType::Quat, Column::new(Vec::<[f32; 4]>::new()));
-        assert_eq!((rep, bytes.len()), (0x8011_0000_0000_0000, 0), "an empty array is nowhere");
+        assert_eq!((rep, bytes.len()), (0x8011_0000_0000_0000, 0), "an empty array has no offset");
     }
 
     #[test]

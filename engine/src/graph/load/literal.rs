@@ -183,7 +183,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
             (3, true) => ColumnType::I3,
             (4, true) => ColumnType::I4,
             _ => {
-                let fact = format!("`{}` has {} a row", shown(name), counted(width, "number"));
+                let fact = format!("`{}` has {} per row", shown(name), counted(width, "number"));
                 return Err(json.fault(code::WRONG_KIND, fact).hint("expected 1, 3 or 4"));
             }
         },
