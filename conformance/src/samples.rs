@@ -114,6 +114,7 @@ pub(crate) fn usual() -> Vec<(String, Owner, ColumnType)> {
         ("orient", O::Point, T::F4),
         ("id", O::Point, T::I1),
         ("shielded", O::Element, T::F1),
+        ("curve_id", O::Element, T::I1),
         ("sample_mask", O::Point, T::F1),
         ("sample_ints", O::Point, T::I3),
         ("sample_group", O::Element, T::I1),

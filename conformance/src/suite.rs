@@ -6,8 +6,8 @@ use numerics::random::Key;
 
 use crate::bench::Bench;
 use crate::promises::{
-    attributes, checkpoints, declaration, determinism, errors, frames, inputs, left_out, outputs, params, pass_through,
-    ranges,
+    attributes, checkpoints, declaration, determinism, errors, frames, inputs, left_out, neutral, outputs, params,
+    pass_through, ranges,
 };
 use crate::samples::Form;
 use crate::trial::{Motion, Outcome, Prepare, Subject, Trial};
@@ -80,6 +80,7 @@ impl Conformance {
         }
         for check in [
             left_out::check,
+            neutral::check,
             ranges::check,
             params::check,
             inputs::check,

@@ -92,7 +92,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    2,
+    3,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
      wire the curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
@@ -105,7 +105,7 @@ pub(crate) static NODE: Node = Node::new(
 .writes(&[&P])
 .metrics(METRICS)
 .neutral(|params, wires| match params {
-    _ if wires.count(&COLLIDERS) == 0 => Some("no `colliders` are wired"),
+    _ if wires.count(&COLLIDERS) + wires.count(&SKIN) == 0 => Some("neither `colliders` nor `skin` is wired"),
     _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
     _ => None,
 })

@@ -8,6 +8,7 @@ pub(crate) mod errors;
 pub(crate) mod frames;
 pub(crate) mod inputs;
 pub(crate) mod left_out;
+pub(crate) mod neutral;
 pub(crate) mod outputs;
 pub(crate) mod params;
 pub(crate) mod pass_through;

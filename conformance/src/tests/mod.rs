@@ -8,6 +8,7 @@ mod errors;
 mod frames;
 mod inputs;
 mod left_out;
+mod neutral;
 mod outputs;
 mod params;
 mod pass_through;
@@ -22,8 +23,8 @@ use serde::{Deserialize, Serialize};
 use super::{conformance, faults};
 use engine::geometry::{Attr, Component, ENVELOPE, Geometry, ID, Kind, Owner, P, SHIELDED, Topology, WIDTH};
 use engine::node::{
-    AttrNames, Chain, Cook, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past, StepCx, Times,
-    Wires,
+    AttrNames, Chain, Cook, CurveLoop, Cx, FrameCx, Input, LeftOut, Many, Metric, Node, Opt, Output, Outputs, Past,
+    StepCx, Times, Wires,
 };
 use engine::param::{Maskable, Param, Params, Seed, Unit};
 use engine::{Error, Result, choice};

@@ -48,7 +48,14 @@ fn all_colliders_stop_curves_and_the_first_is_the_default_skin() {
 }
 
 #[test]
-fn without_colliders_the_same_arrays_pass_through() {
+fn a_skin_without_colliders_still_lifts_roots() {
+    let out = laid_down().input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25).cook();
+    assert!((out.curves().positions()[0][1] - 0.65).abs() < 1e-6);
+    assert_eq!(out.metrics["contacts"], 0.0);
+}
+
+#[test]
+fn without_colliders_and_skin_the_same_arrays_pass_through() {
     let given = goal();
     let out = bench(&NODE).input(CURVES, given.clone()).input(REST, goal()).cook();
     let address = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
