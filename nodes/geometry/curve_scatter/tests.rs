@@ -1,7 +1,8 @@
 //! Properties of scattered curves.
 
 use super::*;
-use conformance::{Bench, BenchResult, bench, conforms};
+use crate::shared::planting::a_third_as_wide;
+use conformance::{Bench, BenchResult, bench, conformance};
 use numerics::vector::{self, DVec3, to_f64};
 
 /// A square in x and z around the origin, `size` wide, facing up.
@@ -260,5 +261,5 @@ fn more_cvs_than_memory_should_hold_are_refused() {
 
 #[test]
 fn it_conforms() {
-    conforms(&NODE);
+    conformance(&NODE).with(|bench| bench.changed(SKIN, a_third_as_wide)).run();
 }
