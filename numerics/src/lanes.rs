@@ -4,6 +4,8 @@
 //! them; inside a function of [`crate::simd`] the compiler vectorises such a loop to the path's width. So one value and
 //! sixteen are computed by the same code, and their bits are the same.
 
+use crate::vector::DVec3;
+
 /// Elements handled side by side, on every path.
 pub const LANES: usize = 16;
 
@@ -88,5 +90,19 @@ pub fn get<const N: usize>(lanes: &Lanes<N>, lane: usize) -> [f32; N] {
 pub fn set<const N: usize>(lanes: &mut Lanes<N>, lane: usize, value: [f32; N]) {
     for component in 0..N {
         lanes[component].0[lane] = value[component];
+    }
+}
+
+/// The vector of one lane.
+#[inline(always)]
+pub fn get_f64(lanes: &[F64x16; 3], lane: usize) -> DVec3 {
+    DVec3::new(lanes[0].0[lane], lanes[1].0[lane], lanes[2].0[lane])
+}
+
+/// Replaces the vector of one lane.
+#[inline(always)]
+pub fn set_f64(lanes: &mut [F64x16; 3], lane: usize, value: DVec3) {
+    for axis in 0..3 {
+        lanes[axis].0[lane] = value[axis];
     }
 }

@@ -2,9 +2,12 @@
 
 use super::closest::ClosestFaces;
 use super::pose::RootPose;
-use super::rotation::nearest_rotation;
+use super::rotation::nearest_rotations;
+use super::triangle_lanes::{Columns, TriangleLanes, deformations};
 use crate::surface::SurfacePoint;
-use numerics::vector::{DMat3, DQuat, DVec3, direction, to_f64};
+use numerics::lanes::{F64x16, LANES};
+use numerics::simd::Path;
+use numerics::vector::{DQuat, DVec3, direction, to_f64};
 use rayon::prelude::*;
 use std::ops::{Add, Mul};
 
@@ -23,7 +26,7 @@ pub struct SkinBinding {
     vertices: Vec<BoundVertex>,
     /// Rows of `triangles` around each vertex, one vertex after another.
     incident: Vec<u32>,
-    triangles: Vec<RestTriangle>,
+    triangles: Vec<TriangleLanes>,
     max_distance: f64,
 }
 
@@ -58,12 +61,12 @@ struct BoundVertex {
 /// A triangle around a vertex. Its area times the gradient of its deformation is linear in the positions of its
 /// corners.
 #[derive(Clone, Copy, Debug)]
-struct RestTriangle {
-    points: [u32; 3],
+pub(super) struct RestTriangle {
+    pub(super) points: [u32; 3],
     /// Area times the gradients of the weights of the second and third corner.
-    gradients: [DVec3; 2],
+    pub(super) gradients: [DVec3; 2],
     /// The unit normal times √(area ÷ 2).
-    normal: DVec3,
+    pub(super) normal: DVec3,
 }
 
 /// No row.
@@ -116,7 +119,8 @@ impl SkinBinding {
         };
         let roots: Vec<BoundRoot> = surface.iter().zip(positions).map(root).collect();
         let max_distance = roots.iter().map(|root| root.offset.norm()).fold(0.0, f64::max);
-        Self { roots, vertices, incident, triangles: rest, max_distance }
+        let triangles = rest.chunks(LANES).map(TriangleLanes::new).collect();
+        Self { roots, vertices, incident, triangles, max_distance }
     }
 
     /// The largest distance of a root from the skin, metres.
@@ -140,28 +144,48 @@ impl SkinBinding {
     /// # Panics
     /// If there are fewer points than at rest.
     pub fn poses(&self, now: &[[f32; 3]]) -> Vec<RootPose> {
-        let deformed = self.triangles.par_iter().with_min_len(TASK).map(|triangle| triangle.deformation(now));
-        let deformed: Vec<DMat3> = deformed.collect();
+        let simd = Path::chosen();
+        let blocks = self.triangles.par_iter().with_min_len(TASK / LANES);
+        let deformed: Vec<[Columns; LANES]> = blocks.map(|triangles| deformations(simd, triangles, now)).collect();
         let vertices = (0..self.vertices.len()).into_par_iter().with_min_len(TASK).map(|row| {
             let vertex = &self.vertices[row];
-            let mut gradient = DMat3::zeros();
+            let mut gradient = [0.0; 9];
             for triangle in &self.incident[range(&self.vertices, row)] {
-                gradient += deformed[*triangle as usize] * vertex.inverse_area;
+                for (sum, entry) in gradient.iter_mut().zip(&deformed.as_flattened()[*triangle as usize]) {
+                    *sum += entry * vertex.inverse_area;
+                }
             }
             (gradient, to_f64(now[vertex.point as usize]) - vertex.position)
         });
-        let vertices: Vec<(DMat3, DVec3)> = vertices.collect();
-        let pose = |root: &BoundRoot| {
-            let corners = root.vertices.map(|vertex| vertices[vertex as usize]);
-            let rotation = nearest_rotation(&weighted(root.weights, corners.map(|(gradient, _)| gradient)));
-            let translation = weighted(root.weights, corners.map(|(_, translation)| translation));
-            let lost = rotation.is_none();
-            let rotation = rotation.unwrap_or_else(DQuat::identity);
-            let translation = translation + (rotation * root.offset - root.offset);
-            RootPose { translation, rotation, lost }
-        };
-        self.roots.par_iter().with_min_len(TASK).map(pose).collect()
+        let vertices: Vec<(Columns, DVec3)> = vertices.collect();
+        let rest = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
+        let mut poses = vec![rest; self.roots.len()];
+        let tasks = poses.par_chunks_mut(LANES).zip(self.roots.par_chunks(LANES)).with_min_len(TASK / LANES);
+        tasks.for_each(|(poses, roots)| {
+            let rotations = nearest_rotations(simd, &gradients_at(roots, &vertices));
+            for ((pose, root), rotation) in poses.iter_mut().zip(roots).zip(rotations) {
+                let translations = root.vertices.map(|vertex| vertices[vertex as usize].1);
+                let translation = weighted(root.weights, translations);
+                let lost = rotation.is_none();
+                let rotation = rotation.unwrap_or_else(DQuat::identity);
+                let translation = translation + (rotation * root.offset - root.offset);
+                *pose = RootPose { translation, rotation, lost };
+            }
+        });
+        poses
     }
+}
+
+/// The gradient of deformation at up to sixteen roots, one a lane; 0 on lanes without one.
+fn gradients_at(roots: &[BoundRoot], vertices: &[(Columns, DVec3)]) -> [F64x16; 9] {
+    let mut lanes = [F64x16::ZERO; 9];
+    for (lane, root) in roots.iter().enumerate() {
+        let [a, b, c] = root.vertices.map(|vertex| &vertices[vertex as usize].0);
+        for entry in 0..9 {
+            lanes[entry].0[lane] = weighted(root.weights, [a[entry], b[entry], c[entry]]);
+        }
+    }
+    lanes
 }
 
 /// The corners of the triangles that `surface` names, and the row of each of the skin's points among them.
@@ -222,18 +246,6 @@ impl RestTriangle {
     /// The normal, with the area as its length.
     fn area_vector(&self) -> DVec3 {
         self.normal * (2.0 * self.normal.norm())
-    }
-
-    /// The rest area times the gradient of the deformation. In the plane it is that of the corners; along the normal it
-    /// takes normal to normal, scaled by the root of the ratio of areas, so that uniform scale changes no rotation.
-    fn deformation(&self, now: &[[f32; 3]]) -> DMat3 {
-        let [a, b, c] = self.points.map(|point| to_f64(now[point as usize]));
-        let (ab, ac) = (b - a, c - a);
-        let twice_area = ab.cross(&ac);
-        let root = twice_area.norm().sqrt();
-        let out = twice_area * if root > 0.0 { 1.0 / root } else { 0.0 };
-        let [second, third] = self.gradients;
-        DMat3::from_columns(&[0, 1, 2].map(|k| out * self.normal[k] + (ab * second[k] + ac * third[k])))
     }
 }
 

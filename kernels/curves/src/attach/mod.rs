@@ -32,6 +32,7 @@ mod closest;
 mod pose;
 mod root_positions;
 mod rotation;
+mod triangle_lanes;
 
 pub use binding::SkinBinding;
 pub(crate) use pose::rotate_orientation;
