@@ -111,7 +111,7 @@ fn chain_of(given: Geometry, types: &[&'static Node]) -> Graph {
     for node in types {
         let before = Link { node: nodes.len() - 1, port: 0 };
         let specs: Arc<[_]> = node.param_specs().into();
-        let params = specs.iter().map(|spec| Source::Constant(spec.default.clone())).collect();
+        let params: Arc<[_]> = specs.iter().map(|spec| Source::Constant(spec.default.clone())).collect();
         let body = Body::Node { node, specs, params, inputs: vec![vec![before]] };
         nodes.push(GraphNode { id: format!("n{}", nodes.len()).into(), body });
     }

@@ -55,7 +55,7 @@ static WINDOW: Node = Node::new("Window", 1, "Hands points on.", Cook::window::<
 /// `count` nodes in a row, the first over a frame node over a still source.
 fn graph(node: &'static Node, count: usize, frames: i64) -> Graph {
     let body =
-        |node: &'static Node, inputs| Body::Node { node, specs: node.param_specs().into(), params: Vec::new(), inputs };
+        |node: &'static Node, inputs| Body::Node { node, specs: node.param_specs().into(), params: [].into(), inputs };
     let mut nodes = vec![GraphNode { id: "source".into(), body: body(&SOURCE, Vec::new()) }];
     for place in 0..=count {
         let kind = if place == 0 { &FRAME } else { node };

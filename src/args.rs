@@ -2,25 +2,26 @@
 
 use std::str::FromStr;
 
+use engine::frames::FrameSet;
 use engine::graph::Scene;
 use engine::time::Frame;
 
 /// Requested frames: `1-48`, `1-48x2`, `10`, `10.5`, `1-2x0.25`, and several of these separated by commas.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frames(Vec<Frame>);
+pub struct Frames(FrameSet);
 
 /// More frames than this are assumed to be a typing error.
 const MOST_FRAMES: i64 = 10_000_000;
 
 impl Frames {
-    /// The frames, ascending, without repetition.
-    pub fn frames(&self) -> Vec<Frame> {
+    /// The frames.
+    pub fn frames(&self) -> FrameSet {
         self.0.clone()
     }
 
     /// All frames of a scene.
-    pub fn of_scene(scene: &Scene) -> Vec<Frame> {
-        (scene.first..=scene.last).map(Frame::whole).collect()
+    pub fn of_scene(scene: &Scene) -> FrameSet {
+        FrameSet::whole(scene.first, scene.last)
     }
 }
 
@@ -28,17 +29,15 @@ impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut frames = Vec::new();
+        let mut frames = FrameSet::default();
         for part in text.split(',') {
-            add_part(part.trim(), &mut frames)?;
+            frames = frames.union(&part_of(part.trim())?);
         }
-        frames.sort_unstable();
-        frames.dedup();
         Ok(Self(frames))
     }
 }
 
-fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
+fn part_of(part: &str) -> Result<FrameSet, String> {
     let frame = |text: &str| text.parse::<Frame>().map_err(|error| format!("{error}; write 1-48, 1-48x2 or 10.5"));
     let (range, step) = match part.split_once('x') {
         Some((range, step)) => (range, Some(step)),
@@ -50,8 +49,7 @@ fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
         if step.is_some() {
             return Err(format!("`{part}` has a step but no range; write 1-48x2"));
         }
-        frames.push(frame(part)?);
-        return Ok(());
+        return Ok(vec![frame(part)?].into());
     };
     let (first, last) = (frame(&range[..dash])?, frame(&range[dash + 1..])?);
     let step = step.map_or(Ok(Frame::whole(1)), frame)?;
@@ -65,8 +63,7 @@ fn add_part(part: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
     if count > MOST_FRAMES {
         return Err(format!("`{part}` is {count} frames, expected at most {MOST_FRAMES}"));
     }
-    frames.extend((0..count).map(|k| first.plus_ticks(k * step.ticks())));
-    Ok(())
+    Ok(FrameSet::range(first, last, step.ticks()))
 }
 
 /// A size in bytes: `500M`, `8G`, `1.5G`, `1000000`.
@@ -108,15 +105,6 @@ impl FromStr for Setting {
             _ => Err(format!("`{text}` is not a setting; write node.param=JSON or control=JSON")),
         }
     }
-}
-
-/// Half of the machine's memory, or 1 GiB if that is unknown.
-pub fn half_of_memory() -> u64 {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text
-        .lines()
-        .find_map(|line| line.strip_prefix("MemTotal:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
-    total.map_or(1 << 30, |kilobytes| kilobytes * 1024 / 2)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
-use crate::load;
+use crate::{load, memory};
 
 /// The arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -32,7 +32,7 @@ pub struct CheckArgs {
 /// # Errors
 /// If there is a fault.
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let engine = load::engine(0, 1 << 30)?;
+    let engine = load::engine(0, memory::ceiling(None))?;
     let format: Option<Format> = args.format.as_deref().and_then(|name| name.parse().ok());
     let found = load::checked_graph(&args.graph, &args.set, &engine, format)?;
     let faults = found.err().unwrap_or_default();

@@ -13,11 +13,11 @@ use formats::Format;
 use formats::atomic::{AtomicFile, FileError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::args::{Frames, Setting, Size, half_of_memory};
+use crate::args::{Frames, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
 use crate::output::{Writers, Written, failed, fill};
 use crate::pictures::{self, Pictures};
-use crate::{load, report};
+use crate::{load, memory, report};
 
 /// The arguments of `cook`.
 #[derive(Debug, clap::Args)]
@@ -42,7 +42,7 @@ pub struct CookArgs {
     /// Number of threads [default: the machine's]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Memory for intermediate results, such as 8G; does not affect the output [default: half of the machine's]
+    /// Memory for results, such as 8G; a node whose result would take more is refused [default: half of the machine's]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
     /// Keep finished frames and solver checkpoints in this folder; an interrupted cook resumes from them
@@ -71,8 +71,7 @@ pub struct CookArgs {
 /// If the graph has faults, a file cannot be written, a node cannot cook, or the cook is interrupted.
 pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
-    let memory = args.memory.map_or_else(half_of_memory, |size| size.0);
-    let engine = load::engine(usize::from(args.threads), usize::try_from(memory).unwrap_or(usize::MAX))?;
+    let engine = load::engine(usize::from(args.threads), memory::ceiling(args.memory))?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
@@ -112,7 +111,7 @@ fn cook(
         }
     };
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
-    let mut inputs = graph.files(&request.frames);
+    let mut inputs = graph.files();
     inputs.push(args.graph.clone());
     writers.refuse_to_overwrite(&inputs, &request.frames)?;
     // Before the cook, so that an invalid path is reported at once.

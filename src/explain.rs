@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 
 use crate::args::{Frames, Setting};
 use crate::failure::{Failure, exit_of_error};
-use crate::load;
 use crate::report::NOT_NEEDED;
+use crate::{load, memory};
 
 /// The arguments of `explain`.
 #[derive(Debug, clap::Args)]
@@ -32,28 +32,36 @@ pub struct ExplainArgs {
     json: bool,
 }
 
+/// Of a request with more frames, only these are planned, so that the answer comes at once.
+const MOST_FRAMES: usize = 10_000;
+
 /// Prints the plan.
 ///
 /// # Errors
 /// If the graph has faults.
 pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
-    let engine = load::engine(0, 1 << 30)?;
+    let engine = load::engine(0, memory::ceiling(None))?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
         frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
     };
-    let rehearsed = engine.rehearse(&graph, &request);
+    let planned = Request { frames: request.frames.iter().take(MOST_FRAMES).collect(), ..request.clone() };
+    let rehearsed = engine.rehearse(&graph, &planned);
     let report = rehearsed.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
     let text = match args.json {
         true => {
             let nodes: Vec<Value> = report.nodes.iter().map(to_json).collect();
-            let plan = json!({"frames": request.frames.len(), "nodes": nodes});
+            let plan = json!({"frames": request.frames.len(), "planned_frames": planned.frames.len(), "nodes": nodes});
             serde_json::to_string_pretty(&plan).unwrap_or_default() + "\n"
         }
         false => {
-            let frames = request.frames.len();
-            let mut text = format!("{frames} frame{}\n", if frames == 1 { "" } else { "s" });
+            let (all, frames) = (request.frames.len(), planned.frames.len());
+            let mut text = match all {
+                1 => "1 frame\n".to_owned(),
+                _ if all > frames => format!("{all} frames, of which the first {frames} are planned\n"),
+                _ => format!("{all} frames\n"),
+            };
             report.nodes.iter().for_each(|node| describe(node, frames, &mut text));
             text
         }

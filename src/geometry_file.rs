@@ -81,8 +81,9 @@ impl Numbered {
         let (whole, fraction) = number.split_once('.').unwrap_or((&number, ""));
         let sign = if frame < Frame::whole(0) { "-" } else { "" };
         let point = if fraction.is_empty() { "" } else { "_" };
-        let digits = self.digits;
-        self.path.with_file_name(format!("{}{sign}{whole:0>digits$}{point}{fraction}{}", self.before, self.after))
+        // Not by a width of `format!`, which has a limit.
+        let zeros = "0".repeat(self.digits.saturating_sub(whole.len()));
+        self.path.with_file_name(format!("{}{sign}{zeros}{whole}{point}{fraction}{}", self.before, self.after))
     }
 
     /// The existing files, frames ascending.

@@ -22,6 +22,7 @@ pub mod explain;
 pub mod failure;
 pub mod geometry_file;
 pub mod load;
+pub mod memory;
 pub mod nodes;
 pub mod numbers;
 pub mod output;

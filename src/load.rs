@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use engine::cook::{Engine, Settings};
 use engine::files::{is_handed_over, unreadable};
 use engine::graph::{Fault, FaultClass, Graph, Part, probe};
+use engine::memory::Ceiling;
 use formats::Format;
 
 use crate::CATALOGUE;
@@ -84,10 +85,10 @@ pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
 ///
 /// # Errors
 /// If threads cannot be started, or `CONVECT_SIMD` is not a valid name.
-pub fn engine(threads: usize, memory: usize) -> Result<Engine, Failure> {
+pub fn engine(threads: usize, ceiling: Ceiling) -> Result<Engine, Failure> {
     use crate::failure::Exit;
     numerics::simd::Path::from_environment().map_err(|error| Failure::new(Exit::CommandLine, error.to_string()))?;
-    Engine::new(&Settings { threads, memory }).map_err(|error| Failure::new(Exit::Cook, error))
+    Engine::new(&Settings { threads, memory: ceiling.bytes, ceiling }).map_err(|error| Failure::new(Exit::Cook, error))
 }
 
 /// The indices of the outputs with these names; all if `names` is empty.

@@ -6,6 +6,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use engine::cook::Delivered;
+use engine::frames::FrameSet;
 use engine::graph::Graph;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError, sweep};
@@ -63,18 +64,20 @@ impl<'g> Writers<'g> {
     ///
     /// # Errors
     /// If one of `frames` would overwrite one of `inputs`.
-    pub fn refuse_to_overwrite(&self, inputs: &[PathBuf], frames: &[Frame]) -> Result<(), Failure> {
+    pub fn refuse_to_overwrite(&self, inputs: &[PathBuf], frames: &FrameSet) -> Result<(), Failure> {
         let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
-        for (output, target, _) in &self.outputs {
-            let name = &self.graph.outputs[*output].name;
-            let paths: Vec<PathBuf> = match target {
-                Target::Sequence { .. } => vec![self.folder.join(format!("{name}.{}", self.format))],
-                Target::PerFrame => {
-                    frames.iter().map(|frame| frame_path(&self.folder, name, *frame, self.format)).collect()
+        // The files in the folder are looked at, not those of all frames: there may be a billion.
+        let there = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        for path in there.map(|entry| entry.path()) {
+            let Some(file) = path.file_name().and_then(|name| name.to_str()) else { continue };
+            let written = self.outputs.iter().any(|(output, target, _)| {
+                let name = &self.graph.outputs[*output].name;
+                match target {
+                    Target::Sequence { .. } => file == format!("{name}.{}", self.format),
+                    Target::PerFrame => frame_in(file, name, self.format).is_some_and(|frame| frames.contains(frame)),
                 }
-            };
-            let same = paths.iter().find(|path| path.canonicalize().is_ok_and(|path| inputs.contains(&path)));
-            if let Some(path) = same {
+            });
+            if written && path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
                 let line =
                     format!("`{}` would be overwritten, but the graph reads it; choose another --out", path.display());
                 return Err(Failure::file(line));
@@ -152,6 +155,13 @@ impl<'g> Writers<'g> {
 
 fn frame_path(folder: &Path, name: &str, frame: Frame, format: Format) -> PathBuf {
     folder.join(format!("{name}.{}.{format}", frame.file_label()))
+}
+
+/// The frame of the file that [`frame_path`] names; `None` if it is another file.
+fn frame_in(file: &str, name: &str, format: Format) -> Option<Frame> {
+    let label = file.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(format.name())?.strip_suffix('.')?;
+    let frame: Frame = label.replace('_', ".").parse().ok()?;
+    (frame.file_label() == label).then_some(frame)
 }
 
 fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) -> Result<(PathBuf, u64), Failure> {

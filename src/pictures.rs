@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use engine::cook::Delivered;
+use engine::frames::FrameSet;
 use engine::geometry::Geometry;
 use engine::graph::Graph;
 use engine::plan::Request;
@@ -82,9 +83,9 @@ impl Pictures {
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let frames = match &args.preview_frames {
             None => spread(&request.frames),
-            Some(frames) => frames.frames(),
+            Some(frames) => frames.frames().iter().collect(),
         };
-        if let Some(frame) = frames.iter().find(|frame| !request.frames.contains(frame)) {
+        if let Some(frame) = frames.iter().find(|frame| !request.frames.contains(**frame)) {
             return Err(wrong(format!("--preview-frames: frame {frame} is not among the frames to cook")));
         }
         let settings =
@@ -174,9 +175,9 @@ fn save(image: &Image, path: PathBuf) -> Result<PathBuf, Failure> {
 }
 
 /// The frames of a contact sheet: evenly spaced, including the first and the last.
-fn spread(frames: &[Frame]) -> Vec<Frame> {
+fn spread(frames: &FrameSet) -> Vec<Frame> {
     if frames.len() <= SHEET_FRAMES {
-        return frames.to_vec();
+        return frames.iter().collect();
     }
-    (0..SHEET_FRAMES).map(|k| frames[k * (frames.len() - 1) / (SHEET_FRAMES - 1)]).collect()
+    (0..SHEET_FRAMES).filter_map(|k| frames.get(k * (frames.len() - 1) / (SHEET_FRAMES - 1))).collect()
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use engine::cook::{NodeReport, Report};
+use engine::frames::FrameSet;
 use engine::graph::Graph;
 use engine::time::Frame;
 use serde_json::{Map, Value, json};
@@ -16,7 +17,7 @@ pub struct Cooked<'a> {
     /// The graph.
     pub graph: &'a Graph,
     /// Requested frames.
-    pub frames: &'a [Frame],
+    pub frames: &'a FrameSet,
     /// What was written, by index of the output.
     pub written: &'a [(usize, Written)],
     /// Number of threads.
@@ -54,7 +55,10 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
             (output.name.to_string(), value)
         })
         .collect();
-    let frames: Vec<Value> = cooked.frames.iter().map(|frame| number(*frame)).collect();
+    // Of an interrupted cook only those that it reached, because a scene may have a billion.
+    let reached = cooked.written.iter().filter_map(|(_, written)| written.frames.last()).max();
+    let was_reached = |frame: &Frame| !report.cancelled || reached.is_some_and(|reached| frame <= reached);
+    let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(number).collect();
     let seconds = report.cooking.as_secs_f64();
     let delivered = report.delivered.values().copied().max().unwrap_or(0);
     json!({

@@ -235,7 +235,7 @@ impl Bench {
         });
         let outputs = outputs.collect();
         let specs = self.node.param_specs().into();
-        let body = Body::Node { node: self.node, specs, params: self.params.clone(), inputs };
+        let body = Body::Node { node: self.node, specs, params: self.params.as_slice().into(), inputs };
         nodes.push(GraphNode { id: "node".into(), body });
         Graph { scene: self.scene.clone(), nodes, outputs, folder: PathBuf::new(), positions: Positions::default() }
     }
@@ -246,7 +246,7 @@ impl Bench {
 /// # Panics
 /// If the request cannot be cooked at all.
 pub fn cook_all(engine: &Engine, graph: &Graph, frames: &[Frame]) -> (BTreeMap<(usize, Frame), Arc<Geometry>>, Report) {
-    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
+    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec().into() };
     let mut found = BTreeMap::new();
     let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
         found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));

@@ -98,7 +98,9 @@ pub(crate) struct Outcome {
 pub(crate) fn engine(threads: usize) -> &'static Engine {
     static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
         // Without a cache, so that no trial finds results of an earlier one.
-        [1, 2, 7].map(|threads| (threads, Engine::new(&Settings { threads, memory: 0 }).expect("threads")))
+        [1, 2, 7].map(|threads| {
+            (threads, Engine::new(&Settings { threads, memory: 0, ..Settings::default() }).expect("threads"))
+        })
     });
     let found = ENGINES.iter().find(|(count, _)| *count == threads);
     &found.expect("one of the counts the suite tries").1
@@ -212,7 +214,7 @@ impl Subject {
     /// The stages that the node reports as left out in a trial, without cooking it; none if params are refused.
     pub(crate) fn left_out(&self, trial: &Trial) -> Vec<LeftOut> {
         let (graph, _) = self.graph(trial);
-        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: self.frames() };
+        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: self.frames().into() };
         let stages = || Some(Plan::new(&graph, &request, Arc::default()).ok()?.left_out(graph.nodes.len() - 1));
         quietly(|| catch_unwind(AssertUnwindSafe(stages))).ok().flatten().unwrap_or_default()
     }
@@ -232,7 +234,7 @@ impl Subject {
 
     pub(crate) fn run_on(&self, threads: usize, reload: bool, trial: &Trial, frames: &[Frame]) -> Outcome {
         let (graph, given) = self.graph(trial);
-        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
+        let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec().into() };
         let mut found = BTreeMap::new();
         let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
             found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));

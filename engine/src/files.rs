@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::key::ContentKey;
+use crate::memory::{Ceiling, size_text};
 
 /// A file identified by the hash of its contents. Its bytes stay in memory until the store releases them, and are read
 /// again when needed after that.
@@ -57,13 +58,25 @@ impl File {
 type Loaded = (Arc<[u8]>, ContentKey);
 
 /// The files of one cook. Bytes are kept until [`Files::release`]; keys for the lifetime of the store.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Files {
+    ceiling: Ceiling,
     keys: Mutex<BTreeMap<PathBuf, ContentKey>>,
     bytes: Mutex<BTreeMap<PathBuf, Loaded>>,
 }
 
+impl Default for Files {
+    fn default() -> Self {
+        Self::within(Ceiling::NONE)
+    }
+}
+
 impl Files {
+    /// A store that refuses files larger than the ceiling.
+    pub fn within(ceiling: Ceiling) -> Self {
+        Self { ceiling, keys: Mutex::default(), bytes: Mutex::default() }
+    }
+
     /// The file at `path`.
     ///
     /// # Errors
@@ -87,14 +100,35 @@ impl Files {
         if let Some(loaded) = bytes.get(path) {
             return Ok(loaded.clone());
         }
-        let mut read = Vec::new();
-        let file = open(path).and_then(|mut file| file.read_to_end(&mut read));
-        file.map_err(|error| unreadable(path, &error))?;
+        let read = self.read(path)?;
         let key = ContentKey::of(&read);
         let loaded = (Arc::from(read), key);
         bytes.insert(path.to_owned(), loaded.clone());
         self.keys.lock().unwrap_or_else(PoisonError::into_inner).entry(path.to_owned()).or_insert(key);
         Ok(loaded)
+    }
+}
+
+impl Files {
+    fn read(&self, path: &Path) -> Result<Vec<u8>> {
+        let too_large = |bytes: String| {
+            let fact = format!("`{}` has {bytes}, but {}", path.display(), self.ceiling.describe());
+            Error::file(fact).hint("split the file, or raise --memory")
+        };
+        let failed = |error: io::Error| unreadable(path, &error);
+        let file = open(path).map_err(failed)?;
+        let length = file.metadata().map_or(0, |about| about.len());
+        if !self.ceiling.allows(usize::try_from(length).unwrap_or(usize::MAX)) {
+            return Err(too_large(size_text(usize::try_from(length).unwrap_or(usize::MAX))));
+        }
+        // A file that grows, or a stream, may have more than it says.
+        let most = self.ceiling.bytes.max(Ceiling::LEAST);
+        let mut read = Vec::new();
+        file.take(most as u64).read_to_end(&mut read).map_err(failed)?;
+        match read.len() < most {
+            true => Ok(read),
+            false => Err(too_large("more".into())),
+        }
     }
 }
 
@@ -107,11 +141,32 @@ pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
     while let Some(at) = rest.find('#') {
         let width = rest[at..].bytes().take_while(|byte| *byte == b'#').count();
         let sign = if frame < 0 { "-" } else { "" };
+        let digits = frame.unsigned_abs().to_string();
         numbered.push_str(&rest[..at]);
-        numbered.push_str(&format!("{sign}{:0width$}", frame.unsigned_abs()));
+        numbered.push_str(sign);
+        // Not by a width of `format!`, which has a limit.
+        numbered.extend(std::iter::repeat_n('0', width.saturating_sub(digits.len())));
+        numbered.push_str(&digits);
         rest = &rest[at + width..];
     }
     path.with_file_name(numbered + rest)
+}
+
+/// The existing files of the sequence at `path`, in no particular order.
+pub(crate) fn existing_files(path: &Path) -> Vec<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return Vec::new() };
+    let before = &name[..name.find('#').unwrap_or(name.len())];
+    let belongs = |found: &str| {
+        let Some(rest) = found.strip_prefix(before) else { return false };
+        let sign = usize::from(rest.starts_with('-'));
+        let digits = rest[sign..].bytes().take_while(u8::is_ascii_digit).count();
+        // Digits may follow the number in the name.
+        let numbers = (1..=digits).filter_map(|count| rest[..sign + count].parse::<i64>().ok());
+        numbers.into_iter().any(|frame| numbered_path(path, frame).file_name().is_some_and(|name| name == found))
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|entry| entry.file_name().to_str().is_some_and(belongs)).map(|entry| entry.path()).collect()
 }
 
 /// Whether `path` is a stream that the program inherited, such as `/dev/stdin` or `/dev/fd/3`. Such a path has no
@@ -160,6 +215,27 @@ mod tests {
         assert_eq!(path("in/fur.####.obj", 7), "in/fur.0007.obj");
         assert_eq!(path("fur_##.obj", 123), "fur_123.obj");
         assert_eq!(path("fur.####.obj", -3), "fur.-0003.obj");
+        for width in [65_535, 65_536, 1_000_000] {
+            assert_eq!(path(&"#".repeat(width), -7), format!("-{}7", "0".repeat(width - 1)));
+        }
+    }
+
+    #[test]
+    fn the_files_of_a_sequence_are_found_in_their_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let all = ["a.0001.obj", "a.-0002.obj", "a.12345.obj", "a.1.obj", "a.0001.ply", "b.0001.obj", "a.00011.obj"];
+        all.iter().for_each(|name| std::fs::write(folder.path().join(name), "").unwrap());
+        let found = |name: &str| {
+            let files = existing_files(&folder.path().join(name));
+            let mut names: Vec<String> =
+                files.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(found("a.####.obj"), ["a.-0002.obj", "a.0001.obj", "a.12345.obj"]);
+        assert_eq!(found("a.####1.obj"), ["a.00011.obj"]);
+        assert_eq!(found("a.#.obj"), ["a.1.obj", "a.12345.obj"]);
+        assert!(found("none.#.obj").is_empty() && existing_files(Path::new("missing/a.#.obj")).is_empty());
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn check_graph(graph: &Graph) {
     let (first, last) = (graph.scene.first as f64, graph.scene.last as f64);
     for node in &graph.nodes {
         let Body::Node { specs, params, .. } = &node.body else { continue };
-        for (spec, source) in specs.iter().zip(params) {
+        for (spec, source) in specs.iter().zip(params.iter()) {
             for frame in [first, 0.5 * (first + last), last] {
                 let _ = spec.refuses(&source.at(frame, graph.scene.clock()));
             }

@@ -34,7 +34,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     for kind in Kind::ALL {
         let parts: Vec<(usize, &Component)> =
             wires.iter().enumerate().filter_map(|(wire, geometry)| Some((wire, geometry.part(kind)?))).collect();
-        if let Some(part) = union(&parts)? {
+        if let Some(part) = union(cx, &parts)? {
             merged.put(part);
         }
     }
@@ -52,24 +52,43 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 }
 
 /// All parts joined, each given with its wire. A single part is shared, not copied.
-fn union(parts: &[(usize, &Component)]) -> Result<Option<Component>> {
+fn union(cx: &Cx, parts: &[(usize, &Component)]) -> Result<Option<Component>> {
     let [(first, head), tail @ ..] = parts else { return Ok(None) };
     if tail.is_empty() {
         return Ok(Some((*head).clone()));
     }
     let names = names(*first, head, tail)?;
-    let mut union = completed(head, &names)?;
+    // Twice, because the last pair is there when they are joined.
+    cx.reserve(2.0 * joined_bytes(parts, &names), "merge fewer geometries, or raise --memory")?;
+    let mut all = vec![completed(head, &names)?];
     for (_, part) in tail {
-        union = union.concat(&completed(part, &names)?)?;
+        all.push(completed(part, &names)?);
     }
-    Ok(Some(union))
+    // Neighbours are joined pair by pair, so that each row is copied a few times and not once for every later wire.
+    while all.len() > 1 {
+        let join = |pair: &[Component]| match pair {
+            [a, b] => Ok(a.concat(b)?),
+            one => Ok(one[0].clone()),
+        };
+        all = all.chunks(2).map(join).collect::<Result<_>>()?;
+    }
+    Ok(all.pop())
+}
+
+/// The bytes of the joined parts: of each attribute a row for every point or element.
+fn joined_bytes(parts: &[(usize, &Component)], names: &[(Owner, Name, ColumnType)]) -> f64 {
+    let total = |count: &dyn Fn(&Component) -> usize| parts.iter().map(|(_, part)| count(part) as f64).sum::<f64>();
+    let rows = [total(&Component::point_count), total(&Component::element_count)];
+    let of_rows =
+        names.iter().map(|(owner, _, kind)| rows[usize::from(*owner == Owner::Element)] * 4.0 * kind.width() as f64);
+    total(&|part| part.topology().bytes()) + of_rows.sum::<f64>()
 }
 
 /// The attributes of points and elements that any part has.
 ///
 /// # Errors
 /// If two parts have the same attribute with different types.
-fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result<Vec<(Owner, Name)>> {
+fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result<Vec<(Owner, Name, ColumnType)>> {
     let mut found: Vec<(Owner, Name, ColumnType, usize)> = Vec::new();
     for (wire, part) in std::iter::once(&(first, head)).chain(tail) {
         for (owner, name, column) in part.columns().filter(|(owner, ..)| *owner != Owner::Once) {
@@ -87,13 +106,13 @@ fn names(first: usize, head: &Component, tail: &[(usize, &Component)]) -> Result
             }
         }
     }
-    Ok(found.into_iter().map(|(owner, name, ..)| (owner, name)).collect())
+    Ok(found.into_iter().map(|(owner, name, kind, _)| (owner, name, kind)).collect())
 }
 
 /// The part with the neutral value of each attribute that it lacks, where there is one.
-fn completed(part: &Component, names: &[(Owner, Name)]) -> Result<Component> {
+fn completed(part: &Component, names: &[(Owner, Name, ColumnType)]) -> Result<Component> {
     let mut part = part.clone();
-    for (owner, name) in names {
+    for (owner, name, _) in names {
         if part.table(*owner).column(name).is_none()
             && let Some(column) = part.neutral(*owner, name)
         {

@@ -56,6 +56,8 @@ pub(crate) static NODE: Node = Node::new(
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (size, thickness) = (cx.get(SIZE).map(f64::from), f64::from(cx.get(THICK)));
     let n = cx.get(DIVISIONS) as usize;
+    // The most that any shape takes: 16 faces for each division squared, in f64 while it is made.
+    cx.reserve(16.0 * 96.0 * (n * n) as f64, "lower `divisions`, or raise --memory")?;
     let [width, _, depth] = size;
     let (size, shape) = match cx.get(SHAPE) {
         Solid::Box => (size, shapes::block(size, [n; 3])),

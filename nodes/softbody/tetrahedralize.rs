@@ -105,6 +105,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let closed = ClosedSurface::of(&surface, cx.get(REPAIR) == Repair::Safe).map_err(refusal)?;
     cx.check_cancelled()?;
     let fill = FillSettings { spacing: cx.get(SPACING), interior: cx.get(INTERIOR) };
+    let bytes = closed.fill_bytes(&fill).map_err(refusal)?;
+    cx.reserve(bytes, "raise `spacing`, fill fewer bodies, or raise --memory")?;
     let solid = closed.fill(&fill).map_err(refusal)?;
     publish(cx, &closed, &solid);
     let repaired = repaired(mesh, &closed)?;

@@ -17,6 +17,15 @@ fn checked(kind: &str, params: &str) -> (Option<i32>, String) {
 }
 
 #[test]
+fn a_frame_number_of_any_width_is_a_missing_file() {
+    for width in [300, 65_535, 65_536] {
+        let (code, message) = checked("Curve_In", &format!(r#""file": "{}""#, "#".repeat(width)));
+        assert_eq!(code, Some(1), "{width}: {message}");
+        assert!(message.starts_with("nodes.a.params.file: "), "{message}");
+    }
+}
+
+#[test]
 fn inline_geometry_is_checked() {
     let curve = r#""points": [[0, 0, 0], [0, 1, 0]]"#;
     let square = r#""points": [[0, 0, 0], [1, 0, 0], [1, 0, 1]]"#;

@@ -223,6 +223,65 @@ fn a_full_disk_under_the_cache_is_reported_once_and_does_not_stop_the_cook() {
     assert!(ran.stderr.contains("the disk is full; cooking continues without it"), "{}", ran.stderr);
 }
 
+/// Cooks `graph` with `arguments` in a shell with a limited address space.
+fn within(kilobytes: u64, graph: &str, arguments: &str) -> Ran {
+    let bench = Bench::with_graph(graph);
+    let script = format!("ulimit -v {kilobytes} && exec \"$0\" cook g.json {arguments}");
+    let mut command = Command::new("sh");
+    command.args(["-c", &script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+    Ran::of(&command.output().unwrap())
+}
+
+/// A box joined with itself again and again.
+fn doubled(times: usize) -> String {
+    let mut text = r#"{"convect": 1, "nodes": {"n0": {"type": "Mesh_Primitive"}"#.to_owned();
+    for n in 1..=times {
+        text += &format!(r#", "n{n}": {{"type": "Merge", "inputs": {{"geometry": ["n{0}", "n{0}"]}}}}"#, n - 1);
+    }
+    format!(r#"{text}}}, "outputs": {{"o": "n{times}", "first": "n0"}}}}"#)
+}
+
+#[test]
+fn a_result_larger_than_the_memory_is_refused_with_its_size() {
+    let ran = within(4_194_304, &doubled(28), "--memory 100M");
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    let expected = "(Merge) at frame 1: the result would take 165.1 MiB with its inputs, but --memory allows 100.0 MiB; \
+                    merge fewer geometries, or raise --memory";
+    assert!(ran.stderr.contains(expected), "{}", ran.stderr);
+    assert!(ran.stderr.contains("wrote out/first.usdc"), "other outputs are written: {}", ran.stderr);
+}
+
+#[test]
+fn the_limits_of_the_process_are_kept_too() {
+    let ran = within(1_500_000, &doubled(28), "--memory 100G --threads 1");
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    assert!(ran.stderr.contains("but the limit on the process's address space leaves "), "{}", ran.stderr);
+}
+
+#[test]
+fn a_billion_frames_take_no_memory_before_they_are_cooked() {
+    let graph = doubled(1).replace(r#"{"convect": 1,"#, r#"{"convect": 1, "scene": {"frames": [1, 1000000000]},"#);
+    let bench = Bench::with_graph(&graph);
+    let limited = |verb: &str| {
+        let script = format!("ulimit -v 2000000 && exec timeout 20 \"$0\" {verb}");
+        let mut command = Command::new("sh");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+        Ran::of(&command.output().unwrap())
+    };
+    let ran = limited("explain g.json");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stdout.starts_with("1000000000 frames, of which the first 10000 are planned\n"), "{}", ran.stdout);
+    let ran = limited("check g.json");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let ran = limited("cook g.json --format json --frames 1,999999999-1000000000 --preview");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let mut child =
+        bench.command(&["cook", "g.json", "--format", "json", "--out", "all"]).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(4, &bench.path("all"));
+    signal("INT", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
 #[test]
 fn four_gigabytes_of_address_space_are_enough() {
     let bench = Bench::new();

@@ -59,8 +59,8 @@ pub(crate) fn lines(path: &Path, keys: &Keys) -> String {
 }
 
 pub(crate) fn cook(graph: &Graph, frames: &[Frame], threads: usize, disk: Option<&mut DiskCache>) -> Keys {
-    let engine = Engine::new(&Settings { threads, memory: 1 << 28 }).unwrap();
-    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec() };
+    let engine = Engine::new(&Settings { threads, memory: 1 << 28, ..Settings::default() }).unwrap();
+    let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec().into() };
     let mut keys = Keys::new();
     let mut sink = |finished: &[Delivered]| -> Result<(), Infallible> {
         keys.extend(

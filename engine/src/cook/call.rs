@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::store::Cooked;
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::{Geometry, Kind, Name, Owner, P};
+use crate::memory::Ceiling;
 use crate::node::{Carries, Cx, FrameCx, History, InputData, Needs, Node, Outputs, StepCx};
 use crate::param::{Clock, Params};
 use crate::time::Frame;
@@ -23,6 +24,7 @@ pub(crate) struct Call<'a> {
     pub(crate) clock: Clock,
     pub(crate) origin: [f64; 3],
     pub(crate) history: Option<&'a dyn History>,
+    pub(crate) ceiling: Ceiling,
 }
 
 /// What came out of a call.
@@ -64,6 +66,7 @@ impl<'a> Call<'a> {
                 inputs: self.inputs,
                 live: self.live,
                 cancel: self.cancel,
+                ceiling: self.ceiling,
                 published: Mutex::default(),
             },
             frame: self.frame,

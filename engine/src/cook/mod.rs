@@ -27,6 +27,7 @@ use crate::files::Files;
 use crate::geometry::Geometry;
 use crate::graph::Graph;
 use crate::key::ContentKey;
+use crate::memory::Ceiling;
 use crate::plan::{Plan, Request};
 use crate::time::Frame;
 use store::Store;
@@ -53,11 +54,13 @@ pub struct Settings {
     pub threads: usize,
     /// Bytes of results to hold.
     pub memory: usize,
+    /// The most that a result may take together with what it is made from; a node that asks for more is refused.
+    pub ceiling: Ceiling,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { threads: 0, memory: 1 << 30 }
+        Self { threads: 0, memory: 1 << 30, ceiling: Ceiling::NONE }
     }
 }
 
@@ -74,6 +77,7 @@ pub enum Stopped<E> {
 pub struct Engine {
     pool: rayon::ThreadPool,
     memory: usize,
+    ceiling: Ceiling,
     store: Mutex<Store>,
     files: Arc<Files>,
     /// What a check of a graph has cooked already, for the report of the cook that follows.
@@ -92,7 +96,9 @@ impl Engine {
             .build()
             .map_err(|error| format!("cannot start threads: {error}"))?;
         let store = Mutex::new(Store::new(settings.memory / 2));
-        Ok(Self { pool, memory: settings.memory, store, files: Arc::default(), verified: Mutex::default() })
+        let files = Arc::new(Files::within(settings.ceiling));
+        let Settings { memory, ceiling, .. } = *settings;
+        Ok(Self { pool, memory, ceiling, store, files, verified: Mutex::default() })
     }
 
     /// Plans a request on `graph`.
@@ -141,6 +147,7 @@ impl Engine {
         let fresh = Self {
             pool: rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread"),
             memory: self.memory,
+            ceiling: self.ceiling,
             store: Mutex::new(Store::new(usize::MAX)),
             files: self.files.clone(),
             verified: Mutex::default(),

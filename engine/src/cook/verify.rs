@@ -11,9 +11,9 @@ use crate::error::{CookError, Error, ErrorKind};
 use crate::files::unreadable;
 use crate::geometry::Name;
 use crate::graph::fault::code;
-use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part};
+use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part, Positions};
 use crate::param::{ParamSpec, Shape, Source};
-use crate::plan::{Plan, Request, Resolver};
+use crate::plan::{Request, Resolver};
 use crate::time::Frame;
 
 /// Checks look at no more frames than this, so that they stay fast. Errors at later frames are reported when cooking.
@@ -27,13 +27,14 @@ impl Engine {
     /// and animated params are evaluated at all frames of the scene. (A cook reports illegal values itself and skips
     /// those frames.)
     pub fn verify(&self, graph: &Graph, needed_by: Option<&Request>) -> Vec<Fault> {
-        let everything = Request { outputs: (0..graph.outputs.len()).collect(), frames: vec![graph.scene.start()] };
+        let everything =
+            Request { outputs: (0..graph.outputs.len()).collect(), frames: vec![graph.scene.start()].into() };
         let plan = match self.plan(graph, needed_by.unwrap_or(&everything)) {
             Ok(plan) => plan,
             Err(_) => return Vec::new(),
         };
         let frames: Vec<Frame> = match needed_by {
-            Some(request) => request.frames.iter().copied().take(MOST_FRAMES).collect(),
+            Some(request) => request.frames.iter().take(MOST_FRAMES).collect(),
             None => (graph.scene.first..=graph.scene.last).map(Frame::whole).take(MOST_FRAMES).collect(),
         };
         let mut faults = Vec::new();
@@ -70,25 +71,29 @@ impl Engine {
             }
         }
         let first = frames.iter().min().copied().unwrap_or(graph.scene.start());
-        for (index, error) in self.cook_sources(&plan, &sources, first) {
+        for (index, error) in self.cook_sources(graph, &sources, first) {
             faults.push(fault(graph, index, error.error.clone()));
         }
         faults.sort_by_key(|fault| (fault.line, fault.column));
         faults
     }
 
-    fn cook_sources(&self, plan: &Plan, sources: &[usize], frame: Frame) -> Vec<(usize, Arc<CookError>)> {
-        let mut graph = plan.graph.clone();
-        graph.outputs = sources
-            .iter()
-            .map(|node| GraphOutput {
-                name: graph.nodes[*node].id.clone(),
-                from: Link { node: *node, port: 0 },
-                attributes: None,
-                v: false,
-            })
-            .collect();
-        let request = Request { outputs: (0..sources.len()).collect(), frames: vec![frame] };
+    fn cook_sources(&self, graph: &Graph, sources: &[usize], frame: Frame) -> Vec<(usize, Arc<CookError>)> {
+        let output = |(index, node): (usize, &usize)| GraphOutput {
+            name: graph.nodes[*node].id.clone(),
+            from: Link { node: index, port: 0 },
+            attributes: None,
+            v: false,
+        };
+        // Sources alone: they read nothing, and a graph may have a million other nodes.
+        let graph = Graph {
+            scene: graph.scene.clone(),
+            nodes: sources.iter().map(|node| graph.nodes[*node].clone()).collect(),
+            outputs: sources.iter().enumerate().map(output).collect(),
+            folder: graph.folder.clone(),
+            positions: Positions::default(),
+        };
+        let request = Request { outputs: (0..sources.len()).collect(), frames: vec![frame].into() };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         let cancel = AtomicBool::new(false);
         let Ok(plan) = self.plan(&graph, &request) else { return Vec::new() };
@@ -119,7 +124,7 @@ struct ParamFaults {
 }
 
 impl ParamFaults {
-    fn over(resolver: &Resolver, frames: &[Frame]) -> Self {
+    fn over(resolver: &Resolver<'_>, frames: &[Frame]) -> Self {
         let mut refused: Option<(Error, Frame, usize)> = None;
         let mut missing: Option<(Error, Frame, usize)> = None;
         let record = |found: &mut Option<(Error, Frame, usize)>, frame: Frame, error: &dyn Fn() -> Error| match found {

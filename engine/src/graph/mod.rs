@@ -13,7 +13,7 @@ mod text;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::files::numbered_path;
+use crate::files::existing_files;
 use crate::geometry::{Geometry, Kind, Name};
 use crate::node::{Carries, Node, Output};
 use crate::param::{Clock, ParamSpec, Source};
@@ -82,8 +82,8 @@ pub enum Body {
         node: &'static Node,
         /// The declaration's params.
         specs: Arc<[ParamSpec]>,
-        /// Where each param's value comes from.
-        params: Vec<Source>,
+        /// Where each param's value comes from. Nodes of one type that set none share them.
+        params: Arc<[Source]>,
         /// Wires of each input.
         inputs: Vec<Vec<Link>>,
     },
@@ -134,18 +134,15 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// The files that the nodes read at `frames`. A numbered file is listed for the whole frame at or before each
-    /// frame.
-    pub fn files(&self, frames: &[Frame]) -> Vec<PathBuf> {
+    /// The files that the nodes may read. Of a sequence these are all that exist, whatever frames are cooked.
+    pub fn files(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();
         for node in &self.nodes {
             let Body::Node { params, .. } = &node.body else { continue };
-            for source in params {
+            for source in params.iter() {
                 match source {
                     Source::File { path, numbered: false } => files.push(path.to_path_buf()),
-                    Source::File { path, numbered: true } => {
-                        files.extend(frames.iter().map(|frame| numbered_path(path, frame.floor_number())));
-                    }
+                    Source::File { path, numbered: true } => files.extend(existing_files(path)),
                     _ => {}
                 }
             }

@@ -1,7 +1,5 @@
 //! Positions of a graph's parts in its file, so that faults found after the load have a line and column too.
 
-use std::collections::BTreeMap;
-
 use super::Graph;
 use super::fault::{Fault, FaultClass};
 use super::json::member_path;
@@ -32,29 +30,68 @@ impl Part<'_> {
     }
 }
 
-/// Line and column in the graph file, or in the value of a `--set` with its key.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Line and column in the graph file, or in the value of a `--set`.
+#[derive(Clone, Copy, Debug)]
 struct FilePosition {
+    /// Where its JSON path starts and ends in [`Positions::paths`]. A graph file is far smaller than 4 GiB.
+    path: [u32; 2],
     line: u32,
     column: u32,
-    set: Option<Box<str>>,
+    /// Index of its `--set`, or [`NO_SET`].
+    set: u32,
 }
 
-/// Positions by JSON path. Empty for a graph that was not read from a text.
+/// The `set` of a position in the file.
+const NO_SET: u32 = u32::MAX;
+
+/// Positions by JSON path. Empty for a graph that was not read from a text. All paths are in one string, because a graph
+/// may have millions.
 #[derive(Clone, Debug, Default)]
-pub struct Positions(BTreeMap<String, FilePosition>);
+pub struct Positions {
+    paths: String,
+    /// Ascending by path once they are [sorted](Self::sort).
+    all: Vec<FilePosition>,
+    sets: Vec<Box<str>>,
+}
 
 impl Positions {
     /// Records that the value at `path` starts at byte `offset` of the text.
-    pub(super) fn record(&mut self, path: String, text: &Text<'_>, offset: usize) {
+    pub(super) fn record(&mut self, path: &str, text: &Text<'_>, offset: usize) {
         let Position { line, column } = text.position(offset);
-        self.0.insert(path, FilePosition { line, column, set: text.set.map(Into::into) });
+        let set = text.set.map_or(NO_SET, |set| {
+            let known = self.sets.iter().position(|known| **known == *set);
+            known.unwrap_or_else(|| {
+                self.sets.push(set.into());
+                self.sets.len() - 1
+            }) as u32
+        });
+        let start = self.paths.len() as u32;
+        self.paths.push_str(path);
+        self.all.push(FilePosition { path: [start, self.paths.len() as u32], line, column, set });
+    }
+
+    /// Makes positions findable, after the last was recorded.
+    pub(super) fn sort(&mut self) {
+        let paths = &self.paths;
+        self.all.sort_by(|a, b| a.path_in(paths).cmp(b.path_in(paths)));
+        self.all.shrink_to_fit();
+        self.paths.shrink_to_fit();
     }
 
     /// The position of `path`, or of the innermost parent that has one.
     fn of(&self, path: &str) -> Option<&FilePosition> {
         let parents = path.rmatch_indices('.').map(|(dot, _)| &path[..dot]);
-        std::iter::once(path).chain(parents).find_map(|path| self.0.get(path))
+        let find = |path: &str| {
+            let found = self.all.binary_search_by(|known| known.path_in(&self.paths).cmp(path));
+            found.ok().map(|index| &self.all[index])
+        };
+        std::iter::once(path).chain(parents).find_map(find)
+    }
+}
+
+impl FilePosition {
+    fn path_in<'p>(&self, paths: &'p str) -> &'p str {
+        &paths[self.path[0] as usize..self.path[1] as usize]
     }
 }
 
@@ -64,7 +101,7 @@ impl Graph {
     pub fn fault_at(&self, part: Part<'_>, code: &'static str, class: FaultClass, fact: impl Into<String>) -> Fault {
         let path = part.path();
         let (line, column, set) = match self.positions.of(&path) {
-            Some(found) => (found.line, found.column, found.set.clone()),
+            Some(found) => (found.line, found.column, self.positions.sets.get(found.set as usize).cloned()),
             None => (0, 0, None),
         };
         Fault { code, line, column, path, fact: fact.into(), hint: None, class, set }

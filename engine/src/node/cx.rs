@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{Metric, Node, Output};
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::{Attr, ColumnType, Component, Geometry, Item, Name, Owner};
+use crate::memory::{Ceiling, size_text};
 use crate::param::{Clock, Maskable, Param, ParamType, Params};
 use crate::time::Frame;
 use numerics::masked::Masked;
@@ -41,6 +42,7 @@ pub struct Cx<'a> {
     pub(crate) inputs: Vec<(&'static str, InputData)>,
     pub(crate) live: Option<&'a [Name]>,
     pub(crate) cancel: &'a AtomicBool,
+    pub(crate) ceiling: Ceiling,
     pub(crate) published: Mutex<Vec<(&'static str, f64)>>,
 }
 
@@ -96,6 +98,34 @@ impl Cx<'_> {
             metric.name
         );
         self.published.lock().unwrap_or_else(PoisonError::into_inner).push((metric.name, value));
+    }
+
+    /// Asks for memory before it is taken: a node whose result can be larger than its input calls this with the bytes
+    /// that the result takes while it is made, as soon as they are known. What the inputs take is added.
+    ///
+    /// # Errors
+    /// If that is more than the cook may take; the hint says how to make less.
+    pub fn reserve(&self, bytes: f64, hint: &str) -> Result<()> {
+        // Saturates, and NaN is 0.
+        let bytes = (bytes as usize).saturating_add(self.input_bytes());
+        if self.ceiling.allows(bytes) {
+            return Ok(());
+        }
+        let size = size_text(bytes);
+        let fact = format!("the result would take {size} with its inputs, but {}", self.ceiling.describe());
+        Err(Error::refused(fact).hint(hint))
+    }
+
+    /// Bytes of all arrays that the inputs hold.
+    fn input_bytes(&self) -> usize {
+        let mut arrays: Vec<(usize, usize)> = Vec::new();
+        for (_, data) in &self.inputs {
+            let wires = data.now.iter().chain(&data.start).chain(data.steps.iter().flat_map(|(_, wires)| wires));
+            arrays.extend(wires.flat_map(|wire| wire.arrays()));
+        }
+        arrays.sort_unstable();
+        arrays.dedup_by_key(|(address, _)| *address);
+        arrays.iter().map(|(_, bytes)| bytes).sum()
     }
 
     /// Ends the cook early if it was cancelled; call it in long loops.

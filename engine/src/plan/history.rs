@@ -32,7 +32,7 @@ pub(crate) fn history_start(scene: &Scene) -> i64 {
 pub(crate) struct Integrals<'a>(Vec<Integral<'a>>);
 
 impl<'a> Integrals<'a> {
-    pub(crate) fn new(resolver: &'a Resolver, node: &Node, scene: &Scene) -> Self {
+    pub(crate) fn new(resolver: &'a Resolver<'a>, node: &Node, scene: &Scene) -> Self {
         let of = |integrand: &Integrand| Integral::new(resolver, *integrand, scene);
         Self(node.integrands.iter().flatten().map(of).collect())
     }
@@ -45,7 +45,7 @@ impl History for Integrals<'_> {
 }
 
 struct Integral<'a> {
-    resolver: &'a Resolver,
+    resolver: &'a Resolver<'a>,
     integrand: Integrand,
     fps: f64,
     since: Frame,
@@ -57,7 +57,7 @@ struct Integral<'a> {
 }
 
 impl<'a> Integral<'a> {
-    fn new(resolver: &'a Resolver, integrand: Integrand, scene: &Scene) -> Self {
+    fn new(resolver: &'a Resolver<'a>, integrand: Integrand, scene: &Scene) -> Self {
         Self {
             resolver,
             integrand,

@@ -25,6 +25,9 @@ pub(crate) struct ResolvedFrame<'g> {
 type Resolved<'g> = std::result::Result<Arc<ResolvedFrame<'g>>, Arc<CookError>>;
 type KeyOrError = std::result::Result<ContentKey, Arc<CookError>>;
 
+/// Results whose keys must be found first: node and canonical frame.
+type Missing = Vec<(usize, Frame)>;
+
 /// Keys known of one node.
 #[derive(Default)]
 struct NodeKeys<'g> {
@@ -37,6 +40,16 @@ struct NodeKeys<'g> {
     /// Of what its integrands were before frame 0.
     before: Option<ContentKey>,
     anchors: Option<Anchors>,
+    /// What the next state reads, while the keys of that are being found.
+    pending: Option<(Moment, Reads<'g>)>,
+}
+
+/// A result whose key is being found.
+struct Task<'g> {
+    node: usize,
+    frame: Frame,
+    /// What it reads, where that is known: from the second visit on.
+    reads: Option<Reads<'g>>,
 }
 
 /// Finds keys, and remembers those of the current slice.
@@ -77,41 +90,74 @@ impl<'p, 'g> Keys<'p, 'g> {
     /// # Errors
     /// Where a param of the node, or of anything it reads, is refused.
     pub(crate) fn resolve(&mut self, node: usize, frame: Frame) -> Resolved<'g> {
-        if let Some(known) = self.nodes[node].frames.get(&frame) {
-            return known.clone();
+        // A stack of its own, because a graph may be deeper than that of the thread.
+        let mut tasks = vec![Task { node, frame, reads: None }];
+        while let Some(Task { node, frame, reads }) = tasks.pop() {
+            if self.nodes[node].frames.contains_key(&frame) {
+                continue;
+            }
+            let resolved = match reads.map_or_else(|| self.plan.reads(node, self.moment(node, frame)), Ok) {
+                Err(error) => Err(error),
+                Ok(reads) => match self.find(node, frame, &reads) {
+                    Ok(key) => key.map(|key| Arc::new(ResolvedFrame { reads, key })),
+                    Err(missing) => {
+                        tasks.push(Task { node, frame, reads: Some(reads) });
+                        // In this order the first is found first.
+                        let missing = missing.into_iter().rev();
+                        tasks.extend(missing.map(|(node, frame)| Task { node, frame, reads: None }));
+                        continue;
+                    }
+                },
+            };
+            self.nodes[node].frames.insert(frame, resolved);
         }
-        let resolved = self.find(node, frame);
-        self.nodes[node].frames.insert(frame, resolved.clone());
-        resolved
+        self.nodes[node].frames[&frame].clone()
     }
 
-    fn find(&mut self, node: usize, frame: Frame) -> Resolved<'g> {
+    /// When a result at `frame` reads.
+    fn moment(&self, node: usize, frame: Frame) -> Moment {
+        match self.plan.graph.nodes[node].node() {
+            Some(declared) if declared.cook.is_chain() => Moment::ChainOutput(frame),
+            _ => Moment::Frame(frame),
+        }
+    }
+
+    /// The key of a result that reads these, unless keys of them are missing.
+    fn find(&mut self, node: usize, frame: Frame, reads: &Reads<'g>) -> std::result::Result<KeyOrError, Missing> {
         let plan = self.plan;
-        let (reads, key) = match &plan.graph.nodes[node].body {
+        let body = &plan.graph.nodes[node].body;
+        match body {
             Body::Given { moves, .. } => {
-                let reads = plan.reads(node, Moment::Frame(frame))?;
                 let hasher = self.hasher.tag(1).i64(plan.number as i64).i64(node as i64);
                 hasher.i64(if *moves { frame.ticks() } else { 0 });
-                (reads, self.finish_with_live(node))
             }
             Body::Node { node: declared, .. } if declared.cook.is_chain() => {
-                let reads = plan.reads(node, Moment::ChainOutput(frame))?;
                 // Between whole frames an output is made of its neighbours each way.
                 let mut states = Vec::new();
                 for whole in plan.output_frames(frame).all().iter().copied() {
-                    let segment = self.segment(node, whole)?;
-                    states.push(self.state_key(node, segment, whole.max(segment.start))?);
+                    let state = match self.segment(node, whole) {
+                        Ok(segment) => self.find_state_key(node, segment, whole.max(segment.start))?,
+                        Err(error) => Err(error),
+                    };
+                    match state {
+                        Ok(key) => states.push(key),
+                        Err(error) => return Ok(Err(error)),
+                    }
                 }
                 let hasher = self.hasher.tag(3).i64(frame.ticks());
                 states.into_iter().fold(hasher, Hasher::key);
-                (reads, self.finish_with_live(node))
             }
             Body::Node { node: declared, .. } => {
-                let reads = plan.reads(node, Moment::Frame(frame))?;
-                let inputs = self.input_keys(&reads)?;
+                let inputs = match self.input_keys(reads)? {
+                    Ok(inputs) => inputs,
+                    Err(error) => return Ok(Err(error)),
+                };
                 let clock = match declared.cook {
                     Cook::Frame { reads_clock, .. } if reads_clock(&reads.params) => {
-                        Some(self.clock_key(node, declared, frame).map_err(|e| Arc::new(plan.error(node, frame, e)))?)
+                        match self.clock_key(node, declared, frame) {
+                            Ok(key) => Some(key),
+                            Err(error) => return Ok(Err(Arc::new(plan.error(node, frame, error)))),
+                        }
                     }
                     _ => None,
                 };
@@ -121,10 +167,9 @@ impl<'p, 'g> Keys<'p, 'g> {
                     hasher.key(clock);
                 }
                 inputs.hash(hasher);
-                (reads, self.finish_with_live(node))
             }
-        };
-        Ok(Arc::new(ResolvedFrame { reads, key }))
+        }
+        Ok(Ok(self.finish_with_live(node)))
     }
 
     /// Completes a key by the attributes that are used of the node's result.
@@ -135,17 +180,23 @@ impl<'p, 'g> Keys<'p, 'g> {
         names.iter().fold(hasher, |hasher, name| hasher.text(name)).finish()
     }
 
-    /// Keys of all results that are read.
-    fn input_keys(&mut self, reads: &Reads<'g>) -> std::result::Result<InputKeys, Arc<CookError>> {
-        let mut keys = Vec::new();
+    /// Keys of all results that are read, or those that are missing.
+    fn input_keys(&self, reads: &Reads<'g>) -> std::result::Result<InputKeysOrError, Missing> {
+        let (mut keys, mut missing) = (Vec::new(), Missing::new());
         for input in &reads.inputs {
             for read in input.results(self.plan) {
-                keys.push((read.port, self.resolve(read.node, read.frame)?.key));
+                match self.nodes[read.node].frames.get(&read.frame) {
+                    Some(Ok(resolved)) => keys.push((read.port, resolved.key)),
+                    // Of several errors the first is reported, and what follows it need not be known.
+                    Some(Err(error)) if missing.is_empty() => return Ok(Err(error.clone())),
+                    Some(Err(_)) => return Err(missing),
+                    None => missing.push((read.node, read.frame)),
+                }
             }
             // Marks the end of a list, so that a wire moved from one input to the next changes the key.
             keys.push((usize::MAX, ContentKey::default()));
         }
-        Ok(InputKeys(keys))
+        if missing.is_empty() { Ok(Ok(InputKeys(keys))) } else { Err(missing) }
     }
 
     /// A key of the frame, the scene's clock and origin, and the history of the node's integrands.
@@ -229,30 +280,62 @@ impl<'p, 'g> Keys<'p, 'g> {
     /// # Errors
     /// Where a param is refused at that frame or an earlier one.
     pub(crate) fn state_key(&mut self, node: usize, segment: ChainSegment, frame: i64) -> KeyOrError {
+        loop {
+            match self.find_state_key(node, segment, frame) {
+                Ok(key) => return key,
+                Err(missing) => missing.into_iter().for_each(|(node, frame)| drop(self.resolve(node, frame))),
+            }
+        }
+    }
+
+    /// The key of a chain's state, unless keys of what it reads are missing.
+    fn find_state_key(
+        &mut self,
+        node: usize,
+        segment: ChainSegment,
+        frame: i64,
+    ) -> std::result::Result<KeyOrError, Missing> {
         let index = (frame - segment.start) as usize;
         loop {
             let known = self.nodes[node].states.entry(segment).or_default();
             if let Some(key) = known.get(index) {
-                return key.clone();
+                return Ok(key.clone());
             }
             let at = segment.start + known.len() as i64;
             let key = match known.last().cloned() {
                 Some(Err(error)) => Err(error),
-                Some(Ok(before)) => self.next_state_key(node, at, Some(before)),
-                None => self.next_state_key(node, at, None),
+                Some(Ok(before)) => self.next_state_key(node, Moment::ChainStep(at), Some(before))?,
+                None => self.next_state_key(node, Moment::ChainStart(at), None)?,
             };
             self.nodes[node].states.entry(segment).or_default().push(key);
         }
     }
 
-    fn next_state_key(&mut self, node: usize, frame: i64, before: Option<ContentKey>) -> KeyOrError {
+    fn next_state_key(
+        &mut self,
+        node: usize,
+        moment: Moment,
+        before: Option<ContentKey>,
+    ) -> std::result::Result<KeyOrError, Missing> {
         let plan = self.plan;
-        let moment = if before.is_some() { Moment::ChainStep(frame) } else { Moment::ChainStart(frame) };
         let Some(declared) = plan.graph.nodes[node].node() else { unreachable!("given geometry has no state") };
-        let reads = plan.reads(node, moment)?;
-        let inputs = self.input_keys(&reads)?;
-        let clock = self.clock_key(node, declared, moment.frame());
-        let clock = clock.map_err(|error| Arc::new(plan.error(node, moment.frame(), error)))?;
+        let pending = self.nodes[node].pending.take().filter(|(at, _)| *at == moment);
+        let reads = match pending.map_or_else(|| plan.reads(node, moment), |(_, reads)| Ok(reads)) {
+            Ok(reads) => reads,
+            Err(error) => return Ok(Err(error)),
+        };
+        let inputs = match self.input_keys(&reads) {
+            Ok(Ok(inputs)) => inputs,
+            Ok(Err(error)) => return Ok(Err(error)),
+            Err(missing) => {
+                self.nodes[node].pending = Some((moment, reads));
+                return Err(missing);
+            }
+        };
+        let clock = match self.clock_key(node, declared, moment.frame()) {
+            Ok(clock) => clock,
+            Err(error) => return Ok(Err(Arc::new(plan.error(node, moment.frame(), error)))),
+        };
         let hasher = self.hasher.tag(7);
         if let Some(before) = before {
             hasher.key(before);
@@ -260,12 +343,14 @@ impl<'p, 'g> Keys<'p, 'g> {
         hash_recipe(hasher, declared, &reads.params);
         hasher.key(clock);
         inputs.hash(hasher);
-        Ok(self.hasher.finish())
+        Ok(Ok(self.hasher.finish()))
     }
 }
 
 /// Keys of the results that a node reads, each with the output it comes from.
 struct InputKeys(Vec<(usize, ContentKey)>);
+
+type InputKeysOrError = std::result::Result<InputKeys, Arc<CookError>>;
 
 impl InputKeys {
     fn hash(&self, hasher: &mut Hasher) {

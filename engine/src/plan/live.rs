@@ -12,7 +12,7 @@ use crate::param::{Source, Value};
 type Taken = Option<BTreeSet<Name>>;
 
 /// Fills in `live` of every planned node, from the outputs upwards.
-pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [PlannedNode]) {
+pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [PlannedNode<'_>]) {
     let mut taken: Vec<Taken> = vec![Some(BTreeSet::new()); graph.nodes.len()];
     for output in request.outputs.iter().map(|place| &graph.outputs[*place]) {
         let asked = output.attributes.as_ref().map(|names| {
@@ -39,7 +39,7 @@ fn add(taken: &mut Taken, more: Taken) {
 }
 
 /// What a node takes of its inputs, where `taken` is taken of its own result.
-fn reads(graph: &Graph, place: usize, planned: &PlannedNode, taken: &Taken) -> Taken {
+fn reads(graph: &Graph, place: usize, planned: &PlannedNode<'_>, taken: &Taken) -> Taken {
     let Body::Node { node, params, .. } = &graph.nodes[place].body else { return Some(BTreeSet::new()) };
     let mut reads: BTreeSet<Name> = node.reads.iter().map(|attribute| attribute.spec().0.into()).collect();
     let mut writes: BTreeSet<Name> = node.writes.iter().map(|attribute| attribute.spec().0.into()).collect();
@@ -55,7 +55,7 @@ fn reads(graph: &Graph, place: usize, planned: &PlannedNode, taken: &Taken) -> T
         }
     }
     reads.insert(P.name.into());
-    for source in params {
+    for source in params.iter() {
         match source {
             Source::Masked(_, attribute) | Source::Constant(Value::Masked(_, Some(attribute))) => {
                 reads.insert(attribute.clone());

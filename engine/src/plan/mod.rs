@@ -25,6 +25,7 @@ pub use segments::Window;
 
 use crate::error::{CookError, Error};
 use crate::files::Files;
+use crate::frames::FrameSet;
 use crate::geometry::Name;
 use crate::graph::{Body, Dag, Graph, GraphNode};
 use crate::node::{Cook, LeftOut, Wires};
@@ -32,25 +33,28 @@ use crate::param::Params;
 use crate::time::Frame;
 use reads::read_spans;
 
+/// Animated params are evaluated at no more frames than this to see what a request leaves out.
+const MOST_FRAMES: usize = 10_000;
+
 /// What is asked of a graph.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
     /// Indices in [`Graph::outputs`].
     pub outputs: Vec<usize>,
-    /// Frames, in any order; each is cooked once.
-    pub frames: Vec<Frame>,
+    /// Frames; each is cooked once.
+    pub frames: FrameSet,
 }
 
 impl Request {
     /// All outputs at all frames of the scene.
     pub fn everything(graph: &Graph) -> Self {
-        let frames = (graph.scene.first..=graph.scene.last).map(Frame::whole).collect();
-        Self { outputs: (0..graph.outputs.len()).collect(), frames }
+        let outputs = (0..graph.outputs.len()).collect();
+        Self { outputs, frames: FrameSet::whole(graph.scene.first, graph.scene.last) }
     }
 }
 
 /// What a plan knows of one node.
-pub(crate) struct PlannedNode {
+pub(crate) struct PlannedNode<'g> {
     /// Whether the request depends on it.
     pub(crate) needed: bool,
     /// Whether its result may change with the frame.
@@ -65,14 +69,14 @@ pub(crate) struct PlannedNode {
     pub(crate) live: Option<Vec<Name>>,
     /// Whether a window or solver depends on it, which asks for every frame in turn.
     pub(crate) feeds_chain: bool,
-    pub(crate) resolver: Resolver,
+    pub(crate) resolver: Resolver<'g>,
 }
 
 /// What must be cooked for a request.
 pub struct Plan<'g> {
     pub(crate) graph: &'g Graph,
     pub(crate) request: Request,
-    pub(crate) nodes: Vec<PlannedNode>,
+    pub(crate) nodes: Vec<PlannedNode<'g>>,
     pub(crate) dag: Dag,
     pub(crate) files: Arc<Files>,
     /// Distinguishes the plans of one process: given geometry has no recipe, so its key is its node in this plan.
@@ -85,12 +89,10 @@ impl<'g> Plan<'g> {
     /// # Errors
     /// Where a sub-frame is asked of an output that depends on a solver.
     pub fn new(graph: &'g Graph, request: &Request, files: Arc<Files>) -> Result<Self, Arc<CookError>> {
-        let mut request = request.clone();
-        request.frames.sort_unstable();
-        request.frames.dedup();
+        let request = request.clone();
         let dag = Dag::of(graph);
         let needed = dag.upstream(request.outputs.iter().map(|output| graph.outputs[*output].from.node));
-        let mut nodes: Vec<PlannedNode> = Vec::with_capacity(graph.nodes.len());
+        let mut nodes: Vec<PlannedNode<'g>> = Vec::with_capacity(graph.nodes.len());
         for (node, needed) in graph.nodes.iter().zip(&needed) {
             // Of a node that is not needed, neither params nor files are looked at.
             let planned = match needed {
@@ -113,12 +115,12 @@ impl<'g> Plan<'g> {
     }
 
     fn check_sub_frames(&self) -> Result<(), Arc<CookError>> {
-        let Some(frame) = self.request.frames.iter().find(|frame| !frame.is_whole()) else { return Ok(()) };
+        let Some(frame) = self.request.frames.fraction() else { return Ok(()) };
         for output in self.request.outputs.iter().map(|output| &self.graph.outputs[*output]) {
             if self.nodes[output.from.node].has_solver {
                 let fact = format!("output `{}` comes from a solver, which has only whole frames", output.name);
                 let error = Error::refused(fact).hint("request whole frames");
-                return Err(Arc::new(self.error(output.from.node, *frame, error)));
+                return Err(Arc::new(self.error(output.from.node, frame, error)));
             }
         }
         Ok(())
@@ -137,18 +139,17 @@ impl<'g> Plan<'g> {
         CookError { node: node.id.clone(), type_name: node.type_name(), frame, error }
     }
 
-    /// Stages of `node` that are left out at every frame of the request.
+    /// Stages of `node` that are left out at every frame of the request, of which the first [`MOST_FRAMES`] are looked at.
     pub fn left_out(&self, node: usize) -> Vec<LeftOut> {
         let resolver = &self.nodes[node].resolver;
         let at = |frame: Frame| resolver.at(frame).map(|params| self.left_out_with(node, &params)).unwrap_or_default();
-        let mut stages =
-            at(self.canonical(node, self.request.frames.first().copied().unwrap_or(self.graph.scene.start())));
+        let mut stages = at(self.canonical(node, self.request.frames.first().unwrap_or(self.graph.scene.start())));
         if resolver.is_animated() {
-            for frame in &self.request.frames {
+            for frame in self.request.frames.iter().take(MOST_FRAMES) {
                 if stages.is_empty() {
                     break;
                 }
-                let here = at(*frame);
+                let here = at(frame);
                 stages.retain(|stage| here.contains(stage));
             }
         }
@@ -176,8 +177,8 @@ impl<'g> Plan<'g> {
     }
 }
 
-impl PlannedNode {
-    fn not_needed(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+impl<'g> PlannedNode<'g> {
+    fn not_needed(node: &'g GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         Self {
             needed: false,
             varies: false,
@@ -192,7 +193,12 @@ impl PlannedNode {
 }
 
 /// Plans a needed node; `before` are the nodes before it, among them all that it reads.
-fn plan_node(node: &GraphNode, graph: &Graph, files: &Arc<Files>, before: &mut [PlannedNode]) -> PlannedNode {
+fn plan_node<'g>(
+    node: &'g GraphNode,
+    graph: &Graph,
+    files: &Arc<Files>,
+    before: &mut [PlannedNode<'g>],
+) -> PlannedNode<'g> {
     let resolver = Resolver::new(node, graph, files);
     let (varies, may_hold, has_solver) = match &node.body {
         Body::Given { moves, .. } => (*moves, false, false),
@@ -213,7 +219,7 @@ fn plan_node(node: &GraphNode, graph: &Graph, files: &Arc<Files>, before: &mut [
                 before[link.node].read_at_start |= span.start;
             }
             let reads =
-                |test: &dyn Fn(&PlannedNode) -> bool| inputs.iter().flatten().any(|link| test(&before[link.node]));
+                |test: &dyn Fn(&PlannedNode<'_>) -> bool| inputs.iter().flatten().any(|link| test(&before[link.node]));
             let pure = matches!(declared.cook, Cook::Pure(_));
             let may_hold = pure && !reads(&|source| source.varies && !source.may_hold);
             let has_solver = matches!(declared.cook, Cook::Solver(..)) || reads(&|source| source.has_solver);

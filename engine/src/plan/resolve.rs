@@ -11,9 +11,9 @@ use crate::param::{Clock, ParamSpec, Params, ReadLog, Source, Unset, Value};
 use crate::time::Frame;
 
 /// Evaluates the params of one node.
-pub(crate) struct Resolver {
+pub(crate) struct Resolver<'g> {
     specs: Arc<[ParamSpec]>,
-    sources: Vec<Source>,
+    sources: &'g [Source],
     log: Arc<ReadLog>,
     files: Arc<Files>,
     clock: Clock,
@@ -22,8 +22,8 @@ pub(crate) struct Resolver {
     constant: Option<Result<Params>>,
 }
 
-impl Resolver {
-    pub(crate) fn new(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+impl<'g> Resolver<'g> {
+    pub(crate) fn new(node: &'g GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         let mut resolver = Self::lazy(node, graph, files);
         let start = graph.scene.start();
         // An animated param that is not read does not make the node animated.
@@ -39,10 +39,10 @@ impl Resolver {
 
     /// The resolver of a node on which no requested output depends: params are evaluated and files opened only on
     /// request.
-    pub(crate) fn lazy(node: &GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
+    pub(crate) fn lazy(node: &'g GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         let (specs, sources) = match &node.body {
-            Body::Node { specs, params, .. } => (specs.clone(), params.clone()),
-            Body::Given { .. } => (Arc::from([]), Vec::new()),
+            Body::Node { specs, params, .. } => (specs.clone(), &**params),
+            Body::Given { .. } => (Arc::from([]), &[][..]),
         };
         Self {
             log: Arc::new(ReadLog::new(specs.len())),
@@ -74,7 +74,7 @@ impl Resolver {
 
     /// Whether any param with `history` changes with time.
     pub(crate) fn history_is_animated(&self) -> bool {
-        self.specs.iter().zip(&self.sources).any(|(spec, source)| spec.facts.history && source.is_animated())
+        self.specs.iter().zip(self.sources).any(|(spec, source)| spec.facts.history && source.is_animated())
     }
 
     /// The params at `frame`.
@@ -99,7 +99,7 @@ impl Resolver {
     /// The files of sequences that `params` select, with the names of their params.
     pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = (&'static str, PathBuf)> {
         let frame = self.file_frame(params);
-        self.specs.iter().zip(&self.sources).filter_map(move |(spec, source)| match source {
+        self.specs.iter().zip(self.sources).filter_map(move |(spec, source)| match source {
             Source::File { path, numbered: true } => Some((spec.name, numbered_path(path, frame))),
             _ => None,
         })
@@ -111,7 +111,7 @@ impl Resolver {
 
     fn values(&self, frame: f64, past: bool) -> Result<Params> {
         let mut values = Vec::with_capacity(self.sources.len());
-        for (spec, source) in self.specs.iter().zip(&self.sources) {
+        for (spec, source) in self.specs.iter().zip(self.sources) {
             let value = source.at(frame, self.clock);
             // Integrals over the past read only these; illegal past values of the others do not matter.
             let matters = !past || spec.facts.history || spec.facts.fixed;

@@ -73,7 +73,7 @@ impl TestGraph {
     pub(crate) fn with(mut self, id: &str, param: &str, source: Source) -> Self {
         let index = self.index(id);
         let Body::Node { node, params, .. } = &mut self.0.nodes[index].body else { panic!("`{id}` is given") };
-        params[param_index(node, param)] = source;
+        std::sync::Arc::make_mut(params)[param_index(node, param)] = source;
         self
     }
 
@@ -93,7 +93,7 @@ impl TestGraph {
 
     /// Cooks frames of all outputs, including fractional ones.
     pub(crate) fn cook_with(&self, engine: &Engine, frames: &[Frame], disk: Option<&mut DiskCache>) -> Cooked {
-        let request = Request { outputs: (0..self.0.outputs.len()).collect(), frames: frames.to_vec() };
+        let request = Request { outputs: (0..self.0.outputs.len()).collect(), frames: frames.to_vec().into() };
         let mut found = BTreeMap::new();
         let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
             found.extend(finished.iter().map(|one| ((one.output, one.frame), one.geometry.clone())));
@@ -128,13 +128,13 @@ impl<'n> NodeBuilder<'n> {
 
     pub(crate) fn done(self) -> Link {
         let Self { graph, id, node, params, inputs } = self;
-        graph.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs })
+        graph.push(id, Body::Node { node, specs: node.param_specs().into(), params: params.into(), inputs })
     }
 
     /// Adds the node and an output of it.
     pub(crate) fn out(self) -> Link {
         let Self { graph, id, node, params, inputs } = self;
-        let link = graph.push(id, Body::Node { node, specs: node.param_specs().into(), params, inputs });
+        let link = graph.push(id, Body::Node { node, specs: node.param_specs().into(), params: params.into(), inputs });
         graph.output(link);
         link
     }
@@ -152,7 +152,7 @@ pub(crate) fn keyed(keys: &[(f64, f32)]) -> Source {
 }
 
 pub(crate) fn engine(threads: usize, memory: usize) -> Engine {
-    Engine::new(&Settings { threads, memory }).expect("threads")
+    Engine::new(&Settings { threads, memory, ..Settings::default() }).expect("threads")
 }
 
 /// Runs `work`, which panics on purpose. From then on panics of cooking threads are not printed; those of tests are.

@@ -2,6 +2,7 @@
 
 mod builder;
 mod checkpoints;
+mod depth;
 mod faults;
 mod integrals;
 mod keys;

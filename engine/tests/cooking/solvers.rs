@@ -143,7 +143,7 @@ fn fractional_frames_of_a_solver_and_of_nodes_that_read_it_are_refused() {
     let from = engine::graph::Link { node: graph.index("bounce"), port: 0 };
     graph.0.outputs.clear();
     graph.add("add", &ADD).wire("points", from).out();
-    let request = engine::plan::Request { outputs: vec![0], frames: vec![at(3.0), at(4.5)] };
+    let request = engine::plan::Request { outputs: vec![0], frames: vec![at(3.0), at(4.5)].into() };
     let error = engine(1, 1 << 20).plan(&graph.0, &request).map(drop).unwrap_err().to_string();
     let expected = "`add` (Add) at frame 4.5: output `add` comes from a solver, which has only whole frames; \
                     request whole frames";

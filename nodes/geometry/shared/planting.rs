@@ -45,6 +45,9 @@ impl Planting<'_> {
             let fact = format!("{most} curves of {cvs} CVs would grow on {area} m², more than {MOST_CVS} CVs");
             return Err(Error::refused(fact).hint("lower `density` or `cvs`, or scale the skin to metres"));
         }
+        // A root with its index, while they are sorted and turned into shapes, and `P`, `Pref` and `uvw` of each CV.
+        const BYTES: [f64; 2] = [192.0, 36.0];
+        cx.reserve(most * (BYTES[0] + BYTES[1] * cvs), "lower `density` or `cvs`, or raise --memory")?;
         let roots = surface.spread(most as usize, Key::new(u64::from(self.seed.0)));
         cx.check_cancelled()?;
 

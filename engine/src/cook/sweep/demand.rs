@@ -194,7 +194,11 @@ impl<'g> Sweep<'_, 'g, '_> {
     /// Whether a frame of the request lies in the segment, or beyond it where a chain will pass through.
     fn is_asked_later(&self, node: usize, segment: ChainSegment) -> bool {
         let frames = &self.plan.request.frames;
-        let first = frames.get(frames.partition_point(|frame| frame.floor_number() < segment.from));
+        // The first segment starts before all frames.
+        let first = match segment.from {
+            i64::MIN => frames.first(),
+            from => frames.at_or_after(Frame::whole(from)),
+        };
         first.is_some_and(|frame| self.plan.nodes[node].feeds_chain || frame.floor_number() < segment.until)
     }
 

@@ -156,15 +156,14 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             .iter()
             .zip(&plan.nodes)
             .any(|(node, planned)| planned.needed && node.node().is_some_and(|declared| declared.cook.is_chain()));
-        let mut rest = plan.request.frames.as_slice();
-        while let Some(first) = rest.first() {
-            let most = self.slice_length();
-            let fits = |frame: &&Frame| !chains || frame.ticks() - first.ticks() < MOST_CHAIN_FRAMES * Frame::TICKS;
-            let count = rest.iter().take(most).take_while(fits).count();
-            let (slice, later) = rest.split_at(count);
-            rest = later;
+        let mut next = 0;
+        while let Some(first) = plan.request.frames.get(next) {
+            let fits = |frame: &Frame| !chains || frame.ticks() - first.ticks() < MOST_CHAIN_FRAMES * Frame::TICKS;
+            let frames = (next..next + self.slice_length()).map_while(|index| plan.request.frames.get(index));
+            let slice: Vec<Frame> = frames.take_while(fits).collect();
+            next += slice.len();
             let cooking = Stopwatch::start();
-            let finished = self.slice(slice);
+            let finished = self.slice(&slice);
             self.report.cooking += cooking.wall();
             if self.cancelled() {
                 self.report.cancelled = true;

@@ -191,6 +191,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             clock: scene.clock(),
             origin: scene.origin,
             history: self.nodes[node].integrals.as_ref().map(|integrals| integrals as &dyn History),
+            ceiling: self.engine.ceiling,
         })
     }
 

@@ -95,8 +95,8 @@ struct Draft<'a> {
     text: NodeText<'a>,
     node: Option<&'static Node>,
     specs: Arc<[ParamSpec]>,
-    inputs: Vec<InputSpec>,
-    params: Vec<Source>,
+    inputs: Arc<[InputSpec]>,
+    params: Arc<[Source]>,
     /// Wires of each input.
     wires: Vec<Vec<Wire<'a>>>,
 }
@@ -126,10 +126,10 @@ fn load(
     let controls = Controls::read(&document.controls, faults);
     let mut reader =
         Reader { scene: &scene, controls: &controls, folder, files, faults, read: BTreeMap::new(), kind: "" };
-    let mut specs = BTreeMap::new();
+    let mut types = BTreeMap::new();
     let mut drafts: Vec<Draft<'_>> = std::mem::take(&mut document.nodes)
         .into_iter()
-        .map(|node| draft(node, catalogue, &mut specs, &mut reader))
+        .map(|node| draft(node, catalogue, &mut types, &mut reader))
         .collect();
     wires::connect(&mut drafts, faults);
 
@@ -148,11 +148,20 @@ fn load(
     Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions })
 }
 
-/// Reads a node's type and params. Nodes of one type share their `specs`.
+/// What nodes of one type share.
+#[derive(Clone)]
+struct NodeType {
+    specs: Arc<[ParamSpec]>,
+    inputs: Arc<[InputSpec]>,
+    /// The params of a node that sets none.
+    unset: Arc<[Source]>,
+}
+
+/// Reads a node's type and params.
 fn draft<'a>(
     text: NodeText<'a>,
     catalogue: Catalogue,
-    specs: &mut BTreeMap<&'static str, Arc<[ParamSpec]>>,
+    types: &mut BTreeMap<&'static str, NodeType>,
     reader: &mut Reader<'a, '_>,
 ) -> Draft<'a> {
     let node = text.kind.as_ref().and_then(|kind| {
@@ -166,13 +175,16 @@ fn draft<'a>(
         }
         node
     });
-    let of_type = |node: &'static Node| specs.entry(node.name).or_insert_with(|| node.param_specs().into()).clone();
-    let specs = node.map_or_else(|| Arc::from([]), of_type);
-    let inputs = node.map(Node::input_specs).unwrap_or_default();
-    let params = match node {
-        Some(node) => reader.params(node, &specs, &text.params),
-        None => Vec::new(),
+    let Some(declared) = node else {
+        return Draft { text, node, specs: [].into(), inputs: [].into(), params: [].into(), wires: Vec::new() };
     };
+    let of_type = types.entry(declared.name).or_insert_with(|| {
+        let specs: Arc<[ParamSpec]> = declared.param_specs().into();
+        let unset = reader.params(declared, &specs, &[]).into();
+        NodeType { specs, inputs: declared.input_specs().into(), unset }
+    });
+    let NodeType { specs, inputs, unset } = of_type.clone();
+    let params = if text.params.is_empty() { unset } else { reader.params(declared, &specs, &text.params).into() };
     Draft { text, node, specs, inputs, params, wires: Vec::new() }
 }
 
@@ -181,15 +193,16 @@ fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
     let mut positions = Positions::default();
     for draft in drafts {
         let id = &draft.text.entry;
-        positions.record(id.json.path(), id.json.text, id.key.start);
+        positions.record(&id.json.path(), id.json.text, id.key.start);
         for entry in draft.text.params.iter().chain(&draft.text.inputs) {
-            positions.record(entry.json.path(), entry.json.text, entry.json.value.start());
+            positions.record(&entry.json.path(), entry.json.text, entry.json.value.start());
         }
     }
     let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok());
     for output in members.into_iter().flatten() {
-        positions.record(output.json.path(), output.json.text, output.key.start);
+        positions.record(&output.json.path(), output.json.text, output.key.start);
     }
+    positions.sort();
     positions
 }
 

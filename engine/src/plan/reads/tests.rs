@@ -266,7 +266,7 @@ fn samples_follow_the_params_of_the_frame_and_refused_ones_are_an_error() {
     let Body::Node { params, .. } = &mut net.0.nodes[solver].body else { unreachable!("just added") };
     let keys = [(4.0, 2_i64), (5.0, 1), (6.0, 9)].map(|(frame, samples)| (frame, i64::erase(samples))).to_vec();
     let interpolation = numerics::ramp::Interpolation::Constant;
-    params[0] = Source::Keys(Arc::new(Keyframes { keys, interpolation }), i64::shape());
+    Arc::make_mut(params)[0] = Source::Keys(Arc::new(Keyframes { keys, interpolation }), i64::shape());
     let plan = net.plan();
     assert_eq!(results(&plan, solver, Moment::ChainStep(4)), "moving@3 moving@3.5 moving@4");
     assert_eq!(results(&plan, solver, Moment::ChainStep(5)), "moving@4 moving@5");

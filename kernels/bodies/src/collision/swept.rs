@@ -128,10 +128,12 @@ pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
     out
 }
 
-/// The largest f32 that is not greater.
+/// The largest f32 that is not greater. Beyond single precision it is the end of the range instead: boxes stay finite, so
+/// none meets [`NOWHERE`], and those that overlap still do, because the order of their bounds is kept.
 fn below(x: f64) -> f32 {
     let near = x as f32;
-    if f64::from(near) > x { near.next_down() } else { near }
+    let below = if f64::from(near) > x { near.next_down() } else { near };
+    below.clamp(-f32::MAX, f32::MAX)
 }
 
 /// Whether two boxes overlap.
@@ -177,6 +179,28 @@ fn gather_on(tree: &BoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) {
             lanes[level] = region.meeting(&tree.levels[level][row]);
         } else {
             out.push(tree.order[rows[0]][lane]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_beyond_single_precision_meet_all_and_only_elements() {
+        let points: Vec<[f64; 3]> = (0..40).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        let elements = Elements::new((0..40).map(|k| [k]).collect(), &points);
+        let far = |x: f64| points.iter().map(|p| [p[0] + x, x, -x]).collect::<Vec<_>>();
+        for x in [0.0, 1e38, 1e39, 1e300, -1e300] {
+            for reach in [0.0, 1e39, f64::INFINITY] {
+                let moved = far(x);
+                let boxes = swept_boxes(&[&points, &moved]);
+                let tree = elements.sweep(&boxes, reach);
+                let mut found = Vec::new();
+                tree.overlapping(&inflated(&bounds_of(&(0..40).collect::<Vec<u32>>(), &boxes), reach), &mut found);
+                assert_eq!(found, (0..40).collect::<Vec<u32>>(), "moved by {x}, reach {reach}");
+            }
         }
     }
 }

@@ -98,8 +98,24 @@ impl ClosedSurface {
         Ok(self.solid(&inner, bodies.concat(), of.collect()))
     }
 
+    /// About how many bytes [`fill`](Self::fill) takes.
+    ///
+    /// # Errors
+    /// If the spacing would make too many points.
+    pub fn fill_bytes(&self, fill: &FillSettings) -> Result<f64, SurfaceFault> {
+        /// Of a point, its tets, and what finds them.
+        const BYTES: f64 = 500.0;
+        let inner = if fill.interior { self.interior_points(fill.spacing)?.0 } else { 0.0 };
+        Ok(BYTES * (inner + self.points.len() as f64))
+    }
+
     /// The spacing in grid steps.
     fn spacing(&self, asked: f64) -> Result<f64, SurfaceFault> {
+        Ok(self.interior_points(asked)?.1 / self.grid.step())
+    }
+
+    /// About how many interior points there will be, and their spacing.
+    fn interior_points(&self, asked: f64) -> Result<(f64, f64), SurfaceFault> {
         let spacing = if asked > 0.0 { asked } else { self.mean_edge() };
         let side = SIDE_BY_EDGE * spacing;
         let cubes = |volume: f64| POINTS_A_CUBE * volume / (side * side * side);
@@ -111,7 +127,7 @@ impl ClosedSurface {
         let (points, tried) = (cubes(self.volume()), cubes(extent(0) * extent(1) * extent(2)));
         match points > MOST_POINTS || tried > MOST_TRIED {
             true => Err(SurfaceFault::TooManyPoints { spacing, points, most: MOST_POINTS }),
-            false => Ok(spacing / self.grid.step()),
+            false => Ok((points, spacing)),
         }
     }
 
