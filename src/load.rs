@@ -22,7 +22,12 @@ const LARGEST_GRAPH: u64 = 256 << 20;
 /// If the file cannot be read. Faults of the graph are in the inner result.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     let mut bytes = Vec::new();
-    let file = engine::files::open(path).and_then(|file| file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes));
+    let file = engine::files::open(path).and_then(|file| {
+        // Without it the buffer grows by doubling.
+        let length = file.metadata().map_or(0, |about| about.len());
+        bytes.reserve(length.min(LARGEST_GRAPH) as usize + 1);
+        file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes)
+    });
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
     if bytes.len() as u64 > LARGEST_GRAPH {
         let fact = format!("the graph `{}` is larger than {} MiB", path.display(), LARGEST_GRAPH >> 20);
@@ -71,12 +76,19 @@ pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fa
     faults
 }
 
+/// More faults are counted, not shown.
+const MOST_SHOWN: usize = 200;
+
 /// The failure for a list of faults, with one line each.
 pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
     let file = path.display().to_string();
-    let mut lines: Vec<String> = faults.iter().map(|fault| fault.in_file(&file)).collect();
-    if faults.len() > 1 {
-        lines.push(format!("{} faults", faults.len()));
+    let mut lines: Vec<String> = faults.iter().take(MOST_SHOWN).map(|fault| fault.in_file(&file)).collect();
+    match faults.len() {
+        0 | 1 => {}
+        count if count > MOST_SHOWN => {
+            lines.push(format!("{count} faults, of which the first {MOST_SHOWN} are shown; `check --json` lists all"));
+        }
+        count => lines.push(format!("{count} faults")),
     }
     Failure { exit: exit_of_faults(faults), lines }
 }

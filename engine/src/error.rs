@@ -32,12 +32,14 @@ pub struct Error {
     pub hint: Option<String>,
     /// The param that caused the error, if one did.
     pub param: Option<&'static str>,
+    /// Whether it depends only on which attributes there are and of which type, so that a check can find it.
+    pub of_types: bool,
 }
 
 impl Error {
     /// An error of that kind.
     pub fn new(kind: ErrorKind, fact: impl Into<String>) -> Self {
-        Self { kind, fact: fact.into(), hint: None, param: None }
+        Self { kind, fact: fact.into(), hint: None, param: None, of_types: false }
     }
 
     /// The node refuses its input or params.
@@ -59,6 +61,13 @@ impl Error {
     #[must_use]
     pub fn of(mut self, param: &'static str) -> Self {
         self.param = Some(param);
+        self
+    }
+
+    /// Marks it as depending only on which attributes there are and of which type, whatever their rows.
+    #[must_use]
+    pub fn of_types(mut self) -> Self {
+        self.of_types = true;
         self
     }
 

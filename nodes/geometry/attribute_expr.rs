@@ -151,7 +151,7 @@ fn part(geometry: &mut Geometry, component: Part) -> Result<&mut Component> {
     let there: Vec<&str> = geometry.kinds().map(Kind::name).collect();
     let hint =
         format!("set `component`; it has {}", if there.is_empty() { "nothing".into() } else { there.join(", ") });
-    geometry.part_mut(kind).ok_or_else(|| Error::refused(format!("`geometry` has no {kind}")).hint(hint))
+    geometry.part_mut(kind).ok_or_else(|| Error::refused(format!("`geometry` has no {kind}")).hint(hint).of_types())
 }
 
 /// The columns that the code writes.
@@ -197,7 +197,8 @@ fn check_owner(part: &Component, owner: Owner, name: &str) -> Result<()> {
     let theirs = other(owner);
     if part.table(owner).column(name).is_none() && part.table(theirs).column(name).is_some() {
         let fact = format!("`{name}` of the {} belongs to {theirs}s, and the code runs on {owner}s", part.kind());
-        return Err(Error::refused(fact).hint(format!("set `over` to \"{theirs}s\", or assign to another name")));
+        let hint = format!("set `over` to \"{theirs}s\", or assign to another name");
+        return Err(Error::refused(fact).hint(hint).of(CODE.name()).of_types());
     }
     Ok(())
 }
@@ -211,7 +212,7 @@ fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
         Owner::Point => format!("`{name}` belongs to elements, and a point of the {} may lie in several", part.kind()),
         _ => format!("`{name}` belongs to points, of which an element has several; set `over` to \"points\""),
     });
-    let error = Error::from(error);
+    let error = Error::from(error).of(CODE.name());
     Error { hint: hint.or(error.hint), ..error }
 }
 

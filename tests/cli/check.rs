@@ -25,6 +25,110 @@ fn a_frame_number_of_any_width_is_a_missing_file() {
     }
 }
 
+/// The exit code and first message of `check` for nodes after curves with a float, a vector and a number for each curve.
+fn checked_chain(nodes: &str) -> (Option<i32>, String) {
+    let graph = format!(
+        r#"{{"convect": 1, "nodes": {{
+            "fur": {{"type": "Curve_In", "params": {{"points": [[0, 0, 0], [0, 1, 0]], "counts": [2],
+                "attributes": {{"soft": [0.5, 1.0], "Cd": [[1, 0, 0.5], [0, 1, 0]]}}}}}},
+            "same": {{"type": "Transform", "inputs": {{"geometry": "fur"}}}},
+            {nodes}}}, "outputs": {{"o": "a"}}}}"#
+    );
+    let bench = Bench::with_graph(&graph);
+    let ran = check(&bench);
+    let cooked = bench.run(&["cook", "g.json"]);
+    assert_eq!(ran.code == Some(0), cooked.code == Some(0), "check and cook differ: {} {}", ran.stderr, cooked.stderr);
+    let line = ran.stderr.lines().next().unwrap_or_default();
+    (ran.code, line.split_once(": ").map_or("", |(_, rest)| rest).to_owned())
+}
+
+#[test]
+fn attributes_that_no_input_can_have_are_faults() {
+    let wind = |params: &str| {
+        format!(r#""a": {{"type": "Curve_Wind", "inputs": {{"curves": "same"}}, "params": {{{params}}}}}"#)
+    };
+    let code = |text: &str| {
+        format!(
+            r#""a": {{"type": "Attribute_Expr", "inputs": {{"geometry": "same"}}, "params": {{"code": "{text}"}}}}"#
+        )
+    };
+    let mask = |name: &str| wind(&format!(r#""blend": {{"value": 1, "attribute": "{name}"}}"#));
+    let made = format!(
+        r#""made": {{"type": "Attribute_Expr", "inputs": {{"geometry": "same"}}, "params": {{"code": "made = P.y"}}}}, {}"#,
+        mask("made").replace("same", "made")
+    );
+    for nodes in [mask("soft"), code("soft = soft*2; b = Cd.x"), made] {
+        assert_eq!(checked_chain(&nodes), (Some(0), String::new()), "{nodes}");
+    }
+    for (nodes, expected) in [
+        (
+            mask("sofft"),
+            "nodes.a.params.blend: `blend` is masked by `sofft`, which the curves do not have; expected one float for \
+             each CV",
+        ),
+        (
+            mask("Cd"),
+            "nodes.a.params.blend: `blend` is masked by `Cd`, which is one float3 for each CV; expected one float for \
+             each CV",
+        ),
+        (code("b = sofft"), "nodes.a.params.code: line 1, column 5: "),
+        (code("b = soft.y"), "nodes.a.params.code: line 1, column 9: a scalar has no components"),
+        (code("Cd = 1"), "nodes.a.params.code: line 1, column 1: "),
+    ] {
+        let (exit, message) = checked_chain(&nodes);
+        assert_eq!(exit, Some(3), "{nodes}: {message}");
+        assert!(message.starts_with(expected), "{nodes}: {message}");
+    }
+}
+
+#[test]
+fn lists_whose_length_changes_are_faults() {
+    let offsets = |last: usize| {
+        let vectors = |count: usize| format!("[{}]", vec!["[0, 0.1, 0]"; count].join(", "));
+        let keys = format!("[[1, {}], [5, {}]]", vectors(8), vectors(last));
+        let graph = format!(
+            r#"{{"convect": 1, "scene": {{"frames": [1, 9]}}, "nodes": {{"box": {{"type": "Mesh_Primitive"}},
+            "a": {{"type": "Lattice_Deform", "inputs": {{"geometry": "box"}},
+                "params": {{"offsets": {{"keyframes": {keys}}}}}}}}}, "outputs": {{"o": "a"}}}}"#
+        );
+        check(&Bench::with_graph(&graph))
+    };
+    assert_eq!(offsets(8).code, Some(0));
+    let ran = offsets(7);
+    assert_eq!(ran.code, Some(3), "{}", ran.stderr);
+    assert!(ran.stderr.contains("nodes.a.params.offsets: `offsets` has 7 vectors"), "{}", ran.stderr);
+}
+
+#[test]
+fn names_of_outputs_leave_room_for_the_rest_of_file_names() {
+    let graph = |length: usize| {
+        let name = "o".repeat(length);
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "nodes": {{"a": {{"type": "Mesh_Primitive"}}}}, "outputs": {{"{name}": "a"}}}}"#
+        ))
+    };
+    let ran = graph(128).run(&["cook", "g.json", "--format", "json", "--frames", "-999999999.0001984126984127"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    for length in [129, 252] {
+        let ran = check(&graph(length));
+        assert_eq!(ran.code, Some(3), "{}", ran.stderr);
+        assert!(ran.stderr.contains("; its files are named after it; expected at most 128"), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn of_thousands_of_faults_the_first_are_shown_and_the_rest_counted() {
+    let nodes: Vec<String> = (0..5_000).map(|n| format!(r#""n{n}": {{"type": "Transfrom"}}"#)).collect();
+    let graph = format!(r#"{{"convect": 1, "nodes": {{{}}}, "outputs": {{"o": "n1"}}}}"#, nodes.join(", "));
+    let bench = Bench::with_graph(&graph);
+    let ran = check(&bench);
+    assert_eq!((ran.code, ran.stderr.lines().count()), (Some(3), 201));
+    assert!(ran.stderr.contains("nodes.n7.type: there is no node type `Transfrom`; did you mean `Transform`?"));
+    assert!(ran.stderr.ends_with("5000 faults, of which the first 200 are shown; `check --json` lists all\n"));
+    let all = bench.run(&["check", "g.json", "--json"]);
+    assert_eq!(all.stdout.matches("\"unknown-type\"").count(), 5_000);
+}
+
 #[test]
 fn inline_geometry_is_checked() {
     let curve = r#""points": [[0, 0, 0], [0, 1, 0]]"#;

@@ -12,6 +12,7 @@ mod interpolate;
 mod report;
 mod store;
 mod sweep;
+mod types;
 mod verify;
 mod warnings;
 

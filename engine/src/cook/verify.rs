@@ -12,7 +12,7 @@ use crate::files::unreadable;
 use crate::geometry::Name;
 use crate::graph::fault::code;
 use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part, Positions};
-use crate::param::{ParamSpec, Shape, Source};
+use crate::param::{ParamSpec, Params, Shape, Source};
 use crate::plan::{Request, Resolver};
 use crate::time::Frame;
 
@@ -52,7 +52,7 @@ impl Engine {
             let before = faults.len();
             let reads_sequence = params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
             if resolver.is_animated() && (reads_sequence || needed_by.is_none()) {
-                let over_time = ParamFaults::over(resolver, &frames);
+                let over_time = ParamFaults::over(resolver, declared.checks, &frames);
                 let missing = over_time.missing.map(|error| fault(graph, index, error));
                 faults.extend(missing.map(|fault| Fault { code: code::FILE_MISSING, ..fault }));
                 let illegal = over_time.refused.filter(|_| needed_by.is_none());
@@ -73,6 +73,11 @@ impl Engine {
         let first = frames.iter().min().copied().unwrap_or(graph.scene.start());
         for (index, error) in self.cook_sources(graph, &sources, first) {
             faults.push(fault(graph, index, error.error.clone()));
+        }
+        // What a file lacks that cannot be read is not known.
+        if needed_by.is_none() && faults.is_empty() {
+            let of_types = self.type_faults(graph).into_iter();
+            faults.extend(of_types.map(|(index, error)| fault(graph, index, error)));
         }
         faults.sort_by_key(|fault| (fault.line, fault.column));
         faults
@@ -124,7 +129,9 @@ struct ParamFaults {
 }
 
 impl ParamFaults {
-    fn over(resolver: &Resolver<'_>, frames: &[Frame]) -> Self {
+    fn over(resolver: &Resolver<'_>, checks: Option<fn(&Params) -> crate::Result<()>>, frames: &[Frame]) -> Self {
+        // Files are not opened here, and checks may look at them.
+        let checks = checks.filter(|_| !resolver.reads_files());
         let mut refused: Option<(Error, Frame, usize)> = None;
         let mut missing: Option<(Error, Frame, usize)> = None;
         let record = |found: &mut Option<(Error, Frame, usize)>, frame: Frame, error: &dyn Fn() -> Error| match found {
@@ -134,7 +141,8 @@ impl ParamFaults {
         // Consecutive frames may read the same file.
         let mut last_found: Option<PathBuf> = None;
         for frame in frames {
-            match resolver.unopened(*frame) {
+            let params = resolver.unopened(*frame);
+            match params.and_then(|params| checks.map_or(Ok(()), |checks| checks(&params)).map(|()| params)) {
                 Err(error) => record(&mut refused, *frame, &|| error.clone()),
                 Ok(params) => {
                     for (param, path) in resolver.sequence_files(&params) {

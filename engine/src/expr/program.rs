@@ -80,7 +80,7 @@ impl From<RunError> for Error {
         match error {
             RunError::Code(fault) => {
                 let fact = format!("line {}, column {}: {}", fault.line, fault.column, fault.fact);
-                Error { hint: fault.hint, ..Error::refused(fact) }
+                Error { hint: fault.hint, ..Error::refused(fact).of_types() }
             }
             RunError::Value(ref bad) => {
                 let fact = format!("line {}, element {}: {error}", bad.line, bad.element);

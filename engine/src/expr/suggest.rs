@@ -10,7 +10,7 @@ use strsim::osa_distance;
 /// Names with more characters are not compared.
 const LONGEST: usize = 64;
 /// The number of candidates that are compared.
-const MOST: usize = 1000;
+pub(crate) const MOST_CANDIDATES: usize = 1000;
 
 /// The candidate with the fewest edits from `name`, if there are at most a third as many edits as characters, or one.
 /// Of equals it is the one with the longest common prefix. Case is ignored; swapping two neighbours is one edit.
@@ -19,7 +19,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let allowed = (wanted.length / 3).max(1);
     candidates
         .into_iter()
-        .take(MOST)
+        .take(MOST_CANDIDATES)
         .filter_map(|candidate| {
             let candidate_folded = folded(candidate)?;
             // Every letter is one edit from every other letter, which is not a similarity.

@@ -10,7 +10,7 @@ use jsonc_parser::common::{Range, Ranged};
 
 use super::fault::{Fault, code};
 use super::text::Text;
-use crate::expr::suggest::nearest;
+use crate::expr::suggest::{MOST_CANDIDATES, nearest};
 
 /// A JSON value, the text that it is part of, and its path.
 #[derive(Clone)]
@@ -22,11 +22,11 @@ pub(super) struct Json<'a> {
     /// Indices in nested lists, outermost first. They become a path only in a fault, so a list of a million items makes
     /// no million strings.
     items: [u32; NESTED],
-    depth: usize,
+    depth: u32,
 }
 
 /// Depth of nested lists whose indices are kept in `items`. A vector in a keyframe has three.
-const NESTED: usize = 4;
+const NESTED: usize = 3;
 
 /// A member of an object.
 #[derive(Clone)]
@@ -75,14 +75,21 @@ pub(super) fn shown(text: &str) -> String {
     short
 }
 
-/// `did you mean …?` if a candidate is similar, else the candidates if they are few, else `None`.
+/// `did you mean …?` if a candidate is similar, else the candidates if they are few, else `None`. After many faults
+/// there are no suggestions any more: nobody reads them, and each compares a name with all others.
 pub(super) fn did_you_mean<'n>(
+    before: &[Fault],
     name: &str,
     candidates: impl IntoIterator<Item = &'n str>,
     what: &str,
 ) -> Option<String> {
     const LISTED: usize = 24;
-    let candidates: Vec<&str> = candidates.into_iter().collect();
+    /// The number of faults with suggestions.
+    const SUGGESTED: usize = 1000;
+    if before.len() >= SUGGESTED {
+        return None;
+    }
+    let candidates: Vec<&str> = candidates.into_iter().take(MOST_CANDIDATES + 1).collect();
     match nearest(name, candidates.iter().copied()) {
         Some(near) => Some(format!("did you mean `{}`?", shown(near))),
         None if candidates.is_empty() => Some(format!("there are no {what}")),
@@ -118,7 +125,7 @@ impl<'a> Json<'a> {
 
     /// Its path.
     pub(super) fn path(&self) -> String {
-        let items = self.items[..self.depth].iter().map(|index| format!("[{index}]"));
+        let items = self.items[..self.depth as usize].iter().map(|index| format!("[{index}]"));
         std::iter::once(self.base.to_string()).chain(items).collect()
     }
 
@@ -129,11 +136,11 @@ impl<'a> Json<'a> {
 
     /// Item `index` of this list.
     pub(super) fn item(&self, value: &'a Value<'a>, index: usize) -> Self {
-        let mut item = match self.depth < NESTED {
+        let mut item = match (self.depth as usize) < NESTED {
             true => Self { value, ..self.clone() },
             false => Self::with_path(value, self.text, &self.path()),
         };
-        item.items[item.depth] = index as u32;
+        item.items[item.depth as usize] = index as u32;
         item.depth += 1;
         item
     }
@@ -290,7 +297,7 @@ fn exact_whole(text: &str) -> Option<i64> {
 pub(super) fn refuse_unknown(entries: &[Entry<'_>], known: &[&str], what: &str, faults: &mut Vec<Fault>) {
     for entry in entries.iter().filter(|entry| !known.contains(&entry.name)) {
         let fact = format!("unknown key `{}`", shown(entry.name));
-        let hint = did_you_mean(entry.name, known.iter().copied(), what);
+        let hint = did_you_mean(faults, entry.name, known.iter().copied(), what);
         faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_KEY, fact) });
     }
 }

@@ -74,7 +74,8 @@ impl Cx<'_> {
             None => format!("which the {kind} do not have"),
         };
         let expected = kind.rows_text(Owner::Point, ColumnType::F1);
-        Err(Error::refused(format!("`{name}` is masked by `{attribute}`, {what}")).hint(format!("expected {expected}")))
+        let fact = format!("`{name}` is masked by `{attribute}`, {what}");
+        Err(Error::refused(fact).hint(format!("expected {expected}")).of(name).of_types())
     }
 
     /// Whether anything downstream, or an output, reads that attribute of this node's result.

@@ -96,6 +96,11 @@ impl<'g> Resolver<'g> {
         self.values(frame.number(), false)
     }
 
+    /// Whether a param is a file.
+    pub(crate) fn reads_files(&self) -> bool {
+        self.sources.iter().any(|source| matches!(source, Source::File { .. }))
+    }
+
     /// The files of sequences that `params` select, with the names of their params.
     pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = (&'static str, PathBuf)> {
         let frame = self.file_frame(params);

@@ -78,7 +78,8 @@ pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f3
         return Ok(Some(mask));
     }
     let what = skin.describe(name).map_or("which `skin` does not have".into(), |found| format!("which is {found}"));
-    Err(Error::refused(format!("`mask` is `{name}`, {what}")).hint("expected one float for each vertex"))
+    let error = Error::refused(format!("`mask` is `{name}`, {what}")).of("mask").of_types();
+    Err(error.hint("expected one float for each vertex"))
 }
 
 /// The skin at the scene's first frame.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::cook::call::{Call, Returned, check_finite};
 use crate::cook::interpolate::interpolated;
 use crate::cook::store::{Cooked, Metrics};
+use crate::cook::types::completed;
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
 use crate::node::{ChainFns, FrameCx, MendBetween, Outputs, SolverFns, StateBox};
@@ -17,6 +18,8 @@ pub(in crate::cook) enum Executor {
     Cook,
     /// Calls nodes for a check of a graph: what each source cost is remembered for the cook that follows.
     Check,
+    /// Calls nodes for geometry without rows; their results get every attribute that they may have.
+    Types,
     /// Calls no node: every result is empty, and nothing is delivered.
     Rehearsal,
     /// Calls nodes, and serialises and reads back the state of every solver after each step.
@@ -54,8 +57,13 @@ impl Executor {
             let cooked = call.node.outputs.iter().map(|_| Arc::new(Geometry::default())).collect();
             return Ok(Returned { cooked, metrics: Vec::new(), new_bytes: 0, stripped: Vec::new() });
         }
+        let (node, inputs) = (call.node, if self == Self::Types { call.inputs.clone() } else { Vec::new() });
         let (outputs, finished) = call.run(cook)?;
-        finished.check(outputs)
+        let mut returned = finished.check(outputs)?;
+        if self == Self::Types {
+            returned.cooked = completed(node, &inputs, returned.cooked);
+        }
+        Ok(returned)
     }
 
     /// The state of a window or solver at its first frame, and what was published there.
@@ -89,7 +97,7 @@ impl Executor {
     pub(super) fn interpolated(self, near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
         match self {
             Self::Rehearsal => Ok(near[1].clone()),
-            Self::Cook | Self::Check | Self::Reload => interpolated(near, share, mend),
+            Self::Cook | Self::Check | Self::Types | Self::Reload => interpolated(near, share, mend),
         }
     }
 }

@@ -111,7 +111,7 @@ impl<'a> Document<'a> {
                     let names = self.controls.iter().map(|control| control.name);
                     let hint = match self.nodes.iter().any(|node| node.entry.name == key) {
                         true => Some(format!("`{0}` is a node; set one of its params with `{0}.param=…`", shown(key))),
-                        false => did_you_mean(key, names, "controls"),
+                        false => did_you_mean(faults, key, names, "controls"),
                     };
                     faults.push(Fault { hint, ..fault });
                 }
@@ -119,7 +119,7 @@ impl<'a> Document<'a> {
         };
         let Some(node) = self.nodes.iter_mut().find(|node| node.entry.name == id) else {
             let fault = value.fault(code::UNKNOWN_SET, format!("there is no node `{}`", shown(id)));
-            let hint = did_you_mean(id, self.nodes.iter().map(|node| node.entry.name), "nodes");
+            let hint = did_you_mean(faults, id, self.nodes.iter().map(|node| node.entry.name), "nodes");
             return faults.push(Fault { hint, ..fault });
         };
         let value = value.at_path(&member_path(&(member_path("nodes", id) + ".params"), param));

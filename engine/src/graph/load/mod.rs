@@ -168,8 +168,8 @@ fn draft<'a>(
         let name = kind.string()?;
         let node = catalogue.get(name);
         if node.is_none() {
-            let hint =
-                did_you_mean(name, catalogue.names(), "node types").or(Some("`convect nodes` lists the types".into()));
+            let hint = did_you_mean(reader.faults, name, catalogue.names(), "node types")
+                .or(Some("`convect nodes` lists the types".into()));
             let fault = kind.fault(code::UNKNOWN_TYPE, format!("there is no node type `{}`", shown(name)));
             reader.faults.push(Fault { hint, ..fault });
         }

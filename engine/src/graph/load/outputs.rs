@@ -16,6 +16,10 @@ pub(super) struct Draft {
     pub(super) v: bool,
 }
 
+/// Longest name of an output. File systems allow 255 bytes, of which frame number, extension and the marks of temporary
+/// files take a part.
+const LONGEST_NAME: usize = 128;
+
 /// Reads the outputs; `None` if the key is missing or its value is not an object.
 pub(super) fn read<'a>(
     json: Option<&Json<'a>>,
@@ -35,6 +39,10 @@ pub(super) fn read<'a>(
 
 fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -> Option<Draft> {
     check_name(entry, "an output", faults);
+    if entry.name.len() > LONGEST_NAME {
+        let fault = entry.fault(code::BAD_NAME, format!("the name of the output has {} characters", entry.name.len()));
+        faults.push(fault.hint(format!("its files are named after it; expected at most {LONGEST_NAME}")));
+    }
     let name: Name = entry.name.into();
     if entry.json.string().is_some() {
         let Wire { node, port, .. } = nodes.resolve(&entry.json, faults)?;

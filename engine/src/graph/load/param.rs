@@ -61,7 +61,7 @@ impl<'a> Reader<'a, '_> {
             let fact = format!("`{}` has no param `{}`", node.name, shown(entry.name));
             let hint = match node.inputs.iter().any(|input| input.spec().name == entry.name) {
                 true => Some("it is an input; write it under `inputs`".into()),
-                false => did_you_mean(entry.name, specs.iter().map(|spec| spec.name), "params"),
+                false => did_you_mean(self.faults, entry.name, specs.iter().map(|spec| spec.name), "params"),
             };
             self.faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_PARAM, fact) });
         }
@@ -304,7 +304,7 @@ impl<'a> Reader<'a, '_> {
             Lookup::Faulty => None,
             Lookup::Nothing => {
                 let fault = name.fault(code::UNKNOWN_CONTROL, format!("there is no control `{}`", shown(text)));
-                let hint = did_you_mean(text, self.controls.names(), "controls");
+                let hint = did_you_mean(self.faults, text, self.controls.names(), "controls");
                 self.faults.push(Fault { hint, ..fault });
                 None
             }

@@ -72,7 +72,7 @@ fn wires_of<'a>(draft: &Draft<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault
             let fact = format!("`{}` has no input `{}`", node.name, shown(entry.name));
             let hint = match draft.specs.iter().any(|spec| spec.name == entry.name) {
                 true => Some("it is a param; write it under `params`".into()),
-                false => did_you_mean(entry.name, draft.inputs.iter().map(|input| input.name), "inputs"),
+                false => did_you_mean(faults, entry.name, draft.inputs.iter().map(|input| input.name), "inputs"),
             };
             faults.push(Fault { hint, ..entry.fault(code::UNKNOWN_INPUT, fact) });
         }
@@ -144,7 +144,7 @@ impl<'d, 'a> Nodes<'d, 'a> {
         let (id, port) = text.split_once('.').map_or((text, None), |(id, port)| (id, Some(port)));
         let Some(&node) = self.by_id.get(id) else {
             let fault = json.fault(code::UNKNOWN_NODE, format!("there is no node `{}`", shown(id)));
-            let hint = did_you_mean(id, self.drafts.iter().map(|draft| draft.text.entry.name), "nodes");
+            let hint = did_you_mean(faults, id, self.drafts.iter().map(|draft| draft.text.entry.name), "nodes");
             faults.push(Fault { hint, ..fault });
             return None;
         };
@@ -154,7 +154,7 @@ impl<'d, 'a> Nodes<'d, 'a> {
         let found = declared.outputs.iter().position(|output| output.name == port);
         if found.is_none() {
             let fact = format!("`{}` is a `{}`, which has no output `{}`", shown(id), declared.name, shown(port));
-            let hint = did_you_mean(port, declared.outputs.iter().map(|output| output.name), "outputs");
+            let hint = did_you_mean(faults, port, declared.outputs.iter().map(|output| output.name), "outputs");
             faults.push(Fault { hint, ..json.fault(code::UNKNOWN_PORT, fact) });
         }
         Some(Wire { json, node, port: found })
