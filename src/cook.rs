@@ -16,7 +16,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::args::{Frames, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
 use crate::output::{Writers, Written, failed, fill};
-use crate::pictures::{self, Pictures};
+use crate::pictures::{self, Pictures, Staged};
 use crate::{load, memory, report};
 
 /// The arguments of `cook`.
@@ -88,17 +88,20 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
         let line = format!("--report would overwrite the graph `{}`; choose another name", args.graph.display());
         return Err(Failure::new(Exit::CommandLine, line));
     }
-    let pictures = Pictures::new(&args.pictures, &graph, &request, &args.out)?;
-    cook(args, &engine, &graph, &request, format, pictures)
+    let staged = Staged::of(&args.pictures, &graph, &request);
+    let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out));
+    let pictures = pictures.transpose()?;
+    // The pictures' guides are cooked along.
+    let cooked = staged.as_ref().map_or((&graph, &request), |staged| (&staged.graph, &staged.request));
+    cook(args, &engine, [(&graph, &request), cooked], format, pictures)
 }
 
 fn cook(
     args: &CookArgs,
     engine: &Engine,
-    graph: &Graph,
-    request: &Request,
+    [(graph, request), cooked]: [(&Graph, &Request); 2],
     format: Format,
-    mut pictures: Option<Pictures>,
+    mut pictures: Option<Pictures<'_>>,
 ) -> Result<(), Failure> {
     let mut disk = match &args.cache {
         None => None,
@@ -113,7 +116,8 @@ fn cook(
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
     let mut inputs = graph.files();
     inputs.push(args.graph.clone());
-    writers.refuse_to_overwrite(&inputs, &request.frames)?;
+    let is_picture = |file: &str| pictures.as_ref().is_some_and(|pictures| pictures.writes(file));
+    writers.refuse_to_overwrite(&inputs, &request.frames, is_picture)?;
     // Before the cook, so that an invalid path is reported at once.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let cancel = cancelled_by_signal();
@@ -123,23 +127,24 @@ fn cook(
         let watch = Stopwatch::start();
         writers.take(finished)?;
         if let Some(pictures) = &mut pictures {
-            pictures.take(finished);
+            pictures.take(finished)?;
         }
-        progress.inc(finished.len() as u64);
+        progress.inc(finished.iter().filter(|one| one.output < graph.outputs.len()).count() as u64);
         writing += watch.wall();
         Ok(())
     };
-    let cooked = engine.cook(graph, request, disk.as_mut(), &cancel, &mut sink);
+    let cooked = engine.cook(cooked.0, cooked.1, disk.as_mut(), &cancel, &mut sink);
     progress.finish_and_clear();
     let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
         Stopped::Sink(failure) => failure,
     })?;
+    report.errors.retain(|(output, _, _)| *output < graph.outputs.len());
     let watch = Stopwatch::start();
     let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
     let written = writers.finish(&incomplete)?;
     report.notes.extend(left_out(graph, &written, format));
-    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write())?;
+    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled))?;
     writing += watch.wall();
     if let Some(file) = report_file {
         let cooked = report::Cooked {

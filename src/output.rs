@@ -63,8 +63,13 @@ impl<'g> Writers<'g> {
     /// Refuses to overwrite the graph or a file that it reads, because the next cook would read its own result.
     ///
     /// # Errors
-    /// If one of `frames` would overwrite one of `inputs`.
-    pub fn refuse_to_overwrite(&self, inputs: &[PathBuf], frames: &FrameSet) -> Result<(), Failure> {
+    /// If one of `frames`, or another file of the folder that is `also` written, would overwrite one of `inputs`.
+    pub fn refuse_to_overwrite(
+        &self,
+        inputs: &[PathBuf],
+        frames: &FrameSet,
+        also: impl Fn(&str) -> bool,
+    ) -> Result<(), Failure> {
         let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
         // The files in the folder are looked at, not those of all frames: there may be a billion.
         let there = fs::read_dir(&self.folder).into_iter().flatten().flatten();
@@ -77,7 +82,7 @@ impl<'g> Writers<'g> {
                     Target::PerFrame => frame_in(file, name, self.format).is_some_and(|frame| frames.contains(frame)),
                 }
             });
-            if written && path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
+            if (written || also(file)) && path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
                 let line =
                     format!("`{}` would be overwritten, but the graph reads it; choose another --out", path.display());
                 return Err(Failure::file(line));
@@ -160,8 +165,7 @@ fn frame_path(folder: &Path, name: &str, frame: Frame, format: Format) -> PathBu
 /// The frame of the file that [`frame_path`] names; `None` if it is another file.
 fn frame_in(file: &str, name: &str, format: Format) -> Option<Frame> {
     let label = file.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(format.name())?.strip_suffix('.')?;
-    let frame: Frame = label.replace('_', ".").parse().ok()?;
-    (frame.file_label() == label).then_some(frame)
+    Frame::of_file_label(label)
 }
 
 fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) -> Result<(PathBuf, u64), Failure> {

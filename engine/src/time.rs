@@ -105,6 +105,12 @@ impl Frame {
             None => format!("{sign}{text:0>4}"),
         }
     }
+
+    /// The frame whose [`Frame::file_label`] this is; `None` for any other text.
+    pub fn of_file_label(label: &str) -> Option<Self> {
+        let frame: Self = label.replace('_', ".").parse().ok()?;
+        (frame.file_label() == label).then_some(frame)
+    }
 }
 
 impl std::fmt::Display for Frame {

@@ -10,12 +10,12 @@ use std::str::FromStr;
 use numerics::vector::{DVec3, direction, to_f64};
 
 /// Default vertical angle of view, degrees: narrow enough to show little distortion.
-const FOV: f64 = 30.0;
+pub(crate) const FOV: f64 = 30.0;
 /// Margin of [`Camera::fit`] around the box, as a fraction of half the picture.
 const MARGIN: f64 = 0.08;
 /// Direction from the target to the eye in [`Camera::fit`]: a three-quarter view from the front right, slightly from
 /// above.
-const THREE_QUARTER: [f64; 3] = [0.52, 0.30, 0.80];
+pub(crate) const THREE_QUARTER: [f64; 3] = [0.52, 0.30, 0.80];
 
 /// Smallest and largest coordinates, metres.
 pub type BoundingBox = [[f32; 3]; 2];
@@ -172,7 +172,7 @@ impl fmt::Display for Camera {
 }
 
 /// Right, up and forward of a view along `forward`.
-fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
+pub(crate) fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
     /// Sine of the angle to the view below which `up` does not define the picture's up.
     const ALONG: f64 = 1e-6;
     let forward = direction(forward).unwrap_or(-DVec3::z());
@@ -182,7 +182,7 @@ fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
     [right, right.cross(&forward), forward]
 }
 
-fn half_tangent(degrees: f64) -> f64 {
+pub(crate) fn half_tangent(degrees: f64) -> f64 {
     libm::tan(degrees.to_radians() / 2.0)
 }
 

@@ -64,10 +64,10 @@ pub fn attribute_range(layers: &[Layer<'_>], name: &str) -> Option<[f32; 2]> {
             range = Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]));
         }
     };
-    for layer in layers {
+    for layer in layers.iter().filter(|layer| !layer.is_guide) {
         for part in layer.geometry.parts() {
-            if let Some((_, column)) = find(part, name) {
-                (0..column.len()).for_each(|row| take(scalar(column, row)));
+            if let Some(shown) = Shown::find(part, name) {
+                (0..shown.column.len()).for_each(|row| take(shown.number(row)));
             }
         }
         if let Some(volume) = layer.geometry.volume().filter(|_| name == SPEED) {
@@ -107,17 +107,16 @@ impl Paint {
     /// The colours of `part`: from the requested attribute, otherwise a colour attribute, otherwise `plain`.
     pub(crate) fn of(part: &Component, color_by: Option<(&str, [f32; 2])>, plain: Vec3) -> Self {
         let painted = match color_by {
-            Some((name, range)) => find(part, name).map(|(owner, column)| {
-                let rows = 0..column.len();
+            Some((name, range)) => Shown::find(part, name).map(|shown| {
+                let rows = 0..shown.column.len();
                 let is_color = COLOR_NAMES.contains(&name);
-                let own = |row| color_row(column, row).filter(|_| is_color);
-                let color = |row| own(row).unwrap_or_else(|| mapped(share(scalar(column, row), range)));
-                (owner, rows.map(color).collect::<Vec<_>>())
+                let own = |row| color_row(shown.column, row).filter(|_| is_color);
+                let color = |row| own(row).unwrap_or_else(|| mapped(share(shown.number(row), range)));
+                (shown.owner, rows.map(color).collect::<Vec<_>>())
             }),
-            None => COLOR_NAMES.iter().find_map(|name| {
-                let (owner, column) = find(part, name)?;
-                let colors = (0..column.len()).map(|row| color_row(column, row)).collect::<Option<Vec<_>>>()?;
-                Some((owner, colors))
+            None => own_color(part).and_then(|(_, shown)| {
+                let rows = 0..shown.column.len();
+                Some((shown.owner, rows.map(|row| color_row(shown.column, row)).collect::<Option<Vec<_>>>()?))
             }),
         };
         match painted {
@@ -163,8 +162,77 @@ fn share(value: f32, [low, high]: [f32; 2]) -> f32 {
     }
 }
 
-fn find<'a>(part: &'a Component, name: &str) -> Option<(Owner, &'a Column)> {
-    Owner::ALL.into_iter().find_map(|owner| part.table(owner).column(name).map(|column| (owner, column)))
+/// An attribute, or one of its components.
+struct Shown<'a> {
+    owner: Owner,
+    column: &'a Column,
+    component: Option<usize>,
+}
+
+impl<'a> Shown<'a> {
+    /// `name` is an attribute, or an attribute and a component like `P.y`.
+    fn find(part: &'a Component, name: &str) -> Option<Self> {
+        let column = |name: &str| {
+            Owner::ALL.into_iter().find_map(|owner| part.table(owner).column(name).map(|column| (owner, column)))
+        };
+        if let Some((owner, column)) = column(name) {
+            return Some(Self { owner, column, component: None });
+        }
+        let (name, letter) = name.rsplit_once('.')?;
+        let component = ["x", "y", "z", "w"].iter().position(|known| *known == letter)?;
+        let (owner, column) = column(name)?;
+        (component < width(column)).then_some(Self { owner, column, component: Some(component) })
+    }
+
+    /// A row as one number: a vector by its length.
+    fn number(&self, row: usize) -> f32 {
+        match (self.component, self.column) {
+            (None, column) => scalar(column, row),
+            (Some(k), Column::F3(rows)) => rows[row][k],
+            (Some(k), Column::F4(rows)) => rows[row][k],
+            (Some(k), Column::I3(rows)) => rows[row][k] as f32,
+            (Some(k), Column::I4(rows)) => rows[row][k] as f32,
+            (Some(_), column) => scalar(column, row),
+        }
+    }
+}
+
+/// Components of a row that have a letter; 0 for numbers.
+fn width(column: &Column) -> usize {
+    match column {
+        Column::F1(_) | Column::I1(_) => 0,
+        Column::F3(_) | Column::I3(_) => 3,
+        Column::F4(_) | Column::I4(_) => 4,
+    }
+}
+
+/// The colour attribute of a component.
+fn own_color(part: &Component) -> Option<(&'static str, Shown<'_>)> {
+    let is_color = |shown: &Shown<'_>| matches!(shown.column, Column::F3(_) | Column::F4(_));
+    COLOR_NAMES.into_iter().find_map(|name| Some((name, Shown::find(part, name).filter(is_color)?)))
+}
+
+/// The colour attribute that is drawn of a layer without `color_by`.
+pub(crate) fn own_color_name(layer: &Layer<'_>) -> Option<&'static str> {
+    layer.geometry.parts().find_map(|part| own_color(part).map(|(name, _)| name))
+}
+
+/// Colours of outputs that are drawn together, sRGB: of similar saturation, and different in lightness as well as in hue,
+/// so that they stay apart with colour blindness.
+const PALETTE: [[u8; 3]; 8] = [
+    [221, 158, 72],
+    [74, 126, 172],
+    [196, 224, 176],
+    [150, 68, 82],
+    [128, 196, 214],
+    [86, 108, 62],
+    [236, 196, 204],
+    [96, 78, 138],
+];
+
+/// The colour of the output at `index` among those drawn together, linear light; they repeat after eight.
+pub fn palette(index: usize) -> [f32; 3] {
+    PALETTE[index % PALETTE.len()].map(|byte| decode(f32::from(byte) / 255.0))
 }
 
 /// A row as one number: a vector by its length.
@@ -251,6 +319,7 @@ mod tests {
         let layers = [Layer::new("a", &a), Layer::new("b", &b)];
         assert_eq!(attribute_range(&layers, "heat"), Some([-2.0, 1.0]));
         assert_eq!(attribute_range(&layers, "cold"), None);
+        assert_eq!(attribute_range(&[Layer::guide("a", &a)], "heat"), None);
         assert_eq!(attribute_names(&layers).into_iter().collect::<Vec<_>>(), ["heat"]);
     }
 
@@ -269,6 +338,38 @@ mod tests {
         assert_eq!(colors[2], NOT_A_NUMBER);
         assert_eq!(colors[3], mapped(1.0));
         assert_eq!(share(3.0e38, [-3.4e38, 3.4e38]), (1.5e38_f32 + 1.7e38) / 3.4e38);
+    }
+
+    #[test]
+    fn a_component_of_a_vector_is_a_number() {
+        let part: Geometry = Component::points(vec![[1.0, -2.0, 3.0], [4.0, 5.0, 6.0]]).into();
+        let range = |name: &str| attribute_range(&[Layer::new("one", &part)], name);
+        assert_eq!(range("P.y"), Some([-2.0, 5.0]));
+        assert_eq!((range("P.w"), range("P.q"), range("Q.x")), (None, None, None));
+        assert_eq!(range("P"), Some([14.0_f32.sqrt(), 77.0_f32.sqrt()]));
+    }
+
+    /// What a person without cones for red (or green, whose confusions are nearly the same) sees of linear light
+    /// (Viénot, Brettel and Mollon, "Digital video colourmaps for checking the legibility of displays by dichromats",
+    /// 1999).
+    fn without_red([r, g, b]: Vec3) -> Vec3 {
+        [0.11238 * r + 0.88762 * g, 0.11238 * r + 0.88762 * g, 0.00401 * r - 0.00401 * g + b]
+    }
+
+    #[test]
+    fn neighbours_in_the_palette_differ_with_and_without_cones_for_red() {
+        let seen = |color: Vec3| {
+            let bytes = encode(color);
+            [lightness(bytes), f64::from(bytes[0]) - f64::from(bytes[1]), f64::from(bytes[1]) - f64::from(bytes[2])]
+        };
+        for (a, b) in (0..8).flat_map(|a| (a + 1..8).map(move |b| (a, b))) {
+            for view in [without_red, |color| color] {
+                let [a, b] = [a, b].map(|k| seen(view(palette(k))));
+                let apart: f64 = (0..3).map(|k| (a[k] - b[k]).abs()).sum();
+                assert!(apart > 20.0, "{a:?} {b:?}");
+            }
+        }
+        assert_eq!(palette(8), palette(0));
     }
 
     #[test]

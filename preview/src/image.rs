@@ -72,17 +72,22 @@ impl Image {
     /// # Errors
     /// If `to` cannot be written.
     pub fn write_png(&self, to: impl Write) -> Result<(), PreviewError> {
-        let size = [self.width, self.height].map(|pixels| pixels as u32);
-        let mut encoder = png::Encoder::new(to, size[0], size[1]);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        encoder.set_compression(png::Compression::High);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_filter(png::Filter::Adaptive);
-        let mut writer = encoder.write_header()?;
+        let mut writer = encoder(to, [self.width, self.height]).write_header()?;
         writer.write_image_data(self.rows.as_flattened())?;
         Ok(writer.finish()?)
     }
+}
+
+/// An encoder of 24 bits per pixel.
+pub(crate) fn encoder<'a, W: Write>(to: W, size: [usize; 2]) -> png::Encoder<'a, W> {
+    let size = size.map(|pixels| pixels as u32);
+    let mut encoder = png::Encoder::new(to, size[0], size[1]);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder
 }
 
 /// Pictures in a row: outputs next to each other. Smaller ones are aligned at the top.

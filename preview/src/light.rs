@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use crate::raster::{self, DepthOnly, Lanes, SAMPLES, Screen, TILE};
-use crate::scene::Scene;
+use crate::scene::{Corner, Scene};
 use crate::vector::{mix, times};
 use crate::view::View;
 use numerics::vector::{Vec3, add, cross, dot, scale, sub, unit};
@@ -28,6 +28,8 @@ const GLOSS: f32 = 0.04;
 const HAIR_GLOSS: f32 = 0.22;
 /// Light on a colour that shows an attribute: from this in the dark to 1 in full light, so that it never gets brighter.
 const MEASURED: f32 = 0.45;
+/// Light above which [`exposed`] compresses.
+const SHOULDER: f32 = 0.6;
 /// Full light: key, sky and fill on a surface that faces them.
 const FULL: f32 = 1.45;
 
@@ -75,6 +77,9 @@ impl Light {
 
     /// A point of a surface; `normal` is on the visible side.
     pub(crate) fn surface(&self, at: Vec3, normal: Vec3, color: Vec3) -> Vec3 {
+        if normal == Corner::UNLIT {
+            return color;
+        }
         let to_eye = unit(sub(self.eye, at)).unwrap_or(self.key);
         let normal = unit(normal).unwrap_or(to_eye);
         let off_skin = add(at, scale(normal, 1.5 * self.shadow.pixel()));
@@ -92,7 +97,7 @@ impl Light {
         }
         let half = unit(add(self.key, to_eye)).unwrap_or(normal);
         let gloss = GLOSS * lit * sixteenth_power(dot(normal, half).max(0.0));
-        add(times(color, light), [gloss; 3])
+        exposed(add(times(color, light), [gloss; 3]))
     }
 
     /// A CV of a strand.
@@ -112,8 +117,19 @@ impl Light {
         let mirrored = (sine(along_key) * sine(along_eye) - along_key * along_eye).max(0.0);
         let gloss = HAIR_GLOSS * lit * sixteenth_power(mirrored);
         // Hair's highlight is half its own colour, half the lamp's.
-        add(times(color, light), scale(mix(KEY_LIGHT, color, 0.6), gloss))
+        exposed(add(times(color, light), scale(mix(KEY_LIGHT, color, 0.6), gloss)))
     }
+}
+
+/// Light as the picture shows it: unchanged to `SHOULDER`, then ever less, so that white in full light stays below 1
+/// and keeps its shading, and a bright colour its hue.
+fn exposed(light: Vec3) -> Vec3 {
+    let most = light[0].max(light[1]).max(light[2]);
+    if most <= SHOULDER || most.is_nan() {
+        return light;
+    }
+    let above = (most - SHOULDER) / (1.0 - SHOULDER);
+    scale(light, (SHOULDER + (1.0 - SHOULDER) * above / (1.0 + above)) / most)
 }
 
 /// A colour that shows an attribute, in `light`; full light gives the colour itself.
@@ -206,13 +222,23 @@ impl DepthMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Corner;
 
     /// A square of side 1 at height 0.5 over the middle.
     fn roof() -> Scene {
         let corner = |x: f32, z: f32| Corner { at: [x, 0.5, z], normal: [0.0, 1.0, 0.0], color: [0.5; 3] };
         let [a, b, c, d] = [corner(-0.5, -0.5), corner(-0.5, 0.5), corner(0.5, 0.5), corner(0.5, -0.5)];
         Scene { triangles: vec![[a, b, c], [a, c, d]], ..Scene::default() }
+    }
+
+    #[test]
+    fn full_light_clips_no_color_and_keeps_hue_and_order() {
+        let full = add(add(KEY_LIGHT, FILL_LIGHT), SKY_LIGHT);
+        let shown = |color: Vec3| exposed(times(color, full));
+        assert!(shown([1.0; 3]).iter().all(|x| *x < 0.95));
+        assert!(shown([1.0; 3])[1] > shown([0.9; 3])[1] + 0.005);
+        let [r, g, _] = shown([1.0, 0.5, 0.0]);
+        assert!((g / r - 0.5 * full[1] / full[0]).abs() < 1e-5);
+        assert_eq!(exposed([0.5, 0.2, 0.1]), [0.5, 0.2, 0.1]);
     }
 
     #[test]

@@ -1,15 +1,16 @@
 //! One panel: the layers staged, lit, drawn over the backdrop, and labelled.
 
 use crate::camera::Camera;
-use crate::color::{attribute_range, decode, encode};
+use crate::color::{attribute_range, decode, encode, own_color_name};
 use crate::ground::Ground;
 use crate::image::Image;
 use crate::light::Light;
 use crate::raster::{self, SAMPLES, Screen, Shader, TILE, Tile, UNCOVERED};
-use crate::scene::{self, Scene};
+use crate::scene::{self, GUIDE, Scene};
+use crate::text::Phrase;
 use crate::vector::{finite, mix};
 use crate::view::{Stage, View};
-use crate::{Layer, PictureSettings, PreviewError, text};
+use crate::{Layer, PictureSettings, PreviewError, arrow, text};
 use numerics::vector::{Vec3, add, scale, sub, unit};
 
 /// Bounds of an empty scene: a metre around the origin.
@@ -36,6 +37,7 @@ pub fn render(layers: &[Layer<'_>], settings: &PictureSettings) -> Result<Image,
     let light = Light::set_up(&mut scene, &view, settings.color_by.is_some());
     let floor = stage.place(bounds[0])[1];
     let ground = (settings.ground && finite([floor; 3])).then(|| Ground::of(&scene, &light, floor));
+    scene.add_guides(layers, settings.clip, &stage);
     let backdrop = Backdrop { light: settings.background.map(|byte| decode(f32::from(byte) / 255.0)), ground, size };
 
     let screen = Screen::of(&scene, &view, size);
@@ -49,14 +51,39 @@ pub fn render(layers: &[Layer<'_>], settings: &PictureSettings) -> Result<Image,
         }
     }
 
-    let names = layers.iter().filter(|_| settings.names).map(|layer| layer.name);
-    let names = names.collect::<Vec<_>>().join(", ");
-    let note = settings.note.as_deref().unwrap_or_default();
-    text::label(&mut image, [names.as_str(), note].join("  ").trim());
+    text::caption(&mut image, &caption(layers, settings));
     if let (Some(name), Some(range), true) = (&settings.color_by, range, settings.legend) {
         text::legend(&mut image, name, range);
     }
+    if let Some(wind) = settings.wind {
+        arrow::draw(&mut image, &camera, wind);
+    }
     Ok(image)
+}
+
+/// The names of the layers, the note, and what colours them.
+fn caption(layers: &[Layer<'_>], settings: &PictureSettings) -> Vec<Phrase> {
+    let drawn = || layers.iter().filter(|layer| !layer.is_guide);
+    let mut phrases: Vec<Phrase> = Vec::new();
+    for layer in layers.iter().filter(|_| settings.names) {
+        let has_own = !layer.is_guide && (settings.color_by.is_some() || own_color_name(layer).is_some());
+        let color = if layer.is_guide { Some(layer.color.unwrap_or(GUIDE)) } else { layer.color };
+        let phrase = Phrase { color: color.filter(|_| !has_own).map(encode), text: layer.name.to_owned() };
+        // Several guides may have one name.
+        if !phrases.contains(&phrase) {
+            phrases.push(phrase);
+        }
+    }
+    phrases.extend(settings.note.iter().map(|note| Phrase { color: None, text: note.clone() }));
+    let colored_by = match &settings.color_by {
+        // The legend names it.
+        Some(_) => None,
+        None => drawn().find_map(own_color_name),
+    };
+    phrases.extend(
+        colored_by.filter(|_| settings.names).map(|name| Phrase { color: None, text: format!("coloured by {name}") }),
+    );
+    phrases
 }
 
 /// The camera's shader.

@@ -3,10 +3,11 @@
 //! Guarantees: contains every component of every layer, in the order of the layers, then mesh, tets, volume, curves,
 //! points. Limit: non-finite triangles and CVs are left out individually.
 
-use engine::geometry::{Component, Kind, Owner, Volume, WIDTH};
+use engine::geometry::{Component, Geometry, Kind, Owner, Volume, WIDTH};
 use rayon::prelude::*;
 
 use crate::camera::BoundingBox;
+use crate::clip::{Clip, Plane};
 use crate::color::{Paint, SPEED};
 use crate::shape::{boundary, level_set, smooth};
 use crate::vector::finite;
@@ -20,6 +21,11 @@ pub(crate) struct Corner {
     pub(crate) at: Vec3,
     pub(crate) normal: Vec3,
     pub(crate) color: Vec3,
+}
+
+impl Corner {
+    /// The normal of a cut face, which is drawn in its colour without light.
+    pub(crate) const UNLIT: Vec3 = [0.0; 3];
 }
 
 /// A CV of a strand.
@@ -57,6 +63,8 @@ pub(crate) struct Scene {
     pub(crate) knots: Vec<Knot>,
     pub(crate) strands: Vec<Strand>,
     pub(crate) dots: Vec<Dot>,
+    /// The plane that cuts what is being added.
+    pub(crate) cut: Option<Plane>,
 }
 
 /// Default colours, linear light: clay, dark skin if curves may grow on it, putty, honey, brown hair, water.
@@ -66,6 +74,14 @@ const TETS: Vec3 = [0.62, 0.46, 0.28];
 const VOLUME: Vec3 = [0.58, 0.24, 0.035];
 const CURVES: Vec3 = [0.50, 0.26, 0.105];
 const POINTS: Vec3 = [0.12, 0.32, 0.60];
+/// Colour of guides, and their width relative to half the scene's diagonal: a line about a pixel wide.
+pub(crate) const GUIDE: Vec3 = [0.03, 0.055, 0.10];
+const GUIDE_WIDTH: f32 = 0.0045;
+/// Points of a guide above which its lines get thinner, and the least fraction of their width.
+const GUIDE_SEGMENTS: f32 = 2000.0;
+const LEAST_GUIDE: f32 = 0.15;
+/// Brightness of a mesh relative to the curves of the same output.
+const UNDER_CURVES: f32 = 0.45;
 
 /// Default width of a curve, relative to half the scene's diagonal: hair on an animal that fills the picture.
 const CURVE_WIDTH: f32 = 0.0035;
@@ -85,21 +101,28 @@ const STRAND_TINT: f32 = 0.22;
 /// With the union over all frames and outputs as [`PictureSettings::bounds`], every picture is framed in the same way.
 pub fn bounds(layers: &[Layer<'_>]) -> Option<BoundingBox> {
     let mut bounds = None::<BoundingBox>;
-    for layer in layers {
-        for part in layer.geometry.parts() {
-            let points = part.positions().iter().filter(|p| finite(**p));
-            bounds = points.fold(bounds, |bounds, p| union(bounds, Some([*p; 2])));
-        }
-        if let Some(volume) = layer.geometry.volume() {
-            let grid = volume.level_grid();
-            for (low, _) in volume.level_set().nodes().filter(|(_, phi)| *phi < 0.0) {
-                let at = |k: usize, i: u32| grid.origin[k] + grid.cell * i as f32;
-                let corner = |step: u32| std::array::from_fn(|k| at(k, low[k] + step));
-                bounds = union(bounds, Some([corner(0), corner(1)]).filter(|[a, b]| finite(*a) && finite(*b)));
+    for layer in layers.iter().filter(|layer| !layer.is_guide) {
+        each_point(layer.geometry, |p| bounds = union(bounds, Some([p; 2])));
+    }
+    bounds
+}
+
+/// Calls `take` with every finite point of a geometry; for a volume, with the corners of its liquid cells.
+pub(crate) fn each_point(geometry: &Geometry, mut take: impl FnMut([f32; 3])) {
+    for part in geometry.parts() {
+        part.positions().iter().filter(|p| finite(**p)).for_each(|p| take(*p));
+    }
+    let Some(volume) = geometry.volume() else { return };
+    let grid = volume.level_grid();
+    for (low, _) in volume.level_set().nodes().filter(|(_, phi)| *phi < 0.0) {
+        for corner in 0..8_u32 {
+            let at: [f32; 3] =
+                std::array::from_fn(|k| grid.origin[k] + grid.cell * (low[k] + (corner >> k & 1)) as f32);
+            if finite(at) {
+                take(at);
             }
         }
     }
-    bounds
 }
 
 /// The smallest box around both.
@@ -114,13 +137,17 @@ impl Scene {
     /// The layers' components on the stage.
     pub(crate) fn of(layers: &[Layer<'_>], settings: &PictureSettings, range: [f32; 2], stage: &Stage) -> Self {
         let color_by = settings.color_by.as_deref().map(|name| (name, range));
-        let mut scene = Self::default();
-        let mesh_color = if layers.iter().any(|layer| layer.geometry.curves().is_some()) { SKIN } else { MESH };
-        for layer in layers {
+        let mut scene = Self { cut: settings.clip.map(|clip| clip.on(stage)), ..Self::default() };
+        let drawn = || layers.iter().filter(|layer| !layer.is_guide);
+        let mesh_color = if drawn().any(|layer| layer.geometry.curves().is_some()) { SKIN } else { MESH };
+        for layer in drawn() {
             let plain = |default: Vec3| layer.color.unwrap_or(default);
             let paint = |part: &Component, default| Paint::of(part, color_by, plain(default));
             if let Some(part) = layer.geometry.mesh() {
-                scene.mesh(part, &paint(part, mesh_color), stage);
+                // Under curves of the same colour a mesh would not be seen.
+                let under = if layer.geometry.curves().is_some() { UNDER_CURVES } else { 1.0 };
+                let color = layer.color.map_or(mesh_color, |color| scale(color, under));
+                scene.mesh(part, &Paint::of(part, color_by, color), stage);
             }
             if let Some(part) = layer.geometry.tets() {
                 let (skin, tets): (Vec<_>, Vec<_>) = boundary::boundary(part.tet_corners()).into_iter().unzip();
@@ -136,7 +163,36 @@ impl Scene {
                 scene.points(part, &paint(part, POINTS), settings.point_width, stage);
             }
         }
+        scene.cut = None;
         scene
+    }
+
+    /// Adds the layers that are guides, as lines without light. After lighting, so that they cast no shadows.
+    pub(crate) fn add_guides(&mut self, layers: &[Layer<'_>], clip: Option<Clip>, stage: &Stage) {
+        let cut = clip.map(|clip| clip.on(stage));
+        for layer in layers.iter().filter(|layer| layer.is_guide) {
+            let Some(part) = layer.geometry.curves() else { continue };
+            // Many lines are thinner, so that what is behind them stays visible.
+            let crowd = (GUIDE_SEGMENTS / part.point_count().max(1) as f32).clamp(LEAST_GUIDE, 1.0);
+            let knot = |at: Vec3| Knot {
+                at,
+                tangent: [0.0, 1.0, 0.0],
+                radius: 0.5 * GUIDE_WIDTH * crowd,
+                color: layer.color.unwrap_or(GUIDE),
+            };
+            let points = place(part.positions(), stage);
+            for range in part.runs().ranges() {
+                for line in
+                    cut.map_or_else(|| vec![points[range.clone()].to_vec()], |cut| cut.pieces(&points[range.clone()]))
+                {
+                    let (seed, start) = (scramble(self.strands.len() as u32), self.knots.len());
+                    if line.len() > 1 {
+                        self.knots.extend(line.into_iter().map(knot));
+                        self.strands.push(Strand { knots: start..self.knots.len(), seed });
+                    }
+                }
+            }
+        }
     }
 
     fn mesh(&mut self, part: &Component, paint: &Paint, stage: &Stage) {
@@ -166,7 +222,15 @@ impl Scene {
             let triangle = [corner(0), corner(1), corner(2)];
             triangle.iter().all(|corner| finite(corner.at)).then_some(triangle)
         });
-        self.triangles.par_extend(drawn);
+        match self.cut {
+            None => self.triangles.par_extend(drawn),
+            Some(plane) => self.triangles.extend(plane.cut(drawn.collect())),
+        }
+    }
+
+    /// Whether a curve with this root, or a point, is on the kept side of the cut.
+    fn keeps(&self, at: Vec3) -> bool {
+        self.cut.is_none_or(|plane| plane.keeps(at))
     }
 
     fn curves(&mut self, part: &Component, paint: &Paint, width: Option<f32>, stage: &Stage) {
@@ -174,6 +238,9 @@ impl Scene {
         let points = place(part.positions(), stage);
         let is_plain = matches!(paint, Paint::Plain(_));
         for (curve, range) in part.runs().ranges().enumerate() {
+            if points.get(range.start).is_none_or(|root| !self.keeps(*root)) {
+                continue;
+            }
             let seed = scramble(self.strands.len() as u32);
             let tint = if is_plain { 1.0 + STRAND_TINT * (fraction(seed) - 0.5) } else { 1.0 };
             let first = range.start;
@@ -212,7 +279,7 @@ impl Scene {
     }
 
     fn dot(&mut self, at: Vec3, radius: f32, color: Vec3) {
-        if finite(at) {
+        if finite(at) && self.keeps(at) {
             let seed = scramble(!(self.dots.len() as u32));
             self.dots.push(Dot { at, radius, color, lit: 1.0, seed });
         }

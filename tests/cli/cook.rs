@@ -106,14 +106,6 @@ fn the_report_is_as_documented() {
 }
 
 #[test]
-fn a_preview_is_a_png_beside_the_outputs() {
-    let bench = Bench::new();
-    bench.done(&["cook", "g.json", "--output", "still", "--preview", "--preview-size", "64x48"]);
-    assert_eq!(bench.names("out"), ["preview.png", "still.usdc"]);
-    assert_eq!(&bench.files("out")["preview.png"][1..4], b"PNG");
-}
-
-#[test]
 fn existing_files_are_replaced() {
     let bench = Bench::new();
     bench.write("out/grass.usdc", "old");

@@ -39,6 +39,7 @@ fn a_wrong_command_line_exits_with_2() {
         &["cook", "g.json", "--threads", "some"],
         &["cook", "g.json", "--set", "scale"],
         &["cook", "g.json", "--preview", "--preview-size", "0x0"],
+        &["cook", "g.json", "--clip", "x"],
         &["nodes", "Curve_Wnd"],
         &["completions", "csh"],
         &["convert", "g.json", "g.abc"],

@@ -13,6 +13,7 @@ mod diff;
 mod exits;
 mod messages;
 mod notes;
+mod pictures;
 mod same_bits;
 mod stats;
 #[cfg(unix)]

@@ -1,5 +1,5 @@
 use super::*;
-use crate::{attribute_range, bounds};
+use crate::{Clip, Framing, attribute_range, bounds};
 use engine::geometry::{Column, Component, Geometry, Grid, Owner, Volume};
 use numerics::vector::length;
 
@@ -165,4 +165,92 @@ fn an_unknown_attribute_is_grey_without_a_legend() {
     assert_eq!(image, quiet);
     let color = |pixel: &[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap();
     assert!(image.pixels().iter().all(|pixel| color(pixel) < 30));
+}
+
+/// A cube from 0 to 1, counter-clockwise seen from outside, in one colour.
+fn cube(color: [f32; 3]) -> Geometry {
+    let corners = (0..8).map(|bits| [0, 1, 2].map(|k| (bits >> k & 1) as f32)).collect();
+    let quads = vec![0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6];
+    let mut mesh = Component::mesh(vec![4; 6], quads, corners).unwrap();
+    mesh.set_column(Owner::Once, "Cd", Column::new(vec![color])).unwrap();
+    mesh.into()
+}
+
+/// Columns and rows of the picture from the first to the last in which a pixel differs from the backdrop.
+fn covered(layers: &[Layer<'_>], settings: &PictureSettings) -> [usize; 2] {
+    let bare = PictureSettings { ground: false, ..settings.clone() };
+    let (image, empty) = (render(layers, &bare).unwrap(), render(&[], &bare).unwrap());
+    let differ = (0..160 * 120).filter(|k| image.pixels()[*k] != empty.pixels()[*k]);
+    let [columns, rows]: [Vec<usize>; 2] =
+        [differ.clone().map(|k| k % 160).collect(), differ.map(|k| k / 160).collect()];
+    [columns, rows].map(|at| at.iter().max().unwrap() + 1 - at.iter().min().unwrap())
+}
+
+#[test]
+fn a_framed_subject_fills_the_panel_in_width_or_height() {
+    for (geometry, widest) in [(still_life(1.0), 1.0), (still_life(1e-3), 1.0), (cube([0.5; 3]), 0.9)] {
+        let layers = [Layer::new("one", &geometry)];
+        let mut framing = Framing::new(160, 120, None);
+        framing.add(&layers);
+        let settings = PictureSettings { camera: Some(framing.camera()), bounds: framing.bounds(), ..small() };
+        let [columns, rows] = covered(&layers, &settings);
+        let most = (columns as f64 / 160.0).max(rows as f64 / 120.0);
+        assert!((0.70..widest).contains(&most), "{columns} × {rows}");
+    }
+}
+
+#[test]
+fn a_bright_color_keeps_its_shading_and_hue_in_full_light() {
+    let white = picture(&cube([1.0; 3]), &PictureSettings { background: [0; 3], ground: false, ..small() });
+    assert!(white.pixels().iter().flatten().all(|byte| *byte < 253));
+    let shades = white.pixels().iter().map(|pixel| pixel[1]).filter(|byte| *byte > 60);
+    assert!(shades.clone().max() > shades.min().map(|darkest| darkest + 40));
+    let orange = picture(&cube([1.0, 0.5, 0.0]), &PictureSettings { background: [0; 3], ground: false, ..small() });
+    let lit = orange.pixels().iter().filter(|pixel| pixel[0] > 200);
+    assert!(lit.clone().count() > 500 && lit.clone().all(|pixel| pixel[1] < 200 && pixel[2] < 60));
+}
+
+#[test]
+fn a_cut_cube_shows_a_flat_face_in_its_colour() {
+    let settings = PictureSettings { clip: Some(Clip { axis: 0, value: 0.5 }), ..small() };
+    let image = picture(&cube([0.2, 0.4, 0.1]), &settings);
+    let flat = encode([0.2, 0.4, 0.1]);
+    let faces = image.pixels().iter().filter(|pixel| **pixel == flat).count();
+    assert!(faces > 1000, "{faces}");
+    let whole = picture(&cube([0.2, 0.4, 0.1]), &small());
+    assert!(whole.pixels().iter().filter(|pixel| **pixel == flat).count() < 50);
+    // Nothing of it is beyond the plane, and curves and points go by their root.
+    let beyond = PictureSettings { clip: Some(Clip { axis: 0, value: -1.0 }), ground: false, ..small() };
+    assert_eq!(picture(&cube([0.5; 3]), &beyond), render(&[], &beyond).unwrap());
+    let balls = Geometry::from(Component::points(vec![[0.25; 3], [0.75; 3]]));
+    assert_ne!(picture(&balls, &settings), picture(&balls, &small()));
+}
+
+#[test]
+fn guides_are_lines_without_shadow() {
+    let geometry = cube([0.5; 3]);
+    let line = Component::curves(vec![2], vec![[0.0, 1.5, 0.0], [1.0, 1.5, 1.0]]).unwrap();
+    let wire = Geometry::from(line);
+    let bounds = Some([[0.0; 3], [1.0, 2.0, 1.0]]);
+    let settings = PictureSettings { bounds, names: true, ..small() };
+    let draw = |layers: &[Layer<'_>]| render(layers, &settings).unwrap();
+    let (without, with) =
+        (draw(&[Layer::new("c", &geometry)]), draw(&[Layer::new("c", &geometry), Layer::guide("", &wire)]));
+    let differ = without.pixels().iter().zip(with.pixels()).filter(|(a, b)| a != b);
+    assert!((10..300).contains(&differ.clone().count()));
+    assert!(differ.clone().all(|(a, b)| b[0] <= a[0]), "a guide darkens");
+}
+
+#[test]
+fn a_color_attribute_and_the_wind_are_shown_in_words() {
+    let settings = PictureSettings { width: 320, height: 240, names: true, ..small() };
+    let geometry = cube([0.5; 3]);
+    let captions = caption(&[Layer { color: Some([1.0; 3]), ..Layer::new("box", &geometry) }], &settings);
+    let texts: Vec<_> = captions.iter().map(|phrase| (phrase.color, phrase.text.as_str())).collect();
+    assert_eq!(texts, [(None, "box"), (None, "coloured by Cd")]);
+    let still = picture(&geometry, &settings);
+    let windy = picture(&geometry, &PictureSettings { wind: Some([1.0, 0.0, 0.0]), ..settings });
+    let changed = still.pixels().iter().zip(windy.pixels()).enumerate().filter(|(_, (a, b))| a != b);
+    assert!(changed.clone().count() > 80);
+    assert!(changed.map(|(k, _)| [k % 320, k / 320]).all(|[x, y]| x > 240 && y > 170));
 }
