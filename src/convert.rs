@@ -6,14 +6,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use engine::geometry::Geometry;
 use engine::time::Frame;
-use formats::atomic::sweep;
 use formats::usd::{Flavour, UsdWriter};
 use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
 use crate::failure::{Exit, Failure, cancelled_by_signal};
-use crate::geometry_file::{Numbered, folder_of, read, refused, stem_and_frame};
-use crate::output::{failed, usd_failed, write_whole};
+use crate::geometry_file::{Numbered, read, refused, stem_and_frame};
+use crate::output::{usd_failed, write_whole};
+use crate::targets::Targets;
 
 /// The arguments of `convert`.
 #[derive(Debug, clap::Args)]
@@ -57,10 +57,11 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
         let line = format!("cannot convert {} files to one {format} file; write {stem}.####.{ending}", files.len());
         return Err(command_line(line));
     }
-    if folder_of(&args.to).is_dir() {
-        sweep(folder_of(&args.to)).map_err(|error| failed(&error))?;
-    }
-    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel: cancelled_by_signal() };
+    let cancel = cancelled_by_signal();
+    let targets = targets(&args.to, &files, to.as_ref());
+    targets.check()?;
+    targets.sweep();
+    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel };
     let written = match &to {
         Some(to) => conversion.file_per_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
@@ -70,6 +71,21 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
         print_summary(&written);
     }
     Ok(())
+}
+
+/// Everything that the conversion reads and writes.
+fn targets(path: &Path, files: &[(Frame, PathBuf)], to: Option<&Numbered>) -> Targets {
+    let mut targets = Targets::default();
+    for (frame, from) in files {
+        targets.reads(from, "it is to be converted");
+        if let Some(to) = to {
+            targets.writes("target", Exit::CommandLine, &to.at(*frame));
+        }
+    }
+    if to.is_none() {
+        targets.writes("target", Exit::CommandLine, path);
+    }
+    targets
 }
 
 /// Prints what was written to stderr.

@@ -10,13 +10,14 @@ use engine::graph::Graph;
 use engine::plan::Request;
 use engine::time::Frame;
 use formats::Format;
-use formats::atomic::{AtomicFile, FileError};
+use formats::atomic::AtomicFile;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
-use crate::output::{Writers, Written, failed, fill};
+use crate::output::{Writers, Written, add_targets, failed, fill};
 use crate::pictures::{self, Pictures, Staged};
+use crate::targets::Targets;
 use crate::{load, memory, report};
 
 /// The arguments of `cook`.
@@ -82,12 +83,6 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     if !faults.is_empty() {
         return Err(load::faulty(&args.graph, &faults));
     }
-    if let Some(report) = &args.report
-        && report.canonicalize().is_ok_and(|report| args.graph.canonicalize().is_ok_and(|graph| graph == report))
-    {
-        let line = format!("--report would overwrite the graph `{}`; choose another name", args.graph.display());
-        return Err(Failure::new(Exit::CommandLine, line));
-    }
     let staged = Staged::of(&args.pictures, &graph, &request);
     let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out));
     let pictures = pictures.transpose()?;
@@ -103,24 +98,16 @@ fn cook(
     format: Format,
     mut pictures: Option<Pictures<'_>>,
 ) -> Result<(), Failure> {
-    let mut disk = match &args.cache {
-        None => None,
-        Some(folder) => {
-            let limit = args.cache_limit.map_or(u64::MAX, |size| size.0);
-            Some(
-                DiskCache::open(folder, limit)
-                    .map_err(|error| failed(&FileError::new(folder, "used as a cache", error)))?,
-            )
-        }
-    };
+    // From here on a signal lets the cook end in order, without temporaries.
+    let cancel = cancelled_by_signal();
+    let targets = targets(args, graph, request, format, pictures.as_ref());
+    targets.check()?;
+    targets.sweep();
+    let limit = args.cache_limit.map_or(u64::MAX, |size| size.0);
+    let mut disk = args.cache.as_ref().map(|folder| DiskCache::open(folder, limit));
     let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
-    let mut inputs = graph.files();
-    inputs.push(args.graph.clone());
-    let is_picture = |file: &str| pictures.as_ref().is_some_and(|pictures| pictures.writes(file));
-    writers.refuse_to_overwrite(&inputs, &request.frames, is_picture)?;
     // Before the cook, so that an invalid path is reported at once.
     let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
-    let cancel = cancelled_by_signal();
     let progress = progress(args, request);
     let mut writing = Duration::ZERO;
     let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
@@ -163,6 +150,19 @@ fn cook(
         print_summary(&report, &written, &drawn, args.verbose);
     }
     outcome(graph, &report, &written)
+}
+
+/// Everything that the cook reads and writes.
+fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pictures: Option<&Pictures>) -> Targets {
+    let mut targets = Targets::default();
+    targets.reads(&args.graph, "it is the graph");
+    graph.files().into_iter().for_each(|path| targets.reads(path, "the graph reads it"));
+    add_targets(&mut targets, graph, &request.outputs, &args.out, format, &request.frames);
+    pictures.iter().for_each(|pictures| pictures.add_targets(&mut targets));
+    if let Some(path) = &args.report {
+        targets.writes("--report", Exit::CommandLine, path);
+    }
+    targets
 }
 
 /// A note for each output that the format could not store completely.

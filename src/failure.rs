@@ -101,3 +101,11 @@ pub fn cancelled_by_signal() -> Arc<AtomicBool> {
     }
     cancel
 }
+
+/// Lets writing beyond the largest size of a file (`ulimit -f`) fail like any write, instead of ending the program with
+/// its temporaries left.
+pub fn too_large_files_are_errors() {
+    #[cfg(unix)]
+    // A flag that nobody reads: that the signal is handled is enough.
+    let _ = flag::register(rustix::process::Signal::XFSZ.as_raw(), Arc::default());
+}

@@ -30,6 +30,7 @@ pub mod pictures;
 pub mod report;
 pub mod schema;
 pub mod stats;
+pub mod targets;
 
 use engine::graph::Catalogue;
 use engine::node::Node;

@@ -1,9 +1,10 @@
 //! The command line: its subcommands and exit codes.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser;
-use convect::failure::{Exit, Failure};
+use convect::failure::{Exit, Failure, too_large_files_are_errors};
 use convect::say;
 use convect::{check, completions, convert, cook, diff, explain, nodes, schema, stats};
 
@@ -38,18 +39,26 @@ enum Verb {
 
 fn main() -> ExitCode {
     quiet_panics();
+    too_large_files_are_errors();
     let verb = match Verb::try_parse() {
         Ok(verb) => verb,
         Err(error) => {
-            // Help and version are not errors.
-            let exit = if error.use_stderr() { Exit::CommandLine } else { Exit::Done };
-            let _ = error.print();
-            return exit.into();
+            // Help and version are not errors, but they are what was asked for.
+            let printed = error.print().and_then(|()| std::io::stdout().flush());
+            return match printed {
+                _ if error.use_stderr() => Exit::CommandLine.into(),
+                Ok(()) => Exit::Done.into(),
+                Err(error) => ended(Err(error.into())),
+            };
         }
     };
     let result = std::panic::catch_unwind(|| run(&verb)).unwrap_or_else(|_| {
         Err(Failure::new(Exit::Cook, "convect failed unexpectedly; this is a bug in convect, please report it"))
     });
+    ended(result)
+}
+
+fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => Exit::Done.into(),
         Err(failure) => {

@@ -1,6 +1,5 @@
 //! Files of outputs: one USD file with all frames, or one file per frame.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,11 +8,12 @@ use engine::cook::Delivered;
 use engine::frames::FrameSet;
 use engine::graph::Graph;
 use engine::time::Frame;
-use formats::atomic::{AtomicFile, FileError, sweep};
+use formats::atomic::{AtomicFile, FileError};
 use formats::usd::{Flavour, UsdError, UsdWriter};
 use formats::{Format, FrameStamp};
 
-use crate::failure::Failure;
+use crate::failure::{Exit, Failure};
+use crate::targets::Targets;
 
 /// What was written for one output.
 #[derive(Clone, Debug, Default)]
@@ -44,13 +44,12 @@ pub struct Writers<'g> {
 }
 
 impl<'g> Writers<'g> {
-    /// Writers for `outputs` into `folder`, which is created if it is missing. Temporaries of killed cooks are removed.
+    /// Writers for `outputs` into `folder`, which is created if it is missing.
     ///
     /// # Errors
     /// If the folder cannot be created or written to.
     pub fn new(graph: &'g Graph, outputs: &[usize], folder: &Path, format: Format) -> Result<Self, Failure> {
         fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "created", error)))?;
-        sweep(folder).map_err(|error| failed(&error))?;
         let target = || match format {
             Format::Usdc => Target::Sequence { flavour: Flavour::Usdc, writer: None },
             Format::Usda => Target::Sequence { flavour: Flavour::Usda, writer: None },
@@ -58,37 +57,6 @@ impl<'g> Writers<'g> {
         };
         let outputs = outputs.iter().map(|output| (*output, target(), Written::default())).collect();
         Ok(Self { graph, folder: folder.to_owned(), format, outputs })
-    }
-
-    /// Refuses to overwrite the graph or a file that it reads, because the next cook would read its own result.
-    ///
-    /// # Errors
-    /// If one of `frames`, or another file of the folder that is `also` written, would overwrite one of `inputs`.
-    pub fn refuse_to_overwrite(
-        &self,
-        inputs: &[PathBuf],
-        frames: &FrameSet,
-        also: impl Fn(&str) -> bool,
-    ) -> Result<(), Failure> {
-        let inputs: BTreeSet<PathBuf> = inputs.iter().filter_map(|path| path.canonicalize().ok()).collect();
-        // The files in the folder are looked at, not those of all frames: there may be a billion.
-        let there = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        for path in there.map(|entry| entry.path()) {
-            let Some(file) = path.file_name().and_then(|name| name.to_str()) else { continue };
-            let written = self.outputs.iter().any(|(output, target, _)| {
-                let name = &self.graph.outputs[*output].name;
-                match target {
-                    Target::Sequence { .. } => file == format!("{name}.{}", self.format),
-                    Target::PerFrame => frame_in(file, name, self.format).is_some_and(|frame| frames.contains(frame)),
-                }
-            });
-            if (written || also(file)) && path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
-                let line =
-                    format!("`{}` would be overwritten, but the graph reads it; choose another --out", path.display());
-                return Err(Failure::file(line));
-            }
-        }
-        Ok(())
     }
 
     /// Writes finished frames.
@@ -109,7 +77,7 @@ impl<'g> Writers<'g> {
                 Target::Sequence { flavour, writer } => {
                     for one in mine {
                         if writer.is_none() {
-                            let path = folder.join(format!("{name}.{format}"));
+                            let path = sequence_path(folder, name, format);
                             let scene = &graph.scene;
                             let new = UsdWriter::create(path, *flavour, name, scene.fps, scene.origin);
                             *writer = Some(Box::new(new.map_err(usd_failed)?));
@@ -148,7 +116,7 @@ impl<'g> Writers<'g> {
                 } else {
                     let name = &self.graph.outputs[output].name;
                     let summary = writer.finish().map_err(usd_failed)?;
-                    written.files.push(self.folder.join(format!("{name}.{}", self.format)));
+                    written.files.push(sequence_path(&self.folder, name, self.format));
                     written.bytes = summary.bytes;
                 }
             }
@@ -158,14 +126,29 @@ impl<'g> Writers<'g> {
     }
 }
 
-fn frame_path(folder: &Path, name: &str, frame: Frame, format: Format) -> PathBuf {
-    folder.join(format!("{name}.{}.{format}", frame.file_label()))
+/// Adds the files of `outputs` to what a command writes.
+pub fn add_targets(
+    targets: &mut Targets,
+    graph: &Graph,
+    outputs: &[usize],
+    folder: &Path,
+    format: Format,
+    frames: &FrameSet,
+) {
+    for name in outputs.iter().map(|output| &graph.outputs[*output].name) {
+        match format.is_sequence() {
+            true => targets.writes("--out", Exit::File, &sequence_path(folder, name, format)),
+            false => targets.writes_frames("--out", folder, name, format.name(), frames),
+        }
+    }
 }
 
-/// The frame of the file that [`frame_path`] names; `None` if it is another file.
-fn frame_in(file: &str, name: &str, format: Format) -> Option<Frame> {
-    let label = file.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(format.name())?.strip_suffix('.')?;
-    Frame::of_file_label(label)
+fn sequence_path(folder: &Path, name: &str, format: Format) -> PathBuf {
+    folder.join(format!("{name}.{format}"))
+}
+
+fn frame_path(folder: &Path, name: &str, frame: Frame, format: Format) -> PathBuf {
+    folder.join(format!("{name}.{}.{format}", frame.file_label()))
 }
 
 fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) -> Result<(PathBuf, u64), Failure> {

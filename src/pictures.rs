@@ -26,6 +26,7 @@ use preview::{
 use crate::args::Frames;
 use crate::failure::{Exit, Failure};
 use crate::output::{failed, write_whole};
+use crate::targets::Targets;
 use guides::Guides;
 use moments::{Moments, Shot};
 use spool::Spool;
@@ -187,18 +188,17 @@ impl<'g> Pictures<'g> {
         })
     }
 
-    /// Whether a picture will be written under this name in its folder.
-    pub fn writes(&self, file: &str) -> bool {
-        let Some(ending) =
-            self.stem.file_name().and_then(|stem| stem.to_str()).and_then(|stem| file.strip_prefix(stem))
-        else {
-            return false;
-        };
-        let still =
-            ending.strip_prefix('.').and_then(|label| label.strip_suffix(".png")).and_then(Frame::of_file_label);
-        (self.sheet.is_some() && ending == ".png")
-            || (self.movie && ending == ".apng")
-            || still.is_some_and(|frame| self.stills.as_ref().is_some_and(|stills| stills.contains(frame)))
+    /// Adds the pictures to what a command writes.
+    pub fn add_targets(&self, targets: &mut Targets) {
+        let wanted = [(self.sheet.is_some(), "png"), (self.movie, "apng")];
+        for (_, ending) in wanted.into_iter().filter(|(is_wanted, _)| *is_wanted) {
+            targets.writes("--preview", Exit::File, &self.path(ending));
+        }
+        if let Some(stills) = &self.stills {
+            let (folder, stem) =
+                (self.stem.parent().unwrap_or(Path::new(".")), self.stem.file_name().unwrap_or_default());
+            targets.writes_frames("--preview", folder, &stem.to_string_lossy(), "png", stills);
+        }
     }
 
     fn path(&self, ending: &str) -> PathBuf {

@@ -1,6 +1,12 @@
-//! The one place that reads clocks: how long things took, for reports. No result depends on it.
+//! The one place that reads clocks: how long things took, for reports, and how old files are. No result depends on it.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
+
+/// The time of day, to compare with that of a file.
+#[allow(clippy::disallowed_methods, reason = "the one place that measures")]
+pub fn now() -> SystemTime {
+    SystemTime::now()
+}
 
 /// Measures wall time, and the CPU time of all threads of the process together.
 pub struct Stopwatch {

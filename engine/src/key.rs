@@ -11,6 +11,21 @@ impl std::fmt::Display for ContentKey {
 }
 
 impl ContentKey {
+    /// The inverse of its text.
+    pub fn parse(text: &str) -> Option<Self> {
+        let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+        let digit = |byte: u8| match byte {
+            b'0'..=b'9' => Some(byte - b'0'),
+            b'a'..=b'f' => Some(byte - b'a' + 10),
+            _ => None,
+        };
+        let mut key = Self::default();
+        for (byte, [high, low]) in key.0.iter_mut().zip(pairs) {
+            *byte = digit(*high)? << 4 | digit(*low)?;
+        }
+        (pairs.len() == key.0.len() && rest.is_empty()).then_some(key)
+    }
+
     /// The key of some bytes.
     pub fn of(bytes: &[u8]) -> Self {
         let mut hasher = Hasher::default();
@@ -74,6 +89,16 @@ mod tests {
         let key = |a: &str, b: &str| Hasher::default().text(a).text(b).finish();
         assert_ne!(key("ab", "c"), key("a", "bc"));
         assert_eq!(key("ab", "c"), key("ab", "c"));
+    }
+
+    #[test]
+    fn a_key_is_read_back_from_its_text() {
+        let key = ContentKey::of(b"a");
+        assert_eq!(ContentKey::parse(&key.to_string()), Some(key));
+        let text = key.to_string();
+        for wrong in ["", &text[1..], &format!("{text}0"), &text.to_uppercase().replace('0', "G"), "é"] {
+            assert_eq!(ContentKey::parse(wrong), None, "{wrong}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod files;
 pub mod frames;
 pub mod geometry;
 pub mod graph;
+pub mod host;
 pub mod key;
 pub mod memory;
 pub mod node;

@@ -2,17 +2,24 @@
 //!
 //! An [`AtomicFile`] is written to a hidden temporary file in the same folder and renamed once it is complete and on
 //! disk, so a killed program leaves no partial file under a final name. [`sweep`] removes temporaries of dead
-//! processes; one belongs to a live process as long as that process holds its lock or has its process number. Limit:
-//! the file system's rename must replace a file atomically, as on all local file systems.
+//! processes; one belongs to a live process as long as that process holds its lock or has its process number. Of
+//! another machine, where neither says anything, they are left-overs after a day. Limit: the file system's rename must
+//! replace a file atomically, as on all local file systems.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
-/// Separates the final name and the process number in the name of a temporary.
+use engine::{clock, host};
+
+/// Separates the final name and the owner in the name of a temporary.
 const MARK: &str = ".tmp-";
+
+/// Temporaries of another machine that nobody has written to for so long are left-overs.
+const LEFT_OVER: Duration = Duration::from_secs(24 * 3600);
 
 /// A file that takes its final name when it is committed; dropped without that, it is removed.
 #[derive(Debug)]
@@ -117,22 +124,35 @@ impl Drop for Temporary {
     }
 }
 
-/// `.NAME.tmp-PID-COUNT`, a new one for each call.
+/// `.NAME.tmp-HOST-PID-COUNT`, a new one for each call.
 fn temporary_name(name: &OsStr) -> OsString {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     let mut hidden = OsString::from(".");
     hidden.push(name);
-    hidden.push(format!("{MARK}{}-{count}", std::process::id()));
+    hidden.push(format!("{MARK}{}-{}-{count}", host::tag(), std::process::id()));
     hidden
 }
 
-/// The process number in a temporary's name; `None` for any other name.
-fn owner_of(name: &str) -> Option<u32> {
-    let (name, numbers) = name.strip_prefix('.')?.rsplit_once(MARK)?;
-    let (owner, count) = numbers.split_once('-')?;
+/// Whose temporary a file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Owner {
+    /// A process of this machine.
+    Process(u32),
+    /// One of another machine.
+    Elsewhere,
+}
+
+/// The owner in a temporary's name; `None` for any other name.
+fn owner_of(name: &str) -> Option<Owner> {
+    let (name, owner) = name.strip_prefix('.')?.rsplit_once(MARK)?;
+    let (host, numbers) = owner.split_once('-')?;
+    let (process, count) = numbers.split_once('-')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    (!name.is_empty() && digits(owner) && digits(count)).then(|| owner.parse().ok()).flatten()
+    let is_host = host.len() == 8 && host.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let process = (!name.is_empty() && is_host && digits(process) && digits(count)).then_some(process)?;
+    let process = process.parse().ok()?;
+    Some(if host == host::tag() { Owner::Process(process) } else { Owner::Elsewhere })
 }
 
 /// A rename is durable only after its folder is synced. Where folders cannot be opened, this is left to the system.
@@ -171,7 +191,12 @@ pub fn sweep(folder: &Path) -> Result<usize, FileError> {
 /// Whether no live process owns a temporary. The lock decides, also across containers; the process number decides
 /// between creation and locking, and on file systems without locks. Our own number proves nothing, because an earlier
 /// process may have had it.
-fn is_stale(path: &Path, owner: u32) -> bool {
+fn is_stale(path: &Path, owner: Owner) -> bool {
+    let Owner::Process(owner) = owner else {
+        let modified = fs::metadata(path).and_then(|about| about.modified());
+        let age = modified.ok().and_then(|modified| clock::now().duration_since(modified).ok());
+        return age.is_some_and(|age| age > LEFT_OVER);
+    };
     let locks = match File::open(path).map(|file| file.try_lock()) {
         Ok(Ok(())) => true,
         Ok(Err(TryLockError::Error(_))) => false,
@@ -214,6 +239,7 @@ impl FileError {
     pub fn hint(&self) -> Option<&'static str> {
         match self.source.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Some("free some space, or write to another disk"),
+            ErrorKind::FileTooLarge => Some("raise the limit (`ulimit -f`), write fewer frames, or one file per frame"),
             ErrorKind::NotFound | ErrorKind::NotADirectory => Some("check the path, or create the folder first"),
             ErrorKind::IsADirectory => Some("give the path of a file"),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
@@ -228,6 +254,7 @@ fn cause(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::StorageFull => "the disk is full".into(),
         ErrorKind::QuotaExceeded => "the disk quota is used up".into(),
+        ErrorKind::FileTooLarge => "it is larger than the system lets a file be".into(),
         ErrorKind::PermissionDenied => "permission denied".into(),
         ErrorKind::ReadOnlyFilesystem => "the file system is read-only".into(),
         ErrorKind::IsADirectory => "it is a folder".into(),
@@ -324,9 +351,19 @@ mod tests {
     fn a_sweep_removes_only_temporaries_of_dead_processes() {
         let folder = tempfile::tempdir().unwrap();
         let mine = AtomicFile::create(folder.path().join("mine.obj")).unwrap();
-        let own = std::process::id();
-        let stale = [".a.obj.tmp-4294967294-0".to_owned(), format!(".b.obj.tmp-{own}-18446744073709551615")];
-        let kept = ["a.obj.tmp-4294967294-0", ".a.obj.tmp-x-0", ".a.obj.tmp-1", ".tmp-4294967294-0", "a.obj"];
+        let (own, host) = (std::process::id(), host::tag());
+        let stale =
+            [format!(".a.obj.tmp-{host}-4294967294-0"), format!(".b.obj.tmp-{host}-{own}-18446744073709551615")];
+        let kept = [
+            &format!("a.obj.tmp-{host}-4294967294-0"),
+            &format!(".tmp-{host}-4294967294-0"),
+            &format!(".a.obj.tmp-{host}-x-0"),
+            // Of another machine: it may live.
+            ".a.obj.tmp-0badcafe-4294967294-0",
+            ".a.obj.tmp-4294967294-0",
+            ".a.obj.tmp-1",
+            "a.obj",
+        ];
         for name in stale.iter().map(String::as_str).chain(kept) {
             fs::write(folder.path().join(name), "").unwrap();
         }
@@ -336,16 +373,19 @@ mod tests {
         }
         mine.commit().unwrap();
         assert_eq!(names(folder.path()).len(), kept.len() + 1);
+        let elsewhere = File::options().append(true).open(folder.path().join(kept[3])).unwrap();
+        elsewhere.set_modified(clock::now() - 2 * LEFT_OVER).unwrap();
+        assert_eq!(sweep(folder.path()).unwrap(), 1, "nobody has written to it for two days");
     }
 
     #[cfg(target_os = "linux")]
     #[test]
     fn a_live_process_keeps_its_temporaries() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(".a.obj.tmp-1-0");
+        let path = folder.path().join(format!(".a.obj.tmp-{}-1-0", host::tag()));
         fs::write(&path, "").unwrap();
         assert_eq!(sweep(folder.path()).unwrap(), 0, "process 1 lives");
-        let path = folder.path().join(".a.obj.tmp-4294967294-0");
+        let path = folder.path().join(format!(".a.obj.tmp-{}-4294967294-0", host::tag()));
         let file = File::create(&path).unwrap();
         file.try_lock().unwrap();
         assert_eq!(sweep(folder.path()).unwrap(), 0, "its lock is held");

@@ -109,6 +109,23 @@ impl Bench {
         self.names(folder).into_iter().map(file).collect()
     }
 
+    /// Every path in the folder with what a file contains.
+    pub(crate) fn tree(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        let mut tree = BTreeMap::new();
+        let mut folders = vec![self.path("")];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if fs::symlink_metadata(&path).unwrap().is_dir() {
+                    folders.push(path.clone());
+                }
+                let bytes = fs::read(&path).unwrap_or_default();
+                tree.insert(path, bytes);
+            }
+        }
+        tree
+    }
+
     pub(crate) fn read_json(&self, name: &str) -> Value {
         serde_json::from_slice(&fs::read(self.path(name)).unwrap()).unwrap()
     }

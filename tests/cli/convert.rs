@@ -109,11 +109,3 @@ fn conversion_scales_lengths() {
     let line = "`a.json`: `P` of points scaled by 1e37 is out of the range of f32\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
 }
-
-#[test]
-fn a_file_may_be_converted_onto_itself() {
-    let bench = Bench::new();
-    bench.done(&["convert", "grass.obj", "grass.obj", "--scale", "2"]);
-    let stats = bench.json(&["stats", "grass.obj", "--json"]);
-    assert_eq!(stats["curves"]["bounds"]["max"], json!([2.25, 0.5, 1.25]));
-}

@@ -18,3 +18,4 @@ mod same_bits;
 mod stats;
 #[cfg(unix)]
 mod stopped;
+mod targets;

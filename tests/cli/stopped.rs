@@ -215,7 +215,9 @@ fn a_full_disk_under_the_cache_is_reported_once_and_does_not_stop_the_cook() {
         let note = "note: the cache `disk` could not be written: the disk is full; cooking continues without it\n";
         assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
         assert_eq!(bench.names("out").len(), 40);
-        assert!(bench.names("disk").iter().all(|name| !name.ends_with(".part")), "{:?}", bench.names("disk"));
+        let names: Vec<String> =
+            bench.names("disk").iter().flat_map(|own| bench.names(&format!("disk/{own}"))).collect();
+        assert!(names.iter().all(|name| !name.ends_with(".part")), "{names:?}");
     }
     fs::write(disk.join("filler"), vec![0; 1 << 16]).unwrap_err();
     let ran = bench.run(&[&args[..7], &["disk/new", "--output", "grass"]].concat());
@@ -290,4 +292,63 @@ fn four_gigabytes_of_address_space_are_enough() {
     command.args(["-c", script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
     let ran = Ran::of(&command.output().unwrap());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+}
+
+/// Falls for a billion frames before the first that is written.
+const FAR_BACK: &str = r#"{
+  "convect": 1, "scene": { "frames": [FIRST, 4] },
+  "nodes": {
+    "ball": { "type": "Mesh_Primitive", "params": { "shape": "sphere" } },
+    "tets": { "type": "Tetrahedralize", "inputs": { "surface": "ball" } },
+    "body": { "type": "Softbody", "inputs": { "bodies": "tets" }, "params": { START } },
+    "blades": { "type": "Curve_In", "params": { "file": "grass.obj" } },
+    "wind": {
+      "type": "Curve_Wind", "inputs": { "curves": "blades" },
+      "params": { "amplitude": 0.1, "scroll": { "keyframes": [[1, 1], [3, 2]] } },
+    },
+  },
+  "outputs": { "OUTPUT": "NODE" },
+}"#;
+
+#[test]
+fn a_signal_is_heard_while_frames_long_past_are_gone_through() {
+    let graph = |first: &str, start: &str, node: &str| {
+        let named = FAR_BACK.replace("FIRST", first).replace("START", start);
+        named.replace("OUTPUT", node).replace("NODE", node)
+    };
+    for (name, graph) in [
+        ("INT", graph("1", r#""start_frame": -1000000000"#, "body")),
+        ("TERM", graph("-1000000000", "", "body")),
+        ("TERM", graph("-1000000000", "", "wind")),
+    ] {
+        let bench = Bench::with_graph(&graph);
+        let child = start(&bench, &["cook", "g.json", "--frames", "1-4", "--cache", "cache", "--report", "r.json"]);
+        wait_for(4, &bench.path(""));
+        std::thread::sleep(Duration::from_millis(200));
+        signal(name, &child);
+        let asked = std::time::Instant::now();
+        let ran = ended(child);
+        assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+        assert!(asked.elapsed() < Duration::from_secs(5), "{:?}", asked.elapsed());
+        assert!(bench.names("out").is_empty() && bench.names("").iter().all(|name| !name.contains(".tmp-")));
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_on_the_size_of_files_is_an_error_without_temporaries() {
+    let bench = Bench::new();
+    for (format, limit) in [("usdc", 4), ("usda", 4), ("json", 1)] {
+        let mut command = Command::new("sh");
+        let script =
+            format!("ulimit -f {limit} && exec \"$0\" cook g.json --frames 1-200 --report r.json --format {format}");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+        let ran = Ran::of(&command.output().unwrap());
+        assert_eq!(ran.code, Some(1), "{format}: {}", ran.stderr);
+        assert!(ran.stderr.contains("it is larger than the system lets a file be; raise the limit"), "{}", ran.stderr);
+        assert_eq!(
+            (bench.names(""), bench.names("out")),
+            (vec!["g.json".into(), "grass.obj".into(), "out".into()], vec![])
+        );
+    }
 }

@@ -1,5 +1,6 @@
 //! Integrals over time of functions of a node's params, accumulated from frame to frame.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use numerics::vector::DVec3;
@@ -32,8 +33,9 @@ pub(crate) fn history_start(scene: &Scene) -> i64 {
 pub(crate) struct Integrals<'a>(Vec<Integral<'a>>);
 
 impl<'a> Integrals<'a> {
-    pub(crate) fn new(resolver: &'a Resolver<'a>, node: &Node, scene: &Scene) -> Self {
-        let of = |integrand: &Integrand| Integral::new(resolver, *integrand, scene);
+    /// `cancel` ends a sum over many frames early: what is made of it is dropped.
+    pub(crate) fn new(resolver: &'a Resolver<'a>, node: &Node, scene: &Scene, cancel: &'a AtomicBool) -> Self {
+        let of = |integrand: &Integrand| Integral::new(resolver, *integrand, scene, cancel);
         Self(node.integrands.iter().flatten().map(of).collect())
     }
 }
@@ -47,6 +49,7 @@ impl History for Integrals<'_> {
 struct Integral<'a> {
     resolver: &'a Resolver<'a>,
     integrand: Integrand,
+    cancel: &'a AtomicBool,
     fps: f64,
     since: Frame,
     /// Whether the integrand changes with time, and its value if it does not.
@@ -57,10 +60,11 @@ struct Integral<'a> {
 }
 
 impl<'a> Integral<'a> {
-    fn new(resolver: &'a Resolver<'a>, integrand: Integrand, scene: &Scene) -> Self {
+    fn new(resolver: &'a Resolver<'a>, integrand: Integrand, scene: &Scene, cancel: &'a AtomicBool) -> Self {
         Self {
             resolver,
             integrand,
+            cancel,
             fps: scene.fps,
             since: Frame::whole(history_start(scene)),
             animated: resolver.history_is_animated(),
@@ -100,6 +104,9 @@ impl<'a> Integral<'a> {
             sums.push(DVec3::zeros());
         }
         while sums.len() as u64 <= whole {
+            if self.cancel.load(Ordering::Relaxed) {
+                return DVec3::zeros();
+            }
             let k = sums.len() as f64;
             let frame = self.over(sign * (k - 1.0), sign * k);
             let before = sums[sums.len() - 1];

@@ -3,13 +3,14 @@
 //! The key of a chain's state includes the key of the previous frame's state: editing anything upstream invalidates its
 //! checkpoints, and editing a key frame invalidates only what comes after it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::history::{gauss_points, history_start};
 use super::segments::{Anchors, ChainSegment, LEAST_SPACING, Window, segment};
 use super::{Moment, Plan, Reads};
-use crate::error::{CookError, Result};
+use crate::error::{CookError, Error, ErrorKind, Result};
 use crate::graph::Body;
 use crate::key::{ContentKey, Hasher};
 use crate::node::{Cook, Node};
@@ -33,8 +34,8 @@ type Missing = Vec<(usize, Frame)>;
 struct NodeKeys<'g> {
     /// By canonical frame.
     frames: BTreeMap<Frame, Resolved<'g>>,
-    /// Of a chain's states: by segment, from its start on.
-    states: BTreeMap<ChainSegment, Vec<KeyOrError>>,
+    /// Of a chain's states: by segment, the last ones found.
+    states: BTreeMap<ChainSegment, StateKeys>,
     /// Of what its integrands were from frame 0 on, frame by frame.
     history: Vec<ContentKey>,
     /// Of what its integrands were before frame 0.
@@ -52,9 +53,19 @@ struct Task<'g> {
     reads: Option<Reads<'g>>,
 }
 
+/// Keys of successive states. The last [`KEPT_STATES`] are remembered: a chain may start any number of frames back.
+#[derive(Default)]
+struct StateKeys {
+    keys: VecDeque<KeyOrError>,
+    /// How many were found before those remembered.
+    before: usize,
+}
+
 /// Finds keys, and remembers those of the current slice.
 pub(crate) struct Keys<'p, 'g> {
     plan: &'p Plan<'g>,
+    /// Set when the cook is cancelled: a chain that starts far back has a key for every frame since.
+    cancel: &'p AtomicBool,
     nodes: Vec<NodeKeys<'g>>,
     hasher: Hasher,
 }
@@ -62,10 +73,13 @@ pub(crate) struct Keys<'p, 'g> {
 /// Frames that keys of segments are kept for after their end.
 const KEPT_FRAMES: i64 = 4 * LEAST_SPACING;
 
+/// Keys of a chain's states that are remembered; an earlier one is found again from the start.
+const KEPT_STATES: usize = 1 << 14;
+
 impl<'p, 'g> Keys<'p, 'g> {
-    pub(crate) fn new(plan: &'p Plan<'g>) -> Self {
+    pub(crate) fn new(plan: &'p Plan<'g>, cancel: &'p AtomicBool) -> Self {
         let nodes = plan.graph.nodes.iter().map(|_| NodeKeys::default()).collect();
-        Self { plan, nodes, hasher: Hasher::default() }
+        Self { plan, cancel, nodes, hasher: Hasher::default() }
     }
 
     /// Forgets what belongs to the slice; keys of chains and of nodes that are the same at all frames stay.
@@ -230,6 +244,11 @@ impl<'p, 'g> Keys<'p, 'g> {
             }
             Ok(())
         };
+        let cancel = self.cancel;
+        let cancelled = || match cancel.load(Ordering::Relaxed) {
+            true => Err(Error::new(ErrorKind::Cancelled, "the cook was cancelled")),
+            false => Ok(()),
+        };
         // A hasher of its own: params refused midway must not leave half a recipe in the shared one.
         let mut hasher = Hasher::default();
         let before = match self.nodes[node].before {
@@ -238,6 +257,7 @@ impl<'p, 'g> Keys<'p, 'g> {
                 let since = history_start(&self.plan.graph.scene);
                 value(since as f64)?.iter().fold(hasher.tag(5), |hasher, x| hasher.f64(*x));
                 for k in since..0 {
+                    cancelled()?;
                     over(&mut hasher, (k + 1) as f64, k as f64)?;
                 }
                 *self.nodes[node].before.insert(hasher.finish())
@@ -249,6 +269,7 @@ impl<'p, 'g> Keys<'p, 'g> {
             known.push(before);
         }
         while known.len() <= whole {
+            cancelled()?;
             let k = known.len();
             hasher.tag(6).key(known[k - 1]);
             over(&mut hasher, (k - 1) as f64, k as f64)?;
@@ -298,17 +319,37 @@ impl<'p, 'g> Keys<'p, 'g> {
         let index = (frame - segment.start) as usize;
         loop {
             let known = self.nodes[node].states.entry(segment).or_default();
-            if let Some(key) = known.get(index) {
+            if index < known.before {
+                *known = StateKeys::default();
+            }
+            if let Some(key) = known.keys.get(index - known.before) {
                 return Ok(key.clone());
             }
-            let at = segment.start + known.len() as i64;
-            let key = match known.last().cloned() {
+            let found = known.before + known.keys.len();
+            let last = known.keys.back().cloned();
+            let at = segment.start + found as i64;
+            let key = match last {
+                _ if self.cancel.load(Ordering::Relaxed) => return Ok(Err(self.cancelled(node, at))),
                 Some(Err(error)) => Err(error),
                 Some(Ok(before)) => self.next_state_key(node, Moment::ChainStep(at), Some(before))?,
                 None => self.next_state_key(node, Moment::ChainStart(at), None)?,
             };
-            self.nodes[node].states.entry(segment).or_default().push(key);
+            let known = self.nodes[node].states.entry(segment).or_default();
+            known.keys.push_back(key);
+            if known.keys.len() > KEPT_STATES {
+                known.keys.pop_front();
+                known.before += 1;
+            }
+            if found % KEPT_STATES == KEPT_STATES - 1 {
+                // What the states before read is not asked for again soon, and there may be any number of them.
+                self.end_slice();
+            }
         }
+    }
+
+    fn cancelled(&self, node: usize, frame: i64) -> Arc<CookError> {
+        let error = Error::new(ErrorKind::Cancelled, "the cook was cancelled");
+        Arc::new(self.plan.error(node, Frame::whole(frame), error))
     }
 
     fn next_state_key(

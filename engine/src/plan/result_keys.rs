@@ -1,6 +1,7 @@
 //! The keys a cook would find, without cooking.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::{Keys, Plan, Request};
 use crate::error::CookError;
@@ -20,6 +21,7 @@ pub fn result_keys(graph: &Graph, node: &str, frames: &[Frame]) -> Result<Vec<Co
     let index = index.unwrap_or_else(|| panic!("the graph has no node `{node}`"));
     let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec().into() };
     let plan = Plan::new(graph, &request, Arc::default())?;
-    let mut keys = Keys::new(&plan);
+    let cancel = AtomicBool::new(false);
+    let mut keys = Keys::new(&plan, &cancel);
     frames.iter().map(|frame| keys.resolve(index, plan.canonical(index, *frame)).map(|resolved| resolved.key)).collect()
 }

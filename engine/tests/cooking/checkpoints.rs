@@ -21,13 +21,20 @@ pub(crate) fn solver() -> TestGraph {
 }
 
 fn cook(graph: &TestGraph, frames: std::ops::RangeInclusive<i64>, folder: &Path) -> Cooked {
-    let mut disk = DiskCache::open(folder, u64::MAX).expect("a folder");
+    let mut disk = DiskCache::open(folder, u64::MAX);
     let frames: Vec<Frame> = frames.map(Frame::whole).collect();
     graph.cook_with(&engine(2, 1 << 30), &frames, Some(&mut disk))
 }
 
+/// The subfolder of the cache that this version of convect owns.
+pub(crate) fn own(cache: &Path) -> PathBuf {
+    let entries = fs::read_dir(cache).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let mut own = entries.filter(|path| path.to_string_lossy().ends_with("-cache-5"));
+    own.next().expect("a subfolder")
+}
+
 fn files(folder: &Path, kind: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let entries = fs::read_dir(own(folder)).expect("a folder").map(|entry| entry.expect("an entry").path());
     let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == kind)).collect();
     files.sort();
     files
@@ -116,16 +123,146 @@ fn damaged_files_are_ignored() {
 }
 
 #[test]
-fn a_cache_of_another_version_is_ignored_with_a_note() {
+fn a_cache_of_another_version_is_ignored_with_a_note_and_stays() {
     let folder = tempfile::tempdir().expect("a folder");
     let graph = solver();
     cook(&graph, 1..=10, folder.path());
-    fs::write(folder.path().join("version"), "convect 0.0.1 cache 0").expect("a file");
+    let other = folder.path().join("convect-0.0.1-cache-0");
+    fs::rename(own(folder.path()), &other).expect("a folder");
+    let entries = || fs::read_dir(&other).expect("a folder").count();
+    let before = entries();
     let cooked = cook(&graph, 1..=10, folder.path());
     assert_eq!(cooked.report.from_disk, 0);
     let note = cooked.report.notes.join("");
-    assert!(note.ends_with("was made by another version and is not used"), "{note}");
-    assert!(cook(&graph, 1..=10, folder.path()).report.notes.is_empty());
+    assert!(note.contains("was made by another version (`convect-0.0.1-cache-0`), which is not used"), "{note}");
+    assert_eq!(entries(), before, "the other version may be in use");
+    let again = cook(&graph, 1..=10, folder.path());
+    assert!(again.report.notes.is_empty() && again.report.from_disk == 10);
+}
+
+/// What may lie in a cache beside convect's own files or in place of them.
+#[cfg(unix)]
+mod hostile {
+    use super::*;
+
+    #[test]
+    fn files_of_other_programs_stay_whatever_their_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let graph = solver();
+        let key = "0123456789abcdef0123456789abcdef";
+        let names =
+            ["version", "a.checkpoint", "a.frame", "a.part", &format!("{key}.frame"), "b.frame.4294967294.part"];
+        let put = |into: &Path| names.iter().for_each(|name| fs::write(into.join(name), "mine").expect("a file"));
+        let stay = |into: &Path| names.iter().all(|name| fs::read(into.join(name)).is_ok_and(|text| text == b"mine"));
+        put(folder.path());
+        cook(&graph, 1..=10, folder.path());
+        assert!(stay(folder.path()));
+        let mut disk = DiskCache::open(folder.path(), 0);
+        let frames: Vec<Frame> = (1..=10).map(Frame::whole).collect();
+        graph.cook_with(&engine(2, 1 << 30), &frames, Some(&mut disk));
+        assert!(stay(folder.path()), "with a limit too");
+        for name in ["a.checkpoint", "a.frame", "a.part", "b.frame.4294967294.part", "notes.txt"] {
+            fs::write(own(folder.path()).join(name), "mine").expect("a file");
+        }
+        DiskCache::open(folder.path(), 0);
+        assert_eq!(
+            fs::read_dir(own(folder.path())).expect("a folder").count(),
+            5,
+            "not convect's, though in its folder"
+        );
+    }
+
+    #[test]
+    fn what_lies_in_place_of_an_entry_is_a_note_and_not_a_hang() {
+        let graph = solver();
+        let whole = graph.cook(1..=12).bits();
+        let elsewhere = tempfile::tempdir().expect("a folder");
+        let precious = elsewhere.path().join("precious");
+        let things: [(&str, Box<dyn Fn(&Path)>); 6] = [
+            ("folder", Box::new(|path| fs::create_dir(path).expect("a folder"))),
+            (
+                "pipe",
+                Box::new(|path| {
+                    let made = std::process::Command::new("mkfifo").arg(path).status().expect("mkfifo");
+                    assert!(made.success());
+                }),
+            ),
+            ("socket", Box::new(|path| drop(std::os::unix::net::UnixListener::bind(path).expect("a socket")))),
+            ("endless", Box::new(|path| std::os::unix::fs::symlink("/dev/zero", path).expect("a link"))),
+            ("link", Box::new(|path| std::os::unix::fs::symlink(&precious, path).expect("a link"))),
+            ("sparse", Box::new(|path| fs::File::create(path).and_then(|file| file.set_len(6 << 30)).expect("a file"))),
+        ];
+        for (name, put) in &things {
+            fs::write(&precious, "mine").expect("a file");
+            let folder = tempfile::tempdir().expect("a folder");
+            cook(&graph, 1..=12, folder.path());
+            for path in [files(folder.path(), "frame"), files(folder.path(), "checkpoint")].concat() {
+                // Its address may be too long for a socket.
+                fs::remove_file(&path).expect("a file");
+                let short = elsewhere.path().join("thing");
+                put(&short);
+                fs::rename(short, path).expect("a thing");
+            }
+            for _ in 0..2 {
+                let cooked = cook(&graph, 1..=12, folder.path());
+                assert!(cooked.bits() == whole, "{name}");
+                let notes = cooked.report.notes.join("; ");
+                let again = notes.is_empty() && *name == "sparse" && cooked.report.from_disk == 12;
+                assert!(again || notes.contains("could not be used; cooked again instead: `"), "{name}: {notes}");
+            }
+            assert_eq!(fs::read(&precious).expect("a file"), b"mine", "{name}");
+        }
+    }
+
+    #[test]
+    fn a_cache_that_is_no_folder_is_a_note() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let graph = solver();
+        let place = folder.path().join("place");
+        for name in ["file", "link", "subfolder"] {
+            match name {
+                "file" => fs::write(&place, "mine").expect("a file"),
+                "link" => std::os::unix::fs::symlink("nowhere/at/all", &place).expect("a link"),
+                _ => {
+                    let cache = folder.path().join("cache");
+                    cook(&graph, 1..=2, &cache);
+                    let own = own(&cache);
+                    fs::remove_dir_all(&own).expect("a folder");
+                    fs::write(folder.path().join("precious"), "mine").expect("a file");
+                    std::os::unix::fs::symlink(folder.path(), own).expect("a link");
+                    fs::rename(cache, &place).expect("a folder");
+                }
+            }
+            let cooked = cook(&graph, 1..=4, &place);
+            let notes = cooked.report.notes.join("; ");
+            assert!(
+                notes.contains("could not be written") && notes.ends_with("continues without it"),
+                "{name}: {notes}"
+            );
+            assert_eq!(cooked.bits().len(), 4);
+            match name {
+                "subfolder" => assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 2),
+                _ => fs::remove_file(&place).expect("a file"),
+            }
+        }
+    }
+
+    #[test]
+    fn left_overs_of_any_process_go_by_age_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        DiskCache::open(folder.path(), u64::MAX);
+        let own = own(folder.path());
+        let part = |number: u32| own.join(format!(".{number:032x}.frame.0badcafe-4294967294-{number:016x}.part"));
+        for number in 0..2 {
+            fs::write(part(number), "half").expect("a file");
+        }
+        let old = fs::metadata(part(0)).and_then(|about| about.modified()).expect("a time")
+            - std::time::Duration::from_secs(7200);
+        fs::File::options().append(true).open(part(0)).and_then(|file| file.set_modified(old)).expect("a time");
+        DiskCache::open(folder.path(), u64::MAX);
+        assert!(!part(0).exists(), "nobody has written to it for two hours");
+        assert!(part(1).exists(), "another machine may be writing it");
+    }
 }
 
 #[test]
@@ -133,7 +270,7 @@ fn a_limited_cache_stays_below_its_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let graph = solver();
     let limit = 5_000;
-    let mut disk = DiskCache::open(folder.path(), limit).expect("a folder");
+    let mut disk = DiskCache::open(folder.path(), limit);
     let frames: Vec<Frame> = (1..=40).map(Frame::whole).collect();
     let cooked = graph.cook_with(&engine(1, 1 << 30), &frames, Some(&mut disk));
     assert!(cooked.bits() == graph.cook(1..=40).bits());

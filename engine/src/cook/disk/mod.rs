@@ -1,91 +1,93 @@
-//! The cache on disk: checkpoints of solvers and finished frames of outputs, so that a killed cook resumes.
+//! The cache on disk: checkpoints of solvers, finished frames of outputs and results of nodes, so that a killed cook
+//! resumes and a changed graph cooks only what changed.
 //!
-//! Every file is written beside its name and renamed, carries its format and a checksum, and is ignored where either does
-//! not fit: whatever a cache holds, a cook's results are those of a cook without it.
+//! Several processes and versions share a cache folder: each version owns one subfolder (`folder`). An entry is written
+//! beside its name and renamed, and is ignored if it is not whole (`entry`). Whatever lies in a cache, a cook's results
+//! are those of a cook without it, and whatever goes wrong with it is a note.
 
 mod bytes;
+mod entry;
+mod folder;
 
-use std::collections::BTreeMap;
-use std::fs;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
+use self::folder::{CHECKPOINT, FRAME, Folder, remove_if_there};
 use crate::geometry::Geometry;
 use crate::key::ContentKey;
-
-/// Changes whenever files of an older convect can no longer be used.
-const FORMAT: &str = concat!("convect ", env!("CARGO_PKG_VERSION"), " cache 4");
 
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
 
-/// A folder with checkpoints and finished frames.
+/// A folder with checkpoints, finished frames and results.
 pub struct DiskCache {
-    folder: PathBuf,
-    limit: u64,
+    /// As the user gave it.
+    name: PathBuf,
+    folder: Folder,
+    /// Checkpoints that were there when it was opened, and those saved since.
+    checkpoints: BTreeSet<ContentKey>,
     /// Recent checkpoints of each node, oldest first.
     recent: BTreeMap<String, Vec<(i64, PathBuf)>>,
+    /// Whether there is a folder to read from.
+    is_there: bool,
     /// Whether it could not be written: nothing more is kept then, but what is there is still taken.
     is_broken: bool,
     notes: Vec<String>,
+    /// The first entry that was there and could not be used, and how many there were.
+    unusable: Option<(String, u64)>,
 }
 
 /// A metric that belongs to a finished frame: the key of the result it was published with, its name and value.
 pub(crate) type KeptMetric = (ContentKey, String, f64);
 
 impl DiskCache {
-    /// Opens a cache, making the folder where it is missing. One that another version made is emptied, and on a full disk
-    /// nothing is kept, with a note.
-    ///
-    /// # Errors
-    /// Where the folder cannot be made, read or written.
-    pub fn open(folder: &Path, limit: u64) -> io::Result<Self> {
-        let recent = BTreeMap::new();
-        let mut cache = Self { folder: folder.to_owned(), limit, recent, is_broken: false, notes: Vec::new() };
-        match cache.prepare() {
-            Err(error) if matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
-                cache.give_up(&error);
-            }
-            prepared => prepared?,
-        }
-        Ok(cache)
-    }
-
-    fn prepare(&mut self) -> io::Result<()> {
-        let folder = &self.folder;
-        fs::create_dir_all(folder)?;
-        let mark = folder.join("version");
-        let is_ours = match fs::read_to_string(&mark) {
-            Ok(text) if text == FORMAT => true,
-            Ok(_) => {
-                let note = format!("the cache `{}` was made by another version and is not used", folder.display());
-                self.notes.push(note);
-                for (path, _, _) in files(folder)? {
-                    fs::remove_file(path)?;
-                }
-                false
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            Err(error) => return Err(error),
+    /// Opens a cache, making its folder if it is missing, with room for `limit` bytes. If that fails nothing is kept,
+    /// with a note.
+    pub fn open(cache: &Path, limit: u64) -> Self {
+        let mut opened = Self {
+            name: cache.to_owned(),
+            folder: Folder::of(cache, limit),
+            checkpoints: BTreeSet::new(),
+            recent: BTreeMap::new(),
+            is_there: false,
+            is_broken: false,
+            notes: Vec::new(),
+            unusable: None,
         };
-        sweep(folder)?;
-        if !is_ours {
-            write_whole(&mark, FORMAT.as_bytes())?;
+        let others = opened.folder.other_versions();
+        if !others.is_empty() {
+            let (cache, others) = (cache.display(), others.join("`, `"));
+            opened
+                .notes
+                .push(format!("the cache `{cache}` was made by another version (`{others}`), which is not used"));
         }
-        self.trim()
+        opened.keep(|cache| {
+            cache.folder.prepare()?;
+            cache.checkpoints = cache.folder.keys(CHECKPOINT)?;
+            Ok(())
+        });
+        opened.is_there = opened.folder.is_there();
+        opened
     }
 
-    /// What is worth telling: about the cache that was found, and whether it could be written.
-    pub fn notes(&self) -> &[String] {
-        &self.notes
+    /// What is worth telling: about the cache that was found, and whether it could be read and written.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.notes.clone();
+        if let Some((why, count)) = &self.unusable {
+            let entries = if *count == 1 { "an entry".into() } else { format!("{count} entries") };
+            let cache = self.name.display();
+            notes.push(format!("{entries} of the cache `{cache}` could not be used; cooked again instead: {why}"));
+        }
+        notes
     }
 
     /// Keeps nothing more. A cook can do without its cache.
     fn give_up(&mut self, error: &io::Error) {
-        let folder = self.folder.display();
+        let folder = self.name.display();
         let why = match error.kind() {
             io::ErrorKind::StorageFull => "the disk is full".to_owned(),
+            io::ErrorKind::FileTooLarge => "an entry is larger than files may be here".to_owned(),
             _ => error.to_string(),
         };
         self.notes.push(format!("the cache `{folder}` could not be written: {why}; cooking continues without it"));
@@ -101,127 +103,95 @@ impl DiskCache {
         }
     }
 
-    fn path(&self, kind: &str, key: ContentKey) -> PathBuf {
-        self.folder.join(format!("{key}.{kind}"))
+    /// Takes an entry; one that cannot be used counts as missing.
+    fn read(&mut self, kind: &str, key: ContentKey) -> Option<Vec<u8>> {
+        if !self.is_there {
+            return None;
+        }
+        let path = self.folder.entry(kind, key);
+        match entry::read(&path, key) {
+            Ok(None) => None,
+            Ok(Some(bytes)) => {
+                self.folder.used(&path);
+                Some(bytes)
+            }
+            Err(why) => {
+                let first = || format!("`{}`: {why}", path.display());
+                self.unusable.get_or_insert_with(|| (first(), 0)).1 += 1;
+                None
+            }
+        }
+    }
+
+    fn write(&mut self, kind: &str, key: ContentKey, bytes: &[u8]) -> io::Result<()> {
+        let size = entry::size(bytes.len());
+        if !self.folder.holds(size) {
+            return Ok(());
+        }
+        match entry::write(&self.folder.entry(kind, key), key, bytes) {
+            // What has its name is not convect's, and concerns this entry alone.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            Err(error) => Err(error),
+            Ok(()) => self.folder.added(size),
+        }
+    }
+
+    /// Whether there are checkpoints at all: if not, no key need be found.
+    pub(crate) fn has_checkpoints(&self) -> bool {
+        !self.checkpoints.is_empty()
+    }
+
+    /// Whether there was a checkpoint under that key when the cache was opened, or one was saved since.
+    pub(crate) fn has_checkpoint(&self, key: ContentKey) -> bool {
+        self.checkpoints.contains(&key)
     }
 
     /// The state a solver was saved in under that key.
-    pub(crate) fn checkpoint(&self, key: ContentKey) -> Option<Vec<u8>> {
-        read_entry(&self.path("checkpoint", key), key)
+    pub(crate) fn checkpoint(&mut self, node: &str, frame: i64, key: ContentKey) -> Option<Vec<u8>> {
+        let state = self.read(CHECKPOINT, key)?;
+        self.note_checkpoint(node, frame, key);
+        Some(state)
     }
 
-    /// Saves a solver's state, and removes older ones that need not stay.
+    /// Saves a solver's state.
     pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: ContentKey, state: &[u8]) {
-        let path = self.path("checkpoint", key);
-        self.keep(|cache| {
-            write_entry(&path, key, state)?;
-            let recent = cache.recent.entry(node.to_owned()).or_default();
-            recent.push((frame, path));
-            if recent.len() > 2 {
-                let (frame, path) = recent.remove(0);
-                if frame % EVERY != 0 {
-                    remove_if_there(&path)?;
-                }
-            }
-            cache.trim()
-        });
+        self.keep(|cache| cache.write(CHECKPOINT, key, state));
+        self.checkpoints.insert(key);
+        self.note_checkpoint(node, frame, key);
+    }
+
+    fn note_checkpoint(&mut self, node: &str, frame: i64, key: ContentKey) {
+        let path = self.folder.entry(CHECKPOINT, key);
+        let recent = self.recent.entry(node.to_owned()).or_default();
+        recent.retain(|(_, known)| *known != path);
+        recent.push((frame, path));
+    }
+
+    /// Removes checkpoints that need not stay, once the frames up to the last ones are finished: until then a cook that
+    /// is killed resumes from an earlier one.
+    pub(crate) fn prune_checkpoints(&mut self) {
+        let mut old = Vec::new();
+        for recent in self.recent.values_mut() {
+            old.extend(recent.drain(..recent.len().saturating_sub(2)).filter(|(frame, _)| frame % EVERY != 0));
+        }
+        self.keep(|_| old.iter().try_for_each(|(_, path)| remove_if_there(path)));
     }
 
     /// A finished frame of an output, and the metrics that were kept with it.
-    pub(crate) fn frame(&self, key: ContentKey) -> Option<(Geometry, Vec<KeptMetric>)> {
-        bytes::decode(&read_entry(&self.path("frame", key), key)?)
+    pub(crate) fn frame(&mut self, key: ContentKey) -> Option<(Geometry, Vec<KeptMetric>)> {
+        bytes::decode(&self.read(FRAME, key)?)
     }
 
     /// Keeps a finished frame of an output, and the metrics of what went into it.
     pub(crate) fn save_frame(&mut self, key: ContentKey, geometry: &Geometry, metrics: &[KeptMetric]) {
-        let path = self.path("frame", key);
-        self.keep(|cache| {
-            write_entry(&path, key, &bytes::encode(geometry, metrics))?;
-            cache.trim()
-        });
+        self.keep(|cache| cache.write(FRAME, key, &bytes::encode(geometry, metrics)));
     }
-
-    /// Removes the oldest files while there are more bytes than the limit.
-    fn trim(&mut self) -> io::Result<()> {
-        if self.limit == u64::MAX {
-            return Ok(());
-        }
-        let mut files = files(&self.folder)?;
-        files.sort_by(|(a, _, s), (b, _, t)| s.cmp(t).then(a.cmp(b)));
-        let mut total: u64 = files.iter().map(|(_, bytes, _)| bytes).sum();
-        for (path, bytes, _) in files {
-            if total <= self.limit {
-                break;
-            }
-            remove_if_there(&path)?;
-            total -= bytes;
-        }
-        Ok(())
-    }
-}
-
-fn files(folder: &Path) -> io::Result<Vec<(PathBuf, u64, SystemTime)>> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        let ours = path.extension().is_some_and(|e| e == "checkpoint" || e == "frame" || e == "part");
-        if ours && let Ok(facts) = fs::metadata(&path) {
-            found.push((path, facts.len(), facts.modified().unwrap_or(SystemTime::UNIX_EPOCH)));
-        }
-    }
-    Ok(found)
-}
-
-/// Removes what processes that are gone were writing. Where the system does not tell who lives, it stays until the limit
-/// takes it.
-fn sweep(folder: &Path) -> io::Result<()> {
-    let proc = Path::new("/proc");
-    if !proc.join("self").exists() {
-        return Ok(());
-    }
-    for (path, _, _) in files(folder)? {
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let owner =
-            name.strip_suffix(".part").and_then(|name| name.rsplit_once('.')).map(|(_, owner)| owner.to_owned());
-        if owner.is_some_and(|owner| owner.parse::<u32>().is_ok() && !proc.join(owner).exists()) {
-            remove_if_there(&path)?;
-        }
-    }
-    Ok(())
-}
-
-fn remove_if_there(path: &Path) -> io::Result<()> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
-}
-
-/// Writes an entry, in front of it a checksum of its key and itself: what was damaged or exchanged is not taken.
-fn write_entry(path: &Path, key: ContentKey, bytes: &[u8]) -> io::Result<()> {
-    write_whole(path, &[checksum(key, bytes).as_bytes().as_slice(), bytes].concat())
-}
-
-fn read_entry(path: &Path, key: ContentKey) -> Option<Vec<u8>> {
-    let bytes = fs::read(path).ok()?;
-    let (sum, rest) = bytes.split_at_checked(blake3::OUT_LEN)?;
-    (checksum(key, rest).as_bytes().as_slice() == sum).then(|| rest.to_vec())
-}
-
-fn checksum(key: ContentKey, bytes: &[u8]) -> blake3::Hash {
-    blake3::Hasher::new().update(&key.0).update(bytes).finalize()
-}
-
-/// Writes beside the name and renames. Killed at any moment, the name holds nothing or all.
-fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(format!(".{}.part", std::process::id()));
-    let part = PathBuf::from(part);
-    fs::write(&part, bytes).and_then(|()| fs::rename(&part, path)).inspect_err(|_| drop(fs::remove_file(&part)))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::geometry::{Column, Component, ENVELOPE, Grid, Owner, SHIELDED, Volume};
 
@@ -251,11 +221,11 @@ mod tests {
     #[test]
     fn a_file_cut_anywhere_is_ignored() {
         let folder = tempfile::tempdir().unwrap();
-        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX);
         let key = ContentKey::of(b"a");
         let metrics = [(ContentKey::of(b"node"), "max_angle".to_owned(), 0.1)];
         cache.save_frame(key, &sample(), &metrics);
-        let path = cache.path("frame", key);
+        let path = cache.folder.entry(FRAME, key);
         let whole = fs::read(&path).unwrap();
         assert_eq!(cache.frame(key).unwrap(), (sample(), metrics.to_vec()));
         for length in 0..whole.len() {
@@ -267,52 +237,45 @@ mod tests {
     #[test]
     fn exchanged_files_are_ignored() {
         let folder = tempfile::tempdir().unwrap();
-        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX);
         let (a, b) = (ContentKey::of(b"a"), ContentKey::of(b"b"));
         cache.save_frame(a, &sample(), &[]);
-        fs::rename(cache.path("frame", a), cache.path("frame", b)).unwrap();
+        fs::rename(cache.folder.entry(FRAME, a), cache.folder.entry(FRAME, b)).unwrap();
         assert!(cache.frame(b).is_none());
     }
 
     #[test]
     fn the_last_two_checkpoints_and_every_eighth_stay() {
         let folder = tempfile::tempdir().unwrap();
-        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX);
         let key = |frame: i64| ContentKey::of(&frame.to_le_bytes());
         for frame in 1..=20 {
             cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]);
         }
-        let stay: Vec<i64> = (1..=20).filter(|frame| cache.checkpoint(key(*frame)).is_some()).collect();
-        assert_eq!(stay, [8, 16, 19, 20]);
+        let staying = |cache: &mut DiskCache| -> Vec<i64> {
+            (1..=20).filter(|frame| cache.checkpoint("body", *frame, key(*frame)).is_some()).collect()
+        };
+        assert_eq!(staying(&mut cache).len(), 20, "until their frames are finished");
+        cache.prune_checkpoints();
+        assert_eq!(staying(&mut DiskCache::open(folder.path(), u64::MAX)), [8, 16, 19, 20]);
     }
 
     #[test]
     fn a_limit_removes_the_oldest() {
         let folder = tempfile::tempdir().unwrap();
-        let mut cache = DiskCache::open(folder.path(), 3 * 132).unwrap();
+        let mut cache = DiskCache::open(folder.path(), 3 * 164);
         for frame in 0..10_i64 {
             cache.save_checkpoint("body", frame * 8, ContentKey::of(&frame.to_le_bytes()), &[0; 100]);
         }
-        let left = files(folder.path()).unwrap();
+        let left = cache.folder.entries().unwrap();
         assert!(left.len() <= 3 && !left.is_empty(), "{}", left.len());
-    }
-
-    #[test]
-    fn a_cache_of_another_version_is_not_used_and_said() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        cache.save_frame(ContentKey::of(b"a"), &sample(), &[]);
-        fs::write(folder.path().join("version"), "convect 0.0.1 cache 0").unwrap();
-        let cache = DiskCache::open(folder.path(), u64::MAX).unwrap();
-        assert!(cache.notes()[0].ends_with("was made by another version and is not used"));
-        assert!(cache.frame(ContentKey::of(b"a")).is_none());
     }
 
     #[test]
     fn a_cache_that_cannot_be_written_is_given_up_once() {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().join("cache");
-        let mut cache = DiskCache::open(&place, u64::MAX).unwrap();
+        let mut cache = DiskCache::open(&place, u64::MAX);
         cache.save_frame(ContentKey::of(b"a"), &sample(), &[]);
         fs::rename(&place, folder.path().join("gone")).unwrap();
         for key in [b"b", b"c"] {

@@ -209,10 +209,18 @@ impl<'g> Sweep<'_, 'g, '_> {
         }
         self.nodes[node].states.remove(&segment);
         let Some(Cook::Solver(_, solver)) = self.plan.graph.nodes[node].node().map(|node| node.cook) else { return };
-        let Some(disk) = self.disk.as_ref() else { return };
-        for at in (segment.start..=frame).rev() {
-            let Ok(key) = self.keys.state_key(node, segment, at) else { continue };
-            let state = disk.checkpoint(key).and_then(|bytes| (solver.load)(&bytes));
+        let Some(disk) = self.disk.as_mut().filter(|disk| disk.has_checkpoints()) else { return };
+        let id = &self.plan.graph.nodes[node].id;
+        // Keys are found from the start on, and the latest state is the one to go on from.
+        let mut saved = Vec::new();
+        for at in segment.start..=frame {
+            let Ok(key) = self.keys.state_key(node, segment, at) else { break };
+            if disk.has_checkpoint(key) {
+                saved.push((at, key));
+            }
+        }
+        for (at, key) in saved.into_iter().rev() {
+            let state = disk.checkpoint(id, at, key).and_then(|bytes| (solver.load)(&bytes));
             if let Some(state) = state {
                 let run = &mut self.nodes[node];
                 run.report.from_cache += 1;

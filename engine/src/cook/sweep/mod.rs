@@ -45,6 +45,9 @@ const MOST_CHAIN_FRAMES: i64 = 16;
 /// Most frames of a slice.
 const MOST_FRAMES: usize = 16;
 
+/// How long a slice should take at most: what a killed cook loses, as its frames are finished together.
+const SLICE_TIME: Duration = Duration::from_millis(500);
+
 /// Bytes of results a slice should hold: a few times a core's cache, so that a node finds its input there.
 const SLICE_BYTES: usize = 16 << 20;
 
@@ -80,7 +83,7 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     plan: &'p Plan<'g>,
     executor: Executor,
     disk: Option<&'e mut DiskCache>,
-    cancel: &'e AtomicBool,
+    cancel: &'p AtomicBool,
     keys: Keys<'p, 'g>,
     nodes: Vec<NodeRun<'p>>,
     /// Slices cooked so far.
@@ -92,11 +95,13 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     live_bytes: usize,
     /// Most bytes that one frame of a slice took.
     frame_bytes: usize,
+    /// Time that a frame of the last slice took; `None` before one was cooked.
+    frame_time: Option<Duration>,
     report: Report,
 }
 
 impl<'p> NodeRun<'p> {
-    fn new(plan: &'p Plan<'_>, index: usize) -> Self {
+    fn new(plan: &'p Plan<'_>, index: usize, cancel: &'p AtomicBool) -> Self {
         let (node, planned) = (&plan.graph.nodes[index], &plan.nodes[index]);
         let integrates = node.node().filter(|declared| declared.integrands[0].is_some());
         Self {
@@ -104,7 +109,7 @@ impl<'p> NodeRun<'p> {
             bytes: 0,
             states: BTreeMap::new(),
             recent: BTreeMap::new(),
-            integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene)),
+            integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
             call_time: Duration::MAX,
             held: None,
             report: NodeReport {
@@ -126,7 +131,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         plan: &'p Plan<'g>,
         executor: Executor,
         disk: Option<&'e mut DiskCache>,
-        cancel: &'e AtomicBool,
+        cancel: &'p AtomicBool,
     ) -> Self {
         // The key of given geometry is of this plan alone, so nothing made of it may outlive the cook.
         let given = plan.graph.nodes.iter().any(|node| matches!(node.body, Body::Given { .. }));
@@ -136,13 +141,14 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             executor,
             disk: disk.filter(|_| !given),
             cancel,
-            keys: Keys::new(plan),
-            nodes: (0..plan.graph.nodes.len()).map(|index| NodeRun::new(plan, index)).collect(),
+            keys: Keys::new(plan, cancel),
+            nodes: (0..plan.graph.nodes.len()).map(|index| NodeRun::new(plan, index, cancel)).collect(),
             slices: 0,
             own: BTreeSet::new(),
             requested: RequestedAttributes::of(plan),
             live_bytes: 0,
             frame_bytes: 0,
+            frame_time: None,
             report: Report::default(),
         }
     }
@@ -175,7 +181,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
             self.keys.forget_before(slice[0].floor_number());
         }
-        self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()).cloned());
+        self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()));
         self.note_missing_attributes();
         self.note_warnings();
         let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };
@@ -201,11 +207,13 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let threads = rayon::current_num_threads();
         let bytes = self.frame_bytes.max(1);
         let most = (self.engine.memory / 2 / bytes).clamp(1, MOST_FRAMES);
-        (SLICE_BYTES / bytes).clamp(threads.min(most), most)
+        let in_time = self.frame_time.map_or(0, |time| SLICE_TIME.as_nanos() / time.as_nanos().max(1));
+        (SLICE_BYTES / bytes).min(in_time as usize).clamp(threads.min(most), most)
     }
 
     /// Cooks some frames of all outputs of the request.
     fn slice(&mut self, frames: &[Frame]) -> Vec<Delivered> {
+        let watch = Stopwatch::start();
         let (mut finished, missing) = self.find_on_disk(frames);
         let reads =
             missing.iter().flat_map(|(output, frame, _)| self.plan.delivery(*output, *frame).all().collect::<Vec<_>>());
@@ -217,6 +225,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             return finished;
         }
         self.frame_bytes = self.frame_bytes.max(peak / frames.len().max(1));
+        let mut cooked: Vec<Frame> = missing.iter().map(|(_, frame, _)| *frame).collect();
+        cooked.dedup();
+        if !cooked.is_empty() {
+            self.frame_time = Some(watch.wall() / cooked.len() as u32);
+        }
         if self.executor.delivers() {
             self.finish_outputs(missing, &mut finished);
         }
@@ -236,7 +249,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             let mut saved: BTreeSet<usize> = BTreeSet::new();
             for output in &plan.request.outputs {
                 let key = self.disk.is_some().then(|| self.output_key(*output, *frame)).flatten();
-                let found = key.and_then(|key| self.disk.as_ref().and_then(|disk| disk.frame(key)));
+                let found = key.and_then(|key| self.disk.as_mut().and_then(|disk| disk.frame(key)));
                 match found {
                     Some((geometry, metrics)) => {
                         self.report.from_disk += 1;

@@ -117,6 +117,9 @@ impl Sweep<'_, '_, '_> {
         self.forget_results();
         self.keys.end_slice();
         self.plan.files.release();
+        if let Some(disk) = self.disk.as_mut() {
+            disk.prune_checkpoints();
+        }
         for run in &mut self.nodes {
             while run.recent.len() > KEPT_NEIGHBOURS {
                 run.recent.pop_first();
