@@ -115,7 +115,9 @@ impl Targets {
                 let Some(identity) = identity(&path) else { continue };
                 if let Some(why) = read.get(&identity) {
                     let fact = format!("`{}` would be overwritten, but {why}", target.as_given(&path).display());
-                    return Err(Failure::new(target.exit, format!("{fact}; choose another {}", target.option)));
+                    // Only a path that was given itself is a wrong command line; the others lie in --out.
+                    let option = if target.exit == Exit::File { "--out" } else { target.option };
+                    return Err(Failure::new(target.exit, format!("{fact}; choose another {option}")));
                 }
                 // Equal frames of one option may be links to one file: each is replaced, none is written through.
                 match written.insert(identity, target) {
