@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use engine::clock::Stopwatch;
 use engine::cook::{Delivered, DiskCache, Engine, Report, Stopped};
-use engine::graph::Graph;
+use engine::graph::{Graph, Part};
+use engine::note::{Note, kind};
 use engine::plan::Request;
 use engine::time::Frame;
 use formats::Format;
@@ -61,6 +62,9 @@ pub struct CookArgs {
     /// Print only errors
     #[arg(short, long)]
     quiet: bool,
+    /// Exit with code 4 if there are notes; files are written all the same
+    #[arg(long)]
+    strict: bool,
     // Last, because its heading would apply to the options that follow.
     #[command(flatten)]
     pictures: pictures::PictureArgs,
@@ -149,7 +153,8 @@ fn cook(
         report.notes.iter().for_each(|note| crate::say!("note: {note}"));
         print_summary(&report, &written, &drawn, args.verbose);
     }
-    outcome(graph, &report, &written)
+    outcome(args, graph, &report, &written)?;
+    load::strict(args.strict, &report.notes)
 }
 
 /// Everything that the cook reads and writes.
@@ -166,11 +171,12 @@ fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pi
 }
 
 /// A note for each output that the format could not store completely.
-fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<String> {
+fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
     let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
     let note = |(output, written): &(usize, Written)| {
         let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
-        format!("output `{name}` was written without {lost}, which {format} cannot hold; usdc and json can")
+        let text = format!("output `{name}` was written without {lost}, which {format} cannot hold; usdc and json can");
+        Note::new(kind::NOT_WRITTEN, text)
     };
     lossy.map(note).collect()
 }
@@ -209,7 +215,7 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
 }
 
 /// The errors of nodes and the exit code.
-fn outcome(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
+fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let mut exit = None;
     let mut reported: Vec<String> = Vec::new();
@@ -221,7 +227,12 @@ fn outcome(graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Resu
                 1 => " (and at 1 more frame)".into(),
                 more => format!(" (and at {more} more frames)"),
             };
-            lines.push(format!("{text}{more}"));
+            let part = match error.error.param {
+                Some(param) => Part::Param(&error.node, param),
+                None => Part::Node(&error.node),
+            };
+            let place = graph.place(&args.graph.display().to_string(), part);
+            lines.push(format!("{place}: {text}{more}"));
             reported.push(text);
         }
         let code = exit_of_error(error);

@@ -76,6 +76,7 @@ pub fn exit_of_faults(faults: &[Fault]) -> Exit {
     let code = |fault: &Fault| match fault.class {
         FaultClass::File => Exit::File,
         FaultClass::Graph => Exit::Graph,
+        FaultClass::Note => Exit::Done,
     };
     faults.iter().map(code).min().unwrap_or(Exit::Done)
 }

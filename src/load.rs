@@ -7,6 +7,7 @@ use engine::cook::{Engine, Settings};
 use engine::files::{is_handed_over, unreadable};
 use engine::graph::{Fault, FaultClass, Graph, Part, probe};
 use engine::memory::Ceiling;
+use engine::note::Note;
 use formats::Format;
 
 use crate::CATALOGUE;
@@ -78,6 +79,18 @@ pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fa
 
 /// More faults are counted, not shown.
 const MOST_SHOWN: usize = 200;
+
+/// Fails with the exit code of a node that could not cook if notes are to be taken as errors and there are any.
+///
+/// # Errors
+/// As said.
+pub fn strict(strict: bool, notes: &[Note]) -> Result<(), Failure> {
+    if !strict || notes.is_empty() {
+        return Ok(());
+    }
+    let count = if notes.len() == 1 { "1 note".into() } else { format!("{} notes", notes.len()) };
+    Err(Failure::new(crate::failure::Exit::Cook, format!("{count}, with --strict")))
+}
 
 /// The failure for a list of faults, with one line each.
 pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {

@@ -5,6 +5,7 @@ use std::time::Duration;
 use engine::cook::{NodeReport, Report};
 use engine::frames::FrameSet;
 use engine::graph::Graph;
+use engine::note::Note;
 use engine::time::Frame;
 use serde_json::{Map, Value, json};
 
@@ -39,7 +40,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
             let errors: Vec<Value> = errors
                 .map(|(_, error, frames)| {
                     json!({
-                        "node": *error.node, "frame": number(error.frame), "frames": frames,
+                        "node": *error.node, "frame": error.frame.to_json(), "frames": frames,
                         "fact": error.error.fact, "hint": error.error.hint,
                     })
                 })
@@ -58,7 +59,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     // Of an interrupted cook only those that it reached, because a scene may have a billion.
     let reached = cooked.written.iter().filter_map(|(_, written)| written.frames.last()).max();
     let was_reached = |frame: &Frame| !report.cancelled || reached.is_some_and(|reached| frame <= reached);
-    let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(number).collect();
+    let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(Frame::to_json).collect();
     let seconds = report.cooking.as_secs_f64();
     let delivered = report.delivered.values().copied().max().unwrap_or(0);
     json!({
@@ -67,6 +68,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
         "frames": frames,
         "nodes": nodes,
         "outputs": outputs,
+        "notes": report.notes.iter().map(Note::to_json).collect::<Vec<Value>>(),
         "total": {
             "cooking_ms": ms(report.cooking),
             "writing_ms": ms(cooked.writing),
@@ -78,7 +80,6 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
             "simd": numerics::simd::Path::chosen().name(),
             "from_disk": report.from_disk,
             "interrupted": report.cancelled,
-            "notes": report.notes,
         },
     })
 }
@@ -117,9 +118,4 @@ pub const NOT_NEEDED: &str = "no requested output depends on it";
 
 fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
-}
-
-/// A frame as a number, an integer if it is whole.
-fn number(frame: Frame) -> Value {
-    if frame.is_whole() { json!(frame.floor_number()) } else { json!(frame.number()) }
 }

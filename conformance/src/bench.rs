@@ -6,7 +6,6 @@
 //! ```
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -15,7 +14,7 @@ use numerics::ramp::Interpolation;
 use engine::cook::{Delivered, Engine, Report, Settings};
 use engine::error::{CookError, Error};
 use engine::geometry::{Component, Geometry, Kind};
-use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Positions, Scene};
+use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link, Scene};
 use engine::node::{Input, Node};
 use engine::param::{Keyframes, Param, ParamType, Shape, Source, Unset, Value};
 use engine::plan::Request;
@@ -237,7 +236,7 @@ impl Bench {
         let specs = self.node.param_specs().into();
         let body = Body::Node { node: self.node, specs, params: self.params.as_slice().into(), inputs };
         nodes.push(GraphNode { id: "node".into(), body });
-        Graph { scene: self.scene.clone(), nodes, outputs, folder: PathBuf::new(), positions: Positions::default() }
+        Graph { scene: self.scene.clone(), nodes, outputs, ..Graph::default() }
     }
 }
 

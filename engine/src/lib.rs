@@ -12,6 +12,7 @@ pub mod host;
 pub mod key;
 pub mod memory;
 pub mod node;
+pub mod note;
 pub mod param;
 pub mod plan;
 pub mod time;

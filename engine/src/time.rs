@@ -59,6 +59,11 @@ impl Frame {
         self.0 as f64 / Self::TICKS as f64
     }
 
+    /// The frame number in JSON: an integer if it is whole.
+    pub fn to_json(self) -> serde_json::Value {
+        if self.is_whole() { self.floor_number().into() } else { self.number().into() }
+    }
+
     /// Seconds since frame 0.
     pub fn seconds(self, fps: f64) -> f64 {
         self.number() / fps

@@ -205,7 +205,7 @@ fn check_owner(part: &Component, owner: Owner, name: &str) -> Result<()> {
 
 /// The error, with a hint if the code names an attribute of the other kind of row.
 fn explained(error: RunError, part: &Component, owner: Owner) -> Error {
-    let RunError::Code(fault) = &error else { return error.into() };
+    let RunError::Code(fault) = &error else { return Error::from(error).of(CODE.name()) };
     let theirs = part.table(other(owner));
     let named = theirs.iter().map(|(name, _)| name).find(|name| fault.fact.contains(&format!("`{name}`")));
     let hint = named.map(|name| match owner {

@@ -27,8 +27,15 @@ const OUT: Output = Output::like("curves", &CURVES, "The curves, carried to `ski
 metrics! { METRICS:
     BOUND = Metric::new("bound", Unit::Metres, "The largest distance of a root from `rest_skin`. A large \
         distance suggests that the curves were grown on another mesh.");
+    FAR_ROOTS = Metric::new("far_roots", Unit::None,
+        "Curves whose roots are farther from `rest_skin` than the curves are long.")
+        .warn_above(0.0, "These roots are farther from `rest_skin` than their curves are long, so the curves probably \
+            grew on another mesh, or on this one at another scale. Compare the `scale` of both files, and wire the \
+            mesh in the pose in which the curves were grown.");
     UNTURNED = Metric::new("unturned", Unit::None,
-        "Curves that move without rotating, because the skin around their roots has collapsed to a line or a point.");
+        "Curves that move without rotating, because the skin around their roots has collapsed to a line or a point.")
+        .warn_above(0.0, "The skin around these roots has collapsed to a line or a point, so that it gives no \
+            direction; the curves keep that of their rest shape.");
     LENGTH_ERROR = Metric::length_error();
 }
 
@@ -75,6 +82,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         out.set_column(Owner::Point, PREF.name, rest)?;
     }
     cx.publish(BOUND, binding.max_distance());
+    cx.publish(FAR_ROOTS, binding.far_roots(curves.runs().starts(), curves.positions()) as f64);
     if rest.positions() == skin.positions() {
         cx.publish(UNTURNED, 0.0);
         cx.publish(LENGTH_ERROR, 0.0);

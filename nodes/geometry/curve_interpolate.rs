@@ -52,6 +52,10 @@ const CURVES: Output = Output::new(
 
 metrics! { METRICS:
     GROWN = Metric::new("curves", Unit::None, "Number of hairs grown.");
+    FAR_ROOTS = Metric::new("far_roots", Unit::None,
+        "Guides whose roots are farther from the skin than the guides are long.")
+        .warn_above(0.0, "These guides are farther from `skin` than they are long, so they probably belong to another \
+            mesh, or to this one at another scale. Compare the `scale` of both files.");
     LENGTH_ERROR = Metric::new("length_error", Unit::None,
         "The largest difference between a hair's length and the blended length of its guides, relative to the \
          latter.");
@@ -104,6 +108,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         curves.set(UVW, at_roots(uvw, &rest.triangles().corners, coat.roots.iter(), cvs))?;
     }
     cx.publish(GROWN, roots.len() as f64);
+    cx.publish(FAR_ROOTS, coat.guides.far_roots(first.runs().starts(), first.positions()) as f64);
     cx.publish(LENGTH_ERROR, blended.length_error);
     Ok(CURVES.with(Geometry::from(curves)))
 }

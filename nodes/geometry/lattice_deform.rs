@@ -68,7 +68,9 @@ const DEFORMED: Output = Output::like("geometry", &GEOMETRY, "The deformed geome
 
 metrics! { METRICS:
     FOLDED = Metric::new("folded", Unit::None, "Points at which the lattice flattens the geometry or turns it inside \
-        out. 0 is a sound deformation.");
+        out. 0 is a sound deformation.")
+        .warn_above(0.0, "The lattice turns the geometry inside out there. Move the offsets of neighbouring control \
+            points closer together, or add `divisions`.");
     MIN_JACOBIAN = Metric::new("min_jacobian", Unit::None,
         "The smallest factor by which volume changes at any point: 1 keeps it, 0 flattens, below 0 the geometry is \
          inside out there.").neutral(1.0);

@@ -177,7 +177,9 @@ metrics! { METRICS:
         "Elastic energy that plastic flow dissipates at the end of the frame; it is no longer part of the next frame's \
          `elastic`.");
     ENERGY_SHED = Metric::new("energy_shed", Unit::Joules, "Energy removed to prevent a spurious gain.");
-    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.");
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")
+        .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
+            `stiffness`; look for colliders that squeeze them into too small a space.");
     WORST_STRETCH = Metric::new("worst_stretch", Unit::None,
         "The largest stretch or compression of a spring: length ÷ rest length, or rest length ÷ length.");
     INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")

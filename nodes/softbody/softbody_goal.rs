@@ -50,7 +50,9 @@ metrics! { METRICS:
     RESIDUAL = Metric::new("residual", Unit::None,
         "Force left on inner points after the solve, relative to the force exerted by the surface.");
     LOOSE = Metric::new("loose_points", Unit::None,
-        "Points that are not connected to the surface: they keep their positions.");
+        "Points that are not connected to the surface: they keep their positions.")
+        .warn_above(0.0, "These points are not connected to the surface by tets, so the shape cannot move them. Remove \
+            them, or connect them.");
 }
 
 pub(crate) static NODE: Node = Node::new(

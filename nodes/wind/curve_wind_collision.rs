@@ -76,13 +76,17 @@ const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the
 
 metrics! { METRICS:
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
-        "Segments of the output that cross a collider. Not counted while `blend` is 0.");
-    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that cross a collider and that no turn can free.")
+        "Segments of the output that cross a collider. Not counted while `blend` is 0.")
         .warn_above(0.0,
-        "These segments still reach into a collider, because no turn about the CV before them frees them: their roots \
-         lie deep in the skin, or they are caught between two colliders. Raise `offset_root`, or start from curves \
-         that are clear of the colliders.");
-    STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.");
+        "These segments still reach into a collider. Either no turn about the CV before them frees them \
+         (`unfreed_segments`), because their roots lie deep in the skin or they are caught between two colliders; or \
+         they begin closer to it than `gap`. Raise `offset_root`, or start from curves that are clear of the \
+         colliders.");
+    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that cross a collider and that no turn can free.");
+    STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.")
+        .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
+            from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
+            `offset_root`, or leave out that collider.");
     CONTACTS = Metric::new("contacts", Unit::None,
         "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,

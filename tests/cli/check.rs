@@ -63,8 +63,8 @@ fn attributes_that_no_input_can_have_are_faults() {
     for (nodes, expected) in [
         (
             mask("sofft"),
-            "nodes.a.params.blend: `blend` is masked by `sofft`, which the curves do not have; expected one float for \
-             each CV",
+            "nodes.a.params.blend: `blend` is masked by `sofft`, which the curves do not have; did you mean \
+             `soft`?",
         ),
         (
             mask("Cd"),

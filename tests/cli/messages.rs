@@ -60,7 +60,7 @@ fn a_broken_file_is_reported_with_its_line() {
 
 #[test]
 fn a_failed_node_is_reported_with_its_frame_and_its_output() {
-    let expected = "`wind` (Curve_Wind) at frame 2: `wind_dir` is [0, 0, 0], which has no direction; \
+    let expected = "g.json:8:31: `wind` (Curve_Wind) at frame 2: `wind_dir` is [0, 0, 0], which has no direction; \
                     use a vector that is not zero, such as [1, 0, 0]\n";
     let cook = |format| stderr(CALM_AT_2, &["cook", "g.json", "-q", "--format", format]);
     assert_eq!(cook("json"), format!("{expected}output `grass` lacks the frames that failed\n"));

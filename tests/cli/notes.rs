@@ -11,8 +11,13 @@ fn notes(bench: &Bench, args: &[&str]) -> Vec<String> {
     let printed: Vec<String> =
         ran.stderr.lines().filter_map(|line| line.strip_prefix("note: ").map(str::to_owned)).collect();
     let report = bench.read_json("report.json");
-    let list = report["total"]["notes"].as_array().unwrap();
-    assert_eq!(list.iter().map(|note| note.as_str().unwrap()).collect::<Vec<_>>(), printed);
+    let list = report["notes"].as_array().unwrap();
+    assert_eq!(list.len(), printed.len(), "{list:?}");
+    for (note, printed) in list.iter().zip(&printed) {
+        assert!(printed.starts_with(note["text"].as_str().unwrap()), "{note} {printed}");
+        assert!(printed.ends_with(note["hint"].as_str().unwrap_or_default()), "{note} {printed}");
+        assert!(note["kind"].is_string() && note["frames"].is_array(), "{note}");
+    }
     printed
 }
 
@@ -64,8 +69,118 @@ fn data_that_a_format_drops_is_noted_once_per_output() {
         r#"{"convect": 1, "nodes": {"none": {"type": "Curve_In", "params": {"points": []}}}, "outputs": {"o": "none"}}"#,
     );
     let expected =
-        ["output `o` was written without the curves without a point, which ply cannot hold; usdc and json can"];
-    assert_eq!(notes(&bench, &["--format", "ply"]), expected);
+        "output `o` was written without the curves without a point, which ply cannot hold; usdc and json can";
+    assert_eq!(notes(&bench, &["--format", "ply"])[1], expected);
+}
+
+#[test]
+fn what_is_probably_not_meant_is_noted_by_check_and_by_cook() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "nodes": {
+            "grass": {"type": "Curve_In", "params": {"points": [[0, 0, 0], [0, 1, 0]], "width": 0.01}},
+            "spare": {"type": "Transform", "inputs": {"geometry": "grass"}},
+            "turn": {"type": "Transform", "inputs": {"geometry": "grass"},
+                "params": {"rotate": {"expr": ["0", "pi/2", "30*sin(2*pi*time)"]}}}
+        }, "outputs": {"d": "turn", "D": "turn", "other": "grass"}}"#,
+    );
+    let expected = [
+        "line 5: nodes.turn.params.rotate.expr[1]: the expression is a multiple of `pi`, but `rotate` is in degrees. \
+         Write 180 instead of `pi`, or degrees(…) around an angle in radians.",
+        "no output needs `spare` (Transform). Connect it, or remove it; it is not cooked.",
+        "the outputs `d` and `D` differ only in case. Their files replace each other on file systems that ignore case, \
+         as on Windows and macOS; rename one.",
+    ];
+    assert_eq!(notes(&bench, &[]), expected);
+    let checked = bench.run(&["check", "g.json"]);
+    let lines: Vec<String> = expected.iter().map(|text| format!("note: {text}\n")).collect();
+    assert_eq!((checked.code, checked.stderr), (Some(0), lines.concat()));
+}
+
+#[test]
+fn notes_with_strict_exit_with_4_and_files_are_written() {
+    let bench = two_curves(r#""width": 0.1"#, r#""wind""#);
+    let strict = |args: &[&str]| bench.run(&[args, &["--strict"]].concat());
+    assert_eq!(strict(&["cook", "g.json"]).code, Some(0));
+    assert_eq!(strict(&["check", "g.json"]).code, Some(0));
+    let ran = strict(&["cook", "g.json", "--frames", "2-5", "--format", "json", "--out", "late"]);
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    assert!(ran.stderr.ends_with("1 note, with --strict\n"), "{}", ran.stderr);
+    assert!(bench.path("late/o.0005.json").exists());
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "nodes": {"a": {"type": "Curve_In", "params": {"points": [[0, 0, 0]], "width": 1}},
+            "b": {"type": "Transform", "inputs": {"geometry": "a"}}}, "outputs": {"o": "a"}}"#,
+    );
+    let ran = bench.run(&["check", "g.json", "--strict"]);
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+}
+
+#[test]
+fn frames_outside_the_scene_are_noted() {
+    let bench = two_curves(r#""width": 0.1"#, r#""wind""#);
+    let hint = "Keyframes hold their first and last value there, and solvers start at the scene's first frame. Extend \
+                `scene.frames` if that is not meant.";
+    let expected = format!("2 frames are outside the scene, whose frames are 1-3 (frames 4-5). {hint}");
+    assert_eq!(notes(&bench, &["--frames", "2-5"]), [expected]);
+    let expected = format!("frame 0.5 is outside the scene, whose frames are 1-3. {hint}");
+    assert_eq!(notes(&bench, &["--frames", "0.5,1"]), [expected]);
+}
+
+#[test]
+fn an_output_without_geometry_is_noted_if_no_frame_has_any() {
+    let graph = |density: &str| {
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "scene": {{"frames": [1, 3]}}, "nodes": {{
+                "ball": {{"type": "Mesh_Primitive", "params": {{"shape": "sphere"}}}},
+                "fur": {{"type": "Curve_Scatter", "inputs": {{"skin": "ball"}}, "params": {{"density": {density}}}}}
+            }}, "outputs": {{"o": "fur"}}}}"#
+        ))
+    };
+    let expected = "output `o` has no geometry at any frame (frames 1-3). Look at what `fur` (Curve_Scatter) returns, and \
+                    what it is given.";
+    assert_eq!(notes(&graph("0"), &["--format", "json"]), [expected]);
+    assert_eq!(notes(&graph("10"), &["--format", "json"]), [""; 0]);
+}
+
+#[test]
+fn a_mask_that_is_zero_everywhere_is_noted() {
+    let graph = |code: &str| {
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "scene": {{"frames": [1, 3]}}, "nodes": {{
+                "two": {{"type": "Curve_In", "params": {{"points": [[0, 0, 0], [0, 1, 0]], "width": 0.1}}}},
+                "mask": {{"type": "Attribute_Expr", "inputs": {{"geometry": "two"}}, "params": {{"code": "m = {code}"}}}},
+                "wind": {{"type": "Curve_Wind", "inputs": {{"curves": "mask"}},
+                    "params": {{"global_rotate": {{"value": 1, "attribute": "m"}}}}}}
+            }}, "outputs": {{"o": "wind"}}}}"#
+        ))
+    };
+    let expected = "`wind` (Curve_Wind): the mask `m` of `global_rotate` is 0 everywhere (frames 1-3). `global_rotate` has \
+                    no effect. Look at where the attribute `m` is made.";
+    assert_eq!(notes(&graph("0*frame"), &[]), [expected]);
+    assert_eq!(notes(&graph("max(frame - 2, 0)"), &[]), [""; 0]);
+    let bench = graph("1");
+    let text = std::fs::read_to_string(bench.path("g.json")).unwrap();
+    bench.write("misspelt.json", &text.replace(r#""attribute": "m""#, r#""attribute": "mm""#));
+    let ran = bench.run(&["cook", "misspelt.json"]);
+    assert!(ran.stderr.contains("which the curves do not have; did you mean `m`?"), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("misspelt.json:5:"), "{}", ran.stderr);
+}
+
+#[test]
+fn roots_far_from_their_skin_are_noted() {
+    let graph = |scale: &str| {
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "nodes": {{
+                "ball": {{"type": "Mesh_Primitive", "params": {{"shape": "sphere", "size": [1, 1, 1]}}}},
+                "fur": {{"type": "Curve_Scatter", "inputs": {{"skin": "ball"}},
+                    "params": {{"density": 20, "length": [0.1, 0.1]}}}},
+                "big": {{"type": "Transform", "inputs": {{"geometry": "ball"}}, "params": {{"scale": {scale}}}}},
+                "on": {{"type": "Curve_Attach", "inputs": {{"curves": "fur", "rest_skin": "big", "skin": "big"}}}}
+            }}, "outputs": {{"o": "on"}}}}"#
+        ))
+    };
+    let found = notes(&graph("[2, 2, 2]"), &[]);
+    assert!(matches!(&found[..], [one] if one.starts_with("`on` (Curve_Attach): `far_roots` is ")), "{found:?}");
+    assert_eq!(notes(&graph("[1.05, 1.05, 1.05]"), &[]), [""; 0]);
 }
 
 #[test]

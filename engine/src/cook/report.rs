@@ -7,6 +7,7 @@ use std::time::Duration;
 use crate::error::CookError;
 use crate::geometry::Name;
 use crate::node::LeftOut;
+use crate::note::Note;
 use crate::plan::Window;
 use crate::time::Frame;
 
@@ -64,6 +65,6 @@ pub struct Report {
     pub peak_bytes: usize,
     /// Whether someone cancelled it.
     pub cancelled: bool,
-    /// Things worth knowing that are not errors.
-    pub notes: Vec<String>,
+    /// What a user should know although it is no error.
+    pub notes: Vec<Note>,
 }

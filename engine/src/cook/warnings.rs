@@ -1,32 +1,36 @@
-//! Notes on metrics that exceed the limit their node declares; see [`crate::node::Metric::warn_above`].
+//! Notes on metrics with values that their node declares to be trouble; see [`crate::node::Metric::warn_above`].
 
 use std::collections::BTreeMap;
 
-use crate::node::Metric;
+use crate::geometry::Name;
+use crate::node::{Metric, Trouble};
+use crate::note::Note;
 use crate::time::Frame;
 
-/// One note for each metric that exceeds its limit at any frame: where it is largest, at how many frames, and what that means.
+/// One note for each metric with such a value at any frame: its worst value, and at which frames there are others.
 pub(super) fn notes(
-    id: &str,
+    id: &Name,
     type_name: &str,
     declared: &[&Metric],
     published: &BTreeMap<&'static str, BTreeMap<Frame, f64>>,
-) -> Vec<String> {
+) -> Vec<Note> {
     let note = |metric: &&Metric| {
         let warning = metric.warning?;
         let values = published.get(metric.name)?;
-        let over = || values.iter().filter(|(_, value)| **value > warning.above);
-        let (frame, worst) = over().reduce(|worst, next| if next.1 > worst.1 { next } else { worst })?;
-        let at = match over().count() {
-            1 => format!("at frame {frame}"),
-            count => format!("at frame {frame}, and too large at {count} of {} frames", values.len()),
-        };
+        let excess = |value: &f64| warning.when.excess(*value);
+        let over: Vec<(&Frame, &f64)> = values.iter().filter(|(_, value)| excess(value) > 0.0).collect();
+        let (frame, worst) =
+            over.iter().reduce(|worst, next| if excess(next.1) > excess(worst.1) { next } else { worst })?;
+        if matches!(warning.when, Trouble::AlwaysAbove(_)) && over.len() < values.len() {
+            return None;
+        }
         let unit = match metric.unit.sign() {
             "" => String::new(),
             sign => format!(" {sign}"),
         };
-        let text = warning.text;
-        Some(format!("`{id}` ({type_name}): `{}` is {}{unit} {at}. {text}", metric.name, rounded(*worst)))
+        let text = format!("`{id}` ({type_name}): `{}` is {}{unit} at frame {frame}", metric.name, rounded(**worst));
+        let frames = over.iter().map(|(frame, _)| **frame).collect();
+        Some(Note::new(metric.name, text).of_node(id).at(frames).hint(warning.text))
     };
     declared.iter().filter_map(note).collect()
 }
@@ -43,23 +47,36 @@ mod tests {
 
     const DEEP: Metric = Metric::new("deep", Unit::Metres, "Depth.").warn_above(0.5, "Raise it.");
     const FREE: Metric = Metric::new("free", Unit::None, "Unlimited.");
+    const RATIO: Metric = Metric::new("ratio", Unit::None, "Ratio.").warn_outside(0.9, 1.1, "Keep it.");
+    const FAR: Metric = Metric::new("far", Unit::None, "Distance.").warn_always_above(1.0, "Come near.");
+
+    fn shown(name: &'static str, values: &[f64]) -> Vec<String> {
+        let frames: BTreeMap<Frame, f64> =
+            values.iter().enumerate().map(|(frame, value)| (Frame::whole(frame as i64), *value)).collect();
+        let published = BTreeMap::from([(name, frames)]);
+        let notes = notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR], &published);
+        notes.iter().map(Note::to_string).collect()
+    }
 
     #[test]
     fn a_metric_beyond_its_limit_is_noted_once_with_its_worst_frame() {
-        let frames = |values: &[f64]| {
-            values
-                .iter()
-                .enumerate()
-                .map(|(frame, value)| (Frame::whole(frame as i64), *value))
-                .collect::<BTreeMap<_, _>>()
-        };
-        let with = |values: &[f64]| BTreeMap::from([("deep", frames(values)), ("free", frames(&[9.0]))]);
-        let note = |values: &[f64]| notes("fur", "Curve_Wind", &[&DEEP, &FREE], &with(values));
-        assert_eq!(note(&[0.0, 0.5]), Vec::<String>::new());
-        assert_eq!(note(&[0.0, 0.75]), ["`fur` (Curve_Wind): `deep` is 7.50e-1 m at frame 1. Raise it."]);
+        assert_eq!(shown("free", &[9.0]), Vec::<String>::new());
+        assert_eq!(shown("deep", &[0.0, 0.5]), Vec::<String>::new());
+        assert_eq!(shown("deep", &[0.0, 0.75]), ["`fur` (Curve_Wind): `deep` is 7.50e-1 m at frame 1. Raise it."]);
         assert_eq!(
-            note(&[1.0, 3.0, 2.0, 0.0]),
-            ["`fur` (Curve_Wind): `deep` is 3 m at frame 1, and too large at 3 of 4 frames. Raise it."]
+            shown("deep", &[1.0, 3.0, 2.0, 0.0]),
+            ["`fur` (Curve_Wind): `deep` is 3 m at frame 1 (frames 0-2). Raise it."]
         );
+    }
+
+    #[test]
+    fn a_metric_has_a_range_or_must_be_good_once() {
+        assert_eq!(shown("ratio", &[1.0, 0.95]), Vec::<String>::new());
+        assert_eq!(
+            shown("ratio", &[1.0, 1.25, 0.5]),
+            ["`fur` (Curve_Wind): `ratio` is 5.00e-1 at frame 2 (frames 1-2). Keep it."]
+        );
+        assert_eq!(shown("far", &[3.0, 0.5, 3.0]), Vec::<String>::new());
+        assert_eq!(shown("far", &[2.0, 3.0]), ["`fur` (Curve_Wind): `far` is 3 at frame 1 (frames 0-1). Come near."]);
     }
 }

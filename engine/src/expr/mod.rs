@@ -30,6 +30,7 @@ mod help;
 mod lexer;
 mod lower;
 mod parser;
+mod pi;
 mod program;
 mod random;
 pub mod suggest;
@@ -178,6 +179,7 @@ pub struct Expr {
     code: Code,
     result: Id,
     uses: Uses,
+    pi_is_term: bool,
 }
 
 impl Expr {
@@ -206,7 +208,7 @@ impl Expr {
         let mut uses = Uses::default();
         lowered.code.inputs().for_each(|input| uses.record(input));
         let result = lowered.result.unwrap_or_default();
-        Ok(Expr { code: lowered.code, result, uses })
+        Ok(Expr { code: lowered.code, result, uses, pi_is_term: pi::is_term(&ast) })
     }
 
     /// The value, which may be NaN or infinite.
@@ -234,6 +236,11 @@ impl Expr {
     /// Whether the value depends on `frame` or `time` directly; controls that it reads may also be animated.
     pub fn reads_time(&self) -> bool {
         self.uses.time
+    }
+
+    /// Whether `pi` is a term or factor of the value, which then is an angle in radians.
+    pub fn has_pi_as_term(&self) -> bool {
+        self.pi_is_term
     }
 
     /// The controls that the value depends on, as indices in [`Scope::controls`], ascending.

@@ -7,6 +7,8 @@ use std::fmt;
 
 use serde_json::{Value, json};
 
+use crate::note::Note;
+
 /// What is at fault; it determines the program's exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FaultClass {
@@ -14,6 +16,8 @@ pub enum FaultClass {
     File,
     /// The graph itself.
     Graph,
+    /// No fault, but probably not what was meant: becomes a [`Note`] of the graph.
+    Note,
 }
 
 /// One error.
@@ -50,6 +54,22 @@ impl Fault {
     pub(super) fn of_file(mut self) -> Self {
         self.class = FaultClass::File;
         self
+    }
+
+    /// Marks it as no fault, only probably not what was meant.
+    #[must_use]
+    pub(super) fn into_remark(mut self) -> Self {
+        self.class = FaultClass::Note;
+        self
+    }
+
+    /// It as a note of that kind, with its line and JSON path.
+    pub(super) fn into_note(self) -> Note {
+        let text = match &self.set {
+            Some(_) => format!("--set {}: {}", self.path, self.fact),
+            None => format!("line {}: {}: {}", self.line, self.path, self.fact),
+        };
+        Note { hint: self.hint, ..Note::new(self.code, text) }
     }
 
     /// The fault as a terminal shows it, `file` being the graph's name there:

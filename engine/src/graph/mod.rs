@@ -16,6 +16,7 @@ use std::sync::Arc;
 use crate::files::existing_files;
 use crate::geometry::{Geometry, Kind, Name};
 use crate::node::{Carries, Node, Output};
+use crate::note::Note;
 use crate::param::{Clock, ParamSpec, Source};
 use crate::time::Frame;
 
@@ -131,6 +132,8 @@ pub struct Graph {
     pub folder: PathBuf,
     /// Line and column of its parts in the graph file.
     pub positions: Positions,
+    /// What is probably not as it was meant, found without cooking.
+    pub notes: Vec<Note>,
 }
 
 impl Graph {

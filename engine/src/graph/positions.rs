@@ -96,6 +96,16 @@ impl FilePosition {
 }
 
 impl Graph {
+    /// Where a part stands in the graph's file, `file` being its name on a terminal: `graph.json:12:7`. As precise as is
+    /// known: a part that the file does not set has the position of the object that it would be in.
+    pub fn place(&self, file: &str, part: Part<'_>) -> String {
+        match self.positions.of(&part.path()) {
+            Some(FilePosition { line, column, set: Some(key) }) => format!("--set {key}:{line}:{column}"),
+            Some(FilePosition { line, column, set: None }) => format!("{file}:{line}:{column}"),
+            None => file.to_owned(),
+        }
+    }
+
     /// A fault of a part of this graph, found after the load: a file that a node cannot parse, an output that a format
     /// cannot hold. A part that the graph file does not set has the position of the object that it would be in.
     pub fn fault_at(&self, part: Part<'_>, code: &'static str, class: FaultClass, fact: impl Into<String>) -> Fault {

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Metric, Node, Output};
 use crate::error::{Error, ErrorKind, Result};
+use crate::expr::suggest::nearest;
 use crate::geometry::{Attr, ColumnType, Component, Geometry, Item, Name, Owner};
 use crate::memory::{Ceiling, size_text};
 use crate::param::{Clock, Maskable, Param, ParamType, Params};
@@ -74,8 +75,13 @@ impl Cx<'_> {
             None => format!("which the {kind} do not have"),
         };
         let expected = kind.rows_text(Owner::Point, ColumnType::F1);
+        let floats = part.table(Owner::Point).iter().filter(|(_, column)| column.kind() == ColumnType::F1);
+        let hint = match nearest(&attribute, floats.map(|(name, _)| &**name)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("expected {expected}"),
+        };
         let fact = format!("`{name}` is masked by `{attribute}`, {what}");
-        Err(Error::refused(fact).hint(format!("expected {expected}")).of(name).of_types())
+        Err(Error::refused(fact).hint(hint).of(name).of_types())
     }
 
     /// Whether anything downstream, or an output, reads that attribute of this node's result.

@@ -22,13 +22,35 @@ pub struct Metric {
     pub warning: Option<Warning>,
 }
 
-/// A value that should not be exceeded, and what to tell an artist when it is.
+/// Values that are worth a note, and what to tell an artist.
 #[derive(Clone, Copy, Debug)]
 pub struct Warning {
-    /// The greatest value that is not worth a note.
-    pub above: f64,
+    /// The values that are worth one.
+    pub when: Trouble,
     /// What it means and what to do about it; whole sentences.
     pub text: &'static str,
+}
+
+/// Values of a metric that are worth a note.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trouble {
+    /// Values above this.
+    Above(f64),
+    /// Values that are not between these two, both included.
+    Outside(f64, f64),
+    /// Values above this, if it is exceeded at all frames.
+    AlwaysAbove(f64),
+}
+
+impl Trouble {
+    /// How far `value` lies outside the values that are good; at most 0 if it is one of them. The values of one metric
+    /// are compared by it.
+    pub fn excess(self, value: f64) -> f64 {
+        match self {
+            Self::Above(limit) | Self::AlwaysAbove(limit) => value - limit,
+            Self::Outside(low, high) => f64::max(low - value, value - high),
+        }
+    }
 }
 
 impl Metric {
@@ -56,8 +78,24 @@ impl Metric {
 
     /// The cook's notes say `text` when the metric exceeds `above` at any frame.
     #[must_use]
-    pub const fn warn_above(mut self, above: f64, text: &'static str) -> Self {
-        self.warning = Some(Warning { above, text });
+    pub const fn warn_above(self, above: f64, text: &'static str) -> Self {
+        self.warn(Trouble::Above(above), text)
+    }
+
+    /// The cook's notes say `text` when the metric is not in `low..=high` at any frame.
+    #[must_use]
+    pub const fn warn_outside(self, low: f64, high: f64, text: &'static str) -> Self {
+        self.warn(Trouble::Outside(low, high), text)
+    }
+
+    /// The cook's notes say `text` when the metric exceeds `above` at every frame.
+    #[must_use]
+    pub const fn warn_always_above(self, above: f64, text: &'static str) -> Self {
+        self.warn(Trouble::AlwaysAbove(above), text)
+    }
+
+    const fn warn(mut self, when: Trouble, text: &'static str) -> Self {
+        self.warning = Some(Warning { when, text });
         self
     }
 }

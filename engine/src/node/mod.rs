@@ -19,7 +19,7 @@ pub use curves::{CurveLoop, CurveView, Cv, MovedCurves};
 pub use cx::{Cx, FrameCx, Outputs, StepCx};
 pub(crate) use cx::{History, InputData};
 pub use edit::Edited;
-pub use metric::{Metric, MetricValues, Warning};
+pub use metric::{Metric, MetricValues, Trouble, Warning};
 pub use neutral::{Fill, WhyNeutral};
 pub use ports::{Arity, Carries, Input, InputDecl, InputSpec, Many, Needs, One, Opt, Output, Times, Wired};
 

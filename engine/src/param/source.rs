@@ -77,6 +77,14 @@ impl Source {
         }
     }
 
+    /// The attribute that masks it, if one does.
+    pub fn mask(&self) -> Option<&Name> {
+        match self {
+            Self::Masked(_, attribute) | Self::Constant(Value::Masked(_, Some(attribute))) => Some(attribute),
+            _ => None,
+        }
+    }
+
     /// The value at `frame`, a frame number with fraction.
     pub fn at(&self, frame: f64, clock: Clock) -> Value {
         match self {

@@ -227,6 +227,11 @@ impl ParamSpec {
         }
     }
 
+    /// Whether its numbers are degrees.
+    pub fn is_in_degrees(&self) -> bool {
+        self.shape == Shape::Turn || self.facts.unit == Unit::Degrees
+    }
+
     /// The unit with a space before it, ` m/s`; empty for a plain number.
     pub fn unit_text(&self) -> String {
         match self.facts.unit {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use engine::cook::DiskCache;
+use engine::note::Note;
 use engine::param::{Source, Value};
 use engine::time::Frame;
 
@@ -133,7 +134,7 @@ fn a_cache_of_another_version_is_ignored_with_a_note_and_stays() {
     let before = entries();
     let cooked = cook(&graph, 1..=10, folder.path());
     assert_eq!(cooked.report.from_disk, 0);
-    let note = cooked.report.notes.join("");
+    let note: String = cooked.report.notes.iter().map(Note::to_string).collect();
     assert!(note.contains("was made by another version (`convect-0.0.1-cache-0`), which is not used"), "{note}");
     assert_eq!(entries(), before, "the other version may be in use");
     let again = cook(&graph, 1..=10, folder.path());

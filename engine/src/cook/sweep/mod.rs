@@ -27,11 +27,12 @@ use crate::geometry::Geometry;
 use crate::graph::Body;
 use crate::key::{ContentKey, Hasher};
 use crate::node::StateBox;
+use crate::note::{Note, kind};
 use crate::plan::{ChainSegment, Integrals, Keys, Plan, Read};
 use crate::time::Frame;
 use demand::Lookahead;
 pub(super) use executor::Executor;
-use notes::RequestedAttributes;
+use notes::Observed;
 
 /// A result, or the error that spoiled it.
 type Outcome = Result<Cooked, Arc<CookError>>;
@@ -90,7 +91,7 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     slices: u64,
     /// Keys of results that this cook has made or found.
     own: BTreeSet<ContentKey>,
-    requested: RequestedAttributes,
+    observed: Observed,
     /// Bytes of all results of the slice.
     live_bytes: usize,
     /// Most bytes that one frame of a slice took.
@@ -145,11 +146,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             nodes: (0..plan.graph.nodes.len()).map(|index| NodeRun::new(plan, index, cancel)).collect(),
             slices: 0,
             own: BTreeSet::new(),
-            requested: RequestedAttributes::of(plan),
+            observed: Observed::of(plan),
             live_bytes: 0,
             frame_bytes: 0,
             frame_time: None,
-            report: Report::default(),
+            report: Report { notes: plan.graph.notes.clone(), ..Report::default() },
         }
     }
 
@@ -181,8 +182,12 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
             self.keys.forget_before(slice[0].floor_number());
         }
-        self.report.notes.extend(self.disk.iter().flat_map(|disk| disk.notes()));
+        let disk = self.disk.iter().flat_map(|disk| disk.notes());
+        self.report.notes.extend(disk.map(|text| Note::new(kind::CACHE, text)));
+        self.note_frames_outside();
         self.note_missing_attributes();
+        self.note_empty_outputs();
+        self.note_zero_masks();
         self.note_warnings();
         let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };
         self.report.nodes = self.nodes.into_iter().enumerate().map(window).collect();
@@ -234,7 +239,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             self.finish_outputs(missing, &mut finished);
         }
         finished.sort_by_key(|delivered| (delivered.frame, delivered.output));
-        finished.iter().for_each(|delivered| self.requested.record(delivered));
+        finished.iter().for_each(|delivered| self.observed.record(delivered));
         self.end_slice();
         self.forget_windows_left_behind();
         finished

@@ -41,6 +41,7 @@ impl<'g> Sweep<'_, 'g, '_> {
                 report.wall += watch.wall();
                 report.cpu += watch.cpu();
                 self.note_misread(node);
+                self.record_masks(node);
             }
             self.keep(node);
             peak = peak.max(self.live_bytes);
@@ -140,7 +141,7 @@ impl<'g> Sweep<'_, 'g, '_> {
         run.bytes += returned.new_bytes;
         self.live_bytes += returned.new_bytes;
         self.publish(node, frame, &returned.metrics);
-        self.requested.unused.extend(returned.stripped);
+        self.observed.unused.extend(returned.stripped);
         Ok(returned.cooked)
     }
 

@@ -1,25 +1,36 @@
-//! Notes: attributes that a graph names but that are missing, or differ from what a node reads. They are not errors, but
-//! a wrong picture might otherwise go unnoticed.
+//! Notes of a cook: attributes that are missing, differ from what a node reads or mask everything; outputs without
+//! geometry; frames outside the scene. They are not errors, but a wrong picture might otherwise go unnoticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Sweep;
 use crate::cook::{Delivered, warnings};
 use crate::expr::suggest::nearest;
-use crate::geometry::{Name, P, V};
+use crate::geometry::{Name, Owner, P, V};
 use crate::graph::Body;
 use crate::node::Needs;
+use crate::note::{Note, kind};
 use crate::plan::Plan;
+use crate::time::Frame;
 
-/// Attributes that outputs ask for by name, and those that exist.
-pub(super) struct RequestedAttributes {
-    /// By output: names that no finished frame has had yet.
+/// Most frames that a note lists.
+const MOST_LISTED: usize = 10_000;
+
+/// What outputs and nodes have been found to have at the frames cooked so far.
+pub(super) struct Observed {
+    /// By output: names of requested attributes that no finished frame has had yet.
     missing: BTreeMap<usize, BTreeSet<Name>>,
     /// Names of attributes that were made and are used nowhere.
     pub(super) unused: BTreeSet<Name>,
+    /// By output: frames without geometry, as long as there is no other.
+    empty: BTreeMap<usize, Vec<Frame>>,
+    /// By node and param: frames at which its mask is 0 everywhere, as long as there is no other.
+    zero_masks: BTreeMap<(usize, usize), Vec<Frame>>,
+    /// Outputs and masks that are not always empty.
+    filled: (BTreeSet<usize>, BTreeSet<(usize, usize)>),
 }
 
-impl RequestedAttributes {
+impl Observed {
     pub(super) fn of(plan: &Plan<'_>) -> Self {
         let names = |index: &usize| {
             let output = &plan.graph.outputs[*index];
@@ -27,11 +38,20 @@ impl RequestedAttributes {
             let names = output.attributes.iter().flatten().filter(|name| !own(name)).cloned().collect();
             (*index, names)
         };
-        Self { missing: plan.request.outputs.iter().map(names).collect(), unused: BTreeSet::new() }
+        Self {
+            missing: plan.request.outputs.iter().map(names).collect(),
+            unused: BTreeSet::new(),
+            empty: BTreeMap::new(),
+            zero_masks: BTreeMap::new(),
+            filled: (BTreeSet::new(), BTreeSet::new()),
+        }
     }
 
-    /// Records which of the names asked for a finished frame has.
+    /// Records whether a finished frame has geometry, and which of the names asked for.
     pub(super) fn record(&mut self, delivered: &Delivered) {
+        let Delivered { output, frame, geometry } = delivered;
+        let is_empty = geometry.parts().all(|part| part.table(Owner::Point).rows() == 0) && geometry.volume().is_none();
+        observe(&mut self.empty, &mut self.filled.0, *output, *frame, is_empty);
         let Some(missing) = self.missing.get_mut(&delivered.output).filter(|missing| !missing.is_empty()) else {
             return;
         };
@@ -43,21 +63,102 @@ impl RequestedAttributes {
     }
 }
 
+/// Adds a frame at which something is empty; forgets all of them once it is not.
+fn observe<K: Copy + Ord>(
+    empty: &mut BTreeMap<K, Vec<Frame>>,
+    filled: &mut BTreeSet<K>,
+    of: K,
+    frame: Frame,
+    is_empty: bool,
+) {
+    if !is_empty {
+        empty.remove(&of);
+        filled.insert(of);
+    } else if !filled.contains(&of) {
+        empty.entry(of).or_default().push(frame);
+    }
+}
+
 impl Sweep<'_, '_, '_> {
+    /// Notes frames of the request that are not in the scene.
+    pub(super) fn note_frames_outside(&mut self) {
+        let scene = &self.plan.graph.scene;
+        let (first, last) = (Frame::whole(scene.first), Frame::whole(scene.last));
+        let request = &self.plan.request.frames;
+        if request.first().is_none_or(|frame| frame >= first) && request.last().is_none_or(|frame| frame <= last) {
+            return;
+        }
+        let outside = || request.iter().filter(|frame| !(first..=last).contains(frame));
+        let frames: Vec<Frame> = outside().take(MOST_LISTED).collect();
+        let Some(one) = frames.first() else { return };
+        let text = match outside().count() {
+            1 => format!("frame {one} is outside the scene, whose frames are {first}-{last}"),
+            count => format!("{count} frames are outside the scene, whose frames are {first}-{last}"),
+        };
+        let hint = "Keyframes hold their first and last value there, and solvers start at the scene's first frame. \
+                    Extend `scene.frames` if that is not meant.";
+        self.report.notes.push(Note::new(kind::OUTSIDE_SCENE, text).at(frames).hint(hint));
+    }
+
+    /// Notes outputs that had no geometry at any frame.
+    pub(super) fn note_empty_outputs(&mut self) {
+        for (output, frames) in std::mem::take(&mut self.observed.empty) {
+            let output = &self.plan.graph.outputs[output];
+            let from = &self.plan.graph.nodes[output.from.node];
+            let text = format!("output `{}` has no geometry at any frame", output.name);
+            let hint = format!("Look at what `{}` ({}) returns, and what it is given.", from.id, from.type_name());
+            self.report.notes.push(Note::new(kind::EMPTY_OUTPUT, text).of_node(&from.id).at(frames).hint(hint));
+        }
+    }
+
+    /// Records at which frames of the slice the masks of a node's params are 0 everywhere.
+    pub(super) fn record_masks(&mut self, node: usize) {
+        let graph = self.plan.graph;
+        let Body::Node { params, inputs, .. } = &graph.nodes[node].body else { return };
+        for (param, source) in params.iter().enumerate() {
+            let Some(mask) = source.mask() else { continue };
+            let known = (node, param);
+            for link in inputs.iter().flatten() {
+                for (frame, cooked) in &self.nodes[link.node].results {
+                    let Ok(cooked) = cooked else { continue };
+                    let masks = cooked[link.port].parts().filter_map(|part| part.table(Owner::Point).get::<f32>(mask));
+                    let masks: Vec<&[f32]> = masks.filter(|mask| !mask.is_empty()).collect();
+                    if masks.is_empty() {
+                        continue;
+                    }
+                    let is_zero = masks.iter().all(|mask| mask.iter().all(|factor| *factor == 0.0));
+                    let Observed { zero_masks, filled, .. } = &mut self.observed;
+                    observe(zero_masks, &mut filled.1, known, *frame, is_zero);
+                }
+            }
+        }
+    }
+
+    /// Notes masks that were 0 everywhere at all frames.
+    pub(super) fn note_zero_masks(&mut self) {
+        for ((node, param), frames) in std::mem::take(&mut self.observed.zero_masks) {
+            let node = &self.plan.graph.nodes[node];
+            let (Body::Node { params, specs, .. }, id) = (&node.body, &node.id) else { continue };
+            let (name, mask) = (specs[param].name, params[param].mask().map_or("", |mask| mask));
+            let text = format!("`{id}` ({}): the mask `{mask}` of `{name}` is 0 everywhere", node.type_name());
+            let hint = format!("`{name}` has no effect. Look at where the attribute `{mask}` is made.");
+            self.report.notes.push(Note::new(kind::ZERO_MASK, text).of_node(id).at(frames).hint(hint));
+        }
+    }
+
     /// Notes the names that an output asked for and that none of its frames had.
     pub(super) fn note_missing_attributes(&mut self) {
-        for (output, names) in &self.requested.missing {
+        for (output, names) in &self.observed.missing {
             // An output without a frame has reported an error.
             if !self.report.delivered.contains_key(output) {
                 continue;
             }
             for name in names {
                 let output = &self.plan.graph.outputs[*output].name;
-                let near = nearest(name, self.requested.unused.iter().map(|name| &**name));
+                let near = nearest(name, self.observed.unused.iter().map(|name| &**name));
                 let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-                self.report
-                    .notes
-                    .push(format!("output `{output}` requests the attribute `{name}`, which it has at no frame{hint}"));
+                let text = format!("output `{output}` requests the attribute `{name}`, which it has at no frame{hint}");
+                self.report.notes.push(Note::new(kind::MISSING_ATTRIBUTE, text));
             }
         }
     }
@@ -89,11 +190,12 @@ impl Sweep<'_, '_, '_> {
                         let as_read = part.table(owner).column(name).is_some_and(|column| column.kind() == rows);
                         let Some(found) = part.describe(name).filter(|_| !as_read) else { continue };
                         let (id, kind) = (&graph.nodes[node].id, part.kind());
-                        let note = format!(
+                        let text = format!(
                             "`{id}` ({}) does not read `{name}` of the {kind}, which is {found}; it reads {}",
                             declared.name,
                             kind.rows_text(owner, rows)
                         );
+                        let note = Note::new(kind::MISREAD_ATTRIBUTE, text).of_node(id);
                         if !self.report.notes.contains(&note) {
                             self.report.notes.push(note);
                         }

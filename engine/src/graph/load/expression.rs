@@ -8,6 +8,7 @@ use crate::expr::{Expr, ExprError, Program, Scope};
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
 use crate::graph::json::{Json, keep, shown};
+use crate::note::kind;
 use crate::param::{CodeSource, ParamSpec, Shape, Source, Value};
 
 /// The source for a param's expressions, constant if they do not depend on time. `None` after a fault, and for a shape
@@ -33,6 +34,13 @@ pub(super) fn read(
             let fault = text.fault(code::ILLEGAL_VALUE, format!("the value of the expression is {x}"));
             faults.push(fault.hint("expected a finite number"));
             valid = false;
+        }
+    }
+    if spec.is_in_degrees() {
+        for (text, _) in texts.iter().zip(&exprs).filter(|(_, expr)| expr.has_pi_as_term()) {
+            let fact = format!("the expression is a multiple of `pi`, but `{}` is in degrees", spec.name);
+            let hint = "Write 180 instead of `pi`, or degrees(…) around an angle in radians.";
+            faults.push(text.fault(kind::PI_IN_DEGREES, fact).hint(hint).into_remark());
         }
     }
     let source = Source::Exprs(Arc::new(exprs), spec.shape, controls.sources.clone());

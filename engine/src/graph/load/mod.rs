@@ -14,6 +14,7 @@ mod document;
 mod expression;
 mod keyframes;
 mod literal;
+mod notes;
 mod outputs;
 mod param;
 mod scene;
@@ -31,7 +32,7 @@ use self::document::{Document, NodeText};
 use self::param::Reader;
 use self::wires::Wire;
 use super::dag::{Dag, Order};
-use super::fault::{Fault, code};
+use super::fault::{Fault, FaultClass, code};
 use super::json::{Json, did_you_mean, shown};
 use super::positions::Positions;
 use super::syntax::parse;
@@ -66,8 +67,14 @@ impl Graph {
     ) -> Result<Self, Vec<Fault>> {
         let mut faults = Vec::new();
         let graph = load(text, folder, catalogue, set, files, &mut faults);
+        let (notes, mut faults): (Vec<Fault>, Vec<Fault>) =
+            faults.into_iter().partition(|fault| fault.class == FaultClass::Note);
         match graph {
-            Some(graph) if faults.is_empty() => Ok(graph),
+            Some(mut graph) if faults.is_empty() => {
+                graph.notes = notes.into_iter().map(Fault::into_note).collect();
+                graph.notes.extend(notes::of(&graph));
+                Ok(graph)
+            }
             _ => {
                 faults.sort_by(|a, b| a.order().cmp(&b.order()));
                 Err(faults)
@@ -145,7 +152,7 @@ fn load(
 
     let positions = positions(&drafts, document.outputs.as_ref());
     let (nodes, outputs) = assemble(drafts, &order, outputs)?;
-    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions })
+    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions, notes: Vec::new() })
 }
 
 /// What nodes of one type share.

@@ -128,6 +128,23 @@ impl SkinBinding {
         self.max_distance
     }
 
+    /// Number of roots whose distance from the skin is more than the length of their curve, which is
+    /// `points[starts[i]..starts[i + 1]]`. Curves without length are not counted.
+    ///
+    /// # Panics
+    /// If there are fewer curves than roots, or `starts` is out of range.
+    pub fn far_roots(&self, starts: &[u32], points: &[[f32; 3]]) -> usize {
+        let segment = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
+        let is_far = |(root, ends): &(&BoundRoot, &[u32])| {
+            let (distance, curve) = (root.offset.norm(), &points[ends[0] as usize..ends[1] as usize]);
+            // Most are clear after one segment.
+            let mut lengths = curve.windows(2).map(segment);
+            let first = lengths.next().unwrap_or(0.0);
+            distance > first && (1e-300..distance).contains(&(first + lengths.sum::<f64>()))
+        };
+        self.roots.iter().zip(starts.windows(2)).filter(is_far).count()
+    }
+
     /// The roots at rest, metres.
     pub fn roots(&self) -> impl ExactSizeIterator<Item = DVec3> {
         self.roots.iter().map(|root| root.position)

@@ -1,0 +1,59 @@
+//! What is probably not as it was meant in a graph without faults.
+
+use std::collections::BTreeMap;
+
+use crate::geometry::Name;
+use crate::graph::Graph;
+use crate::note::{Note, kind};
+
+/// Unused nodes with a note each; of the rest only the number is told.
+const NAMED: usize = 8;
+
+/// The notes of a graph, apart from those of its params.
+pub(super) fn of(graph: &Graph) -> Vec<Note> {
+    let mut notes = unused_nodes(graph);
+    notes.extend(similar_names(graph));
+    notes
+}
+
+/// Nodes that no output needs.
+fn unused_nodes(graph: &Graph) -> Vec<Note> {
+    let mut needed = vec![false; graph.nodes.len()];
+    graph.outputs.iter().for_each(|output| needed[output.from.node] = true);
+    // Every node comes after those that it reads.
+    for place in (0..graph.nodes.len()).rev() {
+        if needed[place] {
+            graph.nodes[place].inputs().iter().flatten().for_each(|link| needed[link.node] = true);
+        }
+    }
+    let unused = || graph.nodes.iter().zip(&needed).filter(|(_, needed)| !**needed).map(|(node, _)| node);
+    let hint = "Connect it, or remove it; it is not cooked.";
+    let note = |id: &Name, type_name: &str| {
+        let text = format!("no output needs `{id}` ({type_name})");
+        Note::new(kind::UNUSED_NODE, text).of_node(id).hint(hint)
+    };
+    let mut notes: Vec<Note> = unused().take(NAMED).map(|node| note(&node.id, node.type_name())).collect();
+    let more = unused().count() - notes.len();
+    if more > 0 {
+        notes.push(
+            Note::new(kind::UNUSED_NODE, format!("no output needs {more} more nodes")).hint("They are not cooked."),
+        );
+    }
+    notes
+}
+
+/// Outputs that would be one file where names ignore case.
+fn similar_names(graph: &Graph) -> Vec<Note> {
+    let mut by_name: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for output in &graph.outputs {
+        by_name.entry(output.name.to_lowercase()).or_default().push(&output.name);
+    }
+    let same = by_name.into_values().filter(|names| names.len() > 1);
+    let note = |names: Vec<&str>| {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        Note::new(kind::SIMILAR_NAMES, format!("the outputs {} differ only in case", names.join(" and "))).hint(
+            "Their files replace each other on file systems that ignore case, as on Windows and macOS; rename one.",
+        )
+    };
+    same.map(note).collect()
+}
