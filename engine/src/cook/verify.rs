@@ -11,7 +11,7 @@ use crate::error::{CookError, Error, ErrorKind};
 use crate::files::unreadable;
 use crate::geometry::Name;
 use crate::graph::fault::code;
-use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part, Positions};
+use crate::graph::{Body, Fault, FaultClass, Graph, GraphOutput, Link, Part};
 use crate::param::{ParamSpec, Params, Shape, Source};
 use crate::plan::{Request, Resolver};
 use crate::time::Frame;
@@ -96,7 +96,7 @@ impl Engine {
             nodes: sources.iter().map(|node| graph.nodes[*node].clone()).collect(),
             outputs: sources.iter().enumerate().map(output).collect(),
             folder: graph.folder.clone(),
-            positions: Positions::default(),
+            ..Graph::default()
         };
         let request = Request { outputs: (0..sources.len()).collect(), frames: vec![frame].into() };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };

@@ -99,10 +99,12 @@ impl Graph {
     /// Where a part stands in the graph's file, `file` being its name on a terminal: `graph.json:12:7`. As precise as is
     /// known: a part that the file does not set has the position of the object that it would be in.
     pub fn place(&self, file: &str, part: Part<'_>) -> String {
-        match self.positions.of(&part.path()) {
-            Some(FilePosition { line, column, set: Some(key) }) => format!("--set {key}:{line}:{column}"),
-            Some(FilePosition { line, column, set: None }) => format!("{file}:{line}:{column}"),
-            None => file.to_owned(),
+        let Some(FilePosition { line, column, set, .. }) = self.positions.of(&part.path()) else {
+            return file.to_owned();
+        };
+        match self.positions.sets.get(*set as usize) {
+            Some(key) => format!("--set {key}:{line}:{column}"),
+            None => format!("{file}:{line}:{column}"),
         }
     }
 
