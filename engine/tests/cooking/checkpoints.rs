@@ -207,7 +207,7 @@ mod hostile {
             for _ in 0..2 {
                 let cooked = cook(&graph, 1..=12, folder.path());
                 assert!(cooked.bits() == whole, "{name}");
-                let notes = cooked.report.notes.join("; ");
+                let notes: String = cooked.report.notes.iter().map(Note::to_string).collect();
                 let again = notes.is_empty() && *name == "sparse" && cooked.report.from_disk == 12;
                 assert!(again || notes.contains("could not be used; cooked again instead: `"), "{name}: {notes}");
             }
@@ -235,7 +235,7 @@ mod hostile {
                 }
             }
             let cooked = cook(&graph, 1..=4, &place);
-            let notes = cooked.report.notes.join("; ");
+            let notes: String = cooked.report.notes.iter().map(Note::to_string).collect();
             assert!(
                 notes.contains("could not be written") && notes.ends_with("continues without it"),
                 "{name}: {notes}"
