@@ -221,7 +221,9 @@ impl<'g> Pictures<'g> {
         let mut frames: BTreeMap<Frame, Shot> = BTreeMap::new();
         for one in finished {
             let lines = || guides::lines_of(&one.geometry).map(Arc::new);
-            let kept = if guides.contains(&one.output) { lines() } else { Some(one.geometry.clone()) };
+            let bare = || guides::without_controls(&one.geometry).filter(|_| self.staged.guides.has_controls());
+            let output = || bare().map_or_else(|| one.geometry.clone(), Arc::new);
+            let kept = if guides.contains(&one.output) { lines() } else { Some(output()) };
             if let Some(kept) = kept {
                 frames.entry(one.frame).or_default().insert(one.output, kept);
             }

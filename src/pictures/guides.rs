@@ -4,7 +4,7 @@
 //! further outputs of the graph, which costs nothing where the drawn outputs need them. Limit: what lies above a node
 //! that moves geometry ([`MOVERS`]) is not where it would be drawn, and is left out.
 
-use engine::geometry::{Column, Component, Geometry, Owner};
+use engine::geometry::{Column, Component, Geometry, Kind, Owner};
 use engine::graph::{Body, Graph, GraphNode, GraphOutput, Link};
 use engine::param::Value;
 use engine::time::Frame;
@@ -78,6 +78,11 @@ impl Guides {
     /// Positions of the outputs that were added to the graph.
     pub(super) fn outputs(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.cooked.len()
+    }
+
+    /// Whether controls are among the guides.
+    pub(super) fn has_controls(&self) -> bool {
+        self.cooked.contains(&CONTROLS)
     }
 
     /// The name of an added output.
@@ -160,6 +165,17 @@ pub(super) fn is_control(geometry: &Geometry) -> bool {
     geometry.parts().count() == 1
         && geometry.volume().is_none()
         && geometry.points().is_some_and(|part| runs(part).is_some())
+}
+
+/// An output without the controls that were merged into it, which are drawn as lines; `None` if there are none.
+pub(super) fn without_controls(geometry: &Geometry) -> Option<Geometry> {
+    let runs = runs(geometry.points()?)?;
+    let rest = geometry.kinds().any(|kind| kind != Kind::Points);
+    (rest && runs.iter().all(|run| *run > 0)).then(|| {
+        let mut geometry = geometry.clone();
+        geometry.remove(Kind::Points);
+        geometry
+    })
 }
 
 /// Points of the control that each point belongs to.

@@ -57,3 +57,17 @@ fn a_mesh_is_its_edges_and_is_visible_where_an_output_has_its_points() {
     assert!(!is_visible(&lines, &[Layer::guide("points", &points)]));
     assert!(!is_control(&points) && lines_of(&points).is_none());
 }
+
+#[test]
+fn controls_merged_into_an_output_are_left_to_their_lines() {
+    let mut control = Component::points(vec![[0.0; 3]; 7]);
+    control.set_column(Owner::Point, RUN, Column::new(vec![7_i32; 7])).unwrap();
+    let alone = Geometry::from(control.clone());
+    assert!(is_control(&alone) && without_controls(&alone).is_none());
+    let curves = Component::curves(vec![2], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap();
+    let both = Geometry::from(curves.clone()).with(control);
+    let bare = without_controls(&both).unwrap();
+    assert!(bare.points().is_none() && bare.curves().is_some());
+    let points = Geometry::from(curves).with(Component::points(vec![[0.0; 3]]));
+    assert!(without_controls(&points).is_none());
+}
