@@ -131,17 +131,20 @@ impl Engine {
 /// Results and errors by output.
 type FirstFrame = (Vec<(usize, Arc<Geometry>)>, Vec<(usize, Arc<crate::error::CookError>)>);
 
-/// Whether a node has a mask, or declares that its params name attributes.
+/// Whether a node has a mask, code, or a text while its params may name attributes.
 fn names_attributes(node: &GraphNode) -> bool {
     let Body::Node { node: declared, params, .. } = &node.body else { return false };
-    let masked = |value: &Value| matches!(value, Value::Masked(_, Some(_)));
-    declared.attributes.is_some()
-        || params.iter().any(|source| match source {
-            Source::Masked(..) => true,
-            Source::Constant(value) => masked(value),
-            Source::Keys(keys, _) => keys.keys.iter().any(|(_, value)| masked(value)),
-            _ => false,
-        })
+    let names = |value: &Value| match value {
+        Value::Masked(_, attribute) => attribute.is_some(),
+        Value::Text(text) => declared.attributes.is_some() && !text.is_empty(),
+        _ => false,
+    };
+    params.iter().any(|source| match source {
+        Source::Masked(..) | Source::Code(_) => true,
+        Source::Constant(value) => names(value),
+        Source::Keys(keys, _) => keys.keys.iter().any(|(_, value)| names(value)),
+        _ => false,
+    })
 }
 
 /// The wires of a node in the new graph; `None` where what comes in is not known, and for sources.

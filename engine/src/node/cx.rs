@@ -94,7 +94,7 @@ impl Cx<'_> {
         self.live.is_none_or(|live| live.iter().any(|name| **name == *attribute))
     }
 
-    /// Publishes a metric at this frame.
+    /// Publishes a metric at this frame. A value that is not finite is left out of the report, with a note.
     ///
     /// # Panics
     /// Where the node does not declare it.

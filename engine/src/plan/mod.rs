@@ -57,6 +57,8 @@ impl Request {
 pub(crate) struct PlannedNode<'g> {
     /// Whether the request depends on it.
     pub(crate) needed: bool,
+    /// Whether it is requested itself.
+    pub(crate) requested: bool,
     /// Whether its result may change with the frame.
     pub(crate) varies: bool,
     /// Whether it is a solver or depends on one: cooked at whole frames only, in order.
@@ -101,6 +103,7 @@ impl<'g> Plan<'g> {
             };
             nodes.push(planned);
         }
+        request.outputs.iter().for_each(|output| nodes[graph.outputs[*output].from.node].requested = true);
         for index in (0..nodes.len()).rev() {
             let chain = |reader: usize| {
                 nodes[reader].feeds_chain || graph.nodes[reader].node().is_some_and(|node| node.cook.is_chain())
@@ -181,6 +184,7 @@ impl<'g> PlannedNode<'g> {
     fn not_needed(node: &'g GraphNode, graph: &Graph, files: &Arc<Files>) -> Self {
         Self {
             needed: false,
+            requested: false,
             varies: false,
             has_solver: false,
             may_hold: false,
@@ -232,6 +236,7 @@ fn plan_node<'g>(
         may_hold,
         resolver,
         needed: true,
+        requested: false,
         read_at_start: false,
         live: None,
         feeds_chain: false,

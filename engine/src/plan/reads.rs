@@ -179,8 +179,8 @@ impl<'g> Plan<'g> {
     /// frames, the scene's first where a reader looks back to it.
     pub(crate) fn reread_frame(&self, node: usize) -> Option<Frame> {
         let planned = &self.nodes[node];
-        let requested = || self.request.outputs.iter().any(|output| self.graph.outputs[*output].from.node == node);
-        let constant = !planned.varies && (requested() || self.readers(node).any(|reader| self.nodes[reader].varies));
+        let constant =
+            !planned.varies && (planned.requested || self.readers(node).any(|reader| self.nodes[reader].varies));
         (constant || planned.read_at_start).then(|| self.graph.scene.start())
     }
 

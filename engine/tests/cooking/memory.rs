@@ -3,7 +3,7 @@
 use engine::geometry::{Geometry, Owner};
 
 use crate::builder::{Cooked, TestGraph, engine};
-use crate::nodes::{ADD, BOUNCE, CLOCK, DUSTY, FOLLOW, SOURCE, SUM};
+use crate::nodes::{ADD, BOUNCE, CLOCK, DUSTY, FOLLOW, SOURCE, SUM, UNSURE_NODE};
 
 fn dusty(attributes: Option<Vec<engine::geometry::Name>>) -> Cooked {
     let mut graph = TestGraph::new(1, 2);
@@ -61,6 +61,18 @@ fn metrics_are_reported_also_for_cached_results() {
         assert_eq!(cooked.node("clock").metrics["height"].values().copied().collect::<Vec<_>>(), [1.0]);
         assert_eq!(cooked.node("moving").metrics["height"].len(), 20);
     }
+}
+
+#[test]
+fn a_metric_that_is_no_number_is_left_out_with_a_note() {
+    let mut graph = TestGraph::new(1, 3);
+    let a = graph.add("a", &SOURCE).done();
+    graph.add("unsure", &UNSURE_NODE).wire("points", a).out();
+    let cooked = graph.cook(1..=3);
+    let metrics = &cooked.node("unsure").metrics["unsure"];
+    assert_eq!(metrics.iter().map(|(frame, value)| (frame.number(), *value)).collect::<Vec<_>>(), [(1.0, 0.5)]);
+    let notes: Vec<String> = cooked.report.notes.iter().map(ToString::to_string).collect();
+    assert_eq!(notes, ["`unsure` (Unsure) has no `unsure` at frame 2, where it is infinite"]);
 }
 
 /// A graph with all kinds of nodes and a few thousand points.

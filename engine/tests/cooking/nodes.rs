@@ -315,6 +315,27 @@ pub(crate) static DUSTY: Node = Node::new(
 .metrics(&[&WANTED])
 .writes(&[&DUST]);
 
+const UNSURE: Metric = Metric::new("unsure", Unit::None, "Infinite at frame 2, undefined at frame 3.");
+inputs! { UNSURE_INPUTS: UNSURE_POINTS: Input = POINTS; }
+
+/// Publishes what no file can hold.
+pub(crate) static UNSURE_NODE: Node = Node::new(
+    "Unsure",
+    1,
+    "Publishes what no file can hold.",
+    Cook::Frame {
+        cook: |cx| {
+            let value = [0.5, f64::INFINITY, f64::NAN][cx.frame().floor_number().clamp(1, 3) as usize - 1];
+            cx.publish(UNSURE, value);
+            Ok(OUT.with(cx.input(UNSURE_POINTS).clone()))
+        },
+        reads_clock: |_| true,
+    },
+)
+.inputs(UNSURE_INPUTS)
+.outputs(&[&OUT])
+.metrics(&[&UNSURE]);
+
 // ——— window ———
 
 params! { FOLLOW_PARAMS:

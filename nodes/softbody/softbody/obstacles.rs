@@ -15,13 +15,16 @@ pub(super) fn obstacles(
     thickness: f64,
     friction: f64,
 ) -> Result<Vec<Obstacle>> {
+    // A mirror turns the faces round, but they keep their corners: which way they face does not matter here.
+    let same = |a: &Component, b: &Component| {
+        a.topology().same(b.topology()) || a.topology() == b.topology() || turned_round(a, b)
+    };
     let Some(((first, wires), (last, _))) = samples.first().zip(samples.last()) else { return Ok(Vec::new()) };
     let mut obstacles = Vec::with_capacity(wires.len());
     for wire in 0..wires.len() {
         let at =
             |sample: &(Frame, Vec<Arc<Geometry>>)| sample.1.get(wire).and_then(|geometry| geometry.mesh()).cloned();
         let meshes: Vec<Component> = samples.iter().filter_map(at).collect();
-        let same = |a: &Component, b: &Component| a.topology().same(b.topology()) || a.topology() == b.topology();
         if let Some(other) = meshes.iter().find(|mesh| !same(mesh, &meshes[0])) {
             let count = |mesh: &Component| format!("{} faces of {} points", mesh.element_count(), mesh.point_count());
             let fact = format!("`colliders` {wire} changes from {} to {}", count(&meshes[0]), count(other));
@@ -41,4 +44,38 @@ pub(super) fn obstacles(
         obstacles.push(obstacle.map_err(|error| Error::refused(format!("`colliders` {wire}: {error}")))?);
     }
     Ok(obstacles)
+}
+
+/// Whether the faces of `b` are those of `a` with the opposite winding from the same first corners.
+fn turned_round(a: &Component, b: &Component) -> bool {
+    let (Some(a_faces), Some(b_faces)) = (a.faces(), b.faces()) else { return false };
+    let turned = |(a, b): (&[u32], &[u32])| match (a, b) {
+        ([first, a @ ..], [same, b @ ..]) => first == same && a.iter().eq(b.iter().rev()),
+        _ => a == b,
+    };
+    a.point_count() == b.point_count() && a_faces.runs == b_faces.runs && a_faces.iter().zip(b_faces.iter()).all(turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sheet(faces: &[u32]) -> Geometry {
+        let points = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+        Component::mesh(vec![faces.len() as u32], faces.to_vec(), points).unwrap().into()
+    }
+
+    #[test]
+    fn a_collider_may_be_mirrored_but_not_joined_otherwise() {
+        let step = |before: &[u32], after: &[u32]| {
+            let wires = [sheet(before), sheet(after)].map(|sheet| vec![Arc::new(sheet)]);
+            let [before, after] = wires;
+            obstacles(&[(Frame::whole(1), before), (Frame::whole(2), after)], 0.1, 0.01, 0.5)
+        };
+        assert!(step(&[0, 1, 2, 3], &[0, 3, 2, 1]).is_ok(), "turned round");
+        for other in [&[0, 2, 1, 3][..], &[3, 2, 1, 0], &[0, 1, 2]] {
+            let error = step(&[0, 1, 2, 3], other).err().map(|error| error.fact);
+            assert!(error.is_some_and(|fact| fact.starts_with("`colliders` 0 changes from 1 faces of 4")), "{other:?}");
+        }
+    }
 }

@@ -236,3 +236,16 @@ fn every_simd_path_finds_the_same_bits() {
         assert_eq!(tree.closest_each_on(path, &from, 0.3), narrow, "{}", path.name());
     }
 }
+
+#[test]
+fn a_region_without_end_meets_every_triangle_and_nothing_else() {
+    for count in [1, 17, 257, 5_000] {
+        let (points, triangles) = soup(4, count, 0.1);
+        let tree = TriangleTree::build(&points, &triangles);
+        let region = Cuboid { low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] };
+        let found: u32 = tree.walk(region).map(|(_, lanes)| lanes.count_ones()).sum();
+        assert_eq!(found, count);
+        let nowhere = Cuboid { low: [f32::NAN; 3], high: [f32::NAN; 3] };
+        assert_eq!(tree.walk(nowhere).count(), 0);
+    }
+}

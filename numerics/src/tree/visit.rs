@@ -93,13 +93,16 @@ impl<R: Region> Iterator for Walk<'_, R> {
             }
             let child = self.open[self.level] * LANES + lanes.trailing_zeros() as usize;
             self.lanes[self.level] = lanes & (lanes - 1);
+            // A region without end meets the empty boxes of unused lanes too, and these have no children.
             if self.level > 0 {
-                self.level -= 1;
-                self.open[self.level] = child;
-                self.lanes[self.level] = self.region.meeting(&self.tree.levels[self.level][child]);
+                if let Some(boxes) = self.tree.levels[self.level - 1].get(child) {
+                    self.level -= 1;
+                    self.open[self.level] = child;
+                    self.lanes[self.level] = self.region.meeting(boxes);
+                }
                 continue;
             }
-            let block = &self.tree.blocks[child];
+            let Some(block) = self.tree.blocks.get(child) else { continue };
             let lanes = self.region.meeting(&block.boxes()) & block.filled();
             if lanes != 0 {
                 return Some((child, lanes));

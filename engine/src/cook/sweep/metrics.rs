@@ -3,12 +3,23 @@
 use super::Sweep;
 use crate::cook::disk::KeptMetric;
 use crate::key::ContentKey;
+use crate::note::Note;
 use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
-    /// Adds what a node published at a frame to the report.
+    /// Adds what a node published at a frame to the report. What is not a number that a file can hold is left out, and a
+    /// note says so once.
     pub(super) fn publish(&mut self, node: usize, frame: Frame, metrics: &[(&'static str, f64)]) {
         for (name, value) in metrics {
+            if !value.is_finite() {
+                if self.nodes[node].left_out_metrics.insert(name) {
+                    let (id, type_name) = (&self.plan.graph.nodes[node].id, self.nodes[node].report.type_name);
+                    let what = if value.is_nan() { "undefined" } else { "infinite" };
+                    let note = format!("`{id}` ({type_name}) has no `{name}` at frame {frame}, where it is {what}");
+                    self.report.notes.push(Note::new(name, note).of_node(id).at(vec![frame]));
+                }
+                continue;
+            }
             self.nodes[node].report.metrics.entry(name).or_default().insert(frame, *value);
         }
     }

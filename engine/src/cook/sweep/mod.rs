@@ -75,6 +75,8 @@ struct NodeRun<'p> {
     call_time: Duration,
     /// Key of the result that is kept because later frames may have the same.
     held: Option<ContentKey>,
+    /// Metrics that were not finite at some frame.
+    left_out_metrics: BTreeSet<&'static str>,
     report: NodeReport,
 }
 
@@ -113,6 +115,7 @@ impl<'p> NodeRun<'p> {
             integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
             call_time: Duration::MAX,
             held: None,
+            left_out_metrics: BTreeSet::new(),
             report: NodeReport {
                 id: Some(node.id.clone()),
                 type_name: node.type_name(),
