@@ -46,8 +46,9 @@ const MOST_CHAIN_FRAMES: i64 = 16;
 /// Most frames of a slice.
 const MOST_FRAMES: usize = 16;
 
-/// How long a slice should take at most: what a killed cook loses, as its frames are finished together.
-const SLICE_TIME: Duration = Duration::from_millis(500);
+/// How long a slice should take at most where there is a disk cache: what a killed cook loses, as the frames of a slice
+/// are finished together. Without one nothing would be gained, and frames that share half a frame cook it twice.
+const SLICE_TIME: Duration = Duration::from_millis(250);
 
 /// Bytes of results a slice should hold: a few times a core's cache, so that a node finds its input there.
 const SLICE_BYTES: usize = 16 << 20;
@@ -215,8 +216,12 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let threads = rayon::current_num_threads();
         let bytes = self.frame_bytes.max(1);
         let most = (self.engine.memory / 2 / bytes).clamp(1, MOST_FRAMES);
-        let in_time = self.frame_time.map_or(0, |time| SLICE_TIME.as_nanos() / time.as_nanos().max(1));
-        (SLICE_BYTES / bytes).min(in_time as usize).clamp(threads.min(most), most)
+        let in_time = match (&self.disk, self.frame_time) {
+            (None, _) => usize::MAX,
+            (Some(_), None) => 0,
+            (Some(_), Some(time)) => (SLICE_TIME.as_nanos() / time.as_nanos().max(1)) as usize,
+        };
+        (SLICE_BYTES / bytes).min(in_time).clamp(threads.min(most), most)
     }
 
     /// Cooks some frames of all outputs of the request.
