@@ -267,6 +267,31 @@ mod hostile {
 }
 
 #[test]
+fn a_change_cooks_only_what_comes_after_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cook = |graph: &TestGraph, frames: std::ops::RangeInclusive<i64>| {
+        let mut disk = DiskCache::open(folder.path(), u64::MAX).keeping_all();
+        let frames: Vec<Frame> = frames.map(Frame::whole).collect();
+        graph.cook_with(&engine(2, 1 << 30), &frames, Some(&mut disk))
+    };
+    let graph = solver();
+    cook(&graph, 1..=20);
+    let other = graph.clone().with("add", "amount", Source::Constant(Value::Float(3.0)));
+    let changed = cook(&other, 1..=20);
+    let fresh = other.cook(1..=20);
+    assert!(changed.bits() == fresh.bits() && changed.bits() != graph.cook(1..=20).bits());
+    assert_eq!((changed.cooks("clock"), changed.cooks("floor"), changed.cooks("bounce")), (0, 0, 0));
+    assert_eq!((changed.cooks("add"), changed.node("bounce").from_cache), (20, 20));
+    for id in ["a", "clock", "floor", "bounce", "add"] {
+        for (name, values) in &fresh.node(id).metrics {
+            // Half a step further on, inputs are read beyond the frames asked.
+            let asked = values.iter().filter(|(frame, _)| **frame <= Frame::whole(20));
+            assert!(asked.eq(&changed.node(id).metrics[name]), "{id}: {name}");
+        }
+    }
+}
+
+#[test]
 fn a_limited_cache_stays_below_its_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let graph = solver();

@@ -1,6 +1,9 @@
 //! A finished frame as bytes, and back.
 
+use std::sync::Arc;
+
 use super::KeptMetric;
+use crate::cook::store::Cooked;
 use crate::geometry::{Geometry, Reader};
 use crate::key::ContentKey;
 
@@ -15,6 +18,28 @@ pub(super) fn encode(geometry: &Geometry, metrics: &[KeptMetric]) -> Vec<u8> {
     }
     out.extend(geometry.to_bytes());
     out
+}
+
+/// A result of a node, one geometry per output, and metrics.
+pub(super) fn encode_result(cooked: &[Arc<Geometry>], metrics: &[KeptMetric]) -> Vec<u8> {
+    let mut out = encode(&Geometry::default(), metrics);
+    for geometry in cooked {
+        let bytes = geometry.to_bytes();
+        out.extend((bytes.len() as u64).to_le_bytes());
+        out.extend(bytes);
+    }
+    out
+}
+
+/// What [`encode_result`] has written; `None` where it is anything else.
+pub(super) fn decode_result(bytes: &[u8]) -> Option<(Cooked, Vec<KeptMetric>)> {
+    let mut reader = Reader(bytes);
+    let metrics = metrics(&mut reader)?;
+    let mut cooked = Vec::new();
+    while !reader.0.is_empty() {
+        cooked.push(Arc::new(Geometry::from_bytes(reader.piece()?)?));
+    }
+    Some((cooked.into(), metrics))
 }
 
 /// What [`encode`] has written; `None` where it is anything else.

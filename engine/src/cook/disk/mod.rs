@@ -12,13 +12,21 @@ mod folder;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use self::folder::{CHECKPOINT, FRAME, Folder, remove_if_there};
+use self::folder::{CHECKPOINT, FRAME, Folder, RESULT, remove_if_there};
+use super::store::Cooked;
 use crate::geometry::Geometry;
 use crate::key::ContentKey;
 
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
+
+/// Nanoseconds of cooking that make a byte of a result worth keeping: several times what writing and reading it takes.
+const COST_PER_BYTE: u32 = 10;
+
+/// What a result must take at least to be kept: an entry is a file.
+const LEAST_COST: Duration = Duration::from_millis(2);
 
 /// A folder with checkpoints, finished frames and results.
 pub struct DiskCache {
@@ -33,6 +41,8 @@ pub struct DiskCache {
     is_there: bool,
     /// Whether it could not be written: nothing more is kept then, but what is there is still taken.
     is_broken: bool,
+    /// Whether results are kept whatever they cost.
+    keeps_all: bool,
     notes: Vec<String>,
     /// The first entry that was there and could not be used, and how many there were.
     unusable: Option<(String, u64)>,
@@ -52,6 +62,7 @@ impl DiskCache {
             recent: BTreeMap::new(),
             is_there: false,
             is_broken: false,
+            keeps_all: false,
             notes: Vec::new(),
             unusable: None,
         };
@@ -69,6 +80,13 @@ impl DiskCache {
         });
         opened.is_there = opened.folder.is_there();
         opened
+    }
+
+    /// Keeps the results of all nodes, whatever they cost, so that tests need no expensive ones.
+    #[must_use]
+    pub fn keeping_all(mut self) -> Self {
+        self.keeps_all = true;
+        self
     }
 
     /// What is worth telling: about the cache that was found, and whether it could be read and written.
@@ -175,6 +193,21 @@ impl DiskCache {
             old.extend(recent.drain(..recent.len().saturating_sub(2)).filter(|(frame, _)| frame % EVERY != 0));
         }
         self.keep(|_| old.iter().try_for_each(|(_, path)| remove_if_there(path)));
+    }
+
+    /// Whether a result of `bytes` that takes `cost` to make is worth its place.
+    pub(crate) fn is_worth(&self, cost: Duration, bytes: usize) -> bool {
+        self.keeps_all || cost > Duration::from_nanos(bytes as u64) * COST_PER_BYTE + LEAST_COST
+    }
+
+    /// A result of a node, and the metrics that were kept with it.
+    pub(crate) fn result(&mut self, key: ContentKey) -> Option<(Cooked, Vec<KeptMetric>)> {
+        bytes::decode_result(&self.read(RESULT, key)?)
+    }
+
+    /// Keeps a result of a node, and the metrics of what went into it.
+    pub(crate) fn save_result(&mut self, key: ContentKey, cooked: &Cooked, metrics: &[KeptMetric]) {
+        self.keep(|cache| cache.write(RESULT, key, &bytes::encode_result(cooked, metrics)));
     }
 
     /// A finished frame of an output, and the metrics that were kept with it.

@@ -57,12 +57,17 @@ impl Sweep<'_, '_, '_> {
     /// Publishes what was kept with a finished frame.
     pub(super) fn publish_kept(&mut self, output: usize, frame: Frame, kept: &[KeptMetric]) {
         for (node, at, key) in self.measured(output, frame) {
-            let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
-            let of_key = kept.iter().filter(|(of, _, _)| *of == key);
-            let metrics: Vec<(&'static str, f64)> = of_key
-                .filter_map(|(_, name, value)| Some((declared.iter().find(|metric| metric.name == name)?.name, *value)))
-                .collect();
-            self.publish(node, at, &metrics);
+            self.publish_of_key(node, at, key, kept);
         }
+    }
+
+    /// Publishes those of the kept metrics that belong to one result.
+    pub(super) fn publish_of_key(&mut self, node: usize, at: Frame, key: ContentKey, kept: &[KeptMetric]) {
+        let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
+        let of_key = kept.iter().filter(|(of, _, _)| *of == key);
+        let metrics: Vec<(&'static str, f64)> = of_key
+            .filter_map(|(_, name, value)| Some((declared.iter().find(|metric| metric.name == name)?.name, *value)))
+            .collect();
+        self.publish(node, at, &metrics);
     }
 }

@@ -9,6 +9,7 @@ mod executor;
 mod metrics;
 mod nodes;
 mod notes;
+mod results;
 mod retention;
 mod warm_up;
 
@@ -74,6 +75,8 @@ struct NodeRun<'p> {
     integrals: Option<Integrals<'p>>,
     /// Mean wall time of a call in the last slice.
     call_time: Duration,
+    /// What it takes to make a result again from what the disk cache holds.
+    recreated_in: Duration,
     /// Key of the result that is kept because later frames may have the same.
     held: Option<ContentKey>,
     /// Metrics that were not finite at some frame.
@@ -115,6 +118,7 @@ impl<'p> NodeRun<'p> {
             recent: BTreeMap::new(),
             integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
             call_time: Duration::MAX,
+            recreated_in: Duration::ZERO,
             held: None,
             left_out_metrics: BTreeSet::new(),
             report: NodeReport {

@@ -36,7 +36,9 @@ impl<'g> Sweep<'_, 'g, '_> {
             }
             if !demand.is_empty() {
                 let watch = Stopwatch::start();
+                let frames = demand.frames.clone();
                 self.cook_node(node, demand);
+                self.save_results(node, &frames, watch.wall());
                 let report = &mut self.nodes[node].report;
                 report.wall += watch.wall();
                 report.cpu += watch.cpu();

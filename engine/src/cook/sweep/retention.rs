@@ -63,7 +63,10 @@ impl Sweep<'_, '_, '_> {
         let outcome = match self.keys.resolve(node, frame) {
             Err(error) => Err(error),
             Ok(resolved) => match self.engine.store(|store| store.get(resolved.key)) {
-                None => return true,
+                None => match self.result_on_disk(node, frame, resolved.key) {
+                    None => return true,
+                    Some(cooked) => Ok(cooked),
+                },
                 Some((cooked, metrics)) => {
                     self.record_found(node, resolved.key);
                     self.publish(node, frame, &metrics);

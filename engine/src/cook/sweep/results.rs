@@ -1,0 +1,82 @@
+//! Results of nodes on disk: those that take long to make for their size, so that a changed graph cooks only what comes
+//! after the change, and windows that start anew find their past.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use super::Sweep;
+use crate::cook::disk::KeptMetric;
+use crate::cook::store::Cooked;
+use crate::key::ContentKey;
+use crate::time::Frame;
+
+impl Sweep<'_, '_, '_> {
+    /// A result that an earlier cook has kept.
+    pub(super) fn result_on_disk(&mut self, node: usize, frame: Frame, key: ContentKey) -> Option<Cooked> {
+        let (cooked, metrics) = self.disk.as_mut()?.result(key)?;
+        let outputs = self.plan.graph.nodes[node].node().map_or(1, |declared| declared.outputs.len());
+        if cooked.len() != outputs {
+            return None;
+        }
+        self.nodes[node].report.from_cache += 1;
+        let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum::<usize>();
+        self.nodes[node].bytes += bytes;
+        self.live_bytes += bytes;
+        self.publish_results(node, frame, &metrics);
+        Some(cooked)
+    }
+
+    /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it.
+    pub(super) fn save_results(&mut self, node: usize, frames: &BTreeSet<Frame>, wall: Duration) {
+        if self.disk.is_none() || frames.is_empty() || self.cancelled() {
+            return;
+        }
+        let upstream: Duration = self.plan.dag.sources(node).map(|source| self.nodes[source].recreated_in).sum();
+        let cost = wall / frames.len() as u32 + upstream;
+        self.nodes[node].recreated_in = cost;
+        for frame in frames {
+            let Some(Ok(cooked)) = self.nodes[node].results.get(frame).cloned() else { continue };
+            let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
+            if !self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes)) {
+                continue;
+            }
+            let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
+            let metrics = self.metrics_of_result(node, *frame);
+            if let Some(disk) = self.disk.as_mut() {
+                disk.save_result(resolved.key, &cooked, &metrics);
+            }
+            self.nodes[node].recreated_in = Duration::ZERO;
+        }
+    }
+
+    /// What a node and those it depends on published at a frame.
+    fn metrics_of_result(&mut self, node: usize, frame: Frame) -> Vec<KeptMetric> {
+        let mut metrics = Vec::new();
+        for (of, at, key) in self.results_behind(node, frame) {
+            metrics.extend(self.published(of, at).into_iter().map(|(name, value)| (key, name.to_owned(), value)));
+        }
+        metrics
+    }
+
+    /// Publishes what was kept with a result.
+    fn publish_results(&mut self, node: usize, frame: Frame, kept: &[KeptMetric]) {
+        if kept.is_empty() {
+            return;
+        }
+        for (of, at, key) in self.results_behind(node, frame) {
+            self.publish_of_key(of, at, key, kept);
+        }
+    }
+
+    /// Results at a frame of a node and of those it depends on that have metrics: node, frame, key.
+    fn results_behind(&mut self, node: usize, frame: Frame) -> Vec<(usize, Frame, ContentKey)> {
+        let plan = self.plan;
+        let measured = |of: &usize| plan.graph.nodes[*of].node().is_some_and(|node| !node.metrics.is_empty());
+        let mut found = Vec::new();
+        for of in plan.ancestors(node).into_iter().filter(measured) {
+            let at = plan.canonical(of, frame);
+            found.extend(self.keys.resolve(of, at).ok().map(|resolved| (of, at, resolved.key)));
+        }
+        found
+    }
+}
