@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Frames, Setting};
 use crate::failure::{Failure, exit_of_error};
-use crate::report::NOT_NEEDED;
+use crate::report::why_not_needed;
 use crate::{load, memory};
 
 /// The arguments of `explain`.
@@ -74,7 +74,7 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
     let id = node.id.as_deref().unwrap_or_default();
     let _ = write!(text, "{id:<16} {:<22} {:<7}", node.type_name, node.time);
     if !node.needed {
-        let _ = writeln!(text, "left out: {NOT_NEEDED}");
+        let _ = writeln!(text, "left out: {}", why_not_needed(node));
         return;
     }
     let _ = match (node.varies, node.cooks) {
@@ -96,7 +96,7 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
 fn to_json(node: &NodeReport) -> Value {
     let left_out: Vec<Value> = match node.needed {
         true => node.left_out.iter().map(|stage| json!({"stage": stage.stage, "why": stage.why})).collect(),
-        false => vec![json!({"stage": "all", "why": NOT_NEEDED})],
+        false => vec![json!({"stage": "all", "why": why_not_needed(node)})],
     };
     json!({
         "id": node.id.as_deref(), "type": node.type_name, "time": node.time, "needed": node.needed,

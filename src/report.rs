@@ -87,7 +87,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
 fn node_to_json(node: &NodeReport) -> Value {
     let left_out: Vec<Value> = match node.needed {
         true => node.left_out.iter().map(|stage| json!({"stage": stage.stage, "why": stage.why})).collect(),
-        false => vec![json!({"stage": "all", "why": NOT_NEEDED})],
+        false => vec![json!({"stage": "all", "why": why_not_needed(node)})],
     };
     let metrics: Map<String, Value> = node
         .metrics
@@ -114,7 +114,9 @@ fn node_to_json(node: &NodeReport) -> Value {
 }
 
 /// Why a node without dependents is left out.
-pub const NOT_NEEDED: &str = "no requested output depends on it";
+pub fn why_not_needed(node: &NodeReport) -> &'static str {
+    if node.bypassed { "`bypass` is true" } else { "no requested output depends on it" }
+}
 
 fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3

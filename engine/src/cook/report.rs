@@ -22,6 +22,8 @@ pub struct NodeReport {
     pub time: &'static str,
     /// Whether anything asked depends on it.
     pub needed: bool,
+    /// Whether `bypass` is set, so that nothing reads it.
+    pub bypassed: bool,
     /// Whether its result may change with the frame.
     pub varies: bool,
     /// Results cooked; steps of a window or solver.

@@ -65,8 +65,10 @@ pub(super) struct Statement {
 /// What the value of a statement is assigned to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Target {
-    /// The value of an expression.
+    /// The value of an expression, a scalar.
     Result,
+    /// The value of an expression, of any width.
+    Components,
     /// A `let`; nodes refer to its value directly.
     Local,
     Attribute {

@@ -58,11 +58,11 @@ impl Checker<'_> {
         self.widths.resize(end, None);
         let value = value?;
         match statement.target {
-            Target::Local => Ok(()),
+            Target::Local | Target::Components => Ok(()),
             Target::Result => match value {
                 Some(width) if width != Width::Scalar => {
                     let fault = statement.position.fault(format!("expected a scalar, found {width}"));
-                    Err(fault.hint("take a component, such as `.x`; a vector param needs three expressions"))
+                    Err(fault.hint("take a component, such as `.x`"))
                 }
                 _ => Ok(()),
             },

@@ -5,7 +5,7 @@ pub const HELP: &str = "\
 Expressions
 
 A param:         \"0.6 + 0.1*sin(2*pi*time)\"
-A vector param:  [\"cos(time)\", \"0\", \"sin(time)\"]
+A vector param:  \"vec(cos(time), 0, sin(time))\" or [\"cos(time)\", 0, \"sin(time)\"]
 Attribute_Expr:  envelope = clamp(envelope*P.y, 0, 1)
                  let sway = 0.1*noise(P*3 + vec(time, 0, 0))
                  P.x += sway*envelope
@@ -16,7 +16,7 @@ Names
   fps              frames per second
   seed             the scene's seed
   pi               3.14159...
-  controls         by name; .x .y .z of vectors
+  controls         by name; .x .y .z of vectors; a control reads those before it
   In Attribute_Expr also:
   attributes       by name; @name is always the attribute, even if something else has that name
   i                index of the point or element, from 0

@@ -42,11 +42,11 @@ pub(super) struct Store {
     pub(super) position: Position,
 }
 
-/// The code of a text: `result` is the value of an expression, `stores` are the assignments of a program, one for each
+/// The code of a text: `results` are the components of the value of an expression, `stores` are the assignments of a program, one for each
 /// component, in the order of attributes and components.
 pub(super) struct Lowered {
     pub(super) code: Code,
-    pub(super) result: Option<Id>,
+    pub(super) results: Vec<Id>,
     pub(super) stores: Vec<Store>,
 }
 
@@ -63,11 +63,11 @@ pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>])
         values: Vec::with_capacity(ast.nodes.len()),
         written: vec![[None; 4]; ast.attributes.len()],
     };
-    let mut result = None;
+    let mut results = Vec::new();
     for statement in &ast.statements {
         let value = lowering.value(statement.value as usize)?;
         match statement.target {
-            Target::Result => result = Some(value.ids[0]),
+            Target::Result | Target::Components => results.extend(value.components()),
             Target::Local => {}
             Target::Attribute { attribute, component } => {
                 lowering.assign(attribute, component, value, statement.position);
@@ -84,13 +84,13 @@ pub(super) fn lower(ast: &Ast, controls: &[Width], kinds: &[Option<ColumnType>])
             }
         }
     }
-    let outputs: Vec<Id> = stores.iter().map(|store| store.value).chain(result).collect();
+    let outputs: Vec<Id> = stores.iter().map(|store| store.value).chain(results).collect();
     let (code, outputs) = lowering.code.finish(&outputs);
     for (store, id) in stores.iter_mut().zip(&outputs) {
         store.value = *id;
     }
-    let result = result.and(outputs.last().copied());
-    Ok(Lowered { code, result, stores })
+    let results = outputs[stores.len()..].to_vec();
+    Ok(Lowered { code, results, stores })
 }
 
 /// For each control the index of its first number among the numbers of all controls, and its width.

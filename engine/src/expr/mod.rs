@@ -45,6 +45,8 @@ pub use parser::RESERVED;
 pub use program::{BadValue, Program, RunError};
 
 use crate::geometry::ColumnType;
+use ast::Target;
+use builder::Builder;
 use code::{Code, Id, Input};
 
 /// The number of components of a value.
@@ -201,14 +203,35 @@ impl Expr {
     /// # Ok::<(), engine::expr::ExprError>(())
     /// ```
     pub fn parse(text: &str, scope: &Scope<'_>) -> Result<Expr, ExprError> {
-        let ast = parser::expression(text, scope)?;
+        Self::components(text, scope, Target::Result).map(|mut one| one.swap_remove(0))
+    }
+
+    /// [`Expr::parse`] of an expression whose value may be a vector: an expression for each of its components.
+    ///
+    /// # Errors
+    /// As for [`Expr::parse`].
+    pub fn parse_components(text: &str, scope: &Scope<'_>) -> Result<Vec<Expr>, ExprError> {
+        Self::components(text, scope, Target::Components)
+    }
+
+    fn components(text: &str, scope: &Scope<'_>, target: Target) -> Result<Vec<Expr>, ExprError> {
+        let ast = parser::expression(text, scope, target)?;
         let widths: Vec<Width> = scope.controls.iter().map(|(_, width)| *width).collect();
         check::check(&ast, &widths, &[], &mut []).map_err(|mut faults| faults.swap_remove(0))?;
         let lowered = lower::lower(&ast, &widths, &[])?;
         let mut uses = Uses::default();
         lowered.code.inputs().for_each(|input| uses.record(input));
-        let result = lowered.result.unwrap_or_default();
-        Ok(Expr { code: lowered.code, result, uses, pi_is_term: pi::is_term(&ast) })
+        let (code, pi_is_term) = (lowered.code, pi::is_term(&ast));
+        let component = |result: &Id| Expr { code: code.clone(), result: *result, uses: uses.clone(), pi_is_term };
+        Ok(lowered.results.iter().map(component).collect())
+    }
+
+    /// An expression that is a number.
+    pub fn number(value: f64) -> Expr {
+        let mut builder = Builder::default();
+        let result = builder.constant(value);
+        let (code, results) = builder.finish(&[result]);
+        Expr { code, result: results[0], uses: Uses::default(), pi_is_term: false }
     }
 
     /// The value, which may be NaN or infinite.

@@ -195,6 +195,8 @@ pub mod code {
         CYCLE = "cycle";
         /// A wire that lacks the component that the input needs.
         WRONG_COMPONENT = "wrong-component";
+        /// A bypassed node with an output that no input can replace.
+        BYPASS = "bypass";
         /// A graph without outputs.
         NO_OUTPUTS = "no-outputs";
         /// A file that does not exist.

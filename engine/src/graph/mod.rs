@@ -10,6 +10,7 @@ mod schema;
 mod syntax;
 mod text;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -132,6 +133,8 @@ pub struct Graph {
     pub folder: PathBuf,
     /// Line and column of its parts in the graph file.
     pub positions: Positions,
+    /// The ids of bypassed nodes. No wire comes from them: what read them reads what they pass.
+    pub bypassed: BTreeSet<Name>,
     /// What is probably not as it was meant, found without cooking.
     pub notes: Vec<Note>,
 }

@@ -5,6 +5,7 @@
 
 mod choice;
 mod code;
+mod controls;
 mod handle;
 mod source;
 mod spec;
@@ -17,6 +18,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use choice::{Choice, ChoiceOption};
 pub use code::Code;
+pub use controls::ControlTable;
+pub(crate) use controls::ControlValue;
 pub use handle::{Param, ParamDecl, ParamType, RampDefault};
 pub(crate) use source::mixed_seed;
 pub use source::{Clock, CodeSource, Keyframe, Keyframes, Source};

@@ -7,10 +7,11 @@ use numerics::ramp::{Interpolation, Ramp};
 use numerics::random::Key;
 
 use super::code::Code;
+use super::controls::ControlTable;
 use super::spec::Shape;
 use super::turn::{self, euler_to_turn};
 use super::value::Value;
-use crate::expr::{Env, Expr, ExprError, Program};
+use crate::expr::{Expr, ExprError, Program};
 use crate::geometry::Name;
 
 /// What expressions can read of the scene.
@@ -42,7 +43,7 @@ pub enum Source {
     /// Keyframes.
     Keys(Arc<Keyframes>, Shape),
     /// One expression for each number of the shape, and the controls (numbers and vectors) that they may use.
-    Exprs(Arc<Vec<Expr>>, Shape, Arc<Vec<Source>>),
+    Exprs(Arc<Vec<Expr>>, Shape, Arc<ControlTable>),
     /// Code, and the controls that it may use.
     Code(CodeSource),
     /// The current frame, rounded down.
@@ -67,7 +68,7 @@ impl Source {
             Self::Keys(keys, _) => keys.keys.windows(2).any(|pair| pair[0].1 != pair[1].1),
             Self::Exprs(exprs, _, controls) => exprs.iter().any(|expr| {
                 let uses = expr.uses();
-                uses.time || uses.controls.iter().any(|control| controls[*control].is_animated())
+                uses.time || uses.controls.iter().any(|control| controls.is_animated(*control))
             }),
             Self::Code(code) => code.is_animated(),
             Self::CurrentFrame => true,
@@ -91,10 +92,9 @@ impl Source {
             Self::Constant(value) => value.clone(),
             Self::Keys(keys, shape) => keys.at(frame, *shape),
             Self::Exprs(exprs, shape, controls) => {
-                let read = |control| exprs.iter().any(|expr| expr.controls().contains(&control));
-                let numbers = control_numbers(controls, frame, clock, read);
-                let env =
-                    Env { frame, time: frame / clock.fps, fps: clock.fps, seed: clock.seed as f64, controls: &numbers };
+                let read = exprs.iter().flat_map(|expr| expr.controls().iter().copied());
+                let numbers = controls.numbers(frame, clock, read);
+                let env = clock.env(frame, &numbers);
                 let x = |k: usize| exprs[k].eval(&env);
                 match shape {
                     Shape::Int => whole(x(0)).map_or(Value::Float(x(0)), Value::Int),
@@ -120,19 +120,6 @@ impl Source {
             Self::Masked(value, attribute) => Value::Masked(value.at(frame, clock).number(), Some(attribute.clone())),
         }
     }
-}
-
-/// The numbers of all controls, concatenated, as expressions read them; 0 for controls that are not `read`.
-pub(super) fn control_numbers(controls: &[Source], frame: f64, clock: Clock, read: impl Fn(usize) -> bool) -> Vec<f64> {
-    let mut numbers = Vec::new();
-    for (index, control) in controls.iter().enumerate() {
-        match control.at(frame, clock) {
-            Value::Vec3(v) if read(index) => numbers.extend(v),
-            Value::Vec3(_) => numbers.extend([0.0; 3]),
-            value => numbers.push(if read(index) { value.number() } else { 0.0 }),
-        }
-    }
-    numbers
 }
 
 /// The seed that a node gets: a param's own and the scene's, mixed. Always within u32.
@@ -228,26 +215,27 @@ fn blend(a: &Value, b: &Value, share: f64) -> Value {
 pub struct CodeSource {
     text: Name,
     program: Arc<Result<Program, Vec<ExprError>>>,
-    controls: Arc<Vec<Source>>,
+    controls: Arc<ControlTable>,
 }
 
 impl CodeSource {
     /// A source for a text that was parsed with `controls` in scope.
-    pub(crate) fn new(text: &str, program: Program, controls: Arc<Vec<Source>>) -> Self {
+    pub(crate) fn new(text: &str, program: Program, controls: Arc<ControlTable>) -> Self {
         Self { text: text.into(), program: Arc::new(Ok(program)), controls }
     }
 
-    fn reads(&self, control: usize) -> bool {
-        self.program.as_ref().as_ref().is_ok_and(|program| program.uses().controls.contains(&control))
+    /// The controls that it reads.
+    fn reads(&self) -> &[usize] {
+        self.program.as_ref().as_ref().map_or(&[], |program| &program.uses().controls)
     }
 
     /// Whether a control that it reads is animated. Whether the code reads the clock is declared by the node.
     pub(super) fn is_animated(&self) -> bool {
-        self.controls.iter().enumerate().any(|(index, control)| self.reads(index) && control.is_animated())
+        self.reads().iter().any(|control| self.controls.is_animated(*control))
     }
 
     pub(super) fn at(&self, frame: f64, clock: Clock) -> Code {
-        let numbers = control_numbers(&self.controls, frame, clock, |control| self.reads(control));
+        let numbers = self.controls.numbers(frame, clock, self.reads().iter().copied());
         Code::with_controls(self.text.clone(), self.program.clone(), numbers)
     }
 }

@@ -37,6 +37,7 @@ impl TestGraph {
             outputs: Vec::new(),
             folder: PathBuf::new(),
             positions: Positions::default(),
+            bypassed: std::collections::BTreeSet::new(),
             notes: Vec::new(),
         })
     }

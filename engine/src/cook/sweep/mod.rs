@@ -126,6 +126,7 @@ impl<'p> NodeRun<'p> {
                 type_name: node.type_name(),
                 time: node.node().map_or("given", |node| node.cook.word()),
                 needed: planned.needed,
+                bypassed: plan.graph.bypassed.contains(&node.id),
                 varies: planned.varies,
                 left_out: if planned.needed { plan.left_out(index) } else { Vec::new() },
                 ..NodeReport::default()

@@ -30,8 +30,8 @@ pub(super) const MAX_DEPTH: usize = 200;
 /// The largest number of faults that a program reports.
 pub(super) const MAX_FAULTS: usize = 50;
 
-/// Parses an expression: no attributes, one value.
-pub(super) fn expression(text: &str, scope: &Scope<'_>) -> Result<Ast, ExprError> {
+/// Parses an expression: no attributes, one value for `target`.
+pub(super) fn expression(text: &str, scope: &Scope<'_>, target: Target) -> Result<Ast, ExprError> {
     let mut parser = Parser::new(text, scope, Language::Expression)?;
     // In an expression a newline is a blank, as between brackets.
     parser.open = 1;
@@ -44,7 +44,7 @@ pub(super) fn expression(text: &str, scope: &Scope<'_>) -> Result<Ast, ExprError
         return Err(unexpected(&end, "an operator or the end"));
     }
     let position = Position::START;
-    parser.ast.statements.push(Statement { target: Target::Result, position, value });
+    parser.ast.statements.push(Statement { target, position, value });
     Ok(parser.ast)
 }
 

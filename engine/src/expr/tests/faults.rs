@@ -64,7 +64,7 @@ fn incomplete_texts_and_trailing_tokens_are_refused() {
 
 #[test]
 fn widths_must_fit() {
-    let part = Some("take a component, such as `.x`; a vector param needs three expressions");
+    let part = Some("take a component, such as `.x`");
     check("wind", 1, "expected a scalar, found a 3-vector", part);
     let part = Some("take a component, such as `.x`, or `length(v)`");
     check("wind < 1", 6, "`<` takes scalars, not a 3-vector", part);

@@ -4,19 +4,24 @@ use std::sync::Arc;
 
 use jsonc_parser::ast::Value as Ast;
 
+use super::expression;
+use super::form::not_a_form;
 use super::keyframes::{Keys, keys};
 use crate::expr::{RESERVED, Width};
+use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
-use crate::param::{Keyframes, Shape, Source, Value};
+use crate::graph::json::{Entry, Json, find, keep, refuse_unknown, shown};
+use crate::param::{ControlTable, ControlValue, Keyframes, Shape, Source, Value};
 
 /// The controls of a graph.
 pub(super) struct Controls<'a> {
     all: Vec<Control<'a>>,
     /// Names and widths of the controls that expressions may read.
     pub(super) scope: Vec<(&'a str, Width)>,
-    /// Their sources, in the same order.
-    pub(super) sources: Arc<Vec<Source>>,
+    /// Their values, in the same order.
+    pub(super) table: Arc<ControlTable>,
+    /// Those that are not read yet, the one that is being read first.
+    unread: Vec<&'a str>,
 }
 
 struct Control<'a> {
@@ -40,8 +45,10 @@ pub(super) enum Lookup<'c, 'a> {
 impl<'a> Controls<'a> {
     /// Reads what can be checked without knowing which params read a control; literals are checked again by each of
     /// those.
-    pub(super) fn read(entries: &[Entry<'a>], faults: &mut Vec<Fault>) -> Self {
-        let (mut all, mut scope, mut sources) = (Vec::new(), Vec::new(), Vec::new());
+    pub(super) fn read(entries: &[Entry<'a>], scene: &Scene, faults: &mut Vec<Fault>) -> Self {
+        let unread = entries.iter().rev().map(|entry| entry.name).collect();
+        let mut read = Self { all: Vec::new(), scope: Vec::new(), table: Arc::default(), unread };
+        let mut table = ControlTable::default();
         for entry in entries {
             let Entry { name, json, .. } = entry;
             let before = faults.len();
@@ -53,15 +60,17 @@ impl<'a> Controls<'a> {
                         .hint(format!("rename the control, for example to `my_{name}`")),
                 );
             }
-            let numeric = numeric(json, faults);
+            let numeric = numeric(json, &read, &table, scene, faults);
             let (is_valid, is_numeric) = (faults.len() == before, numeric.is_some());
-            all.push(Control { name, json: json.clone(), is_valid, is_numeric });
-            if let Some((width, source)) = numeric {
-                scope.push((*name, width));
-                sources.push(source);
+            read.all.push(Control { name, json: json.clone(), is_valid, is_numeric });
+            if let Some((width, value)) = numeric {
+                read.scope.push((*name, width));
+                table.push(value, width);
             }
+            read.unread.pop();
         }
-        Self { all, scope, sources: Arc::new(sources) }
+        read.table = Arc::new(table);
+        read
     }
 
     /// Looks a name up.
@@ -78,35 +87,63 @@ impl<'a> Controls<'a> {
         self.all.iter().map(|control| control.name)
     }
 
-    /// The control named in `fact` that exists but that expressions cannot read, because it is neither a number nor a
-    /// vector.
-    pub(super) fn unreadable_in(&self, fact: &str) -> Option<&'a str> {
-        let unreadable = self.all.iter().filter(|control| !control.is_numeric).map(|control| control.name);
-        unreadable.into_iter().find(|name| fact.contains(&format!("`{name}`")))
+    /// Why an expression cannot read the control that `fact` names, if there is one of that name.
+    pub(super) fn why_unreadable(&self, fact: &str) -> Option<String> {
+        let is_named = |name: &&str| fact.contains(&format!("`{name}`"));
+        let mut others = self.all.iter().filter(|control| !control.is_numeric);
+        if let Some(control) = others.find(|control| is_named(&control.name)) {
+            let name = shown(control.name);
+            return Some(match control.is_valid {
+                true => format!("the control `{name}` is neither a number nor a vector, so expressions cannot read it"),
+                false => format!("the control `{name}` has a fault"),
+            });
+        }
+        let name = self.unread.iter().rfind(|name| is_named(name))?;
+        Some(match self.unread.last() == Some(name) {
+            true => "a control reads only those before it, not itself".into(),
+            false => format!("a control reads only those before it; move `{}` up", shown(name)),
+        })
     }
 }
 
 /// The control as expressions read it: a scalar or a vector. `None` if it is something else or has a fault.
-fn numeric<'a>(json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<(Width, Source)> {
+fn numeric<'a>(
+    json: &Json<'a>,
+    before: &Controls<'_>,
+    table: &ControlTable,
+    scene: &Scene,
+    faults: &mut Vec<Fault>,
+) -> Option<(Width, ControlValue)> {
     let Ast::Object(_) = json.value else {
         if matches!(json.value, Ast::NullKeyword(_)) {
             faults.push(json.unexpected("a value, or {\"keyframes\": [[frame, value], …]}"));
         }
         let value = number_or_vector(json, faults)?;
-        return Some((width(&value), Source::Constant(value)));
+        return Some((width(&value), ControlValue::Source(Source::Constant(value))));
     };
     let members = json.members("", faults);
     let entries = keep(members, faults)?;
-    if find(&entries, "ramp").is_some() {
-        return None;
+    let forms: Vec<&Entry<'a>> = entries.iter().filter(|entry| FORMS.contains(&entry.name)).collect();
+    match forms[..] {
+        [] => faults.push(not_a_form(json, &entries, "a literal", &FORMS)),
+        [form] if form.name == "keyframes" => return keyed(form, &entries, faults),
+        [form] if form.name == "expr" => {
+            refuse_unknown(&entries, &["expr"], "allowed keys", faults);
+            return expression::control(&form.json, before, table, scene, faults);
+        }
+        // Ramps and what is wrong with them are left to the params that read them.
+        _ => {}
     }
-    let Some(list) = find(&entries, "keyframes") else {
-        let fault = json.fault(code::PARAM_FORM, "the object is not a value that a control can have");
-        faults.push(fault.hint("expected a literal, or an object with `keyframes` or `ramp`"));
-        return None;
-    };
-    refuse_unknown(&entries, &["keyframes", "interpolation"], "allowed keys", faults);
-    let Keys { keys, interpolation } = keys(&list.json, find(&entries, "interpolation"), faults)?;
+    None
+}
+
+/// The forms of a control that is an object.
+const FORMS: [&str; 3] = ["keyframes", "expr", "ramp"];
+
+/// Keyframes of numbers or vectors.
+fn keyed<'a>(list: &Entry<'a>, entries: &[Entry<'a>], faults: &mut Vec<Fault>) -> Option<(Width, ControlValue)> {
+    refuse_unknown(entries, &["keyframes", "interpolation"], "allowed keys", faults);
+    let Keys { keys, interpolation } = keys(&list.json, find(entries, "interpolation"), faults)?;
     let values: Vec<Option<Value>> = keys.iter().map(|(_, json)| number_or_vector(json, faults)).collect();
     let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
     let width = width(values.first()?);
@@ -115,7 +152,7 @@ fn numeric<'a>(json: &Json<'a>, faults: &mut Vec<Fault>) -> Option<(Width, Sourc
         return None;
     }
     let keys = keys.iter().zip(values).map(|((frame, _), value)| (*frame, value)).collect();
-    Some((width, Source::Keys(Arc::new(Keyframes { keys, interpolation }), shape)))
+    Some((width, ControlValue::Source(Source::Keys(Arc::new(Keyframes { keys, interpolation }), shape))))
 }
 
 fn width(value: &Value) -> Width {

@@ -26,6 +26,8 @@ pub(super) struct NodeText<'a> {
     pub(super) kind: Option<Json<'a>>,
     pub(super) inputs: Vec<Entry<'a>>,
     pub(super) params: Vec<Entry<'a>>,
+    /// The value of `bypass`, if the node is bypassed.
+    pub(super) bypass: Option<Json<'a>>,
 }
 
 /// The fault of an object that lacks a key.
@@ -142,9 +144,9 @@ impl<'a> NodeText<'a> {
     fn read(entry: Entry<'a>, faults: &mut Vec<Fault>) -> Self {
         let members = entry.json.members("a node {\"type\": \"…\", \"inputs\": {…}, \"params\": {…}}", faults);
         let Some(entries) = keep(members, faults) else {
-            return Self { entry, kind: None, inputs: Vec::new(), params: Vec::new() };
+            return Self { entry, kind: None, inputs: Vec::new(), params: Vec::new(), bypass: None };
         };
-        const KEYS: [&str; 3] = ["type", "inputs", "params"];
+        const KEYS: [&str; 5] = ["type", "inputs", "params", "bypass", "note"];
         refuse_unknown(&entries, &KEYS, "keys of a node", faults);
         let part = |name: &str| find(&entries, name).map(|entry| entry.json.clone());
         let kind = required(&entry.json, &entries, &KEYS, "type", "`convect nodes` lists the types", faults);
@@ -156,6 +158,9 @@ impl<'a> NodeText<'a> {
         };
         let inputs = members("inputs", "inputs {\"name\": \"node\", …}");
         let params = members("params", "params {\"name\": value, …}");
-        Self { entry, kind, inputs, params }
+        let note = part("note").filter(|note| note.string().is_none());
+        faults.extend(note.map(|note| note.unexpected("a string")));
+        let bypass = part("bypass").filter(|bypass| keep(bypass.bool(), faults).unwrap_or(false));
+        Self { entry, kind, inputs, params, bypass }
     }
 }

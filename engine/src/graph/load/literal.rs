@@ -96,7 +96,13 @@ fn tuple<T: Copy + Default, const N: usize>(
     let mut values = [T::default(); N];
     let mut valid = true;
     for (index, item) in items.iter().enumerate() {
-        match keep(read(&json.item(item, index)), faults) {
+        let read = read(&json.item(item, index)).map_err(|fault| match item {
+            Ast::StringLit(_) | Ast::Object(_) => {
+                fault.hint(format!("expressions are written {{\"expr\": [{}]}}", vec!["\"…\""; N].join(", ")))
+            }
+            _ => fault,
+        });
+        match keep(read, faults) {
             Some(value) => values[index] = value,
             None => valid = false,
         }

@@ -12,6 +12,7 @@ mod components;
 mod control;
 mod document;
 mod expression;
+mod form;
 mod keyframes;
 mod literal;
 mod notes;
@@ -130,7 +131,7 @@ fn load(
     }
 
     let scene = scene::read(document.scene.as_ref(), faults);
-    let controls = Controls::read(&document.controls, faults);
+    let controls = Controls::read(&document.controls, &scene, faults);
     let mut reader =
         Reader { scene: &scene, controls: &controls, folder, files, faults, read: BTreeMap::new(), kind: "" };
     let mut types = BTreeMap::new();
@@ -145,14 +146,18 @@ fn load(
     let components = Components::along(&drafts, &order);
     components.refuse_misfits(&drafts, catalogue, faults);
     let outputs = outputs::read(document.outputs.as_ref(), &drafts, faults);
+    let written: Vec<_> = outputs.iter().flatten().map(|output| (output.node, output.port)).collect();
+    components.refuse_impassable(&drafts, &written, faults);
     if !document.nodes_are_known {
         faults.retain(|fault| fault.code != code::UNKNOWN_NODE);
     }
     let outputs = outputs?;
 
     let positions = positions(&drafts, document.outputs.as_ref());
-    let (nodes, outputs) = assemble(drafts, &order, outputs)?;
-    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions, notes: Vec::new() })
+    let is_bypassed = |node: &&usize| drafts[**node].text.bypass.is_some();
+    let bypassed = order.nodes.iter().filter(is_bypassed).map(|node| drafts[*node].text.entry.name.into()).collect();
+    let (nodes, outputs) = assemble(drafts, &order, &components, outputs)?;
+    Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions, bypassed, notes: Vec::new() })
 }
 
 /// What nodes of one type share.
@@ -213,10 +218,11 @@ fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
     positions
 }
 
-/// Sorts the nodes topologically; `None` if one of them has a fault.
+/// Sorts the nodes topologically, and connects what reads a bypassed node to what it passes; `None` if one has a fault.
 fn assemble(
     drafts: Vec<Draft<'_>>,
     order: &Order,
+    components: &Components,
     outputs: Vec<outputs::Draft>,
 ) -> Option<(Vec<GraphNode>, Vec<GraphOutput>)> {
     if order.nodes.len() != drafts.len() {
@@ -224,15 +230,19 @@ fn assemble(
     }
     let mut index = vec![0; drafts.len()];
     order.nodes.iter().enumerate().for_each(|(new, old)| index[*old] = new);
+    let link = |node: usize, port: Option<usize>| {
+        let (node, port) = components.source(node, port?)?;
+        Some(Link { node: index[node], port })
+    };
     let mut nodes: Vec<Option<GraphNode>> = drafts.iter().map(|_| None).collect();
     for (old, draft) in drafts.into_iter().enumerate() {
-        let link = |wire: &Wire<'_>| Some(Link { node: index[wire.node], port: wire.port? });
+        let link = |wire: &Wire<'_>| link(wire.node, wire.port);
         let inputs: Option<Vec<Vec<Link>>> = draft.wires.iter().map(|wires| wires.iter().map(link).collect()).collect();
         let body = Body::Node { node: draft.node?, specs: draft.specs, params: draft.params, inputs: inputs? };
         nodes[index[old]] = Some(GraphNode { id: draft.text.entry.name.into(), body });
     }
     let outputs = outputs.into_iter().map(|output| {
-        let from = Link { node: index[output.node], port: output.port? };
+        let from = link(output.node, output.port)?;
         Some(GraphOutput { name: output.name, from, attributes: output.attributes, v: output.v })
     });
     Some((nodes.into_iter().collect::<Option<_>>()?, outputs.collect::<Option<_>>()?))

@@ -20,6 +20,10 @@ pub(super) fn of(graph: &Graph) -> Vec<Note> {
 fn unused_nodes(graph: &Graph) -> Vec<Note> {
     let mut needed = vec![false; graph.nodes.len()];
     graph.outputs.iter().for_each(|output| needed[output.from.node] = true);
+    // What is bypassed, and what only bypassed nodes need, is so on purpose.
+    for (needed, node) in needed.iter_mut().zip(&graph.nodes) {
+        *needed |= graph.bypassed.contains(&node.id);
+    }
     // Every node comes after those that it reads.
     for place in (0..graph.nodes.len()).rev() {
         if needed[place] {

@@ -12,9 +12,9 @@ use super::FileProbe;
 use super::control::{Controls, Lookup};
 use super::document::missing;
 use super::expression;
+use super::form::not_a_form;
 use super::keyframes::{Keys, interpolation, keys};
 use super::literal::{literal, ramp};
-use crate::expr::suggest::nearest;
 use crate::files::unreadable;
 use crate::graph::Scene;
 use crate::graph::fault::{Fault, code};
@@ -45,7 +45,7 @@ pub(super) struct Reader<'a, 'r> {
 enum Within {
     /// In a param: all forms.
     Param,
-    /// In a control: literals, keyframes and ramps.
+    /// In a control: literals, keyframes, expressions and ramps.
     Control,
     /// In a mask's `value`: all but another mask.
     Mask,
@@ -175,16 +175,8 @@ impl<'a> Reader<'a, '_> {
         let form = match forms[..] {
             [form] => form,
             [] => {
-                let fault = json.fault(code::PARAM_FORM, "the object does not set a value");
                 let forms: Vec<&str> = FORMS.into_iter().filter(|form| accepts(spec.shape, form, within)).collect();
-                let near = entries.iter().find_map(|entry| nearest(entry.name, forms.iter().copied()));
-                self.faults.push(match near {
-                    Some(near) => fault.hint(format!("did you mean `{near}`?")),
-                    None => {
-                        let (shape, forms) = (spec.shape.describe(), forms.join("`, `"));
-                        fault.hint(format!("expected {shape}, or an object with one of `{forms}`"))
-                    }
-                });
+                self.faults.push(not_a_form(json, entries, &spec.shape.describe(), &forms));
                 return None;
             }
             [first, second, ..] => {
@@ -340,7 +332,7 @@ fn accepts(shape: Shape, form: &str, within: Within) -> bool {
         "keyframes" => !matches!(shape, Shape::File | Shape::Code) && within != Within::Key,
         "ramp" => shape == Shape::Ramp,
         "value" => shape == Shape::Masked && within == Within::Param,
-        "expr" => shape.expressions().is_some() && matches!(within, Within::Param | Within::Mask),
+        "expr" => shape.expressions().is_some() && within != Within::Key,
         _ => matches!(within, Within::Param | Within::Mask),
     }
 }

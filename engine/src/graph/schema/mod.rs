@@ -2,7 +2,7 @@
 //!
 //! Promise: a graph that loads is valid under the schema, except for keyframes with a single value on a param that
 //! cannot be animated. Limit: a schema cannot check relations between parts (wires to missing nodes, cycles, order of
-//! keys), expressions and files; whether comments are accepted depends on the editor.
+//! keys), expressions and files. `allowComments` and `allowTrailingCommas` are read by some editors only.
 
 mod param;
 
@@ -19,6 +19,8 @@ const NAME: &str = "^[A-Za-z_][A-Za-z0-9_-]*$";
 /// The pattern of an id with an optional output.
 const LINK: &str = "^[A-Za-z_][A-Za-z0-9_-]*(\\.[A-Za-z0-9_]+)?$";
 
+const BYPASS: &str = "Whether the node is skipped: it passes on the first input that has the components of its output.";
+
 /// The schema (draft 2020-12) of graphs whose nodes are of the catalogue's types.
 pub fn schema(catalogue: Catalogue) -> Value {
     let mut definitions = shared_definitions();
@@ -28,6 +30,9 @@ pub fn schema(catalogue: Catalogue) -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "convect graph",
+        // Read by editors that use the schema for plain JSON files.
+        "allowComments": true,
+        "allowTrailingCommas": true,
         "description": "Nodes that make geometry move, their wires, and the outputs to write.",
         "type": "object",
         "required": ["convect", "nodes", "outputs"],
@@ -86,9 +91,12 @@ fn scene() -> Value {
 fn shared_definitions() -> Map<String, Value> {
     let expression = json!({"type": "string", "minLength": 1});
     let expressions = |count: usize| {
+        let items = json!({"anyOf": [expression, {"type": "number"}]});
+        let list = json!({"type": "array", "items": items, "minItems": count, "maxItems": count});
         let exprs = match count {
             1 => expression.clone(),
-            _ => json!({"type": "array", "items": expression, "minItems": count, "maxItems": count}),
+            2 => list,
+            _ => any_of(vec![expression.clone(), list]),
         };
         param::form("expr", exprs, "", &[])
     };
@@ -114,6 +122,7 @@ fn shared_definitions() -> Map<String, Value> {
         "control-value": any_of(vec![
             json!({"type": ["number", "string", "boolean", "array"]}),
             param::keyframes(&key),
+            json!({"$ref": "#/$defs/expressions-3"}),
             json!({"$ref": "#/$defs/ramp"}),
         ]),
         "output": any_of(vec![
@@ -179,6 +188,8 @@ fn node_schema(node: &Node) -> Value {
             "type": {"const": node.name},
             "inputs": {"type": "object", "required": needed, "additionalProperties": false, "properties": inputs},
             "params": {"type": "object", "additionalProperties": false, "properties": params},
+            "bypass": described(json!({"type": "boolean", "default": false}), BYPASS),
+            "note": described(json!({"type": "string"}), "A note, which convect does not read."),
         },
     })
 }
