@@ -6,22 +6,44 @@ use engine::frames::FrameSet;
 use engine::graph::Scene;
 use engine::time::Frame;
 
-/// Requested frames: `1-48`, `1-48x2`, `10`, `10.5`, `1-2x0.25`, and several of these separated by commas.
+use crate::failure::{Exit, Failure};
+
+/// Requested frames: `1-48`, `1-48x2`, `10`, `10.5`, `1-2x0.25`, `1-` (to the scene's end), and several of these
+/// separated by commas.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frames(FrameSet);
+pub struct Frames {
+    known: FrameSet,
+    /// First frames and steps of ranges to the scene's end.
+    open: Vec<(Frame, Frame)>,
+}
 
 /// More frames than this are assumed to be a typing error.
 const MOST_FRAMES: i64 = 10_000_000;
 
 impl Frames {
-    /// The frames.
-    pub fn frames(&self) -> FrameSet {
-        self.0.clone()
+    /// The frames, of a range without an end up to the end of `scene`.
+    ///
+    /// # Errors
+    /// If such a range starts after the scene's end, or is too long.
+    pub fn of(&self, scene: &Scene) -> Result<FrameSet, Failure> {
+        let mut frames = self.known.clone();
+        for (first, step) in &self.open {
+            if *first > scene.end() {
+                let line = format!("the frames {first}- start after the scene's last frame, {}", scene.last);
+                return Err(Failure::new(Exit::CommandLine, line));
+            }
+            let range = range(*first, scene.end(), *step, &format!("{first}-"));
+            frames = frames.union(&range.map_err(|line| Failure::new(Exit::CommandLine, line))?);
+        }
+        Ok(frames)
     }
 
-    /// All frames of a scene.
-    pub fn of_scene(scene: &Scene) -> FrameSet {
-        FrameSet::whole(scene.first, scene.last)
+    /// The frames that were asked for, or all frames of a scene.
+    ///
+    /// # Errors
+    /// As for [`Frames::of`].
+    pub fn of_scene(asked: Option<&Self>, scene: &Scene) -> Result<FrameSet, Failure> {
+        asked.map_or_else(|| Ok(FrameSet::whole(scene.first, scene.last)), |asked| asked.of(scene))
     }
 }
 
@@ -29,15 +51,25 @@ impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut frames = FrameSet::default();
+        let mut frames = Self { known: FrameSet::default(), open: Vec::new() };
         for part in text.split(',') {
-            frames = frames.union(&part_of(part.trim())?);
+            match part_of(part.trim())? {
+                Part::Known(part) => frames.known = frames.known.union(&part),
+                Part::Open(first, step) => frames.open.push((first, step)),
+            }
         }
-        Ok(Self(frames))
+        Ok(frames)
     }
 }
 
-fn part_of(part: &str) -> Result<FrameSet, String> {
+/// Frames between two commas.
+enum Part {
+    Known(FrameSet),
+    /// First frame and step.
+    Open(Frame, Frame),
+}
+
+fn part_of(part: &str) -> Result<Part, String> {
     let frame = |text: &str| text.parse::<Frame>().map_err(|error| format!("{error}; write 1-48, 1-48x2 or 10.5"));
     let (range, step) = match part.split_once('x') {
         Some((range, step)) => (range, Some(step)),
@@ -49,16 +81,25 @@ fn part_of(part: &str) -> Result<FrameSet, String> {
         if step.is_some() {
             return Err(format!("`{part}` has a step but no range; write 1-48x2"));
         }
-        return Ok(vec![frame(part)?].into());
+        return Ok(Part::Known(vec![frame(part)?].into()));
     };
-    let (first, last) = (frame(&range[..dash])?, frame(&range[dash + 1..])?);
+    let first = frame(&range[..dash])?;
     let step = step.map_or(Ok(Frame::whole(1)), frame)?;
     if step <= Frame::whole(0) {
         return Err(format!("the step in `{part}` is {step}, expected more than 0"));
     }
+    if range[dash + 1..].is_empty() {
+        return Ok(Part::Open(first, step));
+    }
+    let last = frame(&range[dash + 1..])?;
     if last < first {
         return Err(format!("`{part}` ends before it starts; write {last}-{first}"));
     }
+    self::range(first, last, step, part).map(Part::Known)
+}
+
+/// The frames from `first` to `last`, which `part` asks for.
+fn range(first: Frame, last: Frame, step: Frame, part: &str) -> Result<FrameSet, String> {
     let count = (last.ticks() - first.ticks()) / step.ticks() + 1;
     if count > MOST_FRAMES {
         return Err(format!("`{part}` is {count} frames, expected at most {MOST_FRAMES}"));
@@ -92,7 +133,34 @@ impl FromStr for Size {
     }
 }
 
-/// `KEY=JSON` of `--set`.
+/// `A-B` of `--part`: the first and the last frame of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartRange(i64, i64);
+
+impl PartRange {
+    /// Its frames.
+    pub fn frames(self) -> FrameSet {
+        FrameSet::whole(self.0, self.1)
+    }
+}
+
+impl FromStr for PartRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not a part; write the first and the last frame: 1-24");
+        // A minus at the start is a sign.
+        let dash = text.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at).ok_or_else(wrong)?;
+        let end = |text: &str| text.trim().parse::<i64>().ok().filter(|frame| frame.abs() <= Frame::LIMIT);
+        let (first, last) = (end(&text[..dash]).ok_or_else(wrong)?, end(&text[dash + 1..]).ok_or_else(wrong)?);
+        if last < first {
+            return Err(format!("`{text}` ends before it starts; write {last}-{first}"));
+        }
+        Ok(Self(first, last))
+    }
+}
+
+/// `KEY=VALUE` of `--set`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting(pub String, pub String);
 
@@ -102,7 +170,7 @@ impl FromStr for Setting {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
             Some((key, json)) if !key.trim().is_empty() => Ok(Self(key.trim().into(), json.into())),
-            _ => Err(format!("`{text}` is not a setting; write node.param=JSON or control=JSON")),
+            _ => Err(format!("`{text}` is not a setting; write node.param=VALUE or control=VALUE")),
         }
     }
 }
@@ -112,7 +180,8 @@ mod tests {
     use super::*;
 
     fn numbers(text: &str) -> Vec<f64> {
-        text.parse::<Frames>().unwrap().frames().iter().map(|frame| frame.number()).collect()
+        let scene = Scene { first: 1, last: 6, ..Scene::default() };
+        text.parse::<Frames>().unwrap().of(&scene).unwrap().iter().map(|frame| frame.number()).collect()
     }
 
     #[test]
@@ -123,6 +192,8 @@ mod tests {
         assert_eq!(numbers("1-2x0.25"), [1.0, 1.25, 1.5, 1.75, 2.0]);
         assert_eq!(numbers("-3--1"), [-3.0, -2.0, -1.0]);
         assert_eq!(numbers("5,1-2,2"), [1.0, 2.0, 5.0]);
+        assert_eq!(numbers("4-"), [4.0, 5.0, 6.0]);
+        assert_eq!(numbers("-1-x3,6-"), [-1.0, 2.0, 5.0, 6.0]);
     }
 
     #[test]
@@ -134,6 +205,22 @@ mod tests {
         assert_eq!(error("a"), "`a` is not a frame number; write 1-48, 1-48x2 or 10.5");
         assert_eq!(error(""), "`` is not a frame number; write 1-48, 1-48x2 or 10.5");
         assert_eq!(error("1-900000000"), "`1-900000000` is 900000000 frames, expected at most 10000000");
+    }
+
+    #[test]
+    fn a_range_without_an_end_must_start_in_the_scene() {
+        let refused = "7-".parse::<Frames>().unwrap().of(&Scene { last: 6, ..Scene::default() }).unwrap_err();
+        assert_eq!(refused.lines, ["the frames 7- start after the scene's last frame, 6"]);
+        assert_eq!(refused.exit, Exit::CommandLine);
+    }
+
+    #[test]
+    fn a_part_is_a_range_of_whole_frames() {
+        assert_eq!("-3-4".parse(), Ok(PartRange(-3, 4)));
+        let error = |text: &str| text.parse::<PartRange>().unwrap_err();
+        assert_eq!(error("4-1"), "`4-1` ends before it starts; write 1-4");
+        assert_eq!(error("4"), "`4` is not a part; write the first and the last frame: 1-24");
+        assert_eq!(error("1-2x2"), "`1-2x2` is not a part; write the first and the last frame: 1-24");
     }
 
     #[test]

@@ -14,10 +14,10 @@ use crate::{load, memory};
 /// The arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArgs {
-    /// The graph file
+    /// The graph file; - reads it from stdin
     graph: PathBuf,
-    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
-    #[arg(long, value_name = "KEY=JSON")]
+    /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
     /// Also check that this format can hold the outputs
     #[arg(long, value_name = "FORMAT", value_parser = ["usdc", "usda", "obj", "ply", "json"])]

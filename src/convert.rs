@@ -11,17 +11,17 @@ use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
 use crate::failure::{Exit, Failure, cancelled_by_signal};
-use crate::geometry_file::{Numbered, read, refused, stem_and_frame};
-use crate::output::{usd_failed, write_whole};
+use crate::geometry_file::{Numbered, folder_of, read, refused, sequence_in, stem_and_frame};
+use crate::output::{create_folder, usd_failed, write_whole};
 use crate::targets::Targets;
 
 /// The arguments of `convert`.
 #[derive(Debug, clap::Args)]
 pub struct ConvertArgs {
-    /// An obj, ply or json file, or a numbered sequence: fur.####.json
+    /// An obj, ply or json file, a numbered sequence: fur.####.json, or a folder that holds one sequence
     from: PathBuf,
     /// The file to write; its extension selects the format. A sequence becomes one usdc or usda file, or one file per
-    /// frame: fur.####.ply
+    /// frame: fur.####.ply. Its folder is created if it is missing
     to: PathBuf,
     /// Factor for lengths and velocities, such as 0.01 for a file in centimetres
     #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
@@ -49,6 +49,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
         Format::of_path(&args.to).map_err(|error| command_line(format!("`{}`: {error}", args.to.display())))?;
     let files = match Numbered::of(&args.from)? {
         Some(numbered) => numbered.find()?,
+        None if args.from.is_dir() => sequence_in(&args.from)?,
         None => vec![(stem_and_frame(&args.from).1.unwrap_or(Frame::whole(1)), args.from.clone())],
     };
     let to = Numbered::of(&args.to)?;
@@ -61,6 +62,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(&args.to, &files, to.as_ref());
     targets.check()?;
     targets.sweep();
+    create_folder(folder_of(&args.to))?;
     let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel };
     let written = match &to {
         Some(to) => conversion.file_per_frame(&files, |frame| to.at(frame), to.stem())?,

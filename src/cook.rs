@@ -1,7 +1,8 @@
 //! `convect cook`: cooks a graph and writes its outputs.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use engine::clock::Stopwatch;
@@ -14,9 +15,9 @@ use formats::Format;
 use formats::atomic::AtomicFile;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::args::{Frames, Setting, Size};
+use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
-use crate::output::{Writers, Written, add_targets, failed, fill};
+use crate::output::{Writers, Written, add_targets, create_folder, failed, fill};
 use crate::pictures::{self, Pictures, Staged};
 use crate::targets::Targets;
 use crate::{load, memory, report};
@@ -24,11 +25,14 @@ use crate::{load, memory, report};
 /// The arguments of `cook`.
 #[derive(Debug, clap::Args)]
 pub struct CookArgs {
-    /// The graph file
+    /// The graph file; - reads it from stdin
     graph: PathBuf,
-    /// Frames to cook: 1-48, 1-48x2 (every second), 10, 10.5, or a list: 1-4,10,20-24 [default: the scene's frames]
+    /// Frames to cook: 1-48, 1-48x2 (every second), 10, 10.5, 1- (to the scene's end), or a list: 1-4,10 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
+    /// Cook frames A to B as a part of the scene: a USD file samples whatever varies over the scene, even if it is constant in these frames, so that parts can be joined
+    #[arg(long, value_name = "A-B", allow_hyphen_values = true, conflicts_with = "frames")]
+    part: Option<PartRange>,
     /// Cook only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
@@ -38,8 +42,8 @@ pub struct CookArgs {
     /// File format: usdc and usda have all frames in one file; obj, ply and json have one file per frame
     #[arg(long, value_name = "FORMAT", default_value = "usdc", value_parser = ["usdc", "usda", "obj", "ply", "json"])]
     format: String,
-    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
-    #[arg(long, value_name = "KEY=JSON")]
+    /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
     /// Number of threads [default: the machine's]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
@@ -53,7 +57,10 @@ pub struct CookArgs {
     /// Maximum size of the cache; the oldest files are deleted first
     #[arg(long, value_name = "SIZE", requires = "cache")]
     cache_limit: Option<Size>,
-    /// Write a report to this file as JSON: time, memory and metrics of each node
+    /// Cook without writing outputs, for the report, the pictures or the cache
+    #[arg(long)]
+    no_write: bool,
+    /// Write a report to this file as JSON: time, memory and metrics of each node; - writes it to stdout
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Print the time of each node, and which of its steps were left out and why
@@ -80,10 +87,15 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
-        frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
+        frames: match args.part {
+            Some(part) => part.frames(),
+            None => Frames::of_scene(args.frames.as_ref(), &graph.scene)?,
+        },
     };
     let mut faults = engine.verify(&graph, Some(&request));
-    faults.extend(load::format_faults(&graph, &request.outputs, format));
+    if !args.no_write {
+        faults.extend(load::format_faults(&graph, &request.outputs, format));
+    }
     if !faults.is_empty() {
         return Err(load::faulty(&args.graph, &faults));
     }
@@ -109,9 +121,16 @@ fn cook(
     targets.sweep();
     let limit = args.cache_limit.map_or(u64::MAX, |size| size.0);
     let mut disk = args.cache.as_ref().map(|folder| DiskCache::open(folder, limit));
-    let mut writers = Writers::new(graph, &request.outputs, &args.out, format)?;
+    let mut writers = match args.no_write {
+        true => Writers::none(graph, &request.outputs, format),
+        false => Writers::new(graph, &request.outputs, &args.out, format)?,
+    };
+    if args.no_write && pictures.is_some() {
+        create_folder(&args.out)?;
+    }
     // Before the cook, so that an invalid path is reported at once.
-    let report_file = args.report.as_ref().map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
+    let report_path = args.report.as_ref().filter(|path| !is_stdout(path));
+    let report_file = report_path.map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let progress = progress(args, request);
     let mut writing = Duration::ZERO;
     let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
@@ -133,13 +152,14 @@ fn cook(
     report.errors.retain(|(output, _, _)| *output < graph.outputs.len());
     let watch = Stopwatch::start();
     let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
-    let written = writers.finish(&incomplete)?;
+    let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
     report.notes.extend(left_out(graph, &written, format));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled))?;
     writing += watch.wall();
-    if let Some(file) = report_file {
+    let mut reported = Ok(());
+    if args.report.is_some() {
         let cooked = report::Cooked {
-            graph_path: args.graph.display().to_string(),
+            graph_path: load::graph_name(&args.graph),
             graph,
             frames: &request.frames,
             written: &written,
@@ -147,24 +167,44 @@ fn cook(
             writing,
         };
         let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
-        fill(file, format!("{text}\n").as_bytes())?;
+        let text = format!("{text}\n");
+        match report_file {
+            Some(file) => fill(file, text.as_bytes())?,
+            None => reported = std::io::stdout().write_all(text.as_bytes()).map_err(Failure::from),
+        }
     }
     if !args.quiet {
         report.notes.iter().for_each(|note| crate::say!("note: {note}"));
         print_summary(&report, &written, &drawn, args.verbose);
     }
     outcome(args, graph, &report, &written)?;
+    reported?;
     load::strict(args.strict, &report.notes)
+}
+
+/// Whether a report is to be written to stdout.
+fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// The outputs of a part that vary over the scene.
+fn varying(args: &CookArgs, graph: &Graph, report: &Report) -> Vec<usize> {
+    let varies = |output: &usize| report.nodes.get(graph.outputs[*output].from.node).is_some_and(|node| node.varies);
+    (0..graph.outputs.len()).filter(|output| args.part.is_some() && varies(output)).collect()
 }
 
 /// Everything that the cook reads and writes.
 fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pictures: Option<&Pictures>) -> Targets {
     let mut targets = Targets::default();
-    targets.reads(&args.graph, "it is the graph");
+    if !load::is_stdin(&args.graph) {
+        targets.reads(&args.graph, "it is the graph");
+    }
     graph.files().into_iter().for_each(|path| targets.reads(path, "the graph reads it"));
-    add_targets(&mut targets, graph, &request.outputs, &args.out, format, &request.frames);
+    if !args.no_write {
+        add_targets(&mut targets, graph, &request.outputs, &args.out, format, &request.frames);
+    }
     pictures.iter().for_each(|pictures| pictures.add_targets(&mut targets));
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.as_ref().filter(|path| !is_stdout(path)) {
         targets.writes("--report", Exit::CommandLine, path);
     }
     targets
@@ -231,12 +271,15 @@ fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, W
                 Some(param) => Part::Param(&error.node, param),
                 None => Part::Node(&error.node),
             };
-            let place = graph.place(&args.graph.display().to_string(), part);
+            let place = graph.place(&load::graph_name(&args.graph), part);
             lines.push(format!("{place}: {text}{more}"));
             reported.push(text);
         }
         let code = exit_of_error(error);
         exit = Some(exit.map_or(code, |exit: Exit| exit.min(code)));
+        if args.no_write {
+            continue;
+        }
         let kept = written.iter().any(|(index, written)| index == output && !written.files.is_empty());
         let name = &graph.outputs[*output].name;
         lines.push(match kept {
@@ -247,7 +290,10 @@ fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, W
     if report.cancelled {
         let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
         let frames = if frames == 1 { "1 complete frame was".into() } else { format!("{frames} complete frames were") };
-        lines.push(format!("interrupted; {frames} written"));
+        lines.push(match args.no_write {
+            true => "interrupted".into(),
+            false => format!("interrupted; {frames} written"),
+        });
         exit = Some(exit.map_or(Exit::Interrupted, |exit| exit.min(Exit::Interrupted)));
     }
     match exit {

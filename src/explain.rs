@@ -16,16 +16,16 @@ use crate::{load, memory};
 /// The arguments of `explain`.
 #[derive(Debug, clap::Args)]
 pub struct ExplainArgs {
-    /// The graph file
+    /// The graph file; - reads it from stdin
     graph: PathBuf,
-    /// Frames to plan: 1-48, 1-48x2 (every second), 10, 10.5, or a list: 1-4,10,20-24 [default: the scene's frames]
+    /// Frames to plan: 1-48, 1-48x2 (every second), 10, 10.5, 1- (to the scene's end), or a list: 1-4,10 [default: the scene's frames]
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<Frames>,
     /// Explain only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// Override a param (node.param=JSON) or a control (name=JSON), such as wind.octaves=3; repeatable
-    #[arg(long, value_name = "KEY=JSON")]
+    /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
     /// Print the plan as JSON
     #[arg(long)]
@@ -44,7 +44,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
-        frames: args.frames.as_ref().map_or_else(|| Frames::of_scene(&graph.scene), Frames::frames),
+        frames: Frames::of_scene(args.frames.as_ref(), &graph.scene)?,
     };
     let planned = Request { frames: request.frames.iter().take(MOST_FRAMES).collect(), ..request.clone() };
     let rehearsed = engine.rehearse(&graph, &planned);

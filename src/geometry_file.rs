@@ -3,6 +3,7 @@
 //! A run of `#` in a [`Numbered`] name is replaced by the frame number, as in a graph. Limit: files are read as a
 //! whole, and USD is not read.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
@@ -136,6 +137,49 @@ pub fn stem_and_frame(path: &Path) -> (String, Option<Frame>) {
         }
     }
     (stem, None)
+}
+
+/// The files of the one sequence, or the one file, in a folder; frames ascend. Files that cannot be read as geometry do
+/// not count.
+///
+/// # Errors
+/// If the folder cannot be listed, or holds no file or several sequences.
+pub fn sequence_in(folder: &Path) -> Result<Vec<(Frame, PathBuf)>, Failure> {
+    let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
+    let mut sequences: BTreeMap<String, Vec<(Frame, PathBuf)>> = BTreeMap::new();
+    for entry in fs::read_dir(folder).map_err(unread)? {
+        let path = entry.map_err(unread)?.path();
+        let Some(format) = Format::of_path(&path).ok().filter(|format| format.is_read() && path.is_file()) else {
+            continue;
+        };
+        let (stem, frame) = stem_and_frame(&path);
+        let name = match frame {
+            Some(_) => folder.join(format!("{stem}.####.{format}")),
+            None => path.clone(),
+        };
+        let frame = frame.unwrap_or(Frame::whole(1));
+        sequences.entry(name.display().to_string()).or_default().push((frame, path));
+    }
+    let names: Vec<String> = sequences.keys().take(8).map(|name| format!("`{name}`")).collect();
+    let mut files = match (sequences.pop_first(), sequences.is_empty()) {
+        (Some((_, files)), true) => files,
+        (None, _) => return Err(Failure::file(format!("`{}` holds no obj, ply or json file", folder.display()))),
+        (Some(_), false) => {
+            let fact = format!("`{}` holds several sequences", folder.display());
+            return Err(Failure::new(Exit::CommandLine, format!("{fact}; convert one of {}", names.join(", "))));
+        }
+    };
+    files.sort_unstable();
+    match files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some(pair) => {
+            let (one, other) = (pair[0].1.display(), pair[1].1.display());
+            Err(Failure::new(
+                Exit::CommandLine,
+                format!("`{one}` and `{other}` are the same frame; remove one of them"),
+            ))
+        }
+        None => Ok(files),
+    }
 }
 
 /// The inverse of [`Frame::file_label`].

@@ -20,6 +20,7 @@ pub mod cook;
 pub mod diff;
 pub mod explain;
 pub mod failure;
+pub mod functions;
 pub mod geometry_file;
 pub mod load;
 pub mod memory;

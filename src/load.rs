@@ -23,6 +23,11 @@ const LARGEST_GRAPH: u64 = 256 << 20;
 /// If the file cannot be read. Faults of the graph are in the inner result.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     let mut bytes = Vec::new();
+    if is_stdin(path) {
+        let read = std::io::stdin().take(LARGEST_GRAPH + 1).read_to_end(&mut bytes);
+        read.map_err(|error| Failure::file(format!("the graph could not be read from stdin: {error}")))?;
+        return loaded(&bytes, path, set);
+    }
     let file = engine::files::open(path).and_then(|file| {
         // Without it the buffer grows by doubling.
         let length = file.metadata().map_or(0, |about| about.len());
@@ -30,13 +35,29 @@ pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, 
         file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes)
     });
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
+    loaded(&bytes, path, set)
+}
+
+/// Whether a graph is to be read from stdin.
+pub fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// The name of a graph's file in messages and reports.
+pub fn graph_name(path: &Path) -> String {
+    if is_stdin(path) { "stdin".into() } else { path.display().to_string() }
+}
+
+/// The graph in the bytes of the file at `path`.
+fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
     if bytes.len() as u64 > LARGEST_GRAPH {
-        let fact = format!("the graph `{}` is larger than {} MiB", path.display(), LARGEST_GRAPH >> 20);
+        let fact = format!("the graph `{}` is larger than {} MiB", graph_name(path), LARGEST_GRAPH >> 20);
         return Err(Failure::file(format!("{fact}; store geometry in separate files")));
     }
-    let folder = path.parent().filter(|_| !is_handed_over(path)).map_or_else(PathBuf::new, Path::to_owned);
+    let folder =
+        path.parent().filter(|_| !is_handed_over(path) && !is_stdin(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
-    Ok(Graph::load_bytes(&bytes, &folder, CATALOGUE, &set, &probe))
+    Ok(Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe))
 }
 
 /// The graph at `path`, checked as far as possible before cooking: compatible params, valid geometry files, outputs
@@ -94,7 +115,7 @@ pub fn strict(strict: bool, notes: &[Note]) -> Result<(), Failure> {
 
 /// The failure for a list of faults, with one line each.
 pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
-    let file = path.display().to_string();
+    let file = graph_name(path);
     let mut lines: Vec<String> = faults.iter().take(MOST_SHOWN).map(|fault| fault.in_file(&file)).collect();
     match faults.len() {
         0 | 1 => {}

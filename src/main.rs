@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use convect::failure::{Exit, Failure, too_large_files_are_errors};
 use convect::say;
-use convect::{check, completions, convert, cook, diff, explain, nodes, schema, stats};
+use convect::{check, completions, convert, cook, diff, explain, functions, nodes, schema, stats};
 
 /// Keeps the pages of large arrays between frames. The system's allocator returns them at once, and requesting them
 /// again costs a third of the time of a frame of a million curves.
@@ -31,6 +31,8 @@ enum Verb {
     Diff(diff::DiffArgs),
     /// Convert geometry files from one format to another
     Convert(convert::ConvertArgs),
+    /// Print the reference of the expression language: names, operators, functions
+    Functions,
     /// Print the JSON Schema of graph files, for editors
     Schema,
     /// Print a shell's completion script
@@ -77,6 +79,7 @@ fn run(verb: &Verb) -> Result<(), Failure> {
         Verb::Stats(args) => stats::run(args),
         Verb::Diff(args) => diff::run(args),
         Verb::Convert(args) => convert::run(args),
+        Verb::Functions => functions::run(),
         Verb::Schema => schema::run(),
         Verb::Completions(args) => completions::run::<Verb>(args),
     }

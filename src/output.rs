@@ -33,6 +33,8 @@ enum Target {
     Sequence { flavour: Flavour, writer: Option<Box<UsdWriter>> },
     /// One file per frame.
     PerFrame,
+    /// No file: frames are only counted.
+    Nothing,
 }
 
 /// The files of all outputs of a cook.
@@ -44,12 +46,18 @@ pub struct Writers<'g> {
 }
 
 impl<'g> Writers<'g> {
+    /// Writers that only count the frames of `outputs`.
+    pub fn none(graph: &'g Graph, outputs: &[usize], format: Format) -> Self {
+        let outputs = outputs.iter().map(|output| (*output, Target::Nothing, Written::default())).collect();
+        Self { graph, folder: PathBuf::new(), format, outputs }
+    }
+
     /// Writers for `outputs` into `folder`, which is created if it is missing.
     ///
     /// # Errors
     /// If the folder cannot be created or written to.
     pub fn new(graph: &'g Graph, outputs: &[usize], folder: &Path, format: Format) -> Result<Self, Failure> {
-        fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "created", error)))?;
+        create_folder(folder)?;
         let target = || match format {
             Format::Usdc => Target::Sequence { flavour: Flavour::Usdc, writer: None },
             Format::Usda => Target::Sequence { flavour: Flavour::Usda, writer: None },
@@ -68,6 +76,10 @@ impl<'g> Writers<'g> {
         for (output, target, written) in &mut self.outputs {
             let mine: Vec<&Delivered> = finished.iter().filter(|one| one.output == *output).collect();
             let name = &graph.outputs[*output].name;
+            if let Target::Nothing = target {
+                written.frames.extend(mine.iter().map(|one| one.frame));
+                continue;
+            }
             for lost in mine.iter().flat_map(|one| formats::lost(format, &one.geometry)) {
                 if !written.lost.contains(&lost) {
                     written.lost.push(lost);
@@ -87,6 +99,7 @@ impl<'g> Writers<'g> {
                         written.frames.push(one.frame);
                     }
                 }
+                Target::Nothing => {}
                 Target::PerFrame => {
                     use rayon::prelude::*;
                     let files = mine.par_iter().map(|one| write_frame(graph, folder, format, one)).collect::<Vec<_>>();
@@ -103,17 +116,21 @@ impl<'g> Writers<'g> {
     }
 
     /// Finishes files with all frames, except those of outputs in `incomplete`: a file with missing frames could be
-    /// mistaken for a complete one. Returns what was written, by index of the output.
+    /// mistaken for a complete one. Those in `sampled` get time samples of every attribute. Returns what was written, by
+    /// index of the output.
     ///
     /// # Errors
     /// If a file cannot be finished.
-    pub fn finish(self, incomplete: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
+    pub fn finish(self, incomplete: &[usize], sampled: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
         let mut all = Vec::new();
         for (output, target, mut written) in self.outputs {
-            if let Target::Sequence { writer: Some(writer), .. } = target {
+            if let Target::Sequence { writer: Some(mut writer), .. } = target {
                 if incomplete.contains(&output) {
                     written.frames.clear();
                 } else {
+                    if sampled.contains(&output) {
+                        writer.sample_all();
+                    }
                     let name = &self.graph.outputs[output].name;
                     let summary = writer.finish().map_err(usd_failed)?;
                     written.files.push(sequence_path(&self.folder, name, self.format));
@@ -160,6 +177,14 @@ fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) ->
         .map_err(|error| Failure::file(format!("`{}` could not be written: {error}", path.display())))?;
     write_whole(&path, &bytes)?;
     Ok((path, bytes.len() as u64))
+}
+
+/// Creates a folder and those above it, where they are missing.
+///
+/// # Errors
+/// If it cannot be created.
+pub fn create_folder(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| failed(&FileError::new(folder, "created", error)))
 }
 
 /// Writes a whole file atomically.

@@ -151,7 +151,7 @@ impl<'g> Pictures<'g> {
         let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let asked = &staged.request.frames;
-        let stills = args.preview_frames.as_ref().map(Frames::frames);
+        let stills = args.preview_frames.as_ref().map(|frames| frames.of(&staged.graph.scene)).transpose()?;
         if let Some(frame) = stills.iter().flat_map(FrameSet::iter).find(|frame| !asked.contains(*frame)) {
             return Err(wrong(format!("--preview-frames: frame {frame} is not among the frames to cook")));
         }

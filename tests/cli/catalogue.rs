@@ -85,6 +85,12 @@ fn the_schema_is_json_that_names_every_node() {
 }
 
 #[test]
+fn the_expression_language_is_printed() {
+    let text = Bench::new().done(&["functions"]);
+    assert!(text.starts_with("Expressions\n") && text.contains("smoothstep(low, high, x)"), "{text}");
+}
+
+#[test]
 fn every_shell_has_completions() {
     let bench = Bench::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
@@ -97,7 +103,8 @@ fn every_shell_has_completions() {
 fn help_and_version_exit_with_0() {
     let bench = Bench::new();
     let help = bench.done(&["--help"]);
-    for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "schema", "completions"] {
+    for verb in ["cook", "check", "explain", "nodes", "stats", "diff", "convert", "functions", "schema", "completions"]
+    {
         assert!(help.contains(&format!("\n  {verb} ")), "{verb} in {help}");
         let page = bench.done(&[verb, "--help"]);
         assert!(page.contains(&format!("Usage: convect {verb}")), "{page}");

@@ -68,11 +68,9 @@ fn a_sequence_becomes_one_file_or_one_file_per_frame() {
         bench.files("usd")["grass.usdc"] == std::fs::read(bench.path("grass.usdc")).unwrap(),
         "the same as written by cook"
     );
-    std::fs::create_dir(bench.path("ply")).unwrap();
     bench.done(&["convert", "out/grass.####.json", "ply/g_##.ply"]);
     assert_eq!(bench.names("ply"), ["g_01.ply", "g_02.ply", "g_03.ply", "g_04.ply"]);
     assert_eq!(bench.done(&["diff", "out/grass.####.json", "ply/g_##.ply"]), "the same\n");
-    std::fs::create_dir(bench.path("each")).unwrap();
     bench.done(&["convert", "out/grass.####.json", "each/grass.####.usdc"]);
     assert_eq!(bench.names("each").len(), 4);
 }
@@ -87,10 +85,10 @@ fn a_sequence_without_a_valid_target_or_files_is_refused() {
     let ran = bench.run(&["convert", "out/fur.####.json", "fur.usdc"]);
     let line = "no file matches `out/fur.####.json`\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
-    let ran = bench.run(&["convert", "out/grass.####.json", "none/grass.####.ply"]);
-    let line = "`none/grass.0001.ply` could not be created: no such file or folder; \
-                check the path, or create the folder first\n";
-    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
+    bench.write("file", "");
+    let ran = bench.run(&["convert", "out/grass.####.json", "file/grass.####.ply"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.starts_with("`file` could not be created: "), "{}", ran.stderr);
 }
 
 #[test]
@@ -108,4 +106,23 @@ fn conversion_scales_lengths() {
     let ran = bench.run(&["convert", "a.json", "c.usdc", "--scale", "1e37"]);
     let line = "`a.json`: `P` of points scaled by 1e37 is out of the range of f32\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), line));
+}
+
+#[test]
+fn a_folder_is_read_as_the_sequence_in_it() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--format", "json", "--output", "grass"]);
+    bench.write("out/notes.txt", "not geometry");
+    bench.done(&["convert", "out", "new/folder/g.####.ply"]);
+    assert_eq!(bench.names("new/folder"), ["g.0001.ply", "g.0002.ply", "g.0003.ply", "g.0004.ply"]);
+    bench.done(&["convert", "out", "grass.usdc"]);
+    bench.done(&["convert", "out/grass.####.json", "same/grass.usdc"]);
+    assert!(bench.files("same")["grass.usdc"] == std::fs::read(bench.path("grass.usdc")).unwrap());
+    bench.write("out/still.obj", "v 0 0 0");
+    let ran = bench.run(&["convert", "out", "all.usdc"]);
+    let line = "`out` holds several sequences; convert one of `out/grass.####.json`, `out/still.obj`\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), line));
+    std::fs::create_dir(bench.path("empty")).unwrap();
+    let ran = bench.run(&["convert", "empty", "all.usdc"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), "`empty` holds no obj, ply or json file\n"));
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::json;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, GRAPH, Ran};
 
 fn cooked(args: &[&str]) -> Vec<String> {
     let bench = Bench::new();
@@ -42,6 +42,7 @@ fn frames_are_ranges_steps_and_fractions() {
     assert_eq!(files("-1-1"), "grass.-0001 grass.0000 grass.0001");
     assert_eq!(files("4,1-2"), "grass.0001 grass.0002 grass.0004");
     assert_eq!(files("12345"), "grass.12345");
+    assert_eq!(files("3-"), "grass.0003 grass.0004");
 }
 
 #[test]
@@ -80,6 +81,74 @@ fn params_and_controls_are_set_from_the_command_line() {
     assert_ne!(cook("control", &["--set", "wind_dir=[0, 0, -1]"]), plain);
     let still = cook("still", &["--set", "wind.global_rotate=0", "--set", "blades.scale=2"]);
     assert_eq!(still["points"][4], json!([0.0, 0.5, 0.0]), "no wind, twice as long");
+}
+
+#[test]
+fn words_are_set_without_quotes() {
+    let bench = Bench::new();
+    let cook = |out: &str, noise: &str| {
+        let set = format!("wind.noise={noise}");
+        bench.done(&["cook", "g.json", "--format", "json", "--frames", "2", "--out", out, "--set", &set]);
+        bench.read_json(&format!("{out}/grass.0002.json"))["curves"].clone()
+    };
+    assert_eq!(cook("bare", "billow"), cook("quoted", "\"billow\""));
+    assert_ne!(cook("bare", "billow"), cook("none", "none"));
+    let ran = bench.run(&["check", "g.json", "--set", "wind.noise=bilow"]);
+    assert!(ran.stderr.contains("unknown option \"bilow\"; did you mean \"billow\"?"), "{}", ran.stderr);
+    let ran = bench.run(&["check", "g.json", "--set", "wind.wind_dir=[1, 0"]);
+    assert_eq!(ran.code, Some(3), "a list that does not end is not a word: {}", ran.stderr);
+}
+
+#[test]
+fn a_graph_is_read_from_stdin_and_a_report_written_to_stdout() {
+    let bench = Bench::new();
+    let run = |args: &[&str]| {
+        let graph = std::fs::File::open(bench.path("g.json")).unwrap();
+        Ran::of(&bench.command(args).stdin(graph).output().unwrap())
+    };
+    let ran = run(&["cook", "-", "--no-write", "--report", "-"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!((&report["graph"], &report["outputs"]["grass"]["frames"]), (&json!("stdin"), &json!(4)));
+    assert_eq!(report["outputs"]["grass"]["files"], json!([]));
+    assert_eq!(bench.names(""), ["g.json", "grass.obj"], "nothing is written");
+    assert!(ran.stderr.contains("cooked 4 frames"), "{}", ran.stderr);
+    assert_eq!(run(&["check", "-"]).code, Some(0));
+    let ran = run(&["check", "-", "--set", "wind.nose=1"]);
+    assert!(ran.stderr.starts_with("--set wind.nose:1:1: "), "{}", ran.stderr);
+    bench.write("g.json", "{");
+    assert!(run(&["explain", "-"]).stderr.starts_with("stdin:1:"));
+}
+
+#[test]
+fn without_writing_pictures_are_drawn_and_errors_found() {
+    let bench = Bench::with_graph(crate::bench::CALM_AT_2);
+    let ran = bench.run(&["cook", "g.json", "--no-write", "--frames", "1-2", "--format", "obj"]);
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    assert!(!ran.stderr.contains("written"), "no file was to be written: {}", ran.stderr);
+    assert_eq!(bench.names(""), ["g.json", "grass.obj"]);
+    bench.done(&["cook", "g.json", "--no-write", "--frames", "1", "--preview"]);
+    assert_eq!(bench.names("out"), ["g.preview.png"]);
+}
+
+/// What is constant in a part but not in the scene has time samples; what is still has none.
+#[test]
+fn a_part_samples_whatever_varies_over_the_scene() {
+    let bench = Bench::new();
+    let graph = GRAPH.replace(
+        r#""global_rotate": { "expr": "0.4 + 0.1*sin(2*pi*time)" }"#,
+        r#""global_rotate": { "keyframes": [[2, 0.1], [3, 1]] }, "amplitude": 0"#,
+    );
+    bench.write("g.json", &graph);
+    let text = |file: &str| String::from_utf8(bench.files("out")[file].clone()).unwrap();
+    bench.done(&["cook", "g.json", "--format", "usda", "--frames", "1-2"]);
+    assert!(!text("grass.usda").contains("points.timeSamples"), "constant in these frames");
+    bench.done(&["cook", "g.json", "--format", "usda", "--part", "1-2"]);
+    let part = text("grass.usda");
+    assert!(part.contains("points.timeSamples") && part.contains("curveVertexCounts.timeSamples"), "{part}");
+    assert!(!text("still.usda").contains("timeSamples"));
+    let ran = bench.run(&["cook", "g.json", "--part", "1-2", "--frames", "1"]);
+    assert_eq!(ran.code, Some(2));
 }
 
 #[test]

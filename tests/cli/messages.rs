@@ -75,9 +75,9 @@ fn a_wrong_set_is_reported_by_its_key() {
         "--set wind.nois:1:1: nodes.wind.params.nois: `Curve_Wind` has no param `nois`; did you mean `noise`?\n"
     );
     assert_eq!(
-        stderr(graph, &["cook", "g.json", "--set", "wind.noise=perlin"]),
-        "--set wind.noise:1:1: found `perlin`, expected a value; a string needs double quotes that the shell must not remove: \
-         'wind.noise=\"perlin\"'\n"
+        stderr(graph, &["cook", "g.json", "--set", "wind.noise=[perlin]"]),
+        "--set wind.noise:1:2: found `perlin`, expected a value; a string in a list or an object needs double quotes that the \
+         shell must not remove: 'wind.noise=…\"perlin\"…'\n"
     );
 }
 

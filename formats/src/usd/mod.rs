@@ -2,7 +2,7 @@
 //!
 //! A [`UsdWriter`] is given one geometry per frame and keeps only the last one in memory, plus 8 bytes per attribute
 //! and frame. An array that equals the previous one of its attribute, by address or bit for bit, is stored once; what
-//! never changes is written as a default value instead of time samples. Both file formats are written from one
+//! never changes is written as a default value instead of time samples, unless [`UsdWriter::sample_all`] is called. Both file formats are written from one
 //! description of the stage (`layout` maps arrays to attributes, `stage` is the description), and every f32 and i32 is
 //! read back bit for bit, except the payload of a NaN in text. Limits: a volume is refused, a USD attribute has one
 //! type in all frames, and nothing is readable before [`UsdWriter::finish`].
@@ -105,6 +105,12 @@ impl UsdWriter {
     /// attribute changed its type. A refused frame does not change the writer; after a failed write all calls fail.
     pub fn frame(&mut self, time_code: f64, geometry: &Geometry) -> Result<(), UsdError> {
         self.recorder.frame(time_code, geometry).map_err(|fault| located(&self.path, fault))
+    }
+
+    /// Writes time samples of every attribute, even of those that have one value in all frames. Parts of a sequence can
+    /// be joined only if they sample the same attributes.
+    pub fn sample_all(&mut self) {
+        self.recorder.sample_all();
     }
 
     /// Writes the structure, syncs the file to disk and renames it. A file without frames is valid: an empty `/NAME`.

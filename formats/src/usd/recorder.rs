@@ -50,6 +50,8 @@ pub(super) struct Recorder<W> {
     derived: [Derived; 4],
     tracks: BTreeMap<(Kind, Source), Track>,
     store: Store<W>,
+    /// Whether attributes that do not change have time samples too.
+    all_sampled: bool,
     failed: bool,
 }
 
@@ -77,6 +79,7 @@ impl<W> Recorder<W> {
             derived: Default::default(),
             tracks: BTreeMap::new(),
             store: Store { encoder, stored: 0, shared: 0 },
+            all_sampled: false,
             failed: false,
         }
     }
@@ -105,10 +108,15 @@ impl<W> Recorder<W> {
         Ok(())
     }
 
+    /// Writes time samples of all attributes.
+    pub(super) fn sample_all(&mut self) {
+        self.all_sampled = true;
+    }
+
     /// Writes the structure and returns the file.
     pub(super) fn finish(self) -> Result<(W, Counts), Fault> {
         self.refuse_after_failure()?;
-        let Self { header, times, tracks, store, .. } = self;
+        let Self { header, times, tracks, store, all_sampled, .. } = self;
         let counts = Counts { frames: times.len(), stored: store.stored, shared: store.shared };
         let mut by_kind: BTreeMap<Kind, Vec<(Source, Track)>> = BTreeMap::new();
         for ((kind, source), track) in tracks {
@@ -121,7 +129,7 @@ impl<W> Recorder<W> {
             fps: header.fps,
             origin: header.origin,
             times,
-            prims: by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks)).collect(),
+            prims: by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks, all_sampled)).collect(),
         };
         Ok((store.encoder.finish(&stage)?, counts))
     }
@@ -220,12 +228,12 @@ impl Track {
 }
 
 /// A component's tracks as a prim.
-fn prim(kind: Kind, tracks: Vec<(Source, Track)>) -> Prim {
+fn prim(kind: Kind, tracks: Vec<(Source, Track)>, all_sampled: bool) -> Prim {
     let moving = tracks.iter().any(|(source, track)| layout::is_motion(source) && track.changes());
     let names = attribute_names(kind, &tracks);
     let attribute = |((source, track), (name, display_name)): ((Source, Track), (String, Option<String>))| {
         let declaration = layout::declare(kind, &source, track.rows);
-        let sampled = track.changes() || (moving && layout::is_motion(&source));
+        let sampled = all_sampled || track.changes() || (moving && layout::is_motion(&source));
         let values = match track.samples.first() {
             Some(first) if !sampled => Values::Default(*first),
             _ => Values::Samples(track.samples),

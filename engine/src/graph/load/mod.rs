@@ -21,6 +21,7 @@ mod param;
 mod scene;
 mod wires;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -55,7 +56,7 @@ pub fn probe(path: &Path) -> std::io::Result<()> {
 
 impl Graph {
     /// Loads a graph from the text of its file. Relative paths are resolved against `folder`; `set` replaces params
-    /// (`node.param`) and controls by JSON values, as `--set` does.
+    /// (`node.param`) and controls by JSON values or bare words, as `--set` does.
     ///
     /// # Errors
     /// All faults, in the order of the file, then those of `set`.
@@ -119,6 +120,7 @@ fn load(
     faults: &mut Vec<Fault>,
 ) -> Option<Graph> {
     let text = Text::new(text.strip_prefix('\u{feff}').unwrap_or(text), None);
+    let set: Vec<(&str, Cow<'_, str>)> = set.iter().map(|(key, value)| (&**key, quoted_if_bare(value))).collect();
     let set_texts: Vec<Text<'_>> = set.iter().map(|(key, value)| Text::new(value, Some(key))).collect();
     let set_values: Vec<_> = set_texts.iter().map(|text| parse(text).map_err(|fault| faults.push(fault))).collect();
     let root = parse(&text).map_err(|fault| faults.push(fault)).ok()?;
@@ -158,6 +160,22 @@ fn load(
     let bypassed = order.nodes.iter().filter(is_bypassed).map(|node| drafts[*node].text.entry.name.into()).collect();
     let (nodes, outputs) = assemble(drafts, &order, &components, outputs)?;
     Some(Graph { scene, nodes, outputs, folder: folder.to_owned(), positions, bypassed, notes: Vec::new() })
+}
+
+/// A value of `--set`: as it is if it is JSON, or looks like a list, an object, a string or a number with a fault; else as
+/// a JSON string, so that words and paths need no quotes.
+fn quoted_if_bare(value: &str) -> Cow<'_, str> {
+    let text = value.trim();
+    let looks_like_a_number = || {
+        text.starts_with(|c: char| "+-.".contains(c) || c.is_ascii_digit())
+            && text.contains(|c: char| c.is_ascii_digit())
+            && !text.contains(|c: char| c.is_alphabetic() && !"eExX".contains(c) || c == '/')
+    };
+    let is_json = || parse(&Text::new(value, None)).is_ok();
+    match text.is_empty() || text.starts_with(['{', '[', '"']) || looks_like_a_number() || is_json() {
+        true => value.into(),
+        false => serde_json::Value::from(text).to_string().into(),
+    }
 }
 
 /// What nodes of one type share.

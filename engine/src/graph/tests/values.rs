@@ -270,6 +270,18 @@ fn sets_replace_add_and_correct_values() {
 }
 
 #[test]
+fn sets_take_words_without_quotes() {
+    let text = r#"{"convect": 1, "controls": {"word": "none"}, "outputs": {"o": "all"}, "nodes": {
+        "all": {"type": "Every_Shape", "params": {"choice": {"control": "word"}}},
+        "mesh": {"type": "Mesh_In", "params": {"file": "a.obj"}}}}"#;
+    let set = [("word", "wavelet"), ("all.text", "a \\ \"b\" "), ("mesh.file", "../b.obj"), ("all.bool", " false")];
+    let graph = load_with(text, &set).unwrap_or_else(|faults| panic!("{faults:#?}"));
+    assert_eq!((constant(&graph, "choice"), constant(&graph, "bool")), (Value::Choice(2), Value::Bool(false)));
+    assert_eq!(constant(&graph, "text"), Value::Text("a \\ \"b\"".into()));
+    assert!(matches!(source(&graph, "mesh", "file"), Source::File { path, .. } if path.ends_with("../b.obj")));
+}
+
+#[test]
 fn the_probe_distinguishes_files_folders_and_missing_files() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let file = folder.path().join("a.obj");
