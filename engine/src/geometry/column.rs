@@ -153,6 +153,23 @@ impl Column {
         self.kind() == other.kind() && self.address() == other.address()
     }
 
+    /// Whether both have the same type and the same bits.
+    pub fn has_bits_of(&self, other: &Self) -> bool {
+        fn floats<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> bool {
+            let (a, b) = (a.as_flattened(), b.as_flattened());
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+        }
+        match (self, other) {
+            (Self::F1(a), Self::F1(b)) => floats(a.as_chunks::<1>().0, b.as_chunks::<1>().0),
+            (Self::F3(a), Self::F3(b)) => floats(a, b),
+            (Self::F4(a), Self::F4(b)) => floats(a, b),
+            (Self::I1(a), Self::I1(b)) => a == b,
+            (Self::I3(a), Self::I3(b)) => a == b,
+            (Self::I4(a), Self::I4(b)) => a == b,
+            _ => false,
+        }
+    }
+
     /// The array's address: equal addresses mean one shared array.
     pub fn address(&self) -> usize {
         each!(self, a => Arc::as_ptr(a) as usize)
@@ -285,6 +302,18 @@ impl Table {
     pub fn edit<T: Item>(&mut self, name: &str) -> Option<&mut [T]> {
         let column = Arc::make_mut(&mut self.columns).get_mut(name)?;
         T::array_mut(column).map(|array| Arc::make_mut(array).as_mut_slice())
+    }
+
+    /// Takes every array that `other` has with the same bits from there, so that both share it.
+    pub fn share_with(&mut self, other: &Self) {
+        let shared = |(name, column): (&Name, &Column)| {
+            let theirs = other.column(name).filter(|theirs| !theirs.same(column) && theirs.has_bits_of(column))?;
+            Some((name.clone(), theirs.clone()))
+        };
+        let shared: Vec<(Name, Column)> = self.columns.iter().filter_map(shared).collect();
+        if !shared.is_empty() {
+            Arc::make_mut(&mut self.columns).extend(shared);
+        }
     }
 
     /// Removes a column.

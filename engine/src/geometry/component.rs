@@ -210,6 +210,21 @@ impl Component {
         self.derived.get_or(|| compute(self))
     }
 
+    /// Takes topology and arrays that `other` has with the same bits from there, with what is derived of them: what is
+    /// known by address, such as trees, is then known for both.
+    pub fn share_with(&mut self, other: &Self) {
+        if !self.topology.same(&other.topology) && self.topology == other.topology {
+            self.topology = other.topology.clone();
+        }
+        for owner in Owner::ALL {
+            self.table_mut(owner).share_with(other.table(owner));
+        }
+        let positions = |of: &Self| of.points.column(P.name).map(Column::address);
+        if self.topology.same(&other.topology) && positions(self) == positions(other) {
+            self.derived = other.derived.clone();
+        }
+    }
+
     /// Clears derived values, because positions are about to change.
     fn forget_derived(&mut self, owner: Owner, name: &str) {
         if owner == P.owner && name == P.name {

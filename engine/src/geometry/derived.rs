@@ -80,4 +80,28 @@ mod tests {
         assert_eq!(*part.derived(|part| part.point_count()), 1);
         assert_eq!(highest(&part), 2.0);
     }
+
+    #[test]
+    fn equal_arrays_are_shared_with_another_component_and_with_them_what_is_derived() {
+        let part = || {
+            let mut part = Component::curves(vec![2], vec![[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]).unwrap();
+            part.set(ENVELOPE, vec![0.0, 1.0]).unwrap();
+            part
+        };
+        let (known, mut read) = (part(), part());
+        let derived = known.derived(|part| Highest(highest(part)));
+        assert!(!read.topology().same(known.topology()));
+        read.share_with(&known);
+        assert!(read.topology().same(known.topology()));
+        assert!(std::sync::Arc::ptr_eq(&derived, &read.derived(|part| Highest(highest(part)))));
+
+        // A sign of zero is a difference.
+        let mut other = part();
+        other.set(ENVELOPE, vec![-0.0, 1.0]).unwrap();
+        other.set(P, vec![[0.0, 1.0, 0.0], [0.0, 4.0, 0.0]]).unwrap();
+        let before = other.clone();
+        other.share_with(&known);
+        assert_eq!(other.get(ENVELOPE).unwrap()[0].to_bits(), (-0.0_f32).to_bits());
+        assert_eq!((highest(&other), other == before, other.topology().same(known.topology())), (4.0, true, true));
+    }
 }

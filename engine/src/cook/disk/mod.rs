@@ -22,11 +22,11 @@ use crate::key::ContentKey;
 /// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
 const EVERY: i64 = 8;
 
-/// Nanoseconds of cooking that make a byte of a result worth keeping: several times what writing and reading it takes.
-const COST_PER_BYTE: u32 = 10;
+/// Nanoseconds of cooking that make a byte of a result worth keeping: twice what writing and reading it takes.
+const COST_PER_BYTE: u32 = 2;
 
 /// What a result must take at least to be kept: an entry is a file.
-const LEAST_COST: Duration = Duration::from_millis(2);
+const LEAST_COST: Duration = Duration::from_millis(1);
 
 /// A folder with checkpoints, finished frames and results.
 pub struct DiskCache {

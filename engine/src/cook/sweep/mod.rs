@@ -73,6 +73,10 @@ struct NodeRun<'p> {
     /// Outputs of a window or solver at the last whole frames, which samples between frames read again.
     recent: BTreeMap<i64, Outcome>,
     integrals: Option<Integrals<'p>>,
+    /// The result that was read from disk last, with which the next one shares what has not changed.
+    loaded: Option<Cooked>,
+    /// Whether its results are worth keeping on disk.
+    is_kept: bool,
     /// Mean wall time of a call in the last slice.
     call_time: Duration,
     /// What it takes to make a result again from what the disk cache holds.
@@ -117,6 +121,8 @@ impl<'p> NodeRun<'p> {
             states: BTreeMap::new(),
             recent: BTreeMap::new(),
             integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
+            loaded: None,
+            is_kept: false,
             call_time: Duration::MAX,
             recreated_in: Duration::ZERO,
             held: None,

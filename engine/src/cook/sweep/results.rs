@@ -2,28 +2,47 @@
 //! after the change, and windows that start anew find their past.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::Sweep;
 use crate::cook::disk::KeptMetric;
 use crate::cook::store::Cooked;
+use crate::geometry::Kind;
 use crate::key::ContentKey;
 use crate::time::Frame;
 
 impl Sweep<'_, '_, '_> {
     /// A result that an earlier cook has kept.
     pub(super) fn result_on_disk(&mut self, node: usize, frame: Frame, key: ContentKey) -> Option<Cooked> {
-        let (cooked, metrics) = self.disk.as_mut()?.result(key)?;
+        let (mut cooked, metrics) = self.disk.as_mut()?.result(key)?;
         let outputs = self.plan.graph.nodes[node].node().map_or(1, |declared| declared.outputs.len());
         if cooked.len() != outputs {
             return None;
         }
+        self.share_loaded(node, &mut cooked);
         self.nodes[node].report.from_cache += 1;
         let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum::<usize>();
         self.nodes[node].bytes += bytes;
         self.live_bytes += bytes;
         self.publish_results(node, frame, &metrics);
         Some(cooked)
+    }
+
+    /// Shares topology and arrays with what was loaded before: nodes know what they have prepared, such as trees, by
+    /// address.
+    fn share_loaded(&mut self, node: usize, cooked: &mut Cooked) {
+        let own = self.nodes[node].loaded.take();
+        let others = self.nodes.iter().filter_map(|run| run.loaded.clone());
+        let known: Vec<Cooked> = if own.is_some() { own.into_iter().collect() } else { others.collect() };
+        for geometry in Arc::get_mut(cooked).into_iter().flatten().filter_map(Arc::get_mut) {
+            for kind in Kind::ALL {
+                let Some(part) = geometry.part_mut(kind) else { continue };
+                let theirs = known.iter().flat_map(|cooked| cooked.iter()).filter_map(|theirs| theirs.part(kind));
+                theirs.for_each(|theirs| part.share_with(theirs));
+            }
+        }
+        self.nodes[node].loaded = Some(cooked.clone());
     }
 
     /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it.
@@ -37,9 +56,12 @@ impl Sweep<'_, '_, '_> {
         for frame in frames {
             let Some(Ok(cooked)) = self.nodes[node].results.get(frame).cloned() else { continue };
             let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
-            if !self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes)) {
+            // Once and for all: a window with some of its results would start anew for the others.
+            let worth = self.nodes[node].is_kept || self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes));
+            if !worth {
                 continue;
             }
+            self.nodes[node].is_kept = true;
             let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
             let metrics = self.metrics_of_result(node, *frame);
             if let Some(disk) = self.disk.as_mut() {
