@@ -326,10 +326,10 @@ fn a_signal_is_heard_while_frames_long_past_are_gone_through() {
         wait_for(4, &bench.path(""));
         std::thread::sleep(Duration::from_millis(200));
         signal(name, &child);
-        let asked = std::time::Instant::now();
+        let asked = engine::clock::Stopwatch::start();
         let ran = ended(child);
         assert_eq!(ran.code, Some(130), "{}", ran.stderr);
-        assert!(asked.elapsed() < Duration::from_secs(5), "{:?}", asked.elapsed());
+        assert!(asked.wall() < Duration::from_secs(5), "{:?}", asked.wall());
         assert!(bench.names("out").is_empty() && bench.names("").iter().all(|name| !name.contains(".tmp-")));
     }
 }

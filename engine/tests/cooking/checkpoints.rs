@@ -179,7 +179,8 @@ mod hostile {
         let whole = graph.cook(1..=12).bits();
         let elsewhere = tempfile::tempdir().expect("a folder");
         let precious = elsewhere.path().join("precious");
-        let things: [(&str, Box<dyn Fn(&Path)>); 6] = [
+        type Put<'a> = Box<dyn Fn(&Path) + 'a>;
+        let things: [(&str, Put<'_>); 6] = [
             ("folder", Box::new(|path| fs::create_dir(path).expect("a folder"))),
             (
                 "pipe",
