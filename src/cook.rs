@@ -13,12 +13,12 @@ use engine::plan::Request;
 use engine::time::Frame;
 use formats::Format;
 use formats::atomic::AtomicFile;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
 use crate::output::{Writers, Written, add_targets, create_folder, failed, fill};
 use crate::pictures::{self, Pictures, Staged};
+use crate::progress::Progress;
 use crate::targets::Targets;
 use crate::{load, memory, report};
 
@@ -131,7 +131,7 @@ fn cook(
     // Before the cook, so that an invalid path is reported at once.
     let report_path = args.report.as_ref().filter(|path| !is_stdout(path));
     let report_file = report_path.map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
-    let progress = progress(args, request);
+    let progress = Progress::new((request.frames.len() * request.outputs.len()) as u64, args.quiet);
     let mut writing = Duration::ZERO;
     let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
         let watch = Stopwatch::start();
@@ -139,12 +139,12 @@ fn cook(
         if let Some(pictures) = &mut pictures {
             pictures.take(finished)?;
         }
-        progress.inc(finished.iter().filter(|one| one.output < graph.outputs.len()).count() as u64);
+        progress.add(finished.iter().filter(|one| one.output < graph.outputs.len()).count() as u64);
         writing += watch.wall();
         Ok(())
     };
     let cooked = engine.cook(cooked.0, cooked.1, disk.as_mut(), &cancel, &mut sink);
-    progress.finish_and_clear();
+    drop(progress);
     let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
         Stopped::Sink(failure) => failure,
@@ -175,7 +175,7 @@ fn cook(
     }
     if !args.quiet {
         report.notes.iter().for_each(|note| crate::say!("note: {note}"));
-        print_summary(&report, &written, &drawn, args.verbose);
+        print_summary(&report, &written, &drawn, writing, args.verbose);
     }
     outcome(args, graph, &report, &written)?;
     reported?;
@@ -222,7 +222,7 @@ fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<
 }
 
 /// Prints what was written, and the speed, to stderr.
-fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], verbose: bool) {
+fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], writing: Duration, verbose: bool) {
     for (_, written) in written {
         if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
             let files = match written.files.len() {
@@ -236,14 +236,9 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
     }
     drawn.iter().for_each(|path| crate::say!("wrote {}", path.display()));
     let frames: BTreeSet<Frame> = written.iter().flat_map(|(_, written)| written.frames.iter().copied()).collect();
-    let seconds = report.cooking.as_secs_f64();
-    if !frames.is_empty() && seconds > 0.0 {
-        let rate = frames.len() as f64 / seconds;
-        crate::say!(
-            "cooked {} frame{} in {seconds:.2} s ({rate:.0} per second)",
-            frames.len(),
-            if frames.len() == 1 { "" } else { "s" }
-        );
+    if !frames.is_empty() {
+        let wrote_any = !drawn.is_empty() || written.iter().any(|(_, written)| !written.files.is_empty());
+        crate::say!("{}", times(frames.len(), report.cooking, wrote_any.then_some(writing)));
     }
     if verbose {
         for node in report.nodes.iter().filter(|node| node.needed) {
@@ -252,6 +247,19 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
             node.left_out.iter().for_each(|stage| crate::say!("    left out {}: {}", stage.stage, stage.why));
         }
     }
+}
+
+/// `cooked 72 frames in 1.77 s (41 per second), wrote them in 13.2 s`.
+fn times(frames: usize, cooking: Duration, writing: Option<Duration>) -> String {
+    let (s, them) = if frames == 1 { ("", "it") } else { ("s", "them") };
+    let seconds = cooking.as_secs_f64();
+    let rate = match frames as f64 / seconds {
+        rate if !rate.is_finite() => String::new(),
+        rate if rate < 1.0 => format!(" ({:.1} s per frame)", 1.0 / rate),
+        rate => format!(" ({rate:.0} per second)"),
+    };
+    let wrote = writing.map(|writing| format!(", wrote {them} in {:.2} s", writing.as_secs_f64())).unwrap_or_default();
+    format!("cooked {frames} frame{s} in {seconds:.2} s{rate}{wrote}")
 }
 
 /// The errors of nodes and the exit code.
@@ -302,12 +310,16 @@ fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, W
     }
 }
 
-fn progress(args: &CookArgs, request: &Request) -> ProgressBar {
-    let steps = (request.frames.len() * request.outputs.len()) as u64;
-    let target = if args.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let bar = ProgressBar::with_draw_target(Some(steps), target);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left") {
-        bar.set_style(style);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cooking_and_writing_are_told_apart() {
+        let ms = Duration::from_millis;
+        let quick = times(72, ms(1770), Some(ms(13_204)));
+        assert_eq!(quick, "cooked 72 frames in 1.77 s (41 per second), wrote them in 13.20 s");
+        assert_eq!(times(1, ms(4000), Some(ms(10))), "cooked 1 frame in 4.00 s (4.0 s per frame), wrote it in 0.01 s");
+        assert_eq!(times(2, ms(0), None), "cooked 2 frames in 0.00 s");
     }
-    bar
 }

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use engine::cook::NodeReport;
+use engine::graph::{Graph, GraphNode, Link};
 use engine::plan::{Request, Window};
 use serde_json::{Value, json};
 
@@ -51,7 +52,12 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let report = rehearsed.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
     let text = match args.json {
         true => {
-            let nodes: Vec<Value> = report.nodes.iter().map(to_json).collect();
+            let nodes: Vec<Value> = report
+                .nodes
+                .iter()
+                .zip(&graph.nodes)
+                .map(|(report, node)| to_json(report, &inputs(node, &graph)))
+                .collect();
             let plan = json!({"frames": request.frames.len(), "planned_frames": planned.frames.len(), "nodes": nodes});
             serde_json::to_string_pretty(&plan).unwrap_or_default() + "\n"
         }
@@ -93,13 +99,28 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
     }
 }
 
-fn to_json(node: &NodeReport) -> Value {
+/// What each input of a node reads: `"id"`, or `"id.output"` of nodes with several outputs.
+fn inputs(node: &GraphNode, graph: &Graph) -> Value {
+    let name = |link: &Link| {
+        let source = &graph.nodes[link.node];
+        match source.node().map_or(&[][..], |declared| declared.outputs) {
+            outputs @ [_, _, ..] => format!("{}.{}", source.id, outputs[link.port].name),
+            _ => source.id.to_string(),
+        }
+    };
+    let declared = node.node().map_or(&[][..], |declared| declared.inputs);
+    let wired = declared.iter().zip(node.inputs()).filter(|(_, links)| !links.is_empty());
+    let lists = wired.map(|(input, links)| (input.spec().name.to_owned(), links.iter().map(name).collect::<Value>()));
+    Value::Object(lists.collect())
+}
+
+fn to_json(node: &NodeReport, inputs: &Value) -> Value {
     let left_out: Vec<Value> = match node.needed {
         true => node.left_out.iter().map(|stage| json!({"stage": stage.stage, "why": stage.why})).collect(),
         false => vec![json!({"stage": "all", "why": why_not_needed(node)})],
     };
     json!({
-        "id": node.id.as_deref(), "type": node.type_name, "time": node.time, "needed": node.needed,
+        "id": node.id.as_deref(), "type": node.type_name, "inputs": inputs, "time": node.time, "needed": node.needed,
         "varies": node.varies, "cooks": node.cooks, "left_out": left_out,
         "window": node.window.map(|window| json!({"frames": window.frames, "every": window.every})),
     })

@@ -28,6 +28,7 @@ pub mod nodes;
 pub mod numbers;
 pub mod output;
 pub mod pictures;
+pub mod progress;
 pub mod report;
 pub mod schema;
 pub mod stats;

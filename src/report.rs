@@ -93,8 +93,11 @@ fn node_to_json(node: &NodeReport) -> Value {
         .metrics
         .iter()
         .map(|(name, values)| {
-            let values: Map<String, Value> =
-                values.iter().map(|(frame, value)| (frame.to_string(), json!(value))).collect();
+            let values: Map<String, Value> = match values.values().next() {
+                // The same at all frames, not only at the one at which the node was cooked.
+                Some(value) if !node.varies => Map::from_iter([(STILL.to_owned(), json!(value))]),
+                _ => values.iter().map(|(frame, value)| (frame.to_string(), json!(value))).collect(),
+            };
             ((*name).to_owned(), Value::Object(values))
         })
         .collect();
@@ -112,6 +115,9 @@ fn node_to_json(node: &NodeReport) -> Value {
         "metrics": metrics,
     })
 }
+
+/// In place of a frame, of metrics of a node whose result does not vary.
+const STILL: &str = "still";
 
 /// Why a node without dependents is left out.
 pub fn why_not_needed(node: &NodeReport) -> &'static str {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::bench::{Bench, CALM_AT_2};
+use crate::bench::{Bench, CALM_AT_2, GRAPH};
 
 fn names(bench: &Bench) -> Vec<String> {
     let nodes = bench.json(&["nodes", "--json"]);
@@ -55,7 +55,20 @@ fn explain_shows_how_often_each_node_cooks_and_what_is_left_out() {
     let cooks: Vec<(&Value, &Value)> =
         plan["nodes"].as_array().unwrap().iter().map(|node| (&node["id"], &node["cooks"])).collect();
     assert_eq!(cooks, [(&json!("blades"), &json!(1)), (&json!("wind"), &json!(4))]);
+    assert_eq!(plan["nodes"][0]["inputs"], json!({}));
+    assert_eq!(plan["nodes"][1]["inputs"], json!({"curves": ["blades"]}));
     assert_eq!(bench.names("out").len(), 0, "nothing is cooked");
+}
+
+#[test]
+fn a_bypassed_node_is_left_out_and_what_reads_it_reads_its_input() {
+    let bench =
+        Bench::with_graph(&GRAPH.replace(r#""type": "Curve_Wind","#, r#""type": "Curve_Wind", "bypass": true,"#));
+    let text = bench.done(&["explain", "g.json"]);
+    assert!(text.contains("left out: `bypass` is true"), "{text}");
+    assert_eq!(bench.run(&["check", "g.json", "--strict"]).code, Some(0));
+    bench.done(&["cook", "g.json", "--format", "json", "--frames", "2"]);
+    assert_eq!(bench.files("out")["grass.0002.json"], bench.files("out")["still.0002.json"]);
 }
 
 #[test]

@@ -174,6 +174,24 @@ fn the_report_is_as_documented() {
     assert_eq!(bench.names("out"), ["grass.0001.json", "grass.0002.json"]);
 }
 
+/// A tool that reads a metric at a frame finds it at every frame: under the frame, or under `still`.
+#[test]
+fn metrics_of_a_still_node_are_not_those_of_one_frame() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 3]}, "nodes": {
+            "ball": {"type": "Mesh_Primitive", "params": {"shape": "sphere", "divisions": 6}},
+            "tets": {"type": "Tetrahedralize", "inputs": {"surface": "ball"}}}, "outputs": {"o": "tets"}}"#,
+    );
+    for frames in ["1-3", "2"] {
+        bench.done(&["cook", "g.json", "--frames", frames, "--report", "r.json"]);
+        let tets = bench.read_json("r.json")["nodes"]["tets"].clone();
+        assert_eq!(tets["varies"], json!(false));
+        let counts = tets["metrics"]["tets"].as_object().unwrap();
+        assert_eq!(counts.keys().collect::<Vec<_>>(), ["still"], "{counts:?}");
+        assert!(counts["still"].as_f64().unwrap() > 10.0);
+    }
+}
+
 #[test]
 fn existing_files_are_replaced() {
     let bench = Bench::new();

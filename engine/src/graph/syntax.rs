@@ -176,9 +176,10 @@ fn explain(text: &Text<'_>, error: &ParseError) -> Fault {
         }
         K::HexadecimalNumbersNotAllowed => (format!("`{word}` is hexadecimal"), Some("numbers are decimal")),
         K::UnaryPlusNumbersNotAllowed => ("a number starts with `+`".into(), Some("leave the `+` out")),
-        K::BareDecimalPointNumbersNotAllowed => {
-            ("a number has no digit before or after its decimal point".into(), Some("write digits on both sides: 0.5, 5.0"))
-        }
+        K::BareDecimalPointNumbersNotAllowed => (
+            "a number has no digit before or after its decimal point".into(),
+            Some("write digits on both sides: 0.5, 5.0"),
+        ),
         K::ExpectedDigit | K::ExpectedDigitFollowingNegativeSign | K::ExpectedPlusMinusOrDigitInNumberLiteral => {
             ("a number is incomplete, expected a digit".into(), None)
         }
@@ -234,8 +235,14 @@ mod tests {
             ("['a']", "1:2: found `'`, expected a value or a key; write strings in double quotes"),
             ("[0x10]", "1:2: `0x10` is hexadecimal; numbers are decimal"),
             ("[+1]", "1:2: a number starts with `+`; leave the `+` out"),
-            ("[.5]", "1:2: a number has no digit before or after its decimal point; write digits on both sides: 0.5, 5.0"),
-            ("[5.]", "1:2: a number has no digit before or after its decimal point; write digits on both sides: 0.5, 5.0"),
+            (
+                "[.5]",
+                "1:2: a number has no digit before or after its decimal point; write digits on both sides: 0.5, 5.0",
+            ),
+            (
+                "[5.]",
+                "1:2: a number has no digit before or after its decimal point; write digits on both sides: 0.5, 5.0",
+            ),
             ("[01]", "1:3: a number has a leading zero; leave the zero out"),
             ("[1 2]", "1:3: expected `,`"),
             ("[NaN]", "1:2: `NaN` is not allowed; numbers must be finite"),
