@@ -95,7 +95,7 @@ pub(crate) static NODE: Node = Node::new(
     _ if params.get(INHERIT_MOTION) == 0.0 => vec![LeftOut::new("skin", "`inherit_motion` is 0")],
     _ => Vec::new(),
 })
-.mends_between(keep_lengths);
+.restores_between(keep_lengths);
 
 /// The state: springs, and the geometry that the next step needs.
 struct Swing {

@@ -6,21 +6,21 @@ use super::call::guarded;
 use super::store::Cooked;
 use crate::error::Result;
 use crate::geometry::{Geometry, P, V};
-use crate::node::MendBetween;
+use crate::node::RestoreBetween;
 
 /// The results of a window `share` of the way from `near[1]` to `near[2]`; `near[0]` and `near[3]` are the frames before
 /// and after. `P` and `v` go along the cubic Hermite through them (Catmull–Rom slopes); all else is that of `near[1]`.
-/// `mend` has the last word on each output.
+/// `restore` then corrects each output.
 ///
 /// # Errors
-/// Where `mend` panics.
-pub(super) fn interpolated(near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
+/// Where `restore` panics.
+pub(super) fn interpolated(near: [&Cooked; 4], share: f32, restore: Option<RestoreBetween>) -> Result<Cooked> {
     let one = |port: usize| {
         let near = near.map(|cooked| &*cooked[port]);
         let mut result = interpolated_geometry(near, share);
-        if let Some(mend) = mend {
+        if let Some(restore) = restore {
             guarded(|| {
-                mend([near[1], near[2]], share, &mut result);
+                restore([near[1], near[2]], share, &mut result);
                 Ok(())
             })?;
         }

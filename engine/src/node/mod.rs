@@ -147,13 +147,13 @@ pub struct Node {
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
     pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
-    /// Restores what interpolation between a window's frames does not keep; see [`Node::mends_between`].
-    pub mend_between: Option<MendBetween>,
+    /// Restores what interpolation between a window's frames does not keep; see [`Node::restores_between`].
+    pub restore_between: Option<RestoreBetween>,
 }
 
 /// Corrects an output of a window between two whole frames, at `share` (0..1) from the first, whose outputs are `near`.
 /// `P` and `v` of `between` are interpolated by a cubic, everything else is that of the first frame.
-pub type MendBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
+pub type RestoreBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
 
 impl Node {
     /// A node of that name; `version` is raised when its bits change.
@@ -176,7 +176,7 @@ impl Node {
             leaves_out: None,
             checks: None,
             integrands: [None; MOST_INTEGRANDS],
-            mend_between: None,
+            restore_between: None,
         }
     }
 
@@ -267,8 +267,8 @@ impl Node {
     /// Called for each output of a window between two whole frames, where positions are interpolated, to restore what
     /// the node guarantees at whole frames, such as lengths.
     #[must_use]
-    pub const fn mends_between(mut self, mend: MendBetween) -> Self {
-        self.mend_between = Some(mend);
+    pub const fn restores_between(mut self, restore: RestoreBetween) -> Self {
+        self.restore_between = Some(restore);
         self
     }
 

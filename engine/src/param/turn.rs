@@ -20,7 +20,7 @@ pub(super) fn between(from: [f64; 3], to: [f64; 3], share: f64) -> Value {
 }
 
 fn quaternion(degrees: [f64; 3]) -> DQuat {
-    // Whole turns are taken off first: exact, and a large angle loses nothing.
+    // Whole turns are removed first, which is exact, so large angles are as precise as small ones.
     let [x, y, z] = degrees.map(|angle| (angle % 720.0) * (std::f64::consts::PI / 180.0));
     rotation(DVec3::z(), z) * (rotation(DVec3::y(), y) * rotation(DVec3::x(), x))
 }

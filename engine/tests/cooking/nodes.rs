@@ -398,7 +398,7 @@ pub(crate) static FOLLOW: Node = FOLLOW_NODE;
 
 /// The same, with linear interpolation between frames.
 pub(crate) static CORRECTED: Node =
-    Node { name: "Corrected", ..FOLLOW_NODE }.mends_between(|[from, to], share, between| {
+    Node { name: "Corrected", ..FOLLOW_NODE }.restores_between(|[from, to], share, between| {
         let straight = first_x(from) + (first_x(to) - first_x(from)) * share;
         *between = moved(between, |_| straight).expect("as many rows as before");
     });

@@ -127,7 +127,7 @@ impl<'g> Sweep<'_, 'g, '_> {
     fn output_between(&mut self, node: ChainNode, frame: Frame, near: [i64; 4], share: f32) -> Outcome {
         let [a, b, c, d] = near.map(|whole| self.recent_output(node.index, whole));
         let (a, b, c, d) = (a?, b?, c?, d?);
-        let between = self.executor.interpolated([&a, &b, &c, &d], share, node.declared.mend_between);
+        let between = self.executor.interpolated([&a, &b, &c, &d], share, node.declared.restore_between);
         between.map_err(|error| Arc::new(self.plan.error(node.index, frame, error)))
     }
 

@@ -8,7 +8,7 @@ use crate::cook::store::{Cooked, Metrics};
 use crate::cook::types::completed;
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
-use crate::node::{ChainFns, FrameCx, MendBetween, Outputs, SolverFns, StateBox};
+use crate::node::{ChainFns, FrameCx, Outputs, RestoreBetween, SolverFns, StateBox};
 use crate::time::Frame;
 
 /// How a sweep carries out calls.
@@ -94,10 +94,15 @@ impl Executor {
     }
 
     /// The outputs of a window `share` of the way from `near[1]` to `near[2]`.
-    pub(super) fn interpolated(self, near: [&Cooked; 4], share: f32, mend: Option<MendBetween>) -> Result<Cooked> {
+    pub(super) fn interpolated(
+        self,
+        near: [&Cooked; 4],
+        share: f32,
+        restore: Option<RestoreBetween>,
+    ) -> Result<Cooked> {
         match self {
             Self::Rehearsal => Ok(near[1].clone()),
-            Self::Cook | Self::Check | Self::Types | Self::Reload => interpolated(near, share, mend),
+            Self::Cook | Self::Check | Self::Types | Self::Reload => interpolated(near, share, restore),
         }
     }
 }
