@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
 mod bench;
+mod cache;
 mod catalogue;
 mod check;
 mod convert;
