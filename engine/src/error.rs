@@ -20,6 +20,9 @@ pub enum ErrorKind {
     Cancelled,
 }
 
+/// The hint of errors that are not the user's.
+pub(crate) const IS_A_BUG: &str = "this is a bug in convect; please report it with the graph";
+
 /// A fact and an optional hint, neither of which names the node: `` `wind_dir` is [0, 0, 0], which has no direction ``.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{fact}{}", hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default())]
@@ -54,7 +57,7 @@ impl Error {
 
     /// The node violated its declaration.
     pub fn contract(fact: impl Into<String>) -> Self {
-        Self::new(ErrorKind::Contract, fact)
+        Self::new(ErrorKind::Contract, fact).hint(IS_A_BUG)
     }
 
     /// Names the param that caused the error: the fault is reported at its position in the graph file.

@@ -1,8 +1,11 @@
-//! Chores of the repository: `cargo xtask new-node NAME`, `cargo xtask bless [EXPECTATION]…`.
+//! Chores of the repository: `cargo xtask new-node NAME`, `cargo xtask bless [EXPECTATION]…`,
+//! `cargo xtask torture --minutes N`.
 
 mod bless;
 mod new_node;
 mod template;
+#[cfg(unix)]
+mod torture;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -37,6 +40,9 @@ enum Chore {
         /// Which; all if none is named
         expectations: Vec<bless::Expectation>,
     },
+    /// Run the program on mutated graphs, files and command lines; report panics, aborts, hangs and lost files
+    #[cfg(unix)]
+    Torture(torture::Options),
 }
 
 /// Whether a node depends on time.
@@ -55,6 +61,8 @@ fn main() -> ExitCode {
             new_node::write(&root(), &name, &family, &options)
         }
         Chore::Bless { expectations } => bless::store(&root(), &expectations),
+        #[cfg(unix)]
+        Chore::Torture(options) => torture::run(&root(), &options),
     };
     match result {
         Ok(said) => {

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::store::Cooked;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, IS_A_BUG, Result};
 use crate::geometry::{Geometry, Kind, Name, Owner, P};
 use crate::memory::Ceiling;
 use crate::node::{Carries, Cx, FrameCx, History, InputData, Needs, Node, Outputs, StepCx};
@@ -203,6 +203,5 @@ fn without_dead(geometry: &Arc<Geometry>, live: &[Name], stripped: &mut Vec<Name
 fn panicked(panic: &(dyn Any + Send)) -> Error {
     let said = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
     let said = said.unwrap_or("no message");
-    Error::new(ErrorKind::Panic, format!("it failed unexpectedly: {said}"))
-        .hint("this is a bug in convect; please report it with the graph")
+    Error::new(ErrorKind::Panic, format!("it failed unexpectedly: {said}")).hint(IS_A_BUG)
 }
