@@ -31,7 +31,7 @@ fn an_error_names_node_and_frame_and_everything_else_is_cooked() {
         (1, ErrorKind::Panic, format!("it failed unexpectedly: all is lost; {hint}")),
         (2, ErrorKind::NotFinite, "`P` of point 1 of the points is NaN or infinite".into()),
         (3, ErrorKind::Refused, "there is no such frame; ask for another".into()),
-        (4, ErrorKind::Contract, "it returns no `points`".into()),
+        (4, ErrorKind::Contract, format!("it returns no `points`; {hint}")),
     ];
     for (how, kind, text) in cases {
         let cooked = failing(how);
