@@ -85,6 +85,8 @@ pub(crate) struct Outcome {
     /// The first error of each node, by output.
     pub(crate) errors: Vec<(usize, ErrorKind, String)>,
     pub(crate) metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    /// Metrics that were NaN or infinite; the report has a note instead of the value.
+    pub(crate) undefined_metrics: Vec<&'static str>,
     /// The params that were read.
     pub(crate) read: Vec<bool>,
     pub(crate) left_out: Vec<LeftOut>,
@@ -244,6 +246,7 @@ impl Subject {
             found: BTreeMap::new(),
             errors: Vec::new(),
             metrics: BTreeMap::new(),
+            undefined_metrics: Vec::new(),
             read: vec![false; self.specs.len()],
             left_out: Vec::new(),
             names: None,
@@ -276,6 +279,11 @@ impl Subject {
                 outcome
                     .errors
                     .extend(errors.map(|(place, error, _)| (*place, error.error.kind, error.error.to_string())));
+                let metrics = self.node.metrics.iter().map(|metric| metric.name);
+                let says_so = |name: &str| {
+                    report.notes.iter().any(|note| note.kind == name && note.text.contains(&format!("has no `{name}`")))
+                };
+                outcome.undefined_metrics = metrics.filter(|name| says_so(name)).collect();
                 outcome.read = read;
                 outcome.names = names;
                 if let Some(node) = report.nodes.into_iter().last() {

@@ -13,10 +13,8 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
         for ((index, _), geometry) in &outcome.found {
             check_kinds(subject, outcome, subject.node.outputs[*index], geometry, findings);
         }
-        for (name, values) in &outcome.metrics {
-            if values.values().any(|value| !value.is_finite()) {
-                findings.add(format!("the metric `{name}` is NaN or infinite"));
-            }
+        for name in &outcome.undefined_metrics {
+            findings.add(format!("the metric `{name}` is NaN or infinite"));
         }
     }
     for metric in subject.node.metrics {
