@@ -31,7 +31,7 @@ fn main() {
     let noise = |kind: usize, waviness| {
         Some(BendNoise {
             field: &fields[kind],
-            amplitude: 0.5,
+            amplitude: 0.5.into(),
             frequency: 2.0,
             waviness,
             origin: [0.3, 0.0, 0.0],

@@ -59,7 +59,7 @@ params! { PARAMS:
         "The direction that the wind blows towards. Its length does not matter.").history();
     NOISE: Param<NoiseChoice> = Param::choice("noise", Some(NoiseKind::Perlin),
         "The noise that varies the wind's direction from place to place.");
-    AMPLITUDE: Param<f32> = Param::float("amplitude", 0.5,
+    AMPLITUDE: Param<Maskable> = Param::maskable("amplitude", 0.5,
         "Strength of the noise relative to the wind: at 0 the wind blows straight, at 1 noise and wind are equally \
          strong.")
         .at_least(0.0).soft(0.0, 2.0).when(has_kind);
@@ -136,6 +136,16 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let field =
         field.map(|kind| Field::new(kind, cx.get(OCTAVES) as u32, cx.get(ROUGHNESS), u64::from(cx.get(SEED).0)));
     let roots = if field.is_some() { noise_roots(cx, &curves)? } else { None };
+    let noise = |field| -> Result<BendNoise<'_>> {
+        Ok(BendNoise {
+            field,
+            amplitude: cx.mask(AMPLITUDE, &curves)?,
+            frequency: cx.get(FREQUENCY),
+            waviness: cx.get(WAVINESS),
+            origin: noise_origin(cx),
+            roots: roots.as_deref(),
+        })
+    };
     let bent = bend(
         curves.runs().starts(),
         curves.positions(),
@@ -151,14 +161,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
                 }
             },
             blend: cx.mask(BLEND, &curves)?,
-            noise: field.as_ref().map(|field| BendNoise {
-                field,
-                amplitude: cx.get(AMPLITUDE),
-                frequency: cx.get(FREQUENCY),
-                waviness: cx.get(WAVINESS),
-                origin: noise_origin(cx),
-                roots: roots.as_deref(),
-            }),
+            noise: field.as_ref().map(noise).transpose()?,
         },
     );
     cx.publish(MAX_ANGLE, f64::from(bent.max_angle));
@@ -177,7 +180,7 @@ fn has_kind(params: &Params) -> bool {
 }
 
 fn has_noise(params: &Params) -> bool {
-    has_kind(params) && params.get(AMPLITUDE) != 0.0
+    has_kind(params) && params.get(AMPLITUDE).value != 0.0
 }
 
 fn rest_from_start(params: &Params) -> bool {
@@ -300,12 +303,55 @@ mod tests {
         let error = calm(upright(1)).set(GLOBAL_ROTATE, masked.clone()).try_cook().unwrap_err();
         assert_eq!(error.fact, "`global_rotate` is masked by `soft`, which the curves do not have");
         let mut curves = upright(1);
-        curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::element("soft"), vec![0.5]).unwrap();
+        curves.part_mut(Kind::Curves).unwrap().set(Attr::<[f32; 3]>::element("soft"), vec![[0.5; 3]]).unwrap();
         let error = calm(curves).set(GLOBAL_ROTATE, masked).try_cook().unwrap_err();
         assert_eq!(
             error.to_string(),
-            "`global_rotate` is masked by `soft`, which is one float for each curve; expected one float for each CV"
+            "`global_rotate` is masked by `soft`, which is one float3 for each curve; expected one float for each CV"
         );
+    }
+
+    /// A mask of whole numbers, of each CV or of each curve, is that of the floats with these values.
+    #[test]
+    fn a_mask_may_be_whole_numbers_or_numbers_of_curves() {
+        let with = |set: &dyn Fn(&mut Component)| {
+            let mut curves = field(2);
+            set(curves.part_mut(Kind::Curves).unwrap());
+            let masked = Maskable { value: 0.5, attribute: Some("soft".into()) };
+            calm(curves).set(GLOBAL_ROTATE, masked).cook().curves().positions().to_vec()
+        };
+        let of = |curve: usize| [0.0_f32, 1.0, 2.0, 0.5][curve];
+        let floats = with(&|curves| curves.set(Attr::point("soft"), (0..20).map(|cv| of(cv / 5)).collect()).unwrap());
+        let curves = with(&|curves| curves.set(Attr::element("soft"), (0..4).map(of).collect()).unwrap());
+        assert_eq!(floats, curves);
+        let ones =
+            with(&|curves| curves.set(Attr::point("soft"), (0..20).map(|cv| of(cv / 5).floor()).collect()).unwrap());
+        let whole = |count: usize| (0..count).map(|row| of(row * 4 / count) as i32).collect::<Vec<i32>>();
+        assert_eq!(ones, with(&|curves| curves.set(Attr::point("soft"), whole(20)).unwrap()));
+        assert_eq!(ones, with(&|curves| curves.set(Attr::element("soft"), whole(4)).unwrap()));
+        assert_ne!(ones, floats);
+    }
+
+    /// Where the mask is 0 the wind blows straight, where it is 1 as without a mask.
+    #[test]
+    fn a_mask_scales_the_noise_where_it_is() {
+        let with = |amplitude: f32, mask: Option<fn(usize) -> f32>| {
+            let mut curves = field(2);
+            let part = curves.part_mut(Kind::Curves).unwrap();
+            let attribute = mask.map(|mask| {
+                part.set(Attr::element("noisy"), (0..4).map(mask).collect()).unwrap();
+                Name::from("noisy")
+            });
+            let bench = bench(&NODE).input(CURVES, curves).set(AMPLITUDE, Maskable { value: amplitude, attribute });
+            bench.cook().curves().positions().to_vec()
+        };
+        let (straight, noisy) = (with(0.0, None), with(0.8, None));
+        let mixed = with(0.8, Some(|curve| (curve % 2) as f32));
+        for curve in 0..4 {
+            let expected = if curve % 2 == 0 { &straight } else { &noisy };
+            assert_eq!(mixed[curve * 5..][..5], expected[curve * 5..][..5], "curve {curve}");
+            assert_ne!(straight[curve * 5 + 4], noisy[curve * 5 + 4]);
+        }
     }
 
     #[test]

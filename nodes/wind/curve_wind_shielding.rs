@@ -19,6 +19,7 @@ use std::sync::Arc;
 use curves::shield::{Collider, Neighbours, Shield, shield};
 use engine::geometry::Triangles;
 use engine::prelude::*;
+use numerics::masked::Masked;
 use numerics::tree::TriangleTree;
 
 use crate::shared::surface::tree;
@@ -36,7 +37,7 @@ params! { PARAMS:
     OFFSET: Param<f32> = Param::float("offset", 10.0,
         "Largest distance upwind at which a collider still shelters a CV. 0 shelters nothing.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 100.0);
-    SHIELD: Param<f32> = Param::float("shield", 1.0,
+    SHIELD: Param<Maskable> = Param::maskable("shield", 1.0,
         "Fraction of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above \
          1 even partly sheltered curves become calm.")
         .at_least(0.0).soft(0.0, 1.0);
@@ -79,8 +80,9 @@ pub(crate) static NODE: Node = Node::new(
 })
 .neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0)])
 .leaves_out(|params, _| {
-    let stages = [(SHIELD, "envelope", "`shield` is 0"), (SMOOTH, "cones", "`smooth` is 0")];
-    let left_out = stages.into_iter().filter(|(param, ..)| params.get(*param) == 0.0);
+    let stages =
+        [(params.get(SHIELD).value, "envelope", "`shield` is 0"), (params.get(SMOOTH), "cones", "`smooth` is 0")];
+    let left_out = stages.into_iter().filter(|(value, ..)| *value == 0.0);
     left_out.map(|(_, stage, why)| LeftOut::new(stage, why)).collect()
 });
 
@@ -89,7 +91,7 @@ const WIDEST_CONE: f32 = 0.1;
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);
-    let amount = cx.get(SHIELD);
+    let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
     let shielded = if looks { sheltered(cx, &curves) } else { vec![0.0; curves.element_count()] };
     cx.check_cancelled()?;
@@ -97,7 +99,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
     cx.publish(RAYS, if looks { curves.point_count() as f64 } else { 0.0 });
     if amount > 0.0 || curves.get(ENVELOPE).is_none() {
-        let envelope = scaled(&curves, &shielded, amount);
+        let envelope = scaled(&curves, &shielded, cx.mask(SHIELD, &curves)?);
         curves.set(ENVELOPE, envelope)?;
     }
     if cx.wants(SHIELDED) {
@@ -143,11 +145,12 @@ impl<'m> Wall<'m> {
 }
 
 /// The envelope, 1 if missing, less each curve's shelter.
-fn scaled(curves: &Component, shielded: &[f32], amount: f32) -> Vec<f32> {
+fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
     for (cvs, share) in curves.runs().ranges().zip(shielded) {
-        let left = 1.0 - (share * amount).clamp(0.0, 1.0);
-        envelope[cvs].iter_mut().for_each(|envelope| *envelope *= left);
+        for cv in cvs {
+            envelope[cv] *= 1.0 - (share * amount.at(cv)).clamp(0.0, 1.0);
+        }
     }
     envelope
 }
@@ -185,7 +188,7 @@ mod tests {
     fn a_half_sheltered_curve_loses_half_of_shield_at_any_scale() {
         for scale in [1e-3, 1.0, 1e3] {
             let bench = bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale));
-            let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, 0.5).cook();
+            let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, Maskable { value: 0.5, attribute: None }).cook();
             assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
             assert_eq!(out.curves().get(ENVELOPE), Some(&[0.75, 0.75, 0.75, 0.75, 1.0, 1.0][..]));
             assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (1.0, 6.0));
@@ -202,7 +205,7 @@ mod tests {
 
     #[test]
     fn no_more_than_all_of_the_wind_is_removed() {
-        let out = behind_a_wall().set(SHIELD, 5.0).cook();
+        let out = behind_a_wall().set(SHIELD, Maskable { value: 5.0, attribute: None }).cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0][..]));
     }
 
@@ -216,7 +219,7 @@ mod tests {
 
     #[test]
     fn with_shield_0_shielded_is_still_written() {
-        let out = behind_a_wall().set(SHIELD, 0.0).cook();
+        let out = behind_a_wall().set(SHIELD, Maskable { value: 0.0, attribute: None }).cook();
         assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
         assert_eq!(out.curves().get(ENVELOPE), Some(&[1.0; 6][..]));
     }

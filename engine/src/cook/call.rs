@@ -9,6 +9,7 @@ use super::store::Cooked;
 use crate::error::{Error, ErrorKind, IS_A_BUG, Result};
 use crate::geometry::{Geometry, Kind, Name, Owner, P};
 use crate::memory::Ceiling;
+use crate::node::masks::ConvertedMasks;
 use crate::node::{Carries, Cx, FrameCx, History, InputData, Needs, Node, Outputs, StepCx};
 use crate::param::{Clock, Params};
 use crate::time::Frame;
@@ -68,6 +69,7 @@ impl<'a> Call<'a> {
                 cancel: self.cancel,
                 ceiling: self.ceiling,
                 published: Mutex::default(),
+                masks: ConvertedMasks::default(),
             },
             frame: self.frame,
             clock: self.clock,

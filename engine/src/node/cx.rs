@@ -5,6 +5,7 @@ use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::masks::{ConvertedMasks, converted};
 use super::{Metric, Node, Output};
 use crate::error::{Error, ErrorKind, Result};
 use crate::expr::suggest::nearest;
@@ -45,6 +46,7 @@ pub struct Cx<'a> {
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) ceiling: Ceiling,
     pub(crate) published: Mutex<Vec<(&'static str, f64)>>,
+    pub(crate) masks: ConvertedMasks,
 }
 
 impl Cx<'_> {
@@ -58,16 +60,20 @@ impl Cx<'_> {
         &self.params
     }
 
-    /// A maskable param on `part`: its number, with the point attribute that scales it if one is named.
+    /// A maskable param on `part`: its number, with the attribute that scales it if one is named: a number for each
+    /// point, or for each curve.
     ///
     /// # Errors
-    /// Where the attribute is missing or is not one float per point.
-    pub fn mask<'c>(&self, param: Param<Maskable>, part: &'c Component) -> Result<Masked<'c, f32>> {
+    /// Where the attribute is missing or is not one number per point or curve.
+    pub fn mask<'c>(&'c self, param: Param<Maskable>, part: &'c Component) -> Result<Masked<'c, f32>> {
         let name = param.name();
         let Maskable { value, attribute } = self.get(param);
         let Some(attribute) = attribute else { return Ok(Masked::uniform(value)) };
         if let Some(mask) = part.table(Owner::Point).get(&attribute) {
             return Ok(Masked { value, mask: Some(mask) });
+        }
+        if let Some(mask) = converted(part, &attribute) {
+            return Ok(Masked { value, mask: Some(self.masks.keep(mask)) });
         }
         let kind = part.kind();
         let what = match part.describe(&attribute) {

@@ -6,6 +6,7 @@ mod curves;
 mod cx;
 mod edit;
 mod help;
+pub(crate) mod masks;
 mod metric;
 mod neutral;
 mod ports;

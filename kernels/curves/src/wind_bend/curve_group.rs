@@ -56,10 +56,10 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
     curves.write(0, &before, out);
     for step in 0..curves.longest - 1 {
         let (pivot, next) = (&points[step], &points[step + 1]);
-        if step == 0 || wind_direction.varies() {
-            towards = wind_direction.at(&arc[step]);
-        }
         let at = curves.at(step);
+        if step == 0 || wind_direction.varies() {
+            towards = wind_direction.at(&arc[step], &at);
+        }
         let segment = unit.between(pivot, next);
         let chord = unit.between(pivot, &points[curves.longest - 1]);
         let share = share.at([&arc[step], &arc[step + 1]], &segment, &at);

@@ -64,8 +64,8 @@ pub struct Bend<'a> {
 pub struct BendNoise<'a> {
     /// The field.
     pub field: &'a Field,
-    /// Amplitude of the noise, relative to a wind of length 1; 0 costs nothing.
-    pub amplitude: f32,
+    /// Amplitude of the noise, relative to a wind of length 1; a value of 0 costs nothing. Masked for each CV.
+    pub amplitude: Masked<'a, f32>,
     /// Cells of the field per metre.
     pub frequency: f64,
     /// A CV samples this many times its arc length downwind of its root; at 0 one sample for each curve is enough.

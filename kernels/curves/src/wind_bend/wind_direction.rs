@@ -1,6 +1,7 @@
 //! The direction of the wind at each pivot: its own direction plus noise.
 
 use super::curve_group::{CurveGroup, Curves, Unit};
+use super::share::gather;
 use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::vector;
@@ -21,7 +22,7 @@ pub(super) struct WindDirection<'a> {
 impl<'a> WindDirection<'a> {
     #[inline(always)]
     pub(super) fn new(bend: &'a Bend<'a>, group: &CurveGroup<'_>, curves: &Curves, unit: &'a Unit) -> Self {
-        let noise = bend.noise.as_ref().filter(|noise| noise.amplitude.abs() > 0.0);
+        let noise = bend.noise.as_ref().filter(|noise| noise.amplitude.value.abs() > 0.0);
         let mut roots = [[0.0; LANES]; 3];
         if let Some(noise) = noise {
             let at = curves.at(0);
@@ -42,12 +43,12 @@ impl<'a> WindDirection<'a> {
     /// Whether it varies along a curve.
     #[inline(always)]
     pub(super) fn varies(&self) -> bool {
-        self.noise.is_some_and(|noise| noise.waviness != 0.0)
+        self.noise.is_some_and(|noise| noise.waviness != 0.0 || noise.amplitude.mask.is_some())
     }
 
-    /// The direction at CVs at these arc lengths from their roots; of length 1…4.
+    /// The direction at CVs at these arc lengths from their roots, with the indices `at`; of length 1…4.
     #[inline(always)]
-    pub(super) fn at(&self, arc: &F32x16) -> Lanes<3> {
+    pub(super) fn at(&self, arc: &F32x16, at: &[usize; LANES]) -> Lanes<3> {
         let mut towards = self.wind.map(F32x16::splat);
         let Some(noise) = self.noise else { return towards };
         let mut points = [[0.0; LANES]; 3];
@@ -59,8 +60,11 @@ impl<'a> WindDirection<'a> {
             }
         }
         let field = noise.field.at_lanes(&points);
-        let amplitude = noise.amplitude.clamp(-LARGEST, LARGEST);
+        let factors = gather(noise.amplitude.mask, at);
         for lane in 0..LANES {
+            let amplitude = (noise.amplitude.value * factors.0[lane]).clamp(-LARGEST, LARGEST);
+            // Infinity times 0 is NaN and counts as 0.
+            let amplitude = if amplitude.is_nan() { 0.0 } else { amplitude };
             let gust = vector::scale(get(&field, lane), amplitude);
             let sum = vector::add(get(&towards, lane), gust);
             let unit = vector::power_of_two_to_one(vector::largest(sum)).0;

@@ -101,7 +101,7 @@ fn lengths_hold_from_2_to_10_000_cvs() {
             for rotate in [1e-3, 0.1, 1.0, 2.0] {
                 let noise = Some(BendNoise {
                     field: &field,
-                    amplitude: 1.0,
+                    amplitude: 1.0.into(),
                     frequency: 2.0,
                     waviness: 1.0,
                     origin: [0.0; 3],
@@ -166,7 +166,14 @@ fn extreme_parameters_give_finite_results() {
                 for mode in [BendMode::Paper, BendMode::ResolutionFree { reference_segments: 1e30 }] {
                     let waviness = frequency as f32;
                     let origin = [frequency, 0.0, 0.0];
-                    let noise = BendNoise { field: &field, amplitude, frequency, waviness, origin, roots: None };
+                    let noise = BendNoise {
+                        field: &field,
+                        amplitude: amplitude.into(),
+                        frequency,
+                        waviness,
+                        origin,
+                        roots: None,
+                    };
                     let with = Bend { rotate: rotate.into(), mode, noise: Some(noise), ..plain(&ramp) };
                     assert_kept(&groom, &groom.bend(&with));
                     let masked = groom.bend(&Bend { rotate: Masked { value: rotate, mask: Some(&zeros) }, ..with });

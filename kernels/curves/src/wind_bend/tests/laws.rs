@@ -154,7 +154,7 @@ fn scaling_by_a_power_of_two_is_exact() {
 }
 
 fn noisy(field: &numerics::noise::Field) -> BendNoise<'_> {
-    BendNoise { field, amplitude: 0.8, frequency: 1.0, waviness: 0.0, origin: [0.0; 3], roots: None }
+    BendNoise { field, amplitude: 0.8.into(), frequency: 1.0, waviness: 0.0, origin: [0.0; 3], roots: None }
 }
 
 #[test]

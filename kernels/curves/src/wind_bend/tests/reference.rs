@@ -39,7 +39,7 @@ fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
     let wind = [0.48, -0.6, 0.64];
     let noise = BendNoise {
         field: &field,
-        amplitude: 0.7,
+        amplitude: 0.7.into(),
         frequency: 3.0,
         waviness: 0.8,
         origin: [100.0, 7.0, -3.0],
@@ -58,7 +58,7 @@ fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
                 let Some(noise) = &with.noise else { return wind };
                 let displacement = wind * (arc * f64::from(noise.waviness));
                 let at = (to_f64(curve[0]) + DVec3::from(noise.origin) + displacement) * noise.frequency;
-                wind + to_f64(vector::scale(field.at(at.into()), noise.amplitude))
+                wind + to_f64(vector::scale(field.at(at.into()), noise.amplitude.value))
             };
             let expected = paper(curve, share, wind_at);
             let error = farthest(&bent.points[start..end], &expected);
@@ -82,7 +82,7 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
                 mode,
                 noise: Some(BendNoise {
                     field: &field,
-                    amplitude: 0.7,
+                    amplitude: 0.7.into(),
                     frequency: 3.0,
                     waviness: 0.8,
                     origin: [1e6, 0.0, 0.0],
