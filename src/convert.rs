@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use engine::geometry::Geometry;
 use engine::time::Frame;
-use formats::usd::{Flavour, UsdWriter};
+use formats::usd::{DEFAULT_WIDTH, Flavour, UsdWriter, lacks_width};
 use formats::{Format, FormatError, FrameStamp};
 use rayon::prelude::*;
 
@@ -102,6 +102,9 @@ fn print_summary(written: &Written) {
     if !written.lost.is_empty() {
         crate::say!("note: written without {}, which the format cannot hold", written.lost.join(", "));
     }
+    if written.without_width {
+        crate::say!("note: there are curves without `width`, so the file got {DEFAULT_WIDTH} m for them");
+    }
 }
 
 /// What a conversion wrote.
@@ -112,6 +115,8 @@ struct Written {
     bytes: u64,
     /// What the format dropped.
     lost: Vec<String>,
+    /// Whether curves without widths got one in the file.
+    without_width: bool,
 }
 
 struct Conversion {
@@ -127,14 +132,17 @@ impl Conversion {
     fn one_file(&self, files: &[(Frame, PathBuf)], to: &Path, name: &str) -> Result<Written, Failure> {
         let flavour = if self.format == Format::Usda { Flavour::Usda } else { Flavour::Usdc };
         let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
+        let mut without_width = false;
         for some in files.chunks(rayon::current_num_threads()) {
             let read: Vec<_> = some.par_iter().map(|(_, path)| self.read(path)).collect();
             for (geometry, (frame, _)) in read.into_iter().zip(some) {
-                writer.frame(frame.number(), &geometry?).map_err(usd_failed)?;
+                let geometry = geometry?;
+                without_width |= lacks_width(&geometry);
+                writer.frame(frame.number(), &geometry).map_err(usd_failed)?;
             }
         }
         let bytes = writer.finish().map_err(usd_failed)?.bytes;
-        Ok(Written { files: vec![to.to_owned()], frames: files.len(), bytes, lost: Vec::new() })
+        Ok(Written { files: vec![to.to_owned()], frames: files.len(), bytes, lost: Vec::new(), without_width })
     }
 
     /// Writes one file per frame, at the path given by `to`.
@@ -157,6 +165,7 @@ impl Conversion {
             all.files.extend(one.files);
             all.frames += one.frames;
             all.bytes += one.bytes;
+            all.without_width |= one.without_width;
             let new = one.lost.into_iter().filter(|lost| !all.lost.contains(lost)).collect::<Vec<_>>();
             all.lost.extend(new);
             Ok(all)
@@ -170,7 +179,7 @@ impl Conversion {
         formats::write(self.format, &geometry, &stamp, &mut bytes).map_err(|error| refused(&to, &error))?;
         let lost = formats::lost(self.format, &geometry);
         write_whole(&to, &bytes)?;
-        Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost })
+        Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost, without_width: false })
     }
 
     /// Reads a file and scales it; fails after Ctrl-C.

@@ -7,12 +7,14 @@ use std::time::Duration;
 
 use engine::clock::Stopwatch;
 use engine::cook::{Delivered, DiskCache, Engine, Report, Stopped};
-use engine::graph::{Graph, Part};
+use engine::geometry::WIDTH;
+use engine::graph::{Graph, GraphOutput, Part};
 use engine::note::{Note, kind};
 use engine::plan::Request;
 use engine::time::Frame;
 use formats::Format;
 use formats::atomic::AtomicFile;
+use formats::usd::DEFAULT_WIDTH;
 
 use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
@@ -154,6 +156,7 @@ fn cook(
     let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
     let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
     report.notes.extend(left_out(graph, &written, format));
+    report.notes.extend(without_width(graph, &written, format));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled))?;
     writing += watch.wall();
     let mut reported = Ok(());
@@ -219,6 +222,23 @@ fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<
         Note::new(kind::NOT_WRITTEN, text)
     };
     lossy.map(note).collect()
+}
+
+/// A note for each output whose curves got a width in the file because they have none.
+fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
+    let without = written.iter().filter(|(_, written)| !written.without_width.is_empty());
+    let note = |(output, written): &(usize, Written)| {
+        let GraphOutput { name, attributes, .. } = &graph.outputs[*output];
+        let text = format!("output `{name}`: its curves have no `width`, so {format} got {DEFAULT_WIDTH} m for them");
+        let hint = match attributes {
+            Some(names) if !names.iter().any(|name| **name == *WIDTH.name) => {
+                "Add `width` to the output's `attributes`."
+            }
+            _ => "Set `width` in Curve_In, or make it with Attribute_Expr: `width = 0.002`.",
+        };
+        Note::new(kind::NO_WIDTH, text).at(written.without_width.clone()).hint(hint)
+    };
+    without.map(note).collect()
 }
 
 /// Prints what was written, and the speed, to stderr.

@@ -9,7 +9,7 @@ use engine::frames::FrameSet;
 use engine::graph::Graph;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
-use formats::usd::{Flavour, UsdError, UsdWriter};
+use formats::usd::{Flavour, UsdError, UsdWriter, lacks_width};
 use formats::{Format, FrameStamp};
 
 use crate::failure::{Exit, Failure};
@@ -26,6 +26,8 @@ pub struct Written {
     pub frames: Vec<Frame>,
     /// What the format dropped.
     pub lost: Vec<String>,
+    /// Frames whose curves have no widths, so that the file got a width for them.
+    pub without_width: Vec<Frame>,
 }
 
 enum Target {
@@ -88,6 +90,9 @@ impl<'g> Writers<'g> {
             match target {
                 Target::Sequence { flavour, writer } => {
                     for one in mine {
+                        if lacks_width(&one.geometry) {
+                            written.without_width.push(one.frame);
+                        }
                         if writer.is_none() {
                             let path = sequence_path(folder, name, format);
                             let scene = &graph.scene;

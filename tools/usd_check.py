@@ -154,7 +154,7 @@ def check_prim(prim, kind, parts, times, lossy_nan):
     for name, value in TOKENS[kind].items():
         if attributes[name].Get() != value:
             yield f"{where}.{name} is {attributes[name].Get()}, expected {value}"
-    wanted = {}
+    parts, wanted = with_widths(kind, parts), {}
     for place, part in enumerate(parts):
         for key, values in expected_values(kind, part or {}):
             wanted.setdefault(key, [None] * len(parts))[place] = values
@@ -188,6 +188,21 @@ def check_prim(prim, kind, parts, times, lossy_nan):
                 yield f"{where}: the surface at {time} is {surface}, expected {computed}"
 
 
+def with_widths(kind, parts):
+    """Components with the widths that curves without any get: one for all, or one for each CV if other frames have."""
+    if kind != "curves":
+        return parts
+    some = any("width" in part.get("point_attributes", {}) for part in parts if part)
+
+    def with_width(part):
+        if some:
+            widths = {"width": [0.001] * len(part["points"])} | part.get("point_attributes", {})
+            return part | {"point_attributes": widths}
+        return part | {"attributes": part.get("attributes", {}) | {"widths": [0.001]}}
+
+    return [part and with_width(part) for part in parts]
+
+
 def expected_values(kind, part):
     """(name, interpolation) and values of everything a component has."""
     for array in ("counts", "indices"):
@@ -213,6 +228,8 @@ def source_of(kind, attribute):
     }
     name = attribute.GetName()
     if not name.startswith("primvars:"):
+        if name == "widths" and attribute.GetMetadata("interpolation") == "constant":
+            return "widths", "constant"
         return (schema[name], "vertex") if name in schema else (counts.get(name, name), None)
     own = attribute.GetDisplayName() or name.removeprefix("primvars:")
     if own == name.removeprefix("primvars:") and kind == "curves" and own == "id":

@@ -167,6 +167,10 @@ metrics! { METRICS:
         "Solves that reached their iteration limit, and particles whose motion had to be limited. 0 is good.")
         .warn_above(0.0, "At these frames the solver reached its iteration limit, so motion may be damped or contacts \
             may be deeper than `thickness`. Set more `substeps`, or lower the stiffness or the speed of colliders.");
+    TOLERANCE_MISSED = Metric::new("tolerance_missed", Unit::None,
+        "Steps of the `accurate` integrator whose estimated error exceeds what `tolerance` allows.")
+        .warn_above(0.0, "The shortest time steps were still less accurate than `tolerance` at these frames, so they \
+            exceed it. Raise `tolerance`, or lower `stiffness`, the speed of colliders or the strength of goals.");
     ERROR_ESTIMATE = Metric::new("error_estimate", Unit::Metres, "Estimated error that the frame added to positions.");
     KINETIC = Metric::new("kinetic", Unit::Joules, "Kinetic energy.");
     ELASTIC = Metric::new("elastic", Unit::Joules, "Elastic energy of the springs.");
@@ -189,6 +193,15 @@ metrics! { METRICS:
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
         "By how much surfaces came closer than `thickness` at the worst contact. More than `thickness` means \
          penetration.");
+    DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
+        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other.")
+        .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
+            between them, or raise `thickness`.");
+    STARTED_INSIDE = Metric::new("started_inside", Unit::None,
+        "Particles of surfaces that are deeper than `thickness` inside a closed collider, inside another body, or below \
+         the ground when the simulation starts.")
+        .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out \
+            abruptly, or on the wrong side. Move them apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
         "Edges of the surface that are stretched to more than 8 times their rest length, so that colliders let them \
          pass.")
@@ -196,6 +209,30 @@ metrics! { METRICS:
             the skin pass there. Give the collider a smoother shape, lower `friction`, or raise `stiffness`.");
     GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres,
         "Mean distance of the particles pulled by goals from their targets.");
+    GOAL_MISS = Metric::new("goal_miss", Unit::None,
+        "Mean distance of a body from a goal that it should have reached, relative to the size of the body; the largest \
+         of all bodies. Only at the frames of goals and while they are held.")
+        .warn_always_above(0.25, "The body never comes near its goal: something is in the way, or the goal is too weak. \
+            Raise `strength` of Softbody_Goal, give the body more frames to get there, or lower `stiffness`; see whether \
+            colliders, pins or the ground hold it back.");
+    IDLE_GOALS = Metric::new("idle_goals", Unit::None, "Goals that have no particle to pull.")
+        .warn_above(0.0, "`goals` {idle_goals_wire} (counted from 0) has no effect: its body has no particle of the kind \
+            that `goal_on` names. Make inner points with `interior` and a smaller `spacing` of Tetrahedralize, or set \
+            `goal_on` to `all`.");
+    IDLE_GOALS_WIRE = Metric::new("idle_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
+    EARLY_GOALS = Metric::new("early_goals", Unit::None, "Goals that are over before the simulation starts.")
+        .warn_above(0.0, "`goals` {early_goals_wire} (counted from 0) is over before the simulation starts, so it does not \
+            pull. Give it a `frame` after `start_frame`.");
+    EARLY_GOALS_WIRE = Metric::new("early_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
+    DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body has another goal.")
+        .warn_above(0.0, "`goals` {doubled_goals_wire} (counted from 0) has the same `frame` as another goal of its body, \
+            so the body jumps from one to the other. Give each goal its own frame.");
+    DOUBLED_GOALS_WIRE = Metric::new("doubled_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
+    IDLE_PINS = Metric::new("idle_pins", Unit::None, "Pins with no particle within their `radius` at the start.")
+        .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} of `pins` {idle_pins_wire} (both \
+            counted from 0). Move them to the body at `start_frame`, or raise their `radius`.");
+    IDLE_PINS_WIRE = Metric::new("idle_pins_wire", Unit::None, "The wire of the first of these pins, from 0; −1 if there is none.");
+    IDLE_PINS_POINT = Metric::new("idle_pins_point", Unit::None, "The point of the first of these pins, from 0; −1 if there is none.");
     PINNED = Metric::new("pinned", Unit::None,
         "Particles held or pulled by pins. If it is 0, no particle was within a pin's `radius` at the start.");
     TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
@@ -279,7 +316,7 @@ impl Chain for Run {
         goals.pull(times, on, &mut pulled);
         let by_goals = pulled.len();
         if let [(_, before), .., (_, now)] = cx.samples(PINS) {
-            pins::pull(&setup.pins, [before, now], cx.frame(), &mut held, &mut pulled)?;
+            pins::pull(&setup.pins.bindings, [before, now], cx.frame(), &mut held, &mut pulled)?;
         }
         let pinned = held.len() + pulled.len() - by_goals;
         let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
@@ -315,6 +352,9 @@ impl Chain for Run {
             substeps: cx.get(SUBSTEPS) as u32,
             force_implicit_euler: goals.reset_at(times[0], whole, frames),
         };
+        // Positions are those of the start only in the first step.
+        let started_inside =
+            self.metrics.get(STARTED_INSIDE).unwrap_or_else(|| scene.count_inside(&self.state.positions) as f64);
         let report = solving.solver.step(&solving.body, &mut self.state, &frame);
         let plasticity =
             Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
@@ -335,7 +375,11 @@ impl Chain for Run {
         self.metrics.set(RESET_ENERGY, brought);
         self.metrics.set(PLASTIC_WORK, plastic_work);
         self.metrics.set(LET_GO, let_go as f64);
+        self.metrics.set(STARTED_INSIDE, started_inside);
+        let thickness = f64::from(cx.get(THICKNESS));
+        self.metrics.set(DEEPEST_PENETRATION, (report.deepest_overlap - thickness).max(0.0));
         self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
+        goals.measure(times[1], on, &self.state.positions, &mut self.metrics);
         self.metrics.set(PINNED, pinned as f64);
         self.solving = Some(solving);
         Ok(())
@@ -344,6 +388,10 @@ impl Chain for Run {
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let setup = self.setup(cx)?;
         cx.publish_all(&self.metrics);
+        cx.publish(IDLE_PINS, setup.pins.idle.len() as f64);
+        let first = setup.pins.idle.first().map_or([-1.0; 2], |first| first.map(|index| index as f64));
+        cx.publish(IDLE_PINS_WIRE, first[0]);
+        cx.publish(IDLE_PINS_POINT, first[1]);
         let narrow = |p: [f64; 3]| p.map(|x| x as f32);
         let (mut surface, mut tets) = (setup.surface.clone(), setup.body.clone());
         surface
@@ -388,6 +436,7 @@ fn measured(report: &FrameReport, state: &State) -> MetricValues {
     metrics.set(CG, report.cg);
     metrics.set(RESIDUAL, report.residual);
     metrics.set(CAPS_HIT, report.caps_hit + report.stopped);
+    metrics.set(TOLERANCE_MISSED, report.tolerance_missed);
     metrics.set(ERROR_ESTIMATE, report.error_estimate);
     metrics.set(KINETIC, report.kinetic);
     metrics.set(ELASTIC, report.elastic);

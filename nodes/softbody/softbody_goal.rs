@@ -46,6 +46,9 @@ metrics! { METRICS:
         .warn_above(0.0, "The shape cannot be reached without turning parts of the body inside out. Look for places \
             where its surface crosses itself or bends sharply, and smooth them.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, relative to its own.");
+    IDLE = Metric::new("idle", Unit::None, "1 where `strength` is 0, so that the goal does not pull; 0 elsewhere.")
+        .warn_always_above(0.0, "With a `strength` of 0 the body is not pulled towards this shape. Raise `strength`, or \
+            remove the goal.");
     CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
     RESIDUAL = Metric::new("residual", Unit::None,
         "Force left on inner points after the solve, relative to the force exerted by the surface.");
@@ -78,6 +81,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     // Cached, as keyed strengths cook every frame.
     let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
     publish(cx, &found);
+    cx.publish(IDLE, if cx.get(STRENGTH) > 0.0 { 0.0 } else { 1.0 });
     let mut out = body.clone();
     out.set(P, found.points.clone())?;
     out.set(GOAL_FRAME, vec![cx.get(FRAME)])?;

@@ -15,10 +15,13 @@
 //! * Slivers, flat tets without a meaningful volume, are kept, as their edges are good springs, and are marked
 //!   `sliver`.
 
+use std::collections::BTreeSet;
+
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use engine::prelude::*;
 
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
+use crate::shared::pieces::pieces;
 
 choice! {
     /// The repair of an invalid surface.
@@ -66,7 +69,10 @@ metrics! { METRICS:
     QUALITY_MEDIAN = Metric::new("quality_median", Unit::None,
         "Median quality of the tets: three times the inradius ÷ the circumradius. 1 is a regular tet, 0 a flat one.");
     VOLUME_ERROR = Metric::new("volume_error", Unit::None,
-        "Difference between the volume of the tets and that enclosed by the surface, relative to the latter.");
+        "Difference between the volume of the tets and that enclosed by the surface, relative to the latter.")
+        .warn_above(0.01, "The tets cut corners of the surface or bulge beyond it, so the body has another shape than its \
+            surface. Use smaller and more even faces where the surface is thin or has long faces, or a smaller \
+            `spacing`.");
     MISSING_FACES = Metric::new("missing_faces", Unit::None,
         "Faces of the surface that are not faces of tets: there the tets cut a corner or bulge.");
     MISSING_EDGES = Metric::new("missing_edges", Unit::None, "Edges of the surface that are not edges of tets.");
@@ -77,6 +83,10 @@ metrics! { METRICS:
     SLIVERS = Metric::new("slivers", Unit::None, "Tets too flat to have a meaningful volume.");
     REPAIRS = Metric::new("repairs", Unit::None,
         "Number of points merged or removed, and of faces removed, trimmed or reoriented.");
+    LOST_PIECES = Metric::new("lost_pieces", Unit::None,
+        "Connected pieces of the surface of which repairs left no face.")
+        .warn_above(0.0, "These pieces of the surface get no tets: they are so small next to the whole surface (less than \
+            1e-7 of it) that their points coincide. Fill them in a Tetrahedralize of their own, or remove them.");
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -108,7 +118,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let bytes = closed.fill_bytes(&fill).map_err(refusal)?;
     cx.reserve(bytes, "raise `spacing`, fill fewer bodies, or raise --memory")?;
     let solid = closed.fill(&fill).map_err(refusal)?;
-    publish(cx, &closed, &solid);
+    publish(cx, mesh, &closed, &solid);
     let repaired = repaired(mesh, &closed)?;
     Ok(TETS.with(Geometry::from(tets(cx, &closed, solid)?).with(repaired)))
 }
@@ -156,7 +166,7 @@ fn repaired(mesh: &Component, closed: &ClosedSurface) -> Result<Component> {
     Ok(repaired)
 }
 
-fn publish(cx: &Cx, closed: &ClosedSurface, solid: &TetMesh) {
+fn publish(cx: &Cx, mesh: &Component, closed: &ClosedSurface, solid: &TetMesh) {
     let measured = &solid.measured;
     cx.publish(COUNT, solid.tets.len() as f64);
     cx.publish(BODIES, closed.bodies as f64);
@@ -168,6 +178,32 @@ fn publish(cx: &Cx, closed: &ClosedSurface, solid: &TetMesh) {
     cx.publish(BARE_POINTS, measured.bare_points as f64);
     cx.publish(SLIVERS, measured.slivers as f64);
     cx.publish(REPAIRS, closed.changes.count() as f64);
+    cx.publish(LOST_PIECES, lost_pieces(mesh, closed) as f64);
+}
+
+/// Number of connected pieces of `mesh` of which no face was kept, apart from faces without a size. Points at one
+/// position are connected.
+fn lost_pieces(mesh: &Component, closed: &ClosedSurface) -> usize {
+    if closed.changes.dropped_faces == 0 {
+        return 0;
+    }
+    let (faces, positions) = (mesh.faces().expect("a mesh has faces"), mesh.positions());
+    let face = |index: usize| {
+        let starts = faces.runs.starts();
+        &faces.corners[starts[index] as usize..starts[index + 1] as usize]
+    };
+    let mut by_position: Vec<u32> = (0..positions.len() as u32).collect();
+    by_position.sort_by_key(|point| positions[*point as usize].map(f32::to_bits));
+    let same = by_position.windows(2).filter(|pair| positions[pair[0] as usize] == positions[pair[1] as usize]);
+    let sides = (0..mesh.element_count()).flat_map(|index| face(index).windows(2));
+    let piece = pieces(positions.len(), same.chain(sides).map(|pair| [pair[0], pair[1]]));
+    let mut kept = vec![false; positions.len()];
+    for index in &closed.source_faces {
+        face(*index as usize).iter().for_each(|corner| kept[piece[*corner as usize] as usize] = true);
+    }
+    let pieces = faces.corners.iter().map(|corner| (*corner as usize, piece[*corner as usize] as usize));
+    let lost = pieces.filter(|(corner, piece)| !kept[*piece] && positions[*corner] != positions[*piece]);
+    lost.map(|(_, piece)| piece).collect::<BTreeSet<usize>>().len()
 }
 
 fn refusal(fault: SurfaceFault) -> Error {

@@ -34,11 +34,11 @@ fn two_curves(params: &str, output: &str) -> Bench {
 
 #[test]
 fn an_attribute_of_the_wrong_owner_or_type_is_noted() {
-    let bench = two_curves(r#""element_attributes": {"envelope": [0.0, 1.0]}"#, r#""wind""#);
+    let bench = two_curves(r#""width": 0.1, "element_attributes": {"envelope": [0.0, 1.0]}"#, r#""wind""#);
     let expected = "`wind` (Curve_Wind) does not read `envelope` of the curves, which is one float for each curve; \
                     it reads one float for each CV";
     assert_eq!(notes(&bench, &[]), [expected]);
-    let bench = two_curves(r#""attributes": {"envelope": [0.0, 1.0, 0.0, 1.0]}"#, r#""wind""#);
+    let bench = two_curves(r#""width": 0.1, "attributes": {"envelope": [0.0, 1.0, 0.0, 1.0]}"#, r#""wind""#);
     assert_eq!(notes(&bench, &[]), [""; 0]);
 }
 
@@ -50,9 +50,10 @@ fn a_requested_attribute_that_no_frame_has_is_noted() {
         "output `o` requests the attribute `clump`, which it has at no frame; did you mean `clumps`?",
         "output `o` requests the attribute `zebra`, which it has at no frame",
     ];
-    assert_eq!(notes(&bench, &[]), expected);
-    assert_eq!(notes(&bench, &["--cache", "cache"]), expected);
-    assert_eq!(notes(&bench, &["--cache", "cache"])[1], expected[1], "also for frames from disk");
+    assert_eq!(notes(&bench, &["--format", "json"]), expected);
+    assert_eq!(notes(&bench, &["--format", "json", "--cache", "cache"]), expected);
+    let warm = notes(&bench, &["--format", "json", "--cache", "cache"]);
+    assert_eq!(warm[1], expected[1], "also for frames from disk");
 }
 
 #[test]
@@ -178,9 +179,9 @@ fn roots_far_from_their_skin_are_noted() {
             }}, "outputs": {{"o": "on"}}}}"#
         ))
     };
-    let found = notes(&graph("[2, 2, 2]"), &[]);
+    let found = notes(&graph("[2, 2, 2]"), &["--format", "json"]);
     assert!(matches!(&found[..], [one] if one.starts_with("`on` (Curve_Attach): `far_roots` is ")), "{found:?}");
-    assert_eq!(notes(&graph("[1.05, 1.05, 1.05]"), &[]), [""; 0]);
+    assert_eq!(notes(&graph("[1.05, 1.05, 1.05]"), &["--format", "json"]), [""; 0]);
 }
 
 #[test]
@@ -204,4 +205,115 @@ fn a_warm_report_has_the_metrics_of_a_cold_one() {
     assert_eq!(warm["total"]["from_disk"], 4);
     let more = cook("more.json", &["--cache", "cache", "--frames", "3-6"]);
     assert_eq!((of(&more, "wind", "from_disk"), of(&more, "wind", "cooks")), (2.into(), 6.into()), "{more}");
+}
+
+#[test]
+fn curves_that_get_a_width_in_a_usd_file_are_noted() {
+    let bench = two_curves("", r#""wind""#);
+    let expected = |format: &str| {
+        [format!(
+            "output `o`: its curves have no `width`, so {format} got 0.001 m for them (frames 1-3). Set `width` in \
+             Curve_In, or make it with Attribute_Expr: `width = 0.002`."
+        )]
+    };
+    for format in ["usdc", "usda"] {
+        assert_eq!(notes(&bench, &["--format", format]), expected(format));
+    }
+    let text = std::fs::read_to_string(bench.path("out/o.usda")).unwrap();
+    assert!(text.contains("float[] widths = [0.001] ("), "{text}");
+    assert_eq!(notes(&bench, &["--format", "json"]), [""; 0], "json has curves without widths");
+    let bench = two_curves(r#""width": 0.1"#, r#""wind""#);
+    assert_eq!(notes(&bench, &["--format", "usda"]), [""; 0]);
+    let bench = two_curves(r#""width": 0.1"#, r#"{"from": "wind", "attributes": ["P"]}"#);
+    let left_out = &notes(&bench, &[])[0];
+    assert!(left_out.ends_with("(frames 1-3). Add `width` to the output's `attributes`."), "{left_out}");
+    let bench = two_curves("", r#""wind""#);
+    bench.done(&["cook", "g.json", "--format", "json"]);
+    let ran = bench.run(&["convert", "out/o.0001.json", "o.usdc"]);
+    assert!(ran.stderr.contains("note: there are curves without `width`, so the file got 0.001 m for them\n"));
+}
+
+/// A ball that is simulated as a soft body, with a collider, a pin and a goal. Each of `changes` replaces a text.
+fn soft_ball(changes: &[[&str; 2]]) -> Bench {
+    let mut graph = r#"{"convect": 1, "scene": {"frames": [1, 6]}, "nodes": {
+        "ball": {"type": "Mesh_Primitive", "params": {"shape": "sphere", "size": [0.1, 0.1, 0.1], "divisions": 4}},
+        "body": {"type": "Tetrahedralize", "inputs": {"surface": "ball"}},
+        "brick": {"type": "Mesh_Primitive", "params": {"shape": "box", "size": [0.1, 0.1, 0.1]}},
+        "wall": {"type": "Transform", "inputs": {"geometry": "brick"}, "params": {"translate": [0.2, 0, 0]}},
+        "hook": {"type": "Point_In", "params": {"points": [[0, 0.05, 0]]}},
+        "pin": {"type": "Softbody_Pin", "inputs": {"targets": "hook"}, "params": {"radius": 0.01}},
+        "egg": {"type": "Transform", "inputs": {"geometry": "ball"}, "params": {"scale": [0.9, 1.1, 1]}},
+        "goal": {"type": "Softbody_Goal", "inputs": {"body": "body", "shape": "egg"},
+            "params": {"frame": 4, "strength": 1e4, "hold": 1}},
+        "later": {"type": "Softbody_Goal", "inputs": {"body": "body", "shape": "egg"},
+            "params": {"frame": 6, "strength": 1e4}},
+        "soft": {"type": "Softbody", "inputs": {"bodies": "body", "colliders": "wall", "pins": "pin",
+            "goals": ["goal", "later"]}, "params": {"gravity": [0, 0, 0]}}
+    }, "outputs": {"o": "soft.surface"}}"#
+        .to_owned();
+    for [from, to] in changes {
+        assert!(graph.contains(from), "{from}");
+        graph = graph.replace(from, to);
+    }
+    Bench::with_graph(&graph)
+}
+
+#[test]
+fn a_soft_body_that_is_set_up_well_has_no_notes() {
+    assert_eq!(notes(&soft_ball(&[]), &[]), [""; 0]);
+}
+
+#[test]
+fn what_goes_wrong_with_a_soft_body_is_noted() {
+    let only = |changes: &[[&str; 2]], start: &str, part: &str| {
+        let found = notes(&soft_ball(changes), &[]);
+        assert!(matches!(&found[..], [one] if one.starts_with(start) && one.contains(part)), "{changes:?} {found:#?}");
+    };
+    let inside = ["[0.2, 0, 0]", "[0.08, 0, 0]"];
+    only(&[inside], "`soft` (Softbody): `started_inside` is ", "Move them apart at `start_frame`.");
+    let press = ["[0.2, 0, 0]", r#"{"keyframes": [[1, [0, 0.11, 0]], [5, [0, -0.02, 0]]]}"#];
+    let ground = [r#""gravity": [0, 0, 0]"#, r#""ground": true, "ground_height": -0.051"#];
+    let found = notes(&soft_ball(&[press, ground]), &[]);
+    let crushed = |note: &&String| note.starts_with("`soft` (Softbody): `deepest_penetration` is ");
+    assert_eq!(found.iter().filter(crushed).count(), 1, "{found:#?}");
+    let far = ["[[0, 0.05, 0]]", "[[0, 0.05, 0], [0, 1, 0]]"];
+    let idle = "the first is point 1 of `pins` 0 (both counted from 0)";
+    only(&[far], "`soft` (Softbody): `idle_pins` is 1 at frame 1 (frames 1-6)", idle);
+    let doubled = [r#""frame": 6"#, r#""frame": 4"#];
+    only(&[doubled], "`soft` (Softbody): `doubled_goals` is 1 at frame 2", "`goals` 1 (counted from 0) has the same");
+    let early = [r#""frame": 6"#, r#""frame": -6"#];
+    only(&[early], "`soft` (Softbody): `early_goals` is 1 at frame 2", "`goals` 1 (counted from 0) is over before");
+    let hollow = [r#"{"surface": "ball"}"#, r#"{"surface": "ball"}, "params": {"interior": false}"#];
+    only(&[hollow], "`soft` (Softbody): `idle_goals` is 2 at frame 2", "`goals` 0 (counted from 0) has no effect");
+    let weak = [r#""strength": 1e4"#, r#""strength": 1e-3"#];
+    let away = [r#""scale": [0.9, 1.1, 1]"#, r#""scale": [0.9, 1.1, 1], "translate": [0, 0.2, 0]"#];
+    only(&[weak, away], "`soft` (Softbody): `goal_miss` is ", "Raise `strength` of Softbody_Goal");
+    let never = [r#""frame": 6, "strength": 1e4"#, r#""frame": 6, "strength": 0"#];
+    only(&[never], "`later` (Softbody_Goal): `idle` is 1 at frame 1", "Raise `strength`, or remove the goal.");
+    let late = [r#""frame": 6"#, r#""frame": 60"#];
+    let text = "`frame` is 60, after the last frame of the scene, whose frames are 1-6. ";
+    only(&[late], &format!("`later` (Softbody_Goal): {text}"), "extend `scene.frames`");
+    let exact = [r#""gravity": [0, 0, 0]"#, r#""integrator": "accurate", "tolerance": 1e-12"#];
+    only(&[exact], "`soft` (Softbody): `tolerance_missed` is ", "Raise `tolerance`");
+}
+
+#[test]
+fn pieces_of_a_surface_that_get_no_tets_are_noted() {
+    let graph = |size: &str| {
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "nodes": {{
+                "ball": {{"type": "Mesh_Primitive", "params": {{"shape": "sphere", "size": [1, 1, 1]}}}},
+                "crumb": {{"type": "Mesh_Primitive", "params": {{"shape": "sphere", "size": {size}}}}},
+                "aside": {{"type": "Transform", "inputs": {{"geometry": "ball"}}, "params": {{"translate": [1, 0, 0]}}}},
+                "both": {{"type": "Merge", "inputs": {{"geometry": ["aside", "crumb"]}}}},
+                "body": {{"type": "Tetrahedralize", "inputs": {{"surface": "both"}}}}
+            }}, "outputs": {{"o": "body"}}}}"#
+        ))
+    };
+    assert_eq!(notes(&graph("[0.1, 0.1, 0.1]"), &[]), [""; 0]);
+    let found = notes(&graph("[1e-9, 1e-9, 1e-9]"), &[]);
+    assert!(
+        matches!(&found[..], [one] if one.starts_with("`body` (Tetrahedralize): `lost_pieces` is 1 at")),
+        "{found:?}"
+    );
 }

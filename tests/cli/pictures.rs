@@ -135,7 +135,7 @@ fn components_and_planes_are_accepted_and_mistakes_explained() {
     let bench = Bench::new();
     let draw = |more: &[&str]| {
         let args = ["cook", "g.json", "--output", "grass", "--frames", "1", "--preview-size", "64x48"];
-        bench.run(&[&args, more].concat())
+        bench.run(&[&args[..], &["--format", "json"], more].concat())
     };
     let ran = draw(&["--color-by", "P.y", "--clip", "x=0.5"]);
     assert!(ran.code == Some(0) && !ran.stderr.contains("note"), "{}", ran.stderr);

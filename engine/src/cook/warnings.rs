@@ -30,9 +30,17 @@ pub(super) fn notes(
         };
         let text = format!("`{id}` ({type_name}): `{}` is {}{unit} at frame {frame}", metric.name, rounded(**worst));
         let frames = over.iter().map(|(frame, _)| **frame).collect();
-        Some(Note::new(metric.name, text).of_node(id).at(frames).hint(warning.text))
+        Some(Note::new(metric.name, text).of_node(id).at(frames).hint(filled(warning.text, **frame, published)))
     };
     declared.iter().filter_map(note).collect()
+}
+
+/// A text with the names of metrics in braces replaced by their values at a frame.
+fn filled(text: &str, frame: Frame, published: &BTreeMap<&'static str, BTreeMap<Frame, f64>>) -> String {
+    published.iter().fold(text.to_owned(), |text, (name, values)| match values.get(&frame) {
+        Some(value) if text.contains('{') => text.replace(&format!("{{{name}}}"), &rounded(*value)),
+        _ => text,
+    })
 }
 
 /// A number as a person reads it: whole, or with three digits.
@@ -49,6 +57,16 @@ mod tests {
     const FREE: Metric = Metric::new("free", Unit::None, "Unlimited.");
     const RATIO: Metric = Metric::new("ratio", Unit::None, "Ratio.").warn_outside(0.9, 1.1, "Keep it.");
     const FAR: Metric = Metric::new("far", Unit::None, "Distance.").warn_always_above(1.0, "Come near.");
+
+    const IDLE: Metric = Metric::new("idle", Unit::None, "Idle.").warn_above(0.0, "The first is `pins` {wire}.");
+
+    #[test]
+    fn a_warning_names_the_values_of_other_metrics() {
+        let at = |values: [f64; 2]| values.into_iter().zip(1..).map(|(x, frame)| (Frame::whole(frame), x)).collect();
+        let published = BTreeMap::from([("idle", at([0.0, 2.0])), ("wire", at([7.0, 3.0]))]);
+        let notes = notes(&"fur".into(), "Softbody", &[&IDLE], &published);
+        assert_eq!(notes[0].to_string(), "`fur` (Softbody): `idle` is 2 at frame 2. The first is `pins` 3.");
+    }
 
     fn shown(name: &'static str, values: &[f64]) -> Vec<String> {
         let frames: BTreeMap<Frame, f64> =

@@ -80,12 +80,7 @@ impl Cx<'_> {
             Some(found) => format!("which is {found}"),
             None => format!("which the {kind} do not have"),
         };
-        let expected = kind.rows_text(Owner::Point, ColumnType::F1);
-        let floats = part.table(Owner::Point).iter().filter(|(_, column)| column.kind() == ColumnType::F1);
-        let hint = match nearest(&attribute, floats.map(|(name, _)| &**name)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("expected {expected}"),
-        };
+        let hint = point_float_hint(part, &attribute);
         let fact = format!("`{name}` is masked by `{attribute}`, {what}");
         Err(Error::refused(fact).hint(hint).of(name).of_types())
     }
@@ -155,6 +150,16 @@ impl Cx<'_> {
     pub(crate) fn data(&self, name: &'static str) -> &InputData {
         let found = self.inputs.iter().find(|(input, _)| *input == name);
         &found.unwrap_or_else(|| panic!("it reads the input `{name}`, which it does not declare")).1
+    }
+}
+
+/// The hint for an error about `name`, which is no float attribute of the points of `part`: the name of one that is
+/// similar, or what is expected.
+pub fn point_float_hint(part: &Component, name: &str) -> String {
+    let floats = part.table(Owner::Point).iter().filter(|(_, column)| column.kind() == ColumnType::F1);
+    match nearest(name, floats.map(|(name, _)| &**name)) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("expected {}", part.kind().rows_text(Owner::Point, ColumnType::F1)),
     }
 }
 

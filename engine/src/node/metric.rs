@@ -27,7 +27,8 @@ pub struct Metric {
 pub struct Warning {
     /// The values that are worth one.
     pub when: Trouble,
-    /// What it means and what to do about it; whole sentences.
+    /// What it means and what to do about it; whole sentences. A name in braces, `{pin}`, is replaced by the value of
+    /// that metric of the node at the same frame.
     pub text: &'static str,
 }
 
@@ -109,6 +110,11 @@ impl MetricValues {
     /// Sets a metric's value.
     pub fn set(&mut self, metric: Metric, value: impl Into<f64>) {
         self.0.insert(metric.name.to_owned(), value.into());
+    }
+
+    /// A metric's value, if it has been set.
+    pub fn get(&self, metric: Metric) -> Option<f64> {
+        self.0.get(metric.name).copied()
     }
 }
 

@@ -3,7 +3,7 @@
 //! | attribute of a component | in USD |
 //! |---|---|
 //! | `P`, `v`, `N` per point | `points`, `velocities` (m/s), `normals` |
-//! | `width` per point | `widths` on curves and points |
+//! | `width` per point | `widths` on curves and points; curves without it get [`DEFAULT_WIDTH`] |
 //! | `id` per point | `ids` (int64) on points |
 //! | `id` of curves | `primvars:curve_id`: curves have no `ids`, and Blender drops a primvar called `id` there |
 //! | any other NAME | `primvars:NAME`; `vertex` per point, `uniform` per element, `constant` once |
@@ -20,6 +20,9 @@ use super::extent::{EMPTY, extent};
 use super::stage::{Interpolation, UsdType};
 use super::surface::surface;
 
+/// Width of curves that have none, metres. USD has no default, and readers take 1 m.
+pub const DEFAULT_WIDTH: f32 = 0.001;
+
 /// The source of an attribute's values. The order of the variants is that in files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Source {
@@ -29,6 +32,8 @@ pub(super) enum Source {
     Extent,
     /// An attribute of the geometry.
     Attribute(Owner, Name),
+    /// [`DEFAULT_WIDTH`], if no frame has widths.
+    DefaultWidth,
 }
 
 /// Arrays of topology.
@@ -81,6 +86,10 @@ pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declarat
         Source::Topology(TopologyArray::TetIndices) => return schema("tetVertexIndices", UsdType::Int4),
         Source::Topology(TopologyArray::SurfaceIndices) => return schema("surfaceFaceVertexIndices", UsdType::Int3),
         Source::Extent => return schema("extent", UsdType::Float3),
+        Source::DefaultWidth => {
+            let interpolation = Some(Interpolation::Constant);
+            return Declaration { interpolation, ..schema("widths", UsdType::Float) };
+        }
         Source::Attribute(owner, name) => (*owner, &**name),
     };
     let interpolation = Some(match owner {
@@ -130,13 +139,17 @@ pub(super) fn is_motion(source: &Source) -> bool {
     matches!(source, Source::Attribute(Owner::Point, name) if **name == *P.name || **name == *V.name)
 }
 
-/// The value of `source` in a frame without its component: no rows, or an inverted box. `None` for attributes of the
-/// whole component, which always have a row.
-pub(super) fn absent(source: &Source, rows: ColumnType) -> Option<Column> {
-    match source {
-        Source::Attribute(Owner::Once, _) => None,
-        Source::Extent => Some(Column::new(EMPTY.to_vec())),
-        Source::Topology(_) | Source::Attribute(..) => Some(Column::zeros(rows, 0)),
+/// The value of `source` in a frame that does not have it, where the component has `points` points, or does not exist
+/// (`None`). Without the component it has no rows, or an inverted box; widths of curves have a default. `None` if it
+/// has no value then: an attribute of a component without it, and one of a whole component, which always has a row.
+pub(super) fn absent(kind: Kind, source: &Source, rows: ColumnType, points: Option<u32>) -> Option<Column> {
+    match (source, points) {
+        (Source::Attribute(Owner::Point, name), Some(points)) if kind == Kind::Curves && **name == *WIDTH.name => {
+            Some(Column::new(vec![DEFAULT_WIDTH; points as usize]))
+        }
+        (Source::Attribute(Owner::Once, _) | Source::DefaultWidth, _) | (_, Some(_)) => None,
+        (Source::Extent, None) => Some(Column::new(EMPTY.to_vec())),
+        (Source::Topology(_) | Source::Attribute(..), None) => Some(Column::zeros(rows, 0)),
     }
 }
 
@@ -178,7 +191,8 @@ impl Derived {
         {
             return extent.clone();
         }
-        let bounds = extent(component.kind(), component.positions(), component.get(WIDTH));
+        let default = (component.kind() == Kind::Curves).then_some(&[DEFAULT_WIDTH][..]);
+        let bounds = extent(component.kind(), component.positions(), component.get(WIDTH).or(default));
         let column = Column::new(bounds.to_vec());
         self.extent = Some((positions.clone(), widths.cloned(), column.clone()));
         column
@@ -278,6 +292,6 @@ mod tests {
         let box_of_first = find(&first, Source::Extent);
         assert!(find(&first, Source::Extent).same(&box_of_first));
         assert!(find(&moved, counts()).same(&first_counts));
-        assert_eq!(find(&moved, Source::Extent), Column::new(vec![[0.0; 3], [1.0, 2.0, 3.0]]));
+        assert_eq!(find(&moved, Source::Extent), Column::new(vec![[-5e-4; 3], [1.0005, 2.0005, 3.0005]]));
     }
 }

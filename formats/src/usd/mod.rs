@@ -13,6 +13,8 @@
 //! * In a frame without a component its arrays are empty; in a frame without an attribute that other frames have, it is
 //!   a value block. Components are not blocked, because a reader that keeps the last value at a block would keep showing
 //!   them.
+//! * Curves without `width` get a width of 0.001 m ([`lacks_width`]): for all of them if no frame has widths, otherwise
+//!   for each CV of the frames without. Readers would take 1 m.
 //! * `velocities` have samples at the same times as `points`, even if they never change: USD uses them only then.
 //! * An attribute or output whose name is not an ASCII identifier gets one (`names`), with its own as `displayName`.
 //!
@@ -33,11 +35,13 @@ mod usdc;
 use std::io::{self, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use engine::geometry::{ColumnType, Geometry, Kind, Name};
+use engine::geometry::{ColumnType, Geometry, Kind, Name, WIDTH};
 
 use crate::atomic::{AtomicFile, FileError};
 use recorder::{Header, Recorder};
 use stage::Encoder;
+
+pub use layout::DEFAULT_WIDTH;
 
 /// The two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -124,6 +128,11 @@ impl UsdWriter {
         file.commit()?;
         Ok(Summary { bytes, frames: counts.frames, stored: counts.stored, shared: counts.shared })
     }
+}
+
+/// Whether a USD file gets a width for curves of `geometry` because they have none.
+pub fn lacks_width(geometry: &Geometry) -> bool {
+    geometry.curves().is_some_and(|curves| curves.point_count() > 0 && curves.get(WIDTH).is_none())
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -1,12 +1,12 @@
 //! Collects frames into tracks: the values of each attribute over time, stored once while they do not change.
 //!
-//! Memory: the arrays of the last frame (shared with other owners), and a handle of 8 bytes per attribute and frame. A
-//! refused frame changes nothing; after a failed write all calls fail.
+//! Memory: the arrays of the last frame (shared with other owners), a handle of 8 bytes per attribute and frame, and 32
+//! bytes per frame. A refused frame changes nothing; after a failed write all calls fail.
 
 use std::collections::BTreeMap;
 use std::io;
 
-use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Topology};
+use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Owner, Topology, WIDTH};
 
 use super::UsdFault;
 use super::layout::{self, Derived, Source, TargetName};
@@ -45,8 +45,8 @@ pub(super) struct Counts {
 pub(super) struct Recorder<W> {
     header: Header,
     times: Vec<f64>,
-    /// The components of each frame, in the order of [`Kind::ALL`].
-    present: Vec<[bool; 4]>,
+    /// The number of points of each frame's components, in the order of [`Kind::ALL`]; `None` without the component.
+    points: Vec<[Option<u32>; 4]>,
     derived: [Derived; 4],
     tracks: BTreeMap<(Kind, Source), Track>,
     store: Store<W>,
@@ -75,7 +75,7 @@ impl<W> Recorder<W> {
         Self {
             header,
             times: Vec::new(),
-            present: Vec::new(),
+            points: Vec::new(),
             derived: Default::default(),
             tracks: BTreeMap::new(),
             store: Store { encoder, stored: 0, shared: 0 },
@@ -89,21 +89,22 @@ impl<W> Recorder<W> {
         self.refuse_after_failure()?;
         self.check(time, geometry)?;
         self.failed = true;
-        let mut present = [false; 4];
+        let mut points = [None; 4];
         for part in geometry.parts() {
             let kind = part.kind();
-            present[kind as usize] = true;
+            // Below 2³¹, as checked.
+            points[kind as usize] = Some(part.point_count() as u32);
             for (source, column) in self.derived[kind as usize].arrays(part) {
                 self.record((kind, source), column)?;
             }
         }
         for ((kind, source), track) in &mut self.tracks {
             if track.samples.len() == self.times.len() {
-                track.record_absence(*kind, source, present[*kind as usize], &mut self.store)?;
+                track.record_absence(*kind, source, points[*kind as usize], &mut self.store)?;
             }
         }
         self.times.push(time);
-        self.present.push(present);
+        self.points.push(points);
         self.failed = false;
         Ok(())
     }
@@ -114,8 +115,9 @@ impl<W> Recorder<W> {
     }
 
     /// Writes the structure and returns the file.
-    pub(super) fn finish(self) -> Result<(W, Counts), Fault> {
+    pub(super) fn finish(mut self) -> Result<(W, Counts), Fault> {
         self.refuse_after_failure()?;
+        self.record_default_width()?;
         let Self { header, times, tracks, store, all_sampled, .. } = self;
         let counts = Counts { frames: times.len(), stored: store.stored, shared: store.shared };
         let mut by_kind: BTreeMap<Kind, Vec<(Source, Track)>> = BTreeMap::new();
@@ -132,6 +134,21 @@ impl<W> Recorder<W> {
             prims: by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks, all_sampled)).collect(),
         };
         Ok((store.encoder.finish(&stage)?, counts))
+    }
+
+    /// Records [`layout::DEFAULT_WIDTH`] for curves that have widths at no frame. Where some frames have them, the
+    /// others have got theirs already ([`layout::absent`]).
+    fn record_default_width(&mut self) -> io::Result<()> {
+        let curves = self.points.iter().any(|points| points[Kind::Curves as usize].is_some());
+        let width = Source::Attribute(Owner::Point, WIDTH.name.into());
+        if !curves || self.tracks.contains_key(&(Kind::Curves, width)) {
+            return Ok(());
+        }
+        let column = Column::new(vec![layout::DEFAULT_WIDTH]);
+        let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
+        track.record(Kind::Curves, &Source::DefaultWidth, column, &mut self.store)?;
+        self.tracks.insert((Kind::Curves, Source::DefaultWidth), track);
+        Ok(())
     }
 
     fn refuse_after_failure(&self) -> io::Result<()> {
@@ -170,8 +187,8 @@ impl<W> Recorder<W> {
             return track.record(kind, &source, column, &mut self.store);
         }
         let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
-        for present in &self.present {
-            track.record_absence(kind, &source, present[kind as usize], &mut self.store)?;
+        for points in &self.points {
+            track.record_absence(kind, &source, points[kind as usize], &mut self.store)?;
         }
         track.record(kind, &source, column, &mut self.store)?;
         self.tracks.insert(key, track);
@@ -205,15 +222,15 @@ impl Track {
         Ok(())
     }
 
-    /// Records that the next frame has no such value; `present` is whether it has the component.
+    /// Records that the next frame has no such value; `points` is how many points its component has, if it has one.
     fn record_absence<W>(
         &mut self,
         kind: Kind,
         source: &Source,
-        present: bool,
+        points: Option<u32>,
         store: &mut Store<W>,
     ) -> io::Result<()> {
-        match layout::absent(source, self.rows).filter(|_| !present) {
+        match layout::absent(kind, source, self.rows, points) {
             Some(nothing) => self.record(kind, source, nothing, store),
             None => {
                 self.samples.push(Handle::BLOCK);

@@ -89,6 +89,19 @@ def Xform "fur_2" (
 }
 
 #[test]
+fn curves_without_widths_get_a_width_and_an_extent_for_it() {
+    let mut thin = fur();
+    thin.remove(Owner::Point, "width");
+    let text = text_of("fur", [0.0; 3], &[(1.0, thin.clone().into()), (2.0, thin.clone().into())]);
+    assert!(text.contains("        float[] widths = [0.001] (\n            interpolation = \"constant\"\n"), "{text}");
+    assert!(text.contains("extent = [(-0.0005, -0.0005, -0.0005), (1.0005, 2.0005, 1.0005)]"), "{text}");
+    assert!(lacks_width(&thin.clone().into()) && !lacks_width(&fur().into()));
+    let text = text_of("fur", [0.0; 3], &[(1.0, thin.into()), (2.0, fur().into())]);
+    assert_eq!(text.matches("widths").count(), 2, "one property with its time samples: {text}");
+    assert!(text.contains("1: [0.001, 0.001, 0.001, 0.001, 0.001],"), "{text}");
+}
+
+#[test]
 fn files_without_frames_or_components_are_valid() {
     let expected = "#usda 1.0\n(\n    defaultPrim = \"fur\"\n    metersPerUnit = 1\n    timeCodesPerSecond = 24\n    \
         framesPerSecond = 24\n    upAxis = \"Y\"\n)\n\ndef Xform \"fur\"\n{\n}\n";

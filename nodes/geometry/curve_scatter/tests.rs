@@ -139,6 +139,10 @@ fn a_mask_scales_the_density() {
 fn a_missing_or_non_float_mask_is_refused() {
     let error = meadow(square(1.0)).set(MASK, "lawn".into()).try_cook().unwrap_err();
     assert_eq!(error.to_string(), "`mask` is `lawn`, which `skin` does not have; expected one float for each vertex");
+    let mut skin = square(1.0);
+    skin.set(Attr::<f32>::point("lawns"), vec![1.0; 4]).unwrap();
+    let error = meadow(skin).set(MASK, "lawn".into()).try_cook().unwrap_err();
+    assert_eq!(error.hint.as_deref(), Some("did you mean `lawns`?"));
     let error = meadow(square(1.0)).set(MASK, "P".into()).try_cook().unwrap_err();
     assert_eq!(error.fact, "`mask` is `P`, which is one float3 for each vertex");
 }

@@ -79,7 +79,7 @@ pub(crate) fn mask<'s>(name: &str, skin: &'s Component) -> Result<Option<&'s [f3
     }
     let what = skin.describe(name).map_or("which `skin` does not have".into(), |found| format!("which is {found}"));
     let error = Error::refused(format!("`mask` is `{name}`, {what}")).of("mask").of_types();
-    Err(error.hint("expected one float for each vertex"))
+    Err(error.hint(point_float_hint(skin, name)))
 }
 
 /// The skin at the scene's first frame.

@@ -1,3 +1,4 @@
 //! Helpers shared by the family's nodes.
 
 pub(crate) mod attributes;
+pub(crate) mod pieces;

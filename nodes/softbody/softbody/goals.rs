@@ -5,15 +5,20 @@
 use std::sync::Arc;
 
 use bodies::mass_spring;
+use bodies::tets::bounds;
 use engine::prelude::*;
 use numerics::vector::{DVec3, to_f64};
 
-use super::GoalOn;
 use super::setup::{SimulationSetup, StartInputs};
+use super::{
+    DOUBLED_GOALS, DOUBLED_GOALS_WIRE, EARLY_GOALS, EARLY_GOALS_WIRE, GOAL_MISS, GoalOn, IDLE_GOALS, IDLE_GOALS_WIRE,
+};
 use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH};
 
 /// A goal of a body.
 struct GoalKey<'a> {
+    /// Index of its wire.
+    index: usize,
     frame: f64,
     strength: f64,
     hold: f64,
@@ -62,6 +67,7 @@ impl<'a> Goals<'a> {
                 })
             };
             let key = GoalKey {
+                index,
                 frame: number(GOAL_FRAME)?,
                 strength: number(GOAL_STRENGTH)?.max(0.0),
                 hold: number(GOAL_HOLD)?.max(0.0),
@@ -175,17 +181,79 @@ impl<'a> Goals<'a> {
 
     /// Mean distance of pulled particles from their targets at a frame, metres; `None` if none is pulled.
     pub(super) fn distance(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> Option<f64> {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (wire, particles) in self.setup.wires.iter().enumerate() {
-            let Some(now) = self.sample(wire, frame) else { continue };
-            for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
-            {
-                let to = self.place(&now, particle, point);
-                sum += (to - DVec3::from(positions[particle])).norm();
-                count += 1.0;
-            }
-        }
+        let wires = 0..self.of.len();
+        let [sum, count] = wires.fold([0.0; 2], |[sum, count], wire| {
+            let [own, particles] = self.distances(wire, frame, on, positions);
+            [sum + own, count + particles]
+        });
         (count > 0.0).then(|| sum / count)
+    }
+
+    /// The largest mean distance of a body from the goal that it should have reached at a frame, relative to the size
+    /// of the body; `None` if no goal has been reached or is held.
+    fn miss(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> Option<f64> {
+        let of = |wire: usize| {
+            let reached = |key: &GoalKey<'_>| key.strength > 0.0 && (key.frame..=key.frame + key.hold).contains(&frame);
+            if !self.of[wire].iter().any(reached) {
+                return None;
+            }
+            let [sum, count] = self.distances(wire, frame, on, positions);
+            let [low, high] = bounds(self.setup.rest[self.setup.wires[wire].clone()].iter().copied());
+            let size = (DVec3::from(high) - DVec3::from(low)).norm();
+            (count > 0.0 && size > 0.0).then(|| sum / count / size)
+        };
+        (0..self.of.len()).filter_map(of).reduce(f64::max)
+    }
+
+    /// Sets the metrics that tell whether goals work, with particles at `positions`.
+    pub(super) fn measure(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]], metrics: &mut MetricValues) {
+        if let Some(miss) = self.miss(frame, on, positions) {
+            metrics.set(GOAL_MISS, miss);
+        }
+        for (goals, count, wire) in [
+            (self.idle(on), IDLE_GOALS, IDLE_GOALS_WIRE),
+            (self.early(), EARLY_GOALS, EARLY_GOALS_WIRE),
+            (self.doubled(), DOUBLED_GOALS, DOUBLED_GOALS_WIRE),
+        ] {
+            metrics.set(count, goals.len() as f64);
+            metrics.set(wire, goals.first().map_or(-1.0, |first| *first as f64));
+        }
+    }
+
+    /// Sum of the distances of a wire's pulled particles from their targets, and their number.
+    fn distances(&self, wire: usize, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> [f64; 2] {
+        let Some(now) = self.sample(wire, frame) else { return [0.0; 2] };
+        let particles = self.setup.wires[wire].clone().enumerate();
+        let pulled = particles.filter(|(_, particle)| self.is_pulled(*particle, on));
+        pulled.fold([0.0; 2], |[sum, count], (point, particle)| {
+            let to = self.place(&now, particle, point);
+            [sum + (to - DVec3::from(positions[particle])).norm(), count + 1.0]
+        })
+    }
+
+    /// The goals that have no particle to pull, by index of their wire.
+    fn idle(&self, on: GoalOn) -> Vec<usize> {
+        let empty = |wire: &usize| !self.setup.wires[*wire].clone().any(|particle| self.is_pulled(particle, on));
+        let mut idle: Vec<usize> =
+            (0..self.of.len()).filter(empty).flat_map(|wire| self.of[wire].iter().map(|key| key.index)).collect();
+        idle.sort_unstable();
+        idle
+    }
+
+    /// The goals that are over before the start, by index of their wire.
+    fn early(&self) -> Vec<usize> {
+        let over = |key: &&GoalKey<'_>| key.frame + key.hold < self.start;
+        let mut early: Vec<usize> = self.of.iter().flatten().filter(over).map(|key| key.index).collect();
+        early.sort_unstable();
+        early
+    }
+
+    /// The goals at whose frame their body has another one, which they follow among the wires.
+    fn doubled(&self) -> Vec<usize> {
+        let pairs = self.of.iter().flat_map(|keys| keys.windows(2)).filter(|pair| pair[0].frame == pair[1].frame);
+        let mut doubled: Vec<usize> = pairs.map(|pair| pair[1].index).collect();
+        doubled.sort_unstable();
+        doubled
     }
 }
 

@@ -17,25 +17,40 @@ pub(super) struct PinBinding {
     offset: DVec3,
 }
 
+/// The pins at the start.
+#[derive(Default)]
+pub(super) struct BoundPins {
+    pub(super) bindings: Vec<PinBinding>,
+    /// Wire and point of each pin with no particle within its radius.
+    pub(super) idle: Vec<[usize; 2]>,
+}
+
 /// Binds each particle to the nearest pin within whose radius it lies at the start.
-pub(super) fn bind_pins(wires: &[Arc<Geometry>], rest: &[[f64; 3]]) -> Result<Vec<PinBinding>> {
+pub(super) fn bind_pins(wires: &[Arc<Geometry>], rest: &[[f64; 3]]) -> Result<BoundPins> {
     let mut nearest: Vec<Option<(f64, PinBinding)>> = rest.iter().map(|_| None).collect();
+    let mut idle = Vec::new();
     for (wire, geometry) in wires.iter().enumerate() {
         let pins = geometry.require(Kind::Points)?;
         let radii = needed(pins, wire, PIN_RADIUS)?;
         for (point, (pin, radius)) in pins.positions().iter().zip(radii).enumerate() {
+            let mut reaches = false;
             for (particle, at) in rest.iter().enumerate() {
                 let offset = DVec3::from(*at) - to_f64(*pin);
                 let distance = offset.norm();
-                if distance <= f64::from(*radius)
-                    && nearest[particle].as_ref().is_none_or(|(least, _)| distance < *least)
-                {
+                if distance > f64::from(*radius) {
+                    continue;
+                }
+                reaches = true;
+                if nearest[particle].as_ref().is_none_or(|(least, _)| distance < *least) {
                     nearest[particle] = Some((distance, PinBinding { particle: particle as u32, wire, point, offset }));
                 }
             }
+            if !reaches {
+                idle.push([wire, point]);
+            }
         }
     }
-    Ok(nearest.into_iter().flatten().map(|(_, binding)| binding).collect())
+    Ok(BoundPins { bindings: nearest.into_iter().flatten().map(|(_, binding)| binding).collect(), idle })
 }
 
 /// Adds the constraints and springs of a step from the frame `before` to `now`.

@@ -9,9 +9,10 @@ use engine::prelude::*;
 use numerics::masked::Masked;
 
 use super::joints::{Couple, couple};
-use super::pins::{PinBinding, bind_pins};
+use super::pins::{BoundPins, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
 use crate::shared::attributes::{SLIVER, SURFACE_POINT};
+use crate::shared::pieces::pieces;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ pub(super) struct SimulationSetup {
     pub(super) outer: Vec<bool>,
     /// The surface of each connected body, for contacts.
     pub(super) skins: Vec<BodySkin>,
-    pub(super) pins: Vec<PinBinding>,
+    pub(super) pins: BoundPins,
     /// The output components, except for their positions.
     pub(super) surface: Component,
     pub(super) body: Component,
@@ -136,7 +137,8 @@ impl SimulationSetup {
             surface = Some(joined(surface, &found.mesh)?);
         }
         triangles.iter().flatten().for_each(|corner: &u32| outer[*corner as usize] = true);
-        let parts = parts(rest.len(), &all);
+        let links = all.iter().flat_map(|[first, others @ ..]: &[u32; 4]| others.map(|other| [*first, other]));
+        let parts = pieces(rest.len(), links);
         let material = MaterialFields::at(cx, inputs)?;
         let joints = couple(&Couple {
             points: &rest,
@@ -259,25 +261,6 @@ fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
         *rows.get_mut(*row as usize)? = point as u32;
     }
     (!rows.is_empty() && !rows.contains(&u32::MAX)).then_some(rows)
-}
-
-/// For each particle, the lowest particle of its connected body.
-fn parts(count: usize, tets: &[[u32; 4]]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..count as u32).collect();
-    fn root(parent: &mut [u32], mut at: u32) -> u32 {
-        while parent[at as usize] != at {
-            parent[at as usize] = parent[parent[at as usize] as usize];
-            at = parent[at as usize];
-        }
-        at
-    }
-    for tet in tets {
-        for corner in &tet[1..] {
-            let (a, b) = (root(&mut parent, tet[0]), root(&mut parent, *corner));
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    (0..count as u32).map(|particle| root(&mut parent, particle)).collect()
 }
 
 fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<BodySkin>> {

@@ -242,3 +242,104 @@ fn plastic_work_is_published_where_springs_flow() {
     assert_eq!(work(0.0), 0.0);
     assert!(work(20.0) > 0.0, "{}", work(20.0));
 }
+
+/// A closed cube as a collider.
+fn solid(low: [f32; 3], size: f32) -> Component {
+    let cube = block([1; 3], low, [size; 3]);
+    let faces = bodies::tets::boundary(cube.tet_corners(), cube.positions());
+    let corners: Vec<u32> = faces.iter().flat_map(|face| face.corners).collect();
+    Component::mesh(vec![3; faces.len()], corners, cube.positions().to_vec()).unwrap()
+}
+
+#[test]
+fn particles_that_start_inside_something_are_counted_at_every_frame() {
+    let inside = |bench: Bench| {
+        let frames = bench.frames([1, 2, 3]);
+        assert_eq!(frames[1].metrics["started_inside"], frames[2].metrics["started_inside"]);
+        frames[2].metrics["started_inside"]
+    };
+    let at = |low: [f32; 3]| inside(simulating(cube()).input(COLLIDERS, solid(low, 0.2)));
+    assert_eq!(at([0.03, -0.05, -0.05]), 17.0, "all but the nine particles on the face at x = 0");
+    assert_eq!((at([0.1, 0.0, 0.0]), at([0.0995, 0.0, 0.0])), (0.0, 0.0), "closer than `thickness` is touching");
+    let mut open = solid([-0.05; 3], 0.2);
+    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open.clone())), 26.0);
+    let Topology::Mesh(faces) = open.topology() else { panic!("a mesh has faces") };
+    open = Component::mesh(vec![3; 11], faces.corners[3..].to_vec(), open.positions().to_vec()).unwrap();
+    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open)), 0.0, "an open collider has no inside");
+    assert_eq!(inside(simulating(cube()).set(GROUND, true).set(GROUND_HEIGHT, 0.05)), 9.0);
+    assert_eq!(inside(simulating(cube()).set(GROUND, true)), 0.0);
+    let two = |x: f32| simulating(cube()).input(BODIES, block([2; 3], [x, 0.01, 0.01], [0.1; 3]));
+    // Of each, the four corners that lie in the other one, and what is between them.
+    assert!((8.0..=20.0).contains(&inside(two(0.06))), "{}", inside(two(0.06)));
+    assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
+}
+
+#[test]
+fn steps_that_miss_the_tolerance_are_counted() {
+    let missed = |tolerance: f64| {
+        let stiff = simulating(cube()).set(STIFFNESS, all(1e6)).set(INITIAL_VELOCITY, [0.0, -3.0, 0.0]);
+        let accurate = stiff.set(GROUND, true).set(INTEGRATOR, Stepping::Accurate).set(TOLERANCE, tolerance);
+        accurate.frames([1, 3])[1].metrics["tolerance_missed"]
+    };
+    assert_eq!(missed(0.1), 0.0);
+    assert!(missed(1e-9) > 0.0);
+}
+
+#[test]
+fn pins_that_reach_nothing_are_counted_and_the_first_is_named() {
+    let far = pins(vec![[0.0, 0.1, 0.0], [0.0, 5.0, 0.0]], 0.02);
+    let near = pins(vec![[0.1, 0.1, 0.0]], 0.02);
+    let frames = simulating(cube()).input(PINS, near.clone()).input(PINS, far).frames([1, 2]);
+    for frame in &frames {
+        let of = |name: &str| frame.metrics[name];
+        assert_eq!((of("idle_pins"), of("idle_pins_wire"), of("idle_pins_point")), (1.0, 1.0, 1.0));
+    }
+    assert_eq!(simulating(cube()).input(PINS, near).frames([1, 2])[1].metrics["idle_pins"], 0.0);
+}
+
+#[test]
+fn goals_that_have_no_effect_are_counted_and_the_first_is_named() {
+    let goal = |frame: f32, body: Component| {
+        let mut goal = pressed(0, body.into());
+        goal.part_mut(Kind::Tets).unwrap().set(GOAL_FRAME, vec![frame]).unwrap();
+        Geometry::from(goal.tets().unwrap().clone())
+    };
+    let with = |goals: Vec<Geometry>, on: GoalOn| {
+        let soft = simulating(with_inside(0, cube().into())).set(GOAL_ON, on).set(START_FRAME, 1);
+        goals.into_iter().fold(soft, |soft, goal| soft.input(GOALS, goal)).frames([1, 2]).remove(1).metrics
+    };
+    let of = |frame: f32| goal(frame, cube());
+    let healthy = with(vec![of(12.0), of(24.0)], GoalOn::Interior);
+    assert_eq!((healthy["idle_goals"], healthy["doubled_goals"], healthy["early_goals"]), (0.0, 0.0, 0.0));
+    let doubled = with(vec![of(12.0), of(24.0), of(12.0)], GoalOn::Interior);
+    assert_eq!((doubled["doubled_goals"], doubled["doubled_goals_wire"]), (1.0, 2.0));
+    let early = with(vec![of(12.0), of(-5.0)], GoalOn::Interior);
+    assert_eq!((early["early_goals"], early["early_goals_wire"]), (1.0, 1.0));
+    let hollow = simulating(block([1; 3], [0.0; 3], [0.1; 3]));
+    let mut shape = Geometry::from(block([1; 3], [0.0; 3], [0.1; 3]));
+    for (attribute, value) in [(GOAL_FRAME, 2.0), (GOAL_STRENGTH, 2000.0), (GOAL_HOLD, 0.0)] {
+        shape.part_mut(Kind::Tets).unwrap().set(attribute, vec![value]).unwrap();
+    }
+    let idle = hollow.input(GOALS, shape).frames([1, 2]).remove(1).metrics;
+    assert_eq!((idle["idle_goals"], idle["idle_goals_wire"]), (1.0, 0.0));
+}
+
+#[test]
+fn how_far_a_body_misses_a_goal_is_told_where_it_should_have_reached_it() {
+    let missed = |strength: f32| {
+        let mut goal = pressed(0, cube().into());
+        let tets = goal.part_mut(Kind::Tets).unwrap();
+        tets.edit(P).unwrap().iter_mut().for_each(|p| p[0] += 0.3);
+        for (attribute, value) in [(GOAL_FRAME, 12.0), (GOAL_STRENGTH, strength), (GOAL_HOLD, 2.0)] {
+            tets.set(attribute, vec![value]).unwrap();
+        }
+        let soft = simulating(cube()).set(GOAL_ON, GoalOn::All).set(GRAVITY, [0.0; 3]);
+        soft.input(GOALS, goal).frames([11, 12, 14, 15])
+    };
+    let [strong, weak] = [1e4, 1e-3].map(missed);
+    assert!(strong[1].metrics["goal_miss"] < 0.1 && strong[2].metrics["goal_miss"] < 0.05);
+    assert!(weak[1].metrics["goal_miss"] > 1.0 && weak[2].metrics["goal_miss"] > 1.0);
+    for frame in [&weak[0], &weak[3]] {
+        assert!(!frame.metrics.contains_key("goal_miss"), "only while the goal is held");
+    }
+}

@@ -162,3 +162,21 @@ fn any_number_of_threads_gives_the_same_bits() {
     let one = bits(1);
     assert!(one == bits(2) && one == bits(7));
 }
+
+#[test]
+fn pieces_lost_because_they_are_tiny_are_counted() {
+    let moved = |mut part: Component| {
+        part.edit(P).unwrap().iter_mut().for_each(|p| p[0] += 1.0);
+        part
+    };
+    let lost = |size: f64| {
+        let out = filling(moved(ball(3, size)).concat(&ball(4, 1.0)).unwrap()).cook();
+        (out.metrics["lost_pieces"], out.metrics["bodies"])
+    };
+    assert_eq!(lost(0.1), (0.0, 2.0));
+    assert_eq!(filling(untidy()).cook().metrics["lost_pieces"], 0.0, "a duplicate face is no loss");
+    let tiny = ball(3, 1e-9).concat(&ball(3, 1e-9)).unwrap();
+    let far = moved(ball(4, 1.0)).concat(&tiny).unwrap();
+    let out = filling(far).cook();
+    assert_eq!((out.metrics["lost_pieces"], out.metrics["bodies"]), (1.0, 1.0));
+}

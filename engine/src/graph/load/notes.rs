@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::Name;
-use crate::graph::Graph;
+use crate::graph::{Body, Graph, GraphNode};
 use crate::note::{Note, kind};
+use crate::param::{ParamSpec, Source, Unit, Value};
 
 /// Unused nodes with a note each; of the rest only the number is told.
 const NAMED: usize = 8;
@@ -13,7 +14,34 @@ const NAMED: usize = 8;
 pub(super) fn of(graph: &Graph) -> Vec<Note> {
     let mut notes = unused_nodes(graph);
     notes.extend(similar_names(graph));
+    notes.extend(late_frames(graph));
     notes
+}
+
+/// Frames at which something is to happen, in params that cannot be animated, after the last frame of the scene.
+fn late_frames(graph: &Graph) -> Vec<Note> {
+    let (first, last) = (graph.scene.first, graph.scene.last);
+    let late = |node: &GraphNode| {
+        let Body::Node { specs, params, .. } = &node.body else { return Vec::new() };
+        let frames =
+            specs.iter().zip(&params[..]).filter(|(spec, _)| spec.facts.unit == Unit::Frame && spec.facts.fixed);
+        let note = |(spec, source): (&ParamSpec, &Source)| {
+            let frame = match source {
+                Source::Constant(Value::Float(frame)) => *frame,
+                Source::Constant(Value::Int(frame)) => *frame as f64,
+                _ => return None,
+            };
+            let (id, name) = (&node.id, spec.name);
+            let text = format!(
+                "`{id}` ({}): `{name}` is {frame}, after the last frame of the scene, whose frames are {first}-{last}",
+                node.type_name()
+            );
+            let hint = "What happens at that frame is not seen. Set an earlier frame, or extend `scene.frames`.";
+            (frame > last as f64).then(|| Note::new(kind::OUTSIDE_SCENE, text).of_node(id).hint(hint))
+        };
+        frames.filter_map(note).collect()
+    };
+    graph.nodes.iter().flat_map(late).collect()
 }
 
 /// Nodes that no output needs.

@@ -63,12 +63,12 @@ fn curve(x: f32) -> Component {
 #[test]
 fn unchanged_values_are_stored_once_without_samples() {
     let (lines, counts) = recorded(&[curve(0.0).into(), curve(0.0).into(), curve(0.0).into()]);
-    assert_eq!(lines, ["curves.curveVertexCounts: 1", "curves.extent: 2", "curves.points: 2"]);
-    assert_eq!(counts, Counts { frames: 3, stored: 3, shared: 6 });
+    assert_eq!(lines, ["curves.curveVertexCounts: 1", "curves.extent: 2", "curves.points: 2", "curves.widths: 1"]);
+    assert_eq!(counts, Counts { frames: 3, stored: 4, shared: 6 });
     let (lines, counts) = recorded(&[curve(0.0).into(), curve(0.0).into(), curve(-0.0).into()]);
     assert_eq!(lines[0], "curves.curveVertexCounts: 1");
     assert_eq!(lines[2], "curves.points = 2 2 2", "a sign is a change, and then every frame has a sample");
-    assert_eq!(counts.stored, 4, "the extent of 0 and of -0 is the same");
+    assert_eq!(counts.stored, 5, "the extent of 0 and of -0 is the same");
 }
 
 #[test]
@@ -85,11 +85,30 @@ fn a_frame_without_the_component_has_no_rows_and_one_without_the_attribute_no_va
             "curves.curveVertexCounts = 0 1 1 0",
             "curves.extent = 2 2 2 2",
             "curves.points = 0 2 2 0",
-            "curves.widths = 0 - 2 0",
+            "curves.widths = 0 2 2 0",
             "curves.primvars:shielded = 0 - 1 0",
             "curves.primvars:mass = - - 1 -",
         ]
     );
+}
+
+#[test]
+fn curves_without_widths_get_one_for_all_or_one_for_each_cv_where_other_frames_have_them() {
+    let with = |widths: bool, cvs: u32| {
+        let mut part = Component::curves(vec![cvs], vec![[0.0; 3]; cvs as usize]).unwrap();
+        if widths {
+            part.set(WIDTH, vec![0.1; cvs as usize]).unwrap();
+        }
+        Geometry::from(part)
+    };
+    let widths = |frames: &[Geometry]| {
+        let lines = recorded(frames).0;
+        lines.into_iter().filter(|line| line.contains("widths")).collect::<Vec<_>>()
+    };
+    assert_eq!(widths(&[with(false, 2), Geometry::default(), with(false, 3)]), ["curves.widths: 1"]);
+    assert_eq!(widths(&[with(true, 2), with(false, 2), with(false, 3)]), ["curves.widths = 2 2 3"]);
+    assert_eq!(widths(&[with(false, 2), Geometry::default(), with(true, 3)]), ["curves.widths = 2 0 3"]);
+    assert_eq!(widths(&[Component::points(vec![[0.0; 3]]).into()]), [""; 0]);
 }
 
 #[test]
@@ -99,7 +118,7 @@ fn velocities_have_the_same_samples_as_points() {
         part.set(V, vec![[v, 0.0, 0.0]; 2]).unwrap();
         Geometry::from(part)
     };
-    let of = |frames: [Geometry; 2]| recorded(&frames).0[2..].join(", ");
+    let of = |frames: [Geometry; 2]| recorded(&frames).0[2..4].join(", ");
     assert_eq!(of([with_v(0.0, 1.0), with_v(1.0, 1.0)]), "curves.points = 2 2, curves.velocities = 2 2");
     assert_eq!(of([with_v(0.0, 1.0), with_v(0.0, 2.0)]), "curves.points = 2 2, curves.velocities = 2 2");
     assert_eq!(of([with_v(0.0, 1.0), with_v(0.0, 1.0)]), "curves.points: 2, curves.velocities: 2");
@@ -129,6 +148,7 @@ fn names_become_distinct_identifiers_and_are_kept_as_display_names() {
         "curves.primvars:a_b (a-b): 2",
         "curves.primvars:curve_id (id): 2",
         "curves.primvars:a_b_2 (a-b): 1",
+        "curves.widths: 1",
     ];
     assert_eq!(lines[2..], expected);
 }

@@ -17,6 +17,7 @@ mod body_skin;
 mod closest_point;
 mod coplanarity;
 mod edge;
+mod inside;
 mod motion;
 mod obstacle;
 mod pair;

@@ -83,6 +83,9 @@ pub struct FrameReport {
     pub residual: f64,
     /// Solves that did not reach their tolerance, and steps that left contacts too deep.
     pub caps_hit: u32,
+    /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows. Steps
+    /// that start out of balance do not count: their estimate only tells the size of the jump.
+    pub tolerance_missed: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
     /// particle.
     pub error_estimate: f64,
@@ -212,6 +215,8 @@ fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energi
         let stepped = stepper.step(motion, times, energies, accurate, false);
         *energies = stepped.after;
         add(report, &stepped);
+        let allowed = accurate.map_or(f64::INFINITY, |tolerance| tolerance * (times[1] - times[0]));
+        report.tolerance_missed += u32::from(!stepped.damped && stepped.estimate > allowed);
     }
 }
 
@@ -263,8 +268,7 @@ fn adapt(
     /// Bounds on the change of step size, and its safety factor.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
-    /// Newton iterations of a frame after which steps are accepted, damped and counted as caps, so that the frame
-    /// ends.
+    /// Newton iterations of a frame after which steps are accepted, damped and counted, so that the frame ends.
     const MOST_NEWTON: u32 = 4000;
     let (mut time, mut share, mut damp) = (0.0, 1.0_f64, false);
     while time < 1.0 {
@@ -272,7 +276,7 @@ fn adapt(
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let (before, energy_budget) = (motion.clone(), *stepper.energy_budget);
+        let (before, energy_budget, gave_up) = (motion.clone(), *stepper.energy_budget, damp);
         let stepped = stepper.step(motion, [time, end], energies, Some(tolerance), damp);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
@@ -294,7 +298,7 @@ fn adapt(
         damp = !fits && smallest;
         if fits {
             add(report, &stepped);
-            report.caps_hit += u32::from(stepped.euler && !stepped.damped && stepped.estimate > allowed);
+            report.tolerance_missed += u32::from(gave_up || (!stepped.damped && stepped.estimate > allowed));
             *energies = stepped.after;
             time = end;
         } else {
