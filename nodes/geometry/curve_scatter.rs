@@ -34,6 +34,9 @@ params! { PARAMS:
     LEAN: Param<f32> = Param::float("lean", 0.2,
         "Largest angle between a curve and the skin's normal, as a fraction of 90 degrees: at 0 all curves are \
          upright, at 1 some lie flat. Angle and direction are random for each curve.").at_least(0.0).soft(0.0, 1.0);
+    WIDTH_PARAM: Param<f32> = Param::float("width", 0.0,
+        "Width of every curve. 0 leaves curves without the attribute `width`.")
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     SEED: Param<Seed> = Param::seed("Each seed gives other positions, lengths and directions.");
     MASK: Param<Name> = Param::text("mask", "",
         "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If \
@@ -43,7 +46,7 @@ params! { PARAMS:
 const CURVES: Output = Output::new(
     "curves",
     &[Kind::Curves],
-    "The curves, root first, with `Pref`, `curve_id` and, if the skin has it, the `uvw` of the root.",
+    "The curves, root first, with `Pref`, `curve_id`, `width` if it is set and, if the skin has it, the `uvw` of the root.",
 );
 
 metrics! { METRICS:
@@ -61,7 +64,7 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&CURVES])
 .reads(&[&P, &N, &UVW])
-.writes(&[&P, &PREF, &UVW, &CURVE_ID])
+.writes(&[&P, &PREF, &UVW, &WIDTH, &CURVE_ID])
 .attributes(|params| {
     let mask = Some(params.get(MASK)).filter(|mask| !mask.is_empty());
     [AttrNames::These(mask.into_iter().collect()), AttrNames::These(Vec::new())]
@@ -97,6 +100,10 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     }
     if let Some(uvw) = skin.get(UVW).filter(|_| cx.wants(UVW)) {
         curves.set(UVW, at_roots(uvw, triangles, shapes.iter().map(|blade| &blade.root), cvs))?;
+    }
+    let width = cx.get(WIDTH_PARAM);
+    if width > 0.0 && cx.wants(WIDTH) {
+        curves.set(WIDTH, vec![width; curves.point_count()])?;
     }
     cx.publish(GROWN, shapes.len() as f64);
     Ok(CURVES.with(Geometry::from(curves)))

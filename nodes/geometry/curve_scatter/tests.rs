@@ -38,6 +38,14 @@ fn the_number_of_curves_is_density_times_area() {
 }
 
 #[test]
+fn a_width_is_written_for_every_cv_and_changes_nothing_else() {
+    let [none, wide] = [0.0, 0.004].map(|width| meadow(square(1.0)).set(WIDTH_PARAM, width).cook());
+    assert_eq!(none.curves().get(WIDTH), None);
+    assert_eq!(wide.curves().get(WIDTH), Some(&vec![0.004; 5000][..]));
+    assert_eq!(wide.curves().positions(), none.curves().positions());
+}
+
+#[test]
 fn without_lean_curves_are_perpendicular_to_the_skin() {
     let out = meadow(square(1.0))
         .set(DENSITY, 50.0)
