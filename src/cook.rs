@@ -234,7 +234,7 @@ fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) ->
             Some(names) if !names.iter().any(|name| **name == *WIDTH.name) => {
                 "Add `width` to the output's `attributes`."
             }
-            _ => "Set `width` in Curve_In, or make it with Attribute_Expr: `width = 0.002`.",
+            _ => "Set `width` in Curve_Scatter or Curve_In, or make it with Attribute_Expr: `width = 0.002`.",
         };
         Note::new(kind::NO_WIDTH, text).at(written.without_width.clone()).hint(hint)
     };

@@ -36,18 +36,29 @@ impl ContentKey {
 
 /// Builds a key piece by piece. Every piece of variable length is preceded by its length, so no two recipes run together.
 #[derive(Default)]
-pub struct Hasher(Vec<u8>);
+pub struct Hasher {
+    /// Pieces not yet hashed.
+    pieces: Vec<u8>,
+    /// Those before them, of a long recipe: the history of a param may span a billion frames.
+    hashed: Option<Box<blake3::Hasher>>,
+}
+
+/// Bytes of pieces that are kept before they are hashed.
+const MOST_KEPT: usize = 1 << 16;
 
 impl Hasher {
     /// A mark that says which kind of piece follows.
     pub fn tag(&mut self, tag: u8) -> &mut Self {
-        self.0.push(tag);
-        self
+        self.bytes(&[tag])
     }
 
     /// Bytes of a length that the recipe fixes.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        self.0.extend_from_slice(bytes);
+        self.pieces.extend_from_slice(bytes);
+        if self.pieces.len() >= MOST_KEPT {
+            self.hashed.get_or_insert_default().update(&self.pieces);
+            self.pieces.clear();
+        }
         self
     }
 
@@ -74,8 +85,12 @@ impl Hasher {
     /// The key of all pieces; the hasher is empty afterwards and keeps its memory.
     pub fn finish(&mut self) -> ContentKey {
         let mut key = ContentKey::default();
-        key.0.copy_from_slice(&blake3::hash(&self.0).as_bytes()[..16]);
-        self.0.clear();
+        let hash = match self.hashed.take() {
+            None => blake3::hash(&self.pieces),
+            Some(mut hashed) => hashed.update(&self.pieces).finalize(),
+        };
+        key.0.copy_from_slice(&hash.as_bytes()[..16]);
+        self.pieces.clear();
         key
     }
 }
@@ -99,6 +114,20 @@ mod tests {
         for wrong in ["", &text[1..], &format!("{text}0"), &text.to_uppercase().replace('0', "G"), "é"] {
             assert_eq!(ContentKey::parse(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_long_recipe_is_hashed_on_the_way_and_leaves_nothing_behind() {
+        let mut hasher = Hasher::default();
+        let mut whole = Vec::new();
+        for number in 0..50_000_i64 {
+            hasher.tag(7).i64(number);
+            whole.push(7);
+            whole.extend(number.to_le_bytes());
+            assert!(hasher.pieces.len() < MOST_KEPT);
+        }
+        assert_eq!(hasher.finish().0[..], blake3::hash(&whole).as_bytes()[..16]);
+        assert_eq!(hasher.tag(1).finish(), Hasher::default().tag(1).finish());
     }
 
     #[test]

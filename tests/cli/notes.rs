@@ -213,7 +213,7 @@ fn curves_that_get_a_width_in_a_usd_file_are_noted() {
     let expected = |format: &str| {
         [format!(
             "output `o`: its curves have no `width`, so {format} got 0.001 m for them (frames 1-3). Set `width` in \
-             Curve_In, or make it with Attribute_Expr: `width = 0.002`."
+             Curve_Scatter or Curve_In, or make it with Attribute_Expr: `width = 0.002`."
         )]
     };
     for format in ["usdc", "usda"] {
