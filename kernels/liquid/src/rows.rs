@@ -1,0 +1,270 @@
+//! Which cells of a lattice are stored: rows along x, each a list of spans, without gaps in the arrays.
+//!
+//! Promise: memory and time follow the cells, not the box around them: 4 bytes a row of the box and 12 bytes a span
+//! besides the values. A field on the rows is a plain slice with one value a cell, in the order of z, then y, then x, so
+//! loops along a span have unit stride.
+
+use std::cmp::{max, min};
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+#[cfg(test)]
+mod tests;
+
+/// A cell: its number along x, y and z.
+pub type Cell = [i32; 3];
+
+/// Cells next to each other along x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// The first cell.
+    pub start: i32,
+    /// The cell after the last.
+    pub end: i32,
+    /// Where the value of the first cell is in a field.
+    pub base: u32,
+}
+
+impl Span {
+    /// Where the value of the cell `x` is.
+    pub fn at(&self, x: i32) -> usize {
+        self.base as usize + (x - self.start) as usize
+    }
+
+    fn contains(&self, x: i32) -> bool {
+        self.start <= x && x < self.end
+    }
+}
+
+/// A set of cells. Spans of a row ascend and do not touch.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CellRows {
+    /// y and z of the first row.
+    low: [i32; 2],
+    /// Rows along y and z.
+    size: [i32; 2],
+    /// For each row, its first span; then the number of all spans.
+    first: Vec<u32>,
+    spans: Vec<Span>,
+    cells: usize,
+}
+
+impl CellRows {
+    /// The cells that `fill` pushes, as half-open ranges of x in any order, for each row (y, z) of the box. Rows are
+    /// filled in parallel.
+    ///
+    /// # Panics
+    /// Where the cells are more than a `u32` counts.
+    pub fn from_ranges(low: [i32; 2], size: [i32; 2], fill: impl Fn(i32, i32, &mut Vec<Range<i32>>) + Sync) -> Self {
+        let size = size.map(|n| max(n, 0));
+        let of_slice = |z: i32| {
+            let (mut counts, mut spans, mut row) = (Vec::with_capacity(size[0] as usize), Vec::new(), Vec::new());
+            for y in low[0]..low[0] + size[0] {
+                row.clear();
+                fill(y, z, &mut row);
+                let before = spans.len();
+                join(&mut row, &mut spans);
+                counts.push((spans.len() - before) as u32);
+            }
+            (counts, spans)
+        };
+        let slices: Vec<_> = (low[1]..low[1] + size[1]).into_par_iter().map(of_slice).collect();
+        let mut rows = Self { low, size, first: vec![0], ..Self::default() };
+        for (counts, spans) in slices {
+            for count in counts {
+                let last = rows.first[rows.first.len() - 1];
+                rows.first.push(last + count);
+            }
+            for Range { start, end } in spans {
+                let base = u32::try_from(rows.cells).expect("more cells than a u32 counts");
+                rows.spans.push(Span { start, end, base });
+                rows.cells += (end - start) as usize;
+            }
+        }
+        rows
+    }
+
+    /// The cells of a list, in any order, repeats allowed.
+    pub fn from_cells(cells: &[Cell]) -> Self {
+        let mut sorted: Vec<_> = cells.iter().map(|[x, y, z]| (*z, *y, *x)).collect();
+        sorted.par_sort_unstable();
+        let Some(((z0, ..), (z1, ..))) = sorted.first().zip(sorted.last()) else { return Self::default() };
+        let (y0, y1) = sorted.iter().fold((i32::MAX, i32::MIN), |(low, high), (_, y, _)| (min(low, *y), max(high, *y)));
+        Self::from_ranges([y0, *z0], [y1 - y0 + 1, z1 - z0 + 1], |y, z, out| {
+            let start = sorted.partition_point(|cell| *cell < (z, y, i32::MIN));
+            let row = sorted[start..].iter().take_while(|cell| (cell.0, cell.1) == (z, y));
+            out.extend(row.map(|(.., x)| *x..*x + 1));
+        })
+    }
+
+    /// All cells with `low` ≤ cell < `high`.
+    pub fn cuboid(low: Cell, high: Cell) -> Self {
+        let size = [high[1] - low[1], high[2] - low[2]];
+        Self::from_ranges([low[1], low[2]], size, |_, _, out| out.push(low[0]..high[0]))
+    }
+
+    /// Number of cells, and length of a field.
+    pub fn len(&self) -> usize {
+        self.cells
+    }
+
+    /// Whether there is no cell.
+    pub fn is_empty(&self) -> bool {
+        self.cells == 0
+    }
+
+    /// The spans of a row, ascending.
+    pub fn row(&self, y: i32, z: i32) -> &[Span] {
+        let [j, k] = [i64::from(y) - i64::from(self.low[0]), i64::from(z) - i64::from(self.low[1])];
+        if j < 0 || k < 0 || j >= i64::from(self.size[0]) || k >= i64::from(self.size[1]) {
+            return &[];
+        }
+        let row = j as usize + k as usize * self.size[0] as usize;
+        &self.spans[self.first[row] as usize..self.first[row + 1] as usize]
+    }
+
+    /// Where the value of a cell is; `None` where it is not stored.
+    pub fn find(&self, [x, y, z]: Cell) -> Option<usize> {
+        let row = self.row(y, z);
+        let span = row.get(row.partition_point(|span| span.end <= x))?;
+        span.contains(x).then(|| span.at(x))
+    }
+
+    /// The rows that hold cells, with y and z, in the order of fields.
+    pub fn rows(&self) -> impl Iterator<Item = ([i32; 2], &[Span])> {
+        let [ny, nz] = self.size;
+        let rows = (0..nz).flat_map(move |k| (0..ny).map(move |j| [self.low[0] + j, self.low[1] + k]));
+        rows.map(|[y, z]| ([y, z], self.row(y, z))).filter(|(_, spans)| !spans.is_empty())
+    }
+
+    /// The spans with the y and z of their row, in the order of fields.
+    pub fn spans(&self) -> impl Iterator<Item = ([i32; 2], Span)> {
+        self.rows().flat_map(|(row, spans)| spans.iter().map(move |span| (row, *span)))
+    }
+
+    /// All cells, in the order of fields.
+    pub fn iter(&self) -> impl Iterator<Item = Cell> {
+        self.spans().flat_map(|([y, z], span)| (span.start..span.end).map(move |x| [x, y, z]))
+    }
+
+    /// The smallest box, low corner and high, that holds every cell: low ≤ cell < high. `None` where there is no cell.
+    pub fn bounds(&self) -> Option<(Cell, Cell)> {
+        let mut bounds: Option<(Cell, Cell)> = None;
+        for ([y, z], spans) in self.rows() {
+            let (low, high) = bounds.unwrap_or(([i32::MAX; 3], [i32::MIN; 3]));
+            let (x0, x1) = (spans[0].start, spans[spans.len() - 1].end);
+            bounds = Some((
+                [min(low[0], x0), min(low[1], y), min(low[2], z)],
+                [max(high[0], x1), max(high[1], y + 1), max(high[2], z + 1)],
+            ));
+        }
+        bounds
+    }
+
+    /// The cells that `keep` keeps; it gets each cell and where its value is.
+    pub fn filtered(&self, keep: impl Fn(Cell, usize) -> bool + Sync) -> Self {
+        Self::from_ranges(self.low, self.size, |y, z, out| {
+            for span in self.row(y, z) {
+                let mut x = span.start;
+                while x < span.end {
+                    let start = x;
+                    while x < span.end && keep([x, y, z], span.at(x)) {
+                        x += 1;
+                    }
+                    if x > start {
+                        out.push(start..x);
+                    }
+                    x += 1;
+                }
+            }
+        })
+    }
+
+    /// The cells of either set.
+    pub fn union(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() {
+            return if self.is_empty() { other.clone() } else { self.clone() };
+        }
+        let low = [0, 1].map(|axis| min(self.low[axis], other.low[axis]));
+        let end = |rows: &Self, axis: usize| rows.low[axis] + rows.size[axis];
+        let size = [0, 1].map(|axis| max(end(self, axis), end(other, axis)) - low[axis]);
+        Self::from_ranges(low, size, |y, z, out| out.extend(self.row(y, z).iter().chain(other.row(y, z)).map(range)))
+    }
+
+    /// All cells at most `by` cells away along every axis.
+    pub fn dilated(&self, by: i32) -> Self {
+        let [y0, z0] = self.low;
+        let [ny, nz] = self.size;
+        let along_xy = Self::from_ranges([y0 - by, z0], [ny + 2 * by, nz], |y, z, out| {
+            let rows = (y - by..=y + by).flat_map(|y| self.row(y, z));
+            out.extend(rows.map(|span| span.start - by..span.end + by));
+        });
+        Self::from_ranges([y0 - by, z0 - by], [ny + 2 * by, nz + 2 * by], |y, z, out| {
+            out.extend((z - by..=z + by).flat_map(|z| along_xy.row(y, z)).map(range));
+        })
+    }
+
+    /// The part of each cell inside the box `low` ≤ cell < `high`.
+    pub fn clipped(&self, low: Cell, high: Cell) -> Self {
+        let first = [max(self.low[0], low[1]), max(self.low[1], low[2])];
+        let end = [min(self.low[0] + self.size[0], high[1]), min(self.low[1] + self.size[1], high[2])];
+        Self::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
+            let inside = |span: &Span| max(span.start, low[0])..min(span.end, high[0]);
+            out.extend(self.row(y, z).iter().map(inside));
+        })
+    }
+
+    /// The cells of the lattice with cells twice as large that hold a cell of this one.
+    pub fn halved(&self) -> Self {
+        let half = |n: i32| n.div_euclid(2);
+        let first = self.low.map(half);
+        let end = [0, 1].map(|axis| half(self.low[axis] + self.size[axis] + 1));
+        Self::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
+            for (y, z) in [(2 * y, 2 * z), (2 * y + 1, 2 * z), (2 * y, 2 * z + 1), (2 * y + 1, 2 * z + 1)] {
+                out.extend(self.row(y, z).iter().map(|span| half(span.start)..half(span.end + 1)));
+            }
+        })
+    }
+
+    /// Calls `copy` with where each stretch of cells that both sets hold lies in a field on these rows, in one on
+    /// `other`, and its length.
+    pub fn for_each_shared(&self, other: &Self, mut copy: impl FnMut(usize, usize, usize)) {
+        for ([y, z], spans) in self.rows() {
+            let others = other.row(y, z);
+            let mut next = 0;
+            for span in spans {
+                while next < others.len() && others[next].end <= span.start {
+                    next += 1;
+                }
+                for theirs in others[next..].iter().take_while(|theirs| theirs.start < span.end) {
+                    let (start, end) = (max(span.start, theirs.start), min(span.end, theirs.end));
+                    copy(span.at(start), theirs.at(start), (end - start) as usize);
+                }
+            }
+        }
+    }
+
+    /// A field on these rows with the values of `field` on `from`, and `outside` where `from` has no cell.
+    pub fn resampled<T: Copy>(&self, from: &Self, field: &[T], outside: T) -> Vec<T> {
+        let mut out = vec![outside; self.len()];
+        self.for_each_shared(from, |at, theirs, len| out[at..at + len].copy_from_slice(&field[theirs..theirs + len]));
+        out
+    }
+}
+
+fn range(span: &Span) -> Range<i32> {
+    span.start..span.end
+}
+
+/// Sorts the ranges of a row and appends them to `spans`, those that touch as one.
+fn join(row: &mut [Range<i32>], spans: &mut Vec<Range<i32>>) {
+    row.sort_unstable_by_key(|range| range.start);
+    let first = spans.len();
+    for range in row.iter().filter(|range| range.start < range.end) {
+        match spans[first..].last_mut() {
+            Some(last) if range.start <= last.end => last.end = max(last.end, range.end),
+            _ => spans.push(range.clone()),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+use super::*;
+use std::collections::BTreeSet;
+
+/// Cells of a ragged shape: two drops, a bar and single cells, on both sides of 0.
+fn ragged() -> Vec<Cell> {
+    let ball =
+        |cell: Cell, centre: Cell, r2: i32| (0..3).map(|axis| (cell[axis] - centre[axis]).pow(2)).sum::<i32>() < r2;
+    let mut cells = vec![[-9, 3, 2], [9, -9, -9]];
+    for z in -8..8 {
+        for y in -8..8 {
+            for x in -8..8 {
+                let cell = [x, y, z];
+                if ball(cell, [-4, -3, 0], 10) || ball(cell, [4, 3, 1], 14) || (y, z) == (6, -6) && x % 3 != 0 {
+                    cells.push(cell);
+                }
+            }
+        }
+    }
+    cells
+}
+
+fn set(rows: &CellRows) -> BTreeSet<Cell> {
+    rows.iter().collect()
+}
+
+fn near(cells: &[Cell], by: i32) -> BTreeSet<Cell> {
+    let steps = || -by..=by;
+    let around = |c: &Cell| {
+        let c = *c;
+        steps().flat_map(move |z| steps().flat_map(move |y| steps().map(move |x| [c[0] + x, c[1] + y, c[2] + z])))
+    };
+    cells.iter().flat_map(around).collect()
+}
+
+#[test]
+fn rows_hold_exactly_the_cells_of_the_list() {
+    let cells = ragged();
+    let rows = CellRows::from_cells(&cells);
+    assert_eq!(set(&rows), cells.iter().copied().collect());
+    assert_eq!(rows.len(), set(&rows).len());
+    for (at, cell) in rows.iter().enumerate() {
+        assert_eq!(rows.find(cell), Some(at));
+    }
+    for cell in near(&cells, 2) {
+        assert_eq!(rows.find(cell).is_some(), cells.contains(&cell), "{cell:?}");
+    }
+    assert_eq!(rows.bounds(), Some(([-9, -9, -9], [10, 7, 5])));
+}
+
+#[test]
+fn dilated_rows_hold_the_cells_nearby_and_spans_never_touch() {
+    let cells = ragged();
+    for by in [0, 1, 3] {
+        let rows = CellRows::from_cells(&cells).dilated(by);
+        assert_eq!(set(&rows), near(&cells, by), "{by}");
+        for (_, spans) in rows.rows() {
+            assert!(spans.windows(2).all(|pair| pair[0].end < pair[1].start), "{spans:?}");
+        }
+    }
+}
+
+#[test]
+fn unions_clips_filters_and_halves_are_those_of_sets() {
+    let cells = ragged();
+    let rows = CellRows::from_cells(&cells);
+    let block = CellRows::cuboid([-2, -3, -20], [3, 9, 1]);
+    assert_eq!(set(&rows.union(&block)), &set(&rows) | &set(&block));
+    assert_eq!(set(&block.union(&rows)), &set(&rows) | &set(&block));
+    assert_eq!(set(&rows.clipped([-2, -3, -20], [3, 9, 1])), &set(&rows) & &set(&block));
+    let odd = rows.filtered(|[x, y, z], at| {
+        assert_eq!(rows.find([x, y, z]), Some(at));
+        (x + y + z) % 2 != 0
+    });
+    assert_eq!(set(&odd), cells.iter().copied().filter(|c| c.iter().sum::<i32>() % 2 != 0).collect());
+    assert_eq!(set(&rows.halved()), cells.iter().map(|cell| cell.map(|n| n.div_euclid(2))).collect());
+}
+
+#[test]
+fn values_follow_their_cells_to_other_rows() {
+    let rows = CellRows::from_cells(&ragged());
+    let other = CellRows::cuboid([-5, -5, -5], [5, 5, 5]);
+    let number = |cell: Cell| cell[0] + 100 * cell[1] + 10_000 * cell[2];
+    let field: Vec<i32> = other.iter().map(number).collect();
+    let moved = rows.resampled(&other, &field, -1);
+    for (cell, value) in rows.iter().zip(moved) {
+        assert_eq!(value, if other.find(cell).is_some() { number(cell) } else { -1 });
+    }
+}
+
+#[test]
+fn no_cells_make_no_rows() {
+    let none = CellRows::from_cells(&[]);
+    assert!(none.is_empty() && none.bounds().is_none() && none.iter().next().is_none());
+    assert_eq!(none.find([0; 3]), None);
+    assert!(none.dilated(3).is_empty() && none.halved().is_empty());
+    let block = CellRows::cuboid([0; 3], [2; 3]);
+    assert_eq!((none.union(&block), block.union(&none)), (block.clone(), block));
+}
