@@ -6,5 +6,8 @@
 
 #![allow(clippy::needless_range_loop, reason = "a loop over cells reads and writes many arrays")]
 
+pub mod fields;
+pub mod open_share;
+pub mod pressure;
 pub mod rows;
 pub mod stencil;

@@ -5,6 +5,7 @@
 //! loops along a span have unit stride.
 
 use std::cmp::{max, min};
+use std::mem::take;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -32,10 +33,19 @@ impl Span {
         self.base as usize + (x - self.start) as usize
     }
 
+    /// Number of cells.
+    #[expect(clippy::len_without_is_empty, reason = "a span always has a cell")]
+    pub fn len(&self) -> usize {
+        (self.end - self.start) as usize
+    }
+
     fn contains(&self, x: i32) -> bool {
         self.start <= x && x < self.end
     }
 }
+
+/// Cells that one thread tabulates, about.
+const TABULATED: usize = 4096;
 
 /// A set of cells. Spans of a row ascend and do not touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -243,6 +253,41 @@ impl CellRows {
                 }
             }
         }
+    }
+
+    /// The field whose value in each cell is what `value` makes of it; in parallel.
+    pub fn tabulate<T: Copy + Default + Send>(&self, value: impl Fn(Cell) -> T + Sync) -> Vec<T> {
+        let [out] = self.tabulate_each(|cell| [value(cell)]);
+        out
+    }
+
+    /// As many fields as `values` makes values of a cell; in parallel.
+    pub fn tabulate_each<T: Copy + Default + Send, const N: usize>(
+        &self,
+        values: impl Fn(Cell) -> [T; N] + Sync,
+    ) -> [Vec<T>; N] {
+        let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
+        let mut rest = out.each_mut().map(|field| &mut field[..]);
+        let spans: Vec<_> = self.spans().collect();
+        let mut parts = Vec::new();
+        for spans in spans.chunk_by(|a, b| a.1.base as usize / TABULATED == b.1.base as usize / TABULATED) {
+            let len = spans.iter().map(|(_, span)| span.len()).sum();
+            let part = rest.each_mut().map(|field| {
+                let (part, after) = take(field).split_at_mut(len);
+                *field = after;
+                part
+            });
+            parts.push((spans, part));
+        }
+        parts.into_par_iter().for_each(|(spans, mut part)| {
+            let cells = spans.iter().flat_map(|([y, z], span)| (span.start..span.end).map(|x| [x, *y, *z]));
+            for (at, cell) in cells.enumerate() {
+                for (field, value) in part.iter_mut().zip(values(cell)) {
+                    field[at] = value;
+                }
+            }
+        });
+        out
     }
 
     /// A field on these rows with the values of `field` on `from`, and `outside` where `from` has no cell.

@@ -1,0 +1,141 @@
+//! Sums and updates of whole fields, in a fixed order and in parallel.
+
+use numerics::simd::{Path, kernel};
+use rayon::prelude::*;
+
+/// Values that one thread adds up.
+const CHUNK: usize = 8192;
+
+/// Sums kept side by side, so that any SIMD width adds in the same order.
+const LANES: usize = 16;
+
+/// Σ aᵢ·bᵢ.
+///
+/// # Panics
+/// Where the lengths differ.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len(), "a product of fields of different lengths");
+    let path = Path::chosen();
+    if a.len() <= CHUNK {
+        return chunk_dot(path, a, b);
+    }
+    let sums: Vec<f64> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| chunk_dot(path, a, b)).collect();
+    sums.iter().sum()
+}
+
+/// The largest |aᵢ|; NaN does not count.
+pub fn largest(a: &[f64]) -> f64 {
+    let path = Path::chosen();
+    if a.len() <= CHUNK {
+        return chunk_largest(path, a);
+    }
+    let all: Vec<f64> = a.par_chunks(CHUNK).map(|a| chunk_largest(path, a)).collect();
+    all.into_iter().fold(0.0, f64::max)
+}
+
+/// yᵢ += s·xᵢ.
+///
+/// # Panics
+/// Where the lengths differ.
+pub fn add_scaled(y: &mut [f64], s: f64, x: &[f64]) {
+    assert_eq!(y.len(), x.len(), "a sum of fields of different lengths");
+    let path = Path::chosen();
+    if y.len() <= CHUNK {
+        return chunk_add_scaled(path, y, s, x);
+    }
+    y.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).for_each(|(y, x)| chunk_add_scaled(path, y, s, x));
+}
+
+/// yᵢ = xᵢ + s·yᵢ.
+///
+/// # Panics
+/// Where the lengths differ.
+pub fn scale_and_add(y: &mut [f64], s: f64, x: &[f64]) {
+    assert_eq!(y.len(), x.len(), "a sum of fields of different lengths");
+    let path = Path::chosen();
+    if y.len() <= CHUNK {
+        return chunk_scale_and_add(path, y, s, x);
+    }
+    y.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).for_each(|(y, x)| chunk_scale_and_add(path, y, s, x));
+}
+
+kernel! {
+    fn chunk_dot(a: &[f64], b: &[f64]) -> f64 = dot_body;
+}
+
+kernel! {
+    fn chunk_largest(a: &[f64]) -> f64 = largest_body;
+}
+
+kernel! {
+    fn chunk_add_scaled(y: &mut [f64], s: f64, x: &[f64]) = add_scaled_body;
+}
+
+kernel! {
+    fn chunk_scale_and_add(y: &mut [f64], s: f64, x: &[f64]) = scale_and_add_body;
+}
+
+#[inline(always)]
+fn dot_body(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    for (lane, (a, b)) in a_rest.iter().zip(b_rest).enumerate() {
+        sums[lane] += a * b;
+    }
+    sums.iter().sum()
+}
+
+#[inline(always)]
+fn largest_body(a: &[f64]) -> f64 {
+    let mut all = [0.0; LANES];
+    let larger = |a: f64, b: f64| if b > a { b } else { a };
+    let (a, rest) = a.as_chunks::<LANES>();
+    for a in a {
+        for lane in 0..LANES {
+            all[lane] = larger(all[lane], a[lane].abs());
+        }
+    }
+    for (lane, a) in rest.iter().enumerate() {
+        all[lane] = larger(all[lane], a.abs());
+    }
+    all.into_iter().fold(0.0, larger)
+}
+
+#[inline(always)]
+fn add_scaled_body(y: &mut [f64], s: f64, x: &[f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += s * x;
+    }
+}
+
+#[inline(always)]
+fn scale_and_add_body(y: &mut [f64], s: f64, x: &[f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y = x + s * *y;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_those_of_a_loop() {
+        for len in [0, 1, 17, CHUNK, 3 * CHUNK + 5] {
+            let a: Vec<f64> = (0..len).map(|i| (i % 7) as f64 - 3.0).collect();
+            let b: Vec<f64> = (0..len).map(|i| (i % 5) as f64 - 1.0).collect();
+            // Whole numbers: exact in any order.
+            assert_eq!(dot(&a, &b), a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>());
+            assert_eq!(largest(&a), if len == 0 { 0.0 } else { 3.0 });
+            let mut y = b.clone();
+            add_scaled(&mut y, 2.0, &a);
+            scale_and_add(&mut y, -1.0, &a);
+            assert!(y.iter().zip(&a).zip(&b).all(|((y, a), b)| *y == a - (b + 2.0 * a)));
+        }
+    }
+}

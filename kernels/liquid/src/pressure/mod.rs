@@ -1,0 +1,202 @@
+//! The pressure that makes a velocity free of divergence.
+//!
+//! Liquid cells have a pressure at their centre; air has pressure 0 at the surface, whose distance from the centre comes
+//! from the level set (ghost fluid: Gibou et al. 2002); solids cut faces down to their open share (Batty et al. 2007).
+//! Solved by conjugate gradients in `f64`, preconditioned by a multigrid cycle in `f32`, for the change of the pressure
+//! of the last step: a liquid at rest takes no iteration.
+//!
+//! Unknown: q = pressure · Δt ÷ (reference density · cell), m/s.
+
+mod closed;
+mod coarsen;
+mod cycle;
+mod dense;
+mod level;
+#[cfg(test)]
+mod tests;
+mod transfer;
+
+use crate::fields::{add_scaled, dot, largest, scale_and_add};
+use crate::rows::{Cell, CellRows};
+use crate::stencil::{Run, Stencil};
+
+use closed::Closed;
+use cycle::Multigrid;
+use level::{CellKind, HALO, Level, SurfaceDistances};
+
+/// Least distance of the surface from the centre of a liquid cell, in cells: bounds the matrix.
+pub const LEAST_SURFACE_DISTANCE: f32 = 0.01;
+
+/// The grid that a pressure is solved on. Cells that are not stored are solid.
+#[derive(Clone, Copy, Debug)]
+pub struct PressureGrid<'a> {
+    /// The stored cells: liquid ones, and those next to their open faces.
+    pub rows: &'a CellRows,
+    /// Signed distance of the surface from each centre, in any unit; negative inside liquid.
+    pub level_set: &'a [f32],
+    /// Of the low face of each cell along x, y and z: its open share, times the reference density ÷ the density there.
+    pub weights: [&'a [f32]; 3],
+}
+
+/// When a solve ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    /// Largest net flow into or out of a cell, m/s (divergence · cell).
+    pub flow: f64,
+    /// Most iterations.
+    pub iterations: u32,
+}
+
+/// How a solve ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Solved {
+    /// Iterations taken.
+    pub iterations: u32,
+    /// Largest net flow into or out of a cell that is left, m/s.
+    pub flow: f64,
+    /// The net inflow, m/s a cell, that no pressure can drive out of a component that is closed all round. The largest.
+    pub unbalanced: f64,
+}
+
+/// The matrix of a grid, ready to be solved for any velocity.
+#[derive(Clone, Debug)]
+pub struct PressureSolver {
+    multigrid: Multigrid,
+    distances: SurfaceDistances,
+    closed: Closed,
+}
+
+impl PressureSolver {
+    /// Sets the equations up.
+    ///
+    /// # Panics
+    /// Where a field does not have one value a cell.
+    pub fn new(grid: &PressureGrid<'_>) -> Self {
+        assert!(grid.weights.iter().chain([&grid.level_set]).all(|field| field.len() == grid.rows.len()));
+        let liquid = grid.rows.filtered(|cell, at| grid.level_set[at] < 0.0 && is_open(grid, cell, at));
+        let stencil = Stencil::around(liquid, HALO);
+        let rows = stencil.rows();
+        let level_set = rows.resampled(grid.rows, grid.level_set, f32::NAN);
+        let mut kinds: Vec<_> =
+            level_set.iter().map(|phi| if *phi >= 0.0 { CellKind::Air } else { CellKind::Solid }).collect();
+        stencil.runs().iter().for_each(|run| kinds[run.range()].fill(CellKind::Liquid));
+        let weights = grid.weights.map(|weights| rows.resampled(grid.rows, weights, 0.0));
+        let distances = surface_distances(&stencil, &level_set);
+        let finest = Level::new(stencil, kinds, weights, &distances);
+        let closed = Closed::find(&finest);
+        Self { multigrid: Multigrid::new(finest, distances.clone()), distances, closed }
+    }
+
+    /// The cells that fields of this solver are stored for.
+    pub fn rows(&self) -> &CellRows {
+        self.multigrid.finest().rows()
+    }
+
+    /// The liquid cells, and their neighbours.
+    pub fn stencil(&self) -> &Stencil {
+        &self.multigrid.finest().stencil
+    }
+
+    /// Solves for the pressure `q` that drives out the net inflow of each cell, Σ weight · velocity inwards, m/s, given
+    /// in `inflow`. `q` is the first guess on entry. Both on [`PressureSolver::rows`]; cells that are not liquid are set
+    /// to 0. `inflow` is left as the net inflow that remains.
+    pub fn solve(&self, inflow: &mut [f64], q: &mut [f64], stop: Stop) -> Solved {
+        let finest = self.multigrid.finest();
+        clear_outside(finest, inflow);
+        clear_outside(finest, q);
+        let residual = inflow;
+        let unbalanced = self.closed.subtract_means(residual);
+        let mut product = vec![0.0; q.len()];
+        finest.apply(q, &mut product);
+        add_scaled(residual, -1.0, &product);
+        let mut solved = Solved { iterations: 0, flow: largest(residual), unbalanced };
+        if solved.flow <= stop.flow {
+            return solved;
+        }
+        let mut workspace = self.multigrid.workspace();
+        let (mut direction, mut better) = (vec![0.0; q.len()], vec![0.0; q.len()]);
+        let mut energy_before = 0.0;
+        while solved.flow > stop.flow && solved.iterations < stop.iterations {
+            self.multigrid.solve(&mut workspace, residual, solved.flow, &mut better);
+            self.closed.subtract_means(&mut better);
+            let energy = dot(residual, &better);
+            let share = if solved.iterations == 0 { 0.0 } else { energy / energy_before };
+            scale_and_add(&mut direction, share, &better);
+            finest.apply(&direction, &mut product);
+            let curvature = dot(&direction, &product);
+            // Nothing but rounding is left.
+            if energy.is_nan() || curvature.is_nan() || energy <= 0.0 || curvature <= 0.0 {
+                break;
+            }
+            let length = energy / curvature;
+            add_scaled(q, length, &direction);
+            add_scaled(residual, -length, &product);
+            energy_before = energy;
+            solved.iterations += 1;
+            solved.flow = largest(residual);
+        }
+        solved
+    }
+
+    /// Calls `change` with the low face (axis, cell) of each cell that has liquid on one side at least, and what the
+    /// pressure `q` takes from the velocity there for a density that is the reference density: the difference of q over
+    /// the distance of the cells, or of cell and surface.
+    pub fn for_each_gradient(&self, q: &[f64], mut change: impl FnMut(usize, usize, f64)) {
+        let stencil = self.stencil();
+        let kinds = &self.multigrid.finest().kinds;
+        let gradient =
+            |axis: usize, below: usize, above: usize| (q[above] - q[below]) / f64::from(self.distances[axis][above]);
+        for run in stencil.runs() {
+            for n in 0..run.len as usize {
+                let at = run.at as usize + n;
+                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                for axis in 0..3 {
+                    change(axis, at, gradient(axis, below[axis], at));
+                    // The faces above liquid are the low faces of other cells.
+                    if kinds[above[axis]] != CellKind::Liquid {
+                        change(axis, above[axis], gradient(axis, at, above[axis]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Whether a face of the cell is open.
+fn is_open(grid: &PressureGrid<'_>, cell: Cell, at: usize) -> bool {
+    (0..3).any(|axis| {
+        let mut above = cell;
+        above[axis] += 1;
+        let weights = grid.weights[axis];
+        weights[at] > 0.0 || grid.rows.find(above).is_some_and(|above| weights[above] > 0.0)
+    })
+}
+
+fn clear_outside(level: &Level, field: &mut [f64]) {
+    for (value, kind) in field.iter_mut().zip(&level.kinds) {
+        if *kind != CellKind::Liquid {
+            *value = 0.0;
+        }
+    }
+}
+
+/// For each low face between liquid and air, how far from the centre of the liquid cell the surface is, in cells.
+fn surface_distances(stencil: &Stencil, level_set: &[f32]) -> SurfaceDistances {
+    let mut out: SurfaceDistances = std::array::from_fn(|_| vec![1.0; level_set.len()]);
+    let mut set = |run: &Run, n: usize| {
+        let at = run.at as usize + n;
+        let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+        let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+        for axis in 0..3 {
+            for (air, face) in [(below[axis], at), (above[axis], above[axis])] {
+                if level_set[air] >= 0.0 {
+                    let distance = level_set[at] / (level_set[at] - level_set[air]);
+                    out[axis][face] = distance.max(LEAST_SURFACE_DISTANCE);
+                }
+            }
+        }
+    };
+    stencil.runs().iter().for_each(|run| (0..run.len as usize).for_each(|n| set(run, n)));
+    out
+}
