@@ -1,12 +1,14 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
-//! keeps a liquid's volume ([`pressure`]). Functions take and return plain slices; nothing here depends on nodes or on
-//! the engine's geometry.
+//! keeps a liquid's volume ([`pressure`]), the surface as a mesh ([`extract`]). Functions take and return plain slices;
+//! nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
 #![allow(clippy::needless_range_loop, reason = "a loop over cells reads and writes many arrays")]
 
+pub mod extract;
 pub mod fields;
+pub mod level_set;
 pub mod open_share;
 pub mod pressure;
 pub mod rows;

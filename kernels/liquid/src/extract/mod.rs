@@ -1,0 +1,105 @@
+//! The surface φ = 0 as a mesh of quads: dual marching cubes (Nielson 2004) over the centres of cells.
+//!
+//! A cube between eight centres has one vertex for each loop in which the surface crosses its edges. A face whose two
+//! inside corners no edge connects is flipped where both of its cubes would pass it twice (Wenger 2013). A vertex lies at
+//! the mean of its crossings, moved onto tricubic φ by one step of Newton's method where its cube has no other.
+//!
+//! Promise: for any φ the mesh is closed and manifold (each edge has two quads, each vertex one fan), quads wind
+//! counter-clockwise seen from outside, and the bits are the same on any number of threads. Along the ends of the domain
+//! the mesh is closed exactly in their planes. Limits: edges sharper than a cell are rounded; φ must be finite.
+
+mod cubes;
+mod place;
+mod quads;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use numerics::vector::Vec3;
+use numerics::volume;
+use rayon::prelude::*;
+
+use crate::level_set::PhiView;
+use cubes::Cubes;
+
+/// A closed mesh of quads, in cells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QuadMesh {
+    /// The vertices.
+    pub points: Vec<Vec3>,
+    /// A unit normal for each vertex, outward.
+    pub normals: Vec<Vec3>,
+    /// Four vertices each, counter-clockwise seen from outside.
+    pub quads: Vec<[u32; 4]>,
+}
+
+/// How vertices are placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Placement {
+    /// At the mean of their crossings.
+    Mean,
+    /// Moved from there onto tricubic φ.
+    Projected,
+}
+
+/// The mesh of φ = 0.
+///
+/// # Panics
+/// Where the vertices are more than a `u32` counts.
+pub fn extract(view: PhiView<'_>, placement: Placement) -> QuadMesh {
+    let cubes = Cubes::find(view);
+    let project = placement == Placement::Projected;
+    let slabs: Vec<_> = (0..cubes.slabs.len())
+        .into_par_iter()
+        .map(|slab| (place::vertices(view, &cubes, slab, project), quads::quads(&cubes, slab)))
+        .collect();
+    let mut mesh = QuadMesh::default();
+    let count = slabs.iter().fold([0, 0], |[a, b], (vertices, quads)| [a + vertices.len(), b + quads.len()]);
+    mesh.points.reserve_exact(count[0]);
+    mesh.normals.reserve_exact(count[0]);
+    mesh.quads.reserve_exact(count[1]);
+    for (vertices, quads) in slabs {
+        mesh.points.extend(vertices.iter().map(|(point, _)| *point));
+        mesh.normals.extend(vertices.iter().map(|(_, normal)| *normal));
+        mesh.quads.extend(quads);
+    }
+    mesh
+}
+
+/// Terms of a sum that one thread adds up.
+const CHUNK: usize = 4096;
+
+impl QuadMesh {
+    /// The volume inside, in cells.
+    pub fn volume(&self) -> f64 {
+        let Some(origin) = self.points.first() else { return 0.0 };
+        let corner = |at: u32| self.points[at as usize];
+        let twice = |[a, b, c, d]: [u32; 4]| {
+            let [a, b, c, d] = [a, b, c, d].map(corner);
+            volume::six_volumes([*origin, a, b, c]) + volume::six_volumes([*origin, a, c, d])
+        };
+        self.sum(twice) / 6.0
+    }
+
+    /// The area, in squares of a cell's side.
+    pub fn area(&self) -> f64 {
+        let corner = |at: u32| numerics::vector::to_f64(self.points[at as usize]);
+        let twice = |[a, b, c, d]: [u32; 4]| {
+            let [a, b, c, d] = [a, b, c, d].map(corner);
+            (b - a).cross(&(c - a)).norm() + (c - a).cross(&(d - a)).norm()
+        };
+        self.sum(twice) / 2.0
+    }
+
+    fn sum(&self, of: impl Fn([u32; 4]) -> f64 + Sync) -> f64 {
+        let sums: Vec<f64> =
+            self.quads.par_chunks(CHUNK).map(|quads| quads.iter().fold(0.0, |sum, quad| sum + of(*quad))).collect();
+        sums.iter().fold(0.0, |sum, part| sum + part)
+    }
+
+    /// The points in metres, of a lattice whose cell [0, 0, 0] starts at `origin`.
+    pub fn points_at(&self, origin: [f64; 3], cell: f64) -> Vec<Vec3> {
+        let place = |point: &Vec3| std::array::from_fn(|axis| (origin[axis] + cell * f64::from(point[axis])) as f32);
+        self.points.par_iter().map(place).collect()
+    }
+}
