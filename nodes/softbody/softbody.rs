@@ -14,20 +14,21 @@
 use std::sync::{Arc, OnceLock};
 
 use bodies::collision::{CollisionScene, ContactParams, Ground};
-use bodies::mass_spring::{
-    BodySolver, FrameReport, Integrator, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
-};
+use bodies::mass_spring::{BodySolver, Integrator, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear};
 use engine::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
-    GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER, SURFACE_POINT,
+    BODY_NUMBER, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER,
+    SURFACE_POINT,
 };
-use goals::Goals;
+use goals::{GoalHistory, Goals};
+use measured::measured;
 use setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 
 mod goals;
 mod joints;
+mod measured;
 mod obstacles;
 mod pins;
 mod setup;
@@ -210,23 +211,26 @@ metrics! { METRICS:
     GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres,
         "Mean distance of the particles pulled by goals from their targets.");
     GOAL_MISS = Metric::new("goal_miss", Unit::None,
-        "Mean distance of a body from a goal that it should have reached, relative to the size of the body; the largest \
-         of all bodies. Only at the frames of goals and while they are held.")
-        .warn_always_above(0.25, "The body never comes near its goal: something is in the way, or the goal is too weak. \
-            Raise `strength` of Softbody_Goal, give the body more frames to get there, or lower `stiffness`; see whether \
-            colliders, pins or the ground hold it back.");
+        "How near a body came to a goal while it should have had its shape: mean distance relative to the size of the \
+         body. The largest of all goals so far; missing before the first.")
+        .warn_last_above(0.25, "`bodies` {goal_miss_body} never comes near `goals` {goal_miss_goal} (both counted from \
+            0): something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
+            frames to get there, or lower `stiffness`; see whether colliders, pins or the ground hold it back.");
+    GOAL_MISS_BODY = Metric::new("goal_miss_body", Unit::None, "The wire of that body, from 0.");
+    GOAL_MISS_GOAL = Metric::new("goal_miss_goal", Unit::None, "The wire of that goal, from 0.");
     IDLE_GOALS = Metric::new("idle_goals", Unit::None, "Goals that have no particle to pull.")
         .warn_above(0.0, "`goals` {idle_goals_wire} (counted from 0) has no effect: its body has no particle of the kind \
             that `goal_on` names. Make inner points with `interior` and a smaller `spacing` of Tetrahedralize, or set \
             `goal_on` to `all`.");
     IDLE_GOALS_WIRE = Metric::new("idle_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
-    EARLY_GOALS = Metric::new("early_goals", Unit::None, "Goals that are over before the simulation starts.")
-        .warn_above(0.0, "`goals` {early_goals_wire} (counted from 0) is over before the simulation starts, so it does not \
-            pull. Give it a `frame` after `start_frame`.");
+    EARLY_GOALS = Metric::new("early_goals", Unit::None, "Goals that are over when the simulation starts.")
+        .warn_above(0.0, "`goals` {early_goals_wire} (counted from 0) is over when the simulation starts, so it does not \
+            pull. Give it a `frame` after the simulation's `start_frame`.");
     EARLY_GOALS_WIRE = Metric::new("early_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
-    DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body has another goal.")
-        .warn_above(0.0, "`goals` {doubled_goals_wire} (counted from 0) has the same `frame` as another goal of its body, \
-            so the body jumps from one to the other. Give each goal its own frame.");
+    DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body is still held by another goal.")
+        .warn_above(0.0, "At the `frame` of `goals` {doubled_goals_wire} (counted from 0) its body is still held by another \
+            goal, so it jumps from one to the other. Give each goal a `frame` after the `frame` and `hold` of the one \
+            before it.");
     DOUBLED_GOALS_WIRE = Metric::new("doubled_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     IDLE_PINS = Metric::new("idle_pins", Unit::None, "Pins with no particle within their `radius` at the start.")
         .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} of `pins` {idle_pins_wire} (both \
@@ -241,7 +245,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    1,
+    2,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
@@ -256,14 +260,16 @@ pub(crate) static NODE: Node = Node::new(
     &P,
     &SURFACE_POINT,
     &SLIVER,
+    &BODY_NUMBER,
     &GOAL_FRAME,
+    &GOAL_START,
     &GOAL_STRENGTH,
     &GOAL_HOLD,
     &PIN_RADIUS,
     &PIN_STRENGTH,
     &PIN_RELEASE,
 ])
-.writes(&[&P])
+.writes(&[&P, &BODY_NUMBER])
 .metrics(METRICS)
 .leaves_out(leaves_out);
 
@@ -272,6 +278,7 @@ pub(crate) static NODE: Node = Node::new(
 struct Run {
     inputs: StartInputs,
     state: State,
+    goals: GoalHistory,
     /// Metrics of the last step; empty at the start.
     metrics: MetricValues,
     /// Computed from `inputs` only, and recomputed after a checkpoint.
@@ -297,7 +304,8 @@ impl Chain for Run {
         let mut state = State::at_rest(&solving.body);
         state.velocities.fill(cx.get(INITIAL_VELOCITY).map(f64::from));
         let setup = OnceLock::from(Arc::new(setup));
-        Ok(Self { inputs, state, metrics: MetricValues::default(), setup, solving: Some(solving) })
+        let (goals, metrics) = (GoalHistory::default(), MetricValues::default());
+        Ok(Self { inputs, state, goals, metrics, setup, solving: Some(solving) })
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
@@ -311,7 +319,8 @@ impl Chain for Run {
         let seconds = cx.dt() * f64::from(cx.get(TIME_SCALE));
         let on = cx.get(GOAL_ON);
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
-        let goals = Goals::of(&self.inputs, &setup, &cx.part(GOALS), cx.get(START_FRAME) as f64)?;
+        let mut goals = Goals::of(&self.inputs, &setup, &cx.part(GOALS), cx.get(START_FRAME) as f64, &mut self.goals)?;
+        goals.start(times, &self.state.positions);
         let (mut pulled, mut held) = (Vec::new(), Vec::new());
         goals.pull(times, on, &mut pulled);
         let by_goals = pulled.len();
@@ -428,28 +437,6 @@ impl Solving {
         }
         Ok(self)
     }
-}
-
-fn measured(report: &FrameReport, state: &State) -> MetricValues {
-    let mut metrics = MetricValues::default();
-    metrics.set(NEWTON, report.newton);
-    metrics.set(CG, report.cg);
-    metrics.set(RESIDUAL, report.residual);
-    metrics.set(CAPS_HIT, report.caps_hit + report.stopped);
-    metrics.set(TOLERANCE_MISSED, report.tolerance_missed);
-    metrics.set(ERROR_ESTIMATE, report.error_estimate);
-    metrics.set(KINETIC, report.kinetic);
-    metrics.set(ELASTIC, report.elastic);
-    metrics.set(GOAL_ENERGY, report.goal_energy);
-    metrics.set(ENERGY_SHED, report.energy_removed);
-    metrics.set(VOLUME_RATIO, report.volume_ratio);
-    metrics.set(WORST_STRETCH, report.worst_stretch);
-    metrics.set(INVERTED_TETS, report.inverted_tets);
-    metrics.set(CONTACTS, report.contacts);
-    metrics.set(DEEPEST_OVERLAP, report.deepest_overlap);
-    metrics.set(TORN, state.torn.iter().filter(|torn| **torn).count() as f64);
-    metrics.set(SUBSTEPS_USED, report.substeps);
-    metrics
 }
 
 fn couples(params: &Params) -> bool {

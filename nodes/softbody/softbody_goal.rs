@@ -13,7 +13,7 @@
 use bodies::goals::{GoalLimits, GoalShape, HeldBody, goal_shape};
 use engine::prelude::*;
 
-use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH, SURFACE_POINT};
+use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, SURFACE_POINT};
 
 inputs! { INPUTS:
     BODY: Input = Input::one("body", Kind::Tets,
@@ -26,6 +26,11 @@ inputs! { INPUTS:
 params! { PARAMS:
     FRAME: Param<f32> = Param::float("frame", 1.0,
         "The frame at which the body reaches the shape. Between two goals it moves gradually from one to the next.")
+        .unit(Unit::Frame).fixed();
+    START_FRAME: Param<f32> = Param::float("start_frame", ALWAYS,
+        "The frame at which the goal starts to pull. Until then the body is free; from then on it moves gradually to \
+         the shape from wherever it is, to reach it at `frame`. By default a goal pulls from the start of the \
+         simulation, or once the hold of the goal before it is over.")
         .unit(Unit::Frame).fixed();
     STRENGTH: Param<f32> = Param::float("strength", 100.0,
         "How strongly the body is pulled towards the shape: acceleration per distance. 0 does not pull. About 200 · \
@@ -49,6 +54,9 @@ metrics! { METRICS:
     IDLE = Metric::new("idle", Unit::None, "1 where `strength` is 0, so that the goal does not pull; 0 elsewhere.")
         .warn_always_above(0.0, "With a `strength` of 0 the body is not pulled towards this shape. Raise `strength`, or \
             remove the goal.");
+    LATE = Metric::new("late_start", Unit::None, "1 where `start_frame` is not before `frame`; 0 elsewhere.")
+        .warn_above(0.0, "The goal starts to pull only when the body should already have its shape, so the body is \
+            pulled there at once, or not at all where `hold` is over by then. Set `start_frame` before `frame`.");
     CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
     RESIDUAL = Metric::new("residual", Unit::None,
         "Force left on inner points after the solve, relative to the force exerted by the surface.");
@@ -60,7 +68,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody_Goal",
-    1,
+    2,
     "Turns a target shape of a body's surface into a goal for the whole body: the interior follows as if it were \
      elastic. Wire it into `goals` of Softbody, and the body reaches the shape at the frame set here. The shape must \
      have the points and faces of the body's surface.",
@@ -70,7 +78,7 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&GOAL])
 .reads(&[&P, &SURFACE_POINT])
-.writes(&[&P, &GOAL_FRAME, &GOAL_STRENGTH, &GOAL_HOLD])
+.writes(&[&P, &GOAL_FRAME, &GOAL_START, &GOAL_STRENGTH, &GOAL_HOLD])
 .metrics(METRICS);
 
 fn cook(cx: &Cx) -> Result<Outputs> {
@@ -82,9 +90,11 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
     publish(cx, &found);
     cx.publish(IDLE, if cx.get(STRENGTH) > 0.0 { 0.0 } else { 1.0 });
+    cx.publish(LATE, if cx.get(START_FRAME) < cx.get(FRAME) { 0.0 } else { 1.0 });
     let mut out = body.clone();
     out.set(P, found.points.clone())?;
     out.set(GOAL_FRAME, vec![cx.get(FRAME)])?;
+    out.set(GOAL_START, vec![cx.get(START_FRAME)])?;
     out.set(GOAL_STRENGTH, vec![cx.get(STRENGTH)])?;
     out.set(GOAL_HOLD, vec![cx.get(HOLD)])?;
     Ok(GOAL.with(Geometry::from(out)))

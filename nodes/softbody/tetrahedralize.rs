@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use engine::prelude::*;
 
-use crate::shared::attributes::{SLIVER, SURFACE_POINT};
+use crate::shared::attributes::{BODY_NUMBER, SLIVER, SURFACE_POINT};
 use crate::shared::pieces::pieces;
 
 choice! {
@@ -58,8 +58,6 @@ const TETS: Output = Output::new(
 
 /// 0 inside, 1 on the outside of a body, 2 on the wall of a cavity.
 const SIDE: Attr<i32> = Attr::point("side");
-/// The body of each tet, from 0, in the order of the bodies' first faces.
-const BODY: Attr<i32> = Attr::element("body");
 
 metrics! { METRICS:
     COUNT = Metric::new("tets", Unit::None, "Number of tets.");
@@ -103,7 +101,7 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&TETS])
 .reads(&[&P])
-.writes(&[&P, &SURFACE_POINT, &SIDE, &BODY, &SLIVER])
+.writes(&[&P, &SURFACE_POINT, &SIDE, &BODY_NUMBER, &SLIVER])
 .metrics(METRICS)
 .leaves_out(leaves_out)
 .changes_topology();
@@ -139,8 +137,8 @@ fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
         };
         tets.set(SIDE, solid.sides.iter().map(number).collect())?;
     }
-    if cx.wants(BODY) {
-        tets.set(BODY, solid.bodies.iter().map(|body| *body as i32).collect())?;
+    if cx.wants(BODY_NUMBER) {
+        tets.set(BODY_NUMBER, solid.bodies.iter().map(|body| *body as i32).collect())?;
     }
     if cx.wants(SLIVER) {
         tets.set(SLIVER, solid.slivers.iter().map(|sliver| i32::from(*sliver)).collect())?;

@@ -18,7 +18,11 @@ pub(super) fn notes(
         let warning = metric.warning?;
         let values = published.get(metric.name)?;
         let excess = |value: &f64| warning.when.excess(*value);
-        let over: Vec<(&Frame, &f64)> = values.iter().filter(|(_, value)| excess(value) > 0.0).collect();
+        let judged = match warning.when {
+            Trouble::LastAbove(_) => values.len().saturating_sub(1),
+            _ => 0,
+        };
+        let over: Vec<(&Frame, &f64)> = values.iter().skip(judged).filter(|(_, value)| excess(value) > 0.0).collect();
         let (frame, worst) =
             over.iter().reduce(|worst, next| if excess(next.1) > excess(worst.1) { next } else { worst })?;
         if matches!(warning.when, Trouble::AlwaysAbove(_)) && over.len() < values.len() {
@@ -56,6 +60,7 @@ mod tests {
     const DEEP: Metric = Metric::new("deep", Unit::Metres, "Depth.").warn_above(0.5, "Raise it.");
     const FREE: Metric = Metric::new("free", Unit::None, "Unlimited.");
     const RATIO: Metric = Metric::new("ratio", Unit::None, "Ratio.").warn_outside(0.9, 1.1, "Keep it.");
+    const MISSED: Metric = Metric::new("missed", Unit::None, "So far.").warn_last_above(1.0, "Come nearer.");
     const FAR: Metric = Metric::new("far", Unit::None, "Distance.").warn_always_above(1.0, "Come near.");
 
     const IDLE: Metric = Metric::new("idle", Unit::None, "Idle.").warn_above(0.0, "The first is `pins` {wire}.");
@@ -72,7 +77,7 @@ mod tests {
         let frames: BTreeMap<Frame, f64> =
             values.iter().enumerate().map(|(frame, value)| (Frame::whole(frame as i64), *value)).collect();
         let published = BTreeMap::from([(name, frames)]);
-        let notes = notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR], &published);
+        let notes = notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR, &MISSED], &published);
         notes.iter().map(Note::to_string).collect()
     }
 
@@ -88,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_metric_has_a_range_or_must_be_good_once() {
+    fn a_metric_has_a_range_or_must_be_good_once_or_in_the_end() {
         assert_eq!(shown("ratio", &[1.0, 0.95]), Vec::<String>::new());
         assert_eq!(
             shown("ratio", &[1.0, 1.25, 0.5]),
@@ -96,5 +101,7 @@ mod tests {
         );
         assert_eq!(shown("far", &[3.0, 0.5, 3.0]), Vec::<String>::new());
         assert_eq!(shown("far", &[2.0, 3.0]), ["`fur` (Curve_Wind): `far` is 3 at frame 1 (frames 0-1). Come near."]);
+        assert_eq!(shown("missed", &[3.0, 0.5]), Vec::<String>::new());
+        assert_eq!(shown("missed", &[0.5, 2.0]), ["`fur` (Curve_Wind): `missed` is 2 at frame 1. Come nearer."]);
     }
 }

@@ -41,6 +41,8 @@ pub enum Trouble {
     Outside(f64, f64),
     /// Values above this, if it is exceeded at all frames.
     AlwaysAbove(f64),
+    /// Values above this at the last frame that has one.
+    LastAbove(f64),
 }
 
 impl Trouble {
@@ -48,7 +50,7 @@ impl Trouble {
     /// are compared by it.
     pub fn excess(self, value: f64) -> f64 {
         match self {
-            Self::Above(limit) | Self::AlwaysAbove(limit) => value - limit,
+            Self::Above(limit) | Self::AlwaysAbove(limit) | Self::LastAbove(limit) => value - limit,
             Self::Outside(low, high) => f64::max(low - value, value - high),
         }
     }
@@ -93,6 +95,13 @@ impl Metric {
     #[must_use]
     pub const fn warn_always_above(self, above: f64, text: &'static str) -> Self {
         self.warn(Trouble::AlwaysAbove(above), text)
+    }
+
+    /// The cook's notes say `text` when the metric exceeds `above` at the last frame that has a value: for a metric
+    /// that sums up all frames so far.
+    #[must_use]
+    pub const fn warn_last_above(self, above: f64, text: &'static str) -> Self {
+        self.warn(Trouble::LastAbove(above), text)
     }
 
     const fn warn(mut self, when: Trouble, text: &'static str) -> Self {

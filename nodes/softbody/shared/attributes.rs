@@ -4,6 +4,8 @@ use engine::prelude::*;
 
 /// On points of a body: the corresponding point of the surface; −1 inside.
 pub(crate) const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
+/// On tets: the number of the connected body that the tet belongs to, from 0.
+pub(crate) const BODY_NUMBER: Attr<i32> = Attr::element("body");
 /// On tets of a body: 1 if the tet is too flat to have a meaningful volume, else 0.
 pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
 
@@ -11,8 +13,13 @@ pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
 pub(crate) const GOAL_FRAME: Attr<f32> = Attr::once("goal_frame");
 /// Of a goal: how strongly the body is pulled, 1/s² (acceleration per distance).
 pub(crate) const GOAL_STRENGTH: Attr<f32> = Attr::once("goal_strength");
+/// Of a goal: the frame from which the body is pulled.
+pub(crate) const GOAL_START: Attr<f32> = Attr::once("goal_start");
 /// Of a goal: number of frames for which the body is held.
 pub(crate) const GOAL_HOLD: Attr<f32> = Attr::once("goal_hold");
+
+/// `goal_start` of a goal without limit: before the start of any scene, and exact in f32.
+pub(crate) const ALWAYS: f32 = -1e9;
 
 /// Of a pin: its radius at the start, metres.
 pub(crate) const PIN_RADIUS: Attr<f32> = Attr::point("pin_radius");

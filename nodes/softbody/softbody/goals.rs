@@ -1,28 +1,60 @@
 //! Which particles goals pull, when, and when goals become the rest shape.
 //!
-//! A body moves from its start to its first goal, is held there, moves to the next, and is released after the last.
+//! A body moves from its start to its first goal, is held there, moves to the next, and is released after the last. A
+//! goal with a frame from which it pulls leaves the body free until then, and takes it up wherever it is.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bodies::mass_spring;
 use bodies::tets::bounds;
 use engine::prelude::*;
 use numerics::vector::{DVec3, to_f64};
+use serde::{Deserialize, Serialize};
 
 use super::setup::{SimulationSetup, StartInputs};
 use super::{
-    DOUBLED_GOALS, DOUBLED_GOALS_WIRE, EARLY_GOALS, EARLY_GOALS_WIRE, GOAL_MISS, GoalOn, IDLE_GOALS, IDLE_GOALS_WIRE,
+    DOUBLED_GOALS, DOUBLED_GOALS_WIRE, EARLY_GOALS, EARLY_GOALS_WIRE, GOAL_MISS, GOAL_MISS_BODY, GOAL_MISS_GOAL,
+    GoalOn, IDLE_GOALS, IDLE_GOALS_WIRE,
 };
-use crate::shared::attributes::{GOAL_FRAME, GOAL_HOLD, GOAL_STRENGTH};
+use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH};
 
 /// A goal of a body.
 struct GoalKey<'a> {
     /// Index of its wire.
     index: usize,
     frame: f64,
+    /// From when on it pulls.
+    start: f64,
     strength: f64,
     hold: f64,
     positions: &'a [[f32; 3]],
+}
+
+/// What goals remember of a simulation.
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct GoalHistory {
+    /// The bodies on their way to goals that took them up after their start, by index of the goal's wire.
+    starts: BTreeMap<usize, GoalStart>,
+    /// The smallest distance of a body from a goal while it should have had its shape, relative to the size of the
+    /// body, by index of the goal's wire.
+    nearest: BTreeMap<usize, Miss>,
+}
+
+/// Where a goal took up a body.
+#[derive(Serialize, Deserialize)]
+struct GoalStart {
+    frame: f64,
+    /// The particles of the body.
+    positions: Vec<[f64; 3]>,
+}
+
+/// How far a body is from a goal.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct Miss {
+    /// Index of the body's wire.
+    body: usize,
+    distance: f64,
 }
 
 /// The goals of each wire of bodies, by frame.
@@ -30,13 +62,23 @@ pub(super) struct Goals<'a> {
     of: Vec<Vec<GoalKey<'a>>>,
     setup: &'a SimulationSetup,
     start: f64,
+    history: &'a mut GoalHistory,
+}
+
+/// The shape that a body leaves.
+enum Origin<'a> {
+    /// The one at the start of the simulation.
+    Rest,
+    /// That of the goal before.
+    Goal(&'a [[f32; 3]]),
+    /// The one in which a goal took it up.
+    Found(&'a [[f64; 3]]),
 }
 
 /// The target of a body at a time: an interpolation between two shapes, and how strongly it pulls.
 struct GoalSample<'a> {
-    /// `None`: the shape at the start.
-    from: Option<&'a [[f32; 3]]>,
-    to: &'a [[f32; 3]],
+    from: Origin<'a>,
+    to: &'a GoalKey<'a>,
     share: f64,
     strength: f64,
 }
@@ -56,6 +98,7 @@ impl<'a> Goals<'a> {
         setup: &'a SimulationSetup,
         goals: &[&'a Component],
         start: f64,
+        history: &'a mut GoalHistory,
     ) -> Result<Self> {
         let mut of: Vec<Vec<GoalKey<'a>>> = setup.wires.iter().map(|_| Vec::new()).collect();
         for (index, shape) in goals.iter().enumerate() {
@@ -69,14 +112,38 @@ impl<'a> Goals<'a> {
             let key = GoalKey {
                 index,
                 frame: number(GOAL_FRAME)?,
+                start: number(GOAL_START).unwrap_or(f64::from(ALWAYS)),
                 strength: number(GOAL_STRENGTH)?.max(0.0),
                 hold: number(GOAL_HOLD)?.max(0.0),
                 positions: shape.positions(),
             };
-            of[wire].push(key);
+            of[wire].extend(key.pulling());
         }
         of.iter_mut().for_each(|keys| keys.sort_by(|a, b| a.frame.total_cmp(&b.frame)));
-        Ok(Self { of, setup, start })
+        Ok(Self { of, setup, start, history })
+    }
+
+    /// Lets goals whose time has come take up their bodies before a step between two frames, from particles at
+    /// `positions`.
+    pub(super) fn start(&mut self, times: [f64; 2], positions: &[[f64; 3]]) {
+        let mut starts = std::mem::take(&mut self.history.starts);
+        let mut kept = BTreeMap::new();
+        for wire in 0..self.of.len() {
+            let (before, Some(to)) = self.around(wire, times[1]) else { continue };
+            if !to.waits_for(before, self.start) || to.start > times[0] {
+                continue;
+            }
+            let here = || GoalStart { frame: times[0], positions: positions[self.setup.wires[wire].clone()].to_vec() };
+            kept.insert(to.index, starts.remove(&to.index).unwrap_or_else(here));
+        }
+        self.history.starts = kept;
+    }
+
+    /// The last goal of a wire's body before a frame, and the first that is not.
+    fn around(&self, wire: usize, frame: f64) -> (Option<&GoalKey<'a>>, Option<&GoalKey<'a>>) {
+        let keys = &self.of[wire];
+        let next = keys.partition_point(|key| key.frame < frame);
+        (next.checked_sub(1).map(|index| &keys[index]), keys.get(next))
     }
 
     /// Adds the goal springs of a step between two frames.
@@ -109,34 +176,33 @@ impl<'a> Goals<'a> {
     }
 
     fn place(&self, sample: &GoalSample<'_>, particle: usize, point: usize) -> DVec3 {
-        let of = |shape: &[[f32; 3]]| to_f64(shape[point]);
-        let from = sample.from.map_or(self.setup.rest[particle].into(), of);
-        let to = of(sample.to);
+        let from = match sample.from {
+            Origin::Rest => self.setup.rest[particle].into(),
+            Origin::Goal(shape) => to_f64(shape[point]),
+            Origin::Found(positions) => positions[point].into(),
+        };
+        let to = to_f64(sample.to.positions[point]);
         if sample.share >= 1.0 { to } else { from + (to - from) * sample.share }
     }
 
-    /// The target of a wire's body at a frame; `None` if it has no goals, and after its release.
+    /// The target of a wire's body at a frame; `None` while no goal pulls it.
     fn sample(&self, wire: usize, frame: f64) -> Option<GoalSample<'_>> {
-        let keys = &self.of[wire];
-        let next = keys.partition_point(|key| key.frame < frame);
-        let share = |from: f64, to: f64| if to > from { ((frame - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-        let before = next.checked_sub(1).map(|index| &keys[index]);
-        match (before, keys.get(next)) {
-            (None, None) => None,
-            (None, Some(to)) => Some(GoalSample {
-                from: None,
-                to: to.positions,
-                share: share(self.start, to.frame),
-                strength: to.strength,
-            }),
-            (Some(at), None) if frame > at.frame + at.hold => None,
-            (Some(at), None) => Some(GoalSample { from: None, to: at.positions, share: 1.0, strength: at.strength }),
-            (Some(from), Some(to)) => {
-                let share = share((from.frame + from.hold).min(to.frame), to.frame);
-                let strength = from.strength + (to.strength - from.strength) * share;
-                Some(GoalSample { from: Some(from.positions), to: to.positions, share, strength })
-            }
+        let (before, next) = self.around(wire, frame);
+        let held = |at: &&GoalKey<'_>| frame <= at.released() && next.is_none_or(|next| frame < next.frame);
+        if let Some(to) = before.filter(held) {
+            return Some(GoalSample { from: Origin::Rest, to, share: 1.0, strength: to.strength });
         }
+        let to = next?;
+        let (from, since, strength) = match before {
+            _ if to.waits_for(before, self.start) => {
+                let start = self.history.starts.get(&to.index)?;
+                (Origin::Found(&start.positions), start.frame, to.strength)
+            }
+            Some(before) => (Origin::Goal(before.positions), before.released(), before.strength),
+            None => (Origin::Rest, self.start, to.strength),
+        };
+        let share = if to.frame > since { ((frame - since) / (to.frame - since)).clamp(0.0, 1.0) } else { 1.0 };
+        Some(GoalSample { from, to, share, strength: strength + (to.strength - strength) * share })
     }
 
     /// The target positions of all particles at a frame, NaN for particles without a goal; `None` if there are no
@@ -189,26 +255,30 @@ impl<'a> Goals<'a> {
         (count > 0.0).then(|| sum / count)
     }
 
-    /// The largest mean distance of a body from the goal that it should have reached at a frame, relative to the size
-    /// of the body; `None` if no goal has been reached or is held.
-    fn miss(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> Option<f64> {
-        let of = |wire: usize| {
-            let reached = |key: &GoalKey<'_>| key.strength > 0.0 && (key.frame..=key.frame + key.hold).contains(&frame);
-            if !self.of[wire].iter().any(reached) {
-                return None;
-            }
-            let [sum, count] = self.distances(wire, frame, on, positions);
-            let [low, high] = bounds(self.setup.rest[self.setup.wires[wire].clone()].iter().copied());
+    /// Notes how near bodies are to the goals whose shape they should have at a frame.
+    fn compare(&mut self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) {
+        for body in 0..self.of.len() {
+            let reached = |now: &GoalSample<'_>| now.share >= 1.0 && now.strength > 0.0;
+            let Some(goal) = self.sample(body, frame).filter(reached).map(|now| now.to.index) else { continue };
+            let [sum, count] = self.distances(body, frame, on, positions);
+            let [low, high] = bounds(self.setup.rest[self.setup.wires[body].clone()].iter().copied());
             let size = (DVec3::from(high) - DVec3::from(low)).norm();
-            (count > 0.0 && size > 0.0).then(|| sum / count / size)
-        };
-        (0..self.of.len()).filter_map(of).reduce(f64::max)
+            if count > 0.0 && size > 0.0 {
+                let distance = sum / count / size;
+                let nearest = self.history.nearest.entry(goal).or_insert(Miss { body, distance });
+                nearest.distance = nearest.distance.min(distance);
+            }
+        }
     }
 
     /// Sets the metrics that tell whether goals work, with particles at `positions`.
-    pub(super) fn measure(&self, frame: f64, on: GoalOn, positions: &[[f64; 3]], metrics: &mut MetricValues) {
-        if let Some(miss) = self.miss(frame, on, positions) {
-            metrics.set(GOAL_MISS, miss);
+    pub(super) fn measure(&mut self, frame: f64, on: GoalOn, positions: &[[f64; 3]], metrics: &mut MetricValues) {
+        self.compare(frame, on, positions);
+        let farther = |a: &(&usize, &Miss), b: &(&usize, &Miss)| a.1.distance.total_cmp(&b.1.distance);
+        if let Some((goal, miss)) = self.history.nearest.iter().max_by(farther) {
+            metrics.set(GOAL_MISS, miss.distance);
+            metrics.set(GOAL_MISS_BODY, miss.body as f64);
+            metrics.set(GOAL_MISS_GOAL, *goal as f64);
         }
         for (goals, count, wire) in [
             (self.idle(on), IDLE_GOALS, IDLE_GOALS_WIRE),
@@ -240,20 +310,42 @@ impl<'a> Goals<'a> {
         idle
     }
 
-    /// The goals that are over before the start, by index of their wire.
+    /// The goals that are over by the end of the first step, by index of their wire.
     fn early(&self) -> Vec<usize> {
-        let over = |key: &&GoalKey<'_>| key.frame + key.hold < self.start;
+        let over = |key: &&GoalKey<'_>| key.released() < self.start + 1.0;
         let mut early: Vec<usize> = self.of.iter().flatten().filter(over).map(|key| key.index).collect();
         early.sort_unstable();
         early
     }
 
-    /// The goals at whose frame their body has another one, which they follow among the wires.
+    /// The goals at whose frame their body is still held by another one, which they follow among the wires.
     fn doubled(&self) -> Vec<usize> {
-        let pairs = self.of.iter().flat_map(|keys| keys.windows(2)).filter(|pair| pair[0].frame == pair[1].frame);
+        let pairs = self.of.iter().flat_map(|keys| keys.windows(2)).filter(|pair| pair[0].released() >= pair[1].frame);
         let mut doubled: Vec<usize> = pairs.map(|pair| pair[1].index).collect();
         doubled.sort_unstable();
         doubled
+    }
+}
+
+impl GoalKey<'_> {
+    /// The goal as it pulls, if it ever does: where it starts to pull only when its body should have its shape, it is
+    /// reached at once.
+    fn pulling(self) -> Option<Self> {
+        let end = self.released();
+        if self.start < self.frame {
+            return Some(self);
+        }
+        (self.start < end).then(|| Self { frame: self.start, hold: end - self.start, ..self })
+    }
+
+    /// The last frame at which it holds its body.
+    fn released(&self) -> f64 {
+        self.frame + self.hold
+    }
+
+    /// Whether it takes up its body later than where the goal before it, or the start of the simulation, leaves it.
+    fn waits_for(&self, before: Option<&GoalKey<'_>>, start: f64) -> bool {
+        self.start > before.map_or(start, GoalKey::released)
     }
 }
 

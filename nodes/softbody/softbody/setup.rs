@@ -11,7 +11,7 @@ use numerics::masked::Masked;
 use super::joints::{Couple, couple};
 use super::pins::{BoundPins, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
-use crate::shared::attributes::{SLIVER, SURFACE_POINT};
+use crate::shared::attributes::{BODY_NUMBER, SLIVER, SURFACE_POINT};
 use crate::shared::pieces::pieces;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -136,6 +136,9 @@ impl SimulationSetup {
             body = Some(joined(body, own)?);
             surface = Some(joined(surface, &found.mesh)?);
         }
+        if let Some(body) = body.as_mut().filter(|_| cx.wants(BODY_NUMBER)) {
+            body.set(BODY_NUMBER, body_numbers(inputs)?)?;
+        }
         triangles.iter().flatten().for_each(|corner: &u32| outer[*corner as usize] = true);
         let links = all.iter().flat_map(|[first, others @ ..]: &[u32; 4]| others.map(|other| [*first, other]));
         let parts = pieces(rest.len(), links);
@@ -193,6 +196,22 @@ pub(super) fn refusal(error: BodyError) -> Error {
         BodyError::Number { .. } => "`density`, `stiffness`, `damping` and their masks need finite numbers",
     };
     Error::refused(format!("`bodies`: {error}")).hint(hint)
+}
+
+/// The body that each tet belongs to: `body` of each wire, counted on from the wires before it. A wire without it is one
+/// body.
+fn body_numbers(inputs: &StartInputs) -> Result<Vec<i32>> {
+    let mut numbers: Vec<i32> = Vec::new();
+    let mut first = 0_i32;
+    for geometry in &inputs.bodies {
+        let tets = geometry.require(Kind::Tets)?;
+        let own = tets.get(BODY_NUMBER);
+        let number = |tet: usize| first.saturating_add(own.map_or(0, |own| own[tet]));
+        let of_wire: Vec<i32> = (0..tets.element_count()).map(number).collect();
+        first = of_wire.iter().fold(first, |first, number| first.max(number.saturating_add(1)));
+        numbers.extend(of_wire);
+    }
+    Ok(numbers)
 }
 
 fn joined(before: Option<Component>, next: &Component) -> Result<Component> {

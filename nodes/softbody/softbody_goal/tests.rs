@@ -150,3 +150,11 @@ fn a_keyed_strength_changes_only_the_strength() {
     assert_eq!(frames[0].part(Kind::Tets).positions(), frames[1].part(Kind::Tets).positions());
     assert_eq!(frames[0].metrics["cg"], frames[1].metrics["cg"]);
 }
+
+#[test]
+fn a_start_that_is_not_before_the_frame_is_published() {
+    let late = |start: f32| making(body(), ball()).set(FRAME, 24.0).set(START_FRAME, start).cook();
+    assert_eq!([12.0, 24.0, 30.0].map(|start| late(start).metrics["late_start"]), [0.0, 1.0, 1.0]);
+    assert_eq!(late(12.0).part(Kind::Tets).get(GOAL_START), Some(&[12.0][..]));
+    assert_eq!(making(body(), ball()).cook().part(Kind::Tets).get(GOAL_START), Some(&[ALWAYS][..]));
+}

@@ -82,7 +82,7 @@ fn an_egg_is_a_white_around_a_yolk() {
     let out = filling(egg).cook();
     assert_eq!(out.metrics["bodies"], 2.0);
     assert!(out.metrics["repairs"] > 0.0, "the wall of the cavity faced outwards");
-    let body = tets(&out).get(BODY).unwrap();
+    let body = tets(&out).get(BODY_NUMBER).unwrap();
     let (white, yolk) = (volume(tets(&out), |tet| body[tet] == 0), volume(tets(&out), |tet| body[tet] == 1));
     let all = |n: usize, size: f64| volume(tets(&filling(ball(n, size)).cook()), |_| true);
     assert!((white / (all(8, 0.06) - all(6, 0.03)) - 1.0).abs() < 1e-5);
