@@ -14,7 +14,7 @@
 use curves::attach::{RootPose, RootPositions, SkinBinding, attach_curves, rotate_orientations, rotate_vectors};
 use engine::prelude::*;
 
-use crate::shared::faces::{counted, same_faces};
+use crate::shared::faces::{counted, inside_out, same_faces};
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves as they stand on `rest_skin`, root first.");
@@ -60,12 +60,13 @@ pub(crate) static NODE: Node = Node::new(
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (curves, rest, skin) = (cx.part(CURVES), cx.part(REST_SKIN), cx.part(SKIN));
     if !same_faces(rest, skin) {
+        if inside_out(rest, skin) {
+            let fact = "`skin` is `rest_skin` mirrored, with its faces inside out";
+            return Err(Error::refused(fact).hint("mirror the output of this node instead of `skin`"));
+        }
         let [skin, rest] = [skin, rest].map(counted);
         let fact = format!("`skin` has {skin}, `rest_skin` {rest}, or their topology differs");
-        return Err(Error::refused(fact).hint(
-            "give two poses of one mesh; a mirroring Transform reverses faces, so mirror the output of this node \
-             instead",
-        ));
+        return Err(Error::refused(fact).hint("give two poses of one mesh"));
     }
     let roots = RootPositions::of(curves.runs().starts(), curves.positions());
     let bind = || Ok(SkinBinding::to_closest(rest.positions(), &rest.triangles().corners, roots.as_slice()));

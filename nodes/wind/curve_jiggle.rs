@@ -216,6 +216,13 @@ fn check_same(input: &str, now: &Component, first: &Component) -> Result<()> {
         let elements = if part.kind() == Kind::Curves { "curves" } else { "faces" };
         format!("{} {elements} of {} points", part.element_count(), part.point_count())
     };
+    if now.point_count() == first.point_count()
+        && now.faces().zip(first.faces()).is_some_and(|(a, b)| a.is_inside_out(b))
+    {
+        let fact = format!("`{input}` is mirrored, which turns its faces inside out since the scene's first frame");
+        return Err(Error::refused(fact)
+            .hint("keep the sign of its animated `scale`, or mirror the output of this node instead"));
+    }
     let differ = match (count(now), count(first)) {
         (now, first) if now == first => format!("it has {now} with another topology"),
         (now, first) => format!("it had {first} then, and has {now} now"),

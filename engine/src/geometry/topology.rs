@@ -88,6 +88,16 @@ impl Faces {
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + '_ {
         (0..self.runs.len()).map(|i| self.face(i))
     }
+
+    /// Whether these are the faces of `other` inside out: the same corners with the opposite winding, from the same
+    /// first ones, as Transform makes them where it mirrors.
+    pub fn is_inside_out(&self, other: &Self) -> bool {
+        let reversed = |(own, other): (&[u32], &[u32])| match (own, other) {
+            ([first, own @ ..], [same, other @ ..]) => first == same && own.iter().eq(other.iter().rev()),
+            _ => own == other,
+        };
+        !self.runs.is_empty() && self.runs == other.runs && self.iter().zip(other.iter()).all(reversed)
+    }
 }
 
 /// How a component's points are connected.

@@ -209,3 +209,15 @@ fn bits_do_not_depend_on_the_order_of_frames_or_the_number_of_threads() {
 fn it_conforms() {
     conforms(&NODE);
 }
+
+#[test]
+fn a_mirrored_skin_is_refused_as_such() {
+    let mut mirrored = moved(&floor(), |[x, y, z]| [-x, y, z]);
+    let faces = mirrored.faces().unwrap();
+    let reversed =
+        faces.iter().flat_map(|face| [&face[..1], &face[1..].iter().rev().copied().collect::<Vec<_>>()].concat());
+    mirrored =
+        Component::mesh(faces.runs.counts().collect(), reversed.collect(), mirrored.positions().to_vec()).unwrap();
+    let error = attach(hair(), floor(), mirrored).try_cook().unwrap_err();
+    assert_eq!(error.fact, "`skin` is `rest_skin` mirrored, with its faces inside out");
+}

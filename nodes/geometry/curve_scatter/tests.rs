@@ -275,3 +275,13 @@ fn more_cvs_than_memory_should_hold_are_refused() {
 fn it_conforms() {
     conformance(&NODE).with(|bench| bench.changed(SKIN, a_third_as_wide)).run();
 }
+
+#[test]
+fn a_skin_that_is_mirrored_in_motion_is_refused_as_such() {
+    let skin = |frame: Frame| {
+        let corners = if frame.number() < 3.0 { vec![0, 1, 2, 3] } else { vec![0, 3, 2, 1] };
+        Component::mesh(vec![4], corners, square(1.0).positions().to_vec()).unwrap().into()
+    };
+    let error = bench(&NODE).moving(SKIN, skin).at(3.0).try_cook().unwrap_err();
+    assert_eq!(error.fact, "`skin` is mirrored, which turns its faces inside out since the scene's first frame");
+}

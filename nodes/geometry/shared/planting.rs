@@ -90,6 +90,12 @@ pub(crate) fn kept_faces<'c>(rest: &'c Component, now: &Component) -> Result<&'c
     if super::faces::same_faces(rest, now) {
         return Ok(rest);
     }
+    if super::faces::inside_out(rest, now) {
+        return Err(Error::refused(
+            "`skin` is mirrored, which turns its faces inside out since the scene's first frame",
+        )
+        .hint("keep the sign of its animated `scale`, or mirror the output of this node instead"));
+    }
     let [now, rest] = [now, rest].map(|mesh| (mesh.element_count(), mesh.point_count()));
     let fact = format!(
         "`skin` has {} faces and {} points, but {} and {} at the scene's first frame, or its topology differs",

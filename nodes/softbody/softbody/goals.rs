@@ -335,7 +335,7 @@ impl GoalKey<'_> {
         if self.start < self.frame {
             return Some(self);
         }
-        (self.start < end).then(|| Self { frame: self.start, hold: end - self.start, ..self })
+        (self.start < end).then_some(Self { frame: self.start, hold: end - self.start, ..self })
     }
 
     /// The last frame at which it holds its body.

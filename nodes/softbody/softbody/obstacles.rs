@@ -46,14 +46,10 @@ pub(super) fn obstacles(
     Ok(obstacles)
 }
 
-/// Whether the faces of `b` are those of `a` with the opposite winding from the same first corners.
+/// Whether `b` is `a` mirrored.
 fn turned_round(a: &Component, b: &Component) -> bool {
-    let (Some(a_faces), Some(b_faces)) = (a.faces(), b.faces()) else { return false };
-    let turned = |(a, b): (&[u32], &[u32])| match (a, b) {
-        ([first, a @ ..], [same, b @ ..]) => first == same && a.iter().eq(b.iter().rev()),
-        _ => a == b,
-    };
-    a.point_count() == b.point_count() && a_faces.runs == b_faces.runs && a_faces.iter().zip(b_faces.iter()).all(turned)
+    let inside_out = a.faces().zip(b.faces()).is_some_and(|(a, b)| a.is_inside_out(b));
+    inside_out && a.point_count() == b.point_count()
 }
 
 #[cfg(test)]

@@ -367,7 +367,7 @@ fn a_goal_pulls_from_its_start_frame_on() {
     for (frame, moved) in moves.iter().enumerate() {
         let free = 0.5 * H * frame.min(10) as f64;
         let time = H * frame.saturating_sub(10) as f64;
-        let fading = time * f64::exp(-10.0 * time);
+        let fading = time * libm::exp(-10.0 * time);
         let [x, y] = [target[0] * time - target[0] * fading, free + target[1] * time + (0.5 - target[1]) * fading];
         let limit = if frame <= 10 { 1e-7 } else { 2e-6 };
         assert!((moved[0] - x).abs() < limit && (moved[1] - y).abs() < limit, "{frame}: {moved:?} {x} {y}");
