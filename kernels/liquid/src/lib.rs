@@ -1,5 +1,6 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
-//! keeps a liquid's volume ([`pressure`]), the surface as a mesh ([`extract`]). Functions take and return plain slices;
+//! keeps a liquid's volume ([`pressure`]), the surface as a mesh ([`extract`]), velocity
+//! on faces ([`velocity`]). Functions take and return plain slices;
 //! nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
@@ -13,3 +14,4 @@ pub mod open_share;
 pub mod pressure;
 pub mod rows;
 pub mod stencil;
+pub mod velocity;

@@ -9,6 +9,7 @@ use std::mem::take;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 #[cfg(test)]
 mod tests;
@@ -17,7 +18,7 @@ mod tests;
 pub type Cell = [i32; 3];
 
 /// Cells next to each other along x.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Span {
     /// The first cell.
     pub start: i32,
@@ -48,7 +49,7 @@ impl Span {
 const TABULATED: usize = 4096;
 
 /// A set of cells. Spans of a row ascend and do not touch.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellRows {
     /// y and z of the first row.
     low: [i32; 2],
@@ -266,6 +267,16 @@ impl CellRows {
         &self,
         values: impl Fn(Cell) -> [T; N] + Sync,
     ) -> [Vec<T>; N] {
+        self.tabulate_with(|| (), |(), cell, _| values(cell))
+    }
+
+    /// As many fields as `values` makes values of a cell; it also gets where they are stored, and what `start` makes for
+    /// each stretch of cells that a thread goes through in the order of fields. In parallel.
+    pub fn tabulate_with<T: Copy + Default + Send, S, const N: usize>(
+        &self,
+        start: impl Fn() -> S + Sync,
+        values: impl Fn(&mut S, Cell, usize) -> [T; N] + Sync,
+    ) -> [Vec<T>; N] {
         let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
         let mut rest = out.each_mut().map(|field| &mut field[..]);
         let spans: Vec<_> = self.spans().collect();
@@ -280,9 +291,11 @@ impl CellRows {
             parts.push((spans, part));
         }
         parts.into_par_iter().for_each(|(spans, mut part)| {
+            let mut state = start();
+            let first = spans[0].1.base as usize;
             let cells = spans.iter().flat_map(|([y, z], span)| (span.start..span.end).map(|x| [x, *y, *z]));
             for (at, cell) in cells.enumerate() {
-                for (field, value) in part.iter_mut().zip(values(cell)) {
+                for (field, value) in part.iter_mut().zip(values(&mut state, cell, first + at)) {
                     field[at] = value;
                 }
             }

@@ -1,0 +1,156 @@
+//! Points and fields carried by a velocity.
+
+use numerics::vector::{Vec3, add, scale};
+
+use crate::rows::CellRows;
+use crate::velocity::{Corners, FaceMask, Faces, MacVelocity, Sampler, Site, extrapolate, trilinear, within};
+
+/// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
+#[derive(Clone, Debug)]
+pub struct Tracer<'a> {
+    velocity: &'a MacVelocity,
+    sampler: Sampler<'a>,
+    bounds: [Vec3; 2],
+    step: f32,
+}
+
+impl<'a> Tracer<'a> {
+    /// Points stay in the box `bounds`, low corner and high. `step`: cells that a point moves at speed 1, negative to
+    /// follow it back.
+    pub fn new(velocity: &'a MacVelocity, bounds: [Vec3; 2], step: f32) -> Self {
+        Self { velocity, sampler: Sampler::new(velocity.rows()), bounds, step }
+    }
+
+    /// Where a point at `start` goes.
+    #[inline(always)]
+    pub fn trace(&mut self, start: Vec3) -> Vec3 {
+        let a = self.velocity.at(&mut self.sampler, start);
+        let b = self.moved(start, scale(a, 0.5));
+        let b = self.velocity.at(&mut self.sampler, b);
+        let c = self.moved(start, scale(b, 0.75));
+        let c = self.velocity.at(&mut self.sampler, c);
+        let mean = add(scale(a, 2.0 / 9.0), add(scale(b, 3.0 / 9.0), scale(c, 4.0 / 9.0)));
+        self.moved(start, mean)
+    }
+
+    #[inline(always)]
+    fn moved(&self, start: Vec3, velocity: Vec3) -> Vec3 {
+        let mut point = add(start, scale(velocity, self.step));
+        for axis in 0..3 {
+            point[axis] = within(point[axis], self.bounds[0][axis], self.bounds[1][axis]);
+        }
+        point
+    }
+}
+
+/// How values are carried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// The value where the face came from.
+    SemiLagrangian,
+    /// The same, less half of what it changes going there and back (Selle et al. 2008), within the values around the
+    /// place that the face came from.
+    MacCormack,
+}
+
+/// A velocity that carries fields on its own rows to other rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Advection<'a> {
+    /// The velocity, known wherever faces come from.
+    pub velocity: &'a MacVelocity,
+    /// The box that nothing leaves or comes from outside of, low corner and high.
+    pub bounds: [Vec3; 2],
+    /// Cells moved at speed 1.
+    pub step: f32,
+    /// The largest difference between faces next to each other that is continued, see [`extrapolate`].
+    pub steepest: f32,
+    /// How values are carried.
+    pub scheme: Scheme,
+}
+
+/// Layers of faces beside those wanted that the way back may pass.
+const BESIDE_LAYERS: u32 = 3;
+
+/// A value carried, and those around the place that it came from.
+type Bounded = [f32; 3];
+
+impl Advection<'_> {
+    /// The fields `carried`, stored on the rows of the velocity, on faces `wanted` of `rows`; 0 on other faces.
+    ///
+    /// # Panics
+    /// Where a field does not have one value a cell.
+    pub fn carry(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+        assert!(carried.iter().all(|field| field.len() == self.velocity.rows().len()));
+        assert_eq!(wanted.len(), rows.len());
+        match self.scheme {
+            Scheme::SemiLagrangian => self.semi_lagrangian(carried, rows, wanted),
+            Scheme::MacCormack => self.mac_cormack(carried, rows, wanted),
+        }
+    }
+
+    fn tracer(&self, step: f32) -> Tracer<'_> {
+        Tracer::new(self.velocity, self.bounds, step)
+    }
+
+    fn semi_lagrangian(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+        let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
+        rows.tabulate_with(start, |(tracer, sampler), cell, at| {
+            let value = |axis: usize| {
+                if wanted[at] >> axis & 1 == 0 {
+                    return 0.0;
+                }
+                let site = Site::FACES[axis];
+                sampler.value(&carried[axis], site, tracer.trace(site.of(cell)))
+            };
+            let mut value = value;
+            [value(0), value(1), value(2)]
+        })
+    }
+
+    fn mac_cormack(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+        let [x, y, z] = self.bounded(carried, rows, wanted);
+        let first = [&x, &y, &z];
+        let mut there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
+        let mut known = wanted.to_vec();
+        extrapolate(rows, &mut known, [&mut there], self.steepest, BESIDE_LAYERS);
+        let start = || (self.tracer(self.step), Sampler::new(rows), Sampler::new(self.velocity.rows()));
+        rows.tabulate_with(start, |(tracer, new, old), cell, at| {
+            let mut value = |axis: usize| {
+                if wanted[at] >> axis & 1 == 0 {
+                    return 0.0;
+                }
+                let site = Site::FACES[axis];
+                let [there_value, low, high] = first[axis][at];
+                let known = |corners: &Corners| corners.values(&known).iter().all(|mask| mask >> axis & 1 == 1);
+                let back = new.corners(site, tracer.trace(site.of(cell))).filter(known);
+                let before = old.corners(site, site.of(cell));
+                let (Some(back), Some(before)) = (back, before) else { return there_value };
+                let error = before.value(&carried[axis]) - back.value(&there[axis]);
+                within(there_value + 0.5 * error, low, high)
+            };
+            [value(0), value(1), value(2)]
+        })
+    }
+
+    /// Of each wanted face the value where it came from, and the least and largest value around.
+    fn bounded(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> [Vec<Bounded>; 3] {
+        let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
+        rows.tabulate_with(start, |(tracer, sampler), cell, at| {
+            let mut value = |axis: usize| {
+                if wanted[at] >> axis & 1 == 0 {
+                    return [0.0; 3];
+                }
+                let site = Site::FACES[axis];
+                let from = tracer.trace(site.of(cell));
+                let Some(corners) = sampler.corners(site, from) else {
+                    return [sampler.value(&carried[axis], site, from); 3];
+                };
+                let around = corners.values(&carried[axis]);
+                let low = around[1..].iter().fold(around[0], |low, v| if *v < low { *v } else { low });
+                let high = around[1..].iter().fold(around[0], |high, v| if *v > high { *v } else { high });
+                [trilinear(around, corners.t), low, high]
+            };
+            [value(0), value(1), value(2)]
+        })
+    }
+}

@@ -1,0 +1,224 @@
+//! Velocity continued past the faces where it is known.
+//!
+//! Layer by layer outward, an unknown face takes the mean of what its known neighbours say: a neighbour with another
+//! known face behind it, on the same line, continues linearly; only where no neighbour has one do they say what they are
+//! themselves. Linear fields, rigid rotation among them, are continued exactly.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::rows::{CellRows, Span};
+use crate::velocity::{ALL_FACES, FaceMask, Faces};
+
+/// A row that is not stored.
+const NONE: u32 = u32::MAX;
+
+/// Values that one thread goes through.
+const CHUNK: usize = 8192;
+
+/// Stored cells next to each other along x; each row beside them is stored for all of them or for none.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    at: u32,
+    len: u32,
+    /// Whether the cells before the first and after the last are stored.
+    joined: [bool; 2],
+    /// Where the first value of the rows at y − 2, y − 1, y + 1, y + 2 and z − 2, z − 1, z + 1, z + 2 is.
+    beside: [u32; 8],
+}
+
+const BESIDE: [[i32; 2]; 8] = [[-2, 0], [-1, 0], [1, 0], [2, 0], [0, -2], [0, -1], [0, 1], [0, 2]];
+
+/// Pairs of a neighbour and the one behind it, as numbers of [`BESIDE`].
+const PAIRS: [[usize; 2]; 4] = [[1, 0], [2, 3], [5, 4], [6, 7]];
+
+/// What a cell gained in a layer.
+struct Gain<const F: usize> {
+    at: u32,
+    faces: FaceMask,
+    values: [[f32; 3]; F],
+}
+
+/// Lines of a chunk, and whether faces are left unknown there.
+struct Chunk {
+    lines: Range<usize>,
+    open: bool,
+}
+
+/// Continues `fields` on `rows` from the faces `known` to all others that can be reached. Differences between faces one
+/// behind the other count as at most `steepest`, which bounds what a rough field grows to. At most `layers` are added.
+/// In parallel; the same bits on any number of threads.
+///
+/// # Panics
+/// Where a field does not have one value a cell.
+pub fn extrapolate<const F: usize>(
+    rows: &CellRows,
+    known: &mut [FaceMask],
+    mut fields: [&mut Faces; F],
+    steepest: f32,
+    layers: u32,
+) {
+    let fits = |faces: &&mut Faces| faces.iter().all(|field| field.len() == rows.len());
+    assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
+    let lines = lines(rows);
+    let mut chunks = chunks(&lines);
+    for _ in 0..layers {
+        let gains: Vec<Vec<Gain<F>>> = {
+            let layer = Layer { lines: &lines, known, fields: fields.each_ref().map(|faces| &**faces), steepest };
+            chunks.par_iter_mut().map(|chunk| layer.gains(chunk)).collect()
+        };
+        if gains.iter().all(Vec::is_empty) {
+            return;
+        }
+        for gain in gains.iter().flatten() {
+            let at = gain.at as usize;
+            known[at] |= gain.faces;
+            for (faces, values) in fields.iter_mut().zip(gain.values) {
+                for axis in 0..3 {
+                    if gain.faces >> axis & 1 == 1 {
+                        faces[axis][at] = values[axis];
+                    }
+                }
+            }
+        }
+    }
+}
+
+struct Layer<'a, const F: usize> {
+    lines: &'a [Line],
+    known: &'a [FaceMask],
+    fields: [&'a Faces; F],
+    steepest: f32,
+}
+
+impl<const F: usize> Layer<'_, F> {
+    fn gains(&self, chunk: &mut Chunk) -> Vec<Gain<F>> {
+        let mut gains = Vec::new();
+        if !chunk.open {
+            return gains;
+        }
+        chunk.open = false;
+        let mut reached = Vec::new();
+        for line in &self.lines[chunk.lines.clone()] {
+            let own = &self.known[line.at as usize..][..line.len as usize];
+            if own.iter().fold(ALL_FACES, |all, mask| all & mask) == ALL_FACES {
+                continue;
+            }
+            chunk.open = true;
+            self.reach(line, own, &mut reached);
+            for (n, faces) in reached.iter().enumerate().filter(|(_, faces)| **faces != 0) {
+                gains.push(self.gain(line, n, *faces));
+            }
+        }
+        gains
+    }
+
+    /// The unknown faces of each cell that have a known neighbour.
+    fn reach(&self, line: &Line, own: &[FaceMask], reached: &mut Vec<FaceMask>) {
+        reached.clear();
+        reached.resize(own.len(), 0);
+        for row in PAIRS.map(|[near, _]| line.beside[near]).into_iter().filter(|row| *row != NONE) {
+            let near = &self.known[row as usize..][..own.len()];
+            reached.iter_mut().zip(near).for_each(|(reached, mask)| *reached |= mask);
+        }
+        let last = own.len() - 1;
+        reached[1..].iter_mut().zip(own).for_each(|(reached, mask)| *reached |= mask);
+        reached[..last].iter_mut().zip(&own[1..]).for_each(|(reached, mask)| *reached |= mask);
+        if line.joined[0] {
+            reached[0] |= self.known[line.at as usize - 1];
+        }
+        if line.joined[1] {
+            reached[last] |= self.known[line.at as usize + own.len()];
+        }
+        reached.iter_mut().zip(own).for_each(|(reached, mask)| *reached &= !mask);
+    }
+
+    fn gain(&self, line: &Line, n: usize, faces: FaceMask) -> Gain<F> {
+        let pairs = self.pairs(line, n);
+        let mut gain = Gain { at: line.at + n as u32, faces, values: [[0.0; 3]; F] };
+        for axis in (0..3).filter(|axis| faces >> axis & 1 == 1) {
+            let is_known = |at: Option<usize>| at.filter(|at| self.known[*at] >> axis & 1 == 1);
+            let pairs = pairs.map(|[near, behind]| (is_known(near), is_known(behind)));
+            let linear = pairs.iter().any(|(near, behind)| near.is_some() && behind.is_some());
+            for (faces, values) in self.fields.iter().zip(&mut gain.values) {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for (near, behind) in pairs {
+                    let Some(near) = near.filter(|_| !linear || behind.is_some()) else { continue };
+                    let value = faces[axis][near];
+                    let slope = behind.map_or(0.0, |behind| value - faces[axis][behind]);
+                    sum += value + self.limited(slope);
+                    count += 1.0;
+                }
+                values[axis] = sum / count;
+            }
+        }
+        gain
+    }
+
+    fn limited(&self, slope: f32) -> f32 {
+        let slope = if slope > self.steepest { self.steepest } else { slope };
+        if slope < -self.steepest { -self.steepest } else { slope }
+    }
+
+    /// Each neighbour of a cell of a line, and the cell behind it.
+    fn pairs(&self, line: &Line, n: usize) -> [[Option<usize>; 2]; 6] {
+        let (at, last) = (line.at as usize + n, line.len as usize - 1);
+        // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
+        let down = |by: usize| (n >= by || line.joined[0] && n + 1 == by).then(|| at - by);
+        let up = |by: usize| (n + by <= last || line.joined[1] && n + by == last + 1).then(|| at + by);
+        let row = |row: usize| (line.beside[row] != NONE).then(|| line.beside[row] as usize + n);
+        let [a, b, c, d] = PAIRS.map(|pair| pair.map(row));
+        [[down(1), down(2)], [up(1), up(2)], a, b, c, d]
+    }
+}
+
+/// Cuts spans wherever a row beside them begins or ends.
+fn lines(rows: &CellRows) -> Vec<Line> {
+    let mut lines = Vec::new();
+    for ([y, z], spans) in rows.rows() {
+        let mut beside = BESIDE.map(|[j, k]| rows.row(y + j, z + k));
+        for span in spans {
+            let mut x = span.start;
+            while x < span.end {
+                let mut end = span.end;
+                let found = beside.each_mut().map(|row| {
+                    let (base, until) = base_at(row, x);
+                    end = end.min(until);
+                    base
+                });
+                let joined = [x > span.start, end < span.end];
+                lines.push(Line { at: span.at(x) as u32, len: (end - x) as u32, joined, beside: found });
+                x = end;
+            }
+        }
+    }
+    lines
+}
+
+/// Where a row stores `x`, and until which cell that holds. Drops the spans before it.
+fn base_at(row: &mut &[Span], x: i32) -> (u32, i32) {
+    while let Some((first, rest)) = row.split_first()
+        && first.end <= x
+    {
+        *row = rest;
+    }
+    match row.first() {
+        Some(span) if span.start <= x => (span.at(x) as u32, span.end),
+        Some(span) => (NONE, span.start),
+        None => (NONE, i32::MAX),
+    }
+}
+
+fn chunks(lines: &[Line]) -> Vec<Chunk> {
+    let mut chunks = Vec::new();
+    let mut first = 0;
+    for number in 0..lines.len() {
+        let next = lines.get(number + 1);
+        if next.is_none_or(|next| next.at as usize / CHUNK != lines[first].at as usize / CHUNK) {
+            chunks.push(Chunk { lines: first..number + 1, open: true });
+            first = number + 1;
+        }
+    }
+    chunks
+}

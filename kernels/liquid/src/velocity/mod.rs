@@ -1,0 +1,84 @@
+//! Velocity on the faces of cells: sampled anywhere, continued past the liquid, carried along with it.
+//!
+//! A value is stored in the cell whose low face it lies on, one field an axis (marker-and-cell grid: Harlow and Welch
+//! 1965). Positions are in cells: cell [x, y, z] reaches from there to [x + 1, y + 1, z + 1]. Values are in any unit of
+//! speed; functions that move something get the number of cells that it moves at speed 1.
+
+mod advect;
+mod extrapolate;
+mod sampler;
+#[cfg(test)]
+mod tests;
+
+pub use advect::{Advection, Scheme, Tracer};
+pub use extrapolate::extrapolate;
+pub use sampler::{Corners, Sampler, Site, trilinear};
+
+use numerics::vector::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::rows::CellRows;
+
+/// One value an axis for each cell, on its low faces.
+pub type Faces = [Vec<f32>; 3];
+
+/// Which low faces of a cell count: bit 0 along x, bit 1 along y, bit 2 along z.
+pub type FaceMask = u8;
+
+/// All three low faces.
+pub const ALL_FACES: FaceMask = 7;
+
+/// A velocity on the low faces of stored cells.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MacVelocity {
+    rows: CellRows,
+    faces: Faces,
+}
+
+impl MacVelocity {
+    /// The velocity `faces` on `rows`.
+    ///
+    /// # Panics
+    /// Where a field does not have one value a cell.
+    pub fn new(rows: CellRows, faces: Faces) -> Self {
+        assert!(faces.iter().all(|field| field.len() == rows.len()), "a velocity has one value a cell and axis");
+        Self { rows, faces }
+    }
+
+    /// The stored cells.
+    pub fn rows(&self) -> &CellRows {
+        &self.rows
+    }
+
+    /// The values on low faces along x, y and z.
+    pub fn faces(&self) -> &Faces {
+        &self.faces
+    }
+
+    /// The stored cells and the values.
+    pub fn into_parts(self) -> (CellRows, Faces) {
+        (self.rows, self.faces)
+    }
+
+    /// The velocity at `point`, by a sampler of these rows.
+    #[inline(always)]
+    pub fn at(&self, sampler: &mut Sampler<'_>, point: Vec3) -> Vec3 {
+        [
+            sampler.value(&self.faces[0], Site::FaceX, point),
+            sampler.value(&self.faces[1], Site::FaceY, point),
+            sampler.value(&self.faces[2], Site::FaceZ, point),
+        ]
+    }
+}
+
+/// These fields on other rows; 0 where `from` has no cell.
+pub fn resampled(rows: &CellRows, from: &CellRows, faces: &Faces) -> Faces {
+    faces.each_ref().map(|field| rows.resampled(from, field, 0.0))
+}
+
+/// `low` where `x` is NaN.
+#[inline(always)]
+fn within(x: f32, low: f32, high: f32) -> f32 {
+    let x = if x > low { x } else { low };
+    if x < high { x } else { high }
+}
