@@ -165,7 +165,8 @@ metrics! { METRICS:
     RESIDUAL = Metric::new("residual", Unit::None,
         "The largest residual left by a solve, relative to the initial one.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Solves that reached their iteration limit, and particles whose motion had to be limited. 0 is good.")
+        "Solves that reached their iteration limit while particles still moved by more than 1e-4 of the size of the \
+         bodies, and particles whose motion had to be limited. 0 is good.")
         .warn_above(0.0, "At these frames the solver reached its iteration limit, so motion may be damped or contacts \
             may be deeper than `thickness`. Set more `substeps`, or lower the stiffness or the speed of colliders.");
     TOLERANCE_MISSED = Metric::new("tolerance_missed", Unit::None,

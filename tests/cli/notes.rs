@@ -312,6 +312,26 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
 }
 
 #[test]
+fn tets_with_another_volume_than_their_surface_are_noted() {
+    let twisted = |divisions: u32| {
+        let bench = Bench::with_graph(&format!(
+            r#"{{"convect": 1, "nodes": {{
+                "plate": {{"type": "Mesh_Primitive",
+                    "params": {{"shape": "box", "size": [1, 0.1, 0.3], "divisions": {divisions}}}}},
+                "twisted": {{"type": "Attribute_Expr", "inputs": {{"geometry": "plate"}},
+                    "params": {{"component": "mesh", "code": "@P.y += @P.x*@P.z"}}}},
+                "body": {{"type": "Tetrahedralize", "inputs": {{"surface": "twisted"}}}}
+            }}, "outputs": {{"o": "body"}}}}"#
+        ));
+        notes(&bench, &[])
+    };
+    let coarse = twisted(3);
+    let start = "`body` (Tetrahedralize): `volume_error` is 1.23e-2 at frame 1. The tets cut corners of the surface";
+    assert!(matches!(&coarse[..], [one] if one.starts_with(start)), "{coarse:#?}");
+    assert_eq!(twisted(12), [""; 0], "smaller faces, as the note advises");
+}
+
+#[test]
 fn pieces_of_a_surface_that_get_no_tets_are_noted() {
     let graph = |size: &str| {
         Bench::with_graph(&format!(

@@ -60,6 +60,8 @@ fn an_egg_drapes_over_the_rim_with_its_yolk_inside() {
     assert!(held / 60 >= 2 && worst < 1e-7);
     assert_eq!(overlap, 0);
     assert!(inner >= 5 && outer >= 5);
+    let caps = metrics["egg"]["caps_hit"].values().copied().fold(0.0, f64::max);
+    assert_eq!(caps, 0.0, "no limit is noted while the egg is at rest");
 }
 
 fn points_of_pins(pins: &Geometry) -> Vec<[f64; 3]> {

@@ -52,4 +52,5 @@ fn dough_flattens_under_the_pin_swells_in_front_of_it_and_keeps_its_dent() {
         most("substeps_used")
     );
     assert!(most("deepest_overlap") < 2e-3, "no collider is penetrated");
+    assert_eq!(most("caps_hit"), 0.0, "no limit is noted while the dough is at rest");
 }

@@ -81,7 +81,8 @@ pub struct FrameReport {
     pub cg: u32,
     /// The largest final ÷ initial residual of a stage.
     pub residual: f64,
-    /// Solves that did not reach their tolerance, and steps that left contacts too deep.
+    /// Solves that reached their limit of iterations while particles still moved by more than 1e-4 of the size of the
+    /// bodies, and steps that left contacts too deep.
     pub caps_hit: u32,
     /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows. Steps
     /// that start out of balance do not count: their estimate only tells the size of the jump.

@@ -90,7 +90,8 @@ impl StageSolver {
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
             let wanted = (now > solved.enough && !slow) || deep;
             if !wanted || stuck || solved.newton >= most {
-                solved.caps += u32::from(wanted && !stuck && most == MOST_IN_CONTACT);
+                let gave_up = wanted && !stuck && most == MOST_IN_CONTACT;
+                solved.caps += u32::from(gave_up && (deep || self.is_unsettled(context.body)));
                 break;
             }
             self.store_noncontact_residual(stage);

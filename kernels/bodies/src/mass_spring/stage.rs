@@ -28,6 +28,8 @@ const CG_SHARE_FROZEN: f64 = 0.02;
 const NOISE: f64 = 1e-8;
 /// Largest number of iterations of a linear solve.
 const CG_CAP: u32 = 300;
+/// A direction that moves no particle by more than this share of the size of the bodies is not seen.
+const UNSETTLED: f64 = 1e-4;
 /// The coarse factor is renewed once solves take this many times the iterations that they took with it new.
 const STALE: f64 = 1.5;
 /// It is also renewed after this many iterations, since it may have been poor from the start.
@@ -346,12 +348,20 @@ impl StageSolver {
         } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*initial_iterations) + 1.0 {
             *cached = CachedCoarseFactor::default();
         }
-        solved.caps += u32::from(!reached.met);
+        let gave_up = !reached.met && self.is_unsettled(body);
+        solved.caps += u32::from(gave_up);
         // The linear solve left part of the residual; momentum has to be exact.
         self.correct_linear_momentum(body, stage, &target);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
         !solved.failed
+    }
+
+    /// Whether the last direction moves a particle visibly, so that a solve that ends here is not done. Bodies at rest
+    /// pass limits on iterations while they move by less than anyone sees.
+    pub(super) fn is_unsettled(&self, body: &SoftBody) -> bool {
+        let least = UNSETTLED * body.size();
+        self.dx.iter().any(|d| d.norm() > least)
     }
 
     fn gradients(
