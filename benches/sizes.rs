@@ -1,6 +1,7 @@
 //! Large graphs: time and memory of the program for chains and for nodes that no output needs.
 //!
-//! `cargo bench --bench sizes`. Linux only: peak memory is that of `/proc/PID/status`, sampled while the program runs.
+//! `cargo bench --bench sizes`: the best time and the highest peak of some runs. Linux only: peak memory is that of
+//! `/proc/PID/status`, sampled while the program runs.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -71,7 +72,14 @@ const ROWS: [Row; 7] = [
         seconds: 2.0,
         megabytes: 1_000,
     },
-    Row { what: "a Merge doubled 28 times", verb: COOK, graph: doubled, exit: 4, seconds: 20.0, megabytes: 24_000 },
+    Row {
+        what: "a Merge doubled 28 times",
+        verb: &["cook", "g.json", "--memory", "1G"],
+        graph: doubled,
+        exit: 4,
+        seconds: 20.0,
+        megabytes: 1_500,
+    },
 ];
 
 /// A source, and a node that reads the one before: type, input, params.
@@ -129,7 +137,6 @@ fn doubled() -> String {
 
 /// Seconds, peak megabytes and exit code of a run in `folder`.
 fn run(row: &Row, folder: &Path) -> std::io::Result<(f64, u64, Option<i32>)> {
-    std::fs::write(folder.join("g.json"), (row.graph)())?;
     let watch = Stopwatch::start();
     let mut child = Command::new(env!("CARGO_BIN_EXE_convect"))
         .args(row.verb)
@@ -155,7 +162,13 @@ fn main() -> std::io::Result<ExitCode> {
     let folder = tempfile::tempdir()?;
     let mut missed = 0;
     for row in &ROWS {
-        let (seconds, megabytes, exit) = run(row, folder.path())?;
+        std::fs::write(folder.path().join("g.json"), (row.graph)())?;
+        let (mut seconds, mut megabytes, mut exit) = (f64::MAX, 0, None);
+        // The first run pays for memory that the machine has not used for long.
+        for _ in 0..if row.seconds < 1.0 { 5 } else { 2 } {
+            let (wall, peak, code) = run(row, folder.path())?;
+            (seconds, megabytes, exit) = (seconds.min(wall), megabytes.max(peak), code);
+        }
         let kept = seconds <= row.seconds && megabytes <= row.megabytes && exit == Some(row.exit);
         missed += usize::from(!kept);
         println!(

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use engine::clock::Stopwatch;
@@ -50,10 +51,10 @@ pub struct CookArgs {
     /// Number of threads [default: the machine's]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Memory for results, such as 8G; a node whose result would take more is refused [default: half of the machine's]
+    /// Memory for the results that a frame needs, such as 8G; a node with which they would take more is refused, but 16 MiB are always allowed [default: half of the machine's]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
-    /// Keep finished frames and solver checkpoints in this folder; an interrupted cook resumes from them
+    /// Keep finished frames, states of solvers and windows, and slow results in this folder; an interrupted cook resumes from them
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Maximum size of the cache; the oldest files are deleted first
@@ -94,7 +95,7 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
             None => Frames::of_scene(args.frames.as_ref(), &graph.scene)?,
         },
     };
-    let mut faults = engine.verify(&graph, Some(&request));
+    let mut faults = load::as_read_from(&args.graph, engine.verify(&graph, Some(&request)));
     if !args.no_write {
         faults.extend(load::format_faults(&graph, &request.outputs, format));
     }
@@ -157,7 +158,8 @@ fn cook(
     let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
     report.notes.extend(left_out(graph, &written, format));
     report.notes.extend(without_width(graph, &written, format));
-    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled))?;
+    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled, &cancel))?;
+    report.cancelled |= cancel.load(Ordering::Relaxed);
     writing += watch.wall();
     let mut reported = Ok(());
     if args.report.is_some() {

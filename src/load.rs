@@ -4,7 +4,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use engine::cook::{Engine, Settings};
-use engine::files::{is_handed_over, unreadable};
+use engine::files::{RELATIVE_PATHS, is_handed_over, unreadable};
 use engine::graph::{Fault, FaultClass, Graph, Part, probe};
 use engine::memory::Ceiling;
 use engine::note::Note;
@@ -57,7 +57,19 @@ fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Result<Graph, Ve
     let folder =
         path.parent().filter(|_| !is_handed_over(path) && !is_stdin(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
-    Ok(Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe))
+    let loaded = Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe);
+    Ok(loaded.map_err(|faults| as_read_from(path, faults)))
+}
+
+/// The faults of the graph at `path` with hints that fit where it was read from: stdin has no folder.
+pub fn as_read_from(path: &Path, mut faults: Vec<Fault>) -> Vec<Fault> {
+    if is_stdin(path) {
+        let relative = faults.iter_mut().filter(|fault| fault.hint.as_deref() == Some(RELATIVE_PATHS));
+        relative.for_each(|fault| {
+            fault.hint = Some("paths of a graph from stdin are relative to the current folder".into())
+        });
+    }
+    faults
 }
 
 /// The graph at `path`, checked as far as possible before cooking: compatible params, valid geometry files, outputs
@@ -75,7 +87,7 @@ pub fn checked_graph(
         Ok(graph) => graph,
         Err(faults) => return Ok(Err(faults)),
     };
-    let mut faults = engine.verify(&graph, None);
+    let mut faults = as_read_from(path, engine.verify(&graph, None));
     if let Some(format) = format {
         let outputs: Vec<usize> = (0..graph.outputs.len()).collect();
         faults.extend(format_faults(&graph, &outputs, format));

@@ -1,7 +1,7 @@
 //! Files of outputs: one USD file with all frames, or one file per frame.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use engine::cook::Delivered;
@@ -10,7 +10,7 @@ use engine::graph::Graph;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
 use formats::usd::{Flavour, UsdError, UsdWriter, lacks_width};
-use formats::{Format, FrameStamp};
+use formats::{Format, FormatError, FrameStamp};
 
 use crate::failure::{Exit, Failure};
 use crate::targets::Targets;
@@ -177,11 +177,15 @@ fn write_frame(graph: &Graph, folder: &Path, format: Format, one: &Delivered) ->
     let name = &graph.outputs[one.output].name;
     let path = frame_path(folder, name, one.frame, format);
     let stamp = FrameStamp { frame: one.frame.number(), seconds: one.frame.seconds(graph.scene.fps) };
-    let mut bytes = Vec::new();
-    formats::write(format, &one.geometry, &stamp, &mut bytes)
-        .map_err(|error| Failure::file(format!("`{}` could not be written: {error}", path.display())))?;
-    write_whole(&path, &bytes)?;
-    Ok((path, bytes.len() as u64))
+    // Not by way of a buffer: a frame as text is several times as large as in memory.
+    let mut file = AtomicFile::create(&path).map_err(|error| failed(&error))?;
+    formats::write(format, &one.geometry, &stamp, &mut file).map_err(|error| match error {
+        FormatError::Io(error) => failed(&file.failed(error)),
+        error => Failure::file(format!("`{}` could not be written: {error}", path.display())),
+    })?;
+    let bytes = file.stream_position().map_err(|error| failed(&file.failed(error)))?;
+    file.commit().map_err(|error| failed(&error))?;
+    Ok((path, bytes))
 }
 
 /// Creates a folder and those above it, where they are missing.

@@ -11,6 +11,7 @@ mod spool;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use engine::cook::Delivered;
 use engine::frames::FrameSet;
@@ -252,11 +253,13 @@ impl<'g> Pictures<'g> {
         shot.iter().try_for_each(|(output, geometry)| film.spool.add(frame, *output, geometry)).map_err(unwritable)
     }
 
-    /// Draws and writes the pictures; returns their paths. After an interruption there is no movie.
+    /// Draws and writes the pictures; returns their paths. After an interruption there is no movie, and once `cancel` is
+    /// set while pictures are drawn, no more.
     ///
     /// # Errors
     /// If a picture cannot be drawn or written.
-    pub fn write(mut self, interrupted: bool) -> Result<Vec<PathBuf>, Failure> {
+    pub fn write(mut self, interrupted: bool, cancel: &AtomicBool) -> Result<Vec<PathBuf>, Failure> {
+        let stopped = || !interrupted && cancel.load(Ordering::Relaxed);
         let mut written = Vec::new();
         if let Some(sheet) = self.sheet.take() {
             let shots = sheet.chosen(SHEET_FRAMES);
@@ -267,13 +270,16 @@ impl<'g> Pictures<'g> {
         if let Some(mut film) = self.film.take() {
             self.report_unknown_attribute(&film.common);
             for frame in self.stills.iter().flat_map(FrameSet::iter) {
+                if stopped() {
+                    return Ok(written);
+                }
                 let shot = film.spool.read(frame).map_err(unreadable)?;
                 if !shot.is_empty() {
                     written.push(save(&self.panels(frame, &shot, &film.common)?, self.still_path(frame))?);
                 }
             }
             if self.movie && !interrupted {
-                written.push(self.write_movie(&mut film)?);
+                written.extend(self.write_movie(&mut film, &stopped)?);
             }
         }
         Ok(written)
@@ -293,7 +299,8 @@ impl<'g> Pictures<'g> {
         save(&sheet, self.path("png"))
     }
 
-    fn write_movie(&self, film: &mut Film) -> Result<PathBuf, Failure> {
+    /// Draws the movie and writes it; `None` if it is stopped.
+    fn write_movie(&self, film: &mut Film, stopped: &dyn Fn() -> bool) -> Result<Option<PathBuf>, Failure> {
         let frames = film.spool.frames();
         let mut draw = |frame: Frame| {
             let shot = film.spool.read(frame).map_err(unreadable)?;
@@ -304,6 +311,9 @@ impl<'g> Pictures<'g> {
         let movie = Movie::start(&mut file, image.width(), image.height(), frames.len());
         let mut movie = movie.map_err(drawing)?;
         for (index, frame) in frames.iter().enumerate() {
+            if stopped() {
+                return Ok(None);
+            }
             if index > 0 {
                 image = draw(*frame)?;
             }
@@ -312,7 +322,7 @@ impl<'g> Pictures<'g> {
         movie.finish().map_err(drawing)?;
         let path = file.path().to_owned();
         file.commit().map_err(|error| failed(&error))?;
-        Ok(path)
+        Ok(Some(path))
     }
 
     /// Seconds from a frame to the next; the last one is shown as long as the one before.

@@ -191,12 +191,15 @@ pub fn open(path: &Path) -> io::Result<fs::File> {
     fs::File::open(path)
 }
 
+/// The hint of a file that does not exist.
+pub const RELATIVE_PATHS: &str = "paths are relative to the graph file";
+
 /// The error of a file that cannot be read, with hints for the most common causes.
 pub fn unreadable(path: &Path, error: &std::io::Error) -> Error {
     use std::io::ErrorKind as K;
     let path = path.display();
     match error.kind() {
-        K::NotFound => Error::file(format!("`{path}` does not exist")).hint("paths are relative to the graph file"),
+        K::NotFound => Error::file(format!("`{path}` does not exist")).hint(RELATIVE_PATHS),
         K::PermissionDenied => {
             Error::file(format!("no permission to read `{path}`")).hint("change the file's permissions")
         }

@@ -31,7 +31,7 @@ pub mod prelude {
     };
     pub use crate::node::{
         AttrDecl, AttrNames, Chain, Cook, CurveLoop, Cx, Edited, Fill, FrameCx, Input, LeftOut, Many, Metric,
-        MetricValues, Node, Opt, Output, Outputs, Past, StepCx, Times, Wires, point_float_hint,
+        MetricValues, Node, Opt, Output, Outputs, Past, Resumable, StepCx, Times, Wires, point_float_hint,
     };
     pub use crate::param::{Clock, Code, Maskable, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;

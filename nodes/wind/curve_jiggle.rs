@@ -81,7 +81,7 @@ pub(crate) static NODE: Node = Node::new(
     "Makes curves lag behind their incoming motion and swing: they follow a gust softly and overshoot when it stops. A \
      damped spring ties each CV to its position on the incoming curve, stiff at the root and soft at the tip. Any \
      frame can be cooked alone.",
-    Cook::window::<Swing>(past),
+    Cook::resumable_window::<Swing>(past),
 )
 .inputs(INPUTS)
 .params(PARAMS)
@@ -166,6 +166,25 @@ impl Chain for Swing {
         }
         cx.publish(MAX_OFFSET, farthest);
         Ok(OUT.with(curves))
+    }
+}
+
+impl Resumable for Swing {
+    /// Offsets and velocities; `None` while nothing swings.
+    type Saved = Option<Vec<f64>>;
+
+    fn save(&self) -> Self::Saved {
+        self.springs.as_ref().map(Jiggle::swing)
+    }
+
+    fn resume(saved: Self::Saved, cx: &FrameCx) -> Result<Self> {
+        let mut swing = Self::start(cx)?;
+        if let Some(saved) = saved {
+            let (rest, now) = (swing.rest.positions(), swing.before.positions());
+            let springs = Jiggle::swinging(swing.before.runs().starts(), rest, now, &saved);
+            swing.springs = Some(springs.ok_or_else(|| Error::refused("the saved swing is that of other curves"))?);
+        }
+        Ok(swing)
     }
 }
 

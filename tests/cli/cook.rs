@@ -114,6 +114,11 @@ fn a_graph_is_read_from_stdin_and_a_report_written_to_stdout() {
     assert_eq!(bench.names(""), ["g.json", "grass.obj"], "nothing is written");
     assert!(ran.stderr.contains("cooked 4 frames"), "{}", ran.stderr);
     assert_eq!(run(&["check", "-"]).code, Some(0));
+    for verb in ["check", "cook", "explain"] {
+        let ran = run(&[verb, "-", "--set", "blades.file=none.obj"]);
+        let expected = "`none.obj` does not exist; paths of a graph from stdin are relative to the current folder\n";
+        assert!(ran.code == Some(1) && ran.stderr.ends_with(expected), "{verb}: {}", ran.stderr);
+    }
     let ran = run(&["check", "-", "--set", "wind.nose=1"]);
     assert!(ran.stderr.starts_with("--set wind.nose:1:1: "), "{}", ran.stderr);
     bench.write("g.json", "{");
@@ -129,6 +134,42 @@ fn without_writing_pictures_are_drawn_and_errors_found() {
     assert_eq!(bench.names(""), ["g.json", "grass.obj"]);
     bench.done(&["cook", "g.json", "--no-write", "--frames", "1", "--preview"]);
     assert_eq!(bench.names("out"), ["g.preview.png"]);
+}
+
+/// Curves of a file sequence of which only the later files have widths: every part declares them alike, so that a clip of
+/// one can follow that of another.
+#[test]
+fn parts_of_which_some_have_widths_declare_them_alike() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 4]}, "nodes": {
+            "in": {"type": "Curve_In", "params": {"file": "c.####.json", "frame": {"expr": "frame"}}}
+        }, "outputs": {"o": "in"}}"#,
+    );
+    for frame in 1..=4 {
+        let width = if frame < 3 { "" } else { r#", "point_attributes": {"width": [0.5, 0.25]}"# };
+        let curves = format!(r#""counts": [2], "points": [[0.0, 0.0, 0.0], [0.0, 1.0, {frame}.0]]{width}"#);
+        bench.write(&format!("c.{frame:04}.json"), &format!(r#"{{"frame": {frame}, "curves": {{{curves}}}}}"#));
+    }
+    let part = |frames: &str| {
+        bench.done(&["cook", "g.json", "--format", "usda", "--part", frames]);
+        std::fs::read_to_string(bench.path("out/o.usda")).unwrap()
+    };
+    let widths = |text: &str| {
+        let from = text.find("float[] widths.timeSamples").unwrap_or_else(|| panic!("{text}"));
+        let end = text[from..].find('}').unwrap() + from;
+        text[from..end].split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let interpolation = |text: &str| {
+        text[text.find("float[] widths").unwrap()..]
+            .lines()
+            .take(4)
+            .any(|line| line.contains(r#"interpolation = "vertex""#))
+    };
+    let (bare, mixed, wide) = (part("1-2"), part("2-3"), part("3-4"));
+    assert_eq!(widths(&bare), "float[] widths.timeSamples = { 1: [0.001, 0.001], 2: [0.001, 0.001],");
+    assert_eq!(widths(&mixed), "float[] widths.timeSamples = { 2: [0.001, 0.001], 3: [0.5, 0.25],");
+    assert_eq!(widths(&wide), "float[] widths.timeSamples = { 3: [0.5, 0.25], 4: [0.5, 0.25],");
+    assert!([&bare, &mixed, &wide].into_iter().all(|text| interpolation(text)), "{bare}");
 }
 
 /// What is constant in a part but not in the scene has time samples; what is still has none.

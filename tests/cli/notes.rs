@@ -166,6 +166,40 @@ fn a_mask_that_is_zero_everywhere_is_noted() {
     assert!(ran.stderr.starts_with("misspelt.json:5:"), "{}", ran.stderr);
 }
 
+/// Whole numbers and numbers per curve are masks too, and frames from the cache count as those that are cooked.
+#[test]
+fn masks_of_any_kind_are_noted_from_the_cache_too() {
+    let graph = |attributes: &str| {
+        let bench = Bench::with_graph(
+            r#"{"convect": 1, "scene": {"frames": [1, 3]}, "nodes": {
+                "two": {"type": "Curve_In", "params": {"file": "c.json", "width": 0.1}},
+                "wind": {"type": "Curve_Wind", "inputs": {"curves": "two"}, "params": {
+                    "wind_dir": {"expr": ["cos(time)", 0, "sin(time)"]},
+                    "global_rotate": {"value": 1, "attribute": "m"}}}
+            }, "outputs": {"o": "wind"}}"#,
+        );
+        let curves = r#""counts": [2], "points": [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]"#;
+        bench.write("c.json", &format!(r#"{{"frame": 1, "curves": {{{curves}, {attributes}}}}}"#));
+        bench
+    };
+    let zero = "`wind` (Curve_Wind): the mask `m` of `global_rotate` is 0 everywhere (frames 1-3). ";
+    let cases = [
+        (r#""point_attributes": {"m": [0, 0]}"#, true),
+        (r#""point_attributes": {"m": [0, 1]}"#, false),
+        (r#""element_attributes": {"m": [0.0]}"#, true),
+        (r#""element_attributes": {"m": [0]}"#, true),
+        (r#""element_attributes": {"m": [0.5]}"#, false),
+    ];
+    for (attributes, noted) in cases {
+        let bench = graph(attributes);
+        for _ in 0..2 {
+            let found = notes(&bench, &["--cache", "cache"]);
+            assert_eq!(found.len(), usize::from(noted), "{attributes}: {found:?}");
+            assert!(found.iter().all(|note| note.starts_with(zero)), "{attributes}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn roots_far_from_their_skin_are_noted() {
     let graph = |scale: &str| {

@@ -253,6 +253,44 @@ fn a_result_larger_than_the_memory_is_refused_with_its_size() {
     assert!(ran.stderr.contains("wrote out/first.usdc"), "other outputs are written: {}", ran.stderr);
 }
 
+/// Making each of two boxes fits under the ceiling, but not beside the other.
+#[test]
+fn the_results_of_a_frame_count_together() {
+    let graph = r#"{"convect": 1, "nodes": {
+        "a": {"type": "Mesh_Primitive", "params": {"divisions": 200}},
+        "b": {"type": "Mesh_Primitive", "params": {"divisions": 195}}
+    }, "outputs": {"a": "a", "b": "b"}}"#;
+    let ran = within(4_194_304, graph, "--memory 62M --no-write");
+    assert_eq!(ran.code, Some(4), "{}", ran.stderr);
+    assert!(ran.stderr.contains("with the other results of the frame, but --memory allows 62.0 MiB"), "{}", ran.stderr);
+    let ran = within(4_194_304, graph, "--memory 80M --no-write");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_while_a_movie_is_drawn_ends_it_at_once() {
+    let graph = crate::bench::GRAPH.replace("[1, 4]", "[1, 200]");
+    let bench = Bench::with_graph(&graph);
+    let args = ["cook", "g.json", "--output", "grass", "--movie", "--preview-size", "900x900", "--report", "r.json"];
+    let mut child = start(&bench, &args);
+    // The movie's file is started once all frames are cooked.
+    for _ in 0..6_000 {
+        if names(&bench.path("out")).iter().any(|name| name.contains(".apng")) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(child.try_wait().unwrap().is_none(), "the movie is still drawn");
+    signal("INT", &child);
+    let before = std::time::Instant::now();
+    let ran = Ran::of(&child.wait_with_output().unwrap());
+    assert!(before.elapsed() < Duration::from_secs(5), "{:?}", before.elapsed());
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    assert_eq!(bench.names("out"), ["grass.usdc"], "all frames, and no movie");
+    assert_eq!(bench.read_json("r.json")["outputs"]["grass"]["frames"], 200);
+}
+
 #[test]
 fn the_limits_of_the_process_are_kept_too() {
     let ran = within(1_500_000, &doubled(28), "--memory 100G --threads 1");

@@ -1,4 +1,4 @@
-//! Promise: a solver's checkpoint holds its whole state. Saving and loading the state after every step changes no bit.
+//! Promise: what is saved of a state is all of it, with the inputs at its frame. Saving and loading the state after every step changes no bit.
 
 use engine::node::Cook;
 
@@ -6,7 +6,7 @@ use crate::suite::{Findings, sound};
 use crate::trial::{Outcome, Subject, Trial};
 
 pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
-    if !matches!(subject.node.cook, Cook::Solver(..)) {
+    if !matches!(subject.node.cook, Cook::Window(..) | Cook::Solver(..)) {
         return;
     }
     for (trial, outcome) in sound(tried, 6) {

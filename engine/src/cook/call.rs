@@ -26,6 +26,7 @@ pub(crate) struct Call<'a> {
     pub(crate) origin: [f64; 3],
     pub(crate) history: Option<&'a dyn History>,
     pub(crate) ceiling: Ceiling,
+    pub(crate) held: usize,
 }
 
 /// What came out of a call.
@@ -68,6 +69,7 @@ impl<'a> Call<'a> {
                 live: self.live,
                 cancel: self.cancel,
                 ceiling: self.ceiling,
+                held: self.held,
                 published: Mutex::default(),
                 masks: ConvertedMasks::default(),
             },
@@ -114,6 +116,11 @@ impl Finished<'_> {
                 Some(live) => without_dead(geometry, live, &mut stripped),
                 None => geometry.clone(),
             });
+        }
+        // Nodes that may make much have asked before. Others are noticed now.
+        if new_bytes > Ceiling::LEAST / 16 {
+            let refused = self.cx.refuse_larger(new_bytes, "takes");
+            refused.map_err(|error| error.hint("use fewer points, or raise --memory"))?;
         }
         let metrics = self.cx.published.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Returned { cooked: cooked.into(), metrics, new_bytes, stripped })

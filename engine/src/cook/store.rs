@@ -52,7 +52,12 @@ impl Store {
         if let Some(old) = self.entries.insert(key, entry) {
             self.bytes -= old.bytes;
         }
-        while self.bytes > self.budget {
+        self.make_room(self.budget);
+    }
+
+    /// Drops what was used least recently until no more than `bytes` are left.
+    pub(crate) fn make_room(&mut self, bytes: usize) {
+        while self.bytes > bytes {
             let Some(oldest) = self.entries.iter().min_by_key(|(_, entry)| entry.used).map(|(key, _)| *key) else {
                 return;
             };

@@ -1,6 +1,7 @@
 //! Checks of a loaded graph before it is cooked: incompatible params, invalid geometry, animated params that leave
 //! their range, and gaps in file sequences.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -39,8 +40,13 @@ impl Engine {
         };
         let mut faults = Vec::new();
         let mut sources = Vec::new();
+        // Nodes of one type that set no param share them.
+        let mut sound: BTreeSet<*const Source> = BTreeSet::new();
         for (index, node) in graph.nodes.iter().enumerate() {
             let Body::Node { node: declared, specs, params, .. } = &node.body else { continue };
+            if !declared.inputs.is_empty() && sound.contains(&params.as_ptr()) {
+                continue;
+            }
             let own;
             let resolver = match (plan.nodes[index].needed, needed_by) {
                 (false, None) => {
@@ -64,6 +70,9 @@ impl Engine {
                 Err(error) => Some(error),
                 Ok(params) => declared.checks.and_then(|checks| checks(&params).err()),
             };
+            if error.is_none() && faults.len() == before {
+                sound.insert(params.as_ptr());
+            }
             faults.extend(error.map(|error| fault(graph, index, error)));
             let requested = plan.nodes[index].needed || needed_by.is_none();
             if faults.len() == before && requested && declared.inputs.is_empty() && holds_data(specs, params) {

@@ -28,6 +28,9 @@ pub(super) struct Json<'a> {
 /// Depth of nested lists whose indices are kept in `items`. A vector in a keyframe has three.
 const NESTED: usize = 3;
 
+/// Members of an object up to which names are compared one by one: a node has few, a graph may have a million nodes.
+const SMALL: usize = 8;
+
 /// A member of an object.
 #[derive(Clone)]
 pub(super) struct Entry<'a> {
@@ -129,6 +132,11 @@ impl<'a> Json<'a> {
         std::iter::once(self.base.to_string()).chain(items).collect()
     }
 
+    /// The number of bytes of its path, but for indices.
+    pub(super) fn path_bytes(&self) -> usize {
+        self.base.len()
+    }
+
     /// The same value under another path.
     pub(super) fn at_path(&self, path: &str) -> Self {
         Self::with_path(self.value, self.text, path)
@@ -183,21 +191,28 @@ impl<'a> Json<'a> {
     /// If this is not an object. A duplicate key is added to `faults`, and its first value is used.
     pub(super) fn members(&self, expected: &str, faults: &mut Vec<Fault>) -> Result<Vec<Entry<'a>>, Fault> {
         let Value::Object(object) = self.value else { return Err(self.unexpected(expected)) };
+        let is_small = object.properties.len() <= SMALL;
         let mut firsts: BTreeMap<&str, usize> = BTreeMap::new();
-        let mut entries = Vec::with_capacity(object.properties.len());
+        let mut entries: Vec<Entry<'a>> = Vec::with_capacity(object.properties.len());
         let path = self.path();
         for member in &object.properties {
             let (name, key) = (member.name.as_str(), member.name.range());
             let json = Json::with_path(&member.value, self.text, &member_path(&path, name));
             let entry = Entry { name, key, json };
-            match firsts.get(name) {
+            let first = match is_small {
+                true => find(&entries, name).map(|entry| entry.key.start),
+                false => firsts.get(name).copied(),
+            };
+            match first {
                 Some(first) => {
-                    let line = self.text.position(*first).line;
+                    let line = self.text.position(first).line;
                     let fact = format!("duplicate key `{}`, first set on line {line}", shown(name));
                     faults.push(entry.fault(code::DUPLICATE_KEY, fact).hint("keep one of them"));
                 }
                 None => {
-                    firsts.insert(name, key.start);
+                    if !is_small {
+                        firsts.insert(name, key.start);
+                    }
                     entries.push(entry);
                 }
             }

@@ -52,12 +52,24 @@ pub struct Positions {
     /// Ascending by path once they are [sorted](Self::sort).
     all: Vec<FilePosition>,
     sets: Vec<Box<str>>,
+    /// The last position in the file that was recorded, and its offset.
+    last: Option<(usize, Position)>,
 }
 
 impl Positions {
+    /// With room for that many positions whose paths have that many bytes.
+    pub(super) fn with_capacity(count: usize, bytes: usize) -> Self {
+        Self { paths: String::with_capacity(bytes), all: Vec::with_capacity(count), ..Self::default() }
+    }
+
     /// Records that the value at `path` starts at byte `offset` of the text.
     pub(super) fn record(&mut self, path: &str, text: &Text<'_>, offset: usize) {
-        let Position { line, column } = text.position(offset);
+        let known = self.last.filter(|_| text.set.is_none());
+        let position = known.map_or_else(|| text.position(offset), |last| text.position_after(last, offset));
+        if text.set.is_none() {
+            self.last = Some((offset, position));
+        }
+        let Position { line, column } = position;
         let set = text.set.map_or(NO_SET, |set| {
             let known = self.sets.iter().position(|known| **known == *set);
             known.unwrap_or_else(|| {

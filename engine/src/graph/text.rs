@@ -40,9 +40,21 @@ impl<'a> Text<'a> {
     /// The position of the character that starts at byte `offset`, or of the end of the text.
     pub(super) fn position(&self, offset: usize) -> Position {
         let mark = self.marks.partition_point(|(at, _)| *at <= offset).saturating_sub(1);
-        let (start, position) = self.marks[mark];
+        self.walk(self.marks[mark], offset)
+    }
+
+    /// The position of `offset`, given one before it.
+    fn walk(&self, (start, position): (usize, Position), offset: usize) -> Position {
         let walked = positions(&self.content[start..], position);
         walked.take_while(|(at, _)| start + at <= offset).last().map_or(position, |(_, position)| position)
+    }
+
+    /// [`Text::position`] of an offset that is likely to be soon after another.
+    pub(super) fn position_after(&self, before: (usize, Position), offset: usize) -> Position {
+        match (before.0..=before.0 + STRIDE).contains(&offset) {
+            true => self.walk(before, offset),
+            false => self.position(offset),
+        }
     }
 
     /// What this text is called in messages.
@@ -132,6 +144,19 @@ mod tests {
         assert_eq!(text.position(9_000), Position { line: 1, column: 4_501 });
         assert_eq!(text.position(10_001 + 2_999), Position { line: 2, column: 3_000 });
         assert_eq!(text.position(content.len()), Position { line: 2, column: 3_001 });
+    }
+
+    #[test]
+    fn a_position_soon_after_another_is_the_same() {
+        let content = "é\r\nb\n".repeat(300);
+        let text = Text::new(&content, None);
+        let starts: Vec<usize> = content.char_indices().map(|(at, _)| at).chain([content.len()]).collect();
+        for from in starts.iter().copied().step_by(37) {
+            for offset in starts.iter().copied() {
+                let found = text.position_after((from, text.position(from)), offset);
+                assert_eq!(found, text.position(offset), "{offset} after {from}");
+            }
+        }
     }
 
     #[test]

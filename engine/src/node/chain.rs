@@ -45,6 +45,21 @@ pub trait Chain: Send + Sync + Sized + 'static {
 pub trait Solver: Chain + Serialize + DeserializeOwned {}
 impl<S: Chain + Serialize + DeserializeOwned> Solver for S {}
 
+/// A window whose state is kept on disk, so that a cook that was interrupted need not warm it up again.
+pub trait Resumable: Chain {
+    /// What the inputs at the state's frame do not give.
+    type Saved: Serialize + DeserializeOwned + Send + Sync + 'static;
+
+    /// The state without what the inputs give.
+    fn save(&self) -> Self::Saved;
+
+    /// The state that was saved at `cx.frame()`, bit for bit. It is given the same inputs as [`Chain::start`].
+    ///
+    /// # Errors
+    /// Where an input is refused.
+    fn resume(saved: Self::Saved, cx: &FrameCx) -> Result<Self>;
+}
+
 /// How far back a window depends on the past, given its params at a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Past {
@@ -72,14 +87,17 @@ pub struct ChainFns {
     pub(crate) start: fn(&FrameCx) -> Result<StateBox>,
     pub(crate) step: fn(&mut StateBox, &StepCx) -> Result<()>,
     pub(crate) output: fn(&StateBox, &FrameCx) -> Result<Outputs>,
+    /// How its state is kept on disk, where it can be.
+    pub(crate) saved: Option<SavedFns>,
 }
 
-/// What a solver needs in addition.
+/// How a state is written and read back.
 #[derive(Clone, Copy)]
-pub struct SolverFns {
+pub(crate) struct SavedFns {
     pub(crate) save: fn(&StateBox) -> Option<Vec<u8>>,
     pub(crate) load: fn(&[u8]) -> Option<StateBox>,
-    pub(crate) start_frame: fn(&Params) -> Option<i64>,
+    /// Makes what was loaded a state, from the inputs at its frame; `None`: it is one.
+    pub(crate) resume: Option<fn(StateBox, &FrameCx) -> Result<StateBox>>,
 }
 
 fn of<S: 'static>(state: &StateBox) -> &S {
@@ -98,6 +116,7 @@ impl ChainFns {
                 true => cx.node.pass_through(cx),
                 false => of::<S>(state).output(cx),
             },
+            saved: None,
         }
     }
 }
@@ -110,16 +129,27 @@ impl Cook {
         Self::Window(ChainFns::of::<S>(), past)
     }
 
+    /// A [`Cook::window`] whose state is kept on disk where warming it up again would take longer.
+    pub const fn resumable_window<S: Resumable>(past: fn(&Params, Clock) -> Past) -> Self {
+        let saved = SavedFns {
+            save: |state| postcard::to_stdvec(&of::<S>(state).save()).ok(),
+            load: |bytes| Some(Box::new(postcard::from_bytes::<S::Saved>(bytes).ok()?)),
+            resume: Some(|saved, cx| {
+                let saved = saved.downcast::<S::Saved>();
+                Ok(Box::new(S::resume(*saved.expect("a chain's functions are all made for one state type"), cx)?))
+            }),
+        };
+        Self::Window(ChainFns { saved: Some(saved), ..ChainFns::of::<S>() }, past)
+    }
+
     /// A solver: it runs through all frames from `start_frame(params)`, or the scene's first frame, whichever are
     /// requested.
     pub const fn solver<S: Solver>(start_frame: fn(&Params) -> Option<i64>) -> Self {
-        Self::Solver(
-            ChainFns::of::<S>(),
-            SolverFns {
-                save: |state| postcard::to_stdvec(of::<S>(state)).ok(),
-                load: |bytes| Some(Box::new(postcard::from_bytes::<S>(bytes).ok()?)),
-                start_frame,
-            },
-        )
+        let saved = SavedFns {
+            save: |state| postcard::to_stdvec(of::<S>(state)).ok(),
+            load: |bytes| Some(Box::new(postcard::from_bytes::<S>(bytes).ok()?)),
+            resume: None,
+        };
+        Self::Solver(ChainFns { saved: Some(saved), ..ChainFns::of::<S>() }, start_frame)
     }
 }

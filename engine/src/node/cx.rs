@@ -45,6 +45,8 @@ pub struct Cx<'a> {
     pub(crate) live: Option<&'a [Name]>,
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) ceiling: Ceiling,
+    /// Bytes of the results that a frame holds already.
+    pub(crate) held: usize,
     pub(crate) published: Mutex<Vec<(&'static str, f64)>>,
     pub(crate) masks: ConvertedMasks,
 }
@@ -115,13 +117,21 @@ impl Cx<'_> {
     /// If that is more than the cook may take; the hint says how to make less.
     pub fn reserve(&self, bytes: f64, hint: &str) -> Result<()> {
         // Saturates, and NaN is 0.
-        let bytes = (bytes as usize).saturating_add(self.input_bytes());
-        if self.ceiling.allows(bytes) {
-            return Ok(());
+        self.refuse_larger(bytes as usize, "would take").map_err(|error| error.hint(hint))
+    }
+
+    /// Refuses a result that takes more than is allowed together with the inputs, or with all results that its frame
+    /// holds.
+    pub(crate) fn refuse_larger(&self, bytes: usize, takes: &str) -> Result<()> {
+        let with = [(self.input_bytes(), "its inputs"), (self.held, "the other results of the frame")];
+        for (others, with) in with {
+            let bytes = bytes.saturating_add(others);
+            if !self.ceiling.allows(bytes) {
+                let (size, allowed) = (size_text(bytes), self.ceiling.describe());
+                return Err(Error::refused(format!("the result {takes} {size} with {with}, but {allowed}")));
+            }
         }
-        let size = size_text(bytes);
-        let fact = format!("the result would take {size} with its inputs, but {}", self.ceiling.describe());
-        Err(Error::refused(fact).hint(hint))
+        Ok(())
     }
 
     /// Bytes of all arrays that the inputs hold.

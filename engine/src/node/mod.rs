@@ -14,8 +14,8 @@ mod ports;
 use crate::geometry::{Attr, ColumnType, Geometry, Item, Name, Owner};
 use crate::param::{Clock, ParamDecl, ParamSpec, Params};
 
-pub use chain::{Chain, Past, Solver};
-pub(crate) use chain::{ChainFns, SolverFns, StateBox};
+pub use chain::{Chain, Past, Resumable, Solver};
+pub(crate) use chain::{ChainFns, SavedFns, StateBox};
 pub use curves::{CurveLoop, CurveView, Cv, MovedCurves};
 pub use cx::{Cx, FrameCx, Outputs, StepCx, point_float_hint};
 pub(crate) use cx::{History, InputData};
@@ -39,7 +39,7 @@ pub enum Cook {
     /// This frame and a number of frames before it.
     Window(ChainFns, fn(&Params, Clock) -> Past),
     /// Its own state at the previous frame.
-    Solver(ChainFns, SolverFns),
+    Solver(ChainFns, fn(&Params) -> Option<i64>),
 }
 
 impl Cook {
@@ -286,7 +286,7 @@ impl Node {
     /// Where a solver's state starts, given its params; `None` for the scene's first frame, and for nodes without one.
     pub fn start_frame(&self, params: &Params) -> Option<i64> {
         match &self.cook {
-            Cook::Solver(_, solver) => (solver.start_frame)(params),
+            Cook::Solver(_, start_frame) => start_frame(params),
             Cook::Pure(_) | Cook::Frame { .. } | Cook::Window(..) => None,
         }
     }

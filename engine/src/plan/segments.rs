@@ -94,8 +94,8 @@ pub(super) fn segment(
             let from = if anchor == first { i64::MIN } else { anchor };
             Ok(ChainSegment { start, from, until: anchor + every })
         }
-        Some(Cook::Solver(_, solver)) => {
-            let start = (solver.start_frame)(&at(first)?).unwrap_or(first);
+        Some(Cook::Solver(_, start_frame)) => {
+            let start = start_frame(&at(first)?).unwrap_or(first);
             Ok(ChainSegment { start, from: i64::MIN, until: i64::MAX })
         }
         _ => unreachable!("only windows and solvers have segments"),

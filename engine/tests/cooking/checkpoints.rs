@@ -2,10 +2,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
-use engine::cook::DiskCache;
+use engine::cook::{Delivered, DiskCache};
+use engine::geometry::Kind;
+use engine::node::{Cook, Node, Output};
 use engine::note::Note;
 use engine::param::{Source, Value};
+use engine::plan::Request;
 use engine::time::Frame;
 
 use crate::builder::{Cooked, TestGraph, engine, keyed};
@@ -290,6 +294,115 @@ fn a_change_cooks_only_what_comes_after_it() {
             assert!(asked.eq(&changed.node(id).metrics[name]), "{id}: {name}");
         }
     }
+}
+
+/// The output of [`SLOW`].
+const OUT: Output = Output::new("points", &[Kind::Points], "A point.");
+
+/// A point at x = frame, which takes 20 ms.
+static SLOW: Node = Node::new(
+    "Slow",
+    1,
+    "A point that takes its time.",
+    Cook::Frame {
+        cook: |cx| {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            Ok(OUT.with(crate::builder::row(&[cx.frame().number() as f32])))
+        },
+        reads_clock: |_| true,
+    },
+)
+.outputs(&[&OUT]);
+
+/// With a cache, frames are finished a few at a time, so that an interrupted cook has lost little.
+#[test]
+fn a_cook_with_a_cache_finishes_few_frames_at_a_time() {
+    let mut graph = TestGraph::new(1, 40);
+    graph.add("slow", &SLOW).out();
+    let most_at_once = |disk: Option<&mut DiskCache>| {
+        let mut most = 0;
+        let mut sink = |finished: &[Delivered]| -> Result<(), std::convert::Infallible> {
+            most = most.max(finished.len());
+            Ok(())
+        };
+        let cancel = AtomicBool::new(false);
+        let request = Request::everything(&graph.0);
+        let cooked = engine(2, 1 << 30).cook(&graph.0, &request, disk, &cancel, &mut sink);
+        assert_eq!(cooked.unwrap_or_else(|stop| panic!("{stop:?}")).delivered[&0], 40);
+        most
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let with = most_at_once(Some(&mut DiskCache::open(folder.path(), u64::MAX)));
+    let without = most_at_once(None);
+    assert!(with <= 6 && without > 6, "{with} with a cache, {without} without");
+}
+
+/// A window over another, both relative to a point at the scene's start.
+fn windows() -> TestGraph {
+    let mut graph = TestGraph::new(1, 60);
+    let a = graph.add("a", &SOURCE).set("amount", 2.0_f32).set("count", 50_i64).done();
+    let clock = graph.add("clock", &CLOCK).set("amount", 0.01_f32).wire("points", a).done();
+    let near = graph.add("near", &FOLLOW).set("frames", 9_i64).wire("points", clock).wire("anchor", clock).done();
+    graph.add("far", &FOLLOW).set("frames", 12_i64).wire("points", near).wire("anchor", a).out();
+    graph
+}
+
+/// Cooks `frames` with a cache that keeps whatever it may.
+fn cook_keeping(graph: &TestGraph, frames: std::ops::RangeInclusive<i64>, folder: &Path) -> Cooked {
+    let mut disk = DiskCache::open(folder, u64::MAX).keeping_all();
+    let frames: Vec<Frame> = frames.map(Frame::whole).collect();
+    graph.cook_with(&engine(2, 1 << 30), &frames, Some(&mut disk))
+}
+
+#[test]
+fn a_resumed_window_goes_on_from_where_it_stood() {
+    let graph = windows();
+    let whole = graph.cook(1..=60);
+    for until in [5, 18, 23, 24, 25, 40] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let first = cook_keeping(&graph, 1..=until, folder.path());
+        let resumed = cook_keeping(&graph, 1..=60, folder.path());
+        assert!(resumed.bits() == whole.bits(), "after frame {until}");
+        for node in ["near", "far"] {
+            // Fewer where a state or result on disk serves twice.
+            assert!(resumed.cooks(node) <= whole.cooks(node) - first.cooks(node), "{node} after frame {until}");
+        }
+    }
+}
+
+#[test]
+fn damaged_and_foreign_states_of_windows_are_ignored() {
+    let graph = windows();
+    let whole = graph.cook(1..=40).bits();
+    let damages: [fn(&Path, &[u8]); 4] = [
+        |path, _| fs::write(path, b"").expect("a file"),
+        |path, other| fs::write(path, other).expect("a file"),
+        |path, other| fs::write(path, &other[..other.len() - 1]).expect("a file"),
+        |path, _| fs::remove_file(path).expect("a file"),
+    ];
+    for damage in damages {
+        let folder = tempfile::tempdir().expect("a folder");
+        cook_keeping(&graph, 1..=23, folder.path());
+        let states = files(folder.path(), "checkpoint");
+        assert!((2..=8).contains(&states.len()), "{}", states.len());
+        let bytes: Vec<Vec<u8>> = states.iter().map(|path| fs::read(path).expect("a file")).collect();
+        for (path, other) in states.iter().zip(bytes.iter().cycle().skip(1)) {
+            damage(path, other);
+        }
+        let cooked = cook_keeping(&graph, 1..=40, folder.path());
+        assert!(cooked.bits() == whole);
+        // The last window before frame 24 starts at frame 10.
+        assert!(cooked.cooks("near") > 30, "{}", cooked.cooks("near"));
+    }
+}
+
+#[test]
+fn a_changed_window_does_not_take_the_old_state() {
+    let graph = windows();
+    let folder = tempfile::tempdir().expect("a folder");
+    cook_keeping(&graph, 1..=23, folder.path());
+    let other = graph.with("near", "rate", Source::Constant(Value::Float(0.25)));
+    assert!(cook_keeping(&other, 1..=40, folder.path()).bits() == other.cook(1..=40).bits());
 }
 
 #[test]

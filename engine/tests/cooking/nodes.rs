@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use engine::geometry::{Attr, Component, Geometry, P};
-use engine::node::{Chain, Opt, Past};
+use engine::node::{Chain, Opt, Past, Resumable};
 use engine::node::{Cook, Cx, FrameCx, Input, Many, Metric, Node, Output, Outputs, StepCx, Times};
 use engine::param::{Clock, Param, Params, Unit};
 use engine::{Error, Result, inputs, params};
@@ -382,12 +382,25 @@ impl Chain for Follow {
     }
 }
 
+impl Resumable for Follow {
+    type Saved = Vec<f32>;
+
+    fn save(&self) -> Self::Saved {
+        self.xs.clone()
+    }
+
+    fn resume(xs: Self::Saved, cx: &FrameCx) -> Result<Self> {
+        record(cx, "resume", Some(cx.frame().number()), Vec::new());
+        Ok(Self { xs, anchor: cx.at_start(ANCHOR).map_or(0.0, first_x) })
+    }
+}
+
 fn past(params: &Params, _: Clock) -> Past {
     Past { frames: params.get(FRAMES) as u32, preroll: params.get(PREROLL) as u32 }
 }
 
 /// Follows its input, by half of the distance per frame.
-const FOLLOW_NODE: Node = Node::new("Follow", 1, "Points that lag.", Cook::window::<Follow>(past))
+const FOLLOW_NODE: Node = Node::new("Follow", 1, "Points that lag.", Cook::resumable_window::<Follow>(past))
     .inputs(FOLLOW_INPUTS)
     .params(FOLLOW_PARAMS)
     .outputs(&[&OUT])

@@ -136,16 +136,24 @@ impl<W> Recorder<W> {
         Ok((store.encoder.finish(&stage)?, counts))
     }
 
-    /// Records [`layout::DEFAULT_WIDTH`] for curves that have widths at no frame. Where some frames have them, the
+    /// Records [`layout::DEFAULT_WIDTH`] for curves that have widths at no frame: once, or at every point of a part. Where some frames have them, the
     /// others have got theirs already ([`layout::absent`]).
     fn record_default_width(&mut self) -> io::Result<()> {
         let curves = self.points.iter().any(|points| points[Kind::Curves as usize].is_some());
         let width = Source::Attribute(Owner::Point, WIDTH.name.into());
-        if !curves || self.tracks.contains_key(&(Kind::Curves, width)) {
+        if !curves || self.tracks.contains_key(&(Kind::Curves, width.clone())) {
             return Ok(());
         }
         let column = Column::new(vec![layout::DEFAULT_WIDTH]);
         let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
+        if self.all_sampled {
+            // Other parts may have widths of points, and the interpolation is the same in all.
+            for points in &self.points {
+                track.record_absence(Kind::Curves, &width, points[Kind::Curves as usize], &mut self.store)?;
+            }
+            self.tracks.insert((Kind::Curves, width), track);
+            return Ok(());
+        }
         track.record(Kind::Curves, &Source::DefaultWidth, column, &mut self.store)?;
         self.tracks.insert((Kind::Curves, Source::DefaultWidth), track);
         Ok(())

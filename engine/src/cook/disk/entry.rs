@@ -116,3 +116,20 @@ fn reason(error: io::Error) -> String {
         _ => format!("it could not be read: {error}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nobody can lay a link in the place of a temporary, as nobody can know its name, and none is followed.
+    #[test]
+    fn temporaries_have_names_that_cannot_be_foreseen() {
+        let folder = tempfile::tempdir().unwrap();
+        let (key, path) = (ContentKey::of(b"a"), folder.path().join("a.frame"));
+        let names: Vec<PathBuf> = (0..2).map(|_| temporary(&path)).collect();
+        assert_ne!(names[0], names[1]);
+        write(&path, key, b"bytes").unwrap();
+        assert_eq!(read(&path, key), Ok(Some(b"bytes".to_vec())));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary stays");
+    }
+}

@@ -1,4 +1,4 @@
-//! The cache on disk: checkpoints of solvers, finished frames of outputs and results of nodes, so that a killed cook
+//! The cache on disk: states of solvers and windows, finished frames of outputs and results of nodes, so that a killed cook
 //! resumes and a changed graph cooks only what changed.
 //!
 //! Several processes and versions share a cache folder: each version owns one subfolder (`folder`). An entry is written
@@ -19,14 +19,40 @@ use super::store::Cooked;
 use crate::geometry::Geometry;
 use crate::key::ContentKey;
 
-/// Which checkpoints of a solver stay: the last two, and those of every eighth frame.
-const EVERY: i64 = 8;
+/// Whose state a checkpoint holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum StateOf {
+    /// The last two stay, and those of every eighth frame: later frames need the state at an earlier one.
+    Solver,
+    /// The last two of both states that run side by side stay: any other frame has a window of its own.
+    Window,
+}
+
+impl StateOf {
+    fn last_staying(self) -> usize {
+        match self {
+            Self::Solver => 2,
+            Self::Window => 4,
+        }
+    }
+
+    fn stays(self, frame: i64) -> bool {
+        self == Self::Solver && frame % 8 == 0
+    }
+}
 
 /// Nanoseconds of cooking that make a byte of a result worth keeping: twice what writing and reading it takes.
 const COST_PER_BYTE: u32 = 2;
 
+/// Nanoseconds that reading a byte of a result takes.
+const READ_PER_BYTE: u32 = 1;
+
 /// What a result must take at least to be kept: an entry is a file.
 const LEAST_COST: Duration = Duration::from_millis(1);
+
+/// How much more warming a window up again must take than a result to be worth saving its state: it is needed only where
+/// a cook is interrupted, and the next one replaces it.
+const STATE_COST: u32 = 4;
 
 /// A folder with checkpoints, finished frames and results.
 pub struct DiskCache {
@@ -36,7 +62,7 @@ pub struct DiskCache {
     /// Checkpoints that were there when it was opened, and those saved since.
     checkpoints: BTreeSet<ContentKey>,
     /// Recent checkpoints of each node, oldest first.
-    recent: BTreeMap<String, Vec<(i64, PathBuf)>>,
+    recent: BTreeMap<(String, StateOf), Vec<(i64, PathBuf)>>,
     /// Whether there is a folder to read from.
     is_there: bool,
     /// Whether it could not be written: nothing more is kept then, but what is there is still taken.
@@ -164,23 +190,23 @@ impl DiskCache {
         self.checkpoints.contains(&key)
     }
 
-    /// The state a solver was saved in under that key.
-    pub(crate) fn checkpoint(&mut self, node: &str, frame: i64, key: ContentKey) -> Option<Vec<u8>> {
+    /// The state a node was saved in under that key.
+    pub(crate) fn checkpoint(&mut self, of: (&str, StateOf), frame: i64, key: ContentKey) -> Option<Vec<u8>> {
         let state = self.read(CHECKPOINT, key)?;
-        self.note_checkpoint(node, frame, key);
+        self.note_checkpoint(of, frame, key);
         Some(state)
     }
 
-    /// Saves a solver's state.
-    pub(crate) fn save_checkpoint(&mut self, node: &str, frame: i64, key: ContentKey, state: &[u8]) {
+    /// Saves a node's state.
+    pub(crate) fn save_checkpoint(&mut self, of: (&str, StateOf), frame: i64, key: ContentKey, state: &[u8]) {
         self.keep(|cache| cache.write(CHECKPOINT, key, state));
         self.checkpoints.insert(key);
-        self.note_checkpoint(node, frame, key);
+        self.note_checkpoint(of, frame, key);
     }
 
-    fn note_checkpoint(&mut self, node: &str, frame: i64, key: ContentKey) {
+    fn note_checkpoint(&mut self, (node, of): (&str, StateOf), frame: i64, key: ContentKey) {
         let path = self.folder.entry(CHECKPOINT, key);
-        let recent = self.recent.entry(node.to_owned()).or_default();
+        let recent = self.recent.entry((node.to_owned(), of)).or_default();
         recent.retain(|(_, known)| *known != path);
         recent.push((frame, path));
     }
@@ -189,8 +215,9 @@ impl DiskCache {
     /// is killed resumes from an earlier one.
     pub(crate) fn prune_checkpoints(&mut self) {
         let mut old = Vec::new();
-        for recent in self.recent.values_mut() {
-            old.extend(recent.drain(..recent.len().saturating_sub(2)).filter(|(frame, _)| frame % EVERY != 0));
+        for ((_, of), recent) in &mut self.recent {
+            let before_last = recent.len().saturating_sub(of.last_staying());
+            old.extend(recent.drain(..before_last).filter(|(frame, _)| !of.stays(*frame)));
         }
         self.keep(|_| old.iter().try_for_each(|(_, path)| remove_if_there(path)));
     }
@@ -198,6 +225,16 @@ impl DiskCache {
     /// Whether a result of `bytes` that takes `cost` to make is worth its place.
     pub(crate) fn is_worth(&self, cost: Duration, bytes: usize) -> bool {
         self.keeps_all || cost > Duration::from_nanos(bytes as u64) * COST_PER_BYTE + LEAST_COST
+    }
+
+    /// Whether a state of `bytes` that takes `cost` to move to where it is again is worth its place.
+    pub(crate) fn is_worth_state(&self, cost: Duration, bytes: usize) -> bool {
+        self.is_worth(cost / STATE_COST, bytes)
+    }
+
+    /// About what it takes to read a result of `bytes`.
+    pub(crate) fn read_in(bytes: usize) -> Duration {
+        Duration::from_nanos(bytes as u64) * READ_PER_BYTE
     }
 
     /// A result of a node, and the metrics that were kept with it.
@@ -283,10 +320,12 @@ mod tests {
         let mut cache = DiskCache::open(folder.path(), u64::MAX);
         let key = |frame: i64| ContentKey::of(&frame.to_le_bytes());
         for frame in 1..=20 {
-            cache.save_checkpoint("body", frame, key(frame), &[1, 2, 3]);
+            cache.save_checkpoint(("body", StateOf::Solver), frame, key(frame), &[1, 2, 3]);
         }
         let staying = |cache: &mut DiskCache| -> Vec<i64> {
-            (1..=20).filter(|frame| cache.checkpoint("body", *frame, key(*frame)).is_some()).collect()
+            (1..=20)
+                .filter(|frame| cache.checkpoint(("body", StateOf::Solver), *frame, key(*frame)).is_some())
+                .collect()
         };
         assert_eq!(staying(&mut cache).len(), 20, "until their frames are finished");
         cache.prune_checkpoints();
@@ -294,11 +333,30 @@ mod tests {
     }
 
     #[test]
+    fn the_last_four_states_of_a_window_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cache = DiskCache::open(folder.path(), u64::MAX);
+        let key = |frame: i64| ContentKey::of(&frame.to_le_bytes());
+        for frame in 1..=20 {
+            cache.save_checkpoint(("swing", StateOf::Window), frame, key(frame), &[1, 2, 3]);
+        }
+        cache.prune_checkpoints();
+        let cache = DiskCache::open(folder.path(), u64::MAX);
+        let staying: Vec<i64> = (1..=20).filter(|frame| cache.has_checkpoint(key(*frame))).collect();
+        assert_eq!(staying, [17, 18, 19, 20]);
+    }
+
+    #[test]
     fn a_limit_removes_the_oldest() {
         let folder = tempfile::tempdir().unwrap();
         let mut cache = DiskCache::open(folder.path(), 3 * 164);
         for frame in 0..10_i64 {
-            cache.save_checkpoint("body", frame * 8, ContentKey::of(&frame.to_le_bytes()), &[0; 100]);
+            cache.save_checkpoint(
+                ("body", StateOf::Solver),
+                frame * 8,
+                ContentKey::of(&frame.to_le_bytes()),
+                &[0; 100],
+            );
         }
         let left = cache.folder.entries().unwrap();
         assert!(left.len() <= 3 && !left.is_empty(), "{}", left.len());
@@ -313,7 +371,7 @@ mod tests {
         fs::rename(&place, folder.path().join("gone")).unwrap();
         for key in [b"b", b"c"] {
             cache.save_frame(ContentKey::of(key), &sample(), &[]);
-            cache.save_checkpoint("body", 1, ContentKey::of(key), &[1]);
+            cache.save_checkpoint(("body", StateOf::Solver), 1, ContentKey::of(key), &[1]);
         }
         assert_eq!(cache.notes().len(), 1, "{:?}", cache.notes());
         assert!(cache.notes()[0].contains("could not be written"), "{:?}", cache.notes());

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::demand::{Advance, Arrival, ChainFrame, NodeDemand};
+use super::demand::{Advance, Arrival, ChainFrame, NodeDemand, ReadsOrError};
 use super::{ChainState, Outcome, Sweep};
 use crate::error::CookError;
-use crate::node::{ChainFns, FrameCx, Node, SolverFns, StateBox};
+use crate::node::{ChainFns, FrameCx, Node, SavedFns, StateBox};
 use crate::plan::{ChainSegment, OutputFrames, Reads};
 use crate::time::Frame;
 
@@ -16,8 +16,6 @@ struct ChainNode {
     index: usize,
     declared: &'static Node,
     chain: ChainFns,
-    /// What a solver has besides.
-    solver: Option<SolverFns>,
 }
 
 impl<'g> Sweep<'_, 'g, '_> {
@@ -27,10 +25,9 @@ impl<'g> Sweep<'_, 'g, '_> {
         index: usize,
         declared: &'static Node,
         chain: ChainFns,
-        solver: Option<SolverFns>,
         demand: NodeDemand<'g>,
     ) {
-        let node = ChainNode { index, declared, chain, solver };
+        let node = ChainNode { index, declared, chain };
         for (segment, advance) in demand.segments {
             self.advance(node, segment, advance);
         }
@@ -46,11 +43,12 @@ impl<'g> Sweep<'_, 'g, '_> {
             if self.cancelled() {
                 return;
             }
-            if let Some(arrival) = arrival {
-                let arrived = self.arrive(node, frame, arrival, state.take().map(|(_, state)| state));
-                self.count_call(node.index, Frame::whole(frame), arrived.as_ref().err());
-                let arrived = arrived.and_then(|state| self.carry_on(node, frame, state));
-                self.save_state(node, segment, frame, arrived.as_ref().ok());
+            if let Some((arrival, reads)) = arrival {
+                let arrived = self.arrive(node, frame, (arrival, reads), state.take().map(|(_, state)| state));
+                if arrival != Arrival::Resume {
+                    self.count_call(node.index, Frame::whole(frame), arrived.as_ref().err());
+                    self.save_solver(node, segment, frame, arrived.as_ref().ok());
+                }
                 state = Some((frame, arrived));
             }
             if let (Some(reads), Some((_, state))) = (output, &state) {
@@ -60,7 +58,7 @@ impl<'g> Sweep<'_, 'g, '_> {
         }
         if let Some((at, state)) = state.filter(|(at, _)| at + 1 < segment.until) {
             let moved = self.slices;
-            self.nodes[node.index].states.insert(segment, ChainState { at, state, moved });
+            self.nodes[node.index].states.insert(segment, ChainState { at, state, moved, is_saved: false });
         }
     }
 
@@ -69,33 +67,35 @@ impl<'g> Sweep<'_, 'g, '_> {
         &mut self,
         node: ChainNode,
         frame: i64,
-        arrival: Arrival<'g>,
+        (arrival, reads): (Arrival, ReadsOrError<'g>),
         before: Option<Result<StateBox, Arc<CookError>>>,
     ) -> Result<StateBox, Arc<CookError>> {
         let at = Frame::whole(frame);
         let before = before.transpose()?;
-        let (Arrival::Start(reads) | Arrival::Step(reads)) = arrival;
         let call = self.prepare(node.index, node.declared, at, &reads?)?;
-        let arrived = match before {
-            None => self.executor.start(call, node.chain),
-            Some(mut state) => self.executor.step(call, node.chain, &mut state).map(|metrics| (state, metrics)),
+        let arrived = match (before, node.chain.saved) {
+            (None, _) => self.executor.start(call, node.chain),
+            (Some(state), Some(saved)) if arrival == Arrival::Resume => {
+                self.executor.resume(call, saved, state).map(|state| (state, Vec::new()))
+            }
+            (Some(mut state), _) => self.executor.step(call, node.chain, &mut state).map(|metrics| (state, metrics)),
         };
+        // What is resumed is not written again, and a window that has just started need not be.
+        let reloads = |saved: &SavedFns| arrival == Arrival::Step || saved.resume.is_none();
+        let saved = node.chain.saved.filter(reloads);
+        let arrived = arrived.and_then(|(state, metrics)| Ok((self.executor.reloaded(state, saved)?, metrics)));
         let (state, metrics) = arrived.map_err(|error| Arc::new(self.plan.error(node.index, at, error)))?;
         self.publish(node.index, at, &metrics);
         Ok(state)
     }
 
-    fn carry_on(&self, node: ChainNode, frame: i64, state: StateBox) -> Result<StateBox, Arc<CookError>> {
-        let carried = self.executor.carried_on(state, node.solver);
-        carried.map_err(|error| Arc::new(self.plan.error(node.index, Frame::whole(frame), error)))
-    }
-
-    fn save_state(&mut self, node: ChainNode, segment: ChainSegment, frame: i64, state: Option<&StateBox>) {
-        let (Some(solver), Some(state)) = (node.solver, state) else { return };
-        let Some(disk) = self.disk.as_mut() else { return };
-        let Ok(key) = self.keys.state_key(node.index, segment, frame) else { return };
-        if let Some(bytes) = (solver.save)(state) {
-            disk.save_checkpoint(&self.plan.graph.nodes[node.index].id, frame, key, &bytes);
+    /// Saves a solver's state: without it all frames before would be cooked again.
+    fn save_solver(&mut self, node: ChainNode, segment: ChainSegment, frame: i64, state: Option<&StateBox>) {
+        let Some(saved) = node.chain.saved.filter(|saved| saved.resume.is_none() && self.disk.is_some()) else {
+            return;
+        };
+        if let Some(bytes) = state.and_then(|state| (saved.save)(state)) {
+            self.save_state(node.index, segment, frame, saved, &bytes);
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::warm_up::WarmUp;
-use super::{ChainState, MOST_CHAIN_FRAMES, Sweep};
+use super::{MOST_CHAIN_FRAMES, Sweep};
 use crate::error::CookError;
 use crate::node::Cook;
 use crate::plan::{ChainSegment, Moment, Read, Reads};
@@ -23,6 +23,12 @@ impl NodeDemand<'_> {
     pub(super) fn is_empty(&self) -> bool {
         self.frames.is_empty() && self.segments.is_empty()
     }
+
+    /// How many frames its states pass.
+    pub(super) fn frames_moved(&self) -> usize {
+        let moved = |advance: &Advance<'_>| advance.frames.iter().filter(|frame| frame.arrival.is_some()).count();
+        self.segments.values().map(moved).max().unwrap_or(0)
+    }
 }
 
 /// What a slice needs of one state.
@@ -39,23 +45,26 @@ pub(super) struct Advance<'g> {
 }
 
 /// Reads of a moment, or the error of a param that is refused then.
-type ReadsOrError<'g> = Result<Reads<'g>, Arc<CookError>>;
+pub(super) type ReadsOrError<'g> = Result<Reads<'g>, Arc<CookError>>;
 
 /// What a state does at one whole frame.
 pub(super) struct ChainFrame<'g> {
     pub(super) frame: i64,
-    /// How the state gets here; `None`: it stands here already.
-    pub(super) arrival: Option<Arrival<'g>>,
+    /// How the state gets here, and what is read for that; `None`: it stands here already.
+    pub(super) arrival: Option<(Arrival, ReadsOrError<'g>)>,
     /// What its output reads, where that is needed.
     pub(super) output: Option<ReadsOrError<'g>>,
 }
 
 /// How a state gets to a frame.
-pub(super) enum Arrival<'g> {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrival {
     /// It starts there.
-    Start(ReadsOrError<'g>),
+    Start,
+    /// It was saved there, and is given its inputs.
+    Resume,
     /// It moves there from the frame before.
-    Step(ReadsOrError<'g>),
+    Step,
 }
 
 /// How far ahead the inputs of a chain that is far behind are demanded.
@@ -149,22 +158,34 @@ impl<'g> Sweep<'_, 'g, '_> {
                 Lookahead::Whole => advance.goal,
                 Lookahead::Near => advance.goal.min(next.saturating_add(MOST_CHAIN_FRAMES)),
             };
-            let stands_at = advance.from.filter(|at| advance.outputs.contains(at));
+            let is_saved = self.nodes[node].states.get(segment).is_some_and(|state| state.is_saved);
+            let stands_at = advance.from.filter(|at| is_saved || advance.outputs.contains(at));
             for frame in stands_at.into_iter().chain(next..=last) {
-                let arrival = match frame {
-                    _ if frame < next => None,
-                    _ if frame == segment.start => Some(Arrival::Start(plan.reads(node, Moment::ChainStart(frame)))),
-                    _ => Some(Arrival::Step(plan.reads(node, Moment::ChainStep(frame)))),
+                let arrivals: &[Arrival] = match frame {
+                    _ if frame < next && is_saved => &[Arrival::Resume],
+                    _ if frame < next => &[],
+                    _ if frame == segment.start => &[Arrival::Start],
+                    _ if self.reloads_windows(node) => &[Arrival::Step, Arrival::Resume],
+                    _ => &[Arrival::Step],
                 };
-                if let Some(Arrival::Start(Ok(reads)) | Arrival::Step(Ok(reads))) = &arrival {
-                    self.demand_reads(demand, reads);
+                for arrival in arrivals {
+                    let moment = match arrival {
+                        Arrival::Start | Arrival::Resume => Moment::ChainStart(frame),
+                        Arrival::Step => Moment::ChainStep(frame),
+                    };
+                    let reads = plan.reads(node, moment);
+                    if let Ok(reads) = &reads {
+                        self.demand_reads(demand, reads);
+                    }
+                    advance.frames.push(ChainFrame { frame, arrival: Some((*arrival, reads)), output: None });
                 }
-                let needed = advance.outputs.contains(&frame);
-                let output = needed.then(|| plan.reads(node, Moment::ChainOutput(Frame::whole(frame))));
-                if let Some(Ok(reads)) = &output {
-                    self.demand_reads(demand, reads);
+                if advance.outputs.contains(&frame) {
+                    let reads = plan.reads(node, Moment::ChainOutput(Frame::whole(frame)));
+                    if let Ok(reads) = &reads {
+                        self.demand_reads(demand, reads);
+                    }
+                    advance.frames.push(ChainFrame { frame, arrival: None, output: Some(reads) });
                 }
-                advance.frames.push(ChainFrame { frame, arrival, output });
             }
         }
     }
@@ -183,6 +204,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             && segment.start <= high
             && self.is_asked_later(node, segment)
         {
+            self.find_state_at(node, segment, low - 1);
             let from = self.nodes[node].states.get(&segment).map(|state| state.at);
             if (low..=high).contains(&next(segment, from)) {
                 segments.insert(segment, Advance { goal: high, from, ..Advance::default() });
@@ -200,33 +222,5 @@ impl<'g> Sweep<'_, 'g, '_> {
             from => frames.at_or_after(Frame::whole(from)),
         };
         first.is_some_and(|frame| self.plan.nodes[node].feeds_chain || frame.floor_number() < segment.until)
-    }
-
-    /// Provides a state at `frame` or before, if there is one: that of an earlier slice, or a checkpoint.
-    fn find_state(&mut self, node: usize, segment: ChainSegment, frame: i64) {
-        if self.nodes[node].states.get(&segment).is_some_and(|state| state.at <= frame) {
-            return;
-        }
-        self.nodes[node].states.remove(&segment);
-        let Some(Cook::Solver(_, solver)) = self.plan.graph.nodes[node].node().map(|node| node.cook) else { return };
-        let Some(disk) = self.disk.as_mut().filter(|disk| disk.has_checkpoints()) else { return };
-        let id = &self.plan.graph.nodes[node].id;
-        // Keys are found from the start on, and the latest state is the one to go on from.
-        let mut saved = Vec::new();
-        for at in segment.start..=frame {
-            let Ok(key) = self.keys.state_key(node, segment, at) else { break };
-            if disk.has_checkpoint(key) {
-                saved.push((at, key));
-            }
-        }
-        for (at, key) in saved.into_iter().rev() {
-            let state = disk.checkpoint(id, at, key).and_then(|bytes| (solver.load)(&bytes));
-            if let Some(state) = state {
-                let run = &mut self.nodes[node];
-                run.report.from_cache += 1;
-                run.states.insert(segment, ChainState { at, state: Ok(state), moved: self.slices });
-                return;
-            }
-        }
     }
 }

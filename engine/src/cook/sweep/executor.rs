@@ -8,7 +8,7 @@ use crate::cook::store::{Cooked, Metrics};
 use crate::cook::types::completed;
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
-use crate::node::{ChainFns, FrameCx, Outputs, RestoreBetween, SolverFns, StateBox};
+use crate::node::{ChainFns, FrameCx, Outputs, RestoreBetween, SavedFns, StateBox};
 use crate::time::Frame;
 
 /// How a sweep carries out calls.
@@ -22,7 +22,7 @@ pub(in crate::cook) enum Executor {
     Types,
     /// Calls no node: every result is empty, and nothing is delivered.
     Rehearsal,
-    /// Calls nodes, and serialises and reads back the state of every solver after each step.
+    /// Calls nodes, and serialises and reads back every state that can be saved after each step.
     Reload,
 }
 
@@ -83,12 +83,25 @@ impl Executor {
         Ok(call.step(|cx| (chain.step)(state, cx))?.metrics())
     }
 
-    /// The state that later steps go on from.
-    pub(super) fn carried_on(self, state: StateBox, solver: Option<SolverFns>) -> Result<StateBox> {
-        match solver.filter(|_| self == Self::Reload) {
+    /// Makes what was loaded a state.
+    pub(super) fn resume(self, call: Call<'_>, saved: SavedFns, state: StateBox) -> Result<StateBox> {
+        match saved.resume {
+            Some(resume) => Ok(call.run(|cx| resume(state, cx))?.0),
             None => Ok(state),
-            Some(solver) => (solver.save)(&state)
-                .and_then(|bytes| (solver.load)(&bytes))
+        }
+    }
+
+    /// Whether every state is written and read back after each step.
+    pub(super) fn reloads(self) -> bool {
+        self == Self::Reload
+    }
+
+    /// A state written and read back, where this executor does so; a window's is then to be resumed.
+    pub(super) fn reloaded(self, state: StateBox, saved: Option<SavedFns>) -> Result<StateBox> {
+        match saved.filter(|_| self.reloads()) {
+            None => Ok(state),
+            Some(saved) => (saved.save)(&state)
+                .and_then(|bytes| (saved.load)(&bytes))
                 .ok_or_else(|| Error::contract("its state cannot be written and read back")),
         }
     }

@@ -2,9 +2,14 @@
 
 use super::Sweep;
 use crate::cook::disk::KeptMetric;
+use crate::graph::Body;
 use crate::key::ContentKey;
 use crate::note::Note;
 use crate::time::Frame;
+
+/// What the name of a kept number begins with that says whether the mask of a param is 0; its index follows. No metric has
+/// a blank in its name.
+const ZERO_MASK: &str = "zero mask ";
 
 impl Sweep<'_, '_, '_> {
     /// Adds what a node published at a frame to the report. What is not a number that a file can hold is left out, and a
@@ -30,12 +35,28 @@ impl Sweep<'_, '_, '_> {
         metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
     }
 
+    /// Whether there is anything to keep with a node's results: metrics, or where its masks are 0.
+    pub(super) fn measures(&self, node: usize) -> bool {
+        let node = &self.plan.graph.nodes[node];
+        let is_masked = || matches!(&node.body, Body::Node { params, .. } if params.iter().any(|p| p.mask().is_some()));
+        node.node().is_some_and(|declared| !declared.metrics.is_empty()) || is_masked()
+    }
+
+    /// What is kept with a result of a node: its metrics, and which of its masks are 0.
+    pub(super) fn kept_of(&self, node: usize, frame: Frame, key: ContentKey) -> impl Iterator<Item = KeptMetric> {
+        let metrics = self.published(node, frame).into_iter().map(|(name, value)| (name.to_owned(), value));
+        let masks = self.nodes[node].zero_masks.iter();
+        let masks = masks.filter_map(|(param, frames)| Some((format!("{ZERO_MASK}{param}"), *frames.get(&frame)?)));
+        let masks: Vec<_> = masks.collect();
+        metrics.chain(masks).map(move |(name, value)| (key, name, value))
+    }
+
     /// The results that went into a finished frame and have metrics: node, frame, key.
     fn measured(&mut self, output: usize, frame: Frame) -> Vec<(usize, Frame, ContentKey)> {
         let plan = self.plan;
         let mut found = Vec::new();
         for node in plan.ancestors(plan.graph.outputs[output].from.node) {
-            if plan.graph.nodes[node].node().is_none_or(|declared| declared.metrics.is_empty()) {
+            if !self.measures(node) {
                 continue;
             }
             for at in plan.measured_frames(node, output, frame) {
@@ -48,10 +69,7 @@ impl Sweep<'_, '_, '_> {
     /// The metrics to keep with a finished frame.
     pub(super) fn metrics_to_keep(&mut self, output: usize, frame: Frame) -> Vec<KeptMetric> {
         let measured = self.measured(output, frame).into_iter();
-        let of = |(node, at, key): (usize, Frame, ContentKey)| {
-            self.published(node, at).into_iter().map(move |(name, value)| (key, name.to_owned(), value))
-        };
-        measured.flat_map(of).collect()
+        measured.flat_map(|(node, at, key)| self.kept_of(node, at, key)).collect()
     }
 
     /// Publishes what was kept with a finished frame.
@@ -64,8 +82,13 @@ impl Sweep<'_, '_, '_> {
     /// Publishes those of the kept metrics that belong to one result.
     pub(super) fn publish_of_key(&mut self, node: usize, at: Frame, key: ContentKey, kept: &[KeptMetric]) {
         let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
-        let of_key = kept.iter().filter(|(of, _, _)| *of == key);
-        let metrics: Vec<(&'static str, f64)> = of_key
+        let of_key = || kept.iter().filter(|(of, _, _)| *of == key);
+        for (_, name, value) in of_key() {
+            if let Some(param) = name.strip_prefix(ZERO_MASK).and_then(|param| param.parse().ok()) {
+                self.nodes[node].zero_masks.entry(param).or_default().insert(at, *value);
+            }
+        }
+        let metrics: Vec<(&'static str, f64)> = of_key()
             .filter_map(|(_, name, value)| Some((declared.iter().find(|metric| metric.name == name)?.name, *value)))
             .collect();
         self.publish(node, at, &metrics);

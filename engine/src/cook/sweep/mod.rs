@@ -11,6 +11,7 @@ mod nodes;
 mod notes;
 mod results;
 mod retention;
+mod states;
 mod warm_up;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +34,8 @@ use crate::plan::{ChainSegment, Integrals, Keys, Plan, Read};
 use crate::time::Frame;
 use demand::Lookahead;
 pub(super) use executor::Executor;
-use notes::Observed;
+use notes::{Observed, ZeroMasks};
+use results::OnDisk;
 
 /// A result, or the error that spoiled it.
 type Outcome = Result<Cooked, Arc<CookError>>;
@@ -51,6 +53,9 @@ const MOST_FRAMES: usize = 16;
 /// are finished together. Without one nothing would be gained, and frames that share half a frame cook it twice.
 const SLICE_TIME: Duration = Duration::from_millis(250);
 
+/// The share of the time spent so far, one part in this, that a slice should take at most where there is a disk cache.
+const SLICE_SHARE: u32 = 16;
+
 /// Bytes of results a slice should hold: a few times a core's cache, so that a node finds its input there.
 const SLICE_BYTES: usize = 16 << 20;
 
@@ -60,6 +65,8 @@ struct ChainState {
     state: Result<StateBox, Arc<CookError>>,
     /// The slice that moved it last.
     moved: u64,
+    /// Whether it is as it was read from disk, to be given its inputs.
+    is_saved: bool,
 }
 
 /// What a sweep holds of one node.
@@ -73,16 +80,12 @@ struct NodeRun<'p> {
     /// Outputs of a window or solver at the last whole frames, which samples between frames read again.
     recent: BTreeMap<i64, Outcome>,
     integrals: Option<Integrals<'p>>,
-    /// The result that was read from disk last, with which the next one shares what has not changed.
-    loaded: Option<Cooked>,
-    /// Whether its results are worth keeping on disk.
-    is_kept: bool,
+    on_disk: OnDisk,
     /// Mean wall time of a call in the last slice.
     call_time: Duration,
-    /// What it takes to make a result again from what the disk cache holds.
-    recreated_in: Duration,
     /// Key of the result that is kept because later frames may have the same.
     held: Option<ContentKey>,
+    zero_masks: ZeroMasks,
     /// Metrics that were not finite at some frame.
     left_out_metrics: BTreeSet<&'static str>,
     report: NodeReport,
@@ -104,6 +107,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     observed: Observed,
     /// Bytes of all results of the slice.
     live_bytes: usize,
+    /// Most frames of the slice that a node cooks.
+    slice_frames: usize,
     /// Most bytes that one frame of a slice took.
     frame_bytes: usize,
     /// Time that a frame of the last slice took; `None` before one was cooked.
@@ -121,11 +126,10 @@ impl<'p> NodeRun<'p> {
             states: BTreeMap::new(),
             recent: BTreeMap::new(),
             integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
-            loaded: None,
-            is_kept: false,
+            on_disk: OnDisk::default(),
             call_time: Duration::MAX,
-            recreated_in: Duration::ZERO,
             held: None,
+            zero_masks: ZeroMasks::new(),
             left_out_metrics: BTreeSet::new(),
             report: NodeReport {
                 id: Some(node.id.clone()),
@@ -163,6 +167,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             own: BTreeSet::new(),
             observed: Observed::of(plan),
             live_bytes: 0,
+            slice_frames: 0,
             frame_bytes: 0,
             frame_time: None,
             report: Report { notes: plan.graph.notes.clone(), ..Report::default() },
@@ -215,7 +220,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// As many frames as fit the cache, and the memory asked for.
+    /// As many frames as fit a core's cache, and the memory asked for.
     fn slice_length(&self) -> usize {
         if !self.executor.delivers() {
             return MOST_FRAMES;
@@ -230,7 +235,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let in_time = match (&self.disk, self.frame_time) {
             (None, _) => usize::MAX,
             (Some(_), None) => 0,
-            (Some(_), Some(time)) => (SLICE_TIME.as_nanos() / time.as_nanos().max(1)) as usize,
+            (Some(_), Some(time)) => {
+                let most = SLICE_TIME.min(self.report.cooking / SLICE_SHARE);
+                (most.as_nanos() / time.as_nanos().max(1)) as usize
+            }
         };
         (SLICE_BYTES / bytes).min(in_time).clamp(threads.min(most), most)
     }

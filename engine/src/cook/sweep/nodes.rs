@@ -29,6 +29,7 @@ impl<'g> Sweep<'_, 'g, '_> {
         for target in targets {
             readers_left[target.node] += 1;
         }
+        self.slice_frames = demand.iter().map(|demand| demand.frames.len()).max().unwrap_or(0);
         let mut peak = 0;
         for (node, demand) in demand.into_iter().enumerate().filter(|(node, _)| plan.nodes[*node].needed) {
             if self.cancelled() {
@@ -36,14 +37,15 @@ impl<'g> Sweep<'_, 'g, '_> {
             }
             if !demand.is_empty() {
                 let watch = Stopwatch::start();
-                let frames = demand.frames.clone();
+                let (frames, moved) = (demand.frames.clone(), demand.frames_moved());
                 self.cook_node(node, demand);
+                self.record_masks(node, &frames);
+                self.save_window_states(node, moved, watch.wall());
                 self.save_results(node, &frames, watch.wall());
                 let report = &mut self.nodes[node].report;
                 report.wall += watch.wall();
                 report.cpu += watch.cpu();
                 self.note_misread(node);
-                self.record_masks(node);
             }
             self.keep(node);
             peak = peak.max(self.live_bytes);
@@ -76,8 +78,8 @@ impl<'g> Sweep<'_, 'g, '_> {
             Cook::Pure(_) | Cook::Frame { .. } => {
                 self.cook_frames(node, declared, &demand.frames, |cx| declared.cook_frame(cx));
             }
-            Cook::Window(chain, _) => self.cook_chain(node, declared, chain, None, demand),
-            Cook::Solver(chain, solver) => self.cook_chain(node, declared, chain, Some(solver), demand),
+            Cook::Window(chain, _) => self.cook_chain(node, declared, chain, demand),
+            Cook::Solver(chain, _) => self.cook_chain(node, declared, chain, demand),
         }
     }
 
@@ -142,6 +144,8 @@ impl<'g> Sweep<'_, 'g, '_> {
         run.report.peak_bytes = run.report.peak_bytes.max(returned.new_bytes);
         run.bytes += returned.new_bytes;
         self.live_bytes += returned.new_bytes;
+        let room = self.engine.memory.saturating_sub(self.live_bytes);
+        self.engine.store(|store| store.make_room(room));
         self.publish(node, frame, &returned.metrics);
         self.observed.unused.extend(returned.stripped);
         Ok(returned.cooked)
@@ -195,6 +199,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             origin: scene.origin,
             history: self.nodes[node].integrals.as_ref().map(|integrals| integrals as &dyn History),
             ceiling: self.engine.ceiling,
+            held: self.live_bytes / self.slice_frames.max(1),
         })
     }
 

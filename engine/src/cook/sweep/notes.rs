@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Sweep;
 use crate::cook::{Delivered, warnings};
 use crate::expr::suggest::nearest;
-use crate::geometry::{Name, Owner, P, V};
+use crate::geometry::{Component, Geometry, Name, Owner, P, V};
 use crate::graph::Body;
 use crate::node::Needs;
 use crate::note::{Note, kind};
@@ -22,13 +22,12 @@ pub(super) struct Observed {
     missing: BTreeMap<usize, BTreeSet<Name>>,
     /// Names of attributes that were made and are used nowhere.
     pub(super) unused: BTreeSet<Name>,
-    /// By output: frames without geometry, as long as there is no other.
-    empty: BTreeMap<usize, Vec<Frame>>,
-    /// By node and param: frames at which its mask is 0 everywhere, as long as there is no other.
-    zero_masks: BTreeMap<(usize, usize), Vec<Frame>>,
-    /// Outputs and masks that are not always empty.
-    filled: (BTreeSet<usize>, BTreeSet<(usize, usize)>),
+    /// By output: frames without geometry; `None` once there was one with geometry.
+    empty: BTreeMap<usize, Option<Vec<Frame>>>,
 }
+
+/// At which frames the masks of a node are 0 everywhere, by the index of their params: 1 there, 0 elsewhere.
+pub(super) type ZeroMasks = BTreeMap<usize, BTreeMap<Frame, f64>>;
 
 impl Observed {
     pub(super) fn of(plan: &Plan<'_>) -> Self {
@@ -42,8 +41,6 @@ impl Observed {
             missing: plan.request.outputs.iter().map(names).collect(),
             unused: BTreeSet::new(),
             empty: BTreeMap::new(),
-            zero_masks: BTreeMap::new(),
-            filled: (BTreeSet::new(), BTreeSet::new()),
         }
     }
 
@@ -51,7 +48,12 @@ impl Observed {
     pub(super) fn record(&mut self, delivered: &Delivered) {
         let Delivered { output, frame, geometry } = delivered;
         let is_empty = geometry.parts().all(|part| part.table(Owner::Point).rows() == 0) && geometry.volume().is_none();
-        observe(&mut self.empty, &mut self.filled.0, *output, *frame, is_empty);
+        let empty = self.empty.entry(*output).or_insert_with(|| Some(Vec::new()));
+        match empty {
+            Some(frames) if is_empty => frames.push(*frame),
+            _ if is_empty => {}
+            empty => *empty = None,
+        }
         let Some(missing) = self.missing.get_mut(&delivered.output).filter(|missing| !missing.is_empty()) else {
             return;
         };
@@ -63,20 +65,14 @@ impl Observed {
     }
 }
 
-/// Adds a frame at which something is empty; forgets all of them once it is not.
-fn observe<K: Copy + Ord>(
-    empty: &mut BTreeMap<K, Vec<Frame>>,
-    filled: &mut BTreeSet<K>,
-    of: K,
-    frame: Frame,
-    is_empty: bool,
-) {
-    if !is_empty {
-        empty.remove(&of);
-        filled.insert(of);
-    } else if !filled.contains(&of) {
-        empty.entry(of).or_default().push(frame);
-    }
+/// Whether a mask is 0 everywhere, whatever a mask may be stored as; `None` where there is none, or no row of it.
+fn is_zero(geometry: &Geometry, mask: &str) -> Option<bool> {
+    let owners = |part| [Owner::Point, Owner::Element].map(|owner| Component::table(part, owner));
+    let tables: Vec<_> = geometry.parts().flat_map(owners).collect();
+    let floats = tables.iter().filter_map(|table| table.get::<f32>(mask)).filter(|rows| !rows.is_empty());
+    let wholes = tables.iter().filter_map(|table| table.get::<i32>(mask)).filter(|rows| !rows.is_empty());
+    let floats = floats.map(|rows| rows.iter().all(|factor| *factor == 0.0));
+    floats.chain(wholes.map(|rows| rows.iter().all(|factor| *factor == 0))).reduce(|a, b| a && b)
 }
 
 impl Sweep<'_, '_, '_> {
@@ -103,6 +99,7 @@ impl Sweep<'_, '_, '_> {
     /// Notes outputs that had no geometry at any frame.
     pub(super) fn note_empty_outputs(&mut self) {
         for (output, frames) in std::mem::take(&mut self.observed.empty) {
+            let Some(frames) = frames else { continue };
             let output = &self.plan.graph.outputs[output];
             let from = &self.plan.graph.nodes[output.from.node];
             let text = format!("output `{}` has no geometry at any frame", output.name);
@@ -111,24 +108,18 @@ impl Sweep<'_, '_, '_> {
         }
     }
 
-    /// Records at which frames of the slice the masks of a node's params are 0 everywhere.
-    pub(super) fn record_masks(&mut self, node: usize) {
-        let graph = self.plan.graph;
-        let Body::Node { params, inputs, .. } = &graph.nodes[node].body else { return };
-        for (param, source) in params.iter().enumerate() {
-            let Some(mask) = source.mask() else { continue };
-            let known = (node, param);
-            for link in inputs.iter().flatten() {
-                for (frame, cooked) in &self.nodes[link.node].results {
-                    let Ok(cooked) = cooked else { continue };
-                    let masks = cooked[link.port].parts().filter_map(|part| part.table(Owner::Point).get::<f32>(mask));
-                    let masks: Vec<&[f32]> = masks.filter(|mask| !mask.is_empty()).collect();
-                    if masks.is_empty() {
-                        continue;
-                    }
-                    let is_zero = masks.iter().all(|mask| mask.iter().all(|factor| *factor == 0.0));
-                    let Observed { zero_masks, filled, .. } = &mut self.observed;
-                    observe(zero_masks, &mut filled.1, known, *frame, is_zero);
+    /// Records at which of some frames the masks of a node's params are 0 everywhere.
+    pub(super) fn record_masks(&mut self, node: usize, frames: &BTreeSet<Frame>) {
+        let plan = self.plan;
+        let Body::Node { params, inputs, .. } = &plan.graph.nodes[node].body else { return };
+        let masks = params.iter().enumerate().filter_map(|(param, source)| Some((param, source.mask()?)));
+        for (param, mask) in masks {
+            for frame in frames {
+                let reads = inputs.iter().flatten().map(|link| plan.read(*link, *frame));
+                let cooked = reads.filter_map(|read| self.geometry(read).ok());
+                let zero = cooked.filter_map(|geometry| is_zero(&geometry, mask)).reduce(|a, b| a && b);
+                if let Some(zero) = zero {
+                    self.nodes[node].zero_masks.entry(param).or_default().insert(*frame, f64::from(u8::from(zero)));
                 }
             }
         }
@@ -136,13 +127,16 @@ impl Sweep<'_, '_, '_> {
 
     /// Notes masks that were 0 everywhere at all frames.
     pub(super) fn note_zero_masks(&mut self) {
-        for ((node, param), frames) in std::mem::take(&mut self.observed.zero_masks) {
-            let node = &self.plan.graph.nodes[node];
+        for (node, run) in self.plan.graph.nodes.iter().zip(&self.nodes) {
             let (Body::Node { params, specs, .. }, id) = (&node.body, &node.id) else { continue };
-            let (name, mask) = (specs[param].name, params[param].mask().map_or("", |mask| mask));
-            let text = format!("`{id}` ({}): the mask `{mask}` of `{name}` is 0 everywhere", node.type_name());
-            let hint = format!("`{name}` has no effect. Look at where the attribute `{mask}` is made.");
-            self.report.notes.push(Note::new(kind::ZERO_MASK, text).of_node(id).at(frames).hint(hint));
+            let always = |frames: &BTreeMap<Frame, f64>| frames.values().all(|zero| *zero == 1.0);
+            for (param, frames) in run.zero_masks.iter().filter(|(_, frames)| always(frames)) {
+                let (name, mask) = (specs[*param].name, params[*param].mask().map_or("", |mask| mask));
+                let text = format!("`{id}` ({}): the mask `{mask}` of `{name}` is 0 everywhere", node.type_name());
+                let hint = format!("`{name}` has no effect. Look at where the attribute `{mask}` is made.");
+                let frames = frames.keys().copied().collect();
+                self.report.notes.push(Note::new(kind::ZERO_MASK, text).of_node(id).at(frames).hint(hint));
+            }
         }
     }
 

@@ -6,11 +6,27 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::Sweep;
+use crate::cook::DiskCache;
 use crate::cook::disk::KeptMetric;
 use crate::cook::store::Cooked;
 use crate::geometry::Kind;
 use crate::key::ContentKey;
 use crate::time::Frame;
+
+/// What a sweep knows of a node's results and states on disk.
+#[derive(Default)]
+pub(super) struct OnDisk {
+    /// The result that was read last, with which the next one shares what has not changed.
+    loaded: Option<Cooked>,
+    /// Whether results are worth keeping.
+    is_kept: bool,
+    /// What it takes to make a result again from what is there.
+    recreated_in: Duration,
+    /// What it takes to move the states of a window to where they are from where they were saved last.
+    pub(super) moved_for: Duration,
+    /// Bytes of these states when they were last written.
+    pub(super) state_bytes: usize,
+}
 
 impl Sweep<'_, '_, '_> {
     /// A result that an earlier cook has kept.
@@ -32,8 +48,8 @@ impl Sweep<'_, '_, '_> {
     /// Shares topology and arrays with what was loaded before: nodes know what they have prepared, such as trees, by
     /// address.
     fn share_loaded(&mut self, node: usize, cooked: &mut Cooked) {
-        let own = self.nodes[node].loaded.take();
-        let others = self.nodes.iter().filter_map(|run| run.loaded.clone());
+        let own = self.nodes[node].on_disk.loaded.take();
+        let others = self.nodes.iter().filter_map(|run| run.on_disk.loaded.clone());
         let known: Vec<Cooked> = if own.is_some() { own.into_iter().collect() } else { others.collect() };
         for geometry in Arc::get_mut(cooked).into_iter().flatten().filter_map(Arc::get_mut) {
             for kind in Kind::ALL {
@@ -42,7 +58,7 @@ impl Sweep<'_, '_, '_> {
                 theirs.for_each(|theirs| part.share_with(theirs));
             }
         }
-        self.nodes[node].loaded = Some(cooked.clone());
+        self.nodes[node].on_disk.loaded = Some(cooked.clone());
     }
 
     /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it.
@@ -50,32 +66,37 @@ impl Sweep<'_, '_, '_> {
         if self.disk.is_none() || frames.is_empty() || self.cancelled() {
             return;
         }
-        let upstream: Duration = self.plan.dag.sources(node).map(|source| self.nodes[source].recreated_in).sum();
-        let cost = wall / frames.len() as u32 + upstream;
-        self.nodes[node].recreated_in = cost;
+        let cost = wall / frames.len() as u32 + self.upstream_recreated_in(node);
+        self.nodes[node].on_disk.recreated_in = cost;
         for frame in frames {
             let Some(Ok(cooked)) = self.nodes[node].results.get(frame).cloned() else { continue };
             let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
             // Once and for all: a window with some of its results would start anew for the others.
-            let worth = self.nodes[node].is_kept || self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes));
+            let worth =
+                self.nodes[node].on_disk.is_kept || self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes));
             if !worth {
                 continue;
             }
-            self.nodes[node].is_kept = true;
+            self.nodes[node].on_disk.is_kept = true;
             let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
             let metrics = self.metrics_of_result(node, *frame);
             if let Some(disk) = self.disk.as_mut() {
                 disk.save_result(resolved.key, &cooked, &metrics);
             }
-            self.nodes[node].recreated_in = Duration::ZERO;
+            self.nodes[node].on_disk.recreated_in = DiskCache::read_in(bytes);
         }
+    }
+
+    /// What it takes to make the results again that one of this node is made from.
+    pub(super) fn upstream_recreated_in(&self, node: usize) -> Duration {
+        self.plan.dag.sources(node).map(|source| self.nodes[source].on_disk.recreated_in).sum()
     }
 
     /// What a node and those it depends on published at a frame.
     fn metrics_of_result(&mut self, node: usize, frame: Frame) -> Vec<KeptMetric> {
         let mut metrics = Vec::new();
         for (of, at, key) in self.results_behind(node, frame) {
-            metrics.extend(self.published(of, at).into_iter().map(|(name, value)| (key, name.to_owned(), value)));
+            metrics.extend(self.kept_of(of, at, key));
         }
         metrics
     }
@@ -93,9 +114,11 @@ impl Sweep<'_, '_, '_> {
     /// Results at a frame of a node and of those it depends on that have metrics: node, frame, key.
     fn results_behind(&mut self, node: usize, frame: Frame) -> Vec<(usize, Frame, ContentKey)> {
         let plan = self.plan;
-        let measured = |of: &usize| plan.graph.nodes[*of].node().is_some_and(|node| !node.metrics.is_empty());
         let mut found = Vec::new();
-        for of in plan.ancestors(node).into_iter().filter(measured) {
+        for of in plan.ancestors(node) {
+            if !self.measures(of) {
+                continue;
+            }
             let at = plan.canonical(of, frame);
             found.extend(self.keys.resolve(of, at).ok().map(|resolved| (of, at, resolved.key)));
         }

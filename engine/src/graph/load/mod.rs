@@ -189,12 +189,13 @@ struct NodeType {
 
 /// Reads a node's type and params.
 fn draft<'a>(
-    text: NodeText<'a>,
+    mut text: NodeText<'a>,
     catalogue: Catalogue,
     types: &mut BTreeMap<&'static str, NodeType>,
     reader: &mut Reader<'a, '_>,
 ) -> Draft<'a> {
-    let node = text.kind.as_ref().and_then(|kind| {
+    // With its path it takes as much as the rest of the node.
+    let node = text.kind.take().and_then(|kind| {
         let name = kind.string()?;
         let node = catalogue.get(name);
         if node.is_none() {
@@ -220,7 +221,14 @@ fn draft<'a>(
 
 /// The positions of nodes, of the params and inputs that they set, and of outputs.
 fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
-    let mut positions = Positions::default();
+    let parts = |draft: &Draft<'_>| draft.text.params.len() + draft.text.inputs.len();
+    let bytes = |draft: &Draft<'_>| {
+        let NodeText { entry, params, inputs, .. } = &draft.text;
+        std::iter::once(entry).chain(params).chain(inputs).map(|entry| entry.json.path_bytes()).sum::<usize>()
+    };
+    let (count, bytes) =
+        drafts.iter().map(|draft| (1 + parts(draft), bytes(draft))).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let mut positions = Positions::with_capacity(count, bytes);
     for draft in drafts {
         let id = &draft.text.entry;
         positions.record(&id.json.path(), id.json.text, id.key.start);

@@ -112,6 +112,29 @@ impl Jiggle {
         Self { along: along(starts, rest), starts: starts.to_vec(), batches, response_key: None }
     }
 
+    /// Curves that swing as others did: on the same `starts`, `rest` and `targets` as those at their last step, with
+    /// their [`Jiggle::swing`]. `None` if that is of other curves.
+    ///
+    /// # Panics
+    /// As [`Jiggle::at_rest`].
+    pub fn swinging(starts: &[u32], rest: &[Vec3], targets: &[Vec3], swing: &[f64]) -> Option<Self> {
+        let mut jiggle = Self::at_rest(starts, rest, targets);
+        let states = jiggle.batches.iter_mut().flat_map(|batch| &mut batch.states);
+        let mut lanes = states.flat_map(|state| state.offset.iter_mut().chain(&mut state.velocity));
+        let (saved, left) = swing.as_chunks::<LANES>();
+        let mut saved = saved.iter();
+        let fits = lanes.all(|lanes| saved.next().map(|saved| lanes.0 = *saved).is_some());
+        (fits && saved.next().is_none() && left.is_empty()).then_some(jiggle)
+    }
+
+    /// Offset and velocity of every CV, in the order in which they are held: all of the state that does not follow from
+    /// the curves.
+    pub fn swing(&self) -> Vec<f64> {
+        let states = self.batches.iter().flat_map(|batch| &batch.states);
+        let lanes = states.flat_map(|state| state.offset.iter().chain(&state.velocity));
+        lanes.flat_map(|lanes| lanes.0).collect()
+    }
+
     /// Index of the first point of each curve, and the number of points at the end.
     pub fn starts(&self) -> &[u32] {
         &self.starts

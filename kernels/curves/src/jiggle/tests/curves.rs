@@ -56,6 +56,26 @@ fn lengths_and_roots_are_kept_and_every_path_and_number_of_threads_has_the_same_
 }
 
 #[test]
+fn a_swing_that_was_saved_goes_on_bit_for_bit() {
+    let ramp = rising();
+    let (starts, first) = wobbling(100, 9, 0.0);
+    let mut whole = Jiggle::at_rest(&starts, &first, &first);
+    let mut resumed = whole.clone();
+    for frame in 1..=6 {
+        let targets = wobbling(100, 9, frame as f32).1;
+        for jiggle in [&mut whole, &mut resumed] {
+            jiggle.step(&targets, &spring(0.6, 0.2, &ramp, Drag::World), 1.0, None);
+        }
+        let swing = resumed.swing();
+        resumed = Jiggle::swinging(&starts, &first, &targets, &swing).unwrap();
+        let [a, b] = [&whole, &resumed].map(|jiggle| jiggle.shape(1.0.into()));
+        assert!(a == b && bits(&a.points) == bits(&b.points) && a.max_offset > 0.0, "frame {frame}");
+        assert!(Jiggle::swinging(&starts, &first, &targets, &swing[1..]).is_none());
+        assert!(Jiggle::swinging(&starts, &first, &targets, &[swing, vec![0.0; 16]].concat()).is_none());
+    }
+}
+
+#[test]
 fn lengths_are_restored_root_to_tip_by_hand() {
     // Both segments of length 1 upwards; the free CVs are pushed by 1 and by 1 along x. Segment 1 points to (1, 1): it
     // ends at (√½, √½). Segment 2 stays upright and starts there.
