@@ -63,10 +63,11 @@ impl Conformance {
     pub fn faults(self) -> Vec<String> {
         let mut findings = Findings::default();
         if !declaration::check(self.node, &mut findings) {
-            return findings.0;
+            return findings.list;
         }
         let subject = Subject::new(self.node, self.samples);
         let tried = try_all(&subject);
+        findings.effects_are_hidden = tried.iter().any(|(_, outcome)| errors::is_at_fault(outcome));
         errors::check(&subject, &tried, &mut findings);
         outputs::check(&subject, &tried, &mut findings);
         pass_through::check(&subject, &tried, &mut findings);
@@ -76,7 +77,7 @@ impl Conformance {
                 let fact = "it refuses all samples of the suite; provide suitable ones with `with`";
                 findings.add(format!("{fact}: {error}"));
             }
-            return findings.0;
+            return findings.list;
         }
         for check in [
             left_out::check,
@@ -91,19 +92,30 @@ impl Conformance {
         ] {
             check(&subject, &tried, &mut findings);
         }
-        findings.0
+        findings.list
     }
 }
 
 /// Findings, each once.
 #[derive(Default)]
-pub(crate) struct Findings(Vec<String>);
+pub(crate) struct Findings {
+    list: Vec<String>,
+    /// Whether ordinary trials fail by the node's own fault, so that what they would return cannot be compared.
+    effects_are_hidden: bool,
+}
 
 impl Findings {
     pub(crate) fn add(&mut self, finding: impl Into<String>) {
         let finding = finding.into();
-        if !self.0.contains(&finding) {
-            self.0.push(finding);
+        if !self.list.contains(&finding) {
+            self.list.push(finding);
+        }
+    }
+
+    /// Adds that something, such as a param, has no effect; it is told once the node's own failures are mended.
+    pub(crate) fn add_without_effect(&mut self, what: &str) {
+        if !self.effects_are_hidden {
+            self.add(format!("{what} never affects the result"));
         }
     }
 }

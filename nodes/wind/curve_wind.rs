@@ -259,7 +259,7 @@ mod tests {
     fn the_angle_of_segment_k_is_multiplied_by_one_minus_g_to_the_k() {
         // W2 by hand: at every CV the rest of a straight curve turns by g times the remaining angle, so segment k = 1…
         // has 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
-        let out = calm(upright(4)).set(GLOBAL_ROTATE, Maskable { value: 0.5, attribute: None }).cook();
+        let out = calm(upright(4)).set(GLOBAL_ROTATE, 0.5.into()).cook();
         for (k, angle) in angles(&out).iter().enumerate() {
             let left = RIGHT / f64::from(2 << k);
             assert!((angle - left).abs() < 4e-6, "segment {}: {angle} rad, expected {left}", k + 1);
@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn half_blend_is_half_the_turn_and_keeps_lengths() {
         let whole = angles(&calm(upright(4)).cook());
-        let out = calm(upright(4)).set(BLEND, Maskable { value: 0.5, attribute: None }).cook();
+        let out = calm(upright(4)).set(BLEND, 0.5.into()).cook();
         for (half, whole) in angles(&out).iter().zip(whole) {
             assert!((RIGHT - half - 0.5 * (RIGHT - whole)).abs() < 4e-6);
         }
@@ -368,8 +368,7 @@ mod tests {
     fn without_a_turn_the_same_arrays_pass_through() {
         let curves = field(2);
         for share in [GLOBAL_ROTATE, BLEND] {
-            let out =
-                bench(&NODE).input(CURVES, curves.clone()).set(share, Maskable { value: 0.0, attribute: None }).cook();
+            let out = bench(&NODE).input(CURVES, curves.clone()).set(share, 0.0.into()).cook();
             let column = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
             assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
         }

@@ -188,7 +188,7 @@ mod tests {
     fn a_half_sheltered_curve_loses_half_of_shield_at_any_scale() {
         for scale in [1e-3, 1.0, 1e3] {
             let bench = bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale));
-            let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, Maskable { value: 0.5, attribute: None }).cook();
+            let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, 0.5.into()).cook();
             assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
             assert_eq!(out.curves().get(ENVELOPE), Some(&[0.75, 0.75, 0.75, 0.75, 1.0, 1.0][..]));
             assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (1.0, 6.0));
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn no_more_than_all_of_the_wind_is_removed() {
-        let out = behind_a_wall().set(SHIELD, Maskable { value: 5.0, attribute: None }).cook();
+        let out = behind_a_wall().set(SHIELD, 5.0.into()).cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0][..]));
     }
 
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn with_shield_0_shielded_is_still_written() {
-        let out = behind_a_wall().set(SHIELD, Maskable { value: 0.0, attribute: None }).cook();
+        let out = behind_a_wall().set(SHIELD, 0.0.into()).cook();
         assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
         assert_eq!(out.curves().get(ENVELOPE), Some(&[1.0; 6][..]));
     }

@@ -33,6 +33,8 @@ fn sources(path: &Path) -> Vec<(PathBuf, String)> {
 mod curve_helix;
 
 /// Nodes written by `cargo xtask new-node`; xtask's tests check that these are its texts.
+#[path = "../new_nodes/curve_free.rs"]
+mod curve_free;
 #[path = "../new_nodes/curve_full.rs"]
 mod curve_full;
 #[path = "../new_nodes/curve_plain.rs"]

@@ -13,9 +13,9 @@ inputs! { INPUTS:
 }
 
 params! { PARAMS:
-    AMOUNT: Param<Maskable> = Param::maskable("bend", 0.01, "How far CVs move. 0 leaves the curves alone.")
+    BEND: Param<Maskable> = Param::maskable("bend", 0.01, "How far CVs move. 0 leaves the curves alone.")
         .unit(Unit::Metres).soft(0.0, 1.0);
-    RAMP: Param<Arc<Ramp>> = Param::ramp("falloff", &[[0.0, 0.0], [1.0, 1.0]],
+    FALLOFF: Param<Arc<Ramp>> = Param::ramp("falloff", &[[0.0, 0.0], [1.0, 1.0]],
         "Scales the movement along the curve, from root (0) to tip (1).");
     SEED: Param<Seed> = Param::seed("Each seed moves every curve by another random fraction.");
 }
@@ -30,7 +30,7 @@ pub(crate) static NODE: Node = Node::new(
     "Curve_Full",
     1,
     "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.",
-    Cook::Frame { cook, reads_clock: |params| params.get(AMOUNT).value != 0.0 },
+    Cook::Frame { cook, reads_clock: |params| params.get(BEND).value != 0.0 },
 )
 .inputs(INPUTS)
 .params(PARAMS)
@@ -38,12 +38,12 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[&P, &CURVE_ID])
 .writes(&[&P])
 .metrics(METRICS)
-.neutral(|params, _| (params.get(AMOUNT).value == 0.0).then_some("`bend` is 0"));
+.neutral(|params, _| (params.get(BEND).value == 0.0).then_some("`bend` is 0"));
 
 fn cook(cx: &FrameCx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);
-    let amount = cx.mask(AMOUNT, &curves)?;
-    let ramp = cx.get(RAMP);
+    let amount = cx.mask(BEND, &curves)?;
+    let ramp = cx.get(FALLOFF);
     // Seconds are reduced in f64: late frames keep their precision.
     let swing = sin(TAU * cx.seconds().fract() as f32 + 1.0);
     let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).keeping_lengths().map(|curve, out| {
@@ -72,7 +72,7 @@ mod tests {
     fn curves_move_and_keep_their_lengths() {
         let points: Vec<[f32; 3]> = (0..9).map(|k| [0.0, 0.125 * k as f32, 0.0]).collect();
         let curve = Component::curves(vec![9], points.clone()).unwrap();
-        let out = bench(&NODE).input(CURVES, curve).set(AMOUNT, Maskable { value: 0.5, attribute: None }).cook();
+        let out = bench(&NODE).input(CURVES, curve).set(BEND, 0.5.into()).cook();
         assert!(out.curves().positions() != points && out.metrics["length_error"] < 1e-5);
     }
 }

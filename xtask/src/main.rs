@@ -34,6 +34,9 @@ enum Chore {
         /// Give each curve random numbers
         #[arg(long)]
         seed: bool,
+        /// Let segments change their lengths; without it the node restores them and measures how well
+        #[arg(long)]
+        free_lengths: bool,
     },
     /// Rewrite the stored expectations of tests and benches, and show what changed
     Bless {
@@ -56,8 +59,8 @@ enum Time {
 
 fn main() -> ExitCode {
     let result = match Chore::parse() {
-        Chore::NewNode { name, family, time, mask, ramp, seed } => {
-            let options = template::Options { reads_clock: time == Time::Frame, mask, ramp, seed };
+        Chore::NewNode { name, family, time, mask, ramp, seed, free_lengths } => {
+            let options = template::Options { reads_clock: time == Time::Frame, mask, ramp, seed, free_lengths };
             new_node::write(&root(), &name, &family, &options)
         }
         Chore::Bless { expectations } => bless::store(&root(), &expectations),

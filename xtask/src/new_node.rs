@@ -44,10 +44,16 @@ fn module_name(name: &str) -> Result<String, String> {
     }
 }
 
+/// Names whose constants a node's file has already.
+const TAKEN: [&str; 10] =
+    ["curve_id", "curves", "inputs", "length_error", "metrics", "node", "out", "p", "params", "seed"];
+
 fn check_param(name: &str) -> Result<(), String> {
     let fits = name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-        && name != "seed";
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    if TAKEN.contains(&name) {
+        return Err(format!("the param cannot be named `{name}`, which the node's file uses for something else"));
+    }
     if fits { Ok(()) } else { Err(format!("`{name}` is not a valid name of a param; write it like ramp_rotate")) }
 }
 
@@ -99,6 +105,7 @@ mod tests {
     #[test]
     fn params_are_lower_case_words() {
         assert!(check_param("ramp_rotate").is_ok());
+        assert!(check_param("curves").is_err_and(|fact| fact.contains("uses for something else")));
         assert!(["Ramp", "", "a b", "1st", "seed"].iter().all(|name| check_param(name).is_err()));
     }
 

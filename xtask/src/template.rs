@@ -11,6 +11,8 @@ pub(crate) struct Options {
     pub(crate) ramp: Option<String>,
     /// Whether it has random numbers.
     pub(crate) seed: bool,
+    /// Whether segments may change their lengths.
+    pub(crate) free_lengths: bool,
 }
 
 /// The node's file.
@@ -25,6 +27,8 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
             "ramp" => options.ramp.is_some(),
             "seed" => options.seed,
             "no seed" => !options.seed,
+            "kept" => !options.free_lengths,
+            "free" => options.free_lengths,
             tag => unreachable!("the template has an unknown tag `{tag}`"),
         },
     };
@@ -40,11 +44,17 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
     let lines = TEMPLATE.lines().filter(keep).map(|line| line.split("//?").next().unwrap_or(line).trim_end());
     let text: String = lines.map(|line| format!("{line}\n")).collect();
     text.replace("NODE_NAME", name)
-        .replace("AMOUNT_VALUE", if options.mask.is_some() { "params.get(AMOUNT).value" } else { "params.get(AMOUNT)" })
-        .replace("AMOUNT_SET", if options.mask.is_some() { "Maskable { value: 0.5, attribute: None }" } else { "0.5" })
+        .replace(
+            "AMOUNT_VALUE",
+            if options.mask.is_some() { "params.get(AMOUNT_CONST).value" } else { "params.get(AMOUNT_CONST)" },
+        )
+        .replace("AMOUNT_SET", if options.mask.is_some() { "0.5.into()" } else { "0.5" })
+        .replace(".KEEPING", if options.free_lengths { "" } else { ".keeping_lengths()" })
         .replace("AMOUNT_PARAM", amount)
         .replace("RAMP_PARAM", ramp)
         .replace("FACTORS", &factors.join(" * "))
+        .replace("AMOUNT_CONST", &amount.to_ascii_uppercase())
+        .replace("RAMP_CONST", &ramp.to_ascii_uppercase())
 }
 
 /// Lines that end in `//? tag` are kept only with that option.
@@ -63,24 +73,26 @@ inputs! { INPUTS:
 }
 
 params! { PARAMS:
-    AMOUNT: Param<Maskable> = Param::maskable("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? mask
-    AMOUNT: Param<f32> = Param::float("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? no mask
+    AMOUNT_CONST: Param<Maskable> = Param::maskable("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? mask
+    AMOUNT_CONST: Param<f32> = Param::float("AMOUNT_PARAM", 0.01, "How far CVs move. 0 leaves the curves alone.") //? no mask
         .unit(Unit::Metres).soft(0.0, 1.0);
-    RAMP: Param<Arc<Ramp>> = Param::ramp("RAMP_PARAM", &[[0.0, 0.0], [1.0, 1.0]], //? ramp
+    RAMP_CONST: Param<Arc<Ramp>> = Param::ramp("RAMP_PARAM", &[[0.0, 0.0], [1.0, 1.0]], //? ramp
         "Scales the movement along the curve, from root (0) to tip (1)."); //? ramp
     SEED: Param<Seed> = Param::seed("Each seed moves every curve by another random fraction."); //? seed
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The moved curves. Their segments keep their lengths.");
-
-metrics! { METRICS:
-    LENGTH_ERROR = Metric::length_error();
-}
+const OUT: Output = Output::like("curves", &CURVES, "The moved curves. Their segments keep their lengths."); //? kept
+const OUT: Output = Output::like("curves", &CURVES, "The moved curves."); //? free
+ //? kept
+metrics! { METRICS: //? kept
+    LENGTH_ERROR = Metric::length_error(); //? kept
+} //? kept
 
 pub(crate) static NODE: Node = Node::new(
     "NODE_NAME",
     1,
-    "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.",
+    "Moves the CVs of curves across their direction. Segments keep their lengths; roots move with the rest of the curve.", //? kept
+    "Moves the CVs of curves across their direction, so that their segments change their lengths.", //? free
     Cook::Pure(cook), //? pure
     Cook::Frame { cook, reads_clock: |params| AMOUNT_VALUE != 0.0 }, //? frame
 )
@@ -90,26 +102,26 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[&P]) //? no seed
 .reads(&[&P, &CURVE_ID]) //? seed
 .writes(&[&P])
-.metrics(METRICS)
+.metrics(METRICS) //? kept
 .neutral(|params, _| (AMOUNT_VALUE == 0.0).then_some("`AMOUNT_PARAM` is 0"));
 
 fn cook(cx: &Cx) -> Result<Outputs> { //? pure
 fn cook(cx: &FrameCx) -> Result<Outputs> { //? frame
     let mut curves = cx.edit(CURVES);
-    let amount = cx.mask(AMOUNT, &curves)?; //? mask
-    let amount = cx.get(AMOUNT); //? no mask
-    let ramp = cx.get(RAMP); //? ramp
+    let amount = cx.mask(AMOUNT_CONST, &curves)?; //? mask
+    let amount = cx.get(AMOUNT_CONST); //? no mask
+    let ramp = cx.get(RAMP_CONST); //? ramp
     // Seconds are reduced in f64: late frames keep their precision. //? frame
     let swing = sin(TAU * cx.seconds().fract() as f32 + 1.0); //? frame
-    let moved = CurveLoop::over(&curves).keeping_lengths().map(|curve, out| { //? no seed
-    let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).keeping_lengths().map(|curve, out| { //? seed
+    let moved = CurveLoop::over(&curves).KEEPING.map(|curve, out| { //? no seed
+    let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).KEEPING.map(|curve, out| { //? seed
         let own = curve.random(0); //? seed
         for cv in curve.cvs() {
             let offset = FACTORS;
             out[cv.index] = std::array::from_fn(|k| cv.point[k] + offset * cv.normal[k]);
         }
     });
-    cx.publish(LENGTH_ERROR, moved.length_error);
+    cx.publish(LENGTH_ERROR, moved.length_error); //? kept
     curves.set(P, moved.points)?;
     Ok(OUT.with(curves))
 }
@@ -125,11 +137,13 @@ mod tests {
     }
 
     #[test]
-    fn curves_move_and_keep_their_lengths() {
+    fn curves_move_and_keep_their_lengths() { //? kept
+    fn curves_move() { //? free
         let points: Vec<[f32; 3]> = (0..9).map(|k| [0.0, 0.125 * k as f32, 0.0]).collect();
         let curve = Component::curves(vec![9], points.clone()).unwrap();
-        let out = bench(&NODE).input(CURVES, curve).set(AMOUNT, AMOUNT_SET).cook();
-        assert!(out.curves().positions() != points && out.metrics["length_error"] < 1e-5);
+        let out = bench(&NODE).input(CURVES, curve).set(AMOUNT_CONST, AMOUNT_SET).cook();
+        assert!(out.curves().positions() != points && out.metrics["length_error"] < 1e-5); //? kept
+        assert!(out.curves().positions() != points); //? free
     }
 }
 "#;
@@ -142,10 +156,19 @@ mod tests {
     /// The repository's tests compile the same texts and check that the nodes conform.
     #[test]
     fn rendered_nodes_are_those_that_the_tests_compile() {
-        let full = Options { reads_clock: true, mask: Some("bend".into()), ramp: Some("falloff".into()), seed: true };
-        for (name, options, file) in
-            [("Curve_Plain", Options::default(), "curve_plain.rs"), ("Curve_Full", full, "curve_full.rs")]
-        {
+        let full = Options {
+            reads_clock: true,
+            mask: Some("bend".into()),
+            ramp: Some("falloff".into()),
+            seed: true,
+            free_lengths: false,
+        };
+        let free = Options { free_lengths: true, seed: true, ..Options::default() };
+        for (name, options, file) in [
+            ("Curve_Plain", Options::default(), "curve_plain.rs"),
+            ("Curve_Full", full, "curve_full.rs"),
+            ("Curve_Free", free, "curve_free.rs"),
+        ] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/new_nodes").join(file);
             let text = render(name, &options);
             if std::env::var_os("BLESS").is_some() {

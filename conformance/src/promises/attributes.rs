@@ -31,7 +31,7 @@ fn check_declared(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut 
             subject.run(&without, &frames).digest(&ignore) != outcome.digest(&ignore)
         });
         if !matters {
-            findings.add(format!("it declares to read the attribute `{name}`, but it never affects the result"));
+            findings.add_without_effect(&format!("it declares to read the attribute `{name}`, but it"));
         }
     }
 }

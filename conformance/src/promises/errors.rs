@@ -26,6 +26,12 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
     }
 }
 
+/// Whether a trial with ordinary geometry failed by the node's fault.
+pub(crate) fn is_at_fault(outcome: &Outcome) -> bool {
+    let at_fault = |kind: &ErrorKind| matches!(kind, ErrorKind::Panic | ErrorKind::Contract | ErrorKind::NotFinite);
+    outcome.errors.iter().any(|(_, kind, _)| at_fault(kind))
+}
+
 /// Adds those errors of a trial that are the node's fault for any input.
 pub(crate) fn check_outcome(outcome: &Outcome, form: Form, findings: &mut Findings) {
     let given = match form {

@@ -18,7 +18,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
                 || many && subject.run(&fewer, &frames).whole() != before
         });
         if !matters {
-            findings.add(format!("the input `{}` never affects the result", input.name));
+            findings.add_without_effect(&format!("the input `{}`", input.name));
         }
     }
 }

@@ -29,7 +29,7 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, find
     }
     let values = values(subject, index);
     if !matters(subject, tried, index, &values) {
-        findings.add(format!("the param `{}` never affects the result", spec.name));
+        findings.add_without_effect(&format!("the param `{}`", spec.name));
     }
     if spec.shape == Shape::Masked {
         let [low, high] = [0.35, 0.85].map(|share| between(subject, index, share));
@@ -43,7 +43,7 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, find
             })
         });
         if !masked {
-            findings.add(format!("the mask of `{}` never affects the result", spec.name));
+            findings.add_without_effect(&format!("the mask of `{}`", spec.name));
         }
     }
 }

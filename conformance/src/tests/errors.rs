@@ -27,6 +27,13 @@ fn a_panic_is_found_for_any_kind_of_sample() {
 fn nan_for_finite_input_is_found() {
     let node = shift(|cx| Ok(OUT.with(up(cx, (cx.get(AMOUNT) - 0.05).sqrt())?)));
     finds_only(node, "its result contains NaN: `P` of point 0 of the curves is NaN or infinite");
+    // What cannot be compared for NaN is not said to have no effect.
+    let hidden = shift(|cx| {
+        let share = if cx.part(CURVES).point_count() > 12 { f32::NAN } else { 0.0 };
+        Ok(OUT.with(up(cx, cx.get(AMOUNT) * share)?))
+    });
+    let found = findings_of(hidden);
+    assert!(!found.is_empty() && found.iter().all(|line| line.starts_with("its result contains NaN")), "{found:#?}");
     // For coordinates near the largest f32, NaN is unavoidable, and the engine reports it.
     let squares = shift(|cx| {
         let mut curves = cx.input(CURVES).clone();

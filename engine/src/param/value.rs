@@ -34,6 +34,13 @@ pub struct Maskable {
     pub attribute: Option<Name>,
 }
 
+impl From<f32> for Maskable {
+    /// The number alone, without a mask.
+    fn from(value: f32) -> Self {
+        Self { value, attribute: None }
+    }
+}
+
 /// A rotation, a unit quaternion x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn(pub [f64; 4]);

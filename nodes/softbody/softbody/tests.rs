@@ -45,10 +45,6 @@ fn simulating(bodies: impl Into<Geometry>) -> Bench {
     bench(&NODE).input(BODIES, bodies)
 }
 
-fn all(value: f32) -> Maskable {
-    Maskable { value, attribute: None }
-}
-
 fn height(tasted: &BenchResult) -> f32 {
     tasted.mesh().positions().iter().map(|p| p[1]).fold(f32::NEG_INFINITY, f32::max)
 }
@@ -167,7 +163,7 @@ fn a_goal_that_was_reached_becomes_the_rest_shape() {
         .set(GOAL_ON, GoalOn::All)
         .set(GRAVITY, [0.0; 3])
         .set(VOLUME, 0.0)
-        .set(DAMPING, all(0.05))
+        .set(DAMPING, 0.05.into())
         .frames([1, 48]);
     let rest = frames[0].mesh().positions();
     let (low, high) = frames[1]
@@ -182,8 +178,10 @@ fn a_goal_that_was_reached_becomes_the_rest_shape() {
 
 #[test]
 fn a_block_rests_on_the_ground() {
-    let frames =
-        simulating(block([3; 3], [0.0; 3], [0.1; 3])).set(GROUND, true).set(STIFFNESS, all(1e5)).frames([1, 120, 121]);
+    let frames = simulating(block([3; 3], [0.0; 3], [0.1; 3]))
+        .set(GROUND, true)
+        .set(STIFFNESS, 1e5.into())
+        .frames([1, 120, 121]);
     let lowest = |frame: &BenchResult| frame.mesh().positions().iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
     assert!((0.0..=1e-3).contains(&lowest(&frames[1])), "{}", lowest(&frames[1]));
     let moved = frames[1].mesh().positions().iter().zip(frames[2].mesh().positions()).map(|(p, q)| (p[1] - q[1]).abs());
@@ -228,7 +226,7 @@ fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
             .set(COUPLING_RADIUS, 5e-3)
             .set(COUPLING_STIFFNESS, stiffness)
             .set(COUPLING_BREAK, 3.0)
-            .set(STIFFNESS, all(1e5))
+            .set(STIFFNESS, 1e5.into())
             .frames([1, 24])
     };
     let drop = |frames: &[BenchResult]| {
@@ -244,7 +242,7 @@ fn coupled_bodies_stay_together_and_tear_when_pulled_apart() {
 fn plastic_work_is_published_where_springs_flow() {
     let work = |creep: f32| {
         let block = block([2; 3], [0.0; 3], [0.1; 3]);
-        let soft = simulating(block).set(GROUND, true).set(STIFFNESS, all(2e3));
+        let soft = simulating(block).set(GROUND, true).set(STIFFNESS, 2e3.into());
         let frames = soft.set(PLASTIC_YIELD, 0.01).set(PLASTIC_CREEP, creep).frames([1, 12]);
         frames[1].metrics["plastic_work"]
     };
@@ -286,7 +284,7 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
 #[test]
 fn steps_that_miss_the_tolerance_are_counted() {
     let missed = |tolerance: f64| {
-        let stiff = simulating(cube()).set(STIFFNESS, all(1e6)).set(INITIAL_VELOCITY, [0.0, -3.0, 0.0]);
+        let stiff = simulating(cube()).set(STIFFNESS, 1e6.into()).set(INITIAL_VELOCITY, [0.0, -3.0, 0.0]);
         let accurate = stiff.set(GROUND, true).set(INTEGRATOR, Stepping::Accurate).set(TOLERANCE, tolerance);
         accurate.frames([1, 3])[1].metrics["tolerance_missed"]
     };

@@ -47,7 +47,7 @@ fn jiggled() -> Bench {
 }
 
 fn plain(value: f32) -> Maskable {
-    Maskable { value, attribute: None }
+    value.into()
 }
 
 fn bits(out: &BenchResult) -> Vec<u8> {
