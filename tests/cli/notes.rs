@@ -310,6 +310,11 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
     let found = notes(&soft_ball(&[press, ground]), &[]);
     let crushed = |note: &&String| note.starts_with("`soft` (Softbody): `deepest_penetration` is ");
     assert_eq!(found.iter().filter(crushed).count(), 1, "{found:#?}");
+    // Through the pinned middle of the body, which cannot give way.
+    let pierce = ["[0.2, 0, 0]", r#"{"keyframes": [[1, [0.1, 0, 0]], [3, [0, 0, 0]], [6, [-0.1, 0, 0]]]}"#];
+    let found = notes(&soft_ball(&[pierce]), &[]);
+    let capped = |note: &&String| note.starts_with("`soft` (Softbody): `caps_hit` is ");
+    assert_eq!(found.iter().filter(capped).count(), 1, "{found:#?}");
     let far = ["[[0, 0.05, 0]]", "[[0, 0.05, 0], [0, 1, 0]]"];
     let idle = "the first is point 1 of `pins` 0 (both counted from 0)";
     only(&[far], "`soft` (Softbody): `idle_pins` is 1 at frame 1 (frames 1-6)", idle);
