@@ -18,16 +18,16 @@ pub(super) struct Document<'a> {
     pub(super) outputs: Option<Json<'a>>,
 }
 
-/// The parts of a node.
+/// The parts of a node. Of those that are dropped soon or rare, only the place is kept: a graph may have a million nodes.
 pub(super) struct NodeText<'a> {
     /// Its id and its whole value.
     pub(super) entry: Entry<'a>,
     /// The value of its `type`, which may be of the wrong JSON type.
-    pub(super) kind: Option<Json<'a>>,
+    pub(super) kind: Option<Box<Json<'a>>>,
     pub(super) inputs: Vec<Entry<'a>>,
     pub(super) params: Vec<Entry<'a>>,
     /// The value of `bypass`, if the node is bypassed.
-    pub(super) bypass: Option<Json<'a>>,
+    pub(super) bypass: Option<Box<Json<'a>>>,
 }
 
 /// The fault of an object that lacks a key.
@@ -161,6 +161,6 @@ impl<'a> NodeText<'a> {
         let note = part("note").filter(|note| note.string().is_none());
         faults.extend(note.map(|note| note.unexpected("a string")));
         let bypass = part("bypass").filter(|bypass| keep(bypass.bool(), faults).unwrap_or(false));
-        Self { entry, kind, inputs, params, bypass }
+        Self { entry, kind: kind.map(Box::new), inputs, params, bypass: bypass.map(Box::new) }
     }
 }

@@ -220,14 +220,16 @@ fn draft<'a>(
 }
 
 /// The positions of nodes, of the params and inputs that they set, and of outputs.
-fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
-    let parts = |draft: &Draft<'_>| draft.text.params.len() + draft.text.inputs.len();
-    let bytes = |draft: &Draft<'_>| {
+fn positions<'a>(drafts: &[Draft<'a>], outputs: Option<&Json<'a>>) -> Positions {
+    let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok()).unwrap_or_default();
+    // Its tables are large, and would otherwise grow by doubling.
+    let all = |draft: &Draft<'a>| {
         let NodeText { entry, params, inputs, .. } = &draft.text;
-        std::iter::once(entry).chain(params).chain(inputs).map(|entry| entry.json.path_bytes()).sum::<usize>()
+        let bytes = std::iter::once(entry).chain(params).chain(inputs).map(|entry| entry.json.path_bytes());
+        (1 + params.len() + inputs.len(), bytes.sum::<usize>())
     };
-    let (count, bytes) =
-        drafts.iter().map(|draft| (1 + parts(draft), bytes(draft))).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let of_outputs = (members.len(), members.iter().map(|output| output.json.path_bytes()).sum());
+    let (count, bytes) = drafts.iter().map(all).fold(of_outputs, |a, b| (a.0 + b.0, a.1 + b.1));
     let mut positions = Positions::with_capacity(count, bytes);
     for draft in drafts {
         let id = &draft.text.entry;
@@ -236,8 +238,7 @@ fn positions(drafts: &[Draft<'_>], outputs: Option<&Json<'_>>) -> Positions {
             positions.record(&entry.json.path(), entry.json.text, entry.json.value.start());
         }
     }
-    let members = outputs.and_then(|outputs| outputs.members("", &mut Vec::new()).ok());
-    for output in members.into_iter().flatten() {
+    for output in members {
         positions.record(&output.json.path(), output.json.text, output.key.start);
     }
     positions.sort();
