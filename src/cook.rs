@@ -10,6 +10,7 @@ use engine::clock::Stopwatch;
 use engine::cook::{Delivered, DiskCache, Engine, Report, Stopped};
 use engine::geometry::WIDTH;
 use engine::graph::{Graph, GraphOutput, Part};
+use engine::memory::{Ceiling, size_text};
 use engine::note::{Note, kind};
 use engine::plan::Request;
 use engine::time::Frame;
@@ -80,13 +81,17 @@ pub struct CookArgs {
     pictures: pictures::PictureArgs,
 }
 
+/// Memory for each frame of an output, besides its geometry: its files, metrics and place in a USD file.
+const BYTES_PER_FRAME: usize = 128;
+
 /// Cooks a graph.
 ///
 /// # Errors
 /// If the graph has faults, a file cannot be written, a node cannot cook, or the cook is interrupted.
 pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
-    let engine = load::engine(usize::from(args.threads), memory::ceiling(args.memory))?;
+    let ceiling = memory::ceiling(args.memory);
+    let engine = load::engine(usize::from(args.threads), ceiling)?;
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
@@ -95,6 +100,7 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
             None => Frames::of_scene(args.frames.as_ref(), &graph.scene)?,
         },
     };
+    fits(&request, &ceiling)?;
     let mut faults = load::as_read_from(&args.graph, engine.verify(&graph, Some(&request)));
     if !args.no_write {
         faults.extend(load::format_faults(&graph, &request.outputs, format));
@@ -108,6 +114,22 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     // The pictures' guides are cooked along.
     let cooked = staged.as_ref().map_or((&graph, &request), |staged| (&staged.graph, &staged.request));
     cook(args, &engine, [(&graph, &request), cooked], format, pictures)
+}
+
+/// Refuses more frames than memory can keep account of.
+fn fits(request: &Request, ceiling: &Ceiling) -> Result<(), Failure> {
+    let count = request.frames.len();
+    let bytes = count.saturating_mul(request.outputs.len()).saturating_mul(BYTES_PER_FRAME);
+    if ceiling.allows(bytes) {
+        return Ok(());
+    }
+    let line = format!(
+        "the results of {count} frames would take {} besides their geometry, but {}; cook fewer at a time with --frames \
+         or --part, or raise --memory",
+        size_text(bytes),
+        ceiling.describe()
+    );
+    Err(Failure::new(Exit::CommandLine, line))
 }
 
 fn cook(

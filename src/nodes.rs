@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use engine::expr::suggest::nearest;
-use engine::node::{Arity, Needs, Node};
+use engine::node::{Arity, Carries, Needs, Node, Output};
 use engine::param::{Bounds, Shape};
 use serde_json::{Value, json};
 
@@ -87,8 +87,7 @@ fn to_json(node: &Node) -> Value {
             })
         })
         .collect();
-    let outputs: Vec<Value> =
-        node.outputs.iter().map(|output| json!({"name": output.name, "help": output.help})).collect();
+    let outputs: Vec<Value> = node.outputs.iter().map(|output| output_to_json(output)).collect();
     let names = |list: &[&dyn engine::node::AttrDecl]| list.iter().map(|one| one.spec().0).collect::<Vec<_>>();
     let metrics: Vec<Value> = node
         .metrics
@@ -100,4 +99,13 @@ fn to_json(node: &Node) -> Value {
         "inputs": inputs, "params": params, "outputs": outputs,
         "reads": names(node.reads), "writes": names(node.writes), "metrics": metrics,
     })
+}
+
+/// An output with the components it carries, or with the input whose components it has.
+fn output_to_json(output: &Output) -> Value {
+    let (carries, like) = match output.carries {
+        Carries::Kinds(kinds) => (json!(kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>()), Value::Null),
+        Carries::Like(input) | Carries::Union(input) => (Value::Null, json!(input)),
+    };
+    json!({"name": output.name, "carries": carries, "like": like, "help": output.help})
 }

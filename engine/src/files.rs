@@ -204,6 +204,12 @@ pub fn unreadable(path: &Path, error: &std::io::Error) -> Error {
             Error::file(format!("no permission to read `{path}`")).hint("change the file's permissions")
         }
         K::IsADirectory => Error::file(format!("`{path}` is a folder, expected a file")),
+        K::InvalidFilename => {
+            let text = path.to_string();
+            let start: String = text.chars().take(60).collect();
+            Error::file(format!("the name `{start}…` of {} letters is too long for a file", text.chars().count()))
+                .hint("the system allows 255 bytes for each part of a path, and about 4,000 in all")
+        }
         _ => Error::file(format!("`{path}` could not be read: {error}")),
     }
 }
@@ -211,6 +217,14 @@ pub fn unreadable(path: &Path, error: &std::io::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_that_is_too_long_is_not_repeated_in_full() {
+        let path = "a/".to_owned() + &"x".repeat(70_000);
+        let error = unreadable(Path::new(&path), &std::io::ErrorKind::InvalidFilename.into());
+        assert!(error.fact.ends_with("…` of 70002 letters is too long for a file"), "{}", error.fact);
+        assert!(error.fact.len() < 200);
+    }
 
     #[test]
     fn each_run_of_hashes_becomes_the_frame_number() {

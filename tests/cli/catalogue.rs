@@ -26,6 +26,17 @@ fn every_node_is_listed_and_has_a_help_page() {
 }
 
 #[test]
+fn nodes_as_json_say_what_outputs_carry() {
+    let bench = Bench::new();
+    let outputs = |node: &str| bench.json(&["nodes", node, "--json"])[0]["outputs"].clone();
+    let softbody = outputs("Softbody");
+    assert_eq!((&softbody[0]["name"], &softbody[0]["carries"]), (&json!("surface"), &json!(["mesh"])));
+    assert_eq!((&softbody[1]["carries"], &softbody[1]["like"]), (&json!(["tets"]), &Value::Null));
+    let merged = outputs("Merge");
+    assert_eq!((&merged[0]["carries"], &merged[0]["like"]), (&Value::Null, &json!("geometry")));
+}
+
+#[test]
 fn a_valid_graph_has_no_faults() {
     let bench = Bench::new();
     assert_eq!(bench.done(&["check", "g.json"]), "");

@@ -98,6 +98,20 @@ fn what_is_probably_not_meant_is_noted_by_check_and_by_cook() {
 }
 
 #[test]
+fn a_note_on_a_control_does_not_keep_it_from_the_nodes_that_read_it() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 3]}, "controls": {"turn": {"expr": "vec(0, pi*time, 0)"}}, "nodes": {
+            "skin": {"type": "Mesh_Primitive"},
+            "one": {"type": "Transform", "inputs": {"geometry": "skin"}, "params": {"rotate": {"control": "turn"}}},
+            "two": {"type": "Transform", "inputs": {"geometry": "skin"}, "params": {"rotate": {"control": "turn"}}}
+        }, "outputs": {"one": "one", "two": "two"}}"#,
+    );
+    let found = notes(&bench, &["--format", "json"]);
+    assert!(found.len() == 1 && found[0].contains("a multiple of `pi`"), "{found:?}");
+    assert_eq!(bench.read_json("out/one.0003.json"), bench.read_json("out/two.0003.json"));
+}
+
+#[test]
 fn notes_with_strict_exit_with_4_and_files_are_written() {
     let bench = two_curves(r#""width": 0.1"#, r#""wind""#);
     let strict = |args: &[&str]| bench.run(&[args, &["--strict"]].concat());
@@ -157,6 +171,8 @@ fn a_mask_that_is_zero_everywhere_is_noted() {
     let expected = "`wind` (Curve_Wind): the mask `m` of `global_rotate` is 0 everywhere (frames 1-3). `global_rotate` has \
                     no effect. Look at where the attribute `m` is made.";
     assert_eq!(notes(&graph("0*frame"), &[]), [expected]);
+    let still = notes(&graph("0"), &["--frames", "1-3x0.05", "--threads", "1"]);
+    assert!(still[0].contains("is 0 everywhere. `global_rotate` has"), "a mask that is still has one frame: {still:?}");
     assert_eq!(notes(&graph("max(frame - 2, 0)"), &[]), [""; 0]);
     let bench = graph("1");
     let text = std::fs::read_to_string(bench.path("g.json")).unwrap();

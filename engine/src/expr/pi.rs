@@ -1,7 +1,7 @@
 //! Whether `pi` is a term of a value: then the value is in radians, whatever unit was meant.
 
 use super::ast::{Ast, Node};
-use super::code::Binary;
+use super::code::{Binary, Unary};
 use super::functions::{Each, FunctionKind};
 
 /// Whether `pi` reaches the value of the last node as a term or factor. Not through a function such as `sin` or
@@ -22,7 +22,10 @@ pub(super) fn is_term(ast: &Ast) -> bool {
             Node::Call(function, first, count) => {
                 let keeps_unit = matches!(
                     function.kind,
-                    FunctionKind::Each(Each::Binary(Binary::Min | Binary::Max) | Each::Clamp | Each::Mix)
+                    FunctionKind::Vector
+                        | FunctionKind::Each(
+                            Each::Binary(Binary::Min | Binary::Max) | Each::Unary(Unary::Abs) | Each::Clamp | Each::Mix
+                        )
                 );
                 let arguments = ast.arguments.iter().skip(*first as usize).take(*count as usize);
                 keeps_unit && arguments.into_iter().any(of)
@@ -43,6 +46,8 @@ mod tests {
         for text in ["pi", "pi/2", "-pi*time", "frame < 3 ? 0 : pi", "clamp(pi, 0, 90)", "mix(0, 2*pi, time)"] {
             assert!(is_term(text), "{text}");
         }
+        let has_vector = |text: &str| Expr::parse_components(text, &Scope::default()).unwrap()[0].has_pi_as_term();
+        assert!(has_vector("vec(0, pi*time, 0)") && !has_vector("vec(0, sin(pi*time), 0)"));
         for text in ["30*sin(2*pi*time)", "degrees(pi/2)", "2*180/pi", "90", "atan2(1, time)*180/pi", "pi/pi"] {
             assert!(!is_term(text), "{text}");
         }

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use super::case::Call;
@@ -20,7 +21,15 @@ pub(crate) struct Outcome {
     pub(crate) slow: bool,
     /// Whether it did not end although it was asked to.
     pub(crate) hung: bool,
+    pub(crate) stdout: Vec<u8>,
     pub(crate) stderr: String,
+}
+
+impl Outcome {
+    /// Whether it ended by itself.
+    pub(crate) fn is_whole(&self) -> bool {
+        !(self.slow || self.hung || self.signalled)
+    }
 }
 
 /// The patience of a torture.
@@ -56,15 +65,19 @@ pub(crate) fn shell_words(program: &Path, call: &Call) -> Vec<String> {
 #[allow(clippy::disallowed_methods, reason = "measures how long a child process takes; no result depends on it")]
 pub(crate) fn run(program: &Path, call: &Call, folder: &Path, patience: Patience) -> Result<Outcome, String> {
     let failed = |error: std::io::Error| format!("`{}` could not be run: {error}", program.display());
-    let stderr = folder.with_extension("stderr");
-    let stdout = if call.full_stdout {
-        File::options().write(true).open("/dev/full").map_err(failed)?.into()
-    } else {
-        Stdio::null()
+    // Beside the case's folder, a name for each call: several run at once.
+    static CALLS: AtomicUsize = AtomicUsize::new(0);
+    let name = CALLS.fetch_add(1, Ordering::Relaxed);
+    let [stdout, stderr] = ["stdout", "stderr"].map(|end| folder.with_extension(format!("{name}.{end}")));
+    let stdin = match call.stdin {
+        Some(file) => File::open(folder.join(file)).map_err(failed)?.into(),
+        None => Stdio::null(),
     };
+    let printed = if call.full_stdout { Path::new("/dev/full") } else { &stdout };
+    let printed = File::options().write(true).create(!call.full_stdout).truncate(true).open(printed).map_err(failed)?;
     let mut command = Command::new("sh");
-    command.args(shell_words(program, call)).current_dir(folder).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
-    let mut child = command.stdout(stdout).stderr(File::create(&stderr).map_err(failed)?).spawn().map_err(failed)?;
+    command.args(shell_words(program, call)).current_dir(folder).env_remove("RUST_BACKTRACE").stdin(stdin);
+    let mut child = command.stdout(printed).stderr(File::create(&stderr).map_err(failed)?).spawn().map_err(failed)?;
     let start = Instant::now();
     let mut outcome = Outcome::default();
     let mut pause = Duration::from_millis(1);
@@ -78,7 +91,8 @@ pub(crate) fn run(program: &Path, call: &Call, folder: &Path, patience: Patience
             child.kill().map_err(failed)?;
             break child.wait().map_err(failed)?;
         }
-        if elapsed > patience.asks && !outcome.slow {
+        // Only a cook may take long; what else takes a minute hangs.
+        if elapsed > patience.asks && !outcome.slow && call.args.first().is_some_and(|verb| verb == "cook") {
             outcome.slow = true;
             send("TERM", &child);
         }
@@ -93,9 +107,17 @@ pub(crate) fn run(program: &Path, call: &Call, folder: &Path, patience: Patience
         pause = (pause * 3 / 2).min(Duration::from_millis(10));
     };
     finish(&mut outcome, status);
-    outcome.stderr = String::from_utf8_lossy(&fs::read(&stderr).unwrap_or_default()).into_owned();
-    let _ = fs::remove_file(&stderr);
+    outcome.stderr = String::from_utf8_lossy(&taken(&stderr)).into_owned();
+    outcome.stdout = taken(&stdout);
     Ok(outcome)
+}
+
+/// The bytes of a file, which is removed.
+fn taken(path: &Path) -> Vec<u8> {
+    let bytes = fs::read(path).unwrap_or_default();
+    // Of /dev/full there is none.
+    let _ = fs::remove_file(path);
+    bytes
 }
 
 fn finish(outcome: &mut Outcome, status: ExitStatus) {

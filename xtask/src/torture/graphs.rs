@@ -4,11 +4,12 @@ use serde_json::{Map, Value, json};
 
 use super::dice::Dice;
 use super::stock::Stock;
-use super::values::{edit, expression, extreme, form, keyframes, number, plausible, program, resize, scale};
+use super::values::{edit, expression, extreme, form, number, program, resize, scale};
+use super::{generate, params};
 
-/// Changes a graph in one to four ways; half of the graphs only in ways that are legal more often than not.
+/// Changes a graph in one to four ways; three of four graphs only in ways that are legal more often than not.
 pub(crate) fn mutate(graph: &mut Value, stock: &Stock, dice: &mut Dice) {
-    let is_gentle = dice.one_in(2);
+    let is_gentle = !dice.one_in(4);
     let mut count = 1;
     while count < 4 && dice.one_in(2) {
         count += 1;
@@ -25,8 +26,8 @@ pub(crate) fn mutate(graph: &mut Value, stock: &Stock, dice: &mut Dice) {
 fn mutate_gently(graph: &mut Value, stock: &Stock, dice: &mut Dice) {
     match dice.below(8) {
         0 => resize(picked(graph, dice, Value::is_number), dice),
-        1..3 => add_node(graph, stock, dice),
-        3 => {
+        1..4 => generate::grow(graph, stock, dice),
+        4 => {
             let keyed = object(graph, "nodes").into_iter().flat_map(Map::values_mut);
             let params = keyed.filter_map(|node| object(node, "params")).flat_map(Map::values_mut);
             let mut lists: Vec<&mut Value> = params.filter(|value| value.is_array() || value.is_number()).collect();
@@ -54,7 +55,7 @@ fn mutate_hard(graph: &mut Value, stock: &Stock, dice: &mut Dice) {
             }
         }
         14..16 => set_param(graph, stock, dice, false),
-        16 => add_node(graph, stock, dice),
+        16 => generate::grow(graph, stock, dice),
         _ => change_scene(graph, dice),
     }
 }
@@ -86,15 +87,14 @@ fn param_value(node: &Value, stock: &Stock, dice: &mut Dice, is_gentle: bool) ->
     let Some(at) = dice.index(params.len()) else { return ("seed".into(), extreme(dice)) };
     let param = &params[at];
     let value = match dice.below(8) {
-        _ if param.name == "code" => json!(program(dice)),
         0 if !is_gentle => extreme(dice),
         1 if !is_gentle => number(dice),
-        2 => {
-            let value = plausible(param, dice);
+        2 if !is_gentle => {
+            let value = params::plain(param, dice);
             form(dice, &value)
         }
-        3 => keyframes(dice, param),
-        _ => plausible(param, dice),
+        _ if param.name == "code" => json!(program(dice)),
+        _ => params::any_form(param, dice),
     };
     (param.name.clone(), value)
 }
@@ -104,64 +104,12 @@ fn set_param(graph: &mut Value, stock: &Stock, dice: &mut Dice, is_gentle: bool)
     let Some(nodes) = object(graph, "nodes") else { return };
     let Some(node) = dice.index(nodes.len()).and_then(|at| nodes.values_mut().nth(at)) else { return };
     let (name, value) = param_value(node, stock, dice, is_gentle);
-    if node.is_object() {
+    // A null that is not meant: only geometry would fit.
+    if node.is_object() && !(is_gentle && value.is_null()) {
         if !node["params"].is_object() {
             node["params"] = json!({});
         }
         node["params"][name] = value;
-    }
-}
-
-/// Sources of the graph's wires into inputs that need a component; of all wires if none does.
-fn sources(graph: &Value, needs: Option<&String>, stock: &Stock) -> Vec<Value> {
-    let (mut fitting, mut all) = (Vec::new(), Vec::new());
-    for node in graph["nodes"].as_object().into_iter().flat_map(Map::values) {
-        let known = node["type"].as_str().and_then(|name| stock.node_type(name));
-        for input in known.into_iter().flat_map(|known| &known.inputs) {
-            let wire = &node["inputs"][&input.name];
-            let wires = wire.as_array().map_or_else(|| vec![wire.clone()], Clone::clone);
-            let wires = wires.into_iter().filter(Value::is_string);
-            let list = if input.needs.as_ref() == needs { &mut fitting } else { &mut all };
-            list.extend(wires);
-        }
-    }
-    if fitting.is_empty() { all } else { fitting }
-}
-
-/// Adds a node of any type, wired to any others, and makes it an output or the input of another.
-fn add_node(graph: &mut Value, stock: &Stock, dice: &mut Dice) {
-    let Some(at) = dice.index(stock.types.len()) else { return };
-    let added = &stock.types[at];
-    let mut inputs = Map::new();
-    for input in &added.inputs {
-        let from = sources(graph, input.needs.as_ref(), stock);
-        let mut wire = || dice.index(from.len()).map_or(json!("none"), |at| from[at].clone());
-        let wire = if input.is_list { json!([wire(), wire()]) } else { wire() };
-        if !dice.one_in(12) {
-            inputs.insert(input.name.clone(), wire);
-        }
-    }
-    let Some(nodes) = object(graph, "nodes") else { return };
-    let mut params = Map::new();
-    for param in &added.params {
-        if dice.one_in(5) {
-            params.insert(param.name.clone(), plausible(param, dice));
-        } else if param.name == "code" {
-            params.insert(param.name.clone(), json!(program(dice)));
-        } else if param.name == "file" {
-            params.insert(param.name.clone(), json!(format!("in/{}", stock.files[dice.below(stock.files.len())].0)));
-        }
-    }
-    nodes.insert("added".into(), json!({"type": added.name, "inputs": inputs, "params": params}));
-    let nodes = object(graph, "nodes").into_iter().flat_map(Map::values_mut);
-    if dice.one_in(3)
-        && let Some(inputs) = nodes.filter_map(|node| object(node, "inputs")).nth(dice.below(8))
-        && let Some(input) = inputs.values_mut().next()
-    {
-        *input = if input.is_array() { json!(["added"]) } else { json!("added") };
-    } else if let Some(outputs) = object(graph, "outputs") {
-        outputs
-            .insert("added".into(), if dice.one_in(3) { json!({"from": "added", "v": true}) } else { json!("added") });
     }
 }
 
@@ -284,15 +232,15 @@ fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::torture::stock::{Input, NodeType, Param};
+    use crate::torture::stock::{Input, NodeType, Output, Param};
 
     fn stock() -> Stock {
-        let param = Param { name: "density".into(), default: json!(5), legal: vec![json!(0.0)] };
-        let types = vec![NodeType {
-            name: "Merge".into(),
-            inputs: vec![Input { name: "geometry".into(), is_list: true, needs: None }],
-            params: vec![param],
-        }];
+        let param =
+            Param { name: "density".into(), kind: "a number".into(), soft: Some([0.0, 9.0]), ..Param::default() };
+        let input = Input { name: "geometry".into(), is_list: true, ..Input::default() };
+        let output = Output { name: "geometry".into(), carries: Some(vec!["mesh".into()]) };
+        let merge = NodeType { name: "Merge".into(), inputs: vec![input], params: vec![param], outputs: vec![output] };
+        let types = vec![merge];
         Stock { graphs: Vec::new(), files: vec![("a.obj".into(), Vec::new())], types }
     }
 
@@ -310,15 +258,7 @@ mod tests {
             value
         };
         assert_eq!(mutated(9), mutated(9));
-        assert!((0..200).filter(|seed| mutated(*seed) != graph()).count() > 170);
-    }
-
-    #[test]
-    fn added_nodes_are_wired_to_what_is_there() {
-        let mut value = graph();
-        add_node(&mut value, &stock(), &mut Dice::new(3));
-        assert_eq!(value["nodes"]["added"]["type"], "Merge");
-        assert_eq!(value["nodes"]["added"]["inputs"]["geometry"], json!(["a", "a"]), "the graph's only wire");
+        assert!((0..200).filter(|seed| mutated(*seed) != graph()).count() > 150);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Judges a run case: what must never happen, whatever the input.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
 use super::call::Outcome;
@@ -43,6 +44,9 @@ pub(crate) fn ending(call: &Call, outcome: &Outcome) -> Option<String> {
     if let Some(text) = BUGS.iter().find(|text| outcome.stderr.contains(**text)) {
         return Some(format!("stderr says `{text}`"));
     }
+    if let Some(found) = printed(call, outcome) {
+        return Some(found);
+    }
     match (outcome.code, outcome.signal) {
         (Some(code), _) if !CODES.contains(&code) => Some(format!("exit code {code}")),
         (Some(130), _) if !outcome.signalled && !outcome.slow => Some("exit code 130 without a signal".into()),
@@ -59,20 +63,44 @@ pub(crate) fn ending(call: &Call, outcome: &Outcome) -> Option<String> {
     }
 }
 
-/// Files of the case that are lost or changed.
+/// What is wrong with stdout, which is for data only.
+fn printed(call: &Call, outcome: &Outcome) -> Option<String> {
+    let has = |word: &str| call.args.iter().any(|arg| arg == word);
+    let reports = call.args.windows(2).any(|pair| pair == ["--report", "-"]);
+    let is_cook = call.args.first().is_some_and(|verb| verb == "cook") && !has("--help");
+    if call.full_stdout || outcome.stdout.is_empty() || !(is_cook || has("--json")) {
+        return None;
+    }
+    if is_cook && !reports {
+        return Some("a cook prints to stdout".into());
+    }
+    let is_complete = serde_json::from_slice::<serde::de::IgnoredAny>(&outcome.stdout).is_ok();
+    (!is_complete && outcome.is_whole()).then(|| "stdout is not JSON".into())
+}
+
+/// Files, links and pipes of the case that are lost or changed.
 pub(crate) fn lost(case: &Case, folder: &Path) -> Option<String> {
     let changed = |(path, bytes): &&(String, Vec<u8>)| fs::read(folder.join(path)).ok().as_ref() != Some(bytes);
-    case.files.iter().find(changed).map(|(path, _)| format!("`{path}` is lost or changed"))
+    if let Some((path, _)) = case.files.iter().find(changed) {
+        return Some(format!("`{path}` is lost or changed"));
+    }
+    // A link that leads nowhere may be replaced by a file.
+    let is_there = |(link, to): &&(&str, String)| match fs::read_link(folder.join(link)) {
+        Ok(leads) => leads == Path::new(to),
+        Err(_) => *link == "dangling",
+    };
+    let link = case.links.iter().find(|link| !is_there(link)).map(|(link, _)| *link);
+    let is_pipe = |path: &&&str| fs::metadata(folder.join(path)).is_ok_and(|about| about.file_type().is_fifo());
+    let gone = link.or_else(|| case.pipes.iter().find(|path| !is_pipe(path)).copied());
+    gone.map(|path| format!("`{path}` is lost or replaced"))
 }
 
-/// Temporaries of files that a call left although it ended by itself.
-pub(crate) fn temporaries(folder: &Path, outcome: &Outcome) -> Option<String> {
-    outcome.code?;
-    let left = files(folder).into_keys().find(|path| path.to_string_lossy().contains(".tmp-"));
-    left.map(|path| format!("the temporary `{}` is left", path.display()))
+/// The temporaries of files below `folder`.
+pub(crate) fn temporaries(folder: &Path) -> BTreeSet<PathBuf> {
+    files(folder).into_keys().filter(|path| path.to_string_lossy().contains(".tmp-")).collect()
 }
 
-/// Files under a final name that are not complete, and geometry that `reads` refuses.
+/// Files under a final name that are not complete or have numbers that are none, and geometry that `reads` refuses.
 pub(crate) fn incomplete(case: &Case, folder: &Path, mut reads: impl FnMut(&Path) -> bool) -> Option<String> {
     for (path, bytes) in files(folder) {
         let text = path.to_string_lossy();
@@ -93,16 +121,24 @@ pub(crate) fn incomplete(case: &Case, folder: &Path, mut reads: impl FnMut(&Path
         if !complete {
             return Some(format!("`{text}` is not complete"));
         }
+        if let Some(word) = not_a_number(&path, &bytes) {
+            return Some(format!("`{text}` has the number {word}"));
+        }
     }
     None
 }
 
+/// A number of a text file that is none.
+fn not_a_number(path: &Path, bytes: &[u8]) -> Option<&'static str> {
+    let is_text = path.extension().is_some_and(|ending| ending == "usda" || ending == "obj");
+    let text = if is_text { String::from_utf8_lossy(bytes) } else { "".into() };
+    let words = text.split([' ', '\n', '(', ')', '[', ']', ',', '/']).map(|word| word.trim_start_matches('-'));
+    words.filter_map(|word| ["nan", "inf", "NaN"].into_iter().find(|none| *none == word)).next()
+}
+
 /// How two folders differ.
 pub(crate) fn difference(a: &Path, b: &Path) -> Option<String> {
-    let drawn = |path: &PathBuf| path.to_string_lossy().contains(".tmp-");
-    let (mut left, mut right) = (files(a), files(b));
-    left.retain(|path, _| !drawn(path));
-    right.retain(|path, _| !drawn(path));
+    let (left, right) = (files(a), files(b));
     let paths = left.keys().chain(right.keys()).find(|path| left.get(*path) != right.get(*path))?;
     Some(format!("`{}` has other bits in `{}` than in `{}`", paths.display(), b.display(), a.display()))
 }
@@ -145,6 +181,26 @@ mod tests {
         let in_order = Call { succeeds: true, ..Call::default() };
         let outcome = Outcome { code: Some(4), ..Outcome::default() };
         assert_eq!(ending(&in_order, &outcome), Some("exit code 4 of a command in order".into()));
+    }
+
+    #[test]
+    fn a_cook_prints_a_report_or_nothing() {
+        let found = |args: &[&str], stdout: &str| {
+            let outcome = Outcome { code: Some(0), stdout: stdout.into(), ..Outcome::default() };
+            ending(&Call::new(args), &outcome)
+        };
+        assert_eq!(found(&["cook", "g.json", "--report", "-"], "{}"), None);
+        assert_eq!(found(&["cook", "g.json", "--report", "-"], "{"), Some("stdout is not JSON".into()));
+        assert_eq!(found(&["check", "g.json", "--json"], "NaN"), Some("stdout is not JSON".into()));
+        assert_eq!(found(&["cook", "g.json"], "done"), Some("a cook prints to stdout".into()));
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_found_and_names_are_not() {
+        let found = |bytes: &[u8]| not_a_number(Path::new("a.usda"), bytes);
+        assert_eq!(found(b"(0, -inf, 1)"), Some("inf"));
+        assert_eq!(found(b"[nan]"), Some("nan"));
+        assert_eq!(found(b"def \"nano\" # info"), None);
     }
 
     #[test]

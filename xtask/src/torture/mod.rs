@@ -5,8 +5,13 @@ mod bytes;
 mod call;
 mod case;
 mod dice;
+mod file_cases;
+mod generate;
+mod graph_cases;
 mod graphs;
 mod judge;
+mod kill_cases;
+mod params;
 mod stock;
 mod values;
 
@@ -41,6 +46,9 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
 }
+
+/// As many seeds of slow cases are printed.
+const MOST_SLOW: usize = 30;
 
 /// A call is asked to stop after ten seconds, and hangs if it then takes until a minute has passed.
 const PATIENCE: Patience = Patience { asks: Duration::from_secs(10), hangs: Duration::from_secs(60) };
@@ -110,18 +118,30 @@ struct Torture {
 struct Tally {
     /// Of each kind the number of cases, and of their calls by how they ended.
     kinds: BTreeMap<&'static str, (usize, BTreeMap<String, usize>)>,
-    slow: usize,
+    /// The case under way.
+    seed: u64,
+    /// Seeds of cases with calls that were stopped because they took long.
+    slow: Vec<u64>,
+    /// Cooks of graphs with nothing else wrong: all, and those that wrote all they were asked for.
+    graphs: [usize; 2],
     findings: usize,
 }
 
 impl Tally {
-    fn count(&mut self, kind: &'static str, outcome: &Outcome) {
+    fn count(&mut self, kind: &'static str, call: &Call, outcome: &Outcome) {
         let code = match (outcome.code, outcome.signal) {
             (Some(code), _) => code.to_string(),
             (None, signal) => format!("signal {}", signal.unwrap_or(0)),
         };
         *self.kinds.entry(kind).or_default().1.entry(code).or_default() += 1;
-        self.slow += usize::from(outcome.slow);
+        if outcome.slow {
+            self.slow.push(self.seed);
+        }
+        if call.args.first().is_some_and(|verb| verb == "cook") && matches!(kind, "mutated" | "generated") {
+            let has_cooked = outcome.code == Some(0) || outcome.slow || outcome.stderr.contains("with --strict");
+            self.graphs[0] += 1;
+            self.graphs[1] += usize::from(has_cooked);
+        }
     }
 
     fn verdict(&self) -> Result<String, String> {
@@ -135,10 +155,15 @@ impl Tally {
         }
         lines += &format!(
             "{cases} cases, {calls} calls, {} of them stopped after {} s; ",
-            self.slow,
+            self.slow.len(),
             PATIENCE.asks.as_secs()
         );
-        lines += &format!("{} findings", self.findings);
+        if !self.slow.is_empty() {
+            let seeds: Vec<String> = self.slow.iter().take(MOST_SLOW).map(u64::to_string).collect();
+            lines += &format!("of seeds {}; ", seeds.join(" "));
+        }
+        let [all, cooked] = self.graphs;
+        lines += &format!("{cooked} of {all} cooks of changed and generated graphs cooked; {} findings", self.findings);
         if self.findings == 0 { Ok(lines) } else { Err(lines) }
     }
 }
@@ -148,6 +173,7 @@ impl Torture {
     fn case(&mut self, seed: u64, keep: bool) -> Result<(), String> {
         let case = Case::of(seed, &self.stock);
         self.tally.kinds.entry(case.kind).or_default().0 += 1;
+        self.tally.seed = seed;
         let folder = self.folder.join(seed.to_string());
         let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
         if folder.exists() {
@@ -169,33 +195,67 @@ impl Torture {
     /// Takes the steps of a case until something is found: what, and the command that led there.
     fn steps(&mut self, case: &Case, folder: &Path) -> Result<Option<(String, String)>, String> {
         let mut command = String::new();
-        let mut all_done = true;
+        // Of the cooks that were not stopped the exit code, by the folder that they wrote to.
+        let mut ended: BTreeMap<String, Option<i32>> = BTreeMap::new();
         for step in &case.steps {
             let found = match step {
-                Step::Call(call) => {
-                    command = shown(call);
-                    let outcome = call::run(&self.program, call, folder, self.patience)?;
-                    self.tally.count(case.kind, &outcome);
-                    // A call that was stopped on purpose need not succeed.
-                    all_done &= outcome.code == Some(0) || call.signal.is_some();
-                    let found = judge::ending(call, &outcome)
-                        .or_else(|| judge::lost(case, folder))
-                        .or_else(|| judge::temporaries(folder, &outcome))
-                        .or_else(|| self.incomplete(case, folder));
-                    found.map(|found| format!("{found}{}", first_lines(&outcome.stderr)))
+                Step::Calls(calls) => {
+                    command = calls.iter().map(shown).collect::<Vec<_>>().join(" & ");
+                    self.calls(case, calls, folder, &mut ended)?
                 }
                 Step::Damage(below, seed) => {
                     damage(&folder.join(below), *seed, case);
                     None
                 }
-                Step::Same(a, b) if all_done => judge::difference(&folder.join(a), &folder.join(b)),
-                Step::Same(..) => None,
+                Step::Same(a, b) => match (ended.get(*a), ended.get(*b)) {
+                    (Some(one), Some(other)) if one != other => {
+                        Some(format!("the cook into `{a}` ends with {one:?}, that into `{b}` with {other:?}"))
+                    }
+                    (Some(_), Some(_)) => judge::difference(&folder.join(a), &folder.join(b)),
+                    _ => None,
+                },
             };
             if let Some(found) = found {
                 return Ok(Some((found, command)));
             }
         }
         Ok(None)
+    }
+
+    /// Runs `calls` at once and judges how they ended; `ended` gets the exit codes of cooks.
+    fn calls(
+        &mut self,
+        case: &Case,
+        calls: &[Call],
+        folder: &Path,
+        ended: &mut BTreeMap<String, Option<i32>>,
+    ) -> Result<Option<String>, String> {
+        let before = judge::temporaries(folder);
+        let run = |call| call::run(&self.program, call, folder, self.patience);
+        let outcomes: Vec<Outcome> = std::thread::scope(|scope| {
+            let running: Vec<_> = calls.iter().map(|call| scope.spawn(|| run(call))).collect();
+            let joined = running.into_iter().map(|one| one.join().unwrap_or_else(|_| Err("a call panicked".into())));
+            joined.collect::<Result<_, _>>()
+        })?;
+        for (call, outcome) in calls.iter().zip(&outcomes) {
+            self.tally.count(case.kind, call, outcome);
+            if let Some(out) = call.args.iter().skip_while(|arg| *arg != "--out").nth(1) {
+                match outcome.is_whole() {
+                    true => ended.insert(out.clone(), outcome.code),
+                    false => ended.remove(out),
+                };
+            }
+        }
+        let ending = |(call, outcome)| judge::ending(call, outcome).map(|found| (found, outcome));
+        let found = calls.iter().zip(&outcomes).find_map(ending);
+        let found = found.or_else(|| {
+            let ended_all = outcomes.iter().all(|outcome| outcome.code.is_some());
+            let left = || judge::temporaries(folder).into_iter().find(|path| ended_all && !before.contains(path));
+            let left = || left().map(|path| format!("the temporary `{}` is left", path.display()));
+            let found = judge::lost(case, folder).or_else(left).or_else(|| self.incomplete(case, folder));
+            found.map(|found| (found, &outcomes[0]))
+        });
+        Ok(found.map(|(found, outcome)| format!("{found}{}", first_lines(&outcome.stderr))))
     }
 
     fn incomplete(&self, case: &Case, folder: &Path) -> Option<String> {
@@ -246,6 +306,9 @@ fn set_up(case: &Case, folder: &Path) -> std::io::Result<()> {
         let path = folder.join(path);
         fs::create_dir_all(path.parent().unwrap_or(folder))?;
         fs::write(path, bytes)?;
+    }
+    for pipe in &case.pipes {
+        Command::new("mkfifo").arg(folder.join(pipe)).status()?;
     }
     case.links.iter().try_for_each(|(link, target)| std::os::unix::fs::symlink(target, folder.join(link)))
 }

@@ -7,27 +7,48 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 /// A node type of the catalogue.
+#[derive(Clone, Default)]
 pub(crate) struct NodeType {
     pub(crate) name: String,
     pub(crate) inputs: Vec<Input>,
     pub(crate) params: Vec<Param>,
+    pub(crate) outputs: Vec<Output>,
 }
 
 /// An input of a node type.
+#[derive(Clone, Default)]
 pub(crate) struct Input {
     pub(crate) name: String,
     pub(crate) is_list: bool,
+    pub(crate) is_optional: bool,
     /// The component it needs; `None` for any.
     pub(crate) needs: Option<String>,
 }
 
+/// An output of a node type.
+#[derive(Clone, Default)]
+pub(crate) struct Output {
+    pub(crate) name: String,
+    /// Its components; `None` for those of an input.
+    pub(crate) carries: Option<Vec<String>>,
+}
+
 /// A param of a node type.
+#[derive(Clone, Default)]
 pub(crate) struct Param {
     pub(crate) name: String,
-    /// The default, or null where it is not a value.
+    /// What it takes, in the words of the declaration.
+    pub(crate) kind: String,
+    /// The default; null where it is not a value.
     pub(crate) default: Value,
-    /// Words and bounds that the declaration names.
-    pub(crate) legal: Vec<Value>,
+    /// Words that it takes.
+    pub(crate) words: Vec<Value>,
+    /// Numbers that it takes: the lowest and the highest.
+    pub(crate) hard: [Option<f64>; 2],
+    /// Numbers that it usually gets.
+    pub(crate) soft: Option<[f64; 2]>,
+    pub(crate) is_fixed: bool,
+    pub(crate) may_be_masked: bool,
 }
 
 /// What cases are made from.
@@ -107,28 +128,37 @@ fn node_type(listed: &Value) -> Option<NodeType> {
     let named = |value: &Value| value["name"].as_str().map(str::to_owned);
     let input = |one: &Value| {
         let needs = one["needs"].as_str().map(str::to_owned);
-        Some(Input { name: named(one)?, is_list: one["list"] == true, needs })
+        Some(Input { name: named(one)?, is_list: one["list"] == true, is_optional: one["least"] == 0, needs })
     };
-    let params = listed["params"].as_array()?.iter();
+    let output = |one: &Value| {
+        let carries = one["carries"].as_array();
+        let carries = carries.map(|kinds| kinds.iter().filter_map(Value::as_str).map(str::to_owned).collect());
+        Some(Output { name: named(one)?, carries })
+    };
     Some(NodeType {
         name: named(listed)?,
         inputs: listed["inputs"].as_array()?.iter().filter_map(input).collect(),
-        params: params
-            .filter_map(|one| Some(Param { name: named(one)?, default: default(one), legal: legal(one) }))
-            .collect(),
+        params: listed["params"].as_array()?.iter().filter_map(param).collect(),
+        outputs: listed["outputs"].as_array()?.iter().filter_map(output).collect(),
     })
 }
 
-fn default(param: &Value) -> Value {
-    let text = param["default"].as_str().unwrap_or_default();
-    serde_json::from_str(text).unwrap_or_else(|_| if text.is_empty() { Value::Null } else { json!(text) })
-}
-
-fn legal(param: &Value) -> Vec<Value> {
-    let words = param["options"].as_array().into_iter().flatten().map(|option| option["word"].clone());
-    let hard = ["low", "high"].into_iter().map(|end| param["hard"][end].clone());
-    let soft = param["soft"].as_array().into_iter().flatten().cloned();
-    words.chain(hard).chain(soft).filter(|value| !value.is_null()).collect()
+fn param(listed: &Value) -> Option<Param> {
+    let text = listed["default"].as_str().unwrap_or_default();
+    let words: Vec<Value> =
+        listed["options"].as_array().into_iter().flatten().map(|option| option["word"].clone()).collect();
+    let is_word = words.iter().any(|word| word == text);
+    let soft = listed["soft"].as_array().map(|ends| ends.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
+    Some(Param {
+        name: listed["name"].as_str()?.to_owned(),
+        kind: listed["kind"].as_str()?.to_owned(),
+        default: if is_word { json!(text) } else { serde_json::from_str(text).unwrap_or_default() },
+        words,
+        hard: ["low", "high"].map(|end| listed["hard"][end].as_f64()),
+        soft: soft.and_then(|ends| ends.try_into().ok()),
+        is_fixed: listed["fixed"] == true,
+        may_be_masked: listed["mask"] == true,
+    })
 }
 
 /// JSON without comments and trailing commas.
@@ -204,6 +234,18 @@ mod tests {
         let text = "// a\n{\"k\": \"// , }\\\"\", // b\n \"l\": [1, 2, ], }";
         let value: Value = serde_json::from_str(&plain_json(text)).unwrap();
         assert_eq!(value, json!({"k": "// , }\"", "l": [1, 2]}));
+    }
+
+    #[test]
+    fn declarations_of_params_are_understood() {
+        let listed = json!({"name": "rise", "kind": "a number", "default": "0.5", "hard": {"low": 0.0, "high": null, "open": false},
+            "soft": [0.0, 2.0], "fixed": true, "mask": false, "options": []});
+        let rise = param(&listed).unwrap();
+        assert_eq!((rise.default, rise.hard, rise.soft), (json!(0.5), [Some(0.0), None], Some([0.0, 2.0])));
+        assert!(rise.is_fixed && !rise.may_be_masked);
+        let words = json!([{"word": "none"}, {"word": "perlin"}]);
+        let noise = param(&json!({"name": "noise", "kind": "one of …", "default": "none", "options": words})).unwrap();
+        assert_eq!((noise.default, noise.words), (json!("none"), vec![json!("none"), json!("perlin")]));
     }
 
     #[test]

@@ -4,7 +4,6 @@ use serde_json::{Value, json};
 
 use super::bytes::NUMBERS;
 use super::dice::Dice;
-use super::stock::Param;
 
 /// Marks a text that is written into the graph without its quotes, such as `NaN`.
 const RAW: [&str; 2] = ["\"@raw:", "@\""];
@@ -64,32 +63,6 @@ pub(crate) fn extreme(dice: &mut Dice) -> Value {
         17 => json!({"a": number(dice), "value": number(dice)}),
         18 => json!([[number(dice), number(dice), number(dice)], [number(dice), number(dice), number(dice)]]),
         _ => form(dice, &json!(1)),
-    }
-}
-
-/// A value near `default`, legal more often than not.
-pub(crate) fn plausible(param: &Param, dice: &mut Dice) -> Value {
-    if let Some(at) = dice.index(param.legal.len())
-        && dice.one_in(2)
-    {
-        return whole(&param.legal[at], &param.default);
-    }
-    let mut value = param.default.clone();
-    resize(&mut value, dice);
-    value
-}
-
-/// Two keyframes of values near the default.
-pub(crate) fn keyframes(dice: &mut Dice, param: &Param) -> Value {
-    let (first, second) = (plausible(param, dice), plausible(param, dice));
-    json!({"keyframes": [[1, first], [1.5 + dice.below(9) as f64, second]]})
-}
-
-/// A bound as an integer where the default is one.
-fn whole(value: &Value, default: &Value) -> Value {
-    match (value.as_f64(), default.is_i64()) {
-        (Some(number), true) if number.abs() < 1e15 => json!(number as i64),
-        _ => value.clone(),
     }
 }
 
@@ -230,13 +203,6 @@ mod tests {
         assert!(values.iter().any(Value::is_object) && values.iter().any(Value::is_array));
         assert!(values.iter().any(|value| value.as_str().is_some_and(|text| text.len() > 1 << 14)));
         assert!(values.iter().any(|value| value == &json!("@raw:1e999@")));
-    }
-
-    #[test]
-    fn bounds_of_integers_are_integers() {
-        assert_eq!(whole(&json!(4.0), &json!(1)), json!(4));
-        assert_eq!(whole(&json!(4.5), &json!(1.0)), json!(4.5));
-        assert_eq!(whole(&json!("perlin"), &json!("none")), json!("perlin"));
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::keyframes::{Keys, interpolation, keys};
 use super::literal::{literal, ramp};
 use crate::files::unreadable;
 use crate::graph::Scene;
-use crate::graph::fault::{Fault, code};
+use crate::graph::fault::{Fault, FaultClass, code};
 use crate::graph::json::{Entry, Json, did_you_mean, find, keep, refuse_unknown, shown};
 use crate::node::Node;
 use crate::param::{Keyframes, ParamSpec, Shape, Source, Unset, Value, euler_to_turn};
@@ -286,7 +286,8 @@ impl<'a> Reader<'a, '_> {
                 self.faults[before..]
                     .iter_mut()
                     .for_each(|fault| fault.fact += &format!(", in the control `{}`", shown(text)));
-                let read = match self.faults.get(before) {
+                // A remark is no reason to do without the value.
+                let read = match self.faults[before..].iter().find(|fault| fault.class != FaultClass::Note) {
                     Some(fault) => Err(fault.clone()),
                     None => Ok(source.clone()?),
                 };
