@@ -5,12 +5,14 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use engine::cook::NodeReport;
+use engine::frames::FrameSet;
 use engine::graph::{Graph, GraphNode, Link};
 use engine::plan::{Request, Window};
+use engine::time::Frame;
 use serde_json::{Value, json};
 
 use crate::args::{Frames, Setting};
-use crate::failure::{Failure, exit_of_error};
+use crate::failure::{Exit, Failure, exit_of_error};
 use crate::report::why_not_needed;
 use crate::{load, memory};
 
@@ -36,6 +38,10 @@ pub struct ExplainArgs {
 /// Of a request with more frames, only these are planned, so that the answer comes at once.
 const MOST_FRAMES: usize = 10_000;
 
+/// Frames farther from frame 0 or the scene's first are not planned where anything depends on frames before: a plan goes
+/// through all of these.
+const FARTHEST: f64 = 1e6;
+
 /// Prints the plan.
 ///
 /// # Errors
@@ -48,6 +54,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         frames: Frames::of_scene(args.frames.as_ref(), &graph.scene)?,
     };
     let planned = Request { frames: request.frames.iter().take(MOST_FRAMES).collect(), ..request.clone() };
+    within_reach(&planned.frames, &graph)?;
     let rehearsed = engine.rehearse(&graph, &planned);
     let report = rehearsed.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
     let text = match args.json {
@@ -74,6 +81,23 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     };
     std::io::stdout().write_all(text.as_bytes())?;
     Ok(())
+}
+
+/// Refuses frames with a history too long to be gone through at once.
+fn within_reach(frames: &FrameSet, graph: &Graph) -> Result<(), Failure> {
+    let first = graph.scene.first as f64;
+    let history = |frame: Frame| (frame.number() - first).abs().max(frame.number().abs());
+    let ends = [frames.first(), frames.last()].into_iter().flatten();
+    let Some(frame) = ends.filter(|frame| history(*frame) > FARTHEST).last() else { return Ok(()) };
+    if graph.nodes.iter().all(|node| node.node().is_none_or(|declared| declared.cook.word() == "pure")) {
+        return Ok(());
+    }
+    let line = format!(
+        "frame {frame} is {} frames away from frame 0 or the start of the scene, and `explain` would go through all of \
+         them; ask for --frames within {FARTHEST}",
+        history(frame)
+    );
+    Err(Failure::new(Exit::CommandLine, line))
 }
 
 fn describe(node: &NodeReport, frames: usize, text: &mut String) {

@@ -146,7 +146,9 @@ pub fn faulty(path: &Path, faults: &[Fault]) -> Failure {
 pub fn engine(threads: usize, ceiling: Ceiling) -> Result<Engine, Failure> {
     use crate::failure::Exit;
     numerics::simd::Path::from_environment().map_err(|error| Failure::new(Exit::CommandLine, error.to_string()))?;
-    Engine::new(&Settings { threads, memory: ceiling.bytes, ceiling }).map_err(|error| Failure::new(Exit::Cook, error))
+    let engine = Engine::new(&Settings { threads, memory: ceiling.bytes, ceiling });
+    let hint = "set fewer --threads, or raise the limits of the process (`ulimit -u`, `ulimit -v`)";
+    engine.map_err(|error| Failure::new(Exit::Cook, format!("{error}; {hint}")))
 }
 
 /// The indices of the outputs with these names; all if `names` is empty.

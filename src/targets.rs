@@ -107,6 +107,13 @@ impl Targets {
     /// If there is such a target.
     pub fn check(&self) -> Result<(), Failure> {
         self.differ()?;
+        if let Some(target) = self.written.iter().find(|target| target.is_stream()) {
+            let hint = if target.option == "--report" { "; write - for stdout, or the path of a file" } else { "" };
+            return Err(Failure::file(format!(
+                "`{}` is a stream or a device, not a file{hint}",
+                target.path.display()
+            )));
+        }
         let read: BTreeMap<Identity, &'static str> =
             self.read.iter().filter_map(|(path, why)| Some((identity(path)?, *why))).collect();
         let mut written: BTreeMap<Identity, &Target> = BTreeMap::new();
@@ -170,6 +177,14 @@ impl Target {
             false => format!("{option} and {} would both write `{}`", other.option, path.display()),
         };
         Failure::new(exit, format!("{fact}; choose another name"))
+    }
+
+    /// Whether it is a name of the system, such as `/dev/stdout`: a link to whatever stdout is, which must not be replaced
+    /// even where that is a file.
+    fn is_stream(&self) -> bool {
+        let folder = self.path.parent().and_then(|folder| folder.canonicalize().ok());
+        let is_system = |folder: PathBuf| folder == Path::new("/dev") || folder.starts_with("/proc");
+        matches!(self.names, Names::One(_)) && folder.is_some_and(is_system)
     }
 
     /// One of its files as a user knows it.
@@ -312,6 +327,20 @@ mod tests {
         let other = Names::PerFrame { stem: "HAIR".into(), ending: "obj".into(), frames: frames(&[2, 12345]) };
         assert_eq!(names.common(&other, false), None);
         assert_eq!(names.common(&other, true), Some("hair.12345.obj".into()));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_name_of_the_system_is_not_replaced_by_a_file() {
+        for path in ["/dev/stdout", "/dev/../dev/stderr", "/dev/fd/1", "/proc/self/fd/1", "/dev/null"] {
+            let mut targets = Targets::default();
+            targets.writes("--report", Exit::CommandLine, Path::new(path));
+            let refused = targets.check().unwrap_err();
+            assert_eq!(refused.exit, Exit::File);
+            let said =
+                format!("`{path}` is a stream or a device, not a file; write - for stdout, or the path of a file");
+            assert_eq!(refused.lines, [said]);
+        }
     }
 
     #[test]

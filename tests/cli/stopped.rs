@@ -311,6 +311,12 @@ fn a_billion_frames_take_no_memory_before_they_are_cooked() {
     let ran = limited("explain g.json");
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     assert!(ran.stdout.starts_with("1000000000 frames, of which the first 10000 are planned\n"), "{}", ran.stdout);
+    let far = Bench::with_graph(
+        &FAR_BACK.replace("FIRST", "1").replace("START", "").replace("OUTPUT", "body").replace("NODE", "body"),
+    );
+    let ran = far.run(&["explain", "g.json", "--frames", "1000000000"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("frame 1000000000 is 1000000000 frames away from"), "{}", ran.stderr);
     let ran = limited("check g.json");
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let ran = limited("cook g.json --format json --frames 1,999999999-1000000000 --preview");

@@ -109,7 +109,7 @@ impl Finished<'_> {
             if let Carries::Kinds(kinds) = declared.carries {
                 check_kinds(declared.name, kinds, geometry)?;
             }
-            check_finite(geometry, &known)?;
+            check_finite(geometry, &known).map_err(|error| error.hint(NOT_FINITE))?;
             let fresh = geometry.arrays().into_iter().filter(|(address, _)| known.binary_search(address).is_err());
             new_bytes += fresh.map(|(_, bytes)| bytes).sum::<usize>();
             cooked.push(match self.cx.live {
@@ -150,6 +150,9 @@ fn check_kinds(output: &str, kinds: &[Kind], geometry: &Geometry) -> Result<()> 
         None => Ok(()),
     }
 }
+
+/// What to do about numbers beyond single precision that a node made of finite ones.
+const NOT_FINITE: &str = "a param of the node is too large or too small, or a number in its inputs";
 
 /// Refuses NaN and infinity in arrays that no input holds: those were checked where they were made.
 pub(super) fn check_finite(geometry: &Geometry, known: &[usize]) -> Result<()> {

@@ -73,7 +73,12 @@ impl Engine {
             if error.is_none() && faults.len() == before {
                 sound.insert(params.as_ptr());
             }
-            faults.extend(error.map(|error| fault(graph, index, error)));
+            let at_start = error.map(|error| fault(graph, index, error));
+            // It may be what was found over time.
+            let is_known =
+                |new: &Fault| faults[before..].iter().any(|old| (old.line, old.column) == (new.line, new.column));
+            let at_start = at_start.filter(|new| !is_known(new));
+            faults.extend(at_start);
             let requested = plan.nodes[index].needed || needed_by.is_none();
             if faults.len() == before && requested && declared.inputs.is_empty() && holds_data(specs, params) {
                 sources.push(index);

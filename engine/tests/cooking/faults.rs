@@ -29,7 +29,13 @@ fn an_error_names_node_and_frame_and_everything_else_is_cooked() {
     let hint = "this is a bug in convect; please report it with the graph";
     let cases = [
         (1, ErrorKind::Panic, format!("it failed unexpectedly: all is lost; {hint}")),
-        (2, ErrorKind::NotFinite, "`P` of point 1 of the points is NaN or infinite".into()),
+        (
+            2,
+            ErrorKind::NotFinite,
+            "`P` of point 1 of the points is NaN or infinite; a param of the node is too large or too small, or a number \
+             in its inputs"
+                .into(),
+        ),
         (3, ErrorKind::Refused, "there is no such frame; ask for another".into()),
         (4, ErrorKind::Contract, format!("it returns no `points`; {hint}")),
     ];

@@ -182,7 +182,7 @@ pub(crate) fn command_line(stock: &Stock, dice: &mut Dice) -> Case {
         "--report",
         "/dev/full",
         "/dev/null",
-        "/dev/stdout",
+        "/dev/fd/1",
         "-v",
         "-q",
         "--strict",
