@@ -1,11 +1,15 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
 //! keeps a liquid's volume ([`pressure`]), the surface as a mesh ([`extract`]), velocity
-//! on faces ([`velocity`]). Functions take and return plain slices;
+//! on faces ([`velocity`]), and all of it moved frame by frame ([`step`]). Functions take and return plain slices;
 //! nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
 #![allow(clippy::needless_range_loop, reason = "a loop over cells reads and writes many arrays")]
+
+// Test surfaces are shared with examples, which know the crate by its name.
+#[cfg(test)]
+extern crate self as liquid;
 
 pub mod extract;
 pub mod fields;
@@ -14,4 +18,5 @@ pub mod open_share;
 pub mod pressure;
 pub mod rows;
 pub mod stencil;
+pub mod step;
 pub mod velocity;

@@ -25,7 +25,7 @@ use cycle::Multigrid;
 use level::{CellKind, HALO, Level, SurfaceDistances};
 
 /// Least distance of the surface from the centre of a liquid cell, in cells: bounds the matrix.
-pub const LEAST_SURFACE_DISTANCE: f32 = 0.01;
+pub const LEAST_SURFACE_DISTANCE: f32 = 1e-4;
 
 /// The grid that a pressure is solved on. Cells that are not stored are solid.
 #[derive(Clone, Copy, Debug)]

@@ -135,22 +135,28 @@ impl<const F: usize> Layer<'_, F> {
     }
 
     fn gain(&self, line: &Line, n: usize, faces: FaceMask) -> Gain<F> {
-        let pairs = self.pairs(line, n);
+        let pairs = pairs(line, n as u32);
         let mut gain = Gain { at: line.at + n as u32, faces, values: [[0.0; 3]; F] };
         for axis in (0..3).filter(|axis| faces >> axis & 1 == 1) {
-            let is_known = |at: Option<usize>| at.filter(|at| self.known[*at] >> axis & 1 == 1);
-            let pairs = pairs.map(|[near, behind]| (is_known(near), is_known(behind)));
-            let linear = pairs.iter().any(|(near, behind)| near.is_some() && behind.is_some());
-            for (faces, values) in self.fields.iter().zip(&mut gain.values) {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for (near, behind) in pairs {
-                    let Some(near) = near.filter(|_| !linear || behind.is_some()) else { continue };
-                    let value = faces[axis][near];
-                    let slope = behind.map_or(0.0, |behind| value - faces[axis][behind]);
-                    sum += value + self.limited(slope);
-                    count += 1.0;
+            let is_known = |at: u32| at != NONE && self.known[at as usize] >> axis & 1 == 1;
+            let mut count = [0.0_f32; 2];
+            // Of neighbours with a known face behind them, and of the others.
+            let mut sums = [[0.0; 2]; F];
+            for [near, behind] in pairs {
+                if !is_known(near) {
+                    continue;
                 }
-                values[axis] = sum / count;
+                let linear = is_known(behind);
+                count[usize::from(!linear)] += 1.0;
+                for (faces, sums) in self.fields.iter().zip(&mut sums) {
+                    let value = faces[axis][near as usize];
+                    let slope = if linear { self.limited(value - faces[axis][behind as usize]) } else { 0.0 };
+                    sums[usize::from(!linear)] += value + slope;
+                }
+            }
+            let kind = usize::from(count[0] == 0.0);
+            for (values, sums) in gain.values.iter_mut().zip(sums) {
+                values[axis] = sums[kind] / count[kind];
             }
         }
         gain
@@ -160,17 +166,21 @@ impl<const F: usize> Layer<'_, F> {
         let slope = if slope > self.steepest { self.steepest } else { slope };
         if slope < -self.steepest { -self.steepest } else { slope }
     }
+}
 
-    /// Each neighbour of a cell of a line, and the cell behind it.
-    fn pairs(&self, line: &Line, n: usize) -> [[Option<usize>; 2]; 6] {
-        let (at, last) = (line.at as usize + n, line.len as usize - 1);
-        // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
-        let down = |by: usize| (n >= by || line.joined[0] && n + 1 == by).then(|| at - by);
-        let up = |by: usize| (n + by <= last || line.joined[1] && n + by == last + 1).then(|| at + by);
-        let row = |row: usize| (line.beside[row] != NONE).then(|| line.beside[row] as usize + n);
-        let [a, b, c, d] = PAIRS.map(|pair| pair.map(row));
-        [[down(1), down(2)], [up(1), up(2)], a, b, c, d]
-    }
+/// Each neighbour of a cell of a line, and the cell behind it.
+#[inline(always)]
+fn pairs(line: &Line, n: u32) -> [[u32; 2]; 6] {
+    let at = line.at + n;
+    // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
+    let below = n + u32::from(line.joined[0]);
+    let above = line.len - 1 - n + u32::from(line.joined[1]);
+    let down = |by: u32| if by <= below { at - by } else { NONE };
+    let up = |by: u32| if by <= above { at + by } else { NONE };
+    let row = |row: usize| if line.beside[row] == NONE { NONE } else { line.beside[row] + n };
+    let pair = |[near, behind]: [usize; 2]| [row(near), row(behind)];
+    let [a, b, c, d] = PAIRS;
+    [[down(1), down(2)], [up(1), up(2)], pair(a), pair(b), pair(c), pair(d)]
 }
 
 /// Cuts spans wherever a row beside them begins or ends.

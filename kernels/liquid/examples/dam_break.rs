@@ -1,0 +1,99 @@
+//! The laws of a moving liquid on larger grids, and what a frame costs: `cargo run --release -p liquid --example dam_break`.
+//! `-- 2` runs on two threads.
+
+#[path = "../src/step/tests/plain.rs"]
+mod plain;
+
+use std::time::Instant;
+
+use liquid::step::{Domain, Liquid, Settings, Surface, Surroundings};
+use plain::PlainLevelSet;
+
+const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], solid: None };
+
+/// T = t·√(2g/a) and Z = front ÷ a of a column twice as high as its base a (Martin and Moyce 1952).
+const MEASURED: [(f64, f64); 7] =
+    [(1.63, 1.89), (1.83, 2.11), (1.98, 2.33), (2.2, 2.56), (2.32, 2.78), (2.51, 3.0), (2.65, 3.22)];
+
+fn block(low: [f32; 3], high: [f32; 3]) -> impl Fn([f32; 3]) -> f32 {
+    move |p| (0..3).map(|axis| (low[axis] - p[axis]).max(p[axis] - high[axis])).fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// The farthest place on the floor that liquid has reached, in cells.
+fn front(liquid: &Liquid<PlainLevelSet>) -> f64 {
+    let view = liquid.surface().view();
+    let mut front = 0.0;
+    for span in view.rows.row(0, 1) {
+        for x in span.start..span.end - 1 {
+            let (a, b) = (view.phi[span.at(x)], view.phi[span.at(x + 1)]);
+            if a < 0.0 && b >= 0.0 {
+                front = f64::from(x) + 0.5 + f64::from(a / (a - b));
+            }
+        }
+    }
+    front
+}
+
+fn dam(base: i32) {
+    let domain = Domain::closed([0; 3], [5 * base, 3 * base, 3]);
+    let cell = 0.05715 / f64::from(base);
+    let column = block([-99.0; 3], [base as f32, 2.0 * base as f32, 99.0]);
+    let mut liquid = Liquid::new(Settings::new(domain, cell), PlainLevelSet::new(domain, column));
+    let unit = (0.05715_f64 / (2.0 * 9.81)).sqrt();
+    let (mut now, mut line, mut ends) = (0.0, format!("base of {base} cells:"), Vec::new());
+    for (time, measured) in MEASURED {
+        liquid.step_frame(&FALLING, (time - now) * unit);
+        now = time;
+        let front = front(&liquid) / f64::from(base);
+        ends.push(front);
+        line += &format!(" {:.3}", front / measured);
+    }
+    let slope = (ends[ends.len() - 1] - ends[0]) / (MEASURED[6].0 - MEASURED[0].0);
+    println!("{line}, slope {slope:.3}, limit of Z at the end {:.2}, Z {:.2}", 1.0 + 2.0 * now, ends[6]);
+}
+
+/// Milliseconds of a frame, the mean of frames 2 to 25, and what the frames took.
+#[allow(clippy::disallowed_methods, reason = "a measurement")]
+fn cost(name: &str, n: i32, distance: impl Fn([f32; 3]) -> f32 + Sync) -> f64 {
+    let domain = Domain::closed([0; 3], [n; 3]);
+    let mut liquid = Liquid::new(Settings::new(domain, 1.0 / f64::from(n)), PlainLevelSet::new(domain, distance));
+    let (mut time, mut substeps, mut iterations, mut divergence, mut stored) = (0.0, 0, 0, 0.0_f64, 0);
+    for frame in 1..=25 {
+        let start = Instant::now();
+        let report = liquid.step_frame(&FALLING, 1.0 / 24.0);
+        if frame > 1 {
+            time += start.elapsed().as_secs_f64() * 1e3 / 24.0;
+            substeps += report.substeps;
+            iterations += report.pressure_iterations;
+            divergence = divergence.max(report.max_divergence);
+            stored = stored.max(report.stored_cells);
+        }
+    }
+    let mean = f64::from(substeps) / 24.0;
+    let each = f64::from(iterations) / f64::from(substeps);
+    println!(
+        "{name} {n}³: {time:.1} ms a frame, {mean:.1} substeps, {each:.1} iterations each, divergence · Δt {divergence:.1e}, {stored} cells stored"
+    );
+    time
+}
+
+fn costs() {
+    for n in [32, 64] {
+        let s = n as f32;
+        cost("block of 0.4 x 0.6 x 0.4,", n, block([-99.0; 3], [0.4 * s, 0.6 * s, 0.4 * s]));
+        let film = cost("pool of 5 %,", n, |p| p[1] - 0.05 * s);
+        let full = cost("pool of 95 %,", n, |p| p[1] - 0.95 * s);
+        println!("5 % costs {:.0} % of 95 %", 100.0 * film / full);
+    }
+}
+
+fn main() {
+    let threads = std::env::args().nth(1).and_then(|word| word.parse().ok()).unwrap_or(1);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    pool.install(|| {
+        println!("Dam break: front ÷ that of Martin and Moyce at T {:?}", MEASURED.map(|(time, _)| time));
+        [10, 20, 40].into_iter().for_each(dam);
+        println!("Cost on {threads} threads");
+        costs();
+    });
+}

@@ -1,0 +1,208 @@
+//! What moves with a liquid: its velocity, and what the next substep needs to know of the last.
+
+use numerics::vector::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::rows::{Cell, CellRows};
+use crate::step::domain::{Domain, Solid};
+use crate::step::{Settings, Surface, Surroundings, Wall};
+use crate::velocity::{ALL_FACES, FaceMask, Faces, MacVelocity, Sampler, Site, extrapolate, resampled};
+
+/// What gravity and pressure together added to the velocity in a substep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Gain {
+    /// On the rows of the velocity, m/s.
+    pub faces: Faces,
+    /// The length of that substep, s.
+    pub seconds: f64,
+}
+
+/// A pressure · Δt ÷ (density · cell), m/s, the first guess of a later solve.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Guess {
+    pub rows: CellRows,
+    pub q: Vec<f64>,
+}
+
+/// All that a liquid's next substep depends on besides its surface; kept exactly by any format that keeps numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    pub(super) velocity: MacVelocity,
+    /// The faces where it is known: those that touch liquid.
+    pub(super) known: Vec<FaceMask>,
+    pub(super) gain: Option<Gain>,
+    pub(super) guess: Guess,
+    pub(super) liquid_cells: usize,
+}
+
+impl Motion {
+    pub(super) fn starting<S: Surface>(
+        settings: &Settings,
+        surface: &S,
+        around: &Surroundings<'_>,
+        velocity: impl Fn(Vec3) -> Vec3 + Sync,
+    ) -> Self {
+        let cells = LiquidCells::of(&settings.domain, surface, around.solid);
+        let value = |axis: usize, cell: Cell| velocity(Site::FACES[axis].of(cell))[axis];
+        let faces = cells.rows.tabulate_with(
+            || (),
+            |(), cell, at| {
+                let open = |axis: usize| cells.moving[at] >> axis & 1 == 1;
+                [0, 1, 2].map(|axis| if open(axis) { value(axis, cell) } else { 0.0 })
+            },
+        );
+        let liquid_cells = cells.count;
+        let known = cells.known;
+        Self { velocity: MacVelocity::new(cells.rows, faces), known, liquid_cells, ..Self::default() }
+    }
+
+    /// The cells that the velocity is stored for.
+    pub fn rows(&self) -> &CellRows {
+        self.velocity.rows()
+    }
+
+    /// The velocity of the faces that touch liquid, m/s; 0 on others.
+    pub fn velocity(&self) -> &MacVelocity {
+        &self.velocity
+    }
+
+    pub(super) fn liquid_cells(&self) -> usize {
+        self.liquid_cells
+    }
+
+    /// The largest component of the velocity, m/s.
+    pub(super) fn largest_speed(&self) -> f64 {
+        let largest =
+            |field: &Vec<f32>| field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most });
+        self.velocity.faces().iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
+    }
+
+    /// The rows of the velocity and `layers` cells past the liquid.
+    pub(super) fn rows_past_liquid(&self, domain: &Domain, layers: i32) -> CellRows {
+        domain.clip(&self.rows().dilated(layers - 1))
+    }
+
+    /// A field that is known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
+    pub(super) fn continued(
+        &self,
+        faces: &Faces,
+        rows: &CellRows,
+        steepest: f32,
+        domain: &Domain,
+        solid: Option<Solid<'_>>,
+    ) -> Faces {
+        let mut known = rows.resampled(self.rows(), &self.known, 0);
+        let mut faces = resampled(rows, self.rows(), faces);
+        extrapolate(rows, &mut known, [&mut faces], steepest, u32::MAX);
+        hold_walls(domain, rows, &mut faces);
+        match solid {
+            Some(solid) => slide(rows, &faces, solid),
+            None => faces,
+        }
+    }
+}
+
+/// Nothing flows through closed walls, where the faces of the liquid have not said so.
+fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut Faces) {
+    for ([y, z], span) in rows.spans() {
+        for axis in [1, 2] {
+            if matches!(domain.wall_at(axis, [span.start, y, z]), Some(Wall::Closed | Wall::FreeSlip)) {
+                faces[axis][span.at(span.start)..][..span.len()].fill(0.0);
+            }
+        }
+        for x in [domain.low[0], domain.high[0]] {
+            let is_closed = matches!(domain.wall_at(0, [x, y, z]), Some(Wall::Closed | Wall::FreeSlip));
+            if is_closed && span.start <= x && x < span.end {
+                faces[0][span.at(x)] = 0.0;
+            }
+        }
+    }
+}
+
+/// On faces inside a solid, takes away the part that flows into or out of it.
+fn slide(rows: &CellRows, faces: &Faces, solid: Solid<'_>) -> Faces {
+    rows.tabulate_with(
+        || Sampler::new(rows),
+        |sampler, cell, at| {
+            [0, 1, 2].map(|axis| {
+                let own = faces[axis][at];
+                let point = Site::FACES[axis].of(cell);
+                if solid(point) >= 0.0 {
+                    return own;
+                }
+                let Some(normal) = normal(solid, point) else { return own };
+                let value = |other: usize| sampler.value(&faces[other], Site::FACES[other], point);
+                let mut value = value;
+                let flow: f32 = (0..3).map(|other| normal[other] * value(other)).sum();
+                own - flow * normal[axis]
+            })
+        },
+    )
+}
+
+/// The unit vector out of a solid.
+fn normal(solid: Solid<'_>, point: Vec3) -> Option<Vec3> {
+    let slope = |axis: usize| {
+        let (mut below, mut above) = (point, point);
+        below[axis] -= 0.5;
+        above[axis] += 0.5;
+        solid(above) - solid(below)
+    };
+    numerics::vector::unit([slope(0), slope(1), slope(2)])
+}
+
+/// The liquid cells of a surface, and the cells next to them.
+pub(super) struct LiquidCells {
+    /// The stored cells: liquid and all next to it, with one more beyond the walls.
+    pub rows: CellRows,
+    /// φ of each, positive where it lies beyond a wall.
+    pub level_set: Vec<f32>,
+    /// Open share of each low face.
+    pub open: [Vec<f32>; 3],
+    /// Low faces that touch liquid and are open.
+    pub moving: Vec<FaceMask>,
+    /// Low faces that touch liquid and whose velocity is known: open, or a wall of the domain.
+    pub known: Vec<FaceMask>,
+    /// Number of liquid cells.
+    pub count: usize,
+}
+
+impl LiquidCells {
+    pub(super) fn of<S: Surface>(domain: &Domain, surface: &S, solid: Option<Solid<'_>>) -> Self {
+        let view = surface.view();
+        let liquid = view.rows.filtered(|cell, at| view.phi[at] < 0.0 && domain.contains(cell));
+        let rows = domain.clip(&liquid.dilated(1));
+        let mut level_set = rows.resampled(view.rows, view.phi, view.outside);
+        Self::leave_domain(domain, &rows, &mut level_set);
+        let open = domain.open_shares(&rows, solid);
+        let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < 0.0)).collect();
+        let [moving, known] = rows.tabulate_with(
+            || (),
+            |(), cell, at| {
+                let mut masks = [0, 0];
+                for axis in 0..3 {
+                    let mut below = cell;
+                    below[axis] -= 1;
+                    if is_liquid[at] == 1 || rows.find(below).is_some_and(|at| is_liquid[at] == 1) {
+                        let is_open = open[axis][at] > 0.0;
+                        masks[0] |= u8::from(is_open) << axis;
+                        masks[1] |= u8::from(is_open || domain.wall_at(axis, cell).is_some()) << axis;
+                    }
+                }
+                masks
+            },
+        );
+        debug_assert!(moving.iter().zip(&known).all(|(moving, known)| moving & !known == 0 && *known <= ALL_FACES));
+        Self { count: liquid.len(), rows, level_set, open, moving, known }
+    }
+
+    /// Cells beyond the walls are air, and the surface is on the wall.
+    fn leave_domain(domain: &Domain, rows: &CellRows, level_set: &mut [f32]) {
+        let beyond: Vec<_> = rows.iter().enumerate().filter(|(_, cell)| !domain.contains(*cell)).collect();
+        for (at, cell) in beyond {
+            let inner = [0, 1, 2].map(|axis| cell[axis].clamp(domain.low[axis], domain.high[axis] - 1));
+            let phi = rows.find(inner).map_or(1.0, |inner| level_set[inner].abs());
+            level_set[at] = phi.max(f32::MIN_POSITIVE);
+        }
+    }
+}

@@ -1,0 +1,93 @@
+use super::*;
+use numerics::vector::length;
+use rayon::ThreadPoolBuilder;
+
+/// A dam that breaks over a ball.
+fn splash(frames: u32) -> Liquid<PlainLevelSet> {
+    let domain = Domain::closed([0; 3], [24, 16, 12]);
+    let settings = Settings::new(domain, 1.0 / 24.0);
+    let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([-9.0; 3], [9.0, 12.0, 30.0])));
+    go_on(&mut liquid, frames);
+    liquid
+}
+
+fn go_on(liquid: &mut Liquid<PlainLevelSet>, frames: u32) {
+    let ball = |p: Vec3| length([p[0] - 14.0, p[1] - 1.0, p[2] - 6.0]) - 3.2;
+    let around = Surroundings { solid: Some(&ball), ..FALLING };
+    for _ in 0..frames {
+        let report = liquid.step_frame(&around, 1.0 / 24.0);
+        assert!(report.max_divergence < 1e-4 && report.caps_hit == 0, "{report:?}");
+    }
+}
+
+fn bits(liquid: &Liquid<PlainLevelSet>) -> Vec<u32> {
+    let phi = liquid.surface().view().phi.iter();
+    phi.chain(liquid.motion().velocity().faces().iter().flatten()).map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let run = |threads| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bits(&splash(12)))
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(7));
+}
+
+#[test]
+fn a_liquid_taken_apart_and_resumed_goes_on_with_the_same_bits() {
+    fn is_stored<T: serde::Serialize + serde::de::DeserializeOwned>(_: &T) {}
+    let mut whole = splash(5);
+    is_stored(whole.motion());
+    let mut resumed = Liquid::resume(whole.settings.clone(), whole.surface().clone(), whole.motion().clone());
+    go_on(&mut whole, 4);
+    go_on(&mut resumed, 4);
+    assert!(bits(&whole) == bits(&resumed) && whole.motion() == resumed.motion());
+}
+
+#[test]
+fn memory_follows_the_liquid() {
+    let domain = Domain::closed([0; 3], [64; 3]);
+    let stored = |height: f32| {
+        let settings = Settings::new(domain, 1.0 / 64.0);
+        let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - height));
+        let report = liquid.step_frame(&FALLING, 1.0 / 24.0);
+        assert_eq!(report.liquid_cells, (height as usize) * 4096);
+        (report.stored_cells, liquid.stored_rows().len())
+    };
+    let (film, full) = (stored(3.2), stored(60.2));
+    assert!(4 * film.0 < full.0 && 4 * film.1 < full.1, "{film:?} {full:?}");
+}
+
+#[test]
+fn liquid_leaves_through_open_walls_as_it_is_told() {
+    let mut domain = Domain::closed([0; 3], [24, 12, 4]);
+    domain.walls[0][1] = Wall::Open;
+    let settings = Settings::new(domain, 1.0 / 24.0);
+    let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([-9.0; 3], [20.0, 8.0, 30.0])));
+    let start = volume(&liquid.surface().view(), &domain);
+    let mut left = 0.0;
+    for _ in 0..24 {
+        let report = liquid.step_frame(&FALLING, 1.0 / 24.0);
+        left += report.left_domain * (24.0 * 24.0 * 24.0);
+    }
+    let now = volume(&liquid.surface().view(), &domain);
+    assert!(left > 0.3 * start && (start - now - left).abs() < 0.1 * start, "{start} {now} {left}");
+}
+
+#[test]
+fn no_liquid_no_time_and_too_little_time_are_told() {
+    let domain = Domain::closed([0; 3], [8; 3]);
+    let mut none = Liquid::new(Settings::new(domain, 0.1), PlainLevelSet::new(domain, |_| 3.0));
+    let report = none.step_frame(&FALLING, 1.0 / 24.0);
+    assert_eq!((report.liquid_cells, report.substeps, report.pressure_iterations), (0, 1, 0));
+    assert_eq!(none.step_frame(&FALLING, 0.0).substeps, 0);
+    let settings = Settings { max_substeps: 3, ..Settings::new(domain, 0.1) };
+    let mut fast =
+        Liquid::new(settings, PlainLevelSet::new(domain, |p| length([p[0] - 4.0, p[1] - 4.0, p[2] - 4.0]) - 2.5));
+    fast.set_velocity(|_| [300.0, 40.0, -1.0], &FALLING);
+    let report = fast.step_frame(&FALLING, 0.25);
+    assert!(report.substeps == 3 && report.caps_hit > 0 && report.cfl_reached > 2.0, "{report:?}");
+    assert!(largest(&fast).is_finite());
+}

@@ -1,0 +1,47 @@
+//! What keeps spin.
+//!
+//! In a substep liquid is accelerated along its way; the pressure acts all at once at the end of it. To second order the
+//! velocity then lacks ½Δt²·D(∇p)/Dt = ½Δt²·(∇(Dp/Dt) − (∇u)ᵀ∇p). The first term is the gradient of something that is 0 on
+//! the surface, which the next pressure makes good; the second is not. So ½Δt·(∇u)ᵀa is added to the velocity before it
+//! is carried, with a = g − ∇p of the substep before: with ∇p alone, hydrostatic pressure would act on the surface of the
+//! substep before, and waves grow.
+
+use crate::step::motion::{Gain, Motion};
+use crate::velocity::{Faces, Sampler, Site, extrapolate, resampled};
+
+/// Layers of faces past the liquid that differences at its faces reach.
+const REACHED: u32 = 2;
+
+/// The velocity that is to be carried in a substep of `seconds`, on the rows of the velocity. `gain`: of the substep before;
+/// `step`: cells moved at speed 1; differences of velocity count as at most `steepest`.
+pub(super) fn carried(motion: &Motion, gain: &Gain, seconds: f64, step: f32, steepest: f32) -> Faces {
+    let rows = motion.rows().dilated(1);
+    let mut known = rows.resampled(motion.rows(), &motion.known, 0);
+    let mut velocity = resampled(&rows, motion.rows(), motion.velocity.faces());
+    let mut gained = resampled(&rows, motion.rows(), &gain.faces);
+    extrapolate(&rows, &mut known, [&mut velocity, &mut gained], steepest, REACHED);
+    let weight = 0.5 * step * (seconds / gain.seconds) as f32;
+    motion.rows().tabulate_with(
+        || Sampler::new(&rows),
+        |sampler, cell, at| {
+            [0, 1, 2].map(|axis| {
+                let own = motion.velocity.faces()[axis][at];
+                if motion.known[at] >> axis & 1 == 0 {
+                    return 0.0;
+                }
+                let middle = Site::FACES[axis].of(cell);
+                let (mut below, mut above) = (middle, middle);
+                below[axis] -= 0.5;
+                above[axis] += 0.5;
+                let mut sum = 0.0;
+                for other in 0..3 {
+                    let site = Site::FACES[other];
+                    let mut value = |field: &Faces, point| sampler.value(&field[other], site, point);
+                    let slope = value(&velocity, above) - value(&velocity, below);
+                    sum += slope.clamp(-steepest, steepest) * value(&gained, middle);
+                }
+                own + weight * sum
+            })
+        },
+    )
+}
