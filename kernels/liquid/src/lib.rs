@@ -1,7 +1,7 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
-//! keeps a liquid's volume ([`pressure`]), the surface as a mesh ([`extract`]), velocity
-//! on faces ([`velocity`]), and all of it moved frame by frame ([`step`]). Functions take and return plain slices;
-//! nothing here depends on nodes or on the engine's geometry.
+//! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
+//! ([`level_set`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]), and all of it moved frame by frame
+//! ([`step`]). Functions take and return plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
@@ -11,12 +11,16 @@
 #[cfg(test)]
 extern crate self as liquid;
 
+mod dense;
 pub mod extract;
 pub mod fields;
 pub mod level_set;
 pub mod open_share;
 pub mod pressure;
 pub mod rows;
+mod sets;
 pub mod stencil;
 pub mod step;
+mod transfer;
 pub mod velocity;
+pub mod viscosity;

@@ -216,7 +216,17 @@ impl CellRows {
         })
     }
 
-    /// The part of each cell inside the box `low` ≤ cell < `high`.
+    /// All cells of which one at most 1 lower along every axis is in the set: the cells whose low corner touches it.
+    pub fn grown_up(&self) -> Self {
+        let [y0, z0] = self.low;
+        let [ny, nz] = self.size;
+        Self::from_ranges([y0, z0], [ny + 1, nz + 1], |y, z, out| {
+            let rows = [self.row(y, z), self.row(y - 1, z), self.row(y, z - 1), self.row(y - 1, z - 1)];
+            out.extend(rows.into_iter().flatten().map(|span| span.start..span.end + 1));
+        })
+    }
+
+    /// The cells inside the box `low` ≤ cell < `high`.
     pub fn clipped(&self, low: Cell, high: Cell) -> Self {
         let first = [max(self.low[0], low[1]), max(self.low[1], low[2])];
         let end = [min(self.low[0] + self.size[0], high[1]), min(self.low[1] + self.size[1], high[2])];

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::sets::Sets;
 use crate::stencil::Stencil;
 
 use super::level::{CellKind, Level};
@@ -14,7 +15,7 @@ pub(super) struct Closed(Vec<Vec<Range<usize>>>);
 impl Closed {
     pub(super) fn find(level: &Level) -> Self {
         let pieces = pieces(level);
-        let mut sets = Sets((0..pieces.len() as u32).collect());
+        let mut sets = Sets::new(pieces.len());
         let mut meets_air = vec![false; pieces.len()];
         let mut number = vec![u32::MAX; level.rows().len()];
         pieces.iter().enumerate().for_each(|(n, piece)| number[piece.clone()].fill(n as u32));
@@ -88,24 +89,5 @@ fn for_each_face(stencil: &Stencil, mut f: impl FnMut(usize, usize, usize)) {
                 f(axis, at, above[axis]);
             }
         }
-    }
-}
-
-/// Disjoint sets; the first of a set is its smallest member, whatever the order of joins.
-struct Sets(Vec<u32>);
-
-impl Sets {
-    fn first(&mut self, mut n: u32) -> u32 {
-        while self.0[n as usize] != n {
-            let parent = self.0[n as usize];
-            self.0[n as usize] = self.0[parent as usize];
-            n = parent;
-        }
-        n
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.first(a), self.first(b));
-        self.0[a.max(b) as usize] = a.min(b);
     }
 }

@@ -1,9 +1,10 @@
 //! One multigrid V-cycle: an approximate solution of A·q = b, symmetric in b, in `f32`.
 
+use crate::transfer::{Place, add_interpolated, restrict};
+
 use super::coarsen::coarsened;
 use super::dense::Factors;
-use super::level::{Level, SurfaceDistances};
-use super::transfer::{add_interpolated, restrict, scales};
+use super::level::{CellKind, Level, SurfaceDistances};
 
 /// Cells of the coarsest grid that are solved for directly, at most.
 const DIRECT: usize = 160;
@@ -95,9 +96,27 @@ impl Multigrid {
         let coarse = &self.levels[number + 1];
         level.smooth(true, b, q, spare, step);
         level.scaled_residual(q, b, scale, spare);
-        restrict(level, coarse, spare, &mut coarser[0].b);
+        restrict(Place::Centre, level.rows(), &coarse.stencil, spare, &mut coarser[0].b);
         self.cycle(number + 1, coarser);
-        add_interpolated(level, coarse, scale, &coarser[0].q, q);
+        add_interpolated(Place::Centre, &level.stencil, coarse.rows(), scale, &coarser[0].q, q);
         level.smooth(false, b, q, spare, step);
     }
+}
+
+/// What the weights of interpolation are multiplied by in each fine cell; 0 where it is not liquid. Solid cells are left
+/// out, so that walls do not pull the pressure down; air counts, with pressure 0.
+fn scales(fine: &Level, coarse: &Level) -> Vec<f32> {
+    let scale = |cell| {
+        let (mut sum, mut reaches_liquid) = (0.0, false);
+        Place::Centre.each_parent(cell, |parent, weight| {
+            let kind = coarse.rows().find(parent).map_or(CellKind::Air, |at| coarse.kinds[at]);
+            reaches_liquid |= kind == CellKind::Liquid;
+            if kind != CellKind::Solid {
+                sum += weight;
+            }
+        });
+        if reaches_liquid { 1.0 / sum } else { 0.0 }
+    };
+    let liquid = fine.stencil.active();
+    fine.rows().resampled(liquid, &liquid.tabulate(scale), 0.0)
 }

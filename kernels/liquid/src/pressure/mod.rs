@@ -14,7 +14,6 @@ mod dense;
 mod level;
 #[cfg(test)]
 mod tests;
-mod transfer;
 
 use crate::fields::{add_scaled, dot, largest, scale_and_add};
 use crate::rows::{Cell, CellRows};
@@ -138,6 +137,45 @@ impl PressureSolver {
         solved
     }
 
+    /// The net inflow that no pressure can drive out, taken from `inflow`: its mean over each component that is closed
+    /// all round. Returns the largest.
+    pub(crate) fn balance(&self, inflow: &mut [f64]) -> f64 {
+        clear_outside(self.multigrid.finest(), inflow);
+        self.closed.subtract_means(inflow)
+    }
+
+    /// An approximate pressure for a net inflow whose largest entry is `largest`, above 0.
+    pub(crate) fn precondition(&self, workspace: &mut PressureWorkspace, inflow: &[f64], largest: f64, q: &mut [f64]) {
+        self.multigrid.solve(&mut workspace.0, inflow, largest, q);
+        self.closed.subtract_means(q);
+    }
+
+    /// The fields that [`PressureSolver::precondition`] works on.
+    pub(crate) fn workspace(&self) -> PressureWorkspace {
+        PressureWorkspace(self.multigrid.workspace())
+    }
+
+    /// Whether a cell of a field is liquid.
+    pub(crate) fn is_liquid(&self, at: usize) -> bool {
+        self.multigrid.finest().kinds[at] == CellKind::Liquid
+    }
+
+    /// Whether a cell of a field is air.
+    pub(crate) fn is_air(&self, at: usize) -> bool {
+        self.multigrid.finest().kinds[at] == CellKind::Air
+    }
+
+    /// The distance of the surface from the liquid cell beside the low face of each cell, in cells; 1 where the face is
+    /// not between liquid and air.
+    pub(crate) fn surface_distances(&self) -> &[Vec<f32>; 3] {
+        &self.distances
+    }
+
+    /// The inverse of the matrix's diagonal; 0 where the cell is not liquid.
+    pub(crate) fn inverse_diagonal(&self) -> &[f32] {
+        &self.multigrid.finest().inverse_diagonal
+    }
+
     /// Calls `change` with the low face (axis, cell) of each cell that has liquid on one side at least, and what the
     /// pressure `q` takes from the velocity there for a density that is the reference density: the difference of q over
     /// the distance of the cells, or of cell and surface.
@@ -172,6 +210,10 @@ fn is_open(grid: &PressureGrid<'_>, cell: Cell, at: usize) -> bool {
         weights[at] > 0.0 || grid.rows.find(above).is_some_and(|above| weights[above] > 0.0)
     })
 }
+
+/// The fields that a preconditioner works on.
+#[derive(Clone, Debug)]
+pub(crate) struct PressureWorkspace(cycle::Workspace);
 
 fn clear_outside(level: &Level, field: &mut [f64]) {
     for (value, kind) in field.iter_mut().zip(&level.kinds) {

@@ -1,0 +1,203 @@
+//! One multigrid V-cycle: an approximate solution of A·u = b in `f32`.
+
+use crate::fields::{add_scaled, dot, scale_and_add};
+use crate::transfer::{Place, add_interpolated, restrict};
+
+use super::coarsen::coarsened;
+use super::level::{FaceFields, FaceKind, Level, Smoothing, Stresses};
+
+/// Cells of the coarsest grid, about.
+const COARSEST: usize = 150;
+
+/// On the coarsest grid, share of the residual that conjugate gradients leave, and most iterations.
+const REDUCTION: f64 = 1e-3;
+const ITERATIONS: u32 = 80;
+
+#[derive(Clone, Debug)]
+pub(super) struct Multigrid {
+    levels: Vec<Level>,
+    /// Of each level but the coarsest, towards the next.
+    scales: Vec<FaceFields<f32>>,
+}
+
+/// The fields of a level during a cycle.
+#[derive(Clone, Debug)]
+struct Scratch {
+    smoothing: Smoothing,
+    b: FaceFields<f32>,
+}
+
+/// The fields of all levels during a cycle.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace(Vec<Scratch>);
+
+impl Multigrid {
+    pub(super) fn new(finest: Level) -> Self {
+        let mut levels = vec![finest];
+        loop {
+            let fine = &levels[levels.len() - 1];
+            let cells = fine.stencil.active().len();
+            if cells <= COARSEST {
+                break;
+            }
+            let Some(coarse) = coarsened(fine) else { break };
+            // Scattered drops, or a grid that is one cell wide, do not get coarser.
+            if coarse.stencil.active().len() * 10 > cells * 9 {
+                break;
+            }
+            levels.push(coarse);
+        }
+        let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
+        Self { levels, scales }
+    }
+
+    pub(super) fn finest(&self) -> &Level {
+        &self.levels[0]
+    }
+
+    pub(super) fn workspace(&self) -> Workspace {
+        let scratch = |level: &Level| {
+            let len = level.rows().len();
+            let zero = || std::array::from_fn(|_| vec![0.0; len]);
+            let smoothing = Smoothing { u: zero(), step: zero(), product: zero(), stresses: Stresses::zero(len) };
+            Scratch { smoothing, b: zero() }
+        };
+        Workspace(self.levels.iter().map(scratch).collect())
+    }
+
+    /// `out` ≈ A⁻¹·`b`; `largest` is the largest entry of `b`, above 0. `b` is 0 where the face is not free.
+    pub(super) fn solve(
+        &self,
+        workspace: &mut Workspace,
+        b: &FaceFields<f64>,
+        largest: f64,
+        out: &mut FaceFields<f64>,
+    ) {
+        let finest = &mut workspace.0[0];
+        for axis in 0..3 {
+            // Largest entry 1: neither overflow nor denormals, whatever the unit.
+            for (to, from) in finest.b[axis].iter_mut().zip(&b[axis]) {
+                *to = (from / largest) as f32;
+            }
+        }
+        self.cycle(0, &mut workspace.0);
+        for axis in 0..3 {
+            for (to, from) in out[axis].iter_mut().zip(&workspace.0[0].smoothing.u[axis]) {
+                *to = f64::from(*from) * largest;
+            }
+        }
+    }
+
+    fn cycle(&self, number: usize, scratch: &mut [Scratch]) {
+        let level = &self.levels[number];
+        let (fine, coarser) = scratch.split_at_mut(1);
+        let Scratch { smoothing, b } = &mut fine[0];
+        let Some(scale) = self.scales.get(number) else {
+            return solve_coarsest(level, b, &mut smoothing.u);
+        };
+        let coarse = &self.levels[number + 1];
+        level.smooth(true, b, smoothing);
+        level.scaled_residual(b, scale, smoothing);
+        for axis in 0..3 {
+            restrict(
+                Place::Face(axis),
+                level.rows(),
+                &coarse.stencil,
+                &smoothing.product[axis],
+                &mut coarser[0].b[axis],
+            );
+        }
+        if let Some(extensions) = &coarse.extensions {
+            extensions.gather(&mut coarser[0].b);
+        }
+        self.cycle(number + 1, coarser);
+        let correction = &mut coarser[0].smoothing.u;
+        if let Some(extensions) = &coarse.extensions {
+            extensions.extend(correction);
+        }
+        for axis in 0..3 {
+            let (place, u) = (Place::Face(axis), &mut smoothing.u[axis]);
+            add_interpolated(place, &level.stencil, coarse.rows(), &scale[axis], &correction[axis], u);
+        }
+        if let Some(extensions) = &coarse.extensions {
+            extensions.clear(correction);
+        }
+        level.smooth(false, b, smoothing);
+    }
+}
+
+/// Share of the diagonal that is added on the coarsest grid: rounding must not move a body that only its mass holds.
+const STIFFENING: f64 = 1e-4;
+
+/// Conjugate gradients with the diagonal as preconditioner.
+fn solve_coarsest(level: &Level, b: &FaceFields<f32>, u: &mut FaceFields<f32>) {
+    let len = level.rows().len();
+    let zero = || -> FaceFields<f64> { std::array::from_fn(|_| vec![0.0; len]) };
+    let product = |a: &FaceFields<f64>, b: &FaceFields<f64>| (0..3).map(|axis| dot(&a[axis], &b[axis])).sum::<f64>();
+    let is_free = |axis: usize, at: usize| level.mass[axis][at] > 0.0;
+    let inside = |b: &[f32], axis: usize| -> Vec<f64> {
+        b.iter().enumerate().map(|(at, b)| if is_free(axis, at) { f64::from(*b) } else { 0.0 }).collect()
+    };
+    let mut residual: FaceFields<f64> = std::array::from_fn(|axis| inside(&b[axis], axis));
+    let (mut solution, mut direction, mut image, mut stresses) = (zero(), zero(), zero(), Stresses::zero(len));
+    let (mut before, mut first) = (0.0, 0.0);
+    for iteration in 0..ITERATIONS {
+        let better: FaceFields<f64> = std::array::from_fn(|axis| {
+            let inverse = level.inverse_diagonal[axis].iter().map(|inverse| f64::from(*inverse));
+            residual[axis].iter().zip(inverse).map(|(residual, inverse)| residual * inverse).collect()
+        });
+        let energy = product(&residual, &better);
+        if iteration == 0 {
+            first = energy;
+        }
+        if energy.is_nan() || energy <= first * REDUCTION * REDUCTION {
+            break;
+        }
+        let share = if iteration == 0 { 0.0 } else { energy / before };
+        before = energy;
+        (0..3).for_each(|axis| scale_and_add(&mut direction[axis], share, &better[axis]));
+        level.apply(&mut direction, &mut stresses, &mut image);
+        for axis in 0..3 {
+            for (at, inverse) in level.inverse_diagonal[axis].iter().enumerate().filter(|(_, inverse)| **inverse > 0.0)
+            {
+                image[axis][at] += STIFFENING / f64::from(*inverse) * direction[axis][at];
+            }
+        }
+        let curvature = product(&direction, &image);
+        if curvature.is_nan() || curvature <= 0.0 {
+            break;
+        }
+        let length = energy / curvature;
+        for axis in 0..3 {
+            add_scaled(&mut solution[axis], length, &direction[axis]);
+            add_scaled(&mut residual[axis], -length, &image[axis]);
+        }
+    }
+    for axis in 0..3 {
+        u[axis].iter_mut().zip(&solution[axis]).for_each(|(u, solution)| *u = *solution as f32);
+    }
+}
+
+/// What the weights of interpolation are multiplied by at each fine face; 0 where it is not free. FaceFields in air without an
+/// extended velocity are left out; solid ones count, with velocity 0.
+fn scales(fine: &Level, coarse: &Level) -> FaceFields<f32> {
+    let is_extended = |axis, at| coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, at));
+    let scale = |cell, axis: usize| {
+        if fine.rows().find(cell).is_none_or(|at| fine.kinds[axis][at] != FaceKind::Free) {
+            return 0.0;
+        }
+        let (mut sum, mut reaches_free) = (0.0, false);
+        Place::Face(axis).each_parent(cell, |parent, weight| {
+            let at = coarse.rows().find(parent);
+            let kind = at.map_or(FaceKind::Air, |at| coarse.kinds[axis][at]);
+            reaches_free |= kind == FaceKind::Free;
+            if kind != FaceKind::Air || at.is_some_and(|at| is_extended(axis, at)) {
+                sum += weight;
+            }
+        });
+        if reaches_free { 1.0 / sum } else { 0.0 }
+    };
+    let active = fine.stencil.active();
+    let scales: FaceFields<f32> = active.tabulate_each(|cell| [0, 1, 2].map(|axis| scale(cell, axis)));
+    scales.map(|scale| fine.rows().resampled(active, &scale, 0.0))
+}

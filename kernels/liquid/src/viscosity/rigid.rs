@@ -1,0 +1,302 @@
+//! Rigid motions of each component of liquid, and of each part of one that is far more viscous than the rest.
+//!
+//! They have no strain: the matrix has their mass alone, or what softer liquid around resists, which viscosity exceeds by
+//! up to 1e9, so that a multigrid cycle leaves them as they are. In each iteration their share of the error is solved for
+//! exactly.
+
+use nalgebra::{Matrix6, Vector6};
+use rayon::prelude::*;
+
+use crate::rows::Cell;
+use crate::sets::Sets;
+
+use super::level::{FaceFields, FaceKind, Level, Stresses};
+
+/// Free faces of a component next to each other along x.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    axis: usize,
+    at: usize,
+    len: usize,
+    cell: Cell,
+}
+
+impl Piece {
+    /// The six motions at a face: three translations, then three turns about the centre.
+    fn motions(&self, n: usize, centre: [f64; 3], size: f64) -> [f64; 6] {
+        let position = |axis: usize| {
+            let along = f64::from(self.cell[axis]) + if axis == 0 { n as f64 } else { 0.0 };
+            (along + if axis == self.axis { 0.0 } else { 0.5 } - centre[axis]) / size
+        };
+        let [x, y, z] = [position(0), position(1), position(2)];
+        match self.axis {
+            0 => [1.0, 0.0, 0.0, 0.0, z, -y],
+            1 => [0.0, 1.0, 0.0, -z, 0.0, x],
+            _ => [0.0, 0.0, 1.0, y, -x, 0.0],
+        }
+    }
+}
+
+/// A component that no solid holds firmly.
+#[derive(Clone, Debug)]
+struct Component {
+    pieces: Vec<Piece>,
+    centre: [f64; 3],
+    size: f64,
+    /// Of the matrix, on the six motions.
+    inverse: Matrix6<f64>,
+    /// What the matrix has besides their mass: faces beside solids that resist.
+    resistance: Vec<(usize, usize, [f64; 6])>,
+}
+
+/// All components whose rigid motions a multigrid cycle would leave.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RigidMotions(Vec<Component>);
+
+/// Viscous resistance to a motion, relative to its mass, up to which the motion is solved for here.
+const FIRM: f64 = 4.0;
+
+/// A part of a component counts as stiff where its viscosity is this many times less than the largest, or its powers.
+const STIFFER: f32 = 1e3;
+
+/// Stiff parts that are treated, the largest first: each costs six products with the matrix.
+const MOST_STIFF: usize = 16;
+
+/// Share of the viscosity below which a resistance is rounding.
+const ROUNDING: f64 = 1e-12;
+
+impl RigidMotions {
+    pub(super) fn find(level: &Level) -> Self {
+        let whole = components(level, 0.0);
+        let sizes: Vec<usize> = whole.iter().map(|pieces| faces(pieces)).collect();
+        let largest = level.normal.iter().copied().fold(0.0, f32::max);
+        let least = level.normal.iter().copied().filter(|viscosity| *viscosity > 0.0).fold(largest, f32::min);
+        let mut stresses = Stresses::zero(level.rows().len());
+        let mut stiff: Vec<(Vec<Piece>, f32)> = Vec::new();
+        let mut threshold = largest / STIFFER;
+        while threshold > least && threshold > 1.0 {
+            let parts = components(level, threshold).into_iter().filter(|pieces| !sizes.contains(&faces(pieces)));
+            let known: Vec<usize> = stiff.iter().map(|(pieces, _)| faces(pieces)).collect();
+            stiff.extend(parts.filter(|pieces| !known.contains(&faces(pieces))).map(|pieces| (pieces, threshold)));
+            threshold /= STIFFER;
+        }
+        stiff.sort_by_key(|(pieces, _)| std::cmp::Reverse(faces(pieces)));
+        stiff.truncate(MOST_STIFF);
+        let stiff = stiff.into_iter().map(|(pieces, threshold)| (pieces, Some(threshold)));
+        let all = whole.into_iter().map(|pieces| (pieces, None)).chain(stiff);
+        Self(all.filter_map(|(pieces, stiff)| Component::new(level, pieces, stiff, &mut stresses)).collect())
+    }
+
+    /// Takes from `b` what moves components as rigid bodies: a multigrid cycle would answer it by a motion that is nearly
+    /// rigid, which a high viscosity does not forgive.
+    pub(super) fn remove(&self, level: &Level, b: &mut FaceFields<f64>) {
+        for component in &self.0 {
+            let shares = component.inverse * component.lacking(level, b, None);
+            component.for_each_motion(&shares, |axis, at, motion| {
+                b[axis][at] -= f64::from(level.mass[axis][at]) * motion;
+            });
+            for (axis, at, row) in &component.resistance {
+                b[*axis][*at] -= shares.dot(&Vector6::from(*row));
+            }
+        }
+    }
+
+    /// Adds to `z`, an approximation of A⁻¹·`b`, the rigid motions that it lacks.
+    pub(super) fn complete(&self, level: &Level, b: &FaceFields<f64>, z: &mut FaceFields<f64>) {
+        for component in &self.0 {
+            let shares = component.inverse * component.lacking(level, b, Some(z));
+            component.for_each_motion(&shares, |axis, at, motion| z[axis][at] += motion);
+        }
+    }
+}
+
+impl Component {
+    /// `stiff`: the least viscosity of a part that is stiffer than its component. `None` where a multigrid cycle is good
+    /// enough, because solids hold the component.
+    fn new(level: &Level, pieces: Vec<Piece>, stiff: Option<f32>, stresses: &mut Stresses<f64>) -> Option<Self> {
+        let (mut total, mut first) = (0.0, [0.0; 3]);
+        let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+        for piece in &pieces {
+            for axis in 0..3 {
+                let last = piece.cell[axis] + if axis == 0 { piece.len as i32 } else { 1 };
+                (low[axis], high[axis]) = (low[axis].min(piece.cell[axis]), high[axis].max(last));
+            }
+            let masses = &level.mass[piece.axis][piece.at..piece.at + piece.len];
+            for (n, mass) in masses.iter().map(|mass| f64::from(*mass)).enumerate() {
+                total += mass;
+                first[0] += mass * (f64::from(piece.cell[0]) + n as f64);
+                first[1] += mass * f64::from(piece.cell[1]);
+                first[2] += mass * f64::from(piece.cell[2]);
+            }
+        }
+        let centre = first.map(|sum| sum / total);
+        let size = f64::from((0..3).map(|axis| high[axis] - low[axis]).max().unwrap_or(1));
+        let mut component = Self { pieces, centre, size, inverse: Matrix6::zeros(), resistance: Vec::new() };
+        let mut mass = Matrix6::zeros();
+        for piece in &component.pieces {
+            for n in 0..piece.len {
+                let motions = Vector6::from(piece.motions(n, centre, size));
+                mass += motions * motions.transpose() * f64::from(level.mass[piece.axis][piece.at + n]);
+            }
+        }
+        let resistance = component.resist(level, stiff.is_some(), stresses);
+        // A single face, or a thread of them, has fewer than six motions.
+        let scale = (mass + resistance).trace() * 1e-12;
+        let firm = resistance - mass * FIRM;
+        if stiff.is_none() && (firm + Matrix6::identity() * scale).cholesky().is_some() {
+            return None;
+        }
+        component.inverse = (mass + resistance + Matrix6::identity() * scale).try_inverse()?;
+        Some(component)
+    }
+
+    /// Fills `resistance`; returns that of the six motions against each other.
+    fn resist(&mut self, level: &Level, is_stiff: bool, stresses: &mut Stresses<f64>) -> Matrix6<f64> {
+        let touches_solid = |piece: &Piece| touches_solid(level, piece);
+        if !is_stiff && !self.pieces.iter().any(touches_solid) {
+            return Matrix6::zeros();
+        }
+        let len = level.rows().len();
+        let zero = || -> FaceFields<f64> { std::array::from_fn(|_| vec![0.0; len]) };
+        let mut motions: Vec<FaceFields<f64>> = (0..6).map(|_| zero()).collect();
+        for piece in &self.pieces {
+            for n in 0..piece.len {
+                let at_face = piece.motions(n, self.centre, self.size);
+                (0..6).for_each(|motion| motions[motion][piece.axis][piece.at + n] = at_face[motion]);
+            }
+        }
+        let forces: Vec<FaceFields<f64>> = motions
+            .iter_mut()
+            .map(|u| {
+                let mut force = zero();
+                level.apply(u, stresses, &mut force);
+                for axis in 0..3 {
+                    for at in 0..len {
+                        force[axis][at] -= f64::from(level.mass[axis][at]) * u[axis][at];
+                    }
+                }
+                force
+            })
+            .collect();
+        let mut sum = Matrix6::zeros();
+        for axis in 0..3 {
+            for at in 0..len {
+                let row: [f64; 6] = std::array::from_fn(|motion| forces[motion][axis][at]);
+                let inverse = f64::from(level.inverse_diagonal[axis][at]);
+                if row.iter().any(|force| force.abs() * inverse > ROUNDING) {
+                    self.resistance.push((axis, at, row));
+                    let here = Vector6::from_fn(|motion, _| motions[motion][axis][at]);
+                    sum += here * Vector6::from(row).transpose();
+                }
+            }
+        }
+        (sum + sum.transpose()) * 0.5
+    }
+
+    /// The six motions' products with `b` − A·`z`; without `z`, with `b`.
+    fn lacking(&self, level: &Level, b: &FaceFields<f64>, z: Option<&FaceFields<f64>>) -> Vector6<f64> {
+        let of_piece = |piece: &Piece| {
+            let mut sum = [0.0; 6];
+            for n in 0..piece.len {
+                let (axis, at) = (piece.axis, piece.at + n);
+                let momentum = z.map_or(0.0, |z| f64::from(level.mass[axis][at]) * z[axis][at]);
+                let motions = piece.motions(n, self.centre, self.size);
+                (0..6).for_each(|motion| sum[motion] += (b[axis][at] - momentum) * motions[motion]);
+            }
+            Vector6::from(sum)
+        };
+        let sums: Vec<Vector6<f64>> = self.pieces.par_iter().with_min_len(16).map(of_piece).collect();
+        let mut lack: Vector6<f64> = sums.iter().sum();
+        if let Some(z) = z {
+            for (axis, at, row) in &self.resistance {
+                lack -= Vector6::from(*row) * z[*axis][*at];
+            }
+        }
+        lack
+    }
+
+    /// Calls `f` with each face and its velocity in a mix of the six motions.
+    fn for_each_motion(&self, shares: &Vector6<f64>, mut f: impl FnMut(usize, usize, f64)) {
+        for piece in &self.pieces {
+            for n in 0..piece.len {
+                let motions = Vector6::from(piece.motions(n, self.centre, self.size));
+                f(piece.axis, piece.at + n, shares.dot(&motions));
+            }
+        }
+    }
+}
+
+fn touches_solid(level: &Level, piece: &Piece) -> bool {
+    (-1..=piece.len as i32).any(|n| {
+        [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]].into_iter().any(|[dy, dz]| {
+            let cell = [piece.cell[0] + n, piece.cell[1] + dy, piece.cell[2] + dz];
+            level.rows().find(cell).is_none_or(|at| (0..3).any(|axis| level.kinds[axis][at] == FaceKind::Solid))
+        })
+    })
+}
+
+fn faces(pieces: &[Piece]) -> usize {
+    pieces.iter().map(|piece| piece.len).sum()
+}
+
+/// The free faces of each component: faces are connected through the stresses that they share, of viscosities above
+/// `threshold`. Above 0, faces without such a stress are left out.
+fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
+    let len = level.rows().len();
+    let mut sets = Sets::new(3 * len);
+    let is_free = |axis: usize, at: usize| level.kinds[axis][at] == FaceKind::Free;
+    let mut is_joined = vec![threshold == 0.0; 3 * len];
+    for run in level.stencil.runs() {
+        for n in 0..run.len as usize {
+            let at = run.at as usize + n;
+            let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+            let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+            let mut join = |faces: &[(usize, usize)]| {
+                let mut free = faces.iter().filter(|(axis, at)| is_free(*axis, *at));
+                if let Some((axis, first)) = free.next() {
+                    let first = axis * len + first;
+                    is_joined[first] = true;
+                    free.for_each(|(other, at)| {
+                        is_joined[other * len + at] = true;
+                        sets.join(first as u32, (other * len + at) as u32);
+                    });
+                }
+            };
+            if level.normal[at] > threshold {
+                join(&[(0, at), (0, above[0]), (1, at), (1, above[1]), (2, at), (2, above[2])]);
+            }
+            for axis in 0..3 {
+                if level.shear[axis][at] > threshold {
+                    let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
+                    join(&[(side, at), (side, below[other]), (other, at), (other, below[side])]);
+                }
+            }
+        }
+    }
+    let mut number = vec![usize::MAX; 3 * len];
+    let mut components: Vec<Vec<Piece>> = Vec::new();
+    for axis in 0..3 {
+        for run in level.stencil.runs() {
+            for n in 0..run.len as usize {
+                let at = run.at as usize + n;
+                if !is_free(axis, at) || !is_joined[axis * len + at] {
+                    continue;
+                }
+                let first = sets.first((axis * len + at) as u32) as usize;
+                if number[first] == usize::MAX {
+                    number[first] = components.len();
+                    components.push(Vec::new());
+                }
+                let pieces = &mut components[number[first]];
+                match pieces.last_mut() {
+                    Some(last) if last.axis == axis && last.at + last.len == at && n > 0 => last.len += 1,
+                    _ => {
+                        let cell = [run.cell[0] + n as i32, run.cell[1], run.cell[2]];
+                        pieces.push(Piece { axis, at, len: 1, cell });
+                    }
+                }
+            }
+        }
+    }
+    components
+}

@@ -1,0 +1,194 @@
+//! From a grid of liquid to the matrix of its viscosity.
+
+use crate::pressure::PressureSolver;
+use crate::rows::{Cell, CellRows};
+use crate::stencil::Stencil;
+
+use super::StokesGrid;
+use super::level::{FaceFields, FaceKind, Level, lower};
+
+/// Least distance of a solid from a face beside it, in cells: bounds the matrix.
+const LEAST_SOLID_DISTANCE: f32 = 0.1;
+
+/// What a liquid's faces are to velocity and pressure, besides the matrix.
+#[derive(Clone, Debug)]
+pub(super) struct Flow {
+    /// Open share of each low face.
+    pub open: FaceFields<f32>,
+    /// What a difference of pressure does to a free face; 0 at others.
+    pub gradient: FaceFields<f32>,
+}
+
+/// The fields of a grid on the rows of its pressure solver.
+struct Fields<'a> {
+    rows: &'a CellRows,
+    pressure: &'a PressureSolver,
+    level_set: Vec<f32>,
+    density: Vec<f32>,
+    viscosity: Vec<f32>,
+    open: FaceFields<f32>,
+    solid: FaceFields<f32>,
+    slip: f32,
+    kinds: FaceFields<FaceKind>,
+}
+
+pub(super) fn set_up(grid: &StokesGrid<'_>, pressure: &PressureSolver) -> (Level, Flow) {
+    let rows = pressure.rows();
+    let field = |values: &[f32], outside| rows.resampled(grid.rows, values, outside);
+    let open = grid.open.map(|open| field(open, 0.0));
+    let mut fields = Fields {
+        rows,
+        pressure,
+        level_set: field(grid.level_set, f32::MAX),
+        density: field(grid.density, 1.0),
+        viscosity: field(grid.viscosity, 0.0),
+        solid: grid.solid_distance.map(|distance| field(distance, -0.5)),
+        open,
+        slip: grid.slip,
+        kinds: FaceFields::default(),
+    };
+    let active = pressure.stencil().active().grown_up();
+    fields.kinds = rows.tabulate_each(|cell| match rows.find(cell) {
+        Some(at) => [0, 1, 2].map(|axis| fields.kind(cell, at, axis)),
+        None => [FaceKind::Solid; 3],
+    });
+    let shares = fields.on_active(&active, Fields::share, 0.0);
+    let mass: FaceFields<f32> = std::array::from_fn(|axis| {
+        let faces = active.tabulate(|cell| match rows.find(cell) {
+            Some(at) if fields.kinds[axis][at] == FaceKind::Free => {
+                shares[axis][at] * fields.density_at(cell, at, axis)
+            }
+            _ => 0.0,
+        });
+        rows.resampled(&active, &faces, 0.0)
+    });
+    let distances = pressure.surface_distances();
+    let gradient: FaceFields<f32> = std::array::from_fn(|axis| {
+        shares[axis].iter().zip(&distances[axis]).map(|(share, distance)| share / distance).collect()
+    });
+    let normal =
+        (0..rows.len()).map(|at| if pressure.is_liquid(at) { 2.0 * fields.viscosity[at] } else { 0.0 }).collect();
+    let shear = fields.on_active(&active, |fields, cell, _, axis| fields.shear(cell, axis), 0.0);
+    let Fields { kinds, open, .. } = fields;
+    let stencil = Stencil::within(rows.clone(), active);
+    let liquid = (0..rows.len()).map(|at| pressure.is_liquid(at)).collect();
+    let level = Level {
+        stencil,
+        liquid,
+        kinds,
+        mass,
+        normal,
+        shear,
+        extensions: None,
+        inverse_diagonal: FaceFields::default(),
+    };
+    (level.with_diagonal(), Flow { open, gradient })
+}
+
+impl Fields<'_> {
+    /// What `value` makes of each low face of the active cells, `outside` elsewhere.
+    fn on_active<T: Copy + Default + Send + Sync>(
+        &self,
+        active: &CellRows,
+        value: impl Fn(&Self, Cell, usize, usize) -> T + Sync,
+        outside: T,
+    ) -> FaceFields<T> {
+        let faces: FaceFields<T> = active.tabulate_each(|cell| match self.rows.find(cell) {
+            Some(at) => [0, 1, 2].map(|axis| value(self, cell, at, axis)),
+            None => [outside; 3],
+        });
+        faces.map(|faces| self.rows.resampled(active, &faces, outside))
+    }
+
+    fn below(&self, cell: Cell, axis: usize) -> Option<usize> {
+        self.rows.find(lower(cell, axis))
+    }
+
+    fn kind(&self, cell: Cell, at: usize, axis: usize) -> FaceKind {
+        if self.open[axis][at] == 0.0 {
+            return FaceKind::Solid;
+        }
+        let is_liquid = |at: usize| self.pressure.is_liquid(at);
+        if is_liquid(at) || self.below(cell, axis).is_some_and(is_liquid) { FaceKind::Free } else { FaceKind::Air }
+    }
+
+    /// The share of a free face's volume that is liquid: between the centres of the cells beside it, or from the centre of
+    /// the liquid one to the surface.
+    fn share(&self, cell: Cell, at: usize, axis: usize) -> f32 {
+        if self.kinds[axis][at] != FaceKind::Free {
+            return 0.0;
+        }
+        let open = self.open[axis][at];
+        match self.below(cell, axis) {
+            Some(below) if self.pressure.is_liquid(at) && self.pressure.is_liquid(below) => {
+                open * 0.5 * (self.filled(cell, at) + self.filled(lower(cell, axis), below))
+            }
+            _ => open * self.pressure.surface_distances()[axis][at],
+        }
+    }
+
+    /// The liquid of a cell, as a share of a cell's volume, with what reaches beyond it into air; exact where the surface
+    /// is along the grid.
+    fn filled(&self, cell: Cell, at: usize) -> f32 {
+        let is_at_surface = (0..3).any(|axis| {
+            let mut above = cell;
+            above[axis] += 1;
+            [lower(cell, axis), above]
+                .into_iter()
+                .any(|near| self.rows.find(near).is_some_and(|near| self.pressure.is_air(near)))
+        });
+        if is_at_surface { (0.5 - self.level_set[at]).clamp(0.5, 1.5) } else { 1.0 }
+    }
+
+    fn density_at(&self, cell: Cell, at: usize, axis: usize) -> f32 {
+        let is_liquid = |at: &usize| self.pressure.is_liquid(*at);
+        match (self.below(cell, axis).filter(is_liquid), Some(at).filter(is_liquid)) {
+            (Some(a), Some(b)) => 0.5 * (self.density[a] + self.density[b]),
+            (Some(one), None) | (None, Some(one)) => self.density[one],
+            (None, None) => 1.0,
+        }
+    }
+
+    /// The viscosity of the edge along `axis` at the low corner of a cell: the harmonic mean of the liquid around it, as
+    /// shear stress is the same on both sides of a jump. 0 where one of the four faces at the edge is in air: the
+    /// surface has no shear stress. Beside a solid the velocity falls to the solid's over less than a cell.
+    fn shear(&self, cell: Cell, axis: usize) -> f32 {
+        let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (mut inverse, mut liquid, mut air) = (0.0, 0.0, 0.0);
+        for corner in [cell, lower(cell, side), lower(cell, other), lower(lower(cell, side), other)] {
+            let Some(at) = self.rows.find(corner) else { continue };
+            if self.pressure.is_liquid(at) {
+                if self.viscosity[at] <= 0.0 {
+                    return 0.0;
+                }
+                inverse += 1.0 / self.viscosity[at];
+                liquid += 1.0;
+            } else if self.pressure.is_air(at) {
+                air += 1.0;
+            }
+        }
+        let mut distance = 1.0_f32;
+        let mut beside_solid = false;
+        for (face, step) in [(side, other), (other, side)] {
+            let pair = [Some(cell), Some(lower(cell, step))].map(|cell| cell.and_then(|cell| self.rows.find(cell)));
+            let kinds = pair.map(|at| at.map_or(FaceKind::Solid, |at| self.kinds[face][at]));
+            if kinds.contains(&FaceKind::Air) {
+                return 0.0;
+            }
+            if kinds[0] != kinds[1] {
+                let from = |at: Option<usize>| at.map_or(-0.5, |at| self.solid[face][at]);
+                let (free, solid) = if kinds[0] == FaceKind::Free { (0, 1) } else { (1, 0) };
+                let (outside, inside) = (from(pair[free]).max(0.0), from(pair[solid]).min(0.0));
+                if outside - inside > 0.0 {
+                    distance = distance.min(outside / (outside - inside));
+                }
+                beside_solid = true;
+            }
+        }
+        if liquid == 0.0 {
+            return 0.0;
+        }
+        let viscosity = liquid / inverse * (1.0 - 0.25 * air);
+        if beside_solid { viscosity * (1.0 - self.slip) / distance.max(LEAST_SOLID_DISTANCE) } else { viscosity }
+    }
+}
