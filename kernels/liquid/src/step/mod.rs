@@ -152,7 +152,8 @@ impl<S: Surface> Liquid<S> {
     pub fn velocity(&self, layers: i32) -> MacVelocity {
         let domain = &self.settings.domain;
         let rows = self.motion.rows_past_liquid(domain, layers);
-        let faces = self.motion.continued(self.motion.velocity().faces(), &rows, f32::INFINITY, domain, None);
+        let own = self.motion.velocity().faces();
+        let [faces] = self.motion.continued([own], &rows, f32::INFINITY, domain, None);
         MacVelocity::new(rows, faces)
     }
 

@@ -82,23 +82,25 @@ impl Motion {
         domain.clip(&self.rows().dilated(layers - 1))
     }
 
-    /// A field that is known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
-    pub(super) fn continued(
+    /// Fields that are known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
+    pub(super) fn continued<const F: usize>(
         &self,
-        faces: &Faces,
+        fields: [&Faces; F],
         rows: &CellRows,
         steepest: f32,
         domain: &Domain,
         solid: Option<Solid<'_>>,
-    ) -> Faces {
+    ) -> [Faces; F] {
         let mut known = rows.resampled(self.rows(), &self.known, 0);
-        let mut faces = resampled(rows, self.rows(), faces);
-        extrapolate(rows, &mut known, [&mut faces], steepest, u32::MAX);
-        hold_walls(domain, rows, &mut faces);
-        match solid {
-            Some(solid) => slide(rows, &faces, solid),
-            None => faces,
-        }
+        let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
+        extrapolate(rows, &mut known, fields.each_mut(), steepest, u32::MAX);
+        fields.map(|mut faces| {
+            hold_walls(domain, rows, &mut faces);
+            match solid {
+                Some(solid) => slide(rows, &faces, solid),
+                None => faces,
+            }
+        })
     }
 }
 

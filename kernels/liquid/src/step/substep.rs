@@ -72,9 +72,19 @@ pub(super) fn substep<S: Surface>(
     let layers = BAND + reach.ceil().min(64.0) as i32;
     let steepest = STEEPEST / step;
     let rows = motion.rows_past_liquid(domain, layers);
-    let continued = |faces: &Faces| motion.continued(faces, &rows, steepest, domain, around.solid);
-    let carried = motion.gain.as_ref().map(|gain| continued(&turned::carried(motion, gain, seconds, step, steepest)));
-    let velocity = MacVelocity::new(rows.clone(), continued(motion.velocity.faces()));
+    let own = motion.velocity.faces();
+    let (velocity, carried) = match &motion.gain {
+        Some(gain) => {
+            let carried = turned::carried(motion, gain, seconds, step, steepest);
+            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, around.solid);
+            (velocity, Some(carried))
+        }
+        None => {
+            let [velocity] = motion.continued([own], &rows, steepest, domain, around.solid);
+            (velocity, None)
+        }
+    };
+    let velocity = MacVelocity::new(rows, velocity);
     surface.advance(&Moving { velocity: &velocity, step }, reach);
 
     let cells = LiquidCells::of(domain, surface, around.solid);

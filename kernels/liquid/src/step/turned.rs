@@ -6,6 +6,8 @@
 //! is carried, with a = g − ∇p of the substep before: with ∇p alone, hydrostatic pressure would act on the surface of the
 //! substep before, and waves grow.
 
+use numerics::vector::Vec3;
+
 use crate::step::motion::{Gain, Motion};
 use crate::velocity::{Faces, Sampler, Site, extrapolate, resampled};
 
@@ -30,18 +32,24 @@ pub(super) fn carried(motion: &Motion, gain: &Gain, seconds: f64, step: f32, ste
                     return 0.0;
                 }
                 let middle = Site::FACES[axis].of(cell);
-                let (mut below, mut above) = (middle, middle);
-                below[axis] -= 0.5;
-                above[axis] += 0.5;
-                let mut sum = 0.0;
-                for other in 0..3 {
-                    let site = Site::FACES[other];
-                    let mut value = |field: &Faces, point| sampler.value(&field[other], site, point);
-                    let slope = value(&velocity, above) - value(&velocity, below);
-                    sum += slope.clamp(-steepest, steepest) * value(&gained, middle);
+                let mut sum =
+                    along(sampler, &velocity[axis], axis, middle).clamp(-steepest, steepest) * gain.faces[axis][at];
+                for other in (0..3).filter(|other| *other != axis) {
+                    let Some(corners) = sampler.corners(Site::FACES[other], middle) else { continue };
+                    let slope = corners.slope(&velocity[other], axis);
+                    sum += slope.clamp(-steepest, steepest) * corners.value(&gained[other]);
                 }
                 own + weight * sum
             })
         },
     )
+}
+
+/// The derivative of a field on faces along their own axis.
+fn along(sampler: &mut Sampler<'_>, field: &[f32], axis: usize, face: Vec3) -> f32 {
+    let (mut below, mut above) = (face, face);
+    below[axis] -= 0.5;
+    above[axis] += 0.5;
+    let site = Site::FACES[axis];
+    sampler.value(field, site, above) - sampler.value(field, site, below)
 }

@@ -66,6 +66,15 @@ impl Corners {
     pub fn value(&self, field: &[f32]) -> f32 {
         trilinear(self.values(field), self.t)
     }
+
+    /// The derivative along an axis at the point, per cell.
+    #[inline(always)]
+    pub fn slope(&self, field: &[f32], axis: usize) -> f32 {
+        let values = self.values(field);
+        let (mut low, mut high) = (self.t, self.t);
+        (low[axis], high[axis]) = (0.0, 1.0);
+        trilinear(values, high) - trilinear(values, low)
+    }
 }
 
 /// The value between eight corners, x fastest.
@@ -236,6 +245,9 @@ mod tests {
                 if sampler.corners(site, p).is_some() {
                     found += 1;
                     assert!((sampler.value(&field, site, p) - linear(p)).abs() < 1e-5, "{site:?} {p:?}");
+                    let mut slope = |axis| sampler.corners(site, p).unwrap().slope(&field, axis);
+                    let slopes = [0, 1, 2].map(&mut slope);
+                    assert!((0..3).all(|axis| (slopes[axis] - [2.0, -3.0, 0.25][axis]).abs() < 2e-5), "{slopes:?}");
                 }
             }
             assert!(found > 500, "{found}");

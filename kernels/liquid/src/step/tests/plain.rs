@@ -1,4 +1,4 @@
-//! A level set carried to first order and made a distance again: enough of a surface to test what moves it.
+//! A level set carried to first order and made a distance again, and a surface that stays: enough to test what moves them.
 
 use liquid::level_set::PhiView;
 use liquid::rows::CellRows;
@@ -49,6 +49,25 @@ impl Surface for PlainLevelSet {
         self.phi = distances(&rows, &phi);
         self.rows = rows;
     }
+}
+
+/// A surface that stays where it is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Still(PlainLevelSet);
+
+impl Still {
+    /// From a distance at places in cells.
+    pub(crate) fn new(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        Self(PlainLevelSet::new(domain, distance))
+    }
+}
+
+impl Surface for Still {
+    fn view(&self) -> PhiView<'_> {
+        self.0.view()
+    }
+
+    fn advance(&mut self, _: &Moving<'_>, _: f32) {}
 }
 
 /// |∇φ| = 1, with φ kept next to the surface, at most 1 there.

@@ -1,29 +1,6 @@
+use super::plain::Still;
 use super::*;
 use numerics::vector::length;
-
-/// A surface that stays where it is.
-struct Still {
-    rows: CellRows,
-    phi: Vec<f32>,
-    domain: Domain,
-}
-
-impl Still {
-    fn new(domain: Domain, phi: impl Fn(Vec3) -> f32 + Sync) -> Self {
-        let rows = CellRows::cuboid(domain.low, domain.high);
-        let phi = rows.tabulate(|cell| phi(Site::Centre.of(cell)));
-        Self { rows, phi, domain }
-    }
-}
-
-impl Surface for Still {
-    fn view(&self) -> PhiView<'_> {
-        let (low, high) = (self.domain.low, self.domain.high);
-        PhiView { rows: &self.rows, phi: &self.phi, outside: 5.0, low, high }
-    }
-
-    fn advance(&mut self, _: &Moving<'_>, _: f32) {}
-}
 
 /// Angular momentum about the line x = y = 32.
 fn spin(liquid: &Liquid<impl Surface>) -> f64 {
