@@ -23,15 +23,19 @@ use closed::Closed;
 use cycle::Multigrid;
 use level::{CellKind, HALO, Level, SurfaceDistances};
 
-/// Least distance of the surface from the centre of a liquid cell, in cells: bounds the matrix.
-pub const LEAST_SURFACE_DISTANCE: f32 = 1e-4;
+/// Depth of the centre of a liquid cell below the surface, at least, in cells: rounding must not turn cells whose centre the
+/// surface goes through into liquid and back.
+pub const LEAST_DEPTH: f32 = 2e-5;
+
+/// Distance of the surface from the centre of a liquid cell along an axis, in cells: bounds the matrix.
+const SURFACE_DISTANCE: [f32; 2] = [1e-6, 2.0];
 
 /// The grid that a pressure is solved on. Cells that are not stored are solid.
 #[derive(Clone, Copy, Debug)]
 pub struct PressureGrid<'a> {
     /// The stored cells: liquid ones, and those next to their open faces.
     pub rows: &'a CellRows,
-    /// Signed distance of the surface from each centre, in any unit; negative inside liquid.
+    /// Signed distance of the surface from each centre, in cells; negative inside liquid.
     pub level_set: &'a [f32],
     /// Of the low face of each cell along x, y and z: its open share, times the reference density ÷ the density there.
     pub weights: [&'a [f32]; 3],
@@ -72,12 +76,12 @@ impl PressureSolver {
     /// Where a field does not have one value a cell.
     pub fn new(grid: &PressureGrid<'_>) -> Self {
         assert!(grid.weights.iter().chain([&grid.level_set]).all(|field| field.len() == grid.rows.len()));
-        let liquid = grid.rows.filtered(|cell, at| grid.level_set[at] < 0.0 && is_open(grid, cell, at));
+        let liquid = grid.rows.filtered(|cell, at| grid.level_set[at] < -LEAST_DEPTH && is_open(grid, cell, at));
         let stencil = Stencil::around(liquid, HALO);
         let rows = stencil.rows();
         let level_set = rows.resampled(grid.rows, grid.level_set, f32::NAN);
         let mut kinds: Vec<_> =
-            level_set.iter().map(|phi| if *phi >= 0.0 { CellKind::Air } else { CellKind::Solid }).collect();
+            level_set.iter().map(|phi| if *phi >= -LEAST_DEPTH { CellKind::Air } else { CellKind::Solid }).collect();
         stencil.runs().iter().for_each(|run| kinds[run.range()].fill(CellKind::Liquid));
         let weights = grid.weights.map(|weights| rows.resampled(grid.rows, weights, 0.0));
         let distances = surface_distances(&stencil, &level_set);
@@ -232,9 +236,9 @@ fn surface_distances(stencil: &Stencil, level_set: &[f32]) -> SurfaceDistances {
         let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
         for axis in 0..3 {
             for (air, face) in [(below[axis], at), (above[axis], above[axis])] {
-                if level_set[air] >= 0.0 {
+                if level_set[air] >= -LEAST_DEPTH {
                     let distance = level_set[at] / (level_set[at] - level_set[air]);
-                    out[axis][face] = distance.max(LEAST_SURFACE_DISTANCE);
+                    out[axis][face] = distance.clamp(SURFACE_DISTANCE[0], SURFACE_DISTANCE[1]);
                 }
             }
         }

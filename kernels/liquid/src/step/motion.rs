@@ -3,6 +3,7 @@
 use numerics::vector::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Solid};
 use crate::step::{Settings, Surface, Surroundings, Wall};
@@ -172,12 +173,12 @@ pub(super) struct LiquidCells {
 impl LiquidCells {
     pub(super) fn of<S: Surface>(domain: &Domain, surface: &S, solid: Option<Solid<'_>>) -> Self {
         let view = surface.view();
-        let liquid = view.rows.filtered(|cell, at| view.phi[at] < 0.0 && domain.contains(cell));
+        let liquid = view.rows.filtered(|cell, at| view.phi[at] < -LEAST_DEPTH && domain.contains(cell));
         let rows = domain.clip(&liquid.dilated(1));
         let mut level_set = rows.resampled(view.rows, view.phi, view.outside);
         Self::leave_domain(domain, &rows, &mut level_set);
         let open = domain.open_shares(&rows, solid);
-        let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < 0.0)).collect();
+        let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < -LEAST_DEPTH)).collect();
         let [moving, known] = rows.tabulate_with(
             || (),
             |(), cell, at| {

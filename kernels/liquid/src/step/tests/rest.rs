@@ -29,8 +29,11 @@ fn a_pool_at_rest_stays_at_rest() {
         let (speed, off, _) = rest(depth, cell, None, 1e-6);
         assert!(speed < 1e-5 && off < 1e-4, "{depth} {cell}: {speed} {off}");
     }
-    let (speed, off, iterations) = rest(9.3, 0.0625, None, 1e-4);
-    assert!(speed < 1e-4 && off < 1e-3 && iterations < 240, "{speed} {off} {iterations}");
+    // A surface on the centres of cells, where rounding decides which are liquid, too.
+    for (depth, most) in [(9.3, 240), (7.5, 960)] {
+        let (speed, off, iterations) = rest(depth, 0.0625, None, 1e-4);
+        assert!(speed < 1e-4 && off < 1e-3 && iterations < most, "{depth}: {speed} {off} {iterations}");
+    }
 }
 
 #[test]
