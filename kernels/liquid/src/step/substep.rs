@@ -88,7 +88,7 @@ pub(super) fn substep<S: Surface>(
     surface.advance(&Moving { velocity: &velocity, step }, reach);
 
     let cells = LiquidCells::of(domain, surface, around.solid);
-    let advection = Advection { velocity: &velocity, bounds: domain.bounds(), step, steepest, scheme: settings.scheme };
+    let advection = Advection { velocity: &velocity, bounds: domain.bounds(), step, scheme: settings.scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     let gravity = (around.gravity)(middle);
     for axis in 0..3 {

@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, add, scale};
 
 use crate::rows::CellRows;
-use crate::velocity::{Corners, FaceMask, Faces, MacVelocity, Sampler, Site, extrapolate, trilinear, within};
+use crate::velocity::{Corners, FaceMask, Faces, MacVelocity, Sampler, Site, trilinear, within};
 
 /// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
 #[derive(Clone, Debug)]
@@ -49,7 +49,8 @@ pub enum Scheme {
     /// The value where the face came from.
     SemiLagrangian,
     /// The same, less half of what it changes going there and back (Selle et al. 2008), within the values around the
-    /// place that the face came from.
+    /// place that the face came from. Where the way back ends among faces that are not carried, semi-Lagrangian: continuing
+    /// the carried ones past them made a turning disk of 10 cells radius gain 3 % of its spin in a turn.
     MacCormack,
 }
 
@@ -62,14 +63,9 @@ pub struct Advection<'a> {
     pub bounds: [Vec3; 2],
     /// Cells moved at speed 1.
     pub step: f32,
-    /// The largest difference between faces next to each other that is continued, see [`extrapolate`].
-    pub steepest: f32,
     /// How values are carried.
     pub scheme: Scheme,
 }
-
-/// Layers of faces beside those wanted that the way back may pass.
-const BESIDE_LAYERS: u32 = 3;
 
 /// A value carried, and those around the place that it came from.
 type Bounded = [f32; 3];
@@ -110,9 +106,7 @@ impl Advection<'_> {
     fn mac_cormack(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
         let [x, y, z] = self.bounded(carried, rows, wanted);
         let first = [&x, &y, &z];
-        let mut there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
-        let mut known = wanted.to_vec();
-        extrapolate(rows, &mut known, [&mut there], self.steepest, BESIDE_LAYERS);
+        let there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
         let start = || (self.tracer(self.step), Sampler::new(rows), Sampler::new(self.velocity.rows()));
         rows.tabulate_with(start, |(tracer, new, old), cell, at| {
             let mut value = |axis: usize| {
@@ -121,7 +115,7 @@ impl Advection<'_> {
                 }
                 let site = Site::FACES[axis];
                 let [there_value, low, high] = first[axis][at];
-                let known = |corners: &Corners| corners.values(&known).iter().all(|mask| mask >> axis & 1 == 1);
+                let known = |corners: &Corners| corners.values(wanted).iter().all(|mask| mask >> axis & 1 == 1);
                 let back = new.corners(site, tracer.trace(site.of(cell))).filter(known);
                 let before = old.corners(site, site.of(cell));
                 let (Some(back), Some(before)) = (back, before) else { return there_value };
