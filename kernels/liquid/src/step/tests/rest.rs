@@ -72,6 +72,10 @@ fn a_blob_falls_freely() {
         let u = f64::from(motion.velocity().faces()[1][at]);
         assert!((u / -speed - 1.0).abs() < 1e-5, "{u} {speed}");
     }
+    // Past the liquid as in it.
+    let past = liquid.velocity(4);
+    assert!(past.rows().len() > 2 * motion.liquid_cells());
+    assert!(past.faces()[1].iter().all(|u| (f64::from(*u) / -speed - 1.0).abs() < 1e-5));
     let fallen = start - height(&liquid);
     assert!((fallen / way - 1.0).abs() < 1e-3, "{fallen} {way}");
 }
