@@ -87,8 +87,8 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
 fn within_reach(frames: &FrameSet, graph: &Graph) -> Result<(), Failure> {
     let first = graph.scene.first as f64;
     let history = |frame: Frame| (frame.number() - first).abs().max(frame.number().abs());
-    let ends = [frames.first(), frames.last()].into_iter().flatten();
-    let Some(frame) = ends.filter(|frame| history(*frame) > FARTHEST).last() else { return Ok(()) };
+    let mut ends = [frames.first(), frames.last()].into_iter().flatten();
+    let Some(frame) = ends.rfind(|frame| history(*frame) > FARTHEST) else { return Ok(()) };
     if graph.nodes.iter().all(|node| node.node().is_none_or(|declared| declared.cook.word() == "pure")) {
         return Ok(());
     }

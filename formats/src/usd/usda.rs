@@ -1,7 +1,7 @@
 //! `.usda`: USD as text.
 //!
 //! The samples of an attribute are contiguous in the file but arrive frame by frame. Their text is stored in a
-//! temporary spool file and copied at the end, so that memory is limited to one array. Every number is the shortest
+//! temporary spool file and copied at the end, so that memory is limited to the buffers. Every number is the shortest
 //! text that reads back as the same bits; only a NaN loses its payload.
 
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -13,37 +13,36 @@ use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, Stage, UsdType, Va
 /// Size in bytes of the buffers of the file and the spool.
 const BUFFER: usize = 1 << 18;
 
+/// Text is written on in pieces of about this size in bytes.
+const BLOCK: usize = 1 << 15;
+
 /// Writes text to `W`; `S` is the spool.
 pub(super) struct Writer<W: Write, S: Write> {
     file: BufWriter<W>,
     spool: BufWriter<S>,
-    spooled: u64,
-    text: Vec<u8>,
+    /// Where each array's text ends in the spool.
+    ends: Vec<u64>,
 }
 
 impl<W: Write, S: Write> Writer<W, S> {
     /// A writer to `file` with an empty `spool`.
     pub(super) fn new(file: W, spool: S) -> Self {
         let buffered = BufWriter::with_capacity(BUFFER, spool);
-        Self { file: BufWriter::with_capacity(BUFFER, file), spool: buffered, spooled: 0, text: Vec::new() }
+        Self { file: BufWriter::with_capacity(BUFFER, file), spool: buffered, ends: Vec::new() }
     }
 }
 
 impl<W: Write + Send, S: Read + Write + Seek + Send> Encoder<W> for Writer<W, S> {
-    /// The handle is the offset in the spool: u64 length, text.
+    /// The handle is the number of the array.
     fn store(&mut self, kind: UsdType, rows: &Column) -> io::Result<Handle> {
-        self.text.clear();
-        put_array(&mut self.text, kind, rows);
-        let handle = Handle(self.spooled);
-        self.spool.write_all(&(self.text.len() as u64).to_le_bytes())?;
-        self.spool.write_all(&self.text)?;
-        self.spooled += 8 + self.text.len() as u64;
-        Ok(handle)
+        let start = self.ends.last().copied().unwrap_or(0);
+        self.ends.push(start + put_array(&mut self.spool, kind, rows)?);
+        Ok(Handle(self.ends.len() as u64 - 1))
     }
 
     fn finish(self: Box<Self>, stage: &Stage) -> io::Result<W> {
-        let Self { mut file, spool, .. } = *self;
-        let mut spool = spool.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let Self { mut file, spool, ends } = *self;
+        let mut spool = Spool { file: spool.into_inner().map_err(io::IntoInnerError::into_error)?, ends };
         put_header(&mut file, stage)?;
         let display_name = stage.display_name.iter().map(|name| format!("displayName = {}", quoted(name))).collect();
         writeln!(file, "\ndef Xform \"{}\"{}\n{{", stage.name, metadata(0, display_name))?;
@@ -63,6 +62,28 @@ impl<W: Write + Send, S: Read + Write + Seek + Send> Encoder<W> for Writer<W, S>
     }
 }
 
+/// The text of arrays, one after another.
+struct Spool<S> {
+    file: S,
+    ends: Vec<u64>,
+}
+
+impl<S: Read + Seek> Spool<S> {
+    fn copy_to(&mut self, out: &mut impl Write, handle: Handle) -> io::Result<()> {
+        if handle == Handle::BLOCK {
+            return out.write_all(b"None");
+        }
+        let array = handle.0 as usize;
+        let start = if array == 0 { 0 } else { self.ends[array - 1] };
+        let length = self.ends[array] - start;
+        self.file.seek(SeekFrom::Start(start))?;
+        match io::copy(&mut (&mut self.file).take(length), out)? {
+            copied if copied == length => Ok(()),
+            _ => Err(io::ErrorKind::UnexpectedEof.into()),
+        }
+    }
+}
+
 fn put_header(file: &mut impl Write, stage: &Stage) -> io::Result<()> {
     writeln!(file, "#usda 1.0\n(\n    defaultPrim = \"{}\"", stage.name)?;
     for (name, value) in stage.numbers() {
@@ -71,7 +92,7 @@ fn put_header(file: &mut impl Write, stage: &Stage) -> io::Result<()> {
     writeln!(file, "    upAxis = \"Y\"\n)")
 }
 
-fn put_prim(file: &mut impl Write, spool: &mut (impl Read + Seek), prim: &Prim, times: &[f64]) -> io::Result<()> {
+fn put_prim(file: &mut impl Write, spool: &mut Spool<impl Read + Seek>, prim: &Prim, times: &[f64]) -> io::Result<()> {
     writeln!(file, "    def {} \"{}\"\n    {{", prim.schema, prim.name)?;
     for (name, value) in prim.tokens {
         writeln!(file, "        uniform token {name} = \"{value}\"")?;
@@ -85,7 +106,7 @@ fn put_prim(file: &mut impl Write, spool: &mut (impl Read + Seek), prim: &Prim, 
 /// A sampled attribute has its metadata in a separate declaration.
 fn put_attribute(
     file: &mut impl Write,
-    spool: &mut (impl Read + Seek),
+    spool: &mut Spool<impl Read + Seek>,
     attribute: &Attribute,
     times: &[f64],
 ) -> io::Result<()> {
@@ -97,7 +118,7 @@ fn put_attribute(
     match values {
         Values::Default(handle) => {
             write!(file, "{declared} = ")?;
-            copy_value(file, spool, *handle)?;
+            spool.copy_to(file, *handle)?;
             writeln!(file, "{}", metadata(2, lines))
         }
         Values::Samples(handles) => {
@@ -107,7 +128,7 @@ fn put_attribute(
             writeln!(file, "{declared}.timeSamples = {{")?;
             for (time, handle) in times.iter().zip(handles) {
                 write!(file, "            {}: ", decimal(*time))?;
-                copy_value(file, spool, *handle)?;
+                spool.copy_to(file, *handle)?;
                 writeln!(file, ",")?;
             }
             writeln!(file, "        }}")
@@ -120,20 +141,6 @@ fn metadata(depth: usize, lines: Vec<String>) -> String {
     let indent = "    ".repeat(depth);
     let body: String = lines.iter().map(|line| format!("{indent}    {line}\n")).collect();
     if lines.is_empty() { body } else { format!(" (\n{body}{indent})") }
-}
-
-fn copy_value(file: &mut impl Write, spool: &mut (impl Read + Seek), handle: Handle) -> io::Result<()> {
-    if handle == Handle::BLOCK {
-        return file.write_all(b"None");
-    }
-    spool.seek(SeekFrom::Start(handle.0))?;
-    let mut length = [0; 8];
-    spool.read_exact(&mut length)?;
-    let length = u64::from_le_bytes(length);
-    match io::copy(&mut spool.take(length), file)? {
-        copied if copied == length => Ok(()),
-        _ => Err(io::ErrorKind::UnexpectedEof.into()),
-    }
 }
 
 /// A string literal on one line.
@@ -153,35 +160,49 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-fn put_array(text: &mut Vec<u8>, kind: UsdType, rows: &Column) {
+/// Writes an array and returns the length of its text.
+fn put_array(out: &mut impl Write, kind: UsdType, rows: &Column) -> io::Result<u64> {
     let width = rows.kind().width();
-    text.push(b'[');
     match numbers(rows) {
         Numbers::Floats(floats) if kind == UsdType::Quat => {
             // In text the real part comes first.
-            let real_first: Vec<f32> = floats.as_chunks().0.iter().flat_map(|&[x, y, z, w]| [w, x, y, z]).collect();
-            put_rows(text, width, &real_first, put_float);
+            put_rows(out, floats.as_chunks().0.iter().map(|&[x, y, z, w]| [w, x, y, z]), put_float)
         }
-        Numbers::Floats(floats) => put_rows(text, width, floats, put_float),
+        Numbers::Floats(floats) => put_rows(out, floats.chunks_exact(width), put_float),
         Numbers::Ints(ints) => {
             let mut buffer = itoa::Buffer::new();
-            put_rows(text, width, ints, |text, x| text.extend_from_slice(buffer.format(x).as_bytes()));
+            let put = |text: &mut Vec<u8>, x| text.extend_from_slice(buffer.format(x).as_bytes());
+            put_rows(out, ints.chunks_exact(width), put)
         }
     }
-    text.push(b']');
 }
 
-fn put_rows<T: Copy>(text: &mut Vec<u8>, width: usize, numbers: &[T], mut put: impl FnMut(&mut Vec<u8>, T)) {
-    let (open, close): (&[u8], &[u8]) = if width > 1 { (b"(", b")") } else { (b"", b"") };
-    for (i, row) in numbers.chunks_exact(width).enumerate() {
+fn put_rows<T: Copy, R: AsRef<[T]>>(
+    out: &mut impl Write,
+    rows: impl Iterator<Item = R>,
+    mut put: impl FnMut(&mut Vec<u8>, T),
+) -> io::Result<u64> {
+    let mut text = vec![b'['];
+    let mut written = 0;
+    for (i, row) in rows.enumerate() {
+        let row = row.as_ref();
+        let (open, close): (&[u8], &[u8]) = if row.len() > 1 { (b"(", b")") } else { (b"", b"") };
         text.extend_from_slice(if i == 0 { b"" } else { b", " });
         text.extend_from_slice(open);
         for (k, x) in row.iter().enumerate() {
             text.extend_from_slice(if k == 0 { b"" } else { b", " });
-            put(text, *x);
+            put(&mut text, *x);
         }
         text.extend_from_slice(close);
+        if text.len() > BLOCK {
+            out.write_all(&text)?;
+            written += text.len() as u64;
+            text.clear();
+        }
     }
+    text.push(b']');
+    out.write_all(&text)?;
+    Ok(written + text.len() as u64)
 }
 
 fn put_float(text: &mut Vec<u8>, x: f32) {
@@ -203,7 +224,8 @@ mod tests {
 
     fn text(kind: UsdType, rows: Column) -> String {
         let mut text = Vec::new();
-        put_array(&mut text, kind, &rows);
+        let length = put_array(&mut text, kind, &rows).unwrap();
+        assert_eq!(length, text.len() as u64);
         String::from_utf8(text).unwrap()
     }
 
@@ -241,6 +263,13 @@ mod tests {
         assert_eq!(text(UsdType::Quat, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(4, 1, 2, 3)]");
         assert_eq!(text(UsdType::Color4, Column::new(vec![[1.0, 2.0, 3.0, 4.0_f32]])), "[(1, 2, 3, 4)]");
         assert_eq!(text(UsdType::Float3, Column::new(Vec::<[f32; 3]>::new())), "[]");
+    }
+
+    #[test]
+    fn an_array_longer_than_the_buffers_is_written_whole() {
+        let rows: Vec<i32> = (0..100_000).collect();
+        let expected = format!("{rows:?}");
+        assert_eq!(text(UsdType::Int, Column::new(rows)), expected);
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod plain;
 
 use std::time::Instant;
 
-use liquid::step::{Domain, Liquid, Settings, Splitting, Surface, Surroundings};
+use liquid::step::{Domain, Liquid, LiquidSettings, Splitting, Surface, Surroundings};
 use liquid::velocity::Scheme;
 use numerics::vector::length;
 use plain::{PlainLevelSet, Still};
@@ -41,7 +41,7 @@ fn dam(base: i32) {
     let domain = Domain::closed([0; 3], [5 * base, 3 * base, 3]);
     let cell = 0.05715 / f64::from(base);
     let column = block([-99.0; 3], [base as f32, 2.0 * base as f32, 99.0]);
-    let mut liquid = Liquid::new(Settings::new(domain, cell), PlainLevelSet::new(domain, column));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, cell), PlainLevelSet::new(domain, column));
     let unit = (0.05715_f64 / (2.0 * 9.81)).sqrt();
     let (mut now, mut line, mut ends) = (0.0, format!("base of {base} cells:"), Vec::new());
     for (time, measured) in MEASURED {
@@ -60,7 +60,7 @@ fn turn(n: i32, splitting: Splitting, scheme: Scheme, substeps: u32) -> f64 {
     let (middle, turn) = (0.5 * n as f32, std::f32::consts::TAU);
     let domain = Domain::closed([0; 3], [n, n, 2]);
     let disk = |[x, y, _]: [f32; 3]| length([x - middle, y - middle, 0.0]) - 0.3 * n as f32;
-    let settings = Settings { splitting, scheme, cfl: 1e9, tolerance: 1e-5, ..Settings::new(domain, 1.0) };
+    let settings = LiquidSettings { splitting, scheme, cfl: 1e9, tolerance: 1e-5, ..LiquidSettings::new(domain, 1.0) };
     let mut liquid = Liquid::new(settings, Still::new(domain, disk));
     liquid.set_velocity(|[x, y, _]| [-turn * (y - middle), turn * (x - middle), 0.0], &WEIGHTLESS);
     let spin = |liquid: &Liquid<Still>| {
@@ -93,7 +93,7 @@ fn turns() {
 /// 240 frames of a pool; the largest speed ÷ g·Δt.
 fn rest(n: i32, depth: f32, floor: f32, tolerance: f64) -> f64 {
     let domain = Domain::closed([0; 3], [n, n, n.min(16)]);
-    let settings = Settings { tolerance, ..Settings::new(domain, 1.0 / f64::from(n)) };
+    let settings = LiquidSettings { tolerance, ..LiquidSettings::new(domain, 1.0 / f64::from(n)) };
     let solid = |p: [f32; 3]| p[1] - floor;
     let around = Surroundings { solid: Some(&solid), ..FALLING };
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - depth));
@@ -120,7 +120,7 @@ fn rests() {
 #[allow(clippy::disallowed_methods, reason = "a measurement")]
 fn cost(name: &str, n: i32, distance: impl Fn([f32; 3]) -> f32 + Sync) -> f64 {
     let domain = Domain::closed([0; 3], [n; 3]);
-    let mut liquid = Liquid::new(Settings::new(domain, 1.0 / f64::from(n)), PlainLevelSet::new(domain, distance));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / f64::from(n)), PlainLevelSet::new(domain, distance));
     let (mut time, mut substeps, mut iterations, mut divergence, mut stored) = (0.0, 0, 0, 0.0_f64, 0);
     for frame in 1..=25 {
         let start = Instant::now();

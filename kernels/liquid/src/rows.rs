@@ -19,7 +19,7 @@ pub type Cell = [i32; 3];
 
 /// Cells next to each other along x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Span {
+pub struct RowSpan {
     /// The first cell.
     pub start: i32,
     /// The cell after the last.
@@ -28,7 +28,7 @@ pub struct Span {
     pub base: u32,
 }
 
-impl Span {
+impl RowSpan {
     /// Where the value of the cell `x` is.
     pub fn at(&self, x: i32) -> usize {
         self.base as usize + (x - self.start) as usize
@@ -57,7 +57,7 @@ pub struct CellRows {
     size: [i32; 2],
     /// For each row, its first span; then the number of all spans.
     first: Vec<u32>,
-    spans: Vec<Span>,
+    spans: Vec<RowSpan>,
     cells: usize,
 }
 
@@ -89,7 +89,7 @@ impl CellRows {
             }
             for Range { start, end } in spans {
                 let base = u32::try_from(rows.cells).expect("more cells than a u32 counts");
-                rows.spans.push(Span { start, end, base });
+                rows.spans.push(RowSpan { start, end, base });
                 rows.cells += (end - start) as usize;
             }
         }
@@ -126,7 +126,7 @@ impl CellRows {
     }
 
     /// The spans of a row, ascending.
-    pub fn row(&self, y: i32, z: i32) -> &[Span] {
+    pub fn row(&self, y: i32, z: i32) -> &[RowSpan] {
         let [j, k] = [i64::from(y) - i64::from(self.low[0]), i64::from(z) - i64::from(self.low[1])];
         if j < 0 || k < 0 || j >= i64::from(self.size[0]) || k >= i64::from(self.size[1]) {
             return &[];
@@ -143,14 +143,14 @@ impl CellRows {
     }
 
     /// The rows that hold cells, with y and z, in the order of fields.
-    pub fn rows(&self) -> impl Iterator<Item = ([i32; 2], &[Span])> {
+    pub fn rows(&self) -> impl Iterator<Item = ([i32; 2], &[RowSpan])> {
         let [ny, nz] = self.size;
         let rows = (0..nz).flat_map(move |k| (0..ny).map(move |j| [self.low[0] + j, self.low[1] + k]));
         rows.map(|[y, z]| ([y, z], self.row(y, z))).filter(|(_, spans)| !spans.is_empty())
     }
 
     /// The spans with the y and z of their row, in the order of fields.
-    pub fn spans(&self) -> impl Iterator<Item = ([i32; 2], Span)> {
+    pub fn spans(&self) -> impl Iterator<Item = ([i32; 2], RowSpan)> {
         self.rows().flat_map(|(row, spans)| spans.iter().map(move |span| (row, *span)))
     }
 
@@ -231,7 +231,7 @@ impl CellRows {
         let first = [max(self.low[0], low[1]), max(self.low[1], low[2])];
         let end = [min(self.low[0] + self.size[0], high[1]), min(self.low[1] + self.size[1], high[2])];
         Self::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
-            let inside = |span: &Span| max(span.start, low[0])..min(span.end, high[0]);
+            let inside = |span: &RowSpan| max(span.start, low[0])..min(span.end, high[0]);
             out.extend(self.row(y, z).iter().map(inside));
         })
     }
@@ -321,7 +321,7 @@ impl CellRows {
     }
 }
 
-fn range(span: &Span) -> Range<i32> {
+fn range(span: &RowSpan) -> Range<i32> {
     span.start..span.end
 }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::rows::{CellRows, Span};
+use crate::rows::{CellRows, RowSpan};
 
 /// Cells next to each other along x whose neighbours, too, are next to each other in a field. Those along x are one
 /// before and one after.
@@ -122,7 +122,7 @@ fn runs(rows: &CellRows, active: &CellRows) -> Vec<Run> {
         for span in spans {
             let mut x = span.start;
             while x < span.end {
-                let found: [Span; 5] = std::array::from_fn(|row| {
+                let found: [RowSpan; 5] = std::array::from_fn(|row| {
                     while near[row][next[row]].end <= x {
                         next[row] += 1;
                     }

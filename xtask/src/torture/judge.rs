@@ -68,7 +68,8 @@ fn printed(call: &Call, outcome: &Outcome) -> Option<String> {
     let has = |word: &str| call.args.iter().any(|arg| arg == word);
     let reports = call.args.windows(2).any(|pair| pair == ["--report", "-"]);
     let is_cook = call.args.first().is_some_and(|verb| verb == "cook") && !has("--help");
-    if call.full_stdout || outcome.stdout.is_empty() || !(is_cook || has("--json")) {
+    let is_data = is_cook || has("--json") && !has("--help");
+    if call.full_stdout || outcome.stdout.is_empty() || !is_data {
         return None;
     }
     if is_cook && !reports {

@@ -17,13 +17,13 @@ fn weights(t: f32) -> [[f32; 4]; 2] {
 type Four = [f32; 4];
 
 #[inline(always)]
-fn sum_of(four: [Four; 4], weights: Four) -> Four {
+fn weighted_rows(four: [Four; 4], weights: Four) -> Four {
     let [a, b, c, d] = four;
     std::array::from_fn(|n| (weights[0] * a[n] + weights[1] * b[n]) + (weights[2] * c[n] + weights[3] * d[n]))
 }
 
 #[inline(always)]
-fn product(four: Four, weights: Four) -> f32 {
+fn weighted(four: Four, weights: Four) -> f32 {
     (weights[0] * four[0] + weights[1] * four[1]) + (weights[2] * four[2] + weights[3] * four[3])
 }
 
@@ -33,11 +33,12 @@ pub(crate) fn cubic(block: &Block, at: [f32; 3]) -> (f32, [f32; 3]) {
     let [[x, dx], [y, dy], [z, dz]] = at.map(weights);
     let row = |row: usize| -> Four { std::array::from_fn(|n| block[4 * row + n]) };
     let slices: [[Four; 4]; 4] = std::array::from_fn(|k| std::array::from_fn(|j| row(4 * k + j)));
-    let along_y = slices.map(|rows| sum_of(rows, y));
-    let across_y = slices.map(|rows| sum_of(rows, dy));
-    let value = sum_of(along_y, z);
-    let gradient = [product(value, dx), product(sum_of(across_y, z), x), product(sum_of(along_y, dz), x)];
-    (product(value, x), gradient)
+    let along_y = slices.map(|rows| weighted_rows(rows, y));
+    let across_y = slices.map(|rows| weighted_rows(rows, dy));
+    let value = weighted_rows(along_y, z);
+    let gradient =
+        [weighted(value, dx), weighted(weighted_rows(across_y, z), x), weighted(weighted_rows(along_y, dz), x)];
+    (weighted(value, x), gradient)
 }
 
 #[cfg(test)]

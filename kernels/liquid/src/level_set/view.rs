@@ -1,7 +1,7 @@
 //! A level set to read, and the 4³ values around a cube of it.
 
 use crate::level_set::cubic::Block;
-use crate::rows::{Cell, CellRows, Span};
+use crate::rows::{Cell, CellRows, RowSpan};
 
 /// φ at the centres of cells, negative inside the liquid. The unit of length is the cell: cell [x, y, z] reaches from
 /// there to [x + 1, y + 1, z + 1], its centre is in the middle.
@@ -25,7 +25,7 @@ pub(crate) struct RowBlocks<'a> {
     view: PhiView<'a>,
     y: i32,
     z: i32,
-    rows: [&'a [Span]; 16],
+    rows: [&'a [RowSpan]; 16],
     /// Whether the sixteen rows lie in the domain.
     within: bool,
 }
@@ -96,7 +96,7 @@ fn extend_line(block: &mut Block, index: impl Fn(usize) -> usize, first: usize, 
 
 /// What is stored of the four cells from x − 1; spans before them are left out already.
 #[cold]
-fn fill_gaps(phi: &[f32], spans: &[Span], x: i32, four: &mut [f32]) {
+fn fill_gaps(phi: &[f32], spans: &[RowSpan], x: i32, four: &mut [f32]) {
     for (n, value) in four.iter_mut().enumerate() {
         let cell = x - 1 + n as i32;
         if let Some(span) = spans.iter().take_while(|span| span.start <= cell).find(|span| cell < span.end) {

@@ -47,7 +47,7 @@ pub enum Splitting {
 
 /// What does not change while a liquid moves.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct LiquidSettings {
     /// The box of the liquid and its walls.
     pub domain: Domain,
     /// The side of a cell, m.
@@ -66,7 +66,7 @@ pub struct Settings {
     pub splitting: Splitting,
 }
 
-impl Settings {
+impl LiquidSettings {
     /// The defaults for a domain of cells with this side, m.
     pub fn new(domain: Domain, cell: f64) -> Self {
         let (scheme, splitting) = (Scheme::MacCormack, Splitting::KeepsSpin);
@@ -76,7 +76,7 @@ impl Settings {
 
 /// What a frame took and how it ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameReport {
+pub struct LiquidReport {
     /// Substeps taken.
     pub substeps: u32,
     /// The most cells that liquid moved in a substep.
@@ -99,7 +99,7 @@ pub struct FrameReport {
     pub left_domain: f64,
 }
 
-impl FrameReport {
+impl LiquidReport {
     fn add(&mut self, other: &Self) {
         self.substeps += other.substeps;
         self.cfl_reached = self.cfl_reached.max(other.cfl_reached);
@@ -117,19 +117,19 @@ impl FrameReport {
 /// A liquid, and all that its next frame depends on.
 #[derive(Clone, Debug)]
 pub struct Liquid<S> {
-    settings: Settings,
+    settings: LiquidSettings,
     surface: S,
     motion: Motion,
 }
 
 impl<S: Surface> Liquid<S> {
     /// A liquid with this surface, at rest.
-    pub fn new(settings: Settings, surface: S) -> Self {
+    pub fn new(settings: LiquidSettings, surface: S) -> Self {
         Self { settings, surface, motion: Motion::default() }
     }
 
     /// A liquid as it was when `surface` and `motion` were taken from it: its further frames have the same bits.
-    pub fn resume(settings: Settings, surface: S, motion: Motion) -> Self {
+    pub fn resume(settings: LiquidSettings, surface: S, motion: Motion) -> Self {
         Self { settings, surface, motion }
     }
 
@@ -158,8 +158,8 @@ impl<S: Surface> Liquid<S> {
     }
 
     /// Moves on by `seconds`, in as many substeps as the speed asks for.
-    pub fn step_frame(&mut self, around: &Surroundings<'_>, seconds: f64) -> FrameReport {
-        let mut report = FrameReport { liquid_cells: self.motion.liquid_cells(), ..FrameReport::default() };
+    pub fn step_frame(&mut self, around: &Surroundings<'_>, seconds: f64) -> LiquidReport {
+        let mut report = LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() };
         let mut left = seconds;
         while left > 0.0 {
             let gravity = (around.gravity)(seconds - left);

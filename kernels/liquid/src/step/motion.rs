@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Solid};
-use crate::step::{Settings, Surface, Surroundings, Wall};
-use crate::velocity::{ALL_FACES, FaceMask, Faces, MacVelocity, Sampler, Site, extrapolate, resampled};
+use crate::step::{LiquidSettings, Surface, Surroundings, Wall};
+use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
 
 /// What gravity and pressure together added to the velocity in a substep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Gain {
     /// On the rows of the velocity, m/s.
-    pub faces: Faces,
+    pub faces: FaceFields<f32>,
     /// The length of that substep, s.
     pub seconds: f64,
 }
@@ -38,7 +38,7 @@ pub struct Motion {
 
 impl Motion {
     pub(super) fn starting<S: Surface>(
-        settings: &Settings,
+        settings: &LiquidSettings,
         surface: &S,
         around: &Surroundings<'_>,
         velocity: impl Fn(Vec3) -> Vec3 + Sync,
@@ -86,12 +86,12 @@ impl Motion {
     /// Fields that are known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
     pub(super) fn continued<const F: usize>(
         &self,
-        fields: [&Faces; F],
+        fields: [&FaceFields<f32>; F],
         rows: &CellRows,
         steepest: f32,
         domain: &Domain,
         solid: Option<Solid<'_>>,
-    ) -> [Faces; F] {
+    ) -> [FaceFields<f32>; F] {
         let mut known = rows.resampled(self.rows(), &self.known, 0);
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
         extrapolate(rows, &mut known, fields.each_mut(), steepest, u32::MAX);
@@ -106,7 +106,7 @@ impl Motion {
 }
 
 /// Nothing flows through closed walls, where the faces of the liquid have not said so.
-fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut Faces) {
+fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
     for ([y, z], span) in rows.spans() {
         for axis in [1, 2] {
             if matches!(domain.wall_at(axis, [span.start, y, z]), Some(Wall::Closed | Wall::FreeSlip)) {
@@ -123,7 +123,7 @@ fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut Faces) {
 }
 
 /// On faces inside a solid, takes away the part that flows into or out of it.
-fn slide(rows: &CellRows, faces: &Faces, solid: Solid<'_>) -> Faces {
+fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Solid<'_>) -> FaceFields<f32> {
     rows.tabulate_with(
         || Sampler::new(rows),
         |sampler, cell, at| {

@@ -8,8 +8,8 @@ use crate::rows::CellRows;
 use crate::step::domain::Solid;
 use crate::step::motion::{Gain, Guess, LiquidCells, Motion};
 use crate::step::turned;
-use crate::step::{FrameReport, Settings, Splitting, Wall};
-use crate::velocity::{Advection, Faces, MacVelocity, Sampler};
+use crate::step::{LiquidReport, LiquidSettings, Splitting, Wall};
+use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -59,13 +59,13 @@ const FLOW_SHARE: f64 = 0.25;
 
 /// Moves on by `seconds`; `middle` is when gravity is read.
 pub(super) fn substep<S: Surface>(
-    settings: &Settings,
+    settings: &LiquidSettings,
     surface: &mut S,
     motion: &mut Motion,
     around: &Surroundings<'_>,
     middle: f64,
     seconds: f64,
-) -> FrameReport {
+) -> LiquidReport {
     let domain = &settings.domain;
     let step = (seconds / settings.cell) as f32;
     let reach = motion.largest_speed() as f32 * step;
@@ -119,13 +119,13 @@ pub(super) fn substep<S: Surface>(
 /// Drives the divergence out of a velocity. Returns what that took from it besides. `scale`: what errors of the velocity
 /// are measured against.
 fn project(
-    settings: &Settings,
+    settings: &LiquidSettings,
     cells: &LiquidCells,
-    faces: &mut Faces,
+    faces: &mut FaceFields<f32>,
     guess: &mut Guess,
     scale: f64,
     seconds: f64,
-) -> (FrameReport, Faces) {
+) -> (LiquidReport, FaceFields<f32>) {
     let [x, y, z] = &cells.open;
     let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z] };
     let solver = PressureSolver::new(&grid);
@@ -137,18 +137,18 @@ fn project(
     let taken = subtract_gradient(&solver, cells, &q, faces);
     *guess = Guess { rows: solver.rows().clone(), q };
     let per_cell = seconds / settings.cell;
-    let report = FrameReport {
+    let report = LiquidReport {
         pressure_iterations: solved.iterations,
         solves_cut_short: u32::from(solved.flow > stop.flow && solved.iterations >= stop.iterations),
         max_divergence: solved.flow * per_cell,
         unbalanced: solved.unbalanced * per_cell,
-        ..FrameReport::default()
+        ..LiquidReport::default()
     };
     (report, taken)
 }
 
 /// The net inflow of each liquid cell, m/s.
-fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &Faces) -> Vec<f64> {
+fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &FaceFields<f32>) -> Vec<f64> {
     let rows = solver.rows();
     let through: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let flow = |(u, share): (&f32, &f32)| f64::from(*u) * f64::from(*share);
@@ -171,7 +171,12 @@ fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &Faces) -> Vec<f6
 }
 
 /// Takes the gradient of `q` from open faces; returns it.
-fn subtract_gradient(solver: &PressureSolver, cells: &LiquidCells, q: &[f64], faces: &mut Faces) -> Faces {
+fn subtract_gradient(
+    solver: &PressureSolver,
+    cells: &LiquidCells,
+    q: &[f64],
+    faces: &mut FaceFields<f32>,
+) -> FaceFields<f32> {
     let mut gradient: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; solver.rows().len()]);
     solver.for_each_gradient(q, |axis, at, value| gradient[axis][at] = value as f32);
     std::array::from_fn(|axis| {
@@ -188,7 +193,7 @@ fn subtract_gradient(solver: &PressureSolver, cells: &LiquidCells, q: &[f64], fa
 }
 
 /// What flows out through open walls, m/s · faces.
-fn outflow(settings: &Settings, cells: &LiquidCells, faces: &Faces) -> f64 {
+fn outflow(settings: &LiquidSettings, cells: &LiquidCells, faces: &FaceFields<f32>) -> f64 {
     let domain = &settings.domain;
     if domain.walls.as_flattened().iter().all(|wall| *wall != Wall::Open) {
         return 0.0;

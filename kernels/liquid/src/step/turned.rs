@@ -9,14 +9,14 @@
 use numerics::vector::Vec3;
 
 use crate::step::motion::{Gain, Motion};
-use crate::velocity::{Faces, Sampler, Site, extrapolate, resampled};
+use crate::velocity::{FaceFields, Sampler, Site, extrapolate, resampled};
 
 /// Layers of faces past the liquid that differences at its faces reach.
 const REACHED: u32 = 2;
 
 /// The velocity that is to be carried in a substep of `seconds`, on the rows of the velocity. `gain`: of the substep before;
 /// `step`: cells moved at speed 1; differences of velocity count as at most `steepest`.
-pub(super) fn carried(motion: &Motion, gain: &Gain, seconds: f64, step: f32, steepest: f32) -> Faces {
+pub(super) fn carried(motion: &Motion, gain: &Gain, seconds: f64, step: f32, steepest: f32) -> FaceFields<f32> {
     let rows = motion.rows().dilated(1);
     let mut known = rows.resampled(motion.rows(), &motion.known, 0);
     let mut velocity = resampled(&rows, motion.rows(), motion.velocity.faces());

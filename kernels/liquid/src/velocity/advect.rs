@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, add, scale};
 
 use crate::rows::CellRows;
-use crate::velocity::{Corners, FaceMask, Faces, MacVelocity, Sampler, Site, trilinear, within};
+use crate::velocity::{Corners, FaceFields, FaceMask, MacVelocity, Sampler, Site, trilinear, within};
 
 /// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
 #[derive(Clone, Debug)]
@@ -75,7 +75,7 @@ impl Advection<'_> {
     ///
     /// # Panics
     /// Where a field does not have one value a cell.
-    pub fn carry(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+    pub fn carry(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
         assert!(carried.iter().all(|field| field.len() == self.velocity.rows().len()));
         assert_eq!(wanted.len(), rows.len());
         match self.scheme {
@@ -88,7 +88,7 @@ impl Advection<'_> {
         Tracer::new(self.velocity, self.bounds, step)
     }
 
-    fn semi_lagrangian(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+    fn semi_lagrangian(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
         let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
         rows.tabulate_with(start, |(tracer, sampler), cell, at| {
             let value = |axis: usize| {
@@ -103,7 +103,7 @@ impl Advection<'_> {
         })
     }
 
-    fn mac_cormack(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> Faces {
+    fn mac_cormack(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
         let [x, y, z] = self.bounded(carried, rows, wanted);
         let first = [&x, &y, &z];
         let there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
@@ -127,7 +127,7 @@ impl Advection<'_> {
     }
 
     /// Of each wanted face the value where it came from, and the least and largest value around.
-    fn bounded(&self, carried: &Faces, rows: &CellRows, wanted: &[FaceMask]) -> [Vec<Bounded>; 3] {
+    fn bounded(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> [Vec<Bounded>; 3] {
         let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
         rows.tabulate_with(start, |(tracer, sampler), cell, at| {
             let mut value = |axis: usize| {

@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::rows::{CellRows, Span};
-use crate::velocity::{ALL_FACES, FaceMask, Faces};
+use crate::rows::{CellRows, RowSpan};
+use crate::velocity::{ALL_FACES, FaceFields, FaceMask};
 
 /// A row that is not stored.
 const NONE: u32 = u32::MAX;
@@ -55,11 +55,11 @@ struct Chunk {
 pub fn extrapolate<const F: usize>(
     rows: &CellRows,
     known: &mut [FaceMask],
-    mut fields: [&mut Faces; F],
+    mut fields: [&mut FaceFields<f32>; F],
     steepest: f32,
     layers: u32,
 ) {
-    let fits = |faces: &&mut Faces| faces.iter().all(|field| field.len() == rows.len());
+    let fits = |faces: &&mut FaceFields<f32>| faces.iter().all(|field| field.len() == rows.len());
     assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
     let lines = lines(rows);
     let mut chunks = chunks(&lines);
@@ -88,7 +88,7 @@ pub fn extrapolate<const F: usize>(
 struct Layer<'a, const F: usize> {
     lines: &'a [Line],
     known: &'a [FaceMask],
-    fields: [&'a Faces; F],
+    fields: [&'a FaceFields<f32>; F],
     steepest: f32,
 }
 
@@ -207,7 +207,7 @@ fn lines(rows: &CellRows) -> Vec<Line> {
 }
 
 /// Where a row stores `x`, and until which cell that holds. Drops the spans before it.
-fn base_at(row: &mut &[Span], x: i32) -> (u32, i32) {
+fn base_at(row: &mut &[RowSpan], x: i32) -> (u32, i32) {
     while let Some((first, rest)) = row.split_first()
         && first.end <= x
     {

@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::rows::CellRows;
 
-/// One value an axis for each cell, on its low faces.
-pub type Faces = [Vec<f32>; 3];
+/// One value for each face: of the low faces of cells along x, y and z.
+pub type FaceFields<T> = [Vec<T>; 3];
 
 /// Which low faces of a cell count: bit 0 along x, bit 1 along y, bit 2 along z.
 pub type FaceMask = u8;
@@ -32,7 +32,7 @@ pub const ALL_FACES: FaceMask = 7;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MacVelocity {
     rows: CellRows,
-    faces: Faces,
+    faces: FaceFields<f32>,
 }
 
 impl MacVelocity {
@@ -40,7 +40,7 @@ impl MacVelocity {
     ///
     /// # Panics
     /// Where a field does not have one value a cell.
-    pub fn new(rows: CellRows, faces: Faces) -> Self {
+    pub fn new(rows: CellRows, faces: FaceFields<f32>) -> Self {
         assert!(faces.iter().all(|field| field.len() == rows.len()), "a velocity has one value a cell and axis");
         Self { rows, faces }
     }
@@ -51,12 +51,12 @@ impl MacVelocity {
     }
 
     /// The values on low faces along x, y and z.
-    pub fn faces(&self) -> &Faces {
+    pub fn faces(&self) -> &FaceFields<f32> {
         &self.faces
     }
 
     /// The stored cells and the values.
-    pub fn into_parts(self) -> (CellRows, Faces) {
+    pub fn into_parts(self) -> (CellRows, FaceFields<f32>) {
         (self.rows, self.faces)
     }
 
@@ -72,7 +72,7 @@ impl MacVelocity {
 }
 
 /// These fields on other rows; 0 where `from` has no cell.
-pub fn resampled(rows: &CellRows, from: &CellRows, faces: &Faces) -> Faces {
+pub fn resampled(rows: &CellRows, from: &CellRows, faces: &FaceFields<f32>) -> FaceFields<f32> {
     faces.each_ref().map(|field| rows.resampled(from, field, 0.0))
 }
 

@@ -2,7 +2,7 @@
 
 use numerics::vector::Vec3;
 
-use crate::rows::{Cell, CellRows, Span};
+use crate::rows::{Cell, CellRows, RowSpan};
 use crate::velocity::within;
 
 /// Where in its cell the value of a field lies.
@@ -144,7 +144,7 @@ impl<'a> Sampler<'a> {
             let span = row.get(row.partition_point(|span| span.end <= x))?;
             (span.start <= x && x + 1 < span.end).then_some(*span)
         };
-        let mut spans = [Span { start: 0, end: 0, base: 0 }; 4];
+        let mut spans = [RowSpan { start: 0, end: 0, base: 0 }; 4];
         for (span, row) in spans.iter_mut().zip(rows_around([y, z])) {
             *span = around(row)?;
         }
@@ -235,7 +235,8 @@ mod tests {
 
     #[test]
     fn linear_fields_are_sampled_exactly_between_any_cells() {
-        let rows = CellRows::cuboid([-6, -5, -7], [9, 8, 6]).filtered(|[x, y, z], _| x * x + y * y + z * z < 40);
+        let rows =
+            CellRows::cuboid([-6, -5, -7], [9, 8, 6]).filtered(|cell, _| cell.map(|x| x * x).iter().sum::<i32>() < 40);
         for site in [Site::FaceX, Site::FaceY, Site::FaceZ, Site::Centre] {
             let field = rows.tabulate(|cell| linear(site.of(cell)));
             let mut sampler = Sampler::new(&rows);

@@ -16,7 +16,7 @@ fn ball(radius: f32, by: i32) -> CellRows {
 }
 
 /// The field of `velocity` on all faces.
-fn faces(rows: &CellRows, velocity: impl Fn(Vec3) -> Vec3 + Sync) -> Faces {
+fn faces(rows: &CellRows, velocity: impl Fn(Vec3) -> Vec3 + Sync) -> FaceFields<f32> {
     rows.tabulate_each(|cell| [0, 1, 2].map(|axis| velocity(Site::FACES[axis].of(cell))[axis]))
 }
 
@@ -60,7 +60,7 @@ fn single_faces_are_continued_as_they_are_and_slopes_are_bounded() {
     let rows = CellRows::from_cells(&(-9..9).map(|x| [x, 0, 0]).chain([[30, 5, 5]]).collect::<Vec<_>>());
     let at = |x: i32| rows.find([x, 0, 0]).unwrap();
     let mut known = vec![0; rows.len()];
-    let mut fields: Faces = std::array::from_fn(|_| vec![0.0; rows.len()]);
+    let mut fields: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; rows.len()]);
     (known[at(0)], known[at(1)]) = (0b011, 0b001);
     (fields[0][at(0)], fields[0][at(1)], fields[1][at(0)]) = (1.0, 5.0, 3.0);
     extrapolate(&rows, &mut known, [&mut fields], 0.5, u32::MAX);

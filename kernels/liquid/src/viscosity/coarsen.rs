@@ -5,7 +5,8 @@ use crate::rows::{Cell, CellRows};
 use crate::stencil::Stencil;
 
 use super::extension::Extensions;
-use super::level::{FaceFields, FaceKind, HALO, Level, lower};
+use super::level::{FaceKind, HALO, Level, lower};
+use crate::velocity::FaceFields;
 
 /// Least mass of a free coarse face: where the surface only just reaches it.
 const LEAST_MASS: f32 = 0.25;

@@ -4,7 +4,8 @@ use crate::fields::{add_scaled, dot, scale_and_add};
 use crate::transfer::{Place, add_interpolated, restrict};
 
 use super::coarsen::coarsened;
-use super::level::{FaceFields, FaceKind, Level, Smoothing, Stresses};
+use super::level::{FaceKind, Level, Smoothing, Stresses};
+use crate::velocity::FaceFields;
 
 /// Cells of the coarsest grid, about.
 const COARSEST: usize = 150;
@@ -178,7 +179,7 @@ fn solve_coarsest(level: &Level, b: &FaceFields<f32>, u: &mut FaceFields<f32>) {
     }
 }
 
-/// What the weights of interpolation are multiplied by at each fine face; 0 where it is not free. FaceFields in air without an
+/// What the weights of interpolation are multiplied by at each fine face; 0 where it is not free. Faces in air without an
 /// extended velocity are left out; solid ones count, with velocity 0.
 fn scales(fine: &Level, coarse: &Level) -> FaceFields<f32> {
     let is_extended = |axis, at| coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, at));

@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 use crate::rows::{Cell, CellRows};
 
-use super::level::{FaceFields, FaceKind, Real};
+use super::level::{FaceKind, Real};
+use crate::velocity::FaceFields;
 
 /// Steps outwards from free faces: along one axis, then along another.
 const LAYERS: usize = 2;

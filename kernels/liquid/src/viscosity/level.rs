@@ -6,6 +6,7 @@ use numerics::simd::{Path, kernel};
 
 use crate::rows::{Cell, CellRows};
 use crate::stencil::{Run, Stencil};
+use crate::velocity::FaceFields;
 
 use super::extension::Extensions;
 
@@ -20,9 +21,6 @@ pub(super) enum FaceKind {
     /// Moves with a solid.
     Solid,
 }
-
-/// One value for each face: of the low faces along x, y and z.
-pub(super) type FaceFields<T> = [Vec<T>; 3];
 
 /// For each free face, mass · u − Σ differences of stress.
 #[derive(Clone, Debug)]

@@ -24,8 +24,9 @@ use crate::fields::{add_scaled, dot, largest};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace};
 use crate::rows::CellRows;
 
+use crate::velocity::FaceFields;
 use cycle::{Multigrid, Workspace};
-use level::{FaceFields, Stresses};
+use level::Stresses;
 use rigid::RigidMotions;
 use setup::Flow;
 

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use crate::rows::Cell;
 use crate::sets::Sets;
 
-use super::level::{FaceFields, FaceKind, Level, Stresses};
+use super::level::{FaceKind, Level, Stresses};
+use crate::velocity::FaceFields;
 
 /// Free faces of a component next to each other along x.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,8 @@ use crate::rows::{Cell, CellRows};
 use crate::stencil::Stencil;
 
 use super::StokesGrid;
-use super::level::{FaceFields, FaceKind, Level, lower};
+use super::level::{FaceKind, Level, lower};
+use crate::velocity::FaceFields;
 
 /// Least distance of a solid from a face beside it, in cells: bounds the matrix.
 const LEAST_SOLID_DISTANCE: f32 = 0.1;

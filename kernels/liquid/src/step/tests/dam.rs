@@ -51,7 +51,7 @@ fn a_dam_breaks_as_measured_and_then_sloshes() {
     let (base, cell) = (10.0_f32, 1.0 / 160.0);
     let domain = Domain::closed([0; 3], [50, 30, 2]);
     let block = block([-9.0; 3], [base, 2.0 * base, 9.0]);
-    let mut liquid = Liquid::new(Settings::new(domain, cell), PlainLevelSet::new(domain, block));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, cell), PlainLevelSet::new(domain, block));
     let unit = (f64::from(base) * cell / (2.0 * 9.81)).sqrt();
     let start = volume(&liquid.surface().view(), &domain);
     let [energy, _] = energy_and_middle(&liquid, &domain, cell);

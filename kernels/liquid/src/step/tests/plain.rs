@@ -113,8 +113,8 @@ fn eikonal(mut near: [f32; 3]) -> f32 {
         distance = 0.5 * (a + b + (2.0 - (a - b) * (a - b)).max(0.0).sqrt());
     }
     if distance > c {
-        let sum = a + b + c;
-        distance = (sum + (sum * sum - 3.0 * (a * a + b * b + c * c - 1.0)).max(0.0).sqrt()) / 3.0;
+        let (sum, squares) = (a + b + c, near.map(|x| x * x).iter().sum::<f32>());
+        distance = (sum + (sum * sum - 3.0 * (squares - 1.0)).max(0.0).sqrt()) / 3.0;
     }
     distance
 }

@@ -5,7 +5,7 @@ use numerics::vector::length;
 /// change of φ near the surface, and the iterations after the first frames.
 fn rest(depth: f32, cell: f64, solid: Option<&(dyn Fn(Vec3) -> f32 + Sync)>, tolerance: f64) -> (f64, f32, u32) {
     let domain = Domain::closed([0; 3], [16; 3]);
-    let settings = Settings { tolerance, ..Settings::new(domain, cell) };
+    let settings = LiquidSettings { tolerance, ..LiquidSettings::new(domain, cell) };
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - depth));
     let around = Surroundings { solid, ..FALLING };
     let (mut speed, mut iterations) = (0.0_f64, 0);
@@ -50,7 +50,7 @@ fn a_floor_that_cuts_cells_does_not_disturb_the_rest() {
 fn a_blob_falls_freely() {
     let domain = Domain::closed([0; 3], [24, 48, 24]);
     let ball = |p: Vec3| length([p[0] - 12.0, p[1] - 38.0, p[2] - 12.0]) - 6.0;
-    let mut liquid = Liquid::new(Settings::new(domain, 1.0 / 48.0), PlainLevelSet::new(domain, ball));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 48.0), PlainLevelSet::new(domain, ball));
     let height = |liquid: &Liquid<PlainLevelSet>| {
         let (view, mut sums) = (liquid.surface().view(), [0.0; 2]);
         for (at, cell) in view.rows.iter().enumerate() {
@@ -86,7 +86,7 @@ fn a_block_slides_on_a_floor_that_cuts_cells() {
     let domain = Domain::closed([0; 3], [40, 14, 3]);
     let floor = |p: Vec3| p[1] - 2.6;
     let around = Surroundings { solid: Some(&floor), gravity: &|_| [0.0, 0.0, 0.0] };
-    let settings = Settings::new(domain, 1.0 / 16.0);
+    let settings = LiquidSettings::new(domain, 1.0 / 16.0);
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([4.0, -9.0, -9.0], [16.0, 9.0, 9.0])));
     liquid.set_velocity(|_| [1.0, 0.0, 0.0], &around);
     let start = volume(&liquid.surface().view(), &domain);

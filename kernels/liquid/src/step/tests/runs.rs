@@ -5,7 +5,7 @@ use rayon::ThreadPoolBuilder;
 /// A dam that breaks over a ball.
 fn splash(frames: u32) -> Liquid<PlainLevelSet> {
     let domain = Domain::closed([0; 3], [24, 16, 12]);
-    let settings = Settings::new(domain, 1.0 / 24.0);
+    let settings = LiquidSettings::new(domain, 1.0 / 24.0);
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([-9.0; 3], [9.0, 12.0, 30.0])));
     go_on(&mut liquid, frames);
     liquid
@@ -50,7 +50,7 @@ fn a_liquid_taken_apart_and_resumed_goes_on_with_the_same_bits() {
 fn memory_follows_the_liquid() {
     let domain = Domain::closed([0; 3], [64; 3]);
     let stored = |height: f32| {
-        let settings = Settings::new(domain, 1.0 / 64.0);
+        let settings = LiquidSettings::new(domain, 1.0 / 64.0);
         let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - height));
         let report = liquid.step_frame(&FALLING, 1.0 / 24.0);
         assert_eq!(report.liquid_cells, (height as usize) * 4096);
@@ -64,7 +64,7 @@ fn memory_follows_the_liquid() {
 fn liquid_leaves_through_open_walls_as_it_is_told() {
     let mut domain = Domain::closed([0; 3], [24, 12, 4]);
     domain.walls[0][1] = Wall::Open;
-    let settings = Settings::new(domain, 1.0 / 24.0);
+    let settings = LiquidSettings::new(domain, 1.0 / 24.0);
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([-9.0; 3], [20.0, 8.0, 30.0])));
     let start = volume(&liquid.surface().view(), &domain);
     let mut left = 0.0;
@@ -79,11 +79,11 @@ fn liquid_leaves_through_open_walls_as_it_is_told() {
 #[test]
 fn no_liquid_no_time_and_too_little_time_are_told() {
     let domain = Domain::closed([0; 3], [8; 3]);
-    let mut none = Liquid::new(Settings::new(domain, 0.1), PlainLevelSet::new(domain, |_| 3.0));
+    let mut none = Liquid::new(LiquidSettings::new(domain, 0.1), PlainLevelSet::new(domain, |_| 3.0));
     let report = none.step_frame(&FALLING, 1.0 / 24.0);
     assert_eq!((report.liquid_cells, report.substeps, report.pressure_iterations), (0, 1, 0));
     assert_eq!(none.step_frame(&FALLING, 0.0).substeps, 0);
-    let settings = Settings { max_substeps: 3, ..Settings::new(domain, 0.1) };
+    let settings = LiquidSettings { max_substeps: 3, ..LiquidSettings::new(domain, 0.1) };
     let mut fast =
         Liquid::new(settings, PlainLevelSet::new(domain, |p| length([p[0] - 4.0, p[1] - 4.0, p[2] - 4.0]) - 2.5));
     fast.set_velocity(|_| [300.0, 40.0, -1.0], &FALLING);

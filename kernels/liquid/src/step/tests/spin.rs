@@ -21,7 +21,7 @@ const TURN: f32 = std::f32::consts::TAU;
 fn turned_disk(splitting: Splitting, scheme: Scheme, substeps: u32) -> f64 {
     let domain = Domain::closed([0; 3], [64, 64, 2]);
     let surface = Still::new(domain, |[x, y, _]| length([x - 32.0, y - 32.0, 0.0]) - 19.2);
-    let settings = Settings { splitting, scheme, cfl: 1e9, tolerance: 1e-5, ..Settings::new(domain, 1.0) };
+    let settings = LiquidSettings { splitting, scheme, cfl: 1e9, tolerance: 1e-5, ..LiquidSettings::new(domain, 1.0) };
     let mut liquid = Liquid::new(settings, surface);
     liquid.set_velocity(|[x, y, _]| [-TURN * (y - 32.0), TURN * (x - 32.0), 0.0], &WEIGHTLESS);
     let start = spin(&liquid);
