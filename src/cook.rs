@@ -109,7 +109,7 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
         return Err(load::faulty(&args.graph, &faults));
     }
     let staged = Staged::of(&args.pictures, &graph, &request);
-    let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out));
+    let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out, ceiling));
     let pictures = pictures.transpose()?;
     // The pictures' guides are cooked along.
     let cooked = staged.as_ref().map_or((&graph, &request), |staged| (&staged.graph, &staged.request));
@@ -180,7 +180,9 @@ fn cook(
     let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
     report.notes.extend(left_out(graph, &written, format));
     report.notes.extend(without_width(graph, &written, format));
-    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled, &cancel))?;
+    let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled, &cancel));
+    // What could not be drawn is said after all else is written.
+    let (drawn, undrawn) = drawn.map_or_else(|failure| (Vec::new(), Err(failure)), |drawn| (drawn, Ok(())));
     report.cancelled |= cancel.load(Ordering::Relaxed);
     writing += watch.wall();
     let mut reported = Ok(());
@@ -206,6 +208,7 @@ fn cook(
     }
     outcome(args, graph, &report, &written)?;
     reported?;
+    undrawn?;
     load::strict(args.strict, &report.notes)
 }
 

@@ -17,6 +17,7 @@ use engine::cook::Delivered;
 use engine::frames::FrameSet;
 use engine::geometry::Geometry;
 use engine::graph::Graph;
+use engine::memory::{Ceiling, size_text};
 use engine::plan::Request;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
@@ -115,6 +116,7 @@ pub struct Pictures<'g> {
     outputs: Vec<usize>,
     split: bool,
     settings: PictureSettings,
+    ceiling: Ceiling,
     /// DIR/GRAPH.preview, to which endings are added.
     stem: PathBuf,
     sheet: Option<Moments>,
@@ -144,7 +146,13 @@ impl<'g> Pictures<'g> {
     ///
     /// # Errors
     /// If the size or the camera is invalid, a frame to draw is not cooked, or a movie would be too large.
-    pub fn new(args: &PictureArgs, staged: &'g Staged, file: &Path, folder: &Path) -> Result<Self, Failure> {
+    pub fn new(
+        args: &PictureArgs,
+        staged: &'g Staged,
+        file: &Path,
+        folder: &Path,
+        ceiling: Ceiling,
+    ) -> Result<Self, Failure> {
         let wrong = |text: String| Failure::new(Exit::CommandLine, text);
         let text = args.preview_size.as_deref().unwrap_or("640x480");
         let (width, height) =
@@ -181,6 +189,7 @@ impl<'g> Pictures<'g> {
             outputs,
             split: args.preview_split,
             settings,
+            ceiling,
             stem: folder.join(stem),
             sheet: args.asks_for_a_sheet().then(Moments::default),
             stills,
@@ -370,6 +379,7 @@ impl<'g> Pictures<'g> {
             }
         }
         layers.extend(lattices.as_ref().map(|lines| Layer::guide("lattice", lines)));
+        self.fits(frame, shot, &layers)?;
         let settings = PictureSettings {
             camera: Some(self.settings.camera.unwrap_or_else(|| common.framing().camera())),
             bounds: common.framing().bounds(),
@@ -379,6 +389,23 @@ impl<'g> Pictures<'g> {
             ..self.settings.clone()
         };
         render(&layers, &settings).map_err(drawing)
+    }
+
+    /// Refuses a picture that memory cannot hold besides what it shows.
+    fn fits(&self, frame: Frame, shot: &Shot, layers: &[Layer<'_>]) -> Result<(), Failure> {
+        let bytes = preview::memory(layers);
+        let shown = shot.values().map(|geometry| geometry.bytes()).fold(0, usize::saturating_add);
+        if self.ceiling.allows(bytes.saturating_add(shown)) {
+            return Ok(());
+        }
+        let line = format!(
+            "a picture of frame {frame} would take {} besides the {} that it shows, but {}; leave out --preview, name \
+             smaller outputs with --output, or raise --memory",
+            size_text(bytes),
+            size_text(shown),
+            self.ceiling.describe()
+        );
+        Err(Failure::file(line))
     }
 
     fn report_unknown_attribute(&self, common: &Common) {

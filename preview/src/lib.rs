@@ -34,7 +34,7 @@ pub use framing::Framing;
 pub use image::{Image, contact_sheet, side_by_side};
 pub use movie::Movie;
 pub use picture::render;
-pub use scene::{bounds, union};
+pub use scene::{bounds, memory, union};
 
 /// A geometry in a picture.
 #[derive(Clone, Copy, Debug)]

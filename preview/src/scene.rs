@@ -3,7 +3,7 @@
 //! Guarantees: contains every component of every layer, in the order of the layers, then mesh, tets, volume, curves,
 //! points. Limit: non-finite triangles and CVs are left out individually.
 
-use engine::geometry::{Component, Geometry, Kind, Owner, Volume, WIDTH};
+use engine::geometry::{Component, Geometry, Kind, Owner, Topology, Volume, WIDTH};
 use rayon::prelude::*;
 
 use crate::camera::BoundingBox;
@@ -95,6 +95,31 @@ const POINT_WIDTHS: [f32; 2] = [0.004, 0.06];
 const ROOT: f32 = 0.5;
 /// Largest random difference in colour between strands.
 const STRAND_TINT: f32 = 0.22;
+
+/// Bytes that [`render`](crate::render) takes for a point of curves, a corner of a mesh, a tet and a point, measured.
+const CURVE_POINT: usize = 256;
+const MESH_CORNER: usize = 256;
+const TET: usize = 128;
+const POINT: usize = 192;
+/// And for a byte of a volume, whose surface is found.
+const VOLUME_BYTE: usize = 4;
+
+/// About how many bytes a picture of the layers takes besides them.
+pub fn memory(layers: &[Layer<'_>]) -> usize {
+    let part_bytes = |part: &Component| match part.topology() {
+        Topology::Curves(_) => part.point_count().saturating_mul(CURVE_POINT),
+        Topology::Mesh(faces) => faces.corners.len().saturating_mul(MESH_CORNER),
+        Topology::Tets(_) => part.tet_corners().len().saturating_mul(TET),
+        _ => part.point_count().saturating_mul(POINT),
+    };
+    let layer_bytes = |layer: &Layer<'_>| {
+        let volume = layer.geometry.volume().map_or(0, |volume| {
+            volume.fields().into_iter().flat_map(|(_, field)| field.arrays()).map(|(_, bytes)| bytes).sum::<usize>()
+        });
+        layer.geometry.parts().map(part_bytes).fold(volume.saturating_mul(VOLUME_BYTE), usize::saturating_add)
+    };
+    layers.iter().map(layer_bytes).fold(0, usize::saturating_add)
+}
 
 /// Smallest and largest coordinates of everything that is drawn, metres; `None` for an empty scene.
 ///

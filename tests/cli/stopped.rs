@@ -269,6 +269,18 @@ fn the_results_of_a_frame_count_together() {
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
 }
 
+#[test]
+fn a_picture_larger_than_the_memory_is_refused_with_its_size() {
+    let graph = r#"{"convect": 1, "nodes": {"o": {"type": "Mesh_Primitive", "params": {"divisions": 100}}},
+        "outputs": {"o": "o"}}"#;
+    let ran = within(4_194_304, graph, "--preview --preview-size 32x32 --memory 40M");
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("a picture of frame 1 would take 58.6 MiB besides"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("wrote out/o.usdc"), "the geometry is written: {}", ran.stderr);
+    let ran = within(4_194_304, graph, "--preview --preview-size 32x32 --memory 80M");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_while_a_movie_is_drawn_ends_it_at_once() {
