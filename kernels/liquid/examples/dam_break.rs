@@ -6,13 +6,13 @@ mod plain;
 
 use std::time::Instant;
 
-use liquid::step::{Domain, Liquid, LiquidSettings, Splitting, Surface, Surroundings};
+use liquid::step::{Domain, Liquid, LiquidSettings, Solid, Splitting, Surface, Surroundings};
 use liquid::velocity::Scheme;
 use numerics::vector::length;
 use plain::{PlainLevelSet, Still};
 
-const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], solid: None };
-const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], solid: None };
+const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], viscosity: &|_| 0.0, solid: None };
+const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], viscosity: &|_| 0.0, solid: None };
 
 /// T = t·√(2g/a) and Z = front ÷ a of a column twice as high as its base a (Martin and Moyce 1952).
 const MEASURED: [(f64, f64); 7] =
@@ -94,8 +94,8 @@ fn turns() {
 fn rest(n: i32, depth: f32, floor: f32, tolerance: f64) -> f64 {
     let domain = Domain::closed([0; 3], [n, n, n.min(16)]);
     let settings = LiquidSettings { tolerance, ..LiquidSettings::new(domain, 1.0 / f64::from(n)) };
-    let solid = |p: [f32; 3]| p[1] - floor;
-    let around = Surroundings { solid: Some(&solid), ..FALLING };
+    let solid = |_: f64, p: [f32; 3]| p[1] - floor;
+    let around = Surroundings { solid: Some(Solid::still(&solid)), ..FALLING };
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - depth));
     let mut speed = 0.0_f64;
     for _ in 0..240 {

@@ -45,7 +45,7 @@ fn main() {
                     solid_distance: [&solid[0], &solid[1], &solid[2]],
                     density: &density,
                     viscosity: &viscosity,
-                    slip: 0.0,
+                    slip: &|_, _| 0.0,
                 };
                 let start = Instant::now();
                 let solver = StokesSolver::new(&grid);
@@ -60,8 +60,8 @@ fn main() {
                 let solve = |stop: f64, iterations| {
                     let (mut u, mut q) = (before.clone(), vec![0.0; inflow.len()]);
                     let start = Instant::now();
-                    let solved =
-                        solver.solve(&mut u, &mut q, &inflow, StokesStop { velocity: stop, flow: stop, iterations });
+                    let stop = StokesStop { velocity: stop, flow: stop, iterations };
+                    let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
                     (u, solved, start.elapsed().as_secs_f64() * 1e3)
                 };
                 let (exact, best, _) = solve(1e-11, 60);

@@ -1,9 +1,10 @@
 //! The box that a liquid is in.
 
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, unit};
 
 use crate::open_share::open_share;
 use crate::rows::{Cell, CellRows};
+use crate::velocity::{FaceFields, Site};
 
 /// What a side of the domain is to the liquid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,8 +29,54 @@ pub struct Domain {
     pub walls: [[Wall; 2]; 3],
 }
 
-/// A signed distance at a place in cells, negative inside a solid.
-pub type Solid<'a> = &'a (dyn Fn(Vec3) -> f32 + Sync);
+/// What liquid does not enter. Functions of the time since the start of the frame, s, and a place in cells.
+#[derive(Clone, Copy)]
+pub struct Solid<'a> {
+    /// The distance from it, in cells; negative inside.
+    pub distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync),
+    /// How it moves, m/s.
+    pub velocity: &'a (dyn Fn(f64, Vec3) -> Vec3 + Sync),
+}
+
+impl<'a> Solid<'a> {
+    /// A solid that does not move.
+    pub fn still(distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync)) -> Self {
+        Self { distance, velocity: &|_, _| [0.0; 3] }
+    }
+
+    /// The solid at one time.
+    pub(super) fn at(self, time: f64) -> Obstacle<'a> {
+        Obstacle { solid: self, time }
+    }
+}
+
+/// A solid at one time.
+#[derive(Clone, Copy)]
+pub(super) struct Obstacle<'a> {
+    solid: Solid<'a>,
+    time: f64,
+}
+
+impl Obstacle<'_> {
+    pub(super) fn distance(&self, point: Vec3) -> f32 {
+        (self.solid.distance)(self.time, point)
+    }
+
+    pub(super) fn velocity(&self, point: Vec3) -> Vec3 {
+        (self.solid.velocity)(self.time, point)
+    }
+
+    /// The unit vector out of it.
+    pub(super) fn normal(&self, point: Vec3) -> Option<Vec3> {
+        let slope = |axis: usize| {
+            let (mut below, mut above) = (point, point);
+            below[axis] -= 0.5;
+            above[axis] += 0.5;
+            self.distance(above) - self.distance(below)
+        };
+        unit([slope(0), slope(1), slope(2)])
+    }
+}
 
 impl Domain {
     /// A box of these cells with closed walls.
@@ -63,12 +110,63 @@ impl Domain {
         (cell[axis] == self.high[axis]).then_some(self.walls[axis][1])
     }
 
+    /// The open share of the low face of each cell along each axis, and the distance of its middle from the closest closed
+    /// wall or solid, in cells, negative inside.
+    pub(super) fn faces(&self, rows: &CellRows, solid: Option<Obstacle<'_>>) -> [FaceFields<f32>; 2] {
+        let distance = |axis: usize, cell: Cell| {
+            let middle = Site::FACES[axis].of(cell);
+            let mut distance = solid.map_or(f32::MAX, |solid| solid.distance(middle));
+            for other in 0..3 {
+                let ways = [middle[other] - self.low[other] as f32, self.high[other] as f32 - middle[other]];
+                for (wall, way) in self.walls[other].iter().zip(ways) {
+                    distance = if *wall == Wall::Open { distance } else { distance.min(way) };
+                }
+            }
+            distance
+        };
+        [self.open_shares(rows, solid), rows.tabulate_each(|cell| [0, 1, 2].map(|axis| distance(axis, cell)))]
+    }
+
+    /// The share of the shear stress that is dropped at a low face that liquid does not flow through: all beside air
+    /// and walls of free slip, `slip` at other solids.
+    pub(super) fn slip(&self, axis: usize, cell: Cell, slip: f32) -> f32 {
+        let wall_beside = |other: usize| {
+            let beyond = [cell[other] < self.low[other], cell[other] >= self.high[other]];
+            (0..2).find(|side| other != axis && beyond[*side]).map(|side| self.walls[other][side])
+        };
+        match (0..3).find_map(wall_beside) {
+            Some(Wall::Open | Wall::FreeSlip) => 1.0,
+            Some(Wall::Closed) | None => slip,
+        }
+    }
+
     /// The open share of the low face of each cell along each axis.
-    pub fn open_shares(&self, rows: &CellRows, solid: Option<Solid<'_>>) -> [Vec<f32>; 3] {
+    pub(super) fn open_shares(&self, rows: &CellRows, solid: Option<Obstacle<'_>>) -> [Vec<f32>; 3] {
         rows.tabulate_each(|cell| [0, 1, 2].map(|axis| self.open_share(axis, cell, solid)))
     }
 
-    fn open_share(&self, axis: usize, cell: Cell, solid: Option<Solid<'_>>) -> f32 {
+    /// The velocity of the solid at each low face that it covers in part, m/s; 0 at others and at walls.
+    pub(super) fn solid_velocity(
+        &self,
+        rows: &CellRows,
+        open: &FaceFields<f32>,
+        solid: Obstacle<'_>,
+    ) -> FaceFields<f32> {
+        rows.tabulate_with(
+            || (),
+            |(), cell, at| {
+                [0, 1, 2].map(|axis| {
+                    let is_wall = matches!(self.wall_at(axis, cell), Some(Wall::Closed | Wall::FreeSlip));
+                    match open[axis][at] < 1.0 && self.contains(cell) && !is_wall {
+                        true => solid.velocity(Site::FACES[axis].of(cell))[axis],
+                        false => 0.0,
+                    }
+                })
+            },
+        )
+    }
+
+    fn open_share(&self, axis: usize, cell: Cell, solid: Option<Obstacle<'_>>) -> f32 {
         let within = |other: usize| {
             let high = self.high[other] + i32::from(other == axis);
             self.low[other] <= cell[other] && cell[other] < high
@@ -81,7 +179,7 @@ impl Domain {
             let mut corner = cell;
             corner[(axis + 1) % 3] += a;
             corner[(axis + 2) % 3] += b;
-            solid(corner.map(|x| x as f32))
+            solid.distance(corner.map(|x| x as f32))
         }))
     }
 }

@@ -2,7 +2,7 @@
 //! carried along, forces added, and divergence driven out.
 //!
 //! Order of a substep: velocity continued past the liquid → surface moved → velocity carried onto the new liquid →
-//! gravity, read at the substep's middle → pressure. Free fall is then summed as v ← v + g·Δt after the surface moved
+//! gravity, read at the substep's middle → pressure, and viscosity with it ([`Coupling`]). Free fall is then summed as v ← v + g·Δt after the surface moved
 //! with the v before.
 //!
 //! Splitting velocity from pressure loses spin. [`Splitting::KeepsSpin`] adds what is lost before the velocity is carried.
@@ -24,6 +24,7 @@
 
 mod domain;
 mod motion;
+mod project;
 mod substep;
 #[cfg(test)]
 mod tests;
@@ -45,6 +46,33 @@ pub enum Splitting {
     KeepsSpin,
 }
 
+/// When pressure and viscosity are solved together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coupling {
+    /// Where viscosity changes what the grid shows: from [`LEAST_VISCOSITY`] on. Below, it is left out.
+    #[default]
+    Auto,
+    /// Wherever there is viscosity.
+    On,
+    /// Never; viscosity is left out.
+    Off,
+}
+
+/// The least viscosity · Δt ÷ (density · cell²) that is solved for: in a substep it takes at most 0.12 % from a wave of two
+/// cells, the fastest to fade, which is less than carrying the velocity takes.
+pub const LEAST_VISCOSITY: f64 = 1e-4;
+
+impl Coupling {
+    /// Whether a substep with this viscosity · Δt ÷ (density · cell²) is.
+    pub fn is_coupled(self, viscosity: f64) -> bool {
+        match self {
+            Self::Auto => viscosity >= LEAST_VISCOSITY,
+            Self::On => viscosity > 0.0,
+            Self::Off => false,
+        }
+    }
+}
+
 /// What does not change while a liquid moves.
 #[derive(Clone, Debug)]
 pub struct LiquidSettings {
@@ -52,13 +80,19 @@ pub struct LiquidSettings {
     pub domain: Domain,
     /// The side of a cell, m.
     pub cell: f64,
+    /// Mass of a volume, kg/m³.
+    pub density: f64,
+    /// When viscosity is solved for.
+    pub coupling: Coupling,
+    /// Share of the shear stress at closed walls and solids that is dropped: 0 no slip, 1 free slip.
+    pub slip: f32,
     /// Cells that the fastest liquid moves in a substep, at most.
     pub cfl: f64,
     /// Most substeps of a frame; with fewer than `cfl` asks for, they are longer.
     pub max_substeps: u32,
     /// Largest divergence · Δt that is left, and largest error of a velocity ÷ what forces add in a substep.
     pub tolerance: f64,
-    /// Most iterations of a pressure solve.
+    /// Most iterations of a solve.
     pub max_iterations: u32,
     /// How velocity is carried.
     pub scheme: Scheme,
@@ -69,8 +103,19 @@ pub struct LiquidSettings {
 impl LiquidSettings {
     /// The defaults for a domain of cells with this side, m.
     pub fn new(domain: Domain, cell: f64) -> Self {
-        let (scheme, splitting) = (Scheme::MacCormack, Splitting::KeepsSpin);
-        Self { domain, cell, cfl: 2.0, max_substeps: 32, tolerance: 1e-4, max_iterations: 200, scheme, splitting }
+        Self {
+            domain,
+            cell,
+            density: 1000.0,
+            coupling: Coupling::Auto,
+            slip: 0.0,
+            cfl: 2.0,
+            max_substeps: 32,
+            tolerance: 1e-4,
+            max_iterations: 200,
+            scheme: Scheme::MacCormack,
+            splitting: Splitting::KeepsSpin,
+        }
     }
 }
 
@@ -85,7 +130,13 @@ pub struct LiquidReport {
     pub caps_hit: u32,
     /// Iterations of all pressure solves.
     pub pressure_iterations: u32,
-    /// Pressure solves that ended at `max_iterations`.
+    /// Substeps in which viscosity was solved for.
+    pub viscous_substeps: u32,
+    /// Iterations of all solves for pressure and viscosity together.
+    pub coupled_iterations: u32,
+    /// Largest error of a velocity that such a solve left, as it estimates, ÷ the speed.
+    pub coupled_residual: f64,
+    /// Solves that ended at `max_iterations`.
     pub solves_cut_short: u32,
     /// The largest divergence · Δt that was left in a substep.
     pub max_divergence: f64,
@@ -105,6 +156,9 @@ impl LiquidReport {
         self.cfl_reached = self.cfl_reached.max(other.cfl_reached);
         self.caps_hit += other.caps_hit;
         self.pressure_iterations += other.pressure_iterations;
+        self.viscous_substeps += other.viscous_substeps;
+        self.coupled_iterations += other.coupled_iterations;
+        self.coupled_residual = self.coupled_residual.max(other.coupled_residual);
         self.solves_cut_short += other.solves_cut_short;
         self.max_divergence = self.max_divergence.max(other.max_divergence);
         self.unbalanced = self.unbalanced.max(other.unbalanced);

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
-use crate::step::domain::{Domain, Solid};
+use crate::step::domain::{Domain, Obstacle};
 use crate::step::{LiquidSettings, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
 
@@ -43,7 +43,7 @@ impl Motion {
         around: &Surroundings<'_>,
         velocity: impl Fn(Vec3) -> Vec3 + Sync,
     ) -> Self {
-        let cells = LiquidCells::of(&settings.domain, surface, around.solid);
+        let cells = LiquidCells::of(&settings.domain, surface, around.solid.map(|solid| solid.at(0.0)));
         let value = |axis: usize, cell: Cell| velocity(Site::FACES[axis].of(cell))[axis];
         let faces = cells.rows.tabulate_with(
             || (),
@@ -83,6 +83,15 @@ impl Motion {
         domain.clip(&self.rows().dilated(layers - 1))
     }
 
+    /// A velocity on other cells with what the last substep gained, where that is known: liquid at rest and in free fall
+    /// goes on as it did.
+    pub(super) fn with_last_gain(&self, cells: &LiquidCells, faces: &FaceFields<f32>, seconds: f64) -> FaceFields<f32> {
+        let Some(gain) = &self.gain else { return faces.clone() };
+        let ratio = (seconds / gain.seconds) as f32;
+        let gained = resampled(&cells.rows, self.rows(), &gain.faces);
+        std::array::from_fn(|axis| faces[axis].iter().zip(&gained[axis]).map(|(u, gain)| u + ratio * gain).collect())
+    }
+
     /// Fields that are known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
     pub(super) fn continued<const F: usize>(
         &self,
@@ -90,7 +99,7 @@ impl Motion {
         rows: &CellRows,
         steepest: f32,
         domain: &Domain,
-        solid: Option<Solid<'_>>,
+        solid: Option<Obstacle<'_>>,
     ) -> [FaceFields<f32>; F] {
         let mut known = rows.resampled(self.rows(), &self.known, 0);
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
@@ -123,35 +132,25 @@ fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
 }
 
 /// On faces inside a solid, takes away the part that flows into or out of it.
-fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Solid<'_>) -> FaceFields<f32> {
+fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Obstacle<'_>) -> FaceFields<f32> {
     rows.tabulate_with(
         || Sampler::new(rows),
         |sampler, cell, at| {
             [0, 1, 2].map(|axis| {
                 let own = faces[axis][at];
                 let point = Site::FACES[axis].of(cell);
-                if solid(point) >= 0.0 {
+                if solid.distance(point) >= 0.0 {
                     return own;
                 }
-                let Some(normal) = normal(solid, point) else { return own };
-                let value = |other: usize| sampler.value(&faces[other], Site::FACES[other], point);
-                let mut value = value;
-                let flow: f32 = (0..3).map(|other| normal[other] * value(other)).sum();
+                let Some(normal) = solid.normal(point) else { return own };
+                let own_velocity = solid.velocity(point);
+                let mut past =
+                    |other: usize| sampler.value(&faces[other], Site::FACES[other], point) - own_velocity[other];
+                let flow: f32 = (0..3).map(|other| normal[other] * past(other)).sum();
                 own - flow * normal[axis]
             })
         },
     )
-}
-
-/// The unit vector out of a solid.
-fn normal(solid: Solid<'_>, point: Vec3) -> Option<Vec3> {
-    let slope = |axis: usize| {
-        let (mut below, mut above) = (point, point);
-        below[axis] -= 0.5;
-        above[axis] += 0.5;
-        solid(above) - solid(below)
-    };
-    numerics::vector::unit([slope(0), slope(1), slope(2)])
 }
 
 /// The liquid cells of a surface, and the cells next to them.
@@ -160,8 +159,12 @@ pub(super) struct LiquidCells {
     pub rows: CellRows,
     /// φ of each, positive where it lies beyond a wall.
     pub level_set: Vec<f32>,
+    /// φ of cells that are not stored.
+    pub outside: f32,
     /// Open share of each low face.
     pub open: [Vec<f32>; 3],
+    /// The velocity of a solid at each low face that it covers in part, m/s; 0 at others.
+    pub solid_velocity: Option<FaceFields<f32>>,
     /// Low faces that touch liquid and are open.
     pub moving: Vec<FaceMask>,
     /// Low faces that touch liquid and whose velocity is known: open, or a wall of the domain.
@@ -171,13 +174,15 @@ pub(super) struct LiquidCells {
 }
 
 impl LiquidCells {
-    pub(super) fn of<S: Surface>(domain: &Domain, surface: &S, solid: Option<Solid<'_>>) -> Self {
+    pub(super) fn of<S: Surface>(domain: &Domain, surface: &S, solid: Option<Obstacle<'_>>) -> Self {
         let view = surface.view();
         let liquid = view.rows.filtered(|cell, at| view.phi[at] < -LEAST_DEPTH && domain.contains(cell));
         let rows = domain.clip(&liquid.dilated(1));
         let mut level_set = rows.resampled(view.rows, view.phi, view.outside);
         Self::leave_domain(domain, &rows, &mut level_set);
+        let outside = view.outside;
         let open = domain.open_shares(&rows, solid);
+        let solid_velocity = solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
         let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < -LEAST_DEPTH)).collect();
         let [moving, known] = rows.tabulate_with(
             || (),
@@ -196,7 +201,14 @@ impl LiquidCells {
             },
         );
         debug_assert!(moving.iter().zip(&known).all(|(moving, known)| moving & !known == 0 && *known <= ALL_FACES));
-        Self { count: liquid.len(), rows, level_set, open, moving, known }
+        Self { count: liquid.len(), rows, level_set, outside, open, solid_velocity, moving, known }
+    }
+
+    /// φ on wider rows.
+    pub(super) fn level_set_on(&self, domain: &Domain, rows: &CellRows) -> Vec<f32> {
+        let mut level_set = rows.resampled(&self.rows, &self.level_set, self.outside);
+        Self::leave_domain(domain, rows, &mut level_set);
+        level_set
     }
 
     /// Cells beyond the walls are air, and the surface is on the wall.

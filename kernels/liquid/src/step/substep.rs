@@ -3,10 +3,10 @@
 use numerics::vector::{Vec3, scale};
 
 use crate::level_set::PhiView;
-use crate::pressure::{PressureGrid, PressureSolver, Stop};
 use crate::rows::CellRows;
 use crate::step::domain::Solid;
-use crate::step::motion::{Gain, Guess, LiquidCells, Motion};
+use crate::step::motion::{Gain, LiquidCells, Motion};
+use crate::step::project::Projection;
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting, Wall};
 use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
@@ -16,6 +16,8 @@ use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
 pub struct Surroundings<'a> {
     /// Gravity at a time since the start of the frame, m/s².
     pub gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
+    /// Dynamic viscosity at a time since the start of the frame, Pa·s.
+    pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
 }
@@ -54,10 +56,7 @@ const STEEPEST: f32 = 0.25;
 /// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
 const BAND: i32 = 5;
 
-/// Net flow of a cell, of the largest error that it may cause in a velocity.
-const FLOW_SHARE: f64 = 0.25;
-
-/// Moves on by `seconds`; `middle` is when gravity is read.
+/// Moves on by `seconds`; `middle` is when gravity and viscosity are read.
 pub(super) fn substep<S: Surface>(
     settings: &LiquidSettings,
     surface: &mut S,
@@ -67,6 +66,8 @@ pub(super) fn substep<S: Surface>(
     seconds: f64,
 ) -> LiquidReport {
     let domain = &settings.domain;
+    // Where it is and how it moves at the middle of the substep is what pushes the liquid.
+    let solid = around.solid.map(|solid| solid.at(middle));
     let step = (seconds / settings.cell) as f32;
     let reach = motion.largest_speed() as f32 * step;
     let layers = BAND + reach.ceil().min(64.0) as i32;
@@ -76,20 +77,21 @@ pub(super) fn substep<S: Surface>(
     let (velocity, carried) = match &motion.gain {
         Some(gain) => {
             let carried = turned::carried(motion, gain, seconds, step, steepest);
-            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, around.solid);
+            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, solid);
             (velocity, Some(carried))
         }
         None => {
-            let [velocity] = motion.continued([own], &rows, steepest, domain, around.solid);
+            let [velocity] = motion.continued([own], &rows, steepest, domain, solid);
             (velocity, None)
         }
     };
     let velocity = MacVelocity::new(rows, velocity);
     surface.advance(&Moving { velocity: &velocity, step }, reach);
 
-    let cells = LiquidCells::of(domain, surface, around.solid);
+    let cells = LiquidCells::of(domain, surface, solid);
     let advection = Advection { velocity: &velocity, bounds: domain.bounds(), step, scheme: settings.scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
+    let before = faces.clone();
     let gravity = (around.gravity)(middle);
     for axis in 0..3 {
         let gain = (gravity[axis] * seconds) as f32;
@@ -99,10 +101,20 @@ pub(super) fn substep<S: Surface>(
     let stored_cells = velocity.rows().len();
     drop((velocity, carried));
 
-    let scale = gravity.iter().fold(motion.largest_speed(), |most, g| most.max(g.abs() * seconds));
-    let (mut report, taken) = project(settings, &cells, &mut faces, &mut motion.guess, scale, seconds);
+    let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs() * seconds));
+    let projection = Projection { settings, cells: &cells, solid, speed: motion.largest_speed(), pull, seconds };
+    let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
+    let mut report = match settings.coupling.is_coupled(viscosity) {
+        true => {
+            let likely = motion.with_last_gain(&cells, &before, seconds);
+            projection.by_pressure_and_viscosity(viscosity, &likely, &mut faces, &mut motion.guess)
+        }
+        false => projection.by_pressure(&mut faces, &mut motion.guess),
+    };
+    report.viscous_substeps = u32::from(settings.coupling.is_coupled(viscosity));
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
-        let gained = |axis: usize| taken[axis].iter().map(|taken| (gravity[axis] * seconds) as f32 - taken).collect();
+        let gained =
+            |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
         Gain { faces: [gained(0), gained(1), gained(2)], seconds }
     });
     report.substeps = 1;
@@ -114,82 +126,6 @@ pub(super) fn substep<S: Surface>(
     motion.known = cells.known;
     motion.velocity = MacVelocity::new(cells.rows, faces);
     report
-}
-
-/// Drives the divergence out of a velocity. Returns what that took from it besides. `scale`: what errors of the velocity
-/// are measured against.
-fn project(
-    settings: &LiquidSettings,
-    cells: &LiquidCells,
-    faces: &mut FaceFields<f32>,
-    guess: &mut Guess,
-    scale: f64,
-    seconds: f64,
-) -> (LiquidReport, FaceFields<f32>) {
-    let [x, y, z] = &cells.open;
-    let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z] };
-    let solver = PressureSolver::new(&grid);
-    let mut inflow = inflow(&solver, cells, faces);
-    let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
-    let flow = settings.tolerance * (FLOW_SHARE * scale).min(settings.cell / seconds);
-    let stop = Stop { flow, iterations: settings.max_iterations };
-    let solved = solver.solve(&mut inflow, &mut q, stop);
-    let taken = subtract_gradient(&solver, cells, &q, faces);
-    *guess = Guess { rows: solver.rows().clone(), q };
-    let per_cell = seconds / settings.cell;
-    let report = LiquidReport {
-        pressure_iterations: solved.iterations,
-        solves_cut_short: u32::from(solved.flow > stop.flow && solved.iterations >= stop.iterations),
-        max_divergence: solved.flow * per_cell,
-        unbalanced: solved.unbalanced * per_cell,
-        ..LiquidReport::default()
-    };
-    (report, taken)
-}
-
-/// The net inflow of each liquid cell, m/s.
-fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &FaceFields<f32>) -> Vec<f64> {
-    let rows = solver.rows();
-    let through: [Vec<f64>; 3] = std::array::from_fn(|axis| {
-        let flow = |(u, share): (&f32, &f32)| f64::from(*u) * f64::from(*share);
-        let own: Vec<f64> = faces[axis].iter().zip(&cells.open[axis]).map(flow).collect();
-        rows.resampled(&cells.rows, &own, 0.0)
-    });
-    let mut inflow = vec![0.0; rows.len()];
-    solver.stencil().update([&mut inflow], |runs, first, [inflow]| {
-        for run in runs {
-            for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let along_x = through[0][at] - through[0][at + 1];
-                let along_y = through[1][at] - through[1][run.y[1] as usize + n];
-                let along_z = through[2][at] - through[2][run.z[1] as usize + n];
-                inflow[at - first] = along_x + along_y + along_z;
-            }
-        }
-    });
-    inflow
-}
-
-/// Takes the gradient of `q` from open faces; returns it.
-fn subtract_gradient(
-    solver: &PressureSolver,
-    cells: &LiquidCells,
-    q: &[f64],
-    faces: &mut FaceFields<f32>,
-) -> FaceFields<f32> {
-    let mut gradient: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; solver.rows().len()]);
-    solver.for_each_gradient(q, |axis, at, value| gradient[axis][at] = value as f32);
-    std::array::from_fn(|axis| {
-        let mut taken = cells.rows.resampled(solver.rows(), &gradient[axis], 0.0);
-        for (at, taken) in taken.iter_mut().enumerate() {
-            if cells.open[axis][at] > 0.0 {
-                faces[axis][at] -= *taken;
-            } else {
-                *taken = 0.0;
-            }
-        }
-        taken
-    })
 }
 
 /// What flows out through open walls, m/s · faces.

@@ -22,8 +22,8 @@ mod tests;
 
 use crate::fields::{add_scaled, dot, largest};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace};
-use crate::rows::CellRows;
-
+use crate::rows::{Cell, CellRows};
+use crate::stencil::Stencil;
 use crate::velocity::FaceFields;
 use cycle::{Multigrid, Workspace};
 use level::Stresses;
@@ -31,7 +31,7 @@ use rigid::RigidMotions;
 use setup::Flow;
 
 /// The grid that a step is solved on. Cells that are not stored are solid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct StokesGrid<'a> {
     /// The stored cells: liquid ones and at least all within 2 of them that are not solid. Beyond, walls are along the grid.
     pub rows: &'a CellRows,
@@ -45,8 +45,9 @@ pub struct StokesGrid<'a> {
     pub density: &'a [f32],
     /// ν̂ = viscosity · Δt ÷ (reference density · cell²) of each cell.
     pub viscosity: &'a [f32],
-    /// Share of a solid's shear stress that is dropped: 0 no slip, 1 free slip.
-    pub slip: f32,
+    /// Share of a solid's shear stress that is dropped at the low face of a cell along an axis, one inside the solid: 0 no
+    /// slip, 1 free slip.
+    pub slip: &'a (dyn Fn(usize, Cell) -> f32 + Sync),
 }
 
 /// When a solve ends.
@@ -133,16 +134,28 @@ impl StokesSolver {
         self.pressure.rows()
     }
 
+    /// The liquid cells among them.
+    pub fn stencil(&self) -> &Stencil {
+        self.pressure.stencil()
+    }
+
     /// Whether the low face of a cell has an unknown velocity.
     pub fn is_free(&self, axis: usize, at: usize) -> bool {
         self.viscous.finest().mass[axis][at] > 0.0
     }
 
-    /// Solves for the velocity at the end of a step. On entry `u` holds the velocity before it with forces added, and at
-    /// solid faces the solid's; `q` the first guess of pressure · Δt ÷ (reference density · cell), m/s. On return both
+    /// Solves for the velocity at the end of a step from that before it, with forces added. On entry `u` holds a first guess
+    /// of it, and at solid faces the solid's; `q` one of pressure · Δt ÷ (reference density · cell), m/s. On return both
     /// hold the solution. `inflow` is what flows into each cell besides, m/s: by sources, and driven by
     /// solids that move, Σ (1 − open share) · the solid's velocity inwards. All on [`StokesSolver::rows`].
-    pub fn solve(&self, u: &mut FaceFields<f64>, q: &mut [f64], inflow: &[f64], stop: StokesStop) -> StokesSolved {
+    pub fn solve(
+        &self,
+        before: &FaceFields<f64>,
+        u: &mut FaceFields<f64>,
+        q: &mut [f64],
+        inflow: &[f64],
+        stop: StokesStop,
+    ) -> StokesSolved {
         let level = self.viscous.finest();
         let len = level.rows().len();
         let zero = || Unknowns { u: std::array::from_fn(|_| vec![0.0; len]), q: vec![0.0; len] };
@@ -156,7 +169,10 @@ impl StokesSolver {
         (0..len).filter(|at| !self.pressure.is_liquid(*at)).for_each(|at| q[at] = 0.0);
         let mut solved = StokesSolved::default();
         let mut residual = zero();
-        self.first_residual(u, q, inflow, &mut work, &mut residual, &mut solved);
+        self.momentum_lack(before, u, q, &mut work, &mut residual.u);
+        self.outflow(u, &mut residual.q);
+        residual.q.iter_mut().zip(inflow).for_each(|(residual, inflow)| *residual = inflow - *residual);
+        solved.unbalanced = self.pressure.balance(&mut residual.q);
         let kept = (KEPT_BYTES / (8 * size_of::<f64>() * len.max(1))).clamp(LEAST_KEPT, KEPT);
         let mut directions: Vec<(Unknowns, Unknowns, f64)> = Vec::new();
         loop {
@@ -192,30 +208,24 @@ impl StokesSolver {
         solved
     }
 
-    /// What the velocity before the step lacks: momentum at its faces, and net outflow of its cells.
-    fn first_residual(
+    /// `out` = the momentum before the step less that of `u` with its viscous stress and pressure.
+    fn momentum_lack(
         &self,
+        before: &FaceFields<f64>,
         u: &mut FaceFields<f64>,
         q: &[f64],
-        inflow: &[f64],
         work: &mut Work,
-        residual: &mut Unknowns,
-        solved: &mut StokesSolved,
+        out: &mut FaceFields<f64>,
     ) {
         let level = self.viscous.finest();
-        level.apply(u, &mut work.stresses, &mut residual.u);
-        self.add_gradient(q, &mut residual.u);
+        level.apply(u, &mut work.stresses, out);
+        self.add_gradient(q, out);
         for axis in 0..3 {
             for at in 0..q.len() {
-                let momentum = f64::from(level.mass[axis][at]) * u[axis][at];
-                residual.u[axis][at] = if self.is_free(axis, at) { momentum - residual.u[axis][at] } else { 0.0 };
+                let momentum = f64::from(level.mass[axis][at]) * before[axis][at];
+                out[axis][at] = if self.is_free(axis, at) { momentum - out[axis][at] } else { 0.0 };
             }
         }
-        self.outflow(u, &mut residual.q);
-        for (residual, inflow) in residual.q.iter_mut().zip(inflow) {
-            *residual = inflow - *residual;
-        }
-        solved.unbalanced = self.pressure.balance(&mut residual.q);
     }
 
     /// `z` ≈ the solution for `residual`.

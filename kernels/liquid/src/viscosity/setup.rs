@@ -29,7 +29,7 @@ struct Fields<'a> {
     viscosity: Vec<f32>,
     open: FaceFields<f32>,
     solid: FaceFields<f32>,
-    slip: f32,
+    slip: &'a (dyn Fn(usize, Cell) -> f32 + Sync),
     kinds: FaceFields<FaceKind>,
 }
 
@@ -169,7 +169,7 @@ impl Fields<'_> {
             }
         }
         let mut distance = 1.0_f32;
-        let mut beside_solid = false;
+        let mut held: Option<f32> = None;
         for (face, step) in [(side, other), (other, side)] {
             let pair = [Some(cell), Some(lower(cell, step))].map(|cell| cell.and_then(|cell| self.rows.find(cell)));
             let kinds = pair.map(|at| at.map_or(FaceKind::Solid, |at| self.kinds[face][at]));
@@ -183,13 +183,15 @@ impl Fields<'_> {
                 if outside - inside > 0.0 {
                     distance = distance.min(outside / (outside - inside));
                 }
-                beside_solid = true;
+                let wall = if solid == 0 { cell } else { lower(cell, step) };
+                let slip = (self.slip)(face, wall);
+                held = Some(held.map_or(1.0 - slip, |held| held.min(1.0 - slip)));
             }
         }
         if liquid == 0.0 {
             return 0.0;
         }
         let viscosity = liquid / inverse * (1.0 - 0.25 * air);
-        if beside_solid { viscosity * (1.0 - self.slip) / distance.max(LEAST_SOLID_DISTANCE) } else { viscosity }
+        held.map_or(viscosity, |held| viscosity * held / distance.max(LEAST_SOLID_DISTANCE))
     }
 }

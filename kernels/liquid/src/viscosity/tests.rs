@@ -42,7 +42,7 @@ impl Case {
             solid_distance: [sx, sy, sz],
             density: &density,
             viscosity: &self.viscosity,
-            slip: self.slip,
+            slip: &|_, _| self.slip,
         })
     }
 }
@@ -61,7 +61,8 @@ fn velocity(solver: &StokesSolver, of: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> 
 fn solve(solver: &StokesSolver, u: &mut FaceFields<f64>, tolerance: f64) -> StokesSolved {
     let len = solver.rows().len();
     let stop = StokesStop { velocity: tolerance, flow: tolerance, iterations: 80 };
-    solver.solve(u, &mut vec![0.0; len], &vec![0.0; len], stop)
+    let before = u.clone();
+    solver.solve(&before, u, &mut vec![0.0; len], &vec![0.0; len], stop)
 }
 
 /// A velocity without any order, between −1 and 1.
@@ -188,7 +189,8 @@ fn flow_between_plates_is_a_parabola_of_order_two() {
             inflow[rows.find([long - 1, y, z]).unwrap()] = -exact(f64::from(y) + 0.5);
         }
         let stop = StokesStop { velocity: 1e-8, flow: 1e-8, iterations: 200 };
-        let solved = solver.solve(&mut u, &mut vec![0.0; rows.len()], &inflow, stop);
+        let before = u.clone();
+        let solved = solver.solve(&before, &mut u, &mut vec![0.0; rows.len()], &inflow, stop);
         assert!(solved.iterations < 200, "{solved:?}");
         let column = (0..n).map(|y| (y, u[0][rows.find([long / 2, y, 2]).unwrap()]));
         let error = column.map(|(y, u)| (u - exact(f64::from(y) + 0.5)).abs()).fold(0.0, f64::max);

@@ -5,6 +5,7 @@ mod plain;
 mod rest;
 mod runs;
 mod spin;
+mod viscous;
 
 use super::*;
 use crate::level_set::PhiView;
@@ -12,8 +13,8 @@ use crate::velocity::Site;
 use numerics::vector::Vec3;
 use plain::PlainLevelSet;
 
-const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], solid: None };
-const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], solid: None };
+const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], viscosity: &|_| 0.0, solid: None };
+const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], viscosity: &|_| 0.0, solid: None };
 
 /// The distance from a box.
 fn block(low: Vec3, high: Vec3) -> impl Fn(Vec3) -> f32 {

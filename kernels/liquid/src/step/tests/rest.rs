@@ -3,7 +3,7 @@ use numerics::vector::length;
 
 /// 240 frames of a pool whose surface lies at `depth` in a box of 16³ cells; the largest speed in them ÷ g·Δt, the largest
 /// change of φ near the surface, and the iterations after the first frames.
-fn rest(depth: f32, cell: f64, solid: Option<&(dyn Fn(Vec3) -> f32 + Sync)>, tolerance: f64) -> (f64, f32, u32) {
+fn rest(depth: f32, cell: f64, solid: Option<Solid<'_>>, tolerance: f64) -> (f64, f32, u32) {
     let domain = Domain::closed([0; 3], [16; 3]);
     let settings = LiquidSettings { tolerance, ..LiquidSettings::new(domain, cell) };
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - depth));
@@ -38,10 +38,11 @@ fn a_pool_at_rest_stays_at_rest() {
 
 #[test]
 fn a_floor_that_cuts_cells_does_not_disturb_the_rest() {
-    let floor = |p: Vec3| p[1] - 2.6;
-    let (speed, off, _) = rest(9.3, 0.0625, Some(&floor), 1e-6);
+    let floor = |_: f64, p: Vec3| p[1] - 2.6;
+    let floor = Some(Solid::still(&floor));
+    let (speed, off, _) = rest(9.3, 0.0625, floor, 1e-6);
     assert!(speed < 1e-5 && off < 1e-4, "{speed} {off}");
-    let (speed, off, iterations) = rest(9.3, 0.0625, Some(&floor), 1e-4);
+    let (speed, off, iterations) = rest(9.3, 0.0625, floor, 1e-4);
     assert!(speed < 1e-4 && off < 1e-3 && iterations < 240, "{speed} {off} {iterations}");
 }
 
@@ -84,8 +85,8 @@ fn a_blob_falls_freely() {
 #[test]
 fn a_block_slides_on_a_floor_that_cuts_cells() {
     let domain = Domain::closed([0; 3], [40, 14, 3]);
-    let floor = |p: Vec3| p[1] - 2.6;
-    let around = Surroundings { solid: Some(&floor), gravity: &|_| [0.0, 0.0, 0.0] };
+    let floor = |_: f64, p: Vec3| p[1] - 2.6;
+    let around = Surroundings { solid: Some(Solid::still(&floor)), ..WEIGHTLESS };
     let settings = LiquidSettings::new(domain, 1.0 / 16.0);
     let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([4.0, -9.0, -9.0], [16.0, 9.0, 9.0])));
     liquid.set_velocity(|_| [1.0, 0.0, 0.0], &around);

@@ -12,8 +12,8 @@ fn splash(frames: u32) -> Liquid<PlainLevelSet> {
 }
 
 fn go_on(liquid: &mut Liquid<PlainLevelSet>, frames: u32) {
-    let ball = |p: Vec3| length([p[0] - 14.0, p[1] - 1.0, p[2] - 6.0]) - 3.2;
-    let around = Surroundings { solid: Some(&ball), ..FALLING };
+    let ball = |_: f64, p: Vec3| length([p[0] - 14.0, p[1] - 1.0, p[2] - 6.0]) - 3.2;
+    let around = Surroundings { solid: Some(Solid::still(&ball)), ..FALLING };
     for _ in 0..frames {
         let report = liquid.step_frame(&around, 1.0 / 24.0);
         assert!(report.max_divergence < 1e-4 && report.caps_hit == 0, "{report:?}");

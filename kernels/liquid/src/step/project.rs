@@ -1,0 +1,183 @@
+//! The end of a substep: what is left of a velocity once it neither compresses the liquid nor differs from what viscosity
+//! allows.
+
+use crate::pressure::{PressureGrid, PressureSolver, Stop};
+use crate::rows::CellRows;
+use crate::stencil::Stencil;
+use crate::step::domain::Obstacle;
+use crate::step::motion::{Guess, LiquidCells};
+use crate::step::{LiquidReport, LiquidSettings};
+use crate::velocity::FaceFields;
+use crate::viscosity::{StokesGrid, StokesSolver, StokesStop};
+
+/// Net flow of a cell, of the largest error that it may cause in a velocity.
+const FLOW_SHARE: f64 = 0.25;
+
+/// The least speed of thick liquid, of what gravity adds in a substep, that errors are measured against.
+const CREEP: f64 = 1e-3;
+
+/// A projection of one substep.
+pub(super) struct Projection<'a> {
+    pub settings: &'a LiquidSettings,
+    pub cells: &'a LiquidCells,
+    pub solid: Option<Obstacle<'a>>,
+    /// The speed of the liquid, m/s.
+    pub speed: f64,
+    /// What gravity adds to it, m/s.
+    pub pull: f64,
+    /// The length of the substep.
+    pub seconds: f64,
+}
+
+impl Projection<'_> {
+    /// Drives the divergence out of a velocity.
+    pub(super) fn by_pressure(&self, faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
+        let cells = self.cells;
+        let [x, y, z] = &cells.open;
+        let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z] };
+        let solver = PressureSolver::new(&grid);
+        let mut inflow = inflow(&solver, cells, faces);
+        let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
+        let stop =
+            Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
+        let solved = solver.solve(&mut inflow, &mut q, stop);
+        subtract_gradient(&solver, cells, &q, faces);
+        *guess = Guess { rows: solver.rows().clone(), q };
+        let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
+        LiquidReport {
+            pressure_iterations: solved.iterations,
+            solves_cut_short: u32::from(is_cut_short),
+            ..self.report(solved.flow, solved.unbalanced)
+        }
+    }
+
+    /// Drives the divergence out of a velocity and lets viscosity act, both at once. `viscosity`: kinematic, in cell² a
+    /// substep. `likely`: a first guess of the result.
+    pub(super) fn by_pressure_and_viscosity(
+        &self,
+        viscosity: f64,
+        likely: &FaceFields<f32>,
+        faces: &mut FaceFields<f32>,
+        guess: &mut Guess,
+    ) -> LiquidReport {
+        let (cells, domain) = (self.cells, &self.settings.domain);
+        let rows = domain.clip(&cells.rows.dilated(1));
+        let level_set = cells.level_set_on(domain, &rows);
+        let [open, distance] = domain.faces(&rows, self.solid);
+        let [[open_x, open_y, open_z], [x, y, z]] = [&open, &distance];
+        let grid = StokesGrid {
+            rows: &rows,
+            level_set: &level_set,
+            open: [open_x, open_y, open_z],
+            solid_distance: [x, y, z],
+            density: &vec![1.0; rows.len()],
+            viscosity: &vec![viscosity as f32; rows.len()],
+            slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
+        };
+        let solver = StokesSolver::new(&grid);
+        let solid_velocity = self.solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
+        let on_solver = |field: &[f32]| {
+            let field: Vec<f64> = field.iter().map(|u| f64::from(*u)).collect();
+            solver.rows().resampled(&rows, &field, 0.0)
+        };
+        let before = faces.each_ref().map(|faces| on_solver(&rows.resampled(&cells.rows, faces, 0.0)));
+        let mut u: FaceFields<f64> = std::array::from_fn(|axis| {
+            let mut own = rows.resampled(&cells.rows, &likely[axis], 0.0);
+            if let Some(solid) = &solid_velocity {
+                let closed = own.iter_mut().zip(&solid[axis]).zip(&open[axis]).filter(|(_, open)| **open == 0.0);
+                closed.for_each(|((own, solid), _)| *own = *solid);
+            }
+            on_solver(&own)
+        });
+        let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
+        // Thick liquid creeps far more slowly than gravity would have it.
+        let scale = self.speed.max(CREEP * self.pull);
+        let stop = StokesStop {
+            velocity: self.settings.tolerance * scale,
+            flow: self.flow_tolerance(scale),
+            iterations: self.settings.max_iterations,
+        };
+        let pushed = |solid: &FaceFields<f32>| driven(&solver, &rows, &open, solid);
+        let inflow = solid_velocity.as_ref().map_or_else(|| vec![0.0; solver.rows().len()], pushed);
+        let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
+        for axis in 0..3 {
+            let solved = cells.rows.resampled(solver.rows(), &u[axis], 0.0);
+            let moving = faces[axis].iter_mut().zip(&solved).zip(&cells.moving);
+            moving.filter(|(_, mask)| **mask >> axis & 1 == 1).for_each(|((u, solved), _)| *u = *solved as f32);
+        }
+        *guess = Guess { rows: solver.rows().clone(), q };
+        let is_done = solved.flow <= stop.flow && solved.velocity <= stop.velocity;
+        LiquidReport {
+            coupled_iterations: solved.iterations,
+            coupled_residual: if scale > 0.0 { solved.velocity / scale } else { 0.0 },
+            solves_cut_short: u32::from(!is_done && solved.iterations >= stop.iterations),
+            ..self.report(solved.flow, solved.unbalanced)
+        }
+    }
+
+    /// Net flow of a cell, m/s, that may be left.
+    fn flow_tolerance(&self, scale: f64) -> f64 {
+        self.settings.tolerance * (FLOW_SHARE * scale).min(self.settings.cell / self.seconds)
+    }
+
+    fn report(&self, flow: f64, unbalanced: f64) -> LiquidReport {
+        let per_cell = self.seconds / self.settings.cell;
+        LiquidReport { max_divergence: flow * per_cell, unbalanced: unbalanced * per_cell, ..LiquidReport::default() }
+    }
+}
+
+/// The net inflow of each liquid cell, m/s.
+fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &FaceFields<f32>) -> Vec<f64> {
+    let through = std::array::from_fn(|axis| {
+        let flow = |(u, share): (&f32, &f32)| f64::from(*u) * f64::from(*share);
+        let mut own: Vec<f64> = faces[axis].iter().zip(&cells.open[axis]).map(flow).collect();
+        if let Some(solid) = &cells.solid_velocity {
+            own.iter_mut().zip(covered(axis, &cells.open, solid)).for_each(|(own, covered)| *own += covered);
+        }
+        solver.rows().resampled(&cells.rows, &own, 0.0)
+    });
+    net(solver.rows(), solver.stencil(), &through)
+}
+
+/// The net inflow of each liquid cell that solids drive, m/s.
+fn driven(solver: &StokesSolver, rows: &CellRows, open: &FaceFields<f32>, solid: &FaceFields<f32>) -> Vec<f64> {
+    let through = std::array::from_fn(|axis| {
+        let covered: Vec<f64> = covered(axis, open, solid).collect();
+        solver.rows().resampled(rows, &covered, 0.0)
+    });
+    net(solver.rows(), solver.stencil(), &through)
+}
+
+/// What a solid carries through the share of each face that it covers, m/s.
+fn covered(axis: usize, open: &FaceFields<f32>, solid: &FaceFields<f32>) -> impl Iterator<Item = f64> {
+    solid[axis].iter().zip(&open[axis]).map(|(u, share)| f64::from(*u) * (1.0 - f64::from(*share)))
+}
+
+/// What flows into each active cell, less what flows out, where this flows through faces upwards.
+fn net(rows: &CellRows, stencil: &Stencil, through: &FaceFields<f64>) -> Vec<f64> {
+    let mut inflow = vec![0.0; rows.len()];
+    stencil.update([&mut inflow], |runs, first, [inflow]| {
+        for run in runs {
+            for n in 0..run.len as usize {
+                let at = run.at as usize + n;
+                let along_x = through[0][at] - through[0][at + 1];
+                let along_y = through[1][at] - through[1][run.y[1] as usize + n];
+                let along_z = through[2][at] - through[2][run.z[1] as usize + n];
+                inflow[at - first] = along_x + along_y + along_z;
+            }
+        }
+    });
+    inflow
+}
+
+/// Takes the gradient of `q` from open faces.
+fn subtract_gradient(solver: &PressureSolver, cells: &LiquidCells, q: &[f64], faces: &mut FaceFields<f32>) {
+    let mut gradient: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; solver.rows().len()]);
+    solver.for_each_gradient(q, |axis, at, value| gradient[axis][at] = value as f32);
+    for axis in 0..3 {
+        let gradient = cells.rows.resampled(solver.rows(), &gradient[axis], 0.0);
+        let open = cells.open[axis].iter().map(|open| *open > 0.0);
+        let taken = faces[axis].iter_mut().zip(&gradient).zip(open);
+        taken.filter(|(_, is_open)| *is_open).for_each(|((u, gradient), _)| *u -= gradient);
+    }
+}
