@@ -2,6 +2,7 @@
 
 mod dam;
 mod plain;
+mod pushed;
 mod rest;
 mod runs;
 mod spin;
