@@ -321,6 +321,36 @@ impl CellRows {
     }
 }
 
+/// Finds cells near each other faster than [`CellRows::find`]: it remembers the last span of each of 16 rows.
+#[derive(Clone, Debug)]
+pub struct Finder<'a> {
+    rows: &'a CellRows,
+    /// For rows with the same y and z modulo 4, the row that was looked at last, and its span.
+    last: [([i32; 2], RowSpan); 16],
+}
+
+impl<'a> Finder<'a> {
+    /// Finds cells of these rows.
+    pub fn new(rows: &'a CellRows) -> Self {
+        Self { rows, last: [([0; 2], RowSpan { start: 0, end: 0, base: 0 }); 16] }
+    }
+
+    /// Where the value of a cell is; `None` where it is not stored.
+    #[inline(always)]
+    pub fn find(&mut self, [x, y, z]: Cell) -> Option<usize> {
+        let (row, span) = &self.last[(y & 3 | (z & 3) << 2) as usize];
+        if *row == [y, z] && span.contains(x) { Some(span.at(x)) } else { self.find_span([x, y, z]) }
+    }
+
+    #[inline(never)]
+    fn find_span(&mut self, [x, y, z]: Cell) -> Option<usize> {
+        let row = self.rows.row(y, z);
+        let span = row.get(row.partition_point(|span| span.end <= x)).filter(|span| span.contains(x))?;
+        self.last[(y & 3 | (z & 3) << 2) as usize] = ([y, z], *span);
+        Some(span.at(x))
+    }
+}
+
 fn range(span: &RowSpan) -> Range<i32> {
     span.start..span.end
 }

@@ -4,7 +4,7 @@
 //! its children are liquid as air. And the distance of the surface from a coarse cell is kept for each face apart: the
 //! mean over the four columns of children that cross the face.
 
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Finder};
 use crate::stencil::Stencil;
 
 use super::level::{CellKind, HALO, Level, SurfaceDistances};
@@ -15,24 +15,27 @@ const LEAST_DISTANCE: f32 = 0.1;
 /// The next coarser grid; `None` where no cell of it is liquid.
 pub(super) fn coarsened(fine: &Level, distances: &SurfaceDistances) -> Option<(Level, SurfaceDistances)> {
     let candidates = fine.rows().halved();
-    let kinds = candidates.tabulate(|cell| kind(fine, cell));
+    let finder = || Finder::new(fine.rows());
+    let [kinds] = candidates.tabulate_with(finder, |finder, cell, _| [kind(fine, finder, cell)]);
     let liquid = candidates.filtered(|_, at| kinds[at] == CellKind::Liquid);
     if liquid.is_empty() {
         return None;
     }
     let stencil = Stencil::around(liquid, HALO);
     let kinds = stencil.rows().resampled(&candidates, &kinds, CellKind::Air);
-    let weights = stencil.rows().tabulate_each(|cell| [0, 1, 2].map(|axis| weight(fine, cell, axis)));
+    let weights = stencil
+        .rows()
+        .tabulate_with(finder, |finder, cell, _| [0, 1, 2].map(|axis| weight(&fine.weights[axis], finder, cell, axis)));
     let coarse_distances = coarse_distances(fine, distances, stencil.rows(), &kinds);
     let level = Level::new(stencil, kinds, weights, &coarse_distances);
     Some((level, coarse_distances))
 }
 
-fn kind(fine: &Level, coarse: Cell) -> CellKind {
+fn kind(fine: &Level, finder: &mut Finder<'_>, coarse: Cell) -> CellKind {
     let (mut liquid, mut air) = (0, 0);
     for child in 0..8 {
         let offset = [child & 1, child >> 1 & 1, child >> 2];
-        let Some(at) = fine.rows().find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
+        let Some(at) = finder.find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
         match fine.kinds[at] {
             CellKind::Liquid => liquid += 1,
             CellKind::Air => air += 1,
@@ -48,11 +51,11 @@ fn kind(fine: &Level, coarse: Cell) -> CellKind {
 
 /// Four children's faces, with four times the area over twice the distance. Where none is stored the face is far from
 /// any liquid, and open.
-fn weight(fine: &Level, coarse: Cell, axis: usize) -> f32 {
+fn weight(weights: &[f32], finder: &mut Finder<'_>, coarse: Cell, axis: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for column in columns(coarse, axis) {
-        if let Some(at) = fine.rows().find(column) {
-            sum += fine.weights[axis][at];
+        if let Some(at) = finder.find(column) {
+            sum += weights[at];
             count += 1.0;
         }
     }
@@ -76,14 +79,15 @@ fn coarse_distances(
     rows: &CellRows,
     kinds: &[CellKind],
 ) -> SurfaceDistances {
-    rows.tabulate_each(|cell| {
-        let above = rows.find(cell).map(|at| kinds[at]);
+    let start = || (Finder::new(rows), Finder::new(fine.rows()));
+    rows.tabulate_with(start, |(coarse, finder), cell, at| {
         [0, 1, 2].map(|axis| {
             let mut below = cell;
             below[axis] -= 1;
-            match (rows.find(below).map(|at| kinds[at]), above) {
-                (Some(CellKind::Liquid), Some(CellKind::Air)) => distance(fine, &distances[axis], cell, axis, 1),
-                (Some(CellKind::Air), Some(CellKind::Liquid)) => distance(fine, &distances[axis], cell, axis, -1),
+            let mut distance = |towards: i32| distance(fine, finder, &distances[axis], cell, axis, towards);
+            match (coarse.find(below).map(|at| kinds[at]), kinds[at]) {
+                (Some(CellKind::Liquid), CellKind::Air) => distance(1),
+                (Some(CellKind::Air), CellKind::Liquid) => distance(-1),
                 _ => 1.0,
             }
         })
@@ -92,23 +96,23 @@ fn coarse_distances(
 
 /// The distance of the surface from the centre of the liquid cell beside the low face of `coarse`, in coarse cells; the
 /// liquid is below the face where `towards` is 1, above it where −1.
-fn distance(fine: &Level, distances: &[f32], coarse: Cell, axis: usize, towards: i32) -> f32 {
+fn distance(fine: &Level, finder: &mut Finder<'_>, distances: &[f32], coarse: Cell, axis: usize, towards: i32) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for column in columns(coarse, axis) {
         // Four cells from within the liquid outwards, the face between the second and the third.
         let first = if towards > 0 { column[axis] - 2 } else { column[axis] + 1 };
-        let child = |n: i32| {
+        let mut child = |n: usize| {
             let mut cell = column;
-            cell[axis] = first + towards * n;
-            fine.rows().find(cell)
+            cell[axis] = first + towards * n as i32;
+            finder.find(cell)
         };
-        let kind = |n: i32| child(n).map_or(CellKind::Air, |at| fine.kinds[at]);
-        let Some(inside) = (0..4).find(|n| kind(*n) == CellKind::Liquid) else {
+        let kinds = [0, 1, 2, 3].map(|n| child(n).map_or(CellKind::Air, |at| fine.kinds[at]));
+        let Some(inside) = kinds.iter().position(|kind| *kind == CellKind::Liquid) else {
             count += 1.0;
             continue;
         };
-        let end = (inside..4).find(|n| kind(*n) != CellKind::Liquid).unwrap_or(4);
-        if end < 4 && kind(end) == CellKind::Solid {
+        let end = (inside..4).find(|n| kinds[*n] != CellKind::Liquid).unwrap_or(4);
+        if end < 4 && kinds[end] == CellKind::Solid {
             continue;
         }
         // The low face of the upper of the two cells.

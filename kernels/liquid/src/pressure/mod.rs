@@ -16,7 +16,7 @@ mod level;
 mod tests;
 
 use crate::fields::{add_scaled, dot, largest, scale_and_add};
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Finder};
 use crate::stencil::{Run, Stencil};
 
 use closed::Closed;
@@ -76,7 +76,11 @@ impl PressureSolver {
     /// Where a field does not have one value a cell.
     pub fn new(grid: &PressureGrid<'_>) -> Self {
         assert!(grid.weights.iter().chain([&grid.level_set]).all(|field| field.len() == grid.rows.len()));
-        let liquid = grid.rows.filtered(|cell, at| grid.level_set[at] < -LEAST_DEPTH && is_open(grid, cell, at));
+        let [is_liquid] = grid.rows.tabulate_with(
+            || Finder::new(grid.rows),
+            |finder, cell, at| [grid.level_set[at] < -LEAST_DEPTH && is_open(grid, finder, cell, at)],
+        );
+        let liquid = grid.rows.filtered(|_, at| is_liquid[at]);
         let stencil = Stencil::around(liquid, HALO);
         let rows = stencil.rows();
         let level_set = rows.resampled(grid.rows, grid.level_set, f32::NAN);
@@ -206,12 +210,12 @@ impl PressureSolver {
 }
 
 /// Whether a face of the cell is open.
-fn is_open(grid: &PressureGrid<'_>, cell: Cell, at: usize) -> bool {
+fn is_open(grid: &PressureGrid<'_>, finder: &mut Finder<'_>, cell: Cell, at: usize) -> bool {
     (0..3).any(|axis| {
         let mut above = cell;
         above[axis] += 1;
         let weights = grid.weights[axis];
-        weights[at] > 0.0 || grid.rows.find(above).is_some_and(|above| weights[above] > 0.0)
+        weights[at] > 0.0 || finder.find(above).is_some_and(|above| weights[above] > 0.0)
     })
 }
 
