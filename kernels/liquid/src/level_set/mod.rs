@@ -1,7 +1,195 @@
-//! The level set of a liquid's surface.
+//! The level set of a liquid's surface: which cells are inside, and the distance to the surface in a band around it.
+//!
+//! Each step φ follows the flow ([`LevelSet::advect`]: first-order semi-Lagrangian, good for signs and little else), is made
+//! exact at the surface by [`crate::markers`], and becomes a distance again by [`LevelSet::fill`].
+//!
+//! Promise: memory and time follow the liquid and its surface; the bits are the same on any number of threads. The unit of
+//! length is the cell: cell [x, y, z] reaches from there to [x + 1, y + 1, z + 1] and φ is that of its middle. At the ends
+//! of the domain φ goes on as it is there, so a surface meets a wall at a right angle. Limit: coordinates beyond 2²⁰
+//! cells lose the digits that place a surface within a cell.
 
 pub(crate) mod cubic;
+mod fill;
+mod sample;
+#[cfg(test)]
+mod tests;
 mod view;
 
+use numerics::vector::{Vec3, add, scale, sub};
+
+pub use sample::PhiSampler;
+pub(crate) use sample::floor;
 pub use view::PhiView;
 pub(crate) use view::RowBlocks;
+
+use crate::rows::{Cell, CellRows};
+use crate::stencil::Stencil;
+
+/// Distance, in cells, to which φ is known on either side of the surface; beyond it is this much.
+pub const BAND: f32 = 5.0;
+
+/// How far the liquid moves in one step.
+pub trait Flow: Sync {
+    /// The way, in cells, from each point, a place in cells. Points of successive calls are near each other, which a
+    /// reader may make use of.
+    fn reader(&self) -> impl FnMut(Vec3) -> Vec3;
+}
+
+impl<F: Fn(Vec3) -> Vec3 + Sync> Flow for F {
+    fn reader(&self) -> impl FnMut(Vec3) -> Vec3 {
+        move |point| self(point)
+    }
+}
+
+/// φ, negative inside the liquid, at the centres of the cells inside and of those in the band around the surface.
+#[derive(Clone, Debug)]
+pub struct LevelSet {
+    /// The stored cells; active are those whose φ is a distance.
+    stencil: Stencil,
+    phi: Vec<f32>,
+    low: Cell,
+    high: Cell,
+}
+
+impl LevelSet {
+    /// The level set of a domain `low` ≤ cell < `high`, from values that are distances already, at the cells of `rows`;
+    /// what is not among them is outside. Values must be finite.
+    ///
+    /// # Panics
+    /// Where there is not one value for each cell.
+    pub fn new(rows: &CellRows, phi: &[f32], low: Cell, high: Cell) -> Self {
+        assert_eq!(rows.len(), phi.len(), "one value for each cell");
+        let rows_within = rows.clipped(low, high);
+        let phi = rows_within.resampled(rows, phi, BAND).into_iter().map(|phi| phi.clamp(-BAND, BAND)).collect();
+        let stencil = Stencil::around(CellRows::default(), 1);
+        let mut set = Self { stencil, phi: Vec::new(), low, high };
+        set.store(&rows_within, phi, 0);
+        set
+    }
+
+    /// The stored cells.
+    pub fn rows(&self) -> &CellRows {
+        self.stencil.rows()
+    }
+
+    /// The cells whose φ is a distance; the others are [`BAND`] inside or outside.
+    pub fn band(&self) -> &CellRows {
+        self.stencil.active()
+    }
+
+    /// φ of each stored cell.
+    pub fn phi(&self) -> &[f32] {
+        &self.phi
+    }
+
+    /// The domain: `low` ≤ cell < `high`.
+    pub fn domain(&self) -> (Cell, Cell) {
+        (self.low, self.high)
+    }
+
+    /// φ to read and to extract.
+    pub fn view(&self) -> PhiView<'_> {
+        let (low, high) = (self.low, self.high);
+        PhiView { rows: self.rows(), phi: &self.phi, outside: BAND, low, high }
+    }
+
+    pub(crate) fn stencil(&self) -> &Stencil {
+        &self.stencil
+    }
+
+    pub(crate) fn parts(&mut self) -> (&Stencil, &mut [f32]) {
+        (&self.stencil, &mut self.phi)
+    }
+
+    /// Moves φ by a flow that moves nothing farther than `reach` cells, and stores the cells that this needs. φ is a
+    /// distance again after [`Self::fill`].
+    pub fn advect(&mut self, flow: &impl Flow, reach: f32) {
+        let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
+        self.store(&rows, phi.clone(), reach.ceil() as i32);
+        let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
+        let far = far_from_surface(reach);
+        let mut phi = std::mem::take(&mut self.phi);
+        self.stencil.update([&mut phi], |runs, first, [phi]| {
+            let (mut flow, mut sampler) = (flow.reader(), PhiSampler::new(before));
+            for run in runs {
+                for n in 0..run.len as usize {
+                    let value = &mut phi[run.at as usize + n - first];
+                    if value.abs() < far {
+                        let [x, y, z] = run.cell;
+                        let at = [x + n as i32, y, z].map(|x| x as f32 + 0.5);
+                        let middle = sub(at, scale(flow(at), 0.5));
+                        *value = sampler.at(sub(at, flow(middle)));
+                    }
+                }
+            }
+        });
+        self.phi = phi;
+    }
+
+    /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of the middle of the cell and its φ; the least
+    /// of φ and a distance adds a shape. Follow with [`Self::fill`] where the result is no distance.
+    pub fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        let low = [0, 1, 2].map(|axis| low[axis].max(self.low[axis]));
+        let high = [0, 1, 2].map(|axis| high[axis].min(self.high[axis]));
+        let part = CellRows::cuboid(low, high);
+        let old = part.resampled(self.rows(), &self.phi, BAND);
+        let at = |cell: Cell| old[part.find(cell).unwrap_or_default()];
+        let new: Vec<f32> = part.tabulate(|cell| change(cell.map(|x| x as f32 + 0.5), at(cell)).clamp(-BAND, BAND));
+        let rows = self.rows().union(&part);
+        let mut phi = rows.resampled(self.rows(), &self.phi, BAND);
+        rows.for_each_shared(&part, |to, from, len| phi[to..to + len].copy_from_slice(&new[from..from + len]));
+        self.store(&rows, phi, 0);
+    }
+
+    /// Makes φ a distance again: kept at the cells next to the surface, at most 1 there; elsewhere by the eikonal equation.
+    pub fn fill(&mut self) {
+        self.copy_to_walls();
+        fill::fill(&self.stencil, &mut self.phi);
+    }
+
+    /// Replaces φ and chooses what is stored: the band, wider by `by` cells, the inside, and a ring around both.
+    fn store(&mut self, rows: &CellRows, phi: Vec<f32>, by: i32) {
+        let near = rows.filtered(|_, at| phi[at].abs() < BAND);
+        let near = if by > 0 { near.dilated(by) } else { near };
+        let active = near.clipped(self.low, self.high);
+        let inside = rows.filtered(|_, at| phi[at] < 0.0).clipped(self.low, self.high);
+        let stored = active.dilated(1).union(&inside);
+        self.phi = stored.resampled(rows, &phi, BAND);
+        self.stencil = Stencil::within(stored, active);
+        self.copy_to_walls();
+    }
+
+    /// Cells just beyond the domain get φ of the cell next to them, so that no surface is seen along walls.
+    fn copy_to_walls(&mut self) {
+        let (low, high) = (self.low, self.high);
+        let within = |x: i32, axis: usize| x.clamp(low[axis], high[axis] - 1);
+        let rows = self.stencil.rows();
+        for ([y, z], spans) in rows.rows() {
+            let whole = within(y, 1) != y || within(z, 2) != z;
+            for span in spans {
+                let ends = [span.start..span.start + 1, span.end - 1..span.end];
+                let all = [span.start..span.end, 0..0];
+                for x in if whole { all } else { ends }.into_iter().flatten() {
+                    let inner = [within(x, 0), within(y, 1), within(z, 2)];
+                    if inner != [x, y, z] {
+                        self.phi[span.at(x)] = rows.find(inner).map_or(BAND, |at| self.phi[at]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// |φ| from which on a cell cannot come next to the surface in a step. φ may fall short of the distance by a fifth.
+pub(crate) fn far_from_surface(reach: f32) -> f32 {
+    1.25 * reach + 2.5
+}
+
+/// Where a point goes in a step: third order (Ralston 1962).
+#[inline]
+pub(crate) fn displacement(flow: &mut impl FnMut(Vec3) -> Vec3, from: Vec3) -> Vec3 {
+    let first = flow(from);
+    let second = flow(add(from, scale(first, 0.5)));
+    let third = flow(add(from, scale(second, 0.75)));
+    std::array::from_fn(|axis| (2.0 * first[axis] + 3.0 * second[axis] + 4.0 * third[axis]) * (1.0 / 9.0))
+}

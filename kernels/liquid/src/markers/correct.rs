@@ -1,0 +1,101 @@
+//! φ next to the surface from the planes of its markers.
+
+use numerics::vector::{Vec3, add, dot, length, scale, sub};
+use rayon::prelude::*;
+
+use super::bins::Bins;
+use super::{Marker, ONE_SIDED, one_sided};
+use crate::level_set::{LevelSet, far_from_surface};
+
+/// Markers count that are at most this much farther than the closest.
+const SPREAD: f32 = 0.5;
+/// Distance of the closest marker beyond which markers say nothing.
+const FARTHEST: f32 = 0.9;
+/// Distance of the closest marker up to which its plane is the surface, wherever the others are.
+const NEXT_TO: f32 = 0.3;
+/// Share of the distance from the closest marker from which the distance from planes is one from the surface.
+const STRAIGHT: f32 = 0.9;
+/// Cosine to the closest marker's normal below which a marker belongs to the other side of a sheet.
+const OPPOSITE: f32 = -0.5;
+/// Length of the mean of unit normals from which the surface is smooth there.
+const SMOOTH: f32 = 0.97;
+/// Distance up to which markers show where the surface ends.
+const AROUND: f32 = 1.5;
+
+/// At cells with markers around them, makes φ the distance from the surface through those closest.
+pub(super) fn correct(set: &mut LevelSet, markers: &[Marker], reach: f32) {
+    let bins = Bins::new(set.rows(), set.domain(), markers, |_| true);
+    let sorted: Vec<Marker> = bins.order.par_iter().map(|n| markers[*n as usize]).collect();
+    let (stencil, phi) = set.parts();
+    let far = far_from_surface(reach);
+    let first = &bins.first;
+    stencil.update([phi], |runs, start, [phi]| {
+        for run in runs {
+            let ([x, y, z], len) = (run.cell, run.len as usize);
+            // All 26 cells around an active one are stored, so the places of their rows are constant along a run.
+            let Some(diagonal) = stencil.rows().find([x, y - 1, z - 1]) else { continue };
+            let rows = [run.at as usize, run.y[0] as usize, run.z[0] as usize, diagonal];
+            if rows.iter().all(|row| first[row - 1] == first[row + len]) {
+                continue;
+            }
+            for n in 0..len {
+                let value = &mut phi[run.at as usize + n - start];
+                if value.abs() >= far {
+                    continue;
+                }
+                let near = rows.map(|row| &sorted[first[row + n - 1] as usize..first[row + n + 1] as usize]);
+                let centre = [x + n as i32, y, z].map(|x| x as f32 + 0.5);
+                if let Some(distance) = surface_distance(centre, near) {
+                    *value = distance;
+                }
+            }
+        }
+    });
+}
+
+/// The mean distance of a point from the surface by the closest markers, where the surface reaches that far.
+#[inline]
+fn surface_distance(point: Vec3, near: [&[Marker]; 4]) -> Option<f32> {
+    let (mut closest, mut side) = (f32::INFINITY, [0.0; 3]);
+    for marker in near.into_iter().flatten() {
+        let way = sub(point, marker.point);
+        let square = dot(way, way);
+        if square < closest {
+            (closest, side) = (square, marker.normal);
+        }
+    }
+    if closest > FARTHEST * FARTHEST {
+        return None;
+    }
+    let closest = closest.sqrt();
+    let (mut planes, mut ways, mut normals, mut weights) = (0.0, [0.0; 3], [0.0; 3], 0.0);
+    for marker in near.into_iter().flatten() {
+        let way = sub(point, marker.point);
+        let share = 1.0 - (dot(way, way).sqrt() - closest) * (1.0 / SPREAD);
+        if share > 0.0 && dot(marker.normal, side) > OPPOSITE {
+            let weight = share * share;
+            planes += weight * dot(marker.normal, way);
+            ways = add(ways, scale(way, weight));
+            normals = add(normals, scale(marker.normal, weight));
+            weights += weight;
+        }
+    }
+    // Where the surface is bent, distances along markers' normals are off to one side by as much as those along the
+    // point's own normal are to the other. At edges there is no such normal.
+    let agreement = length(normals);
+    let is_smooth = agreement > SMOOTH * weights;
+    let distance = if is_smooth { 0.5 * (planes + dot(normals, ways) / agreement) } else { planes } / weights;
+    let beside = closest > NEXT_TO && distance.abs() < STRAIGHT * closest;
+    (!(beside && is_beyond(point, near))).then_some(distance)
+}
+
+/// Whether a point lies beyond the rim of the markers. There both sides of a sheet would make it thicker and longer.
+#[cold]
+fn is_beyond(point: Vec3, near: [&[Marker]; 4]) -> bool {
+    let ways = near.into_iter().flatten().map(|marker| {
+        let way = sub(point, marker.point);
+        let weight = (1.0 - dot(way, way) * (1.0 / (AROUND * AROUND))).max(0.0);
+        (sub(way, scale(marker.normal, dot(marker.normal, way))), weight)
+    });
+    one_sided(ways) > ONE_SIDED
+}
