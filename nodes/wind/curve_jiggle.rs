@@ -15,7 +15,7 @@
 //!   Where the skin collapses to a line or a point it carries curves without rotating them.
 //! * While `blend` is 0, or `ramp` is nowhere above 0, nothing swings: when they rise, curves start from rest.
 
-use curves::attach::{RootPose, RootPositions, SkinBinding};
+use curves::attach::{RootPositions, SkinBinding};
 use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
@@ -108,8 +108,16 @@ struct Swing {
     skin: Option<Component>,
     /// `None` while nothing swings.
     springs: Option<Jiggle>,
-    /// Poses of the roots on the skin at that frame, if the last step computed them.
-    poses: Option<Vec<RootPose>>,
+}
+
+/// A binding as a key: it equals itself alone.
+#[derive(Clone)]
+struct SameBinding(Arc<Option<SkinBinding>>);
+
+impl PartialEq for SameBinding {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 impl Chain for Swing {
@@ -120,7 +128,6 @@ impl Chain for Swing {
             before: cx.part(CURVES).clone(),
             skin: cx.part(SKIN).cloned(),
             springs: None,
-            poses: None,
         };
         swing.check(cx)?;
         Ok(swing)
@@ -148,7 +155,6 @@ impl Chain for Swing {
     fn step_neutral(&mut self, cx: &StepCx) -> Result<()> {
         self.check(cx)?;
         self.springs = None;
-        self.poses = None;
         self.advance(cx);
         Ok(())
     }
@@ -205,23 +211,21 @@ impl Swing {
     }
 
     /// The motion that each curve inherits from its skin over the step to this frame; `None` where it inherits none.
-    fn inherited(&mut self, cx: &StepCx) -> Result<Option<Vec<RigidStep>>> {
+    fn inherited(&self, cx: &StepCx) -> Result<Option<Vec<RigidStep>>> {
         let share = f64::from(cx.get(INHERIT_MOTION));
-        let before = self.poses.take();
         let (Some(rest), Some(skin), Some(now)) = (&self.rest_skin, &self.skin, cx.part(SKIN)) else { return Ok(None) };
         if share == 0.0 {
             return Ok(None);
         }
         let roots = RootPositions::of(self.rest.runs().starts(), self.rest.positions());
         let bind = || Ok(SkinBinding::to_closest(rest.positions(), &rest.triangles().corners, roots.as_slice()));
-        let binding = rest.kept(roots.clone(), bind)?;
+        let key = SameBinding(rest.kept(roots.clone(), bind)?);
         // A skin without faces moves nothing.
-        let Some(binding) = &*binding else { return Ok(None) };
-        let from = before.unwrap_or_else(|| binding.poses(skin.positions()));
-        let to = binding.poses(now.positions());
-        let steps = RigidStep::all_between(binding, &from, &to, share);
-        self.poses = Some(to);
-        Ok(Some(steps))
+        let Some(binding) = &*key.0 else { return Ok(None) };
+        // Cached with the skin: the next step reads them again, a second state at the same frame too, and a skin that
+        // stands still keeps them.
+        let poses = |skin: &Component| skin.kept(key.clone(), || Ok(binding.poses(skin.positions())));
+        Ok(Some(RigidStep::all_between(binding, &poses(skin)?, &poses(now)?, share)))
     }
 }
 
