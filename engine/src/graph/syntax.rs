@@ -3,7 +3,7 @@
 //! Promise: any text gives a value or its first fault with a position; deep nesting does not overflow the stack.
 //! Limit: lists and objects nest at most [`DEEPEST`] deep, and only the first syntax fault is reported.
 
-use jsonc_parser::ast::Value;
+use jsonc_parser::ast::{Object, ObjectProp, Value};
 use jsonc_parser::errors::{ParseError, ParseErrorKind};
 use jsonc_parser::{CollectOptions, ParseOptions, ParseStringErrorKind, parse_to_ast};
 
@@ -38,10 +38,20 @@ pub(super) fn parse<'a>(text: &'a Text<'_>) -> Result<Value<'a>, Fault> {
     let end = brackets(text)?;
     let parsed = parse_to_ast(text.content, &CollectOptions::default(), &STRICT);
     match (parsed, end) {
-        (Ok(parsed), _) => parsed.value.ok_or_else(|| empty(text)),
+        (Ok(parsed), _) => parsed.value.map(tight).ok_or_else(|| empty(text)),
         (Err(error), Some(end)) if ends_early(text, &error) => Err(end),
         (Err(error), _) => Err(explain(text, &error)),
     }
+}
+
+/// Frees what the parser has reserved for more members than an object has: room for four, of which the inputs of a node
+/// mostly need one. A graph may have a million nodes.
+fn tight(value: Value<'_>) -> Value<'_> {
+    let Value::Object(Object { range, properties }) = value else { return value };
+    // Not `collect`, which would keep the room.
+    let mut members = Vec::with_capacity(properties.len());
+    members.extend(properties.into_iter().map(|member| ObjectProp { value: tight(member.value), ..member }));
+    Value::Object(Object { range, properties: members })
 }
 
 /// Whether the error is that the text ends too early. An error before the end has another cause, which is reported
@@ -226,6 +236,20 @@ mod tests {
     #[test]
     fn comments_and_trailing_commas_are_read() {
         assert!(parse(&Text::new("/* a */ {\"a\": [1, 2,], // b\n}", None)).is_ok());
+    }
+
+    #[test]
+    fn objects_hold_no_room_for_more_members() {
+        let text = Text::new(r#"{"nodes": {"a": {"inputs": {"b": 1}}, "c": {"d": 2}}}"#, None);
+        let mut objects = vec![parse(&text).unwrap()];
+        let mut members = 0;
+        while let Some(Value::Object(object)) = objects.pop() {
+            assert_eq!(object.properties.capacity(), object.properties.len());
+            members += object.properties.len();
+            let values = object.properties.into_iter().map(|member| member.value);
+            objects.extend(values.filter(|value| matches!(value, Value::Object(_))));
+        }
+        assert_eq!(members, 6);
     }
 
     #[test]
