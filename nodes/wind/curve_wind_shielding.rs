@@ -94,7 +94,6 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
     let shielded = if looks { sheltered(cx, &curves) } else { vec![0.0; curves.element_count()] };
-    cx.check_cancelled()?;
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
     cx.publish(RAYS, if looks { curves.point_count() as f64 } else { 0.0 });

@@ -101,14 +101,16 @@ impl<'g> Sweep<'_, 'g, '_> {
             }
         }
         let this = &*self;
+        // After a cancellation calls that are under way end, but none starts.
         let one = |(frame, resolved): &(Frame, Arc<ResolvedFrame<'g>>)| {
-            (resolved.key, *frame, this.call(node, declared, *frame, &resolved.reads, &cook))
+            let call = || (resolved.key, *frame, this.call(node, declared, *frame, &resolved.reads, &cook));
+            (!this.cancelled()).then(call)
         };
         let watch = Stopwatch::start();
         let worth = self.nodes[node].call_time.saturating_mul(jobs.len() as u32) > WORTH_A_THREAD;
         let cooked: Vec<_> = match jobs.len() > 1 && worth {
-            true => jobs.par_iter().map(one).collect(),
-            false => jobs.iter().map(one).collect(),
+            true => jobs.par_iter().filter_map(one).collect(),
+            false => jobs.iter().filter_map(one).collect(),
         };
         self.nodes[node].call_time = watch.wall() / (jobs.len().max(1) as u32);
         let mut outcomes: Vec<(ContentKey, Frame, Outcome)> = Vec::with_capacity(cooked.len());

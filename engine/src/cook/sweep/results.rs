@@ -61,9 +61,12 @@ impl Sweep<'_, '_, '_> {
         self.nodes[node].on_disk.loaded = Some(cooked.clone());
     }
 
-    /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it.
+    /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it; after a cancellation
+    /// those of calls that had ended, or ended all the same.
     pub(super) fn save_results(&mut self, node: usize, frames: &BTreeSet<Frame>, wall: Duration) {
-        if self.disk.is_none() || frames.is_empty() || self.cancelled() {
+        // Integrals end early when the cook is cancelled.
+        let is_spoiled = self.cancelled() && self.nodes[node].integrals.is_some();
+        if self.disk.is_none() || frames.is_empty() || is_spoiled {
             return;
         }
         let cost = wall / frames.len() as u32 + self.upstream_recreated_in(node);
@@ -79,7 +82,7 @@ impl Sweep<'_, '_, '_> {
             }
             self.nodes[node].on_disk.is_kept = true;
             let Ok(resolved) = self.keys.resolve(node, *frame) else { continue };
-            let metrics = self.metrics_of_result(node, *frame);
+            let Some(metrics) = self.metrics_of_result(node, *frame) else { continue };
             if let Some(disk) = self.disk.as_mut() {
                 disk.save_result(resolved.key, &cooked, &metrics);
             }
@@ -92,13 +95,19 @@ impl Sweep<'_, '_, '_> {
         self.plan.dag.sources(node).map(|source| self.nodes[source].on_disk.recreated_in).sum()
     }
 
-    /// What a node and those it depends on published at a frame.
-    fn metrics_of_result(&mut self, node: usize, frame: Frame) -> Vec<KeptMetric> {
+    /// What a node and those it depends on published at a frame; `None` where a cancellation came before all keys were
+    /// found.
+    fn metrics_of_result(&mut self, node: usize, frame: Frame) -> Option<Vec<KeptMetric>> {
+        let behind = self.results_behind(node, frame);
+        let measured = self.plan.ancestors(node).into_iter().filter(|of| self.measures(*of)).count();
+        if self.cancelled() && behind.len() < measured {
+            return None;
+        }
         let mut metrics = Vec::new();
-        for (of, at, key) in self.results_behind(node, frame) {
+        for (of, at, key) in behind {
             metrics.extend(self.kept_of(of, at, key));
         }
-        metrics
+        Some(metrics)
     }
 
     /// Publishes what was kept with a result.
