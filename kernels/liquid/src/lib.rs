@@ -1,7 +1,8 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
 //! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
-//! ([`level_set`]) made exact by markers ([`markers`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]), and
-//! all of it moved frame by frame ([`step`]). Functions take and return plain slices; nothing here depends on nodes or on the engine's geometry.
+//! ([`level_set`]) made exact by markers ([`markers`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
+//! meshes as sources and colliders ([`shape`]), and all of it moved frame by frame ([`step`]). Functions take and return
+//! plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
@@ -20,6 +21,7 @@ pub mod open_share;
 pub mod pressure;
 pub mod rows;
 mod sets;
+pub mod shape;
 pub mod stencil;
 pub mod step;
 mod transfer;
