@@ -1,6 +1,6 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
 //! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
-//! ([`level_set`]) made exact by markers ([`markers`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
+//! ([`level_set`]) made exact by markers ([`markers`], together [`marked`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
 //! meshes as sources and colliders ([`shape`]), and all of it moved frame by frame ([`step`]). Functions take and return
 //! plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
@@ -16,6 +16,7 @@ mod dense;
 pub mod extract;
 pub mod fields;
 pub mod level_set;
+pub mod marked;
 pub mod markers;
 pub mod open_share;
 pub mod pressure;

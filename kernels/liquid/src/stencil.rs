@@ -8,6 +8,7 @@ use std::mem::take;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::rows::{CellRows, RowSpan};
 
@@ -110,6 +111,20 @@ impl Stencil {
     /// What `f` makes of the runs of each chunk, in the order of fields.
     pub fn fold<R: Send>(&self, f: impl Fn(&[Run]) -> R + Sync) -> Vec<R> {
         self.chunks.par_iter().map(|chunk| f(&self.runs[chunk.runs.clone()])).collect()
+    }
+}
+
+/// Only the cells are kept: the runs follow from them.
+impl Serialize for Stencil {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (&self.rows, &self.active).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Stencil {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (rows, active) = Deserialize::deserialize(deserializer)?;
+        Ok(Self::within(rows, active))
     }
 }
 

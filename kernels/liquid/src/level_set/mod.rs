@@ -16,6 +16,7 @@ mod tests;
 mod view;
 
 use numerics::vector::{Vec3, add, scale, sub};
+use serde::{Deserialize, Serialize};
 
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;
@@ -42,7 +43,7 @@ impl<F: Fn(Vec3) -> Vec3 + Sync> Flow for F {
 }
 
 /// φ, negative inside the liquid, at the centres of the cells inside and of those in the band around the surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevelSet {
     /// The stored cells; active are those whose φ is a distance.
     stencil: Stencil,

@@ -33,12 +33,13 @@ mod tests;
 use numerics::random::Key;
 use numerics::vector::{Vec3, add, cross, length, perpendicular, scale, sub, unit};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::level_set::{Flow, LevelSet, PhiSampler, displacement};
 use bins::Bins;
 
 /// A point of the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
     /// Where it is, in cells.
     pub point: Vec3,
@@ -47,7 +48,7 @@ pub struct Marker {
 }
 
 /// The markers of a liquid. Marker n has `ids[n]`, and in each attribute the value n.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Markers {
     /// Points and normals.
     pub markers: Vec<Marker>,

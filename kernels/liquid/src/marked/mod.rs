@@ -1,0 +1,148 @@
+//! The surface of a liquid that is solved for: a level set with markers, on cells as large as the solver's or smaller.
+//!
+//! It is all that the next step depends on, and any format that keeps numbers keeps it exactly: a liquid resumed from it
+//! has the same bits.
+
+#[cfg(test)]
+mod tests;
+
+use numerics::vector::{Vec3, scale};
+use serde::{Deserialize, Serialize};
+
+use crate::level_set::{BAND, Flow, LevelSet, PhiView};
+use crate::markers::Markers;
+use crate::rows::{Cell, CellRows};
+use crate::step::{Domain, Moving, Surface};
+
+/// A level set and its markers, moved together.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MarkedSurface {
+    set: LevelSet,
+    markers: Markers,
+    /// Surface cells along the side of a solver cell.
+    resolution: i32,
+    /// φ of the solver's cells, in solver cells; empty where it is that of the surface.
+    rows: CellRows,
+    phi: Vec<f32>,
+}
+
+impl MarkedSurface {
+    /// A surface with `resolution` ≥ 1 cells along the side of a cell of `domain`, from a distance at places in the
+    /// domain's cells. `attributes` and `seed` are those of [`Markers::new`].
+    pub fn new(
+        domain: Domain,
+        resolution: u32,
+        distance: impl Fn(Vec3) -> f32 + Sync,
+        attributes: usize,
+        seed: u64,
+    ) -> Self {
+        let resolution = resolution.max(1) as i32;
+        let size = resolution as f32;
+        let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * resolution));
+        let near = CellRows::cuboid(domain.low, domain.high);
+        let phi = |cell: Cell| size * distance(cell.map(|x| (x as f32 + 0.5) / size));
+        let cells = refined(&near, resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
+        let mut set = LevelSet::new(&cells, &cells.tabulate(phi), low, high);
+        set.fill();
+        let markers = Markers::new(&set, attributes, seed);
+        let mut surface = Self { set, markers, resolution, rows: CellRows::default(), phi: Vec::new() };
+        surface.restrict();
+        surface
+    }
+
+    /// The level set, in surface cells.
+    pub fn level_set(&self) -> &LevelSet {
+        &self.set
+    }
+
+    /// The markers, in surface cells.
+    pub fn markers(&self) -> &Markers {
+        &self.markers
+    }
+
+    /// Surface cells along the side of a solver cell.
+    pub fn resolution(&self) -> u32 {
+        self.resolution as u32
+    }
+
+    /// The domain in solver cells.
+    fn solver_domain(&self) -> (Cell, Cell) {
+        let (low, high) = self.set.domain();
+        (low.map(|x| x / self.resolution), high.map(|x| x / self.resolution))
+    }
+
+    /// Makes φ of the solver's cells the mean of that of the surface cells in each.
+    fn restrict(&mut self) {
+        if self.resolution == 1 {
+            return;
+        }
+        let (fine, r) = (self.set.view(), self.resolution);
+        let (low, high) = self.solver_domain();
+        let rows = coarsened(fine.rows, r).clipped(low, high);
+        let share = 1.0 / (r * r * r * r) as f32;
+        self.phi = rows.tabulate(|[x, y, z]| {
+            let mut sum = 0.0;
+            for (y, z) in (0..r * r).map(|n| (r * y + n % r, r * z + n / r)) {
+                for x in r * x..r * x + r {
+                    sum += fine.rows.find([x, y, z]).map_or(fine.outside, |at| fine.phi[at]);
+                }
+            }
+            sum * share
+        });
+        self.rows = rows;
+    }
+}
+
+impl Surface for MarkedSurface {
+    fn view(&self) -> PhiView<'_> {
+        if self.resolution == 1 {
+            return self.set.view();
+        }
+        let (low, high) = self.solver_domain();
+        PhiView { rows: &self.rows, phi: &self.phi, outside: BAND / self.resolution as f32, low, high }
+    }
+
+    fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
+        let size = self.resolution as f32;
+        self.markers.step(&mut self.set, &Scaled { flow, size }, reach * size);
+        self.restrict();
+    }
+}
+
+/// A flow in surface cells.
+struct Scaled<'a> {
+    flow: &'a Moving<'a>,
+    size: f32,
+}
+
+impl Flow for Scaled<'_> {
+    fn reader(&self) -> impl FnMut(Vec3) -> Vec3 {
+        let (mut way, size) = (self.flow.reader(), self.size);
+        move |point| scale(way(scale(point, 1.0 / size)), size)
+    }
+}
+
+/// The cells `by` times smaller that fill those of `rows`.
+fn refined(rows: &CellRows, by: i32) -> CellRows {
+    let Some((low, high)) = rows.bounds() else { return CellRows::default() };
+    CellRows::from_ranges(
+        [by * low[1], by * low[2]],
+        [by * (high[1] - low[1]), by * (high[2] - low[2])],
+        |y, z, out| {
+            let spans = rows.row(y.div_euclid(by), z.div_euclid(by));
+            out.extend(spans.iter().map(|span| by * span.start..by * span.end));
+        },
+    )
+}
+
+/// The cells `by` times larger that hold one of `rows`.
+fn coarsened(rows: &CellRows, by: i32) -> CellRows {
+    let Some((low, high)) = rows.bounds() else { return CellRows::default() };
+    let first = [low[1], low[2]].map(|x| x.div_euclid(by));
+    let end = [high[1], high[2]].map(|x| (x - 1).div_euclid(by) + 1);
+    CellRows::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
+        for (y, z) in (0..by * by).map(|n| (by * y + n % by, by * z + n / by)) {
+            out.extend(rows.row(y, z).iter().map(|span| span.start.div_euclid(by)..(span.end - 1).div_euclid(by) + 1));
+        }
+    })
+}
