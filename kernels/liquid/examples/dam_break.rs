@@ -11,8 +11,8 @@ use liquid::velocity::Scheme;
 use numerics::vector::length;
 use plain::{PlainLevelSet, Still};
 
-const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], viscosity: &|_| 0.0, solid: None };
-const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], viscosity: &|_| 0.0, solid: None };
+const WEIGHTLESS: Surroundings<'_> = Surroundings::new(&|_| [0.0; 3], &|_| 0.0);
+const FALLING: Surroundings<'_> = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
 
 /// T = t·√(2g/a) and Z = front ÷ a of a column twice as high as its base a (Martin and Moyce 1952).
 const MEASURED: [(f64, f64); 7] =

@@ -36,6 +36,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::level_set::{Flow, LevelSet, PhiSampler, displacement};
+use crate::rows::Cell;
 use bins::Bins;
 
 /// A point of the surface.
@@ -67,6 +68,10 @@ const PER_CELL: usize = 3;
 const UPKEEP: u64 = 5;
 /// |φ| beyond which a marker is no longer on the surface.
 const LOST: f32 = 1.5;
+/// Change of φ at a marker from which on it is off the surface.
+const CHANGED: f32 = 0.05;
+/// Distance from a marker at which that counts, too.
+const BESIDE: f32 = 0.5;
 /// Markers that one thread moves at a time.
 const CHUNK: usize = 512;
 /// Beyond this much [`one_sided`], a point lies beyond the rim of the markers around it.
@@ -111,6 +116,31 @@ impl Markers {
                 marker.normal = unit(cross(a, b)).unwrap_or(marker.normal);
             }
         });
+    }
+
+    /// Changes a level set as [`LevelSet::change`] does, and makes it a distance again. Markers in the box that are then off
+    /// the surface are dropped.
+    pub fn change(&mut self, set: &mut LevelSet, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        let view = set.view();
+        let is_in = |at: Vec3| (0..3).all(|axis| low[axis] as f32 <= at[axis] && at[axis] <= high[axis] as f32);
+        // Beside the surface, too: a marker on the edge of what is added would look along the old surface.
+        let stays = |marker: &Marker, sampler: &mut PhiSampler<'_>| {
+            [-BESIDE, 0.0, BESIDE].into_iter().all(|way| {
+                let point = add(marker.point, scale(marker.normal, way));
+                let phi = sampler.at(point);
+                (change(point, phi) - phi).abs() < CHANGED
+            })
+        };
+        let on_surface: Vec<bool> = self
+            .markers
+            .par_iter()
+            .map_init(|| PhiSampler::new(view), |sampler, marker| !is_in(marker.point) || stays(marker, sampler))
+            .collect();
+        let order: Vec<u32> = (0..self.markers.len() as u32).filter(|n| on_surface[*n as usize]).collect();
+        self.reorder(&order);
+        set.change(low, high, change);
+        set.fill();
+        self.upkeep(set);
     }
 
     /// Drops markers that are not on the surface, thins them where they crowd, and fills holes. A step does so now and

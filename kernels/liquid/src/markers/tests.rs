@@ -254,3 +254,31 @@ fn bits_do_not_depend_on_threads() {
     assert!(one.0.ids.len() > 1000);
     assert!([2, 7].into_iter().all(|threads| run(threads) == one));
 }
+
+/// Markers of the old surface do not pull φ back to it, whether the new one lies a tenth of a cell outside it or far inside.
+#[test]
+fn shapes_that_are_added_and_taken_away_stay_so() {
+    let centre = [12.0; 3];
+    let mut set = made([24; 3], ball(centre, 7.0));
+    let mut markers = Markers::new(&set, 1, 7);
+    let still = |_: Vec3| [0.0; 3];
+    let mut radius = 7.0;
+    for next in [7.1, 7.6, 6.0] {
+        let shape = ball(centre, next);
+        markers.change(
+            &mut set,
+            [0; 3],
+            [24; 3],
+            |p, phi| {
+                if next > radius { phi.min(shape(p)) } else { phi.max(shape(p)) }
+            },
+        );
+        (0..3).for_each(|_| markers.step(&mut set, &still, 0.0));
+        let ratio = volume(&set) / f64::from(4.0 / 3.0 * PI * next * next * next);
+        assert!((ratio - 1.0).abs() < 0.01, "{radius} to {next}: {ratio}");
+        let off = |marker: &Marker| (length(sub(marker.point, centre)) - next).abs();
+        assert!(markers.markers.len() > 500 && markers.markers.iter().all(|marker| off(marker) < 0.1));
+        assert!(markers.ids.len() == markers.markers.len() && markers.attributes[0].len() == markers.markers.len());
+        radius = next;
+    }
+}

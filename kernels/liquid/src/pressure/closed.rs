@@ -46,6 +46,10 @@ impl Closed {
         Self(components)
     }
 
+    pub(super) fn components(&self) -> &[Vec<Range<usize>>] {
+        &self.0
+    }
+
     /// Subtracts its mean from each component of `field`; returns the largest mean, by magnitude.
     pub(super) fn subtract_means(&self, field: &mut [f64]) -> f64 {
         let mut largest = 0.0_f64;

@@ -15,6 +15,8 @@ mod level;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use crate::fields::{add_scaled, dot, largest, scale_and_add};
 use crate::rows::{Cell, CellRows, Finder};
 use crate::stencil::{Run, Stencil};
@@ -143,6 +145,11 @@ impl PressureSolver {
             solved.flow = largest(residual);
         }
         solved
+    }
+
+    /// The liquid cells of each component that meets no air, as ranges of a field.
+    pub(crate) fn closed_components(&self) -> &[Vec<Range<usize>>] {
+        self.closed.components()
     }
 
     /// The net inflow that no pressure can drive out, taken from `inflow`: its mean over each component that is closed

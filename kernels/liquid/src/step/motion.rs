@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Obstacle};
+use crate::step::sources::FlowAccount;
 use crate::step::{LiquidSettings, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
 
@@ -34,6 +35,10 @@ pub struct Motion {
     pub(super) gain: Option<Gain>,
     pub(super) guess: Guess,
     pub(super) liquid_cells: usize,
+    /// What each source has given, and what it owes.
+    pub(super) sources: Vec<FlowAccount>,
+    /// The same of sinks.
+    pub(super) sinks: Vec<FlowAccount>,
 }
 
 impl Motion {

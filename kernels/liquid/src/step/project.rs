@@ -5,7 +5,8 @@ use crate::pressure::{PressureGrid, PressureSolver, Stop};
 use crate::rows::CellRows;
 use crate::stencil::Stencil;
 use crate::step::domain::Obstacle;
-use crate::step::motion::{Guess, LiquidCells};
+use crate::step::motion::{Guess, LiquidCells, Motion};
+use crate::step::pour::{Pour, pour};
 use crate::step::{LiquidReport, LiquidSettings};
 use crate::velocity::FaceFields;
 use crate::viscosity::{StokesGrid, StokesSolver, StokesStop};
@@ -30,13 +31,36 @@ pub(super) struct Projection<'a> {
 }
 
 impl Projection<'_> {
+    /// Lets pressure act on a velocity, and viscosity where it counts: kinematic, in cell² a substep. `before`: the
+    /// velocity without gravity.
+    pub(super) fn apply(
+        &self,
+        viscosity: f64,
+        before: &FaceFields<f32>,
+        pours: &mut [Pour],
+        faces: &mut FaceFields<f32>,
+        motion: &mut Motion,
+    ) -> LiquidReport {
+        let is_coupled = self.settings.coupling.is_coupled(viscosity);
+        let report = match is_coupled {
+            true => {
+                let likely = motion.with_last_gain(self.cells, before, self.seconds);
+                self.by_pressure_and_viscosity(viscosity, &likely, pours, faces, &mut motion.guess)
+            }
+            false => self.by_pressure(pours, faces, &mut motion.guess),
+        };
+        pours.iter().for_each(|pour| pour.enter(motion));
+        LiquidReport { viscous_substeps: u32::from(is_coupled), ..report }
+    }
+
     /// Drives the divergence out of a velocity.
-    pub(super) fn by_pressure(&self, faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
+    fn by_pressure(&self, pours: &mut [Pour], faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
         let cells = self.cells;
         let [x, y, z] = &cells.open;
         let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z] };
         let solver = PressureSolver::new(&grid);
         let mut inflow = inflow(&solver, cells, faces);
+        let poured = pour(pours, &solver, self.settings.cell, &mut inflow);
         let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
         let stop =
             Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
@@ -47,16 +71,17 @@ impl Projection<'_> {
         LiquidReport {
             pressure_iterations: solved.iterations,
             solves_cut_short: u32::from(is_cut_short),
-            ..self.report(solved.flow, solved.unbalanced)
+            ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
 
     /// Drives the divergence out of a velocity and lets viscosity act, both at once. `viscosity`: kinematic, in cell² a
     /// substep. `likely`: a first guess of the result.
-    pub(super) fn by_pressure_and_viscosity(
+    fn by_pressure_and_viscosity(
         &self,
         viscosity: f64,
         likely: &FaceFields<f32>,
+        pours: &mut [Pour],
         faces: &mut FaceFields<f32>,
         guess: &mut Guess,
     ) -> LiquidReport {
@@ -98,7 +123,8 @@ impl Projection<'_> {
             iterations: self.settings.max_iterations,
         };
         let pushed = |solid: &FaceFields<f32>| driven(&solver, &rows, &open, solid);
-        let inflow = solid_velocity.as_ref().map_or_else(|| vec![0.0; solver.rows().len()], pushed);
+        let mut inflow = solid_velocity.as_ref().map_or_else(|| vec![0.0; solver.rows().len()], pushed);
+        let poured = pour(pours, solver.pressure(), self.settings.cell, &mut inflow);
         let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
         for axis in 0..3 {
             let solved = cells.rows.resampled(solver.rows(), &u[axis], 0.0);
@@ -111,7 +137,7 @@ impl Projection<'_> {
             coupled_iterations: solved.iterations,
             coupled_residual: if scale > 0.0 { solved.velocity / scale } else { 0.0 },
             solves_cut_short: u32::from(!is_done && solved.iterations >= stop.iterations),
-            ..self.report(solved.flow, solved.unbalanced)
+            ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
 
@@ -120,8 +146,9 @@ impl Projection<'_> {
         self.settings.tolerance * (FLOW_SHARE * scale).min(self.settings.cell / self.seconds)
     }
 
-    fn report(&self, flow: f64, unbalanced: f64) -> LiquidReport {
+    fn report(&self, flow: f64, unbalanced: [f64; 2]) -> LiquidReport {
         let per_cell = self.seconds / self.settings.cell;
+        let unbalanced = if unbalanced[1].abs() > unbalanced[0].abs() { unbalanced[1] } else { unbalanced[0] };
         LiquidReport { max_divergence: flow * per_cell, unbalanced: unbalanced * per_cell, ..LiquidReport::default() }
     }
 }

@@ -3,10 +3,12 @@
 use numerics::vector::{Vec3, scale};
 
 use crate::level_set::PhiView;
-use crate::rows::CellRows;
-use crate::step::domain::Solid;
+use crate::rows::{Cell, CellRows};
+use crate::step::domain::{Domain, Obstacle, Solid};
+use crate::step::exchange::Exchange;
 use crate::step::motion::{Gain, LiquidCells, Motion};
 use crate::step::project::Projection;
+use crate::step::sources::{LiquidSink, LiquidSource};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting, Wall};
 use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
@@ -20,6 +22,20 @@ pub struct Surroundings<'a> {
     pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
+    /// Where liquid comes in. Their order is that of their accounts: it stays from frame to frame.
+    pub sources: &'a [LiquidSource<'a>],
+    /// Where it is taken away; likewise.
+    pub sinks: &'a [LiquidSink<'a>],
+}
+
+impl<'a> Surroundings<'a> {
+    /// Gravity and viscosity at a time since the start of the frame, m/s² and Pa·s; nothing else.
+    pub const fn new(
+        gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
+        viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
+    ) -> Self {
+        Self { gravity, viscosity, solid: None, sources: &[], sinks: &[] }
+    }
 }
 
 /// The surface of a liquid.
@@ -29,6 +45,10 @@ pub trait Surface {
 
     /// Moves by a flow that moves nothing in the liquid farther than `reach` cells.
     fn advance(&mut self, flow: &Moving<'_>, reach: f32);
+
+    /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of a place in them and φ there, both in cells;
+    /// the result need be a distance only where it is next to 0.
+    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync);
 }
 
 /// The ways of points in a substep.
@@ -56,76 +76,83 @@ const STEEPEST: f32 = 0.25;
 /// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
 const BAND: i32 = 5;
 
-/// Moves on by `seconds`; `middle` is when gravity and viscosity are read.
+/// Moves on between two times since the start of the frame, s. Gravity and viscosity are read in the middle.
 pub(super) fn substep<S: Surface>(
     settings: &LiquidSettings,
     surface: &mut S,
     motion: &mut Motion,
     around: &Surroundings<'_>,
-    middle: f64,
-    seconds: f64,
+    times: [f64; 2],
 ) -> LiquidReport {
-    let domain = &settings.domain;
+    let (seconds, middle) = (times[1] - times[0], 0.5 * (times[0] + times[1]));
     // Where it is and how it moves at the middle of the substep is what pushes the liquid.
     let solid = around.solid.map(|solid| solid.at(middle));
     let step = (seconds / settings.cell) as f32;
     let reach = motion.largest_speed() as f32 * step;
-    let layers = BAND + reach.ceil().min(64.0) as i32;
-    let steepest = STEEPEST / step;
-    let rows = motion.rows_past_liquid(domain, layers);
-    let own = motion.velocity.faces();
-    let (velocity, carried) = match &motion.gain {
-        Some(gain) => {
-            let carried = turned::carried(motion, gain, seconds, step, steepest);
-            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, solid);
-            (velocity, Some(carried))
-        }
-        None => {
-            let [velocity] = motion.continued([own], &rows, steepest, domain, solid);
-            (velocity, None)
-        }
-    };
-    let velocity = MacVelocity::new(rows, velocity);
+    let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     surface.advance(&Moving { velocity: &velocity, step }, reach);
+    let mut exchanged = Exchange { settings, around, solid, times }.apply(surface, motion);
 
-    let cells = LiquidCells::of(domain, surface, solid);
-    let advection = Advection { velocity: &velocity, bounds: domain.bounds(), step, scheme: settings.scheme };
+    let cells = LiquidCells::of(&settings.domain, surface, solid);
+    let carried = exchanged.entered(motion, &velocity, carried);
+    let bounds = settings.domain.bounds();
+    let advection = Advection { velocity: &velocity, bounds, step, scheme: settings.scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
-    let before = faces.clone();
-    let gravity = (around.gravity)(middle);
-    for axis in 0..3 {
-        let gain = (gravity[axis] * seconds) as f32;
-        let moving = faces[axis].iter_mut().zip(&cells.moving).filter(|(_, mask)| **mask >> axis & 1 == 1);
-        moving.for_each(|(u, _)| *u += gain);
-    }
+    exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();
     drop((velocity, carried));
+    let mut before = faces.clone();
+    let gravity = (around.gravity)(middle).map(|g| g * seconds);
+    for axis in 0..3 {
+        let moving = faces[axis].iter_mut().zip(&cells.moving).filter(|(_, mask)| **mask >> axis & 1 == 1);
+        moving.for_each(|(u, _)| *u += gravity[axis] as f32);
+    }
+    exchanged.impose(&cells, [&mut faces, &mut before]);
 
-    let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs() * seconds));
-    let projection = Projection { settings, cells: &cells, solid, speed: motion.largest_speed(), pull, seconds };
+    let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+    let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
+    let projection = Projection { settings, cells: &cells, solid, speed, pull, seconds };
     let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
-    let mut report = match settings.coupling.is_coupled(viscosity) {
-        true => {
-            let likely = motion.with_last_gain(&cells, &before, seconds);
-            projection.by_pressure_and_viscosity(viscosity, &likely, &mut faces, &mut motion.guess)
-        }
-        false => projection.by_pressure(&mut faces, &mut motion.guess),
-    };
-    report.viscous_substeps = u32::from(settings.coupling.is_coupled(viscosity));
-    motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
-        let gained =
-            |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
-        Gain { faces: [gained(0), gained(1), gained(2)], seconds }
-    });
+    let mut report = projection.apply(viscosity, &before, &mut exchanged.pours, &mut faces, motion);
     report.substeps = 1;
     report.cfl_reached = f64::from(reach);
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.count;
     report.left_domain = outflow(settings, &cells, &faces) * seconds * settings.cell * settings.cell;
+    motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
+        let gained =
+            |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
+        Gain { faces: [gained(0), gained(1), gained(2)], seconds }
+    });
     motion.liquid_cells = cells.count;
     motion.known = cells.known;
     motion.velocity = MacVelocity::new(cells.rows, faces);
     report
+}
+
+/// The velocity, continued past the liquid, and what is carried in its place to keep spin. `step`: cells moved at 1 m/s, and
+/// by the fastest liquid.
+fn continued(
+    domain: &Domain,
+    motion: &Motion,
+    solid: Option<Obstacle<'_>>,
+    seconds: f64,
+    [step, reach]: [f32; 2],
+) -> (MacVelocity, Option<FaceFields<f32>>) {
+    let steepest = STEEPEST / step;
+    let rows = motion.rows_past_liquid(domain, BAND + reach.ceil().min(64.0) as i32);
+    let own = motion.velocity.faces();
+    match &motion.gain {
+        Some(gain) => {
+            let carried = turned::carried(motion, gain, seconds, step, steepest);
+            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, solid);
+            (MacVelocity::new(rows, velocity), Some(carried))
+        }
+        None => {
+            let [velocity] = motion.continued([own], &rows, steepest, domain, solid);
+            (MacVelocity::new(rows, velocity), None)
+        }
+    }
 }
 
 /// What flows out through open walls, m/s · faces.

@@ -134,6 +134,11 @@ impl StokesSolver {
         self.pressure.rows()
     }
 
+    /// What solves for the pressure.
+    pub(crate) fn pressure(&self) -> &PressureSolver {
+        &self.pressure
+    }
+
     /// The liquid cells among them.
     pub fn stencil(&self) -> &Stencil {
         self.pressure.stencil()

@@ -5,6 +5,7 @@ mod plain;
 mod pushed;
 mod rest;
 mod runs;
+mod sources;
 mod spin;
 mod viscous;
 
@@ -14,8 +15,8 @@ use crate::velocity::Site;
 use numerics::vector::Vec3;
 use plain::PlainLevelSet;
 
-const WEIGHTLESS: Surroundings<'_> = Surroundings { gravity: &|_| [0.0; 3], viscosity: &|_| 0.0, solid: None };
-const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], viscosity: &|_| 0.0, solid: None };
+const WEIGHTLESS: Surroundings<'_> = Surroundings::new(&|_| [0.0; 3], &|_| 0.0);
+const FALLING: Surroundings<'_> = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
 
 /// The distance from a box.
 fn block(low: Vec3, high: Vec3) -> impl Fn(Vec3) -> f32 {

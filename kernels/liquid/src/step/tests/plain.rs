@@ -1,7 +1,7 @@
 //! A level set carried to first order and made a distance again, and a surface that stays: enough to test what moves them.
 
 use liquid::level_set::PhiView;
-use liquid::rows::CellRows;
+use liquid::rows::{Cell, CellRows, Finder};
 use liquid::stencil::{Run, Stencil};
 use liquid::step::{Domain, Moving, Surface};
 use liquid::velocity::{Sampler, Site};
@@ -49,6 +49,22 @@ impl Surface for PlainLevelSet {
         self.phi = distances(&rows, &phi);
         self.rows = rows;
     }
+
+    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        let domain = self.domain;
+        let part = CellRows::cuboid(low, high).clipped(domain.low, domain.high);
+        let rows = self.rows.union(&part);
+        let old = rows.resampled(&self.rows, &self.phi, BAND);
+        let [phi] = rows.tabulate_with(
+            || Finder::new(&part),
+            |part, cell, at| {
+                let is_in = part.find(cell).is_some();
+                [if is_in { change(Site::Centre.of(cell), old[at]) } else { old[at] }]
+            },
+        );
+        self.phi = distances(&rows, &phi);
+        self.rows = rows;
+    }
 }
 
 /// A surface that stays where it is.
@@ -68,6 +84,10 @@ impl Surface for Still {
     }
 
     fn advance(&mut self, _: &Moving<'_>, _: f32) {}
+
+    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        self.0.change(low, high, change);
+    }
 }
 
 /// |∇φ| = 1, with φ kept next to the surface, at most 1 there.

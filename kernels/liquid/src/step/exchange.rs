@@ -1,0 +1,236 @@
+//! What sources and sinks do in a substep.
+//!
+//! After the surface moved, sources fill what is missing of their shapes as far as their rates allow, and sinks without a
+//! rate empty theirs. What a rate asks for beyond that becomes divergence of the liquid cells in the shape, which moves the
+//! surface in the next substep. The volumes are those that the level set shows before and after.
+
+use numerics::vector::{Vec3, largest};
+
+use crate::rows::{Cell, CellRows};
+use crate::step::domain::Obstacle;
+use crate::step::motion::{LiquidCells, Motion};
+use crate::step::pour::{Holder, Pour};
+use crate::step::shape_cells::ShapeCells;
+use crate::step::sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape, volume_between};
+use crate::step::{LiquidSettings, Surface, Surroundings};
+use crate::velocity::{FaceFields, MacVelocity, Site};
+
+/// Share of its liquid cells that a sink takes in a substep, at most.
+const TAKEN: f64 = 0.5;
+
+/// Cells from a shape within which the faces of liquid that it adds lie.
+const FACES: f32 = 0.5;
+
+/// A substep to sources and sinks.
+pub(super) struct Exchange<'a> {
+    pub settings: &'a LiquidSettings,
+    pub around: &'a Surroundings<'a>,
+    pub solid: Option<Obstacle<'a>>,
+    /// When the substep begins and ends.
+    pub times: [f64; 2],
+}
+
+/// What sources and sinks want of the rest of a substep.
+pub(super) struct Exchanged<'a> {
+    /// Liquid to come out of cells and to vanish in them.
+    pub pours: Vec<Pour>,
+    entering: Vec<Entering<'a>>,
+}
+
+/// A source whose shape was filled, or whose velocity is imposed.
+struct Entering<'a> {
+    cells: ShapeCells<'a>,
+    is_filled: bool,
+    /// m/s.
+    velocity: Option<Vec3>,
+}
+
+impl<'a> Exchange<'a> {
+    /// Changes the surface, and counts what that and what poured have moved.
+    pub(super) fn apply<S: Surface>(&self, surface: &mut S, motion: &mut Motion) -> Exchanged<'a> {
+        let mut exchanged = Exchanged { pours: Vec::new(), entering: Vec::new() };
+        for (n, source) in self.around.sources.iter().enumerate() {
+            self.give(n, source, surface, &mut motion.sources[n], &mut exchanged);
+        }
+        for (n, sink) in self.around.sinks.iter().enumerate() {
+            exchanged.pours.extend(self.take(n, sink, surface, &mut motion.sinks[n]));
+        }
+        exchanged
+    }
+
+    fn give<S: Surface>(
+        &self,
+        n: usize,
+        source: &LiquidSource<'a>,
+        surface: &mut S,
+        account: &mut FlowAccount,
+        out: &mut Exchanged<'a>,
+    ) {
+        let before = account.settle(self.seconds());
+        let gave = self.asked(source.rate, account);
+        let is_active = self.is_active(source.active);
+        if !is_active && account.owed <= 0.0 {
+            return;
+        }
+        let Some(cells) = self.cells(source.shape) else { return account.withhold_beyond(0.0) };
+        let mut phi = cells.level_set(&surface.view());
+        let shrink = match source.rate {
+            None => Some(0.0),
+            Some(_) if account.owed > 0.0 => cells.shrunk_to(&phi, account.owed / self.cell_volume()),
+            Some(_) => None,
+        };
+        let mut filled = 0.0;
+        if let Some(shrink) = shrink.filter(|shrink| cells.adds(&phi, *shrink)) {
+            let [low, high] = cells.bounds();
+            let held = cells.volume(&phi);
+            surface.change(low, high, cells.filled(shrink));
+            phi = cells.level_set(&surface.view());
+            filled = (cells.volume(&phi) - held) * self.cell_volume();
+            account.moved += filled;
+            account.owed -= if source.rate.is_some() { filled } else { 0.0 };
+        }
+        let liquid = cells.liquid_cells(&phi);
+        account.place = liquid.first().map_or(account.place, |deepest| Site::Centre.of(*deepest));
+        if source.rate.is_some() && shrink == Some(0.0) {
+            let rate = account.rate_to_pour(gave, filled, before, self.seconds());
+            match liquid.is_empty() {
+                true => account.withhold_beyond(0.0),
+                false if rate > 0.0 => out.pours.push(Pour::new(Holder::Source(n), liquid, rate)),
+                false => {}
+            }
+        }
+        let velocity = source.velocity.filter(|_| is_active).map(|velocity| velocity(self.times[1]));
+        out.entering.push(Entering { cells, is_filled: filled > 0.0, velocity });
+    }
+
+    fn take<S: Surface>(
+        &self,
+        n: usize,
+        sink: &LiquidSink<'a>,
+        surface: &mut S,
+        account: &mut FlowAccount,
+    ) -> Option<Pour> {
+        let owed = account.owed;
+        let before = account.settle(self.seconds());
+        let gave = self.asked(sink.rate, account);
+        let empties = sink.rate.is_none() && self.is_active(sink.active);
+        if !empties && account.owed <= 0.0 {
+            return None;
+        }
+        let Some(cells) = self.cells(sink.shape) else {
+            account.withhold_beyond(0.0);
+            return None;
+        };
+        let phi = cells.level_set(&surface.view());
+        let liquid = cells.liquid_cells(&phi);
+        account.place = liquid.first().map_or(account.place, |deepest| Site::Centre.of(*deepest));
+        if empties {
+            if cells.takes(&phi) {
+                let [low, high] = cells.bounds();
+                surface.change(low, high, cells.emptied());
+                let left = cells.volume(&cells.level_set(&surface.view()));
+                account.moved += (cells.volume(&phi) - left) * self.cell_volume();
+            }
+            return None;
+        }
+        let most = TAKEN * liquid.len() as f64 * self.cell_volume();
+        account.withhold_beyond(if liquid.is_empty() { 0.0 } else { most.max(gave).max(owed) });
+        let rate = account.rate_to_pour(gave, 0.0, before, self.seconds()).min(most / self.seconds());
+        (rate > 0.0).then(|| Pour::new(Holder::Sink(n), liquid, -rate))
+    }
+
+    /// Adds what a rate asks for to its account; returns it, m³.
+    fn asked(&self, rate: Option<&(dyn Fn(f64, f64) -> f64 + Sync)>, account: &mut FlowAccount) -> f64 {
+        let [from, to] = self.times;
+        let gave = rate.map_or(0.0, |rate| volume_between(rate, from, to));
+        account.owed = if rate.is_some() { account.owed + gave } else { 0.0 };
+        gave
+    }
+
+    fn is_active(&self, active: &(dyn Fn(f64) -> bool + Sync)) -> bool {
+        active(0.5 * (self.times[0] + self.times[1]))
+    }
+
+    fn cells(&self, shape: SourceShape<'a>) -> Option<ShapeCells<'a>> {
+        ShapeCells::new(shape, &self.settings.domain, self.solid, self.times[1])
+    }
+
+    fn seconds(&self) -> f64 {
+        self.times[1] - self.times[0]
+    }
+
+    fn cell_volume(&self) -> f64 {
+        self.settings.cell * self.settings.cell * self.settings.cell
+    }
+}
+
+impl Exchanged<'_> {
+    /// The speed of the liquid that comes in or vanishes, m/s; `cell`: the side of a cell, m.
+    pub(super) fn speed(&self, cell: f64) -> f64 {
+        let pours = self.pours.iter().map(|pour| pour.speed(cell));
+        let imposed = self.entering.iter().filter_map(|entering| entering.velocity.map(|v| f64::from(largest(v))));
+        pours.chain(imposed).fold(0.0, f64::max)
+    }
+
+    /// What the velocity carries, `carried` or itself, where liquid comes into air: there it is that of the liquid, not what
+    /// the flow beside it was continued to.
+    pub(super) fn entered(
+        &self,
+        motion: &Motion,
+        velocity: &MacVelocity,
+        carried: Option<FaceFields<f32>>,
+    ) -> Option<FaceFields<f32>> {
+        if self.entering.iter().all(|entering| !entering.is_filled) {
+            return carried;
+        }
+        let mut carried = carried.unwrap_or_else(|| velocity.faces().clone());
+        for entering in self.entering.iter().filter(|entering| entering.is_filled) {
+            entering.for_each_face(FACES, |axis, cell, value| {
+                let is_known = motion.rows().find(cell).is_some_and(|at| motion.known[at] >> axis & 1 == 1);
+                if let Some(at) = velocity.rows().find(cell).filter(|_| !is_known) {
+                    carried[axis][at] = value;
+                }
+            });
+        }
+        Some(carried)
+    }
+
+    /// The same on faces far from the flow, which was known on `rows`.
+    pub(super) fn enter_far(&self, rows: &CellRows, cells: &LiquidCells, faces: &mut FaceFields<f32>) {
+        for entering in self.entering.iter().filter(|entering| entering.is_filled) {
+            entering.for_each_face(f32::INFINITY, |axis, cell, velocity| {
+                if let Some(at) = cells.rows.find(cell).filter(|at| cells.moving[*at] >> axis & 1 == 1)
+                    && rows.find(cell).is_none()
+                {
+                    faces[axis][at] = velocity;
+                }
+            });
+        }
+    }
+
+    /// Sets faces inside the shapes whose velocity is imposed.
+    pub(super) fn impose(&self, cells: &LiquidCells, fields: [&mut FaceFields<f32>; 2]) {
+        let [faces, before] = fields;
+        for entering in self.entering.iter().filter(|entering| entering.velocity.is_some()) {
+            entering.for_each_face(0.0, |axis, cell, velocity| {
+                if let Some(at) = cells.rows.find(cell).filter(|at| cells.moving[*at] >> axis & 1 == 1) {
+                    (faces[axis][at], before[axis][at]) = (velocity, velocity);
+                }
+            });
+        }
+    }
+}
+
+impl Entering<'_> {
+    /// Calls `f` with each low face less than `near` cells from the shape and the velocity there.
+    fn for_each_face(&self, near: f32, mut f: impl FnMut(usize, Cell, f32)) {
+        let velocity = self.velocity.unwrap_or_default();
+        for cell in self.cells.rows().iter() {
+            for axis in 0..3 {
+                if near == f32::INFINITY || self.cells.distance(Site::FACES[axis].of(cell)) < near {
+                    f(axis, cell, velocity[axis]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The cells that a source or sink reaches, and how much liquid they hold.
+
+use numerics::vector::Vec3;
+
+use crate::level_set::PhiView;
+use crate::pressure::LEAST_DEPTH;
+use crate::rows::{Cell, CellRows};
+use crate::step::domain::{Domain, Obstacle};
+use crate::step::sources::SourceShape;
+use crate::velocity::Site;
+
+/// Cells around the bounds of a shape whose φ adding it may change.
+const MARGIN: i32 = 2;
+
+/// Half the diagonal of a cell: a shape farther from its middle does not touch it.
+const HALF_DIAGONAL: f32 = 0.87;
+
+/// Depth to which a shape inside a solid is filled, in cells: φ on the solid's surface must not see the end.
+const INTO_SOLID: f32 = 2.0;
+
+/// Depth of the piece of a shape that is filled whole or not at all, in cells: a surface loses smaller ones.
+const LEAST_FILL: f32 = 1.0;
+
+/// Changes of volume that count, in cells.
+const LEAST_VOLUME: f64 = 1e-5;
+
+/// The shape of a source or sink at one time, on the cells around it.
+pub(super) struct ShapeCells<'a> {
+    shape: SourceShape<'a>,
+    solid: Option<Obstacle<'a>>,
+    time: f64,
+    /// What is added to a shape that is too thin for the grid, so that its deepest cell is half a cell deep.
+    thickening: f32,
+    domain: Domain,
+    rows: CellRows,
+    low: Cell,
+    size: [usize; 3],
+    /// The distance of each cell's middle.
+    distance: Vec<f32>,
+    /// Where filling it goes: the same, with its end inside solids.
+    reached: Vec<f32>,
+    /// The share of each cell that is neither solid nor beyond a wall.
+    open: Vec<f32>,
+}
+
+impl<'a> ShapeCells<'a> {
+    /// None where the shape is not in the domain.
+    pub(super) fn new(shape: SourceShape<'a>, domain: &Domain, solid: Option<Obstacle<'a>>, time: f64) -> Option<Self> {
+        let [low, high] = shape.bounds;
+        let low: Cell = std::array::from_fn(|n| low[n].saturating_sub(MARGIN).max(domain.low[n] - 1));
+        let high: Cell = std::array::from_fn(|n| high[n].saturating_add(MARGIN).min(domain.high[n] + 1));
+        if (0..3).any(|axis| low[axis] >= high[axis]) {
+            return None;
+        }
+        let size = [0, 1, 2].map(|axis| (high[axis] - low[axis]) as usize);
+        let rows = CellRows::cuboid(low, high);
+        let [mut distance, depth, open] = rows.tabulate_each(|cell| {
+            let middle = Site::Centre.of(cell);
+            let depth = solid.map_or(f32::MIN, |solid| -solid.distance(middle));
+            let open = if domain.contains(cell) { (0.5 - depth).clamp(0.0, 1.0) } else { 0.0 };
+            [distance_from(shape, time, middle), depth, open]
+        });
+        let closest = distance.iter().fold(f32::INFINITY, |least, d| if *d < least { *d } else { least });
+        if closest > HALF_DIAGONAL {
+            return None;
+        }
+        let thickening = (closest + 0.5).max(0.0);
+        distance.iter_mut().for_each(|d| *d -= thickening);
+        let reached = distance.iter().zip(&depth).map(|(d, depth)| d.max(depth - INTO_SOLID)).collect();
+        Some(Self { shape, solid, time, thickening, domain: *domain, rows, low, size, distance, reached, open })
+    }
+
+    /// The cells around the shape.
+    pub(super) fn rows(&self) -> &CellRows {
+        &self.rows
+    }
+
+    /// The distance of a place from the shape.
+    pub(super) fn distance(&self, point: Vec3) -> f32 {
+        distance_from(self.shape, self.time, point) - self.thickening
+    }
+
+    /// The box of cells that changing φ by the shape changes.
+    pub(super) fn bounds(&self) -> [Cell; 2] {
+        let high = [0, 1, 2].map(|axis| self.low[axis] + self.size[axis] as i32);
+        [self.low, high]
+    }
+
+    /// φ with the shape, smaller by `shrink` cells on all sides, added.
+    pub(super) fn filled(&self, shrink: f32) -> impl Fn(Vec3, f32) -> f32 + Sync {
+        move |point, phi| {
+            let distance = self.distance(point) + shrink;
+            let reached = match self.solid {
+                Some(solid) if distance < phi => distance.max(-solid.distance(point) - INTO_SOLID + shrink),
+                _ => distance,
+            };
+            phi.min(reached)
+        }
+    }
+
+    /// φ with the shape taken away.
+    pub(super) fn emptied(&self) -> impl Fn(Vec3, f32) -> f32 + Sync {
+        move |point, phi| phi.max(-self.distance(point))
+    }
+
+    /// φ of the cells; beyond walls that next to them.
+    pub(super) fn level_set(&self, view: &PhiView<'_>) -> Vec<f32> {
+        self.rows.tabulate(|cell| {
+            let inner = [0, 1, 2].map(|axis| cell[axis].clamp(self.domain.low[axis], self.domain.high[axis] - 1));
+            view.rows.find(inner).map_or(view.outside, |at| view.phi[at])
+        })
+    }
+
+    /// How much liquid the cells hold, ÷ cell³.
+    pub(super) fn volume(&self, phi: &[f32]) -> f64 {
+        let [nx, ny, nz] = self.size;
+        let mut sum = 0.0;
+        for z in 0..nz {
+            for y in 0..ny {
+                let row = (z * ny + y) * nx;
+                let beside = [
+                    (z * ny + y.saturating_sub(1)) * nx,
+                    (z * ny + (y + 1).min(ny - 1)) * nx,
+                    (z.saturating_sub(1) * ny + y) * nx,
+                    ((z + 1).min(nz - 1) * ny + y) * nx,
+                ];
+                for x in 0..nx {
+                    let around = beside.iter().fold(0.0, |sum, row| sum + phi[row + x])
+                        + (phi[row + x.saturating_sub(1)] + phi[row + (x + 1).min(nx - 1)]);
+                    // The mean of φ over the cell: exact where φ bends as a sphere's does.
+                    let mean = 0.75 * phi[row + x] + (1.0 / 24.0) * around;
+                    sum += f64::from((0.5 - mean).clamp(0.0, 1.0) * self.open[row + x]);
+                }
+            }
+        }
+        sum
+    }
+
+    /// How far the shape must shrink so that filling it adds `most`, ÷ cell³; 0 where all of it adds no more. None where
+    /// not even the least piece of it can be filled.
+    pub(super) fn shrunk_to(&self, phi: &[f32], most: f64) -> Option<f32> {
+        let before = self.volume(phi);
+        let mut filled = vec![0.0; phi.len()];
+        let mut added = |shrink: f32| {
+            for ((filled, phi), reached) in filled.iter_mut().zip(phi).zip(&self.reached) {
+                *filled = phi.min(reached + shrink);
+            }
+            self.volume(&filled) - before
+        };
+        if added(0.0) <= most.max(LEAST_VOLUME) {
+            return Some(0.0);
+        }
+        let open = self.distance.iter().zip(&self.open).filter(|(_, open)| **open > 0.0);
+        let deepest = open.fold(f32::INFINITY, |least, (d, _)| if *d < least { *d } else { least });
+        let (mut too_much, mut enough) = (0.0, (-deepest - LEAST_FILL).max(0.0));
+        if added(enough) > most {
+            return None;
+        }
+        for _ in 0..16 {
+            let middle = 0.5 * (too_much + enough);
+            if added(middle) > most { too_much = middle } else { enough = middle }
+        }
+        Some(enough)
+    }
+
+    /// Whether filling the shape, shrunk, adds liquid.
+    pub(super) fn adds(&self, phi: &[f32], shrink: f32) -> bool {
+        let filled: Vec<f32> = phi.iter().zip(&self.reached).map(|(phi, reached)| phi.min(reached + shrink)).collect();
+        self.volume(&filled) - self.volume(phi) > LEAST_VOLUME
+    }
+
+    /// Whether there is liquid in the shape that emptying it takes.
+    pub(super) fn takes(&self, phi: &[f32]) -> bool {
+        let emptied: Vec<f32> = phi.iter().zip(&self.distance).map(|(phi, distance)| phi.max(-distance)).collect();
+        self.volume(phi) - self.volume(&emptied) > LEAST_VOLUME
+    }
+
+    /// The liquid cells whose middle is in the shape, the deepest first.
+    pub(super) fn liquid_cells(&self, phi: &[f32]) -> Vec<Cell> {
+        let is_liquid = |at: usize| phi[at] < -LEAST_DEPTH && self.open[at] > 0.0 && self.distance[at] < 0.0;
+        let mut cells: Vec<Cell> =
+            self.rows.iter().enumerate().filter(|(at, _)| is_liquid(*at)).map(|(_, cell)| cell).collect();
+        if let Some(deepest) = self.deepest(&cells) {
+            cells.swap(0, deepest);
+        }
+        cells
+    }
+
+    fn deepest(&self, cells: &[Cell]) -> Option<usize> {
+        let depth = |cell: Cell| self.rows.find(cell).map_or(0.0, |at| self.distance[at]);
+        let mut best: Option<(usize, f32)> = None;
+        for (n, cell) in cells.iter().enumerate() {
+            let distance = depth(*cell);
+            if best.is_none_or(|(_, least)| distance < least) {
+                best = Some((n, distance));
+            }
+        }
+        best.map(|(n, _)| n)
+    }
+}
+
+/// The distance of a place from a shape; far where it is not a number.
+fn distance_from(shape: SourceShape<'_>, time: f64, point: Vec3) -> f32 {
+    let distance = (shape.distance)(time, point);
+    if distance.is_nan() { f32::MAX } else { distance }
+}

@@ -1,0 +1,114 @@
+//! Where liquid comes in and where it is taken away.
+
+use numerics::vector::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::rows::Cell;
+
+/// The shape of a source or a sink; it may move.
+#[derive(Clone, Copy)]
+pub struct SourceShape<'a> {
+    /// The distance from it, in cells, at a time since the start of the frame, s, and a place in cells; negative inside.
+    pub distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync),
+    /// The cells `low` ≤ cell < `high` that it does not leave in the frame.
+    pub bounds: [Cell; 2],
+}
+
+/// Where liquid comes in. Times are since the start of the frame, s.
+#[derive(Clone, Copy)]
+pub struct LiquidSource<'a> {
+    /// Where.
+    pub shape: SourceShape<'a>,
+    /// The volume that it gives between two times, m³. None: it keeps its shape full.
+    pub rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>,
+    /// The velocity of the liquid inside the shape, m/s. None: liquid comes in at rest and moves freely.
+    pub velocity: Option<&'a (dyn Fn(f64) -> Vec3 + Sync)>,
+    /// Whether it keeps its shape full and imposes its velocity. What `rate` gives comes all the same.
+    pub active: &'a (dyn Fn(f64) -> bool + Sync),
+}
+
+/// Where liquid is taken away. Times are since the start of the frame, s.
+#[derive(Clone, Copy)]
+pub struct LiquidSink<'a> {
+    /// Where.
+    pub shape: SourceShape<'a>,
+    /// The volume that it takes between two times as long as there is liquid in its shape, m³. None: it takes all that
+    /// enters.
+    pub rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>,
+    /// Whether it takes all that enters. What `rate` takes goes all the same.
+    pub active: &'a (dyn Fn(f64) -> bool + Sync),
+}
+
+impl<'a> LiquidSource<'a> {
+    /// A source that gives this volume between two times, m³, or keeps its shape full.
+    pub fn new(shape: SourceShape<'a>, rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>) -> Self {
+        Self { shape, rate, velocity: None, active: &|_| true }
+    }
+}
+
+impl<'a> LiquidSink<'a> {
+    /// A sink that takes this volume between two times, m³, or all that enters.
+    pub fn new(shape: SourceShape<'a>, rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>) -> Self {
+        Self { shape, rate, active: &|_| true }
+    }
+}
+
+/// What a source has given, or a sink has taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FlowAccount {
+    /// In the last frame, m³.
+    pub moved: f64,
+    /// What its rate asked for in the last frame and could not pass, m³: there was no liquid to give way or to take, or no
+    /// room. It is not made good later.
+    pub withheld: f64,
+    /// A place in its liquid, in cells: the deepest of its shape.
+    pub place: Vec3,
+    /// What its rate asked for and has not passed yet, m³.
+    pub(super) owed: f64,
+    /// What passes as divergence of its liquid, m³/s.
+    pub(super) pouring: f64,
+}
+
+/// Share of the rate by which more or less pours while too much or too little is owed: what a short substep gives must not
+/// be made good within it, since faster liquid makes substeps shorter still.
+const CORRECTION: f64 = 0.25;
+
+impl FlowAccount {
+    pub(super) fn start_frame(accounts: &mut Vec<Self>, count: usize) {
+        accounts.resize(count, Self::default());
+        accounts.iter_mut().for_each(|account| (account.moved, account.withheld) = (0.0, 0.0));
+    }
+
+    /// Counts what poured in a substep; returns the rate that it poured at, m³/s.
+    pub(super) fn settle(&mut self, seconds: f64) -> f64 {
+        let poured = self.pouring * seconds;
+        self.owed -= poured;
+        self.moved += poured;
+        std::mem::take(&mut self.pouring)
+    }
+
+    /// The rate to pour at, m³/s, after a substep whose rate `gave` so much, of which `filled` has passed, m³. Pouring acts
+    /// in the next substep, so what one substep gives is always owed.
+    pub(super) fn rate_to_pour(&self, gave: f64, filled: f64, before: f64, seconds: f64) -> f64 {
+        if gave <= 0.0 {
+            return (self.owed / seconds).clamp(0.0, before.max(0.0));
+        }
+        let rest = gave - filled;
+        let wanted = rest + CORRECTION * (self.owed - rest);
+        wanted.clamp(0.0, (1.0 + CORRECTION) * gave) / seconds
+    }
+
+    /// Gives up what is owed beyond `most`, m³.
+    pub(super) fn withhold_beyond(&mut self, most: f64) {
+        if self.owed > most {
+            self.withheld += self.owed - most;
+            self.owed = most;
+        }
+    }
+}
+
+/// What a rate asks for between two times, m³; nothing where it is negative or not a number.
+pub(super) fn volume_between(rate: &(dyn Fn(f64, f64) -> f64 + Sync), from: f64, to: f64) -> f64 {
+    let volume = rate(from, to);
+    if volume.is_finite() { volume.max(0.0) } else { 0.0 }
+}

@@ -1,0 +1,332 @@
+use rayon::ThreadPoolBuilder;
+
+use super::*;
+use crate::extract::{Placement, extract};
+use crate::level_set::{Flow, LevelSet};
+use crate::markers::Markers;
+use crate::rows::{Cell, CellRows};
+use numerics::vector::{length, sub};
+
+const FRAME: f64 = 1.0 / 24.0;
+
+/// A level set with markers: it keeps its volume.
+#[derive(Clone, Debug)]
+struct Marked {
+    set: LevelSet,
+    markers: Markers,
+}
+
+impl Marked {
+    fn new(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        let rows = CellRows::cuboid(domain.low, domain.high);
+        let phi = rows.tabulate(|cell| distance(Site::Centre.of(cell)));
+        let set = LevelSet::new(&rows, &phi, domain.low, domain.high);
+        Self { markers: Markers::new(&set, 0, 1), set }
+    }
+
+    /// m³ in cells of this side.
+    fn volume(&self, cell: f64) -> f64 {
+        extract(self.view(), Placement::Projected).volume() * cell * cell * cell
+    }
+}
+
+struct Way<'a>(&'a Moving<'a>);
+
+impl Flow for Way<'_> {
+    fn reader(&self) -> impl FnMut(Vec3) -> Vec3 {
+        self.0.reader()
+    }
+}
+
+impl Surface for Marked {
+    fn view(&self) -> PhiView<'_> {
+        self.set.view()
+    }
+
+    fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
+        self.markers.step(&mut self.set, &Way(flow), reach);
+    }
+
+    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        self.markers.change(&mut self.set, low, high, change);
+    }
+}
+
+fn ball(centre: Vec3, radius: f32) -> impl Fn(f64, Vec3) -> f32 + Sync {
+    move |_, p| length(sub(p, centre)) - radius
+}
+
+const EVERYWHERE: [Cell; 2] = [[-99; 3], [99; 3]];
+
+fn shape<'a>(distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync)) -> SourceShape<'a> {
+    SourceShape { distance, bounds: EVERYWHERE }
+}
+
+/// A pool in a box of 16³ cells of 1/16 m.
+fn pool(depth: f32) -> Liquid<Marked> {
+    let domain = Domain::closed([0; 3], [16; 3]);
+    Liquid::new(LiquidSettings::new(domain, 0.0625), Marked::new(domain, |p| p[1] - depth))
+}
+
+/// The volume after each of these frames, m³.
+fn volumes(liquid: &mut Liquid<Marked>, around: &Surroundings<'_>, frames: usize) -> Vec<f64> {
+    let cell = liquid.settings.cell;
+    (0..frames)
+        .map(|_| {
+            let report = liquid.step_frame(around, FRAME);
+            assert_eq!((report.caps_hit, report.solves_cut_short), (0, 0), "{report:?}");
+            assert!(report.max_divergence < 1e-4, "{report:?}");
+            liquid.surface().volume(cell)
+        })
+        .collect()
+}
+
+/// Volume gained a second from frame `first` on.
+fn gained(volumes: &[f64], first: usize) -> f64 {
+    (volumes[volumes.len() - 1] - volumes[first]) / (FRAME * (volumes.len() - 1 - first) as f64)
+}
+
+/// First it fills its shape, then its liquid grows. In a frame, of 40 cells' volume, the one turns into the other.
+#[test]
+fn a_source_in_the_open_gives_its_rate() {
+    for (middle, share) in [(20.0, 1.0), (0.0, 0.5)] {
+        let domain = Domain::closed([0; 3], [40, 40, 2]);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), Marked::new(domain, |_| 5.0));
+        let distance = move |_: f64, p: Vec3| length([p[0] - middle, p[1] - 20.0, 0.0]) - 8.0;
+        let given = 40.0 * share * 24.0;
+        let rate = move |from: f64, to: f64| given * (to - from);
+        let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
+        let around = Surroundings { sources: &sources, ..WEIGHTLESS };
+        let volumes = volumes(&mut liquid, &around, 24);
+        for part in [&volumes[2..10], &volumes[12..]] {
+            let gained = gained(part, 0);
+            assert!((gained / given - 1.0).abs() < 0.01, "{middle} {gained}: {volumes:?}");
+        }
+        let behind = given - volumes[23];
+        assert!(behind > 0.0 && behind < 1.1 * given * FRAME, "{middle} {behind}");
+    }
+}
+
+#[test]
+fn a_source_in_a_full_pool_gives_its_rate() {
+    for centre in [[8.0, 4.0, 8.0], [0.0, 4.0, 8.0]] {
+        let mut liquid = pool(7.3);
+        let distance = ball(centre, 2.6);
+        let rate = |from: f64, to: f64| 0.2 * (to - from);
+        let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
+        let around = Surroundings { sources: &sources, ..FALLING };
+        let volumes = volumes(&mut liquid, &around, 24);
+        let gained = gained(&volumes, 2);
+        assert!((gained / 0.2 - 1.0).abs() < 0.01, "{centre:?} {gained}: {volumes:?}");
+        let account = liquid.sources()[0];
+        assert!((account.moved / (0.2 * FRAME) - 1.0).abs() < 0.01 && account.withheld == 0.0, "{account:?}");
+        assert!(length(sub(account.place, centre)) < 1.3, "{account:?}");
+    }
+}
+
+#[test]
+fn a_source_half_in_a_solid_gives_its_rate() {
+    let solid = |_: f64, p: Vec3| p[0] - 6.4;
+    let mut liquid = pool(7.3);
+    let distance = ball([6.4, 4.0, 8.0], 2.6);
+    let rate = |from: f64, to: f64| 0.1 * (to - from);
+    let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
+    let around = Surroundings { sources: &sources, solid: Some(Solid::still(&solid)), ..FALLING };
+    let outside = |liquid: &Liquid<Marked>| {
+        let view = liquid.surface().view();
+        let share = |(at, cell): (usize, Cell)| {
+            let open = f64::from(Site::Centre.of(cell)[0] - 6.4 + 0.5).clamp(0.0, 1.0);
+            let is_in = liquid.settings.domain.contains(cell);
+            if is_in { open * f64::from((0.5 - view.phi[at]).clamp(0.0, 1.0)) } else { 0.0 }
+        };
+        view.rows.iter().enumerate().map(share).sum::<f64>() / 4096.0
+    };
+    let mut volumes = Vec::new();
+    for _ in 0..24 {
+        liquid.step_frame(&around, FRAME);
+        volumes.push(outside(&liquid));
+    }
+    let gained = gained(&volumes, 2);
+    assert!((gained / 0.1 - 1.0).abs() < 0.01, "{gained}: {volumes:?}");
+}
+
+#[test]
+fn a_sink_in_a_pool_takes_its_rate() {
+    let mut liquid = pool(12.3);
+    let distance = ball([8.0, 3.0, 8.0], 2.6);
+    let rate = |from: f64, to: f64| 0.2 * (to - from);
+    let sinks = [LiquidSink::new(shape(&distance), Some(&rate))];
+    let around = Surroundings { sinks: &sinks, ..FALLING };
+    let volumes = volumes(&mut liquid, &around, 24);
+    let gained = gained(&volumes, 2);
+    assert!((gained / -0.2 - 1.0).abs() < 0.01, "{gained}: {volumes:?}");
+}
+
+#[test]
+fn a_rate_is_integrated() {
+    let mut liquid = pool(7.3);
+    let distance = ball([8.0, 4.0, 8.0], 2.6);
+    // 0.4·t m³/s over a second.
+    let mut sum = 0.0;
+    let start = liquid.surface().volume(0.0625);
+    for frame in 0..24 {
+        let now = f64::from(frame) * FRAME;
+        let rate = move |from: f64, to: f64| 0.2 * ((now + to) * (now + to) - (now + from) * (now + from));
+        let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
+        sum += liquid.step_frame(&Surroundings { sources: &sources, ..FALLING }, FRAME).sourced;
+    }
+    let account = liquid.sources()[0];
+    assert!((sum + account.owed - 0.2).abs() < 1e-9, "{account:?}");
+    let gained = liquid.surface().volume(0.0625) - start;
+    assert!((gained / sum - 1.0).abs() < 0.01, "{gained} {sum}");
+}
+
+/// A nozzle keeps its shape full of liquid with its velocity: it gives area · speed, and a sink that takes all that enters
+/// takes as much.
+#[test]
+fn a_jet_has_the_speed_of_its_nozzle_and_a_sink_takes_it() {
+    let domain = Domain::closed([0; 3], [40, 6, 4]);
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 16.0), Marked::new(domain, |_| 5.0));
+    let nozzle = |_: f64, p: Vec3| (p[0] - 5.0).abs() - 3.0;
+    let drain = |_: f64, p: Vec3| (p[0] - 35.0).abs() - 3.0;
+    let velocity = |_: f64| [1.0, 0.0, 0.0];
+    let sources = [LiquidSource { velocity: Some(&velocity), ..LiquidSource::new(shape(&nozzle), None) }];
+    let sinks = [LiquidSink::new(shape(&drain), None)];
+    let around = Surroundings { sources: &sources, sinks: &sinks, ..WEIGHTLESS };
+    let mut last = [0.0; 2];
+    for frame in 0..60 {
+        let report = liquid.step_frame(&around, FRAME);
+        if frame >= 48 {
+            last = [last[0] + report.sourced, last[1] + report.sunk];
+        }
+    }
+    let [given, taken] = last.map(|volume| volume / (12.0 * FRAME));
+    let expected = 24.0 / 256.0;
+    assert!((given / expected - 1.0).abs() < 0.01, "{given} {expected}");
+    assert!((taken / expected - 1.0).abs() < 0.01, "{taken} {expected}");
+    let motion = liquid.motion();
+    let inside = |cell: Cell| domain.contains(cell) && (3..30).contains(&cell[0]);
+    let mut count = 0;
+    for (at, _) in motion.rows().iter().enumerate().filter(|(_, cell)| inside(*cell)) {
+        let u = motion.velocity().faces()[0][at];
+        assert!((u - 1.0).abs() < 1e-3, "{u}");
+        count += 1;
+    }
+    assert_eq!(count, 27 * 24);
+}
+
+#[test]
+fn a_box_full_to_the_brim_takes_nothing_and_goes_on() {
+    for viscosity in [0.0, 100.0] {
+        let domain = Domain::closed([0; 3], [8; 3]);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.125), Marked::new(domain, |_| -5.0));
+        let (distance, other) = (ball([2.5; 3], 1.6), ball([5.5; 3], 1.6));
+        let rate = |from: f64, to: f64| 0.1 * (to - from);
+        let viscosity = |_| viscosity;
+        let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
+        let around = Surroundings { sources: &sources, viscosity: &viscosity, ..FALLING };
+        for _ in 0..6 {
+            let report = liquid.step_frame(&around, FRAME);
+            let account = liquid.sources()[0];
+            assert!(report.sourced == 0.0 && report.unbalanced > 1e-3 && report.solves_cut_short == 0, "{report:?}");
+            assert!((account.withheld / (0.1 * FRAME) - 1.0).abs() < 1e-9 && account.owed.abs() < 1e-9, "{account:?}");
+            assert!(largest(&liquid) < 1e-3);
+        }
+        // What a sink takes elsewhere makes room.
+        let less = |from: f64, to: f64| 0.05 * (to - from);
+        let sinks = [LiquidSink::new(shape(&other), Some(&less))];
+        let around = Surroundings { sinks: &sinks, ..around };
+        for frame in 0..6 {
+            let report = liquid.step_frame(&around, FRAME);
+            let passed = if frame == 0 { 0.0 } else { 0.05 * FRAME };
+            assert!((report.sourced - passed).abs() < 1e-6 && (report.sunk - passed).abs() < 1e-6, "{report:?}");
+            assert!(largest(&liquid) > 0.02 && report.max_divergence < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn sources_where_no_liquid_can_be_give_nothing() {
+    let solid = ball([8.0, 4.0, 8.0], 4.0);
+    for distance in [ball([8.0, 4.0, 8.0], 2.0), ball([8.0, 19.0, 8.0], 2.9), ball([80.0; 3], 2.0)] {
+        let rate = |from: f64, to: f64| 0.1 * (to - from);
+        for rate in [Some(&rate as _), None] {
+            let sources = [LiquidSource::new(shape(&distance), rate)];
+            let sinks = [LiquidSink::new(shape(&distance), rate)];
+            let around =
+                Surroundings { sources: &sources, sinks: &sinks, solid: Some(Solid::still(&solid)), ..FALLING };
+            let mut liquid = pool(9.3);
+            for _ in 0..3 {
+                let report = liquid.step_frame(&around, FRAME);
+                assert_eq!((report.sourced, report.sunk), (0.0, 0.0));
+                let withheld = if rate.is_some() { 0.1 * FRAME } else { 0.0 };
+                for account in [liquid.sources()[0], liquid.sinks()[0]] {
+                    assert!((account.withheld - withheld).abs() < 1e-12 && account.owed == 0.0, "{account:?}");
+                }
+                assert!(largest(&liquid) < 1e-3 && report.unbalanced == 0.0, "{report:?}");
+            }
+        }
+    }
+}
+
+/// Shapes too thin for the grid count as half a cell deep.
+#[test]
+fn a_sheet_between_the_middles_of_cells_gives_its_rate() {
+    let mut liquid = pool(3.3);
+    let sheet = |_: f64, p: Vec3| (p[1] - 9.0).abs().max(length([p[0] - 8.0, 0.0, p[2] - 8.0]) - 3.0);
+    let rate = |from: f64, to: f64| 0.05 * (to - from);
+    let sources = [LiquidSource::new(shape(&sheet), Some(&rate))];
+    let around = Surroundings { sources: &sources, ..FALLING };
+    let given: f64 = (0..24).map(|_| liquid.step_frame(&around, FRAME).sourced).sum();
+    assert!((given / (0.05 * 24.0 * FRAME) - 1.0).abs() < 0.1, "{given}");
+}
+
+fn fountain(frames: std::ops::Range<u32>, liquid: &mut Liquid<PlainLevelSet>) {
+    let nozzle = ball([5.0, 5.0, 6.0], 1.8);
+    let inlet = ball([14.0, 9.0, 6.0], 2.2);
+    let outlet = ball([18.0, 1.0, 6.0], 2.0);
+    let velocity = |_: f64| [0.0, 2.0, 0.0];
+    for frame in frames {
+        let now = f64::from(frame) * FRAME;
+        let rate = move |from: f64, to: f64| 0.02 * (to - from) * (1.0 + now);
+        let sources = [
+            LiquidSource { velocity: Some(&velocity), ..LiquidSource::new(shape(&nozzle), None) },
+            LiquidSource::new(shape(&inlet), Some(&rate)),
+        ];
+        let sinks = [LiquidSink::new(shape(&outlet), Some(&rate))];
+        liquid.step_frame(&Surroundings { sources: &sources, sinks: &sinks, ..FALLING }, FRAME);
+    }
+}
+
+fn start() -> Liquid<PlainLevelSet> {
+    let domain = Domain::closed([0; 3], [24, 16, 12]);
+    Liquid::new(LiquidSettings::new(domain, 1.0 / 24.0), PlainLevelSet::new(domain, |p| p[1] - 4.3))
+}
+
+fn bits(liquid: &Liquid<PlainLevelSet>) -> Vec<u32> {
+    let phi = liquid.surface().view().phi.iter();
+    phi.chain(liquid.motion().velocity().faces().iter().flatten()).map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn sources_resume_and_run_on_any_number_of_threads_with_the_same_bits() {
+    let run = |threads| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut liquid = start();
+            fountain(0..9, &mut liquid);
+            liquid
+        })
+    };
+    let mut whole = start();
+    fountain(0..5, &mut whole);
+    let mut resumed = Liquid::resume(whole.settings.clone(), whole.surface().clone(), whole.motion().clone());
+    assert!(resumed.sources().iter().chain(resumed.sinks()).all(|account| account.moved > 0.0));
+    fountain(5..9, &mut resumed);
+    fountain(5..9, &mut whole);
+    assert!(bits(&whole) == bits(&resumed) && whole.motion() == resumed.motion());
+    for threads in [1, 3] {
+        let other = run(threads);
+        assert!(bits(&other) == bits(&whole) && other.motion() == whole.motion());
+    }
+}
