@@ -107,6 +107,14 @@ impl Surface for MarkedSurface {
         self.markers.step(&mut self.set, &Scaled { flow, size }, reach * size);
         self.restrict();
     }
+
+    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+        let [low, high] = [low, high].map(|corner| corner.map(|x| x.saturating_mul(self.resolution)));
+        let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
+        let scaled = |point: Vec3, phi: f32| size * change(scale(point, unit), phi * unit);
+        self.markers.change(&mut self.set, low, high, scaled);
+        self.restrict();
+    }
 }
 
 /// A flow in surface cells.

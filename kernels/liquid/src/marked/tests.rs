@@ -7,7 +7,7 @@ use crate::step::{Liquid, LiquidSettings, Motion, Surroundings};
 
 const FRAME: f64 = 1.0 / 24.0;
 
-const FALLING: Surroundings<'_> = Surroundings { gravity: &|_| [0.0, -9.81, 0.0], viscosity: &|_| 0.0, solid: None };
+const FALLING: Surroundings<'_> = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
 
 fn volume(surface: &MarkedSurface) -> f64 {
     let size = f64::from(surface.resolution());

@@ -2,54 +2,14 @@ use rayon::ThreadPoolBuilder;
 
 use super::*;
 use crate::extract::{Placement, extract};
-use crate::level_set::{Flow, LevelSet};
-use crate::markers::Markers;
-use crate::rows::{Cell, CellRows};
+use crate::marked::MarkedSurface;
+use crate::rows::Cell;
 use numerics::vector::{length, sub};
 
 const FRAME: f64 = 1.0 / 24.0;
 
-/// A level set with markers: it keeps its volume.
-#[derive(Clone, Debug)]
-struct Marked {
-    set: LevelSet,
-    markers: Markers,
-}
-
-impl Marked {
-    fn new(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> Self {
-        let rows = CellRows::cuboid(domain.low, domain.high);
-        let phi = rows.tabulate(|cell| distance(Site::Centre.of(cell)));
-        let set = LevelSet::new(&rows, &phi, domain.low, domain.high);
-        Self { markers: Markers::new(&set, 0, 1), set }
-    }
-
-    /// m³ in cells of this side.
-    fn volume(&self, cell: f64) -> f64 {
-        extract(self.view(), Placement::Projected).volume() * cell * cell * cell
-    }
-}
-
-struct Way<'a>(&'a Moving<'a>);
-
-impl Flow for Way<'_> {
-    fn reader(&self) -> impl FnMut(Vec3) -> Vec3 {
-        self.0.reader()
-    }
-}
-
-impl Surface for Marked {
-    fn view(&self) -> PhiView<'_> {
-        self.set.view()
-    }
-
-    fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
-        self.markers.step(&mut self.set, &Way(flow), reach);
-    }
-
-    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
-        self.markers.change(&mut self.set, low, high, change);
-    }
+fn marked(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> MarkedSurface {
+    MarkedSurface::new(domain, 1, distance, 0, 1)
 }
 
 fn ball(centre: Vec3, radius: f32) -> impl Fn(f64, Vec3) -> f32 + Sync {
@@ -63,20 +23,25 @@ fn shape<'a>(distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync)) -> SourceShape<'a>
 }
 
 /// A pool in a box of 16³ cells of 1/16 m.
-fn pool(depth: f32) -> Liquid<Marked> {
+fn pool(depth: f32) -> Liquid<MarkedSurface> {
     let domain = Domain::closed([0; 3], [16; 3]);
-    Liquid::new(LiquidSettings::new(domain, 0.0625), Marked::new(domain, |p| p[1] - depth))
+    Liquid::new(LiquidSettings::new(domain, 0.0625), marked(domain, |p| p[1] - depth))
+}
+
+fn volume(liquid: &Liquid<MarkedSurface>) -> f64 {
+    let surface = liquid.surface();
+    let cell = liquid.settings.cell / f64::from(surface.resolution());
+    extract(surface.level_set().view(), Placement::Projected).volume() * cell * cell * cell
 }
 
 /// The volume after each of these frames, m³.
-fn volumes(liquid: &mut Liquid<Marked>, around: &Surroundings<'_>, frames: usize) -> Vec<f64> {
-    let cell = liquid.settings.cell;
+fn volumes(liquid: &mut Liquid<MarkedSurface>, around: &Surroundings<'_>, frames: usize) -> Vec<f64> {
     (0..frames)
         .map(|_| {
             let report = liquid.step_frame(around, FRAME);
             assert_eq!((report.caps_hit, report.solves_cut_short), (0, 0), "{report:?}");
             assert!(report.max_divergence < 1e-4, "{report:?}");
-            liquid.surface().volume(cell)
+            volume(liquid)
         })
         .collect()
 }
@@ -91,7 +56,7 @@ fn gained(volumes: &[f64], first: usize) -> f64 {
 fn a_source_in_the_open_gives_its_rate() {
     for (middle, share) in [(20.0, 1.0), (0.0, 0.5)] {
         let domain = Domain::closed([0; 3], [40, 40, 2]);
-        let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), Marked::new(domain, |_| 5.0));
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), marked(domain, |_| 5.0));
         let distance = move |_: f64, p: Vec3| length([p[0] - middle, p[1] - 20.0, 0.0]) - 8.0;
         let given = 40.0 * share * 24.0;
         let rate = move |from: f64, to: f64| given * (to - from);
@@ -125,6 +90,20 @@ fn a_source_in_a_full_pool_gives_its_rate() {
 }
 
 #[test]
+fn a_surface_with_smaller_cells_is_fed_by_the_same_rate() {
+    let domain = Domain::closed([0; 3], [20, 20, 2]);
+    let surface = MarkedSurface::new(domain, 2, |_| 5.0, 0, 1);
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), surface);
+    let disk = |_: f64, p: Vec3| length([p[0] - 10.0, p[1] - 10.0, 0.0]) - 5.0;
+    let rate = |from: f64, to: f64| 240.0 * (to - from);
+    let sources = [LiquidSource::new(shape(&disk), Some(&rate))];
+    let around = Surroundings { sources: &sources, ..WEIGHTLESS };
+    let volumes = volumes(&mut liquid, &around, 24);
+    let gained = gained(&volumes, 3);
+    assert!((volumes[23] / 240.0 - 1.0).abs() < 0.06 && (gained / 240.0 - 1.0).abs() < 0.06, "{gained}: {volumes:?}");
+}
+
+#[test]
 fn a_source_half_in_a_solid_gives_its_rate() {
     let solid = |_: f64, p: Vec3| p[0] - 6.4;
     let mut liquid = pool(7.3);
@@ -132,7 +111,7 @@ fn a_source_half_in_a_solid_gives_its_rate() {
     let rate = |from: f64, to: f64| 0.1 * (to - from);
     let sources = [LiquidSource::new(shape(&distance), Some(&rate))];
     let around = Surroundings { sources: &sources, solid: Some(Solid::still(&solid)), ..FALLING };
-    let outside = |liquid: &Liquid<Marked>| {
+    let outside = |liquid: &Liquid<MarkedSurface>| {
         let view = liquid.surface().view();
         let share = |(at, cell): (usize, Cell)| {
             let open = f64::from(Site::Centre.of(cell)[0] - 6.4 + 0.5).clamp(0.0, 1.0);
@@ -168,7 +147,7 @@ fn a_rate_is_integrated() {
     let distance = ball([8.0, 4.0, 8.0], 2.6);
     // 0.4·t m³/s over a second.
     let mut sum = 0.0;
-    let start = liquid.surface().volume(0.0625);
+    let start = volume(&liquid);
     for frame in 0..24 {
         let now = f64::from(frame) * FRAME;
         let rate = move |from: f64, to: f64| 0.2 * ((now + to) * (now + to) - (now + from) * (now + from));
@@ -177,7 +156,7 @@ fn a_rate_is_integrated() {
     }
     let account = liquid.sources()[0];
     assert!((sum + account.owed - 0.2).abs() < 1e-9, "{account:?}");
-    let gained = liquid.surface().volume(0.0625) - start;
+    let gained = volume(&liquid) - start;
     assert!((gained / sum - 1.0).abs() < 0.01, "{gained} {sum}");
 }
 
@@ -186,7 +165,7 @@ fn a_rate_is_integrated() {
 #[test]
 fn a_jet_has_the_speed_of_its_nozzle_and_a_sink_takes_it() {
     let domain = Domain::closed([0; 3], [40, 6, 4]);
-    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 16.0), Marked::new(domain, |_| 5.0));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 16.0), marked(domain, |_| 5.0));
     let nozzle = |_: f64, p: Vec3| (p[0] - 5.0).abs() - 3.0;
     let drain = |_: f64, p: Vec3| (p[0] - 35.0).abs() - 3.0;
     let velocity = |_: f64| [1.0, 0.0, 0.0];
@@ -219,7 +198,7 @@ fn a_jet_has_the_speed_of_its_nozzle_and_a_sink_takes_it() {
 fn a_box_full_to_the_brim_takes_nothing_and_goes_on() {
     for viscosity in [0.0, 100.0] {
         let domain = Domain::closed([0; 3], [8; 3]);
-        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.125), Marked::new(domain, |_| -5.0));
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.125), marked(domain, |_| -5.0));
         let (distance, other) = (ball([2.5; 3], 1.6), ball([5.5; 3], 1.6));
         let rate = |from: f64, to: f64| 0.1 * (to - from);
         let viscosity = |_| viscosity;
