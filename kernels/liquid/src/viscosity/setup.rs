@@ -129,16 +129,23 @@ impl Fields<'_> {
     }
 
     /// The liquid of a cell, as a share of a cell's volume, with what reaches beyond it into air; exact where the surface
-    /// is along the grid.
+    /// is along the grid. Air behind closed faces does not count: cells beyond walls are such.
     fn filled(&self, cell: Cell, at: usize) -> f32 {
-        let is_at_surface = (0..3).any(|axis| {
+        let distances = self.pressure.surface_distances();
+        let mut reach = f32::INFINITY;
+        for axis in 0..3 {
             let mut above = cell;
             above[axis] += 1;
-            [lower(cell, axis), above]
-                .into_iter()
-                .any(|near| self.rows.find(near).is_some_and(|near| self.pressure.is_air(near)))
-        });
-        if is_at_surface { (0.5 - self.level_set[at]).clamp(0.5, 1.5) } else { 1.0 }
+            let above = self.rows.find(above);
+            for (face, air) in [(Some(at), self.below(cell, axis)), (above, above)] {
+                let (Some(face), Some(air)) = (face, air) else { continue };
+                if self.open[axis][face] > 0.0 && self.pressure.is_air(air) {
+                    reach = reach.min(distances[axis][face]);
+                }
+            }
+        }
+        // Open walls are nearer than φ has it.
+        if reach < f32::INFINITY { (0.5 + reach.min(-self.level_set[at])).clamp(0.5, 1.5) } else { 1.0 }
     }
 
     fn density_at(&self, cell: Cell, at: usize, axis: usize) -> f32 {
