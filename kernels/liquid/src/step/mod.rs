@@ -29,6 +29,7 @@
 
 mod domain;
 mod exchange;
+mod force;
 mod motion;
 mod pour;
 mod project;
@@ -162,6 +163,8 @@ pub struct LiquidReport {
     pub sourced: f64,
     /// What sinks took, m³.
     pub sunk: f64,
+    /// The force of pressure and viscosity on the solid, N: the mean over the time.
+    pub solid_force: [f64; 3],
 }
 
 impl LiquidReport {
@@ -181,6 +184,7 @@ impl LiquidReport {
         self.left_domain += other.left_domain;
         self.sourced += other.sourced;
         self.sunk += other.sunk;
+        (0..3).for_each(|axis| self.solid_force[axis] += other.solid_force[axis]);
     }
 }
 
@@ -245,6 +249,7 @@ impl<S: Surface> Liquid<S> {
             let times = [seconds - left, seconds - after];
             let mut done = substep::substep(&self.settings, &mut self.surface, &mut self.motion, around, times);
             done.caps_hit = u32::from(is_capped);
+            done.solid_force = done.solid_force.map(|force| force * (times[1] - times[0]) / seconds);
             report.add(&done);
             left = after;
         }

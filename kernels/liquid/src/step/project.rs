@@ -5,6 +5,7 @@ use crate::pressure::{PressureGrid, PressureSolver, Stop};
 use crate::rows::CellRows;
 use crate::stencil::Stencil;
 use crate::step::domain::Obstacle;
+use crate::step::force::pressed;
 use crate::step::motion::{Guess, LiquidCells, Motion};
 use crate::step::pour::{Pour, pour};
 use crate::step::{LiquidReport, LiquidSettings};
@@ -66,11 +67,14 @@ impl Projection<'_> {
             Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, &q, faces);
+        let domain = &self.settings.domain;
+        let force = self.solid.map(|solid| pressed(domain, solid, &cells.rows, &cells.open, &solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
         LiquidReport {
             pressure_iterations: solved.iterations,
             solves_cut_short: u32::from(is_cut_short),
+            solid_force: self.force(force.unwrap_or_default()),
             ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
@@ -126,6 +130,13 @@ impl Projection<'_> {
         let mut inflow = solid_velocity.as_ref().map_or_else(|| vec![0.0; solver.rows().len()], pushed);
         let poured = pour(pours, solver.pressure(), self.settings.cell, &mut inflow);
         let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
+        let force = self.solid.map(|solid| {
+            let is_solid = |axis: usize, cell| domain.contains(cell) && domain.wall_at(axis, cell).is_none();
+            let mut force = solver.solid_impulse(&u, is_solid);
+            let of_pressure = pressed(domain, solid, &rows, &open, solver.pressure(), &q);
+            force.iter_mut().zip(of_pressure).for_each(|(force, of_pressure)| *force += of_pressure);
+            force
+        });
         for axis in 0..3 {
             let solved = cells.rows.resampled(solver.rows(), &u[axis], 0.0);
             let moving = faces[axis].iter_mut().zip(&solved).zip(&cells.moving);
@@ -137,6 +148,7 @@ impl Projection<'_> {
             coupled_iterations: solved.iterations,
             coupled_residual: if scale > 0.0 { solved.velocity / scale } else { 0.0 },
             solves_cut_short: u32::from(!is_done && solved.iterations >= stop.iterations),
+            solid_force: self.force(force.unwrap_or_default()),
             ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
@@ -144,6 +156,12 @@ impl Projection<'_> {
     /// Net flow of a cell, m/s, that may be left.
     fn flow_tolerance(&self, scale: f64) -> f64 {
         self.settings.tolerance * (FLOW_SHARE * scale).min(self.settings.cell / self.seconds)
+    }
+
+    /// The force, N, of an impulse ÷ density · cell³.
+    fn force(&self, impulse: [f64; 3]) -> [f64; 3] {
+        let LiquidSettings { cell, density, .. } = self.settings;
+        impulse.map(|impulse| impulse * density * cell * cell * cell / self.seconds)
     }
 
     fn report(&self, flow: f64, unbalanced: [f64; 2]) -> LiquidReport {

@@ -143,6 +143,38 @@ impl Level {
         }
     }
 
+    /// The net stress on the solid faces that `counts` picks, by axis and cell.
+    pub(super) fn solid_impulse(&self, u: &FaceFields<f64>, counts: impl Fn(usize, Cell) -> bool) -> [f64; 3] {
+        let mut stresses = Stresses::zero(self.normal.len());
+        self.stress(Path::chosen(), u, &mut stresses, strain_f64);
+        let mut sum = [0.0; 3];
+        let mut give = |axis: usize, cell: Cell, stress: f64| {
+            let is_solid = |at: usize| self.kinds[axis][at] == FaceKind::Solid;
+            if stress != 0.0 && self.rows().find(cell).is_some_and(is_solid) && counts(axis, cell) {
+                sum[axis] += stress;
+            }
+        };
+        for (at, cell) in self.stencil.runs().iter().flat_map(|run| {
+            let [x, y, z] = run.cell;
+            run.range().zip((x..).map(move |x| [x, y, z]))
+        }) {
+            for axis in 0..3 {
+                let mut above = cell;
+                above[axis] += 1;
+                let normal = stresses.normal[axis][at];
+                give(axis, cell, normal);
+                give(axis, above, -normal);
+                let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
+                let shear = stresses.shear[axis][at];
+                for (face, across) in [(side, other), (other, side)] {
+                    give(face, cell, -shear);
+                    give(face, lower(cell, across), shear);
+                }
+            }
+        }
+        sum
+    }
+
     /// `out` = A·`u` at free faces, whatever at others.
     fn multiply(&self, path: Path, u: &mut FaceFields<f32>, stresses: &mut Stresses<f32>, out: &mut FaceFields<f32>) {
         if let Some(extensions) = &self.extensions {

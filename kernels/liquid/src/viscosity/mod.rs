@@ -213,6 +213,12 @@ impl StokesSolver {
         solved
     }
 
+    /// What the viscous stress of a velocity gives to the solid faces that `counts` picks, by axis and cell, in a step:
+    /// velocity · the mass of a cell, m/s.
+    pub fn solid_impulse(&self, u: &FaceFields<f64>, counts: impl Fn(usize, Cell) -> bool) -> [f64; 3] {
+        self.viscous.finest().solid_impulse(u, counts)
+    }
+
     /// `out` = the momentum before the step less that of `u` with its viscous stress and pressure.
     fn momentum_lack(
         &self,

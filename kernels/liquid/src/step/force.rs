@@ -1,0 +1,74 @@
+//! What a liquid does to the solid in it.
+
+use crate::pressure::PressureSolver;
+use crate::rows::CellRows;
+use crate::stencil::Run;
+use crate::step::domain::{Domain, Obstacle};
+use crate::velocity::{FaceFields, Site};
+
+/// Distance of a solid's surface from the middle of a cell that it cuts, at most, in cells.
+const FARTHEST: f32 = 1.0;
+
+/// The impulse of a pressure `q` on a solid, ÷ density · cell³: the pressure on its surface · its area, cell by cell.
+/// `open`: the open share of each low face of `rows`.
+pub(super) fn pressed(
+    domain: &Domain,
+    solid: Obstacle<'_>,
+    rows: &CellRows,
+    open: &FaceFields<f32>,
+    solver: &PressureSolver,
+    q: &[f64],
+) -> [f64; 3] {
+    let covered = rows.tabulate_with(
+        || (),
+        |(), cell, at| [0, 1, 2].map(|axis| domain.covered_share(axis, cell, open[axis][at], solid)),
+    );
+    let [covered, open] = [&covered, open].map(|fields| fields.each_ref().map(|field| on_solver(solver, rows, field)));
+    let mut sum = [0.0; 3];
+    for run in solver.stencil().runs() {
+        for n in 0..run.len as usize {
+            let [at, x, y, z] = above(run, n);
+            let area =
+                [(0, x), (1, y), (2, z)].map(|(axis, above)| f64::from(covered[axis][above] - covered[axis][at]));
+            if area == [0.0; 3] {
+                continue;
+            }
+            let cell = [run.cell[0] + n as i32, run.cell[1], run.cell[2]];
+            let middle = Site::Centre.of(cell);
+            let away = solid.distance(middle).clamp(-FARTHEST, FARTHEST);
+            let normal = solid.normal(middle).unwrap_or_default();
+            let slopes = slopes(solver, &open, q, run, n);
+            let mut pressure = q[at];
+            (0..3).for_each(|axis| pressure -= slopes[axis] * f64::from(away * normal[axis]));
+            (0..3).for_each(|axis| sum[axis] += pressure * area[axis]);
+        }
+    }
+    sum
+}
+
+fn on_solver(solver: &PressureSolver, rows: &CellRows, field: &[f32]) -> Vec<f32> {
+    solver.rows().resampled(rows, field, 0.0)
+}
+
+/// A cell of a run, and those above it along x, y and z.
+fn above(run: &Run, n: usize) -> [usize; 4] {
+    let at = run.at as usize + n;
+    [at, at + 1, run.y[1] as usize + n, run.z[1] as usize + n]
+}
+
+/// How a pressure changes along each axis, per cell: the mean of the differences to liquid neighbours; 0 without one.
+fn slopes(solver: &PressureSolver, open: &FaceFields<f32>, q: &[f64], run: &Run, n: usize) -> [f64; 3] {
+    let [at, x, y, z] = above(run, n);
+    let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+    [(0, x), (1, y), (2, z)].map(|(axis, above): (usize, usize)| {
+        let is_joined = |face: usize, other: usize| open[axis][face] > 0.0 && solver.is_liquid(other);
+        let (mut sum, mut count) = (0.0, 0.0);
+        if is_joined(at, below[axis]) {
+            (sum, count) = (q[at] - q[below[axis]], 1.0);
+        }
+        if is_joined(above, above) {
+            (sum, count) = (sum + q[above] - q[at], count + 1.0);
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    })
+}

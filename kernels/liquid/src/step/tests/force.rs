@@ -1,0 +1,67 @@
+use super::plain::Still;
+use super::*;
+use numerics::vector::{length, sub};
+
+const FRAME: f64 = 1.0 / 24.0;
+const GRAVITY: f64 = 9.81;
+
+/// The force on the solid in the last of four frames, N, in cells of 1/20 m.
+fn force(
+    domain: Domain,
+    viscosity: f64,
+    liquid: impl Fn(Vec3) -> f32 + Sync,
+    solid: &(dyn Fn(f64, Vec3) -> f32 + Sync),
+) -> [f64; 3] {
+    let settings = LiquidSettings { tolerance: 1e-6, ..LiquidSettings::new(domain, 0.05) };
+    let mut liquid = Liquid::new(settings, Still::new(domain, liquid));
+    let viscosity = |_| viscosity;
+    let around = Surroundings { viscosity: &viscosity, solid: Some(Solid::still(solid)), ..FALLING };
+    let reports = (0..4).map(|_| liquid.step_frame(&around, FRAME));
+    reports.last().unwrap().solid_force
+}
+
+/// The weight of so many cells of liquid, N.
+fn weight(cells: f64) -> f64 {
+    1000.0 * GRAVITY * 0.05 * 0.05 * 0.05 * cells
+}
+
+#[test]
+fn a_ball_under_water_has_the_lift_of_what_it_displaces() {
+    let domain = Domain::closed([0; 3], [20; 3]);
+    let lift = weight(4.0 / 3.0 * std::f64::consts::PI * 125.0);
+    for viscosity in [0.0, 100.0] {
+        for centre in [[10.0; 3], [10.3, 9.4, 9.1]] {
+            let ball = move |_: f64, p: Vec3| length(sub(p, centre)) - 5.0;
+            let [x, y, z] = force(domain, viscosity, |p| p[1] - 18.2, &ball);
+            assert!((y / lift - 1.0).abs() < 0.02, "{viscosity} {y} {lift}");
+            assert!(x.abs() < 0.01 * lift && z.abs() < 0.01 * lift, "{viscosity} {x} {z}");
+        }
+    }
+}
+
+/// Nothing pushes up from under a floor.
+#[test]
+fn a_floor_carries_the_pool_on_it() {
+    let domain = Domain::closed([0; 3], [8, 20, 8]);
+    for floor in [2.6_f32, 3.0, 2.2] {
+        let solid = move |_: f64, p: Vec3| p[1] - floor;
+        let [x, y, z] = force(domain, 0.0, |p| p[1] - 17.2, &solid);
+        let expected = -weight(64.0 * (17.2 - f64::from(floor)));
+        assert!((y / expected - 1.0).abs() < 1e-4, "{floor}: {y} {expected}");
+        assert!(x.abs() < 1e-3 * y.abs() && z.abs() < 1e-3 * y.abs(), "{x} {z}");
+    }
+}
+
+/// Thick liquid between two plates creeps down as fast as the plates let it: they carry its weight.
+#[test]
+fn plates_carry_the_thick_liquid_between_them() {
+    let walls = [[Wall::Closed; 2], [Wall::Closed; 2], [Wall::FreeSlip; 2]];
+    let domain = Domain { walls, ..Domain::closed([0; 3], [16, 40, 3]) };
+    for viscosity in [1e3, 1e6] {
+        let plates = |_: f64, p: Vec3| (p[0] - 4.3).min(11.6 - p[0]);
+        let [x, y, z] = force(domain, viscosity, |p| (p[1] - 32.2).max(11.7 - p[1]), &plates);
+        let expected = -weight(7.3 * 20.5 * 3.0);
+        assert!((y / expected - 1.0).abs() < 0.02, "{viscosity}: {y} {expected}");
+        assert!(x.abs() < 1e-3 * y.abs() && z.abs() < 1e-3 * y.abs(), "{x} {z}");
+    }
+}
