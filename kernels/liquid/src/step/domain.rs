@@ -176,18 +176,10 @@ impl Domain {
         }
         solid.map_or(1.0, |solid| share_outside(axis, cell, solid))
     }
-
-    /// The share of a low face, `open` in part, that a solid covers; at walls, too.
-    pub(super) fn covered_share(&self, axis: usize, cell: Cell, open: f32, solid: Obstacle<'_>) -> f32 {
-        match self.wall_at(axis, cell) {
-            Some(Wall::Closed | Wall::FreeSlip) => 1.0 - share_outside(axis, cell, solid),
-            _ => 1.0 - open,
-        }
-    }
 }
 
 /// The share of a low face outside a solid.
-fn share_outside(axis: usize, cell: Cell, solid: Obstacle<'_>) -> f32 {
+pub(super) fn share_outside(axis: usize, cell: Cell, solid: Obstacle<'_>) -> f32 {
     open_share([(0, 0), (1, 0), (1, 1), (0, 1)].map(|(a, b)| {
         let mut corner = cell;
         corner[(axis + 1) % 3] += a;

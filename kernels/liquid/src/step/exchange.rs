@@ -15,11 +15,11 @@ use crate::step::sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape, v
 use crate::step::{LiquidSettings, Surface, Surroundings};
 use crate::velocity::{FaceFields, MacVelocity, Site};
 
-/// Share of its liquid cells that a sink takes in a substep, at most.
-const TAKEN: f64 = 0.5;
+/// What a sink takes in a substep, at most, ÷ the volume of its liquid cells.
+const TAKEN: f64 = 2.0;
 
-/// Cells from a shape within which the faces of liquid that it adds lie.
-const FACES: f32 = 0.5;
+/// Cells around the way of what comes in that its interpolation reaches.
+const AROUND: f32 = 1.5;
 
 /// A substep to sources and sinks.
 pub(super) struct Exchange<'a> {
@@ -173,19 +173,20 @@ impl Exchanged<'_> {
     }
 
     /// What the velocity carries, `carried` or itself, where liquid comes into air: there it is that of the liquid, not what
-    /// the flow beside it was continued to.
+    /// the flow beside it was continued to, or it would come in the faster the farther it fell. `reach`: cells moved.
     pub(super) fn entered(
         &self,
         motion: &Motion,
         velocity: &MacVelocity,
         carried: Option<FaceFields<f32>>,
+        reach: f32,
     ) -> Option<FaceFields<f32>> {
         if self.entering.iter().all(|entering| !entering.is_filled) {
             return carried;
         }
         let mut carried = carried.unwrap_or_else(|| velocity.faces().clone());
         for entering in self.entering.iter().filter(|entering| entering.is_filled) {
-            entering.for_each_face(FACES, |axis, cell, value| {
+            entering.for_each_face(reach + AROUND, |axis, cell, value| {
                 let is_known = motion.rows().find(cell).is_some_and(|at| motion.known[at] >> axis & 1 == 1);
                 if let Some(at) = velocity.rows().find(cell).filter(|_| !is_known) {
                     carried[axis][at] = value;
@@ -208,15 +209,55 @@ impl Exchanged<'_> {
         }
     }
 
-    /// Sets faces inside the shapes whose velocity is imposed.
-    pub(super) fn impose(&self, cells: &LiquidCells, fields: [&mut FaceFields<f32>; 2]) {
-        let [faces, before] = fields;
+    /// Makes the faces inside the shapes whose velocity is imposed move with it, as a solid's do, but liquid passes. Returns
+    /// them.
+    pub(super) fn impose(&self, cells: &mut LiquidCells) -> Vec<Imposed> {
+        let mut imposed = Vec::new();
         for entering in self.entering.iter().filter(|entering| entering.velocity.is_some()) {
             entering.for_each_face(0.0, |axis, cell, velocity| {
                 if let Some(at) = cells.rows.find(cell).filter(|at| cells.moving[*at] >> axis & 1 == 1) {
-                    (faces[axis][at], before[axis][at]) = (velocity, velocity);
+                    cells.moving[at] &= !(1 << axis);
+                    imposed.push(Imposed { axis, cell, velocity });
                 }
             });
+        }
+        if !imposed.is_empty() {
+            let len = cells.rows.len();
+            let still = || std::array::from_fn(|_| vec![0.0; len]);
+            let solid_velocity = cells.solid_velocity.get_or_insert_with(still);
+            Imposed::close(&imposed, &cells.rows, &mut cells.open, solid_velocity);
+        }
+        imposed
+    }
+}
+
+/// A face whose velocity is imposed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Imposed {
+    axis: usize,
+    cell: Cell,
+    /// m/s.
+    velocity: f32,
+}
+
+impl Imposed {
+    /// Closes faces of `rows` to the flow that is solved for.
+    pub(super) fn close(
+        all: &[Self],
+        rows: &CellRows,
+        open: &mut FaceFields<f32>,
+        solid_velocity: &mut FaceFields<f32>,
+    ) {
+        Self::set(all, rows, open, |_| 0.0);
+        Self::set(all, rows, solid_velocity, |velocity| velocity);
+    }
+
+    /// Sets faces of `rows` to what `value` makes of their velocities.
+    pub(super) fn set(all: &[Self], rows: &CellRows, faces: &mut FaceFields<f32>, value: impl Fn(f32) -> f32) {
+        for face in all {
+            if let Some(at) = rows.find(face.cell) {
+                faces[face.axis][at] = value(face.velocity);
+            }
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What a liquid does to the solid in it.
 
 use crate::pressure::PressureSolver;
-use crate::rows::CellRows;
+use crate::rows::{Cell, CellRows};
 use crate::stencil::Run;
-use crate::step::domain::{Domain, Obstacle};
+use crate::step::domain::{Obstacle, share_outside};
 use crate::velocity::{FaceFields, Site};
 
 /// Distance of a solid's surface from the middle of a cell that it cuts, at most, in cells.
@@ -12,17 +12,17 @@ const FARTHEST: f32 = 1.0;
 /// The impulse of a pressure `q` on a solid, ÷ density · cell³: the pressure on its surface · its area, cell by cell.
 /// `open`: the open share of each low face of `rows`.
 pub(super) fn pressed(
-    domain: &Domain,
     solid: Obstacle<'_>,
     rows: &CellRows,
     open: &FaceFields<f32>,
     solver: &PressureSolver,
     q: &[f64],
 ) -> [f64; 3] {
-    let covered = rows.tabulate_with(
-        || (),
-        |(), cell, at| [0, 1, 2].map(|axis| domain.covered_share(axis, cell, open[axis][at], solid)),
-    );
+    // Walls and nozzles close faces, too.
+    let share = |axis: usize, cell: Cell, at: usize| {
+        if open[axis][at] < 1.0 { 1.0 - share_outside(axis, cell, solid) } else { 0.0 }
+    };
+    let covered = rows.tabulate_with(|| (), |(), cell, at| [0, 1, 2].map(|axis| share(axis, cell, at)));
     let [covered, open] = [&covered, open].map(|fields| fields.each_ref().map(|field| on_solver(solver, rows, field)));
     let mut sum = [0.0; 3];
     for run in solver.stencil().runs() {

@@ -4,7 +4,8 @@
 use crate::pressure::{PressureGrid, PressureSolver, Stop};
 use crate::rows::CellRows;
 use crate::stencil::Stencil;
-use crate::step::domain::Obstacle;
+use crate::step::domain::{Obstacle, share_outside};
+use crate::step::exchange::Imposed;
 use crate::step::force::pressed;
 use crate::step::motion::{Guess, LiquidCells, Motion};
 use crate::step::pour::{Pour, pour};
@@ -23,6 +24,7 @@ pub(super) struct Projection<'a> {
     pub settings: &'a LiquidSettings,
     pub cells: &'a LiquidCells,
     pub solid: Option<Obstacle<'a>>,
+    pub imposed: &'a [Imposed],
     /// The speed of the liquid, m/s.
     pub speed: f64,
     /// What gravity adds to it, m/s.
@@ -67,8 +69,7 @@ impl Projection<'_> {
             Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, &q, faces);
-        let domain = &self.settings.domain;
-        let force = self.solid.map(|solid| pressed(domain, solid, &cells.rows, &cells.open, &solver, &q));
+        let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
         LiquidReport {
@@ -92,7 +93,12 @@ impl Projection<'_> {
         let (cells, domain) = (self.cells, &self.settings.domain);
         let rows = domain.clip(&cells.rows.dilated(1));
         let level_set = cells.level_set_on(domain, &rows);
-        let [open, distance] = domain.faces(&rows, self.solid);
+        let [mut open, distance] = domain.faces(&rows, self.solid);
+        let mut solid_velocity = self.solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
+        if !self.imposed.is_empty() {
+            let still = || std::array::from_fn(|_| vec![0.0; rows.len()]);
+            Imposed::close(self.imposed, &rows, &mut open, solid_velocity.get_or_insert_with(still));
+        }
         let [[open_x, open_y, open_z], [x, y, z]] = [&open, &distance];
         let grid = StokesGrid {
             rows: &rows,
@@ -104,7 +110,6 @@ impl Projection<'_> {
             slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
         };
         let solver = StokesSolver::new(&grid);
-        let solid_velocity = self.solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
         let on_solver = |field: &[f32]| {
             let field: Vec<f64> = field.iter().map(|u| f64::from(*u)).collect();
             solver.rows().resampled(&rows, &field, 0.0)
@@ -131,9 +136,12 @@ impl Projection<'_> {
         let poured = pour(pours, solver.pressure(), self.settings.cell, &mut inflow);
         let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
         let force = self.solid.map(|solid| {
-            let is_solid = |axis: usize, cell| domain.contains(cell) && domain.wall_at(axis, cell).is_none();
+            let is_solid = |axis: usize, cell| {
+                let is_inner = domain.contains(cell) && domain.wall_at(axis, cell).is_none();
+                is_inner && share_outside(axis, cell, solid) == 0.0
+            };
             let mut force = solver.solid_impulse(&u, is_solid);
-            let of_pressure = pressed(domain, solid, &rows, &open, solver.pressure(), &q);
+            let of_pressure = pressed(solid, &rows, &open, solver.pressure(), &q);
             force.iter_mut().zip(of_pressure).for_each(|(force, of_pressure)| *force += of_pressure);
             force
         });

@@ -21,7 +21,8 @@ pub struct LiquidSource<'a> {
     pub shape: SourceShape<'a>,
     /// The volume that it gives between two times, m³. None: it keeps its shape full.
     pub rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>,
-    /// The velocity of the liquid inside the shape, m/s. None: liquid comes in at rest and moves freely.
+    /// The velocity of the liquid inside the shape, m/s, whatever is around it: a nozzle. None: liquid comes in at rest and
+    /// moves freely.
     pub velocity: Option<&'a (dyn Fn(f64) -> Vec3 + Sync)>,
     /// Whether it keeps its shape full and imposes its velocity. What `rate` gives comes all the same.
     pub active: &'a (dyn Fn(f64) -> bool + Sync),

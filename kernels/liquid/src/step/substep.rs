@@ -5,7 +5,7 @@ use numerics::vector::{Vec3, scale};
 use crate::level_set::PhiView;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Obstacle, Solid};
-use crate::step::exchange::Exchange;
+use crate::step::exchange::{Exchange, Imposed};
 use crate::step::motion::{Gain, LiquidCells, Motion};
 use crate::step::project::Projection;
 use crate::step::sources::{LiquidSink, LiquidSource};
@@ -93,25 +93,26 @@ pub(super) fn substep<S: Surface>(
     surface.advance(&Moving { velocity: &velocity, step }, reach);
     let mut exchanged = Exchange { settings, around, solid, times }.apply(surface, motion);
 
-    let cells = LiquidCells::of(&settings.domain, surface, solid);
-    let carried = exchanged.entered(motion, &velocity, carried);
+    let mut cells = LiquidCells::of(&settings.domain, surface, solid);
+    let imposed = exchanged.impose(&mut cells);
+    let carried = exchanged.entered(motion, &velocity, carried, reach);
     let bounds = settings.domain.bounds();
     let advection = Advection { velocity: &velocity, bounds, step, scheme: settings.scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();
     drop((velocity, carried));
-    let mut before = faces.clone();
+    Imposed::set(&imposed, &cells.rows, &mut faces, |velocity| velocity);
+    let before = faces.clone();
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
     for axis in 0..3 {
         let moving = faces[axis].iter_mut().zip(&cells.moving).filter(|(_, mask)| **mask >> axis & 1 == 1);
         moving.for_each(|(u, _)| *u += gravity[axis] as f32);
     }
-    exchanged.impose(&cells, [&mut faces, &mut before]);
 
     let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
     let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
-    let projection = Projection { settings, cells: &cells, solid, speed, pull, seconds };
+    let projection = Projection { settings, cells: &cells, solid, imposed: &imposed, speed, pull, seconds };
     let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
     let mut report = projection.apply(viscosity, &before, &mut exchanged.pours, &mut faces, motion);
     report.substeps = 1;

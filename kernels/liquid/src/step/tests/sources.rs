@@ -194,6 +194,43 @@ fn a_jet_has_the_speed_of_its_nozzle_and_a_sink_takes_it() {
     assert_eq!(count, 27 * 24);
 }
 
+/// Around a nozzle in a pool, thick liquid resists; inside, it has the speed.
+#[test]
+fn a_nozzle_in_a_pool_has_its_speed() {
+    for viscosity in [0.0, 1e5] {
+        let mut liquid = pool(9.3);
+        let (distance, viscosity) = (ball([8.0, 4.0, 8.0], 2.6), |_| viscosity);
+        let velocity = |_: f64| [0.5, -1.0, 0.0];
+        let sources = [LiquidSource { velocity: Some(&velocity), ..LiquidSource::new(shape(&distance), None) }];
+        let around = Surroundings { sources: &sources, viscosity: &viscosity, ..FALLING };
+        for _ in 0..3 {
+            let report = liquid.step_frame(&around, FRAME);
+            assert!(report.max_divergence < 1e-4 && report.unbalanced < 1e-6, "{report:?}");
+            let motion = liquid.motion();
+            for (at, cell) in motion.rows().iter().enumerate() {
+                for axis in (0..3).filter(|axis| distance(0.0, Site::FACES[*axis].of(cell)) < 0.0) {
+                    assert_eq!(motion.velocity().faces()[axis][at], velocity(0.0)[axis]);
+                }
+            }
+        }
+    }
+}
+
+/// Liquid comes in at rest, however fast what came in before has become.
+#[test]
+fn a_source_kept_full_in_the_air_gives_steadily() {
+    let mut liquid = pool(2.3);
+    let distance = ball([8.0, 12.0, 8.0], 2.6);
+    let sources = [LiquidSource::new(shape(&distance), None)];
+    let around = Surroundings { sources: &sources, ..FALLING };
+    let given: Vec<f64> = (0..24).map(|_| liquid.step_frame(&around, FRAME).sourced).collect();
+    let [first, then]: [f64; 2] = [&given[8..16], &given[16..]].map(|part| part.iter().sum());
+    assert!((then / first - 1.0).abs() < 0.05, "{given:?}");
+    // What falls freely from the top of the shape leaves at its foot.
+    let falling = std::f64::consts::PI * 2.6 * 2.6 / 256.0 * (2.0 * 9.81 * 5.2 / 16.0_f64).sqrt();
+    assert!((0.5..1.0).contains(&(then / (8.0 * FRAME * falling))), "{then} {falling}");
+}
+
 #[test]
 fn a_box_full_to_the_brim_takes_nothing_and_goes_on() {
     for viscosity in [0.0, 100.0] {
