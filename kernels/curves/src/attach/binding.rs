@@ -3,11 +3,11 @@
 use super::closest::ClosestFaces;
 use super::pose::RootPose;
 use super::rotation::nearest_rotations;
-use super::triangle_lanes::{Columns, TriangleLanes, deformations};
+use super::triangle_lanes::{Area, Columns, TriangleLanes, deformations, direction_or_zero};
 use crate::surface::SurfacePoint;
 use numerics::lanes::{F64x16, LANES};
-use numerics::simd::Path;
-use numerics::vector::{DQuat, DVec3, direction, to_f64};
+use numerics::simd::{Path, kernel};
+use numerics::vector::{DQuat, DVec3, to_f64};
 use rayon::prelude::*;
 use std::ops::{Add, Mul};
 
@@ -54,19 +54,8 @@ struct BoundVertex {
     incident_end: u32,
     /// 1 ÷ the area of the triangles around it; 0 if they have none.
     inverse_area: f64,
-    /// Unit normal: the area-weighted mean over the triangles around it; zero if undefined.
-    normal: DVec3,
-}
-
-/// A triangle around a vertex. Its area times the gradient of its deformation is linear in the positions of its
-/// corners.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RestTriangle {
-    pub(super) points: [u32; 3],
-    /// Area times the gradients of the weights of the second and third corner.
-    pub(super) gradients: [DVec3; 2],
-    /// The unit normal times √(area ÷ 2).
-    pub(super) normal: DVec3,
+    /// The sum of the normals of the triangles around it, each as long as its triangle's area.
+    area_vector: DVec3,
 }
 
 /// No row.
@@ -98,28 +87,30 @@ impl SkinBinding {
     }
 
     /// Binds roots at `positions` to points of the surface.
-    fn new(points: &[[f32; 3]], triangles: &[[u32; 3]], surface: &[SurfacePoint], positions: Vec<DVec3>) -> Self {
-        let (mut vertices, row_of) = bound_vertices(points, triangles, surface);
+    fn new(points: &[[f32; 3]], faces: &[[u32; 3]], surface: &[SurfacePoint], positions: Vec<DVec3>) -> Self {
+        let (mut vertices, row_of) = bound_vertices(points, faces, surface);
         let is_bound = |corner: &u32| row_of[*corner as usize] != NONE;
-        let around: Vec<[u32; 3]> = triangles.iter().filter(|corners| corners.iter().any(is_bound)).copied().collect();
-        let rest = around.par_iter().with_min_len(TASK).map(|corners| RestTriangle::new(points, *corners));
-        let rest: Vec<RestTriangle> = rest.collect();
+        let around: Vec<[u32; 3]> = faces.iter().filter(|corners| corners.iter().any(is_bound)).copied().collect();
+        let simd = Path::chosen();
+        let blocks = around.par_chunks(LANES).with_min_len(TASK / LANES);
+        let (triangles, areas): (Vec<TriangleLanes>, Vec<[Area; LANES]>) =
+            blocks.map(|corners| TriangleLanes::new(simd, points, corners)).unzip();
 
         let rows = |corners: &[u32; 3]| corners.map(|corner| row_of[corner as usize]);
         let incident = link_incident(&mut vertices, around.iter().map(rows));
+        let areas = areas.as_flattened();
         for row in 0..vertices.len() {
-            let normals = incident[range(&vertices, row)].iter().map(|triangle| rest[*triangle as usize].area_vector());
-            let area: f64 = normals.clone().map(|normal| normal.norm()).sum();
+            let around = incident[range(&vertices, row)].iter().map(|triangle| areas[*triangle as usize]);
+            let area: f64 = around.clone().map(|(_, area)| area).sum();
             vertices[row].inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
-            vertices[row].normal = direction_or_zero(normals.fold(DVec3::zeros(), Add::add));
+            vertices[row].area_vector = around.map(|(vector, _)| vector).fold(DVec3::zeros(), Add::add);
         }
         let root = |(on, position): (&SurfacePoint, DVec3)| {
-            let offset = position - on.position(points, triangles);
-            BoundRoot { position, offset, vertices: rows(&triangles[on.triangle as usize]), weights: on.weights }
+            let offset = position - on.position(points, faces);
+            BoundRoot { position, offset, vertices: rows(&faces[on.triangle as usize]), weights: on.weights }
         };
         let roots: Vec<BoundRoot> = surface.iter().zip(positions).map(root).collect();
         let max_distance = roots.iter().map(|root| root.offset.norm()).fold(0.0, f64::max);
-        let triangles = rest.chunks(LANES).map(TriangleLanes::new).collect();
         Self { roots, vertices, incident, triangles, max_distance }
     }
 
@@ -152,7 +143,8 @@ impl SkinBinding {
 
     /// The skin's unit normal at each root, at rest; zero where it has none.
     pub fn normals(&self) -> Vec<DVec3> {
-        let normal = |vertex: u32| self.vertices[vertex as usize].normal;
+        let normals: Vec<DVec3> = self.vertices.iter().map(|vertex| direction_or_zero(vertex.area_vector)).collect();
+        let normal = |vertex: u32| normals[vertex as usize];
         self.roots.iter().map(|root| direction_or_zero(weighted(root.weights, root.vertices.map(normal)))).collect()
     }
 
@@ -164,24 +156,17 @@ impl SkinBinding {
         let simd = Path::chosen();
         let blocks = self.triangles.par_iter().with_min_len(TASK / LANES);
         let deformed: Vec<[Columns; LANES]> = blocks.map(|triangles| deformations(simd, triangles, now)).collect();
-        let vertices = (0..self.vertices.len()).into_par_iter().with_min_len(TASK).map(|row| {
-            let vertex = &self.vertices[row];
-            let mut gradient = [0.0; 9];
-            for triangle in &self.incident[range(&self.vertices, row)] {
-                for (sum, entry) in gradient.iter_mut().zip(&deformed.as_flattened()[*triangle as usize]) {
-                    *sum += entry * vertex.inverse_area;
-                }
-            }
-            (gradient, to_f64(now[vertex.point as usize]) - vertex.position)
-        });
-        let vertices: Vec<(Columns, DVec3)> = vertices.collect();
+        let rows = (0..self.vertices.len().div_ceil(LANES)).into_par_iter().with_min_len(TASK / LANES);
+        let motions = rows.map(|block| vertex_motions(simd, self, LANES * block, deformed.as_flattened(), now));
+        let motions: Vec<[VertexMotion; LANES]> = motions.collect();
+        let motions = motions.as_flattened();
         let rest = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
         let mut poses = vec![rest; self.roots.len()];
         let tasks = poses.par_chunks_mut(LANES).zip(self.roots.par_chunks(LANES)).with_min_len(TASK / LANES);
         tasks.for_each(|(poses, roots)| {
-            let rotations = nearest_rotations(simd, &gradients_at(roots, &vertices));
+            let rotations = nearest_rotations(simd, &gradients_at(simd, roots, motions));
             for ((pose, root), rotation) in poses.iter_mut().zip(roots).zip(rotations) {
-                let translations = root.vertices.map(|vertex| vertices[vertex as usize].1);
+                let translations = root.vertices.map(|vertex| motions[vertex as usize].displacement);
                 let translation = weighted(root.weights, translations);
                 let lost = rotation.is_none();
                 let rotation = rotation.unwrap_or_else(DQuat::identity);
@@ -193,11 +178,49 @@ impl SkinBinding {
     }
 }
 
-/// The gradient of deformation at up to sixteen roots, one a lane; 0 on lanes without one.
-fn gradients_at(roots: &[BoundRoot], vertices: &[(Columns, DVec3)]) -> [F64x16; 9] {
+/// How the skin around a vertex has moved since rest.
+#[derive(Clone, Copy)]
+struct VertexMotion {
+    /// The mean gradient of deformation.
+    gradient: Columns,
+    /// Of the vertex itself, metres.
+    displacement: DVec3,
+}
+
+kernel! {
+    /// The motions of sixteen vertices from row `first` on, given the deformation of each triangle and the skin's current
+    /// points `now`; zero where there is no vertex.
+    fn vertex_motions(binding: &SkinBinding, first: usize, deformed: &[Columns], now: &[[f32; 3]])
+        -> [VertexMotion; LANES] = motions;
+}
+
+#[inline(always)]
+fn motions(binding: &SkinBinding, first: usize, deformed: &[Columns], now: &[[f32; 3]]) -> [VertexMotion; LANES] {
+    let mut motions = [VertexMotion { gradient: [0.0; 9], displacement: DVec3::zeros() }; LANES];
+    for (motion, row) in motions.iter_mut().zip(first..binding.vertices.len()) {
+        let vertex = &binding.vertices[row];
+        for triangle in &binding.incident[range(&binding.vertices, row)] {
+            let deformed = &deformed[*triangle as usize];
+            for entry in 0..9 {
+                motion.gradient[entry] += deformed[entry] * vertex.inverse_area;
+            }
+        }
+        motion.displacement = to_f64(now[vertex.point as usize]) - vertex.position;
+    }
+    motions
+}
+
+kernel! {
+    /// The gradient of deformation at up to sixteen roots, one a lane; 0 on lanes without one.
+    fn gradients_at(roots: &[BoundRoot], motions: &[VertexMotion]) -> [F64x16; 9] = gradients;
+}
+
+#[inline(always)]
+fn gradients(roots: &[BoundRoot], motions: &[VertexMotion]) -> [F64x16; 9] {
     let mut lanes = [F64x16::ZERO; 9];
     for (lane, root) in roots.iter().enumerate() {
-        let [a, b, c] = root.vertices.map(|vertex| &vertices[vertex as usize].0);
+        let [a, b, c] = root.vertices;
+        let [a, b, c] = [&motions[a as usize].gradient, &motions[b as usize].gradient, &motions[c as usize].gradient];
         for entry in 0..9 {
             lanes[entry].0[lane] = weighted(root.weights, [a[entry], b[entry], c[entry]]);
         }
@@ -218,8 +241,8 @@ fn bound_vertices(
     let mut vertices = Vec::new();
     for (point, row) in row_of.iter_mut().enumerate().filter(|(_, row)| **row != NONE) {
         *row = vertices.len() as u32;
-        let (position, normal) = (to_f64(points[point]), DVec3::zeros());
-        vertices.push(BoundVertex { point: point as u32, position, incident_end: 0, inverse_area: 0.0, normal });
+        let (position, area_vector) = (to_f64(points[point]), DVec3::zeros());
+        vertices.push(BoundVertex { point: point as u32, position, incident_end: 0, inverse_area: 0.0, area_vector });
     }
     (vertices, row_of)
 }
@@ -246,31 +269,14 @@ fn link_incident(vertices: &mut [BoundVertex], corners: impl Iterator<Item = [u3
 }
 
 /// The range of `incident` that holds the triangles around a vertex.
+#[inline(always)]
 fn range(vertices: &[BoundVertex], row: usize) -> std::ops::Range<usize> {
     let start = row.checked_sub(1).map_or(0, |before| vertices[before].incident_end);
     start as usize..vertices[row].incident_end as usize
 }
 
-impl RestTriangle {
-    fn new(positions: &[[f32; 3]], points: [u32; 3]) -> Self {
-        let [a, b, c] = points.map(|point| to_f64(positions[point as usize]));
-        let twice_area = (b - a).cross(&(c - a));
-        let normal = direction_or_zero(twice_area);
-        let gradients = [normal.cross(&(a - c)), normal.cross(&(b - a))].map(|side| side * 0.5);
-        Self { points, gradients, normal: normal * (0.5 * twice_area.norm().sqrt()) }
-    }
-
-    /// The normal, with the area as its length.
-    fn area_vector(&self) -> DVec3 {
-        self.normal * (2.0 * self.normal.norm())
-    }
-}
-
 /// The weighted sum of three.
+#[inline(always)]
 fn weighted<T: Mul<f64, Output = T> + Add<Output = T>>([first, second, third]: [f64; 3], [a, b, c]: [T; 3]) -> T {
     a * first + b * second + c * third
-}
-
-fn direction_or_zero(v: DVec3) -> DVec3 {
-    direction(v).unwrap_or_else(DVec3::zeros)
 }

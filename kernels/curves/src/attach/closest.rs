@@ -10,6 +10,9 @@
 //!   close faces the one listed first is taken. A closest point that rounding put outside its face's box is moved into
 //!   it, so a box is never farther than its contents.
 //!
+//! A leaf of the hierarchy holds consecutive faces that are near each other, as in the usual mesh: building it for single
+//! faces took longer than searching it.
+//!
 //! Guarantees: the same bits on any number of threads; no panic for any position. Coordinates are f32, and f64 holds
 //! fourth powers of their differences. Limit: faces without area are ignored unless there are no others; faces with a
 //! non-finite corner always are.
@@ -23,14 +26,22 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::Triangle;
 use std::cell::Cell;
 
-/// Each box is enlarged by this fraction of its face's longest side, because parry splits by volume and a flat skin has
+/// Each leaf's box is enlarged by this fraction of its longest side, because parry splits by volume and a flat skin has
 /// none.
-const THICKENED: f64 = 1.0 / 16.0;
+const THICKENED: f64 = 1.0 / 256.0;
+
+/// Largest number of faces in a leaf.
+const LEAF_FACES: usize = 8;
+
+/// A leaf's longest side is at most this many times that of its first face.
+const LEAF_SPREAD: f64 = 3.0;
 
 /// The faces of a skin, to be searched.
 pub(super) struct ClosestFaces {
     /// In the order in which they are listed.
     faces: Vec<SortedFace>,
+    /// Index of the first face of each leaf, and the number of faces at the end.
+    leaf_starts: Vec<u32>,
     hierarchy: Bvh,
 }
 
@@ -40,7 +51,8 @@ struct SortedFace {
     triangle: u32,
     /// For each corner its position in the listed triangle.
     slots: [u8; 3],
-    corners: Triangle,
+    /// In f32, which takes half the memory.
+    corners: [[f32; 3]; 3],
 }
 
 /// The closest point so far.
@@ -66,13 +78,15 @@ impl ClosestFaces {
             let finite = corners.as_flattened().iter().all(|x| x.is_finite());
             finite.then(|| SortedFace::new(triangle as u32, corners))
         };
-        let mut faces: Vec<SortedFace> = triangles.iter().enumerate().filter_map(sorted).collect();
-        if faces.iter().any(SortedFace::has_area) {
-            faces.retain(SortedFace::has_area);
+        let finite = || triangles.iter().enumerate().filter_map(sorted);
+        let mut faces = Vec::with_capacity(triangles.len());
+        faces.extend(finite().filter(SortedFace::has_area));
+        if faces.is_empty() {
+            faces.extend(finite());
         }
-        let boxes: Vec<Aabb> = faces.iter().map(SortedFace::thickened_box).collect();
+        let (leaf_starts, boxes) = leaves(&faces);
         let hierarchy = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-        (!faces.is_empty()).then_some(Self { faces, hierarchy })
+        (!faces.is_empty()).then_some(Self { faces, leaf_starts, hierarchy })
     }
 
     /// The closest point to each root; the first corner of the first face for a root that is not finite.
@@ -95,16 +109,15 @@ impl ClosestFaces {
         let root = parry(to_f64(root));
         let best = Cell::new(self.faces[hint as usize].closest(hint, root));
         // A box or face exactly as far as the best so far is visited, as it may hold a face listed before it.
-        let box_distance = |node: &BvhNode, _| outside(node, root).length_squared().next_down();
-        let face_distance = |face: u32, _| {
-            let found = self.faces[face as usize].closest(face, root);
-            let so_far = best.get();
-            if found.square < so_far.square || (found.square == so_far.square && face < so_far.face) {
-                best.set(found);
+        let box_distance = |node: &BvhNode, _| outside(node.mins(), node.maxs(), root).length_squared().next_down();
+        let leaf_distance = |leaf: u32, _| {
+            let ends = [leaf, leaf + 1].map(|leaf| self.leaf_starts[leaf as usize]);
+            for face in ends[0]..ends[1] {
+                best.set(self.faces[face as usize].closer(face, root, best.get()));
             }
-            Some(found.square)
+            Some(best.get().square)
         };
-        self.hierarchy.find_best(best.get().square, box_distance, face_distance);
+        self.hierarchy.find_best(best.get().square, box_distance, leaf_distance);
         best.get()
     }
 
@@ -122,27 +135,50 @@ impl ClosestFaces {
 impl SortedFace {
     fn new(triangle: u32, corners: [[f32; 3]; 3]) -> Self {
         let mut slots = [0, 1, 2];
-        let order = |slot: u8| corners[usize::from(slot)].map(|x| x + 0.0);
-        slots.sort_by(|a, b| order(*a).partial_cmp(&order(*b)).unwrap_or(std::cmp::Ordering::Equal));
-        let [a, b, c] = slots.map(|slot| parry(to_f64(corners[usize::from(slot)])));
-        Self { triangle, slots, corners: Triangle::new(a, b, c) }
+        // A sorting network.
+        for [first, second] in [[0, 1], [1, 2], [0, 1]] {
+            let [a, b] = [slots[first], slots[second]].map(|slot: u8| corners[usize::from(slot)]);
+            // Without a branch, as it could not be predicted.
+            let swapped = usize::from(comes_before(b, a));
+            let pair = [slots[first], slots[second], slots[first]];
+            (slots[first], slots[second]) = (pair[swapped], pair[swapped + 1]);
+        }
+        Self { triangle, slots, corners: slots.map(|slot| corners[usize::from(slot)]) }
     }
 
     fn has_area(&self) -> bool {
-        self.corners.scaled_normal().length_squared() > 0.0
+        self.shape().scaled_normal().length_squared() > 0.0
     }
 
-    fn thickened_box(&self) -> Aabb {
-        let exact = self.corners.local_aabb();
-        let by = THICKENED * exact.extents().max_element();
-        Aabb::new(exact.mins - by, exact.maxs + by)
+    fn shape(&self) -> Triangle {
+        let [a, b, c] = self.corners.map(|corner| parry(to_f64(corner)));
+        Triangle::new(a, b, c)
+    }
+
+    fn exact_box(&self) -> Aabb {
+        let [a, b, c] = self.corners;
+        let least = |axis: usize| lesser(lesser(a[axis], b[axis]), c[axis]);
+        let most = |axis: usize| larger(larger(a[axis], b[axis]), c[axis]);
+        let [mins, maxs] = [[least(0), least(1), least(2)], [most(0), most(1), most(2)]].map(|p| parry(to_f64(p)));
+        Aabb::new(mins, maxs)
+    }
+
+    /// The closest point to `root` if it replaces `so_far`, otherwise `so_far`; `face` is the index of this face.
+    fn closer(&self, face: u32, root: Vector, so_far: Candidate) -> Candidate {
+        let Aabb { mins, maxs } = self.exact_box();
+        if outside(mins, maxs, root).length_squared() > so_far.square {
+            return so_far;
+        }
+        let found = self.closest(face, root);
+        let replaces = found.square < so_far.square || (found.square == so_far.square && face < so_far.face);
+        if replaces { found } else { so_far }
     }
 
     /// The closest point to `root`; `face` is the index of this face.
     fn closest(&self, face: u32, root: Vector) -> Candidate {
-        let (projected, location) = self.corners.project_local_point_and_get_location(root, true);
-        let Triangle { a, b, c } = self.corners;
-        let point = projected.point.clamp(a.min(b).min(c), a.max(b).max(c));
+        let (projected, location) = self.shape().project_local_point_and_get_location(root, true);
+        let Aabb { mins, maxs } = self.exact_box();
+        let point = projected.point.clamp(mins, maxs);
         let weights = location.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
         Candidate { square: (point - root).length_squared(), face, weights: proper(weights) }
     }
@@ -158,9 +194,50 @@ fn proper(weights: [f64; 3]) -> [f64; 3] {
     if sum > 0.0 { clamped.map(|weight| weight / sum) } else { [1.0, 0.0, 0.0] }
 }
 
-/// How far `p` is outside of a node's box, axis by axis.
-fn outside(node: &BvhNode, p: Vector) -> Vector {
-    (node.mins() - p).max(p - node.maxs()).max(Vector::ZERO)
+/// How far `p` is outside of a box, axis by axis.
+fn outside(mins: Vector, maxs: Vector, p: Vector) -> Vector {
+    (mins - p).max(p - maxs).max(Vector::ZERO)
+}
+
+/// Where each leaf's faces start, with the number of faces at the end, and the leaves' boxes.
+fn leaves(faces: &[SortedFace]) -> (Vec<u32>, Vec<Aabb>) {
+    let (mut starts, mut boxes) = (Vec::new(), Vec::<Aabb>::new());
+    // The longest that the last leaf's sides may get.
+    let mut limit = 0.0;
+    for (index, face) in faces.iter().enumerate() {
+        let own = face.exact_box();
+        let fits = |joined: &Aabb, start: u32| {
+            index - (start as usize) < LEAF_FACES && joined.extents().max_element() <= limit
+        };
+        let joined = boxes.last().map(|leaf| Aabb::new(leaf.mins.min(own.mins), leaf.maxs.max(own.maxs)));
+        match joined.zip(starts.last()).filter(|(joined, start)| fits(joined, **start)) {
+            Some((joined, _)) => *boxes.last_mut().expect("it has been joined") = joined,
+            None => {
+                starts.push(index as u32);
+                limit = LEAF_SPREAD * own.extents().max_element();
+                boxes.push(own);
+            }
+        }
+    }
+    starts.push(faces.len() as u32);
+    let thickened = |exact: Aabb| {
+        let by = THICKENED * exact.extents().max_element();
+        Aabb::new(exact.mins - by, exact.maxs + by)
+    };
+    (starts, boxes.into_iter().map(thickened).collect())
+}
+
+/// The order of corners: by x, then y, then z.
+fn comes_before(a: [f32; 3], b: [f32; 3]) -> bool {
+    if a[0] == b[0] { (a[1], a[2]) < (b[1], b[2]) } else { a[0] < b[0] }
+}
+
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 fn parry(v: DVec3) -> Vector {
@@ -261,6 +338,20 @@ mod tests {
                 });
                 assert!((both[0] - both[1]).norm() < 1e-15);
             }
+        }
+    }
+
+    #[test]
+    fn neighbours_that_are_listed_together_share_a_leaf_and_are_found_as_if_they_did_not() {
+        let (points, together) = sphere();
+        let count = together.len();
+        let apart: Vec<[u32; 3]> = (0..count).map(|k| together[k * 101 % count]).collect();
+        let leaves = |triangles: &[[u32; 3]]| ClosestFaces::new(&points, triangles).unwrap().leaf_starts.len() - 1;
+        assert!(leaves(&together) < count / 4 && leaves(&apart) > count / 2, "{count} {}", leaves(&together));
+        let roots = some_roots(200);
+        let [listed, mixed] = [&together, &apart].map(|faces| found(&(points.clone(), faces.clone()), &roots));
+        for (listed, mixed) in listed.iter().zip(mixed) {
+            assert_eq!(listed.position(&points, &together), mixed.position(&points, &apart));
         }
     }
 
