@@ -136,10 +136,14 @@ impl CellRows {
     }
 
     /// Where the value of a cell is; `None` where it is not stored.
-    pub fn find(&self, [x, y, z]: Cell) -> Option<usize> {
+    pub fn find(&self, cell: Cell) -> Option<usize> {
+        self.span_of(cell).map(|span| span.at(cell[0]))
+    }
+
+    /// The span that holds a cell.
+    pub fn span_of(&self, [x, y, z]: Cell) -> Option<&RowSpan> {
         let row = self.row(y, z);
-        let span = row.get(row.partition_point(|span| span.end <= x))?;
-        span.contains(x).then(|| span.at(x))
+        row.get(row.partition_point(|span| span.end <= x)).filter(|span| span.contains(x))
     }
 
     /// The rows that hold cells, with y and z, in the order of fields.
@@ -344,8 +348,7 @@ impl<'a> Finder<'a> {
 
     #[inline(never)]
     fn find_span(&mut self, [x, y, z]: Cell) -> Option<usize> {
-        let row = self.rows.row(y, z);
-        let span = row.get(row.partition_point(|span| span.end <= x)).filter(|span| span.contains(x))?;
+        let span = self.rows.span_of([x, y, z])?;
         self.last[(y & 3 | (z & 3) << 2) as usize] = ([y, z], *span);
         Some(span.at(x))
     }

@@ -15,11 +15,12 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, to_f64};
 use numerics::volume;
 use rayon::prelude::*;
 
 use crate::level_set::PhiView;
+use crate::rows::Cell;
 use cubes::Cubes;
 
 /// A closed mesh of quads, in cells.
@@ -47,23 +48,34 @@ pub enum Placement {
 /// # Panics
 /// Where the vertices are more than a `u32` counts.
 pub fn extract(view: PhiView<'_>, placement: Placement) -> QuadMesh {
+    extract_with(view, placement, |_, _| ()).0
+}
+
+/// The mesh, and what `of` makes of the cells inside and outside that each quad separates.
+pub(crate) fn extract_with<T: Send>(
+    view: PhiView<'_>,
+    placement: Placement,
+    of: impl Fn(Cell, Cell) -> T + Sync,
+) -> (QuadMesh, Vec<T>) {
     let cubes = Cubes::find(view);
     let project = placement == Placement::Projected;
     let slabs: Vec<_> = (0..cubes.slabs.len())
         .into_par_iter()
-        .map(|slab| (place::vertices(view, &cubes, slab, project), quads::quads(&cubes, slab)))
+        .map(|slab| (place::vertices(view, &cubes, slab, project), quads::quads(&cubes, slab, &of)))
         .collect();
-    let mut mesh = QuadMesh::default();
-    let count = slabs.iter().fold([0, 0], |[a, b], (vertices, quads)| [a + vertices.len(), b + quads.len()]);
+    let (mut mesh, mut all_made) = (QuadMesh::default(), Vec::new());
+    let count = slabs.iter().fold([0, 0], |[a, b], (vertices, (quads, _))| [a + vertices.len(), b + quads.len()]);
     mesh.points.reserve_exact(count[0]);
     mesh.normals.reserve_exact(count[0]);
     mesh.quads.reserve_exact(count[1]);
-    for (vertices, quads) in slabs {
+    all_made.reserve_exact(count[1]);
+    for (vertices, (quads, made)) in slabs {
         mesh.points.extend(vertices.iter().map(|(point, _)| *point));
         mesh.normals.extend(vertices.iter().map(|(_, normal)| *normal));
         mesh.quads.extend(quads);
+        all_made.extend(made);
     }
-    mesh
+    (mesh, all_made)
 }
 
 /// Terms of a sum that one thread adds up.
@@ -73,22 +85,24 @@ impl QuadMesh {
     /// The volume inside, in cells.
     pub fn volume(&self) -> f64 {
         let Some(origin) = self.points.first() else { return 0.0 };
-        let corner = |at: u32| self.points[at as usize];
-        let twice = |[a, b, c, d]: [u32; 4]| {
-            let [a, b, c, d] = [a, b, c, d].map(corner);
-            volume::six_volumes([*origin, a, b, c]) + volume::six_volumes([*origin, a, c, d])
-        };
-        self.sum(twice) / 6.0
+        self.sum(|quad| self.six_volumes(*origin, quad)) / 6.0
+    }
+
+    /// Six times the volume of the two tets from a point to the halves of a quad.
+    pub(crate) fn six_volumes(&self, from: Vec3, quad: [u32; 4]) -> f64 {
+        let [a, b, c, d] = quad.map(|at| self.points[at as usize]);
+        volume::six_volumes([from, a, b, c]) + volume::six_volumes([from, a, c, d])
     }
 
     /// The area, in squares of a cell's side.
     pub fn area(&self) -> f64 {
-        let corner = |at: u32| numerics::vector::to_f64(self.points[at as usize]);
-        let twice = |[a, b, c, d]: [u32; 4]| {
-            let [a, b, c, d] = [a, b, c, d].map(corner);
-            (b - a).cross(&(c - a)).norm() + (c - a).cross(&(d - a)).norm()
-        };
-        self.sum(twice) / 2.0
+        self.sum(|quad| self.twice_area(quad)) / 2.0
+    }
+
+    /// Twice the area of a quad.
+    pub(crate) fn twice_area(&self, quad: [u32; 4]) -> f64 {
+        let [a, b, c, d] = quad.map(|at| to_f64(self.points[at as usize]));
+        (b - a).cross(&(c - a)).norm() + (c - a).cross(&(d - a)).norm()
     }
 
     fn sum(&self, of: impl Fn([u32; 4]) -> f64 + Sync) -> f64 {

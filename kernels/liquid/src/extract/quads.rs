@@ -2,11 +2,13 @@
 
 use super::cubes::{Cube, Cubes};
 use super::table::table;
+use crate::rows::Cell;
 
-/// The quads of the edges that start at the first corners of a slab's cubes, counter-clockwise seen from outside.
-pub(super) fn quads(cubes: &Cubes, slab: usize) -> Vec<[u32; 4]> {
+/// The quads of the edges that start at the first corners of a slab's cubes, counter-clockwise seen from outside, and what
+/// `of` makes of the cells inside and outside that each separates.
+pub(super) fn quads<T>(cubes: &Cubes, slab: usize, of: impl Fn(Cell, Cell) -> T) -> (Vec<[u32; 4]>, Vec<T>) {
     let z = cubes.low[1] + slab as i32;
-    let mut out = Vec::with_capacity(cubes.slabs[slab].vertices.len());
+    let (mut out, mut made) = (Vec::with_capacity(cubes.slabs[slab].vertices.len()), Vec::new());
     for (y, row) in cubes.rows(slab) {
         let mut near = Near::new([row, cubes.row(y - 1, z), cubes.row(y, z - 1), cubes.row(y - 1, z - 1)]);
         for cube in row {
@@ -15,12 +17,16 @@ pub(super) fn quads(cubes: &Cubes, slab: usize) -> Vec<[u32; 4]> {
                 let inside = cube.inside(0);
                 if inside != cube.inside(1 << axis) {
                     let [a, b, c, d] = near.around(axis);
+                    let first = [cube.x, y, z];
+                    let mut second = first;
+                    second[axis] += 1;
                     out.push(if inside { [a, b, c, d] } else { [d, c, b, a] });
+                    made.push(if inside { of(first, second) } else { of(second, first) });
                 }
             }
         }
     }
-    out
+    (out, made)
 }
 
 /// The cubes around those of a row: in the row itself, one before along y, along z, and along both.

@@ -142,6 +142,14 @@ impl LevelSet {
         self.store(&rows, phi, 0);
     }
 
+    /// Lowers φ of each stored cell by one of `by`, less than the width of a cell, and makes it a distance again.
+    pub(crate) fn lower(&mut self, by: &[f32]) {
+        for (phi, by) in self.phi.iter_mut().zip(by) {
+            *phi -= by;
+        }
+        self.fill();
+    }
+
     /// Makes φ a distance again: kept at the cells next to the surface, at most 1 there; elsewhere by the eikonal equation.
     pub fn fill(&mut self) {
         self.copy_to_walls();

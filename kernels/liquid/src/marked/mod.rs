@@ -9,10 +9,14 @@ mod tests;
 use numerics::vector::{Vec3, scale};
 use serde::{Deserialize, Serialize};
 
+use crate::extract::{Placement, QuadMesh, extract};
 use crate::level_set::{BAND, Flow, LevelSet, PhiView};
 use crate::markers::Markers;
 use crate::rows::{Cell, CellRows};
 use crate::step::{Domain, Moving, Surface};
+
+/// The distance from a solid, in solver cells, negative inside, of a place in them.
+pub type SolidDistance<'a> = &'a (dyn Fn(Vec3) -> f32 + Sync);
 
 /// A level set and its markers, moved together.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -63,6 +67,41 @@ impl MarkedSurface {
     /// Surface cells along the side of a solver cell.
     pub fn resolution(&self) -> u32 {
         self.resolution as u32
+    }
+
+    /// The surface where it is not in a solid, as a mesh in surface cells.
+    pub fn mesh(&self, solid: Option<SolidDistance<'_>>) -> QuadMesh {
+        let clipped = solid.map(|solid| self.phi_outside(solid));
+        extract(self.view_of(clipped.as_deref()), Placement::Projected)
+    }
+
+    /// φ of surface cells, positive in a solid.
+    pub(crate) fn phi_outside(&self, solid: SolidDistance<'_>) -> Vec<f32> {
+        let (size, phi) = (self.resolution as f32, self.set.phi());
+        let outside = |cell: Cell| size * solid(cell.map(|x| (x as f32 + 0.5) / size));
+        let [clipped] = self.set.rows().tabulate_with(
+            || (),
+            |(), cell, at| [if phi[at] < BAND { phi[at].max(-outside(cell)).min(BAND) } else { BAND }],
+        );
+        clipped
+    }
+
+    /// The surface cells with another φ, where there is one.
+    pub(crate) fn view_of<'a>(&'a self, phi: Option<&'a [f32]>) -> PhiView<'a> {
+        let view = self.set.view();
+        PhiView { phi: phi.unwrap_or(view.phi), ..view }
+    }
+
+    /// The markers, to say which pieces they are on.
+    pub(crate) fn markers_mut(&mut self) -> &mut Markers {
+        &mut self.markers
+    }
+
+    /// Moves the surface outward: by how many surface cells at each stored cell and at each marker.
+    pub(crate) fn shift(&mut self, cells: &[f32], markers: &[f32]) {
+        self.set.lower(cells);
+        self.markers.shift(markers);
+        self.restrict();
     }
 
     /// The domain in solver cells.

@@ -19,6 +19,9 @@ const STRAIGHT: f32 = 0.9;
 const OPPOSITE: f32 = -0.5;
 /// Length of the mean of unit normals from which the surface is smooth there.
 const SMOOTH: f32 = 0.97;
+/// Depth of φ, as the flow carried it, from which markers do not make a cell air. They are left over from surfaces that
+/// met: liquid around would fill that air, lose its volume, and the markers bring it back each step.
+const INSIDE: f32 = 0.2;
 /// Distance up to which markers show where the surface ends.
 const AROUND: f32 = 1.5;
 
@@ -45,7 +48,8 @@ pub(super) fn correct(set: &mut LevelSet, markers: &[Marker], reach: f32) {
                 }
                 let near = rows.map(|row| &sorted[first[row + n - 1] as usize..first[row + n + 1] as usize]);
                 let centre = [x + n as i32, y, z].map(|x| x as f32 + 0.5);
-                if let Some(distance) = surface_distance(centre, near) {
+                let is_liquid = *value < -INSIDE;
+                if let Some(distance) = surface_distance(centre, near).filter(|far| !is_liquid || *far <= 0.0) {
                     *value = distance;
                 }
             }

@@ -57,10 +57,15 @@ pub struct Markers {
     pub ids: Vec<u64>,
     /// Numbers that ride on the markers, one list each.
     pub attributes: Vec<Vec<f32>>,
+    /// The piece of the liquid that each was on when [`crate::volumes`] last looked; [`NO_PIECE`] for newer ones.
+    pieces: Vec<u32>,
     next_id: u64,
     steps: u64,
     seed: u64,
 }
+
+/// No piece of the liquid.
+pub(crate) const NO_PIECE: u32 = u32::MAX;
 
 /// Markers that a cell on the surface gets.
 const PER_CELL: usize = 3;
@@ -83,9 +88,34 @@ impl Markers {
     /// Markers on the surface of a level set, with as many attributes as `attributes`, all 0.
     pub fn new(set: &LevelSet, attributes: usize, seed: u64) -> Self {
         let attributes = vec![Vec::new(); attributes];
-        let mut markers = Self { markers: Vec::new(), ids: Vec::new(), attributes, next_id: 0, steps: 0, seed };
+        let (markers, ids, pieces) = (Vec::new(), Vec::new(), Vec::new());
+        let mut markers = Self { markers, ids, attributes, pieces, next_id: 0, steps: 0, seed };
         markers.fill_holes(set);
         markers
+    }
+
+    /// The piece that each was on.
+    pub(crate) fn pieces(&self) -> &[u32] {
+        &self.pieces
+    }
+
+    /// Says which piece each is on.
+    pub(crate) fn set_pieces(&mut self, pieces: Vec<u32>) {
+        assert_eq!(pieces.len(), self.markers.len(), "one piece for each marker");
+        self.pieces = pieces;
+    }
+
+    /// Drops markers of which `keep` is false.
+    pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        let order: Vec<u32> = (0..self.markers.len()).filter(|n| keep(*n)).map(|n| n as u32).collect();
+        self.reorder(&order);
+    }
+
+    /// Moves marker n along its normal by `by[n]` cells.
+    pub(crate) fn shift(&mut self, by: &[f32]) {
+        for (marker, by) in self.markers.iter_mut().zip(by) {
+            marker.point = add(marker.point, scale(marker.normal, *by));
+        }
     }
 
     /// One step of the surface: moves the level set and the markers by `flow`, which moves nothing farther than `reach`
@@ -171,6 +201,7 @@ impl Markers {
         }
         self.markers = pick(order, &self.markers);
         self.ids = pick(order, &self.ids);
+        self.pieces = pick(order, &self.pieces);
         self.attributes = self.attributes.iter().map(|values| pick(order, values)).collect();
     }
 
@@ -184,6 +215,7 @@ impl Markers {
         }
         self.ids.extend(self.next_id..self.next_id + new.len() as u64);
         self.next_id += new.len() as u64;
+        self.pieces.resize(self.pieces.len() + new.len(), NO_PIECE);
         self.markers.extend(new);
     }
 }

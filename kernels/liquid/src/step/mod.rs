@@ -212,6 +212,11 @@ impl<S: Surface> Liquid<S> {
         &self.surface
     }
 
+    /// The surface, to change it between frames: liquid where there was none gets the velocity of what is around it.
+    pub fn surface_mut(&mut self) -> &mut S {
+        &mut self.surface
+    }
+
     /// The velocity and what else the next substep starts from.
     pub fn motion(&self) -> &Motion {
         &self.motion

@@ -1,0 +1,312 @@
+//! The volume of each piece of a liquid, kept: how much it should have follows it where it splits and merges, and its
+//! surface is moved until the mesh encloses that.
+//!
+//! A piece is liquid that the mesh does not part; bubbles belong to the piece around them. Markers tell where its liquid
+//! went: pieces that merge add up their targets, and one that splits shares its target by what the parts enclose. A piece
+//! that got too small for the grid is lost, with its target, to whoever carries it on.
+//!
+//! Promise: targets, lost pieces and what waits to be added make up all that there was at the start and was added since;
+//! a piece within [`LEAST_ERROR`] of its target is not touched; no surface moves farther than [`CAP`] in a frame; the bits
+//! are the same on any number of threads. Limit: liquid that goes from one piece to another and parts again within a frame
+//! is not noticed.
+
+mod follow;
+mod pieces;
+#[cfg(test)]
+mod tests;
+
+use std::mem::take;
+
+use numerics::vector::{Vec3, add, length, scale, sub};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::level_set::floor;
+use crate::marked::{MarkedSurface, SolidDistance};
+use crate::markers::NO_PIECE;
+use follow::{Passage, passages, passed_on};
+use pieces::{Measured, Pieces};
+
+/// Error of a piece's volume ÷ its target up to which its surface stays.
+pub const LEAST_ERROR: f64 = 1e-5;
+/// The farthest that a surface is moved in a frame, in surface cells.
+pub const CAP: f64 = 0.1;
+/// Times that a surface is moved in a frame, at most, each at most half as far as the one before.
+const PASSES: u32 = 4;
+/// Distance, in surface cells, from which liquid that is added belongs to no piece.
+const BESIDE: f32 = 4.0;
+
+/// How much a piece should enclose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PieceTarget {
+    /// m³.
+    pub volume: f64,
+    /// What its mesh enclosed when it was last measured, m³.
+    pub measured: f64,
+    /// The mean of its cells then, in solver cells.
+    pub place: Vec3,
+}
+
+/// A piece that the grid no longer shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LostPiece {
+    /// Its target, m³.
+    pub volume: f64,
+    /// Where it was last seen, in solver cells.
+    pub place: Vec3,
+}
+
+/// Liquid that came or went.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Change {
+    /// m³.
+    volume: f64,
+    /// In solver cells; everywhere where `None`.
+    at: Option<Vec3>,
+}
+
+/// What a frame's correction found and left.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VolumeReport {
+    /// Volume of the mesh, m³.
+    pub volume: f64,
+    /// The targets of all pieces, m³.
+    pub target: f64,
+    /// Error of the volume ÷ target.
+    pub drift: f64,
+    /// What the drift would be if no surface had ever been moved here.
+    pub raw_drift: f64,
+    /// Pieces.
+    pub pieces: usize,
+    /// The largest error of a piece's volume, m³.
+    pub worst: f64,
+    /// The farthest that a surface was moved, in surface cells.
+    pub moved: f64,
+    /// Pieces that vanished.
+    pub lost: Vec<LostPiece>,
+}
+
+/// How much each piece of a liquid should enclose. Kept exactly by any format that keeps numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VolumeTargets {
+    /// The side of a solver cell, m.
+    cell: f64,
+    pieces: Vec<PieceTarget>,
+    changes: Vec<Change>,
+    /// What moving surfaces has added so far, m³.
+    corrected: f64,
+}
+
+impl VolumeTargets {
+    /// Targets that are what each piece of a surface encloses outside a solid. `cell` is the side of a solver cell, m.
+    pub fn new(surface: &mut MarkedSurface, cell: f64, solid: Option<SolidDistance<'_>>) -> Self {
+        let found = Pieces::new(surface, solid);
+        let now = marked(surface, &found);
+        surface.markers_mut().set_pieces(now);
+        let mut targets = Self { cell, pieces: Vec::new(), changes: Vec::new(), corrected: 0.0 };
+        let unit = targets.unit(surface);
+        targets.set(surface, &found, found.all.iter().map(|piece| unit * piece.volume));
+        targets
+    }
+
+    /// Adds to what pieces should enclose, or takes from it where `volume`, m³, is negative: that of the piece around a
+    /// place in solver cells, or of all pieces in proportion. Counts from the next correction on. What is added far from
+    /// any piece waits for one.
+    pub fn add(&mut self, volume: f64, at: Option<Vec3>) {
+        self.changes.push(Change { volume, at });
+    }
+
+    /// The pieces as of the last correction, in the order of their first cells.
+    pub fn pieces(&self) -> &[PieceTarget] {
+        &self.pieces
+    }
+
+    /// What was added and waits for a piece, m³.
+    pub fn waiting(&self) -> f64 {
+        self.changes.iter().fold(0.0, |sum, change| sum + change.volume)
+    }
+
+    /// Follows the pieces of a surface that has moved, and moves it so that each encloses its target; once a frame. The
+    /// solid is where it is at the end of the frame.
+    pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> VolumeReport {
+        let unit = self.unit(surface);
+        let (mut found, mut lost) = self.follow(surface, solid);
+        let (mut cap, mut moved) = (0.5 * CAP, 0.0);
+        for _ in 0..PASSES {
+            let by: Vec<f64> = found
+                .all
+                .iter()
+                .zip(&self.pieces)
+                .map(|(piece, target)| shift(piece, target.volume / unit, cap))
+                .collect();
+            let farthest = by.iter().fold(0.0_f64, |most, by| most.max(by.abs()));
+            if farthest == 0.0 {
+                break;
+            }
+            let before = found.volume();
+            let by: Vec<f32> = by.iter().map(|by| *by as f32).collect();
+            found.shift(surface, &by);
+            let (now, vanished) = self.follow(surface, solid);
+            self.corrected += unit * (now.volume() - before);
+            // What vanished by a shift was not lost by the solver.
+            self.corrected += vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
+            lost.extend(vanished);
+            (found, cap, moved) = (now, 0.5 * cap, moved + farthest);
+        }
+        self.report(&found, unit, moved, lost)
+    }
+
+    fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
+        let volume = unit * found.volume();
+        let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume);
+        let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume);
+        let share = |error: f64| if target > 0.0 { error / target } else { 0.0 };
+        VolumeReport {
+            volume,
+            target,
+            drift: share(volume - target),
+            raw_drift: share(volume - self.corrected - target),
+            pieces: found.all.len(),
+            worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
+            moved,
+            lost,
+        }
+    }
+
+    /// The volume of a surface cell, m³.
+    fn unit(&self, surface: &MarkedSurface) -> f64 {
+        let cell = self.cell / f64::from(surface.resolution());
+        cell * cell * cell
+    }
+
+    /// Gives each piece its target, m³.
+    fn set(&mut self, surface: &MarkedSurface, found: &Pieces, targets: impl IntoIterator<Item = f64>) {
+        let (unit, size) = (self.unit(surface), 1.0 / surface.resolution() as f32);
+        let piece = |(piece, volume): (&Measured, f64)| PieceTarget {
+            volume,
+            measured: unit * piece.volume,
+            place: scale(piece.place, size),
+        };
+        self.pieces = found.all.iter().zip(targets).map(piece).collect();
+    }
+
+    /// Finds the pieces and passes the targets on to them; returns them and the old ones that are in none.
+    fn follow(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> (Pieces, Vec<LostPiece>) {
+        let found = Pieces::new(surface, solid);
+        let now = marked(surface, &found);
+        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
+        let mut passages = passages(surface.markers().pieces(), &now);
+        let unknown = self.newcomers(surface, &found, &mut passages);
+        let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.volume).collect();
+        let volumes: Vec<f64> = found.all.iter().map(|piece| unit * piece.volume).collect();
+        let mut shares = passed_on(&targets, &passages, &volumes);
+        unknown.into_iter().for_each(|piece| shares[piece] = volumes[piece]);
+        let mut is_lost = vec![true; self.pieces.len()];
+        passages.iter().for_each(|passage| is_lost[passage.old] = false);
+        let mut lost = self.lost(surface, &is_lost);
+        self.apply(&found, &mut shares, &mut lost, size);
+        let on_lost = |old: &u32| is_lost.get(*old as usize).is_some_and(|is_lost| *is_lost);
+        let drop: Vec<bool> = surface.markers().pieces().iter().map(on_lost).collect();
+        surface.markers_mut().set_pieces(now);
+        if drop.contains(&true) {
+            // φ must not be made from them again.
+            surface.markers_mut().retain(|n| !drop[n]);
+        }
+        self.set(surface, &found, shares);
+        lost.retain(|piece| piece.volume > 0.0);
+        (found, lost)
+    }
+
+    /// Adds passages for pieces that no marker was on: from the piece that most markers around were on. Returns those that
+    /// are of unknown origin. Pieces beside which something was added need none.
+    fn newcomers(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) -> Vec<usize> {
+        let size = surface.resolution() as f32;
+        let mut has_origin = vec![false; found.all.len()];
+        passages.iter().for_each(|passage| has_origin[passage.new] = true);
+        for change in self.changes.iter().filter(|change| change.volume > 0.0) {
+            let closest = change.at.and_then(|at| found.closest(scale(at, size)));
+            if let Some((piece, _)) = closest.filter(|(_, distance)| *distance < BESIDE) {
+                has_origin[piece] = true;
+            }
+        }
+        let mut unknown = Vec::new();
+        for new in (0..found.all.len()).filter(|piece| !has_origin[*piece]) {
+            let around = found.cells_around(new, BESIDE as i32);
+            let mut votes = vec![0; self.pieces.len()];
+            let markers = surface.markers();
+            for (marker, old) in markers.markers.iter().zip(markers.pieces()) {
+                if *old != NO_PIECE && around.find(marker.point.map(floor)).is_some() {
+                    votes[*old as usize] += 1;
+                }
+            }
+            match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
+                Some(old) => passages.push(Passage { old, new, markers: 1 }),
+                None => unknown.push(new),
+            }
+        }
+        unknown
+    }
+
+    /// The old pieces that are in no new one, where their markers are now.
+    fn lost(&self, surface: &MarkedSurface, is_lost: &[bool]) -> Vec<LostPiece> {
+        let size = 1.0 / surface.resolution() as f32;
+        let markers = surface.markers();
+        let lost = |(old, piece): (usize, &PieceTarget)| {
+            let own = markers.markers.iter().zip(markers.pieces()).filter(|(_, of)| **of as usize == old);
+            let (sum, count) = own.fold(([0.0; 3], 0.0), |(sum, n), (marker, _)| (add(sum, marker.point), n + 1.0));
+            let place = if count > 0.0 { scale(sum, size / count) } else { piece.place };
+            LostPiece { volume: piece.volume, place }
+        };
+        self.pieces.iter().enumerate().filter(|(old, _)| is_lost[*old]).map(lost).collect()
+    }
+
+    /// Adds what came and takes what went, also from pieces that vanished where it went.
+    fn apply(&mut self, found: &Pieces, shares: &mut [f64], lost: &mut [LostPiece], size: f32) {
+        let mut everywhere = 0.0;
+        for change in take(&mut self.changes) {
+            let Some(at) = change.at else {
+                everywhere += change.volume;
+                continue;
+            };
+            let closest = found.closest(scale(at, size));
+            let away = closest.map_or(f32::INFINITY, |(_, distance)| distance / size);
+            let vanished = lost.iter_mut().find(|piece| length(sub(piece.place, at)) < away);
+            match (vanished, closest) {
+                (Some(piece), _) if change.volume < 0.0 => everywhere += change_by(&mut piece.volume, change.volume),
+                (_, Some((piece, distance))) if change.volume < 0.0 || distance < BESIDE => {
+                    everywhere += change_by(&mut shares[piece], change.volume);
+                }
+                _ => self.changes.push(change),
+            }
+        }
+        let sum = shares.iter().fold(0.0, |sum, share| sum + share);
+        let spread = if sum > 0.0 { everywhere.max(-sum) } else { 0.0 };
+        if spread != 0.0 {
+            shares.iter_mut().for_each(|share| *share *= 1.0 + spread / sum);
+        }
+        if spread != everywhere {
+            self.changes.push(Change { volume: everywhere - spread, at: None });
+        }
+    }
+}
+
+/// Adds to a volume, which stays at 0 or above; returns what could not be taken from it.
+fn change_by(volume: &mut f64, by: f64) -> f64 {
+    let sum = *volume + by;
+    *volume = sum.max(0.0);
+    sum.min(0.0)
+}
+
+/// How far outward, in surface cells, the surface of a piece has to move; at most `cap`.
+fn shift(piece: &Measured, target: f64, cap: f64) -> f64 {
+    let error = target - piece.volume;
+    if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
+        return 0.0;
+    }
+    (error / piece.area).clamp(-cap, cap)
+}
+
+/// The piece of each marker.
+fn marked(surface: &MarkedSurface, found: &Pieces) -> Vec<u32> {
+    surface.markers().markers.par_iter().map(|marker| found.of_marker(marker)).collect()
+}

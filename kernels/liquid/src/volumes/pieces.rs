@@ -1,0 +1,233 @@
+//! The pieces of a liquid and their volumes, from its mesh.
+
+use std::f32::consts::FRAC_1_SQRT_2;
+
+use numerics::vector::{Vec3, dot, length, sub};
+use rayon::prelude::*;
+
+use crate::extract::{Placement, QuadMesh, extract_with};
+use crate::level_set::{PhiView, floor};
+use crate::marked::{MarkedSurface, SolidDistance};
+use crate::markers::{Marker, NO_PIECE};
+use crate::rows::{Cell, CellRows, Finder, RowSpan};
+use crate::sets::Sets;
+
+/// Distance, in cells, up to which φ moves with a shift; beyond, it is made anew from there.
+const NEAR: f32 = 3.0;
+/// Steps down the slope of φ to the piece that it belongs to.
+const DESCENT: usize = 5;
+
+/// A piece as it was measured, in surface cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Measured {
+    /// What its surface encloses, without its bubbles.
+    pub(super) volume: f64,
+    /// The area of its surface, bubbles included, walls and solids not.
+    pub(super) area: f64,
+    /// The mean of its cells.
+    pub(super) place: Vec3,
+}
+
+/// All pieces: cells inside that share a face are of one piece, and so are those along one closed surface.
+pub(super) struct Pieces {
+    pub(super) all: Vec<Measured>,
+    inside: CellRows,
+    /// At the first cell of each span of `inside`, its piece.
+    of_span: Vec<u32>,
+    /// φ outside solids, where there are any.
+    clipped: Option<Vec<f32>>,
+}
+
+/// What a quad lies on.
+#[derive(Clone, Copy)]
+struct Side {
+    /// The first cell, in `inside`, of the span behind it.
+    span: u32,
+    /// Whether it is neither on a wall nor on a solid.
+    is_free: bool,
+}
+
+impl Pieces {
+    /// The pieces of what is not in a solid.
+    pub(super) fn new(surface: &MarkedSurface, solid: Option<SolidDistance<'_>>) -> Self {
+        let clipped = solid.map(|solid| surface.phi_outside(solid));
+        let (view, whole) = (surface.view_of(clipped.as_deref()), surface.view_of(None));
+        let inside = view.rows.filtered(|_, at| view.phi[at] < 0.0).clipped(view.low, view.high);
+        let is_free = |cell: Cell| contains(view, cell) && whole.rows.find(cell).is_none_or(|at| whole.phi[at] >= 0.0);
+        let (mesh, sides) = extract_with(view, Placement::Projected, |inner, outer| Side {
+            span: inside.span_of(inner).map_or(0, |span| span.base),
+            is_free: is_free(outer),
+        });
+        let (of_span, count) = numbered(&inside, &mesh, &sides);
+        let all = measured(&inside, &of_span, count, &mesh, &sides);
+        Self { all, inside, of_span, clipped }
+    }
+
+    /// The volume of all, in surface cells.
+    pub(super) fn volume(&self) -> f64 {
+        self.all.iter().fold(0.0, |sum, piece| sum + piece.volume)
+    }
+
+    /// The piece of a cell inside.
+    fn of_cell(&self, cell: Cell) -> Option<u32> {
+        self.inside.span_of(cell).map(|span| self.of_span[span.base as usize])
+    }
+
+    /// The piece that a marker is on: that of the cell next to it which is farthest behind it.
+    pub(super) fn of_marker(&self, marker: &Marker) -> u32 {
+        let first = marker.point.map(|x| floor(x - 0.5));
+        let (mut deepest, mut found) = (f32::INFINITY, NO_PIECE);
+        for corner in 0..8 {
+            let cell = [0, 1, 2].map(|axis| first[axis] + (corner >> axis & 1));
+            let Some(piece) = self.of_cell(cell) else { continue };
+            let ahead = dot(sub(cell.map(|x| x as f32 + 0.5), marker.point), marker.normal);
+            if ahead < deepest {
+                (deepest, found) = (ahead, piece);
+            }
+        }
+        found
+    }
+
+    /// The piece closest to a place in surface cells, and how far from it its closest cell is.
+    pub(super) fn closest(&self, place: Vec3) -> Option<(usize, f32)> {
+        let mut closest: Option<(usize, f32)> = None;
+        for ([y, z], span) in self.inside.spans() {
+            let beyond = |at: f32, low: i32, high: i32| (low as f32 - at).max(at - high as f32).max(0.0);
+            let away = [beyond(place[0], span.start, span.end), beyond(place[1], y, y + 1), beyond(place[2], z, z + 1)];
+            let distance = length(away);
+            if closest.is_none_or(|(_, least)| distance < least) {
+                closest = Some((self.of_span[span.base as usize] as usize, distance));
+            }
+        }
+        closest
+    }
+
+    /// The cells of a piece and those at most `by` away.
+    pub(super) fn cells_around(&self, piece: usize, by: i32) -> CellRows {
+        self.inside.filtered(|cell, _| self.of_cell(cell) == Some(piece as u32)).dilated(by)
+    }
+
+    /// Moves the surface of each piece, which its markers know, outward by one of `by` cells.
+    pub(super) fn shift(&self, surface: &mut MarkedSurface, by: &[f32]) {
+        let view = surface.view_of(self.clipped.as_deref());
+        let phi = surface.level_set().phi();
+        let [cells] = view.rows.tabulate_with(
+            || Finder::new(view.rows),
+            |finder, cell, at| {
+                let piece = if phi[at].abs() < NEAR { self.downhill(view, finder, cell) } else { None };
+                [piece.map_or(0.0, |piece| by[piece as usize])]
+            },
+        );
+        let of_marker = |piece: &u32| by.get(*piece as usize).copied().unwrap_or(0.0);
+        let markers: Vec<f32> = surface.markers().pieces().iter().map(of_marker).collect();
+        surface.shift(&cells, &markers);
+    }
+
+    /// The piece that the steepest way down φ leads to from a cell.
+    fn downhill(&self, view: PhiView<'_>, finder: &mut Finder<'_>, cell: Cell) -> Option<u32> {
+        let mut at = cell;
+        for _ in 0..DESCENT {
+            if let Some(piece) = self.of_cell(at) {
+                return Some(piece);
+            }
+            let mut phi = |cell: Cell| finder.find(cell).map_or(view.outside, |at| view.phi[at]);
+            let own = phi(at);
+            let (mut steepest, mut next) = (0.0, at);
+            for n in (0..27).filter(|n| *n != 13) {
+                let (x, y, z) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+                let cell = [at[0] + x, at[1] + y, at[2] + z];
+                let inverse_length =
+                    [0.0, 1.0, FRAC_1_SQRT_2, 0.577_350_26][[x, y, z].iter().filter(|n| **n != 0).count()];
+                let slope = (phi(cell) - own) * inverse_length;
+                if slope < steepest && contains(view, cell) {
+                    (steepest, next) = (slope, cell);
+                }
+            }
+            if next == at {
+                return None;
+            }
+            at = next;
+        }
+        self.of_cell(at)
+    }
+}
+
+fn contains(view: PhiView<'_>, cell: Cell) -> bool {
+    (0..3).all(|axis| view.low[axis] <= cell[axis] && cell[axis] < view.high[axis])
+}
+
+/// The piece of each span, at its first cell, and how many there are. They are numbered by their first cells.
+fn numbered(inside: &CellRows, mesh: &QuadMesh, sides: &[Side]) -> (Vec<u32>, usize) {
+    let mut sets = Sets::new(inside.len());
+    for ([y, z], spans) in inside.rows() {
+        join_touching(spans, inside.row(y + 1, z), &mut sets);
+        join_touching(spans, inside.row(y, z + 1), &mut sets);
+    }
+    let mut surfaces = Sets::new(mesh.points.len());
+    for [a, rest @ ..] in &mesh.quads {
+        rest.iter().for_each(|b| surfaces.join(*a, *b));
+    }
+    let mut behind = vec![NO_PIECE; mesh.points.len()];
+    for (quad, side) in mesh.quads.iter().zip(sides) {
+        let first = &mut behind[surfaces.first(quad[0]) as usize];
+        if *first == NO_PIECE {
+            *first = side.span;
+        }
+        sets.join(*first, side.span);
+    }
+    let (mut of_span, mut count) = (vec![NO_PIECE; inside.len()], 0);
+    for (_, span) in inside.spans() {
+        let first = sets.first(span.base);
+        if first == span.base {
+            of_span[first as usize] = count;
+            count += 1;
+        }
+        of_span[span.base as usize] = of_span[first as usize];
+    }
+    (of_span, count as usize)
+}
+
+/// Joins the spans of two rows that share a face.
+fn join_touching(spans: &[RowSpan], others: &[RowSpan], sets: &mut Sets) {
+    let mut next = 0;
+    for span in spans {
+        while next < others.len() && others[next].end <= span.start {
+            next += 1;
+        }
+        for other in others[next..].iter().take_while(|other| other.start < span.end) {
+            sets.join(span.base, other.base);
+        }
+    }
+}
+
+fn measured(inside: &CellRows, of_span: &[u32], count: usize, mesh: &QuadMesh, sides: &[Side]) -> Vec<Measured> {
+    let piece = |side: &Side| of_span[side.span as usize] as usize;
+    let mut origins: Vec<Option<Vec3>> = vec![None; count];
+    for (quad, side) in mesh.quads.iter().zip(sides) {
+        origins[piece(side)].get_or_insert(mesh.points[quad[0] as usize]);
+    }
+    let term = |(quad, side): (&[u32; 4], &Side)| {
+        let volume = origins[piece(side)].map_or(0.0, |origin| mesh.six_volumes(origin, *quad));
+        (volume, if side.is_free { mesh.twice_area(*quad) } else { 0.0 })
+    };
+    let terms: Vec<(f64, f64)> = mesh.quads.par_iter().zip(sides).map(term).collect();
+    let mut all = vec![Measured::default(); count];
+    for ((volume, area), side) in terms.iter().zip(sides) {
+        let piece = &mut all[piece(side)];
+        piece.volume += volume / 6.0;
+        piece.area += area / 2.0;
+    }
+    // Sums over cells, then how many they are.
+    let mut sums = vec![[0.0_f64; 4]; count];
+    for ([y, z], span) in inside.spans() {
+        let sum = &mut sums[of_span[span.base as usize] as usize];
+        let cells = span.len() as f64;
+        let middle = [0.5 * f64::from(span.start + span.end), f64::from(y) + 0.5, f64::from(z) + 0.5];
+        (0..3).for_each(|axis| sum[axis] += cells * middle[axis]);
+        sum[3] += cells;
+    }
+    for (piece, [x, y, z, cells]) in all.iter_mut().zip(sums) {
+        piece.place = [x, y, z].map(|sum| (sum / cells) as f32);
+    }
+    all
+}
