@@ -10,17 +10,18 @@
 //!
 //! | | V | L1 | pieces | V at T/2 | pieces at T/2 |
 //! |---|---|---|---|---|---|
-//! | slotted disk (Zalesak 1979), 100², 1 turn | −0.10 % | 0.95 % | 1 | | |
-//! | the same, 10 turns | −0.10 % | 0.96 % | 1 | | |
-//! | slotted ball, 64³, 2 turns | −0.21 % | 0.59 % | 1 | | |
-//! | LeVeque, 64³ | −0.13 % | 0.33 % | 1 | −9.8 % | 80 |
-//! | LeVeque, 100³ | −0.03 % | 0.07 % | 2 | −3.4 % | 3 |
-//! | LeVeque, 128³ | −0.01 % | 0.02 % | 1 | −1.2 % | 2 |
+//! | slotted disk (Zalesak 1979), 100², 1 turn | −0.06 % | 1.08 % | 1 | | |
+//! | the same, 10 turns | −0.11 % | 1.11 % | 1 | | |
+//! | slotted ball, 64³, 2 turns | −0.11 % | 0.64 % | 2 | | |
+//! | LeVeque, 64³ | −0.00 % | 0.24 % | 2 | −9.0 % | 92 |
+//! | LeVeque, 100³ | −0.02 % | 0.06 % | 2 | −3.4 % | 3 |
+//! | LeVeque, 128³ | −0.01 % | 0.02 % | 2 | −1.2 % | 2 |
 //!
-//! A slotted shape has its L1 within a cell of its edges, which the first steps round, from then on it is constant. A
-//! step at 100³ takes about 0.25 µs a band cell on two cores.
+//! A slotted shape has its L1 within a cell of its edges, which the first steps round; from then on it is nearly constant.
+//! At 100³ and 128³ the other pieces of LeVeque's flow are single cells of less than a tenth of a cell's volume: the sheet
+//! holds.
 //!
-//! Limit: a sheet thinner than about a cell tears, as at T/2. Where the flow turns back that is undone; elsewhere its
+//! Limit: a sheet thinner than about a cell tears, as at T/2 of 64³. Where the flow turns back that is undone; elsewhere its
 //! volume is lost.
 
 mod attributes;
