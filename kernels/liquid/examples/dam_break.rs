@@ -1,4 +1,5 @@
-//! The laws of a moving liquid on larger grids, and what a frame costs: `cargo run --release -p liquid --example dam_break`.
+//! The laws of a moving liquid on larger grids, and what a frame costs:
+//! `cargo run --release -p liquid --features studies --example dam_break`.
 //! `-- 2` runs on two threads.
 
 #[path = "../src/step/tests/plain.rs"]

@@ -1,5 +1,5 @@
-//! Iterations and times of the pressure solve: `cargo run --release -p liquid --example pressure_study`; `-- 64 128` for
-//! boxes of these sizes.
+//! Iterations and times of the pressure solve:
+//! `cargo run --release -p liquid --features studies --example pressure_study`; `-- 64 128` for boxes of these sizes.
 
 use std::time::Instant;
 

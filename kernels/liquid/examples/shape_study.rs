@@ -1,4 +1,5 @@
-//! What the distance of a mesh costs: `cargo run --release -p liquid --example shape_study`. `-- 2` runs on two threads.
+//! What the distance of a mesh costs: `cargo run --release -p liquid --features studies --example shape_study`. `-- 2`
+//! runs on two threads.
 
 use std::time::Instant;
 

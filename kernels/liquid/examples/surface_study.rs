@@ -1,4 +1,5 @@
-//! What the surface of a liquid costs and how exact it is: `cargo run --release -p liquid --example surface_study [name]`.
+//! What the surface of a liquid costs and how exact it is:
+//! `cargo run --release -p liquid --features studies --example surface_study [name]`.
 
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 

@@ -1,5 +1,5 @@
 //! Times of sampling, continuing and carrying a velocity, on one thread:
-//! `cargo run --release -p liquid --example velocity_study`.
+//! `cargo run --release -p liquid --features studies --example velocity_study`.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Iterations and times of the coupled solve: `cargo run --release -p liquid --example viscosity_study`.
+//! Iterations and times of the coupled solve:
+//! `cargo run --release -p liquid --features studies --example viscosity_study`.
 
 use std::time::Instant;
 
