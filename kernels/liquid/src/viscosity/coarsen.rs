@@ -19,8 +19,9 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
     if liquid.is_empty() {
         return None;
     }
-    let rows = liquid.dilated(HALO);
-    let active = liquid.dilated(1);
+    let rows = liquid.dilated(HALO + 1);
+    // Next to liquid, with the upper faces of what is there.
+    let active = liquid.dilated(1).grown_up();
     let is_liquid = |cell: Cell| liquid.find(cell).is_some();
     let kinds: FaceFields<FaceKind> = rows.tabulate_each(|cell| {
         [0, 1, 2].map(|axis| {
@@ -39,8 +40,10 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
         [0, 1, 2].map(|axis| if is_free(axis) { mass(fine, cell, axis).max(LEAST_MASS) } else { 0.0 })
     });
     let extensions = Extensions::new(&rows, &kinds);
+    // A stress on a face that is not active would have no reaction there, and the matrix no symmetry.
     let has_velocity = |axis: usize, cell: Cell| {
-        rows.find(cell).is_some_and(|at| kinds[axis][at] != FaceKind::Air || extensions.reaches(axis, at))
+        let is_known = |at: usize| kinds[axis][at] != FaceKind::Air || extensions.reaches(axis, at);
+        active.find(cell).is_some() && rows.find(cell).is_some_and(is_known)
     };
     let normal = active.tabulate(|cell| normal(fine, cell, has_velocity));
     let shear: FaceFields<f32> =

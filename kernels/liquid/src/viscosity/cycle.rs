@@ -52,6 +52,12 @@ impl Multigrid {
         Self { levels, scales }
     }
 
+    /// The grids, the finest first.
+    #[cfg(test)]
+    pub(super) fn grids(&self) -> &[Level] {
+        &self.levels
+    }
+
     pub(super) fn finest(&self) -> &Level {
         &self.levels[0]
     }

@@ -270,3 +270,37 @@ fn no_liquid_and_single_cells_are_solved() {
     let solved = solve(&drops, &mut velocity(&drops, noise), 1e-6);
     assert!(solved.velocity <= 1e-6 && solved.flow <= 1e-6, "{solved:?}");
 }
+
+#[test]
+fn coarse_grids_are_as_symmetric_as_the_fine_one() {
+    // A velocity's work on the force of another is that of the other on its own.
+    for lift in [0.0, 0.27, 0.44, 0.81] {
+        let case = Case::new([16; 3], 1e6, |p| length(sub(p, [8.0, 7.3 + lift, 8.0])) - 4.5);
+        let solver = case.solver();
+        let grids = solver.viscous.grids();
+        assert!(grids.len() > 1);
+        for (number, level) in grids.iter().enumerate() {
+            let any = |shift: f64| -> FaceFields<f64> {
+                let values = level.rows().tabulate_each(|cell| noise(cell.map(|x| f64::from(x) + shift)));
+                let free = |axis: usize, at: usize, u: f64| if level.mass[axis][at] > 0.0 { u } else { 0.0 };
+                let own = |axis: usize| values[axis].iter().enumerate().map(|(at, u)| free(axis, at, *u)).collect();
+                [own(0), own(1), own(2)]
+            };
+            let (mut a, mut b) = (any(64.0), any(300.0));
+            let len = level.rows().len();
+            let mut stresses = Stresses::zero(len);
+            let mut force = |u: &mut FaceFields<f64>| {
+                let mut out: FaceFields<f64> = std::array::from_fn(|_| vec![0.0; len]);
+                level.apply(u, &mut stresses, &mut out);
+                out
+            };
+            let (of_a, of_b) = (force(&mut a), force(&mut b));
+            let work = |u: &FaceFields<f64>, f: &FaceFields<f64>| -> f64 {
+                (0..3).map(|axis| u[axis].iter().zip(&f[axis]).map(|(u, f)| u * f).sum::<f64>()).sum()
+            };
+            let scale = (work(&a, &of_a) * work(&b, &of_b)).sqrt();
+            let skew = (work(&a, &of_b) - work(&b, &of_a)).abs() / scale;
+            assert!(skew < 1e-10, "grid {number}, {lift}: {skew:e}");
+        }
+    }
+}

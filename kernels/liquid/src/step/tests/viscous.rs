@@ -134,3 +134,28 @@ fn viscosity_is_left_out_below_its_bound() {
         assert_eq!(liquid.step_frame(&thick(&viscosity), 1.0 / 24.0).viscous_substeps, expected);
     }
 }
+
+/// A ball that is hardly deformable: whichever cells it fills, its trembling stops and it falls by g·Δt.
+#[test]
+fn nearly_rigid_liquid_falls_freely_wherever_it_is() {
+    let domain = Domain::closed([0; 3], [16; 3]);
+    let trembling = |[x, y, z]: Vec3| {
+        let wave = |x: f32| (x - x.floor() - 0.5) * 0.02;
+        [wave(0.37 * y + 0.2 * z), -0.7 + wave(0.53 * z - 0.31 * x), wave(0.77 * x)]
+    };
+    let speed = |liquid: &Liquid<PlainLevelSet>| {
+        let faces = &liquid.motion().velocity().faces()[1];
+        let moving: Vec<f64> = faces.iter().map(|u| f64::from(*u)).filter(|u| *u != 0.0).collect();
+        moving.iter().sum::<f64>() / moving.len() as f64
+    };
+    for n in 0..24 {
+        let middle = 6.9 + 0.123 * n as f32;
+        let ball = |p: Vec3| length([p[0] - 8.0, p[1] - middle, p[2] - 8.0]) - 3.52;
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 16.0), PlainLevelSet::new(domain, ball));
+        let around = thick(&|_| 1e8);
+        liquid.set_velocity(trembling, &around);
+        let report = liquid.step_frame(&around, 1.0 / 240.0);
+        assert!(report.solves_cut_short == 0 && report.coupled_iterations < 40, "{middle}: {report:?}");
+        assert!((speed(&liquid) + 0.7 + 9.81 / 240.0).abs() < 0.01, "{middle}: {}", speed(&liquid));
+    }
+}
