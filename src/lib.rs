@@ -41,6 +41,8 @@ use engine::node::Node;
 pub static CATALOGUE: Catalogue = Catalogue(FAMILIES);
 
 static FAMILIES: &[&[&Node]] = &[
+    #[cfg(feature = "fluid")]
+    fluid::NODES,
     geometry::NODES,
     #[cfg(feature = "softbody")]
     softbody::NODES,

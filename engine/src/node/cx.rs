@@ -177,6 +177,9 @@ pub fn point_float_hint(part: &Component, name: &str) -> String {
 pub(crate) trait History: Sync {
     /// The integral of integrand `index`.
     fn integral(&self, index: usize, upto: Frame) -> [f64; 3];
+
+    /// The integrand `index` at a frame number.
+    fn integrand(&self, index: usize, frame: f64) -> [f64; 3];
 }
 
 /// The context of a node that may read the clock.
@@ -228,7 +231,20 @@ impl FrameCx<'_> {
         integral
     }
 
-    /// The same for the node's first `N` integrands.
+    /// The node's first `N` integrands at a frame number between whole frames, at most the frame that is cooked.
+    ///
+    /// # Panics
+    /// Where the node declares fewer, or `frame` is in the future.
+    pub fn integrands<const N: usize>(&self, frame: f64) -> [[f64; 3]; N] {
+        assert!(frame <= self.frame.number(), "it asks for integrands at {frame}, which is after frame {}", self.frame);
+        let declared = self.node.integrands.iter().flatten().count();
+        match self.history {
+            Some(history) if N <= declared => std::array::from_fn(|place| history.integrand(place, frame)),
+            _ => panic!("it asks for {N} integrands and declares {declared}"),
+        }
+    }
+
+    /// [`Self::integral`] of the node's first `N` integrands.
     ///
     /// # Panics
     /// Where the node declares fewer, or `upto` is in the future.

@@ -211,6 +211,31 @@ impl ParamType for Option<Arc<Vec<[f32; 3]>>> {
     }
 }
 
+/// Numbers that may be absent, so that something else decides.
+macro_rules! optional {
+    ($($t:ty, $shape:expr, $value:pat => $typed:expr, $back:expr;)*) => {$(
+        impl ParamType for Option<$t> {
+            type Value = Self;
+            type Default = ();
+            fn shape() -> Shape { $shape }
+            fn erase_default((): ()) -> Value { Value::Nothing }
+            fn typed(value: &Value) -> Option<Self> {
+                match value {
+                    Value::Nothing => Some(None),
+                    $value => Some(Some($typed)),
+                    _ => None,
+                }
+            }
+            fn erase(value: Self) -> Value { value.map_or(Value::Nothing, $back) }
+        }
+    )*};
+}
+
+optional! {
+    f32, Shape::Float, Value::Float(x) => *x as f32, |x: f32| Value::Float(shortest(x));
+    [f32; 3], Shape::Vec3, Value::Vec3(v) => v.map(|x| x as f32), |v: [f32; 3]| Value::Vec3(v.map(shortest));
+}
+
 impl<T: Choice> ParamType for T {
     type Value = T::Value;
     type Default = T::Value;
@@ -275,6 +300,20 @@ impl Param<bool> {
     /// `true` or `false`.
     pub const fn bool(name: &'static str, default: bool, help: &'static str) -> Self {
         Self::new(name, default, help)
+    }
+}
+
+impl Param<Option<f32>> {
+    /// A number that is absent unless the graph sets it.
+    pub const fn optional_float(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help)
+    }
+}
+
+impl Param<Option<[f32; 3]>> {
+    /// A vector that is absent unless the graph sets it.
+    pub const fn optional_vec3(name: &'static str, help: &'static str) -> Self {
+        Self::new(name, (), help)
     }
 }
 

@@ -35,10 +35,14 @@ pub enum Unit {
     Pascal,
     /// Pa·s
     PascalSeconds,
+    /// N
+    Newtons,
     /// N/m
     NewtonsPerMetre,
     /// kg/m³
     KilogramsPerCubicMetre,
+    /// m³
+    CubicMetres,
     /// m³/s
     CubicMetresPerSecond,
     /// J
@@ -65,8 +69,10 @@ impl Unit {
             Self::Hertz => "Hz",
             Self::Pascal => "Pa",
             Self::PascalSeconds => "Pa·s",
+            Self::Newtons => "N",
             Self::NewtonsPerMetre => "N/m",
             Self::KilogramsPerCubicMetre => "kg/m³",
+            Self::CubicMetres => "m³",
             Self::CubicMetresPerSecond => "m³/s",
             Self::Joules => "J",
         }

@@ -44,6 +44,10 @@ impl History for Integrals<'_> {
     fn integral(&self, index: usize, upto: Frame) -> [f64; 3] {
         self.0[index].upto(upto).into()
     }
+
+    fn integrand(&self, index: usize, frame: f64) -> [f64; 3] {
+        self.0[index].value(frame).into()
+    }
 }
 
 struct Integral<'a> {

@@ -14,6 +14,7 @@ mod quads;
 mod table;
 #[cfg(test)]
 mod tests;
+mod thickness;
 
 use numerics::vector::{Vec3, to_f64};
 use numerics::volume;

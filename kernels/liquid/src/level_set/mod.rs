@@ -15,7 +15,7 @@ mod sample;
 mod tests;
 mod view;
 
-use numerics::vector::{Vec3, add, scale, sub};
+use numerics::vector::{Vec3, add, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
 pub use sample::PhiSampler;
@@ -28,6 +28,12 @@ use crate::stencil::Stencil;
 
 /// Distance, in cells, to which φ is known on either side of the surface; beyond it is this much.
 pub const BAND: f32 = 5.0;
+
+/// Depth in a solid, in cells, to which liquid that touches it goes on.
+pub const CONTACT: f32 = 2.5;
+
+/// Depth in a solid up to which φ is the liquid's own.
+const SKIN: f32 = 0.25;
 
 /// How far the liquid moves in one step.
 pub trait Flow: Sync {
@@ -148,6 +154,36 @@ impl LevelSet {
             *phi -= by;
         }
         self.fill();
+    }
+
+    /// Makes the surface meet a solid at a right angle: φ inside it is that of the mirrored place outside, to a depth of
+    /// [`CONTACT`] cells, and there is no liquid beyond. `solid` is the distance from it, in cells, negative inside.
+    pub fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
+        let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
+        let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
+        let outward = |at: Vec3| {
+            let slope = |axis: usize| {
+                let (mut below, mut above) = (at, at);
+                (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
+                solid(above) - solid(below)
+            };
+            unit([slope(0), slope(1), slope(2)])
+        };
+        let start = || PhiSampler::new(before);
+        let [phi] = rows.tabulate_with(start, |sampler, cell, n| {
+            let at = cell.map(|x| x as f32 + 0.5);
+            let depth = -solid(at);
+            if depth < SKIN {
+                return [phi[n]];
+            }
+            let value = if depth > CONTACT {
+                phi[n].max(depth - CONTACT)
+            } else {
+                outward(at).map_or(phi[n], |normal| sampler.at(add(at, scale(normal, 2.0 * depth))))
+            };
+            [value.clamp(-BAND, BAND)]
+        });
+        self.store(&rows, phi, 0);
     }
 
     /// Makes φ a distance again: kept at the cells next to the surface, at most 1 there; elsewhere by the eikonal equation.

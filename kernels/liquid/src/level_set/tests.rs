@@ -162,3 +162,23 @@ fn gradients_are_those_of_the_interpolated_field() {
         assert!((difference - gradient[axis]).abs() < 1e-4);
     }
 }
+
+/// A pool that ends within a wall: inside it the surface goes on as outside, mirrored, and ends.
+#[test]
+fn a_surface_meets_a_solid_at_a_right_angle() {
+    // The surface slopes by 1 in 2; the wall is x < 6.
+    let slope = |p: Vec3| (p[1] - 8.0 - 0.5 * (p[0] - 6.0)) * 0.894_427_2;
+    let rows = CellRows::cuboid([0; 3], [20, 20, 6]);
+    let phi = rows.tabulate(|cell| slope(cell.map(|x| x as f32 + 0.5)).clamp(-BAND, BAND));
+    let mut set = LevelSet::new(&rows, &phi, [0; 3], [20, 20, 6]);
+    set.meet(|p| p[0] - 6.0);
+    let at = |cell: Cell| set.rows().find(cell).map_or(BAND, |at| set.phi()[at]);
+    for y in 6..11 {
+        for depth in 0..2 {
+            let mirrored = at([6 + depth, y, 3]);
+            assert!((at([5 - depth, y, 3]) - mirrored).abs() < 1e-4, "{y}: {} {mirrored}", at([5 - depth, y, 3]));
+        }
+        assert!((0..3).all(|x| at([x, y, 3]) > 0.0), "there is none deep inside");
+    }
+    assert!((at([9, 9, 3]) - slope([9.5, 9.5, 3.5])).abs() < 1e-4, "outside it stays");
+}

@@ -7,6 +7,7 @@
 mod tests;
 
 use numerics::vector::{Vec3, scale};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract};
@@ -17,6 +18,9 @@ use crate::step::{Domain, Moving, Surface};
 
 /// The distance from a solid, in solver cells, negative inside, of a place in them.
 pub type SolidDistance<'a> = &'a (dyn Fn(Vec3) -> f32 + Sync);
+
+/// Depth in a solid, in surface cells, from which a marker is dropped: nearer, its plane is the surface outside, too.
+const INSIDE: f32 = 1.0;
 
 /// A level set and its markers, moved together.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -48,7 +52,13 @@ impl MarkedSurface {
         let cells = refined(&near, resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
         let mut set = LevelSet::new(&cells, &cells.tabulate(phi), low, high);
         set.fill();
+        Self::of_level_set(set, resolution as u32, attributes, seed)
+    }
+
+    /// The surface of a level set whose cells are `resolution` ≥ 1 times as small as the solver's.
+    pub fn of_level_set(set: LevelSet, resolution: u32, attributes: usize, seed: u64) -> Self {
         let markers = Markers::new(&set, attributes, seed);
+        let resolution = resolution.max(1) as i32;
         let mut surface = Self { set, markers, resolution, rows: CellRows::default(), phi: Vec::new() };
         surface.restrict();
         surface
@@ -76,7 +86,7 @@ impl MarkedSurface {
     }
 
     /// φ of surface cells, positive in a solid.
-    pub(crate) fn phi_outside(&self, solid: SolidDistance<'_>) -> Vec<f32> {
+    pub fn phi_outside(&self, solid: SolidDistance<'_>) -> Vec<f32> {
         let (size, phi) = (self.resolution as f32, self.set.phi());
         let outside = |cell: Cell| size * solid(cell.map(|x| (x as f32 + 0.5) / size));
         let [clipped] = self.set.rows().tabulate_with(
@@ -144,6 +154,19 @@ impl Surface for MarkedSurface {
     fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
         let size = self.resolution as f32;
         self.markers.step(&mut self.set, &Scaled { flow, size }, reach * size);
+        self.restrict();
+    }
+
+    fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
+        let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
+        let scaled = |point: Vec3| size * solid(scale(point, unit));
+        self.set.meet(scaled);
+        // Those in its inside mark nothing that is seen.
+        let markers = &self.markers.markers;
+        let seen: Vec<bool> = markers.par_iter().map(|marker| scaled(marker.point) > -INSIDE).collect();
+        if seen.contains(&false) {
+            self.markers.retain(|n| seen[n]);
+        }
         self.restrict();
     }
 

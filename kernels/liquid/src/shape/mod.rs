@@ -228,7 +228,14 @@ fn lines_of(part: &Part, points: &[Vec3], settings: &ShapeSettings) -> Option<Ro
         }
     }
     let meets = |axis: usize| bounds[0][axis] < high[axis] as f32 && bounds[1][axis] > low[axis] as f32;
-    (0..3).all(meets).then(|| RowLines::new(points, &part.corners, low, high))
+    if !(0..3).all(meets) {
+        return None;
+    }
+    // Rows that the mesh does not come near are not stored, however large the domain is.
+    let near = |at: f32, beyond: i32| at.clamp(-1e9, 1e9).floor() as i32 + beyond;
+    let low = [0, 1, 2].map(|axis| low[axis].max(near(bounds[0][axis], -by)));
+    let high = [0, 1, 2].map(|axis| high[axis].min(near(bounds[1][axis], by + 1)));
+    Some(RowLines::new(points, &part.corners, low, high))
 }
 
 fn band_of(lines: &RowLines, part: &Part, points: &[Vec3], settings: &ShapeSettings) -> (CellRows, Vec<Foot>) {

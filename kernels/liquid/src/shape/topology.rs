@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::sets::Sets;
 
 /// Triangles of a mesh, with their numbers in it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Part {
     pub(super) corners: Vec<[u32; 3]>,
     pub(super) numbers: Vec<u32>,
@@ -18,7 +18,7 @@ pub(super) struct Part {
 /// A piece is all that is connected through points; points in the same place count as one. It is closed where every edge
 /// is used equally often in both directions. Counter-clockwise faces are seen from outside; a mesh whose closed pieces
 /// have negative volume in all counts as turned inside out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShapeTopology {
     pub(super) solid: Part,
     pub(super) sheet: Part,

@@ -72,7 +72,8 @@ impl Motion {
         &self.velocity
     }
 
-    pub(super) fn liquid_cells(&self) -> usize {
+    /// Number of liquid cells.
+    pub fn liquid_cells(&self) -> usize {
         self.liquid_cells
     }
 

@@ -46,6 +46,10 @@ pub trait Surface {
     /// Moves by a flow that moves nothing in the liquid farther than `reach` cells.
     fn advance(&mut self, flow: &Moving<'_>, reach: f32);
 
+    /// Continues the liquid into a solid that it touches, and takes it out of the rest of the solid, which would leave it
+    /// behind as it moves on. `solid` is the distance from it, in cells, negative inside. A surface may do without.
+    fn meet(&mut self, _solid: impl Fn(Vec3) -> f32 + Sync) {}
+
     /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of a place in them and φ there, both in cells;
     /// the result need be a distance only where it is next to 0.
     fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync);
@@ -91,6 +95,9 @@ pub(super) fn substep<S: Surface>(
     let reach = motion.largest_speed() as f32 * step;
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     surface.advance(&Moving { velocity: &velocity, step }, reach);
+    if let Some(solid) = solid {
+        surface.meet(|point| solid.distance(point));
+    }
     let mut exchanged = Exchange { settings, around, solid, times }.apply(surface, motion);
 
     let mut cells = LiquidCells::of(&settings.domain, surface, solid);

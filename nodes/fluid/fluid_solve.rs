@@ -1,0 +1,358 @@
+//! FluidSolve: viscous liquids from water to honey to nearly rigid.
+//!
+//! R2: a grid with a level set, directed by animated gravity and viscosity, sources, sinks and colliders. The solver is
+//! [`liquid::step`], its surface [`liquid::marked`].
+//!
+//! Departures, and what R leaves open:
+//! * Viscosity is in Pa·s and never clamped: it is solved for together with pressure, so that free fall and rotation are not
+//!   slowed and sagging has its rate at any time step.
+//! * Gravity and viscosity are read at the middle of each substep.
+
+use std::sync::{Arc, OnceLock};
+
+use engine::prelude::*;
+use liquid::level_set::{BAND, PhiView};
+use liquid::marked::MarkedSurface;
+use liquid::step::{
+    Coupling, Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::shared::attributes::{
+    SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
+};
+use crate::shared::surface::surface;
+use crate::shared::volume::volume;
+use domain::{Walls, checks, domain, lattice, settings};
+use measured::{measured, pool_of};
+use openings::{Opening, SAMPLES, SINK, SOURCE, Timed};
+use shapes::{Colliders, liquid_at_start};
+
+mod domain;
+mod measured;
+mod openings;
+mod shapes;
+
+choice! {
+    /// How liquid is represented.
+    enum Method {
+        LevelSet = "levelset": "a level set with markers on the surface",
+        Particles = "particles": "particles that fill the liquid; not available yet",
+    }
+}
+
+choice! {
+    /// When pressure and viscosity are solved together.
+    Stokes for Coupling {
+        Coupling::Auto => "auto": "where viscosity changes what the grid shows",
+        Coupling::On => "on": "wherever there is viscosity",
+        Coupling::Off => "off": "never: viscosity is left out",
+    }
+}
+
+inputs! { INPUTS:
+    LIQUID: Input<Many> = Input::many("liquid", Kind::Mesh,
+        "Closed meshes full of liquid at the start.").read_at(|_| Times::START);
+    SOURCES: Input<Many> = Input::many("sources", Kind::Mesh,
+        "Shapes from Fluid_Source that liquid comes from. A mesh without its attributes is kept full.")
+        .read_at(|_| Times::within_step(SAMPLES));
+    SINKS: Input<Many> = Input::many("sinks", Kind::Mesh,
+        "Shapes from Fluid_Sink that liquid drains into. A mesh without its attributes takes all that enters.")
+        .read_at(|_| Times::within_step(SAMPLES));
+    COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
+        "Meshes that liquid does not enter. They may move and deform. Sheets and thin plates do not leak.")
+        .read_at(|_| Times::NOW.and(Times::START).and(Times::within_step(1)));
+}
+
+params! { PARAMS:
+    START_FRAME: Param<i64> = Param::int("start_frame", 1, "The frame at which the simulation starts from `liquid`.")
+        .unit(Unit::Frame).default_scene_start().fixed();
+    METHOD: Param<Method> = Param::choice("method", Method::LevelSet, "How the liquid is represented.").fixed();
+    CELL: Param<f64> = Param::double("cell", 0.02,
+        "Side of a cell. Details smaller than two cells are lost; half the side takes about 12 times as long.")
+        .unit(Unit::Metres).above(0.0).soft(0.005, 0.1).fixed();
+    DOMAIN_FROM: Param<[f64; 3]> = Param::dvec3("domain_from", [-0.5, 0.0, -0.5],
+        "Lowest corner of the box that the liquid stays in.").unit(Unit::Metres).fixed();
+    DOMAIN_TO: Param<[f64; 3]> = Param::dvec3("domain_to", [0.5, 1.0, 0.5],
+        "Highest corner of that box. A side that is no multiple of `cell` grows to the next one. Time and memory depend on the \
+         liquid, not on the box.").unit(Unit::Metres).fixed();
+    FOLLOW: Param<bool> = Param::bool("follow", false,
+        "Whether the box grows with the liquid; it has no walls then.").fixed();
+    WALL_X_MIN: Param<Walls> = Param::choice("wall_x_min", domain::CLOSED, "The wall at the lowest x.").fixed().when(has_walls);
+    WALL_X_MAX: Param<Walls> = Param::choice("wall_x_max", domain::CLOSED, "The wall at the highest x.").fixed().when(has_walls);
+    WALL_Y_MIN: Param<Walls> = Param::choice("wall_y_min", domain::CLOSED, "The floor.").fixed().when(has_walls);
+    WALL_Y_MAX: Param<Walls> = Param::choice("wall_y_max", domain::CLOSED, "The ceiling.").fixed().when(has_walls);
+    WALL_Z_MIN: Param<Walls> = Param::choice("wall_z_min", domain::CLOSED, "The wall at the lowest z.").fixed().when(has_walls);
+    WALL_Z_MAX: Param<Walls> = Param::choice("wall_z_max", domain::CLOSED, "The wall at the highest z.").fixed().when(has_walls);
+    GRAVITY: Param<[f64; 3]> = Param::dvec3("gravity", [0.0, -9.81, 0.0],
+        "Acceleration due to gravity. Animate it to direct the liquid.").unit(Unit::MetresPerSecondSquared).history();
+    DENSITY: Param<f64> = Param::double("density", 1000.0,
+        "Mass per volume: water 1000, honey 1400. Denser liquid flows faster at the same viscosity.")
+        .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
+    VISCOSITY: Param<f64> = Param::double("viscosity", 1.0,
+        "Dynamic viscosity: water 0.001, oil 0.1, syrup 1, honey 10, batter 20, ketchup 100, peanut butter 1e3, pitch 1e8. 0 \
+         leaves it out.")
+        .unit(Unit::PascalSeconds).at_least(0.0).soft(0.0, 1e3).history();
+    SURFACE_TENSION: Param<f64> = Param::double("surface_tension", 0.0, "Surface tension; not available yet.")
+        .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 0.1);
+    SLIP: Param<f32> = Param::float("slip", 0.0,
+        "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction.").within(0.0, 1.0);
+    STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together.");
+    CFL: Param<f64> = Param::double("cfl", 2.0,
+        "Cells that the fastest liquid moves in a substep, at most. Smaller values are more accurate and take longer.")
+        .above(0.0).soft(0.5, 5.0);
+    MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
+        "Most substeps of a frame. Where `cfl` asks for more, they are longer, and less accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
+    TOLERANCE: Param<f64> = Param::double("tolerance", 1e-4,
+        "Largest share of a cell's volume that a substep may gain or lose, and largest error of a velocity relative to what a \
+         substep changes.")
+        .within(1e-9, 0.1).soft(1e-6, 1e-2);
+    FLIP: Param<f32> = Param::float("flip", 0.0, "Share of FLIP of the particle method; not available yet.").within(0.0, 1.0);
+    PARTICLES_PER_CELL: Param<i64> = Param::int("particles_per_cell", 8,
+        "Particles of a cell in the particle method; not available yet.").within(1.0, 64.0);
+    INITIAL_VELOCITY: Param<[f64; 3]> = Param::dvec3("initial_velocity", [0.0; 3], "Velocity of the liquid at the start.")
+        .unit(Unit::MetresPerSecond).fixed();
+    INITIAL_SPIN: Param<[f64; 3]> = Param::dvec3("initial_spin", [0.0; 3],
+        "Rotation of the liquid at the start, in radians per second about axes through its centre of mass.")
+        .unit(Unit::PerSecond).fixed();
+    RESOLUTION: Param<i64> = Param::int("resolution", 1,
+        "Cells of the surface along a side of `cell`: 2 keeps finer detail of the surface at the same motion.")
+        .within(1.0, 4.0).fixed();
+    TIME_SCALE: Param<f64> = Param::double("time_scale", 1.0,
+        "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.").at_least(0.0).soft(0.0, 2.0).history();
+}
+
+const SURFACE: Output = Output::new(
+    "surface",
+    &[Kind::Mesh],
+    "The surface of the liquid: closed, with `N`, `v` and `thickness`; the same as Fluid_Surface makes of `volume`.",
+);
+const VOLUME: Output =
+    Output::new("volume", &[Kind::Volume], "The level set and the velocity, which goes on past the surface.");
+
+metrics! { METRICS:
+    SUBSTEPS_USED = Metric::new("substeps_used", Unit::None, "Substeps of the frame.");
+    CFL_REACHED = Metric::new("cfl_reached", Unit::None, "The most cells that liquid moved in a substep.");
+    CAPS_HIT = Metric::new("caps_hit", Unit::None,
+        "Substeps that were longer than `cfl` allows because of `max_substeps`, and solves that ended before `tolerance`.")
+        .warn_above(0.0, "At these frames the liquid is faster than `max_substeps` allows at this `cfl`, or a solve ended \
+            before `tolerance`, so it loses detail. Raise `max_substeps`, or `cell`.");
+    PRESSURE_ITERATIONS = Metric::new("pressure_iterations", Unit::None, "Iterations of the pressure solves.");
+    COUPLED_ITERATIONS = Metric::new("coupled_iterations", Unit::None,
+        "Iterations of the solves for pressure and viscosity together.");
+    COUPLED_RESIDUAL = Metric::new("coupled_residual", Unit::None,
+        "Largest error of a velocity that such a solve left, as it estimates, relative to the speed.");
+    MAX_DIVERGENCE = Metric::new("max_divergence", Unit::None,
+        "The largest share of a cell's volume that a substep gained or lost.")
+        .warn_above(1e-2, "Cells gain or lose more than a hundredth of their volume in a substep. Lower `tolerance`; see whether \
+            colliders squeeze liquid that cannot get away.");
+    VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it.");
+    LIQUID_CELLS = Metric::new("liquid_cells", Unit::None, "Cells with liquid.");
+    SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources gave since the start.");
+    SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks took since the start.");
+    LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
+}
+
+pub(crate) static NODE: Node = Node::new(
+    "FluidSolve",
+    1,
+    "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
+     the same effect at any cell size and time step.",
+    Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
+)
+.inputs(INPUTS)
+.params(PARAMS)
+.outputs(&[&SURFACE, &VOLUME])
+.reads(&[
+    &P,
+    &SOURCE_RATE,
+    &SOURCE_ACTIVE,
+    &SOURCE_VELOCITY,
+    &SOURCE_VISCOSITY,
+    &SOURCE_DENSITY,
+    &SINK_RATE,
+    &SINK_ACTIVE,
+])
+.writes(&[&P, &N, &V, &THICKNESS])
+.changes_topology()
+.metrics(METRICS)
+.leaves_out(leaves_out)
+.checks(checks)
+.integrates(|params| params.get(GRAVITY))
+.integrates(|params| [params.get(VISCOSITY), params.get(TIME_SCALE), 0.0]);
+
+fn has_walls(params: &Params) -> bool {
+    !params.get(FOLLOW)
+}
+
+/// The state of the simulation.
+#[derive(Serialize, Deserialize)]
+struct Run {
+    surface: MarkedSurface,
+    motion: Motion,
+    /// Since the start, m³: what sources gave, what sinks took, what left through open walls.
+    sourced: f64,
+    sunk: f64,
+    left_domain: f64,
+    /// Metrics of the last step; empty at the start.
+    metrics: MetricValues,
+    #[serde(skip)]
+    colliders: Option<Colliders>,
+    /// The output at the state's frame.
+    #[serde(skip)]
+    volume: OnceLock<Arc<Volume>>,
+}
+
+impl Chain for Run {
+    fn start(cx: &FrameCx) -> Result<Self> {
+        checks(cx.params())?;
+        let lattice = lattice(cx);
+        let domain = domain(cx);
+        let mut surface = liquid_at_start(cx, &domain, lattice)?;
+        let colliders = Colliders::at_start(cx, &domain, lattice);
+        if !colliders.is_empty() {
+            surface.meet(|point| colliders.distance(1.0, point));
+        }
+        let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
+        let centre = pool_of(&surface).centre;
+        let side = lattice.cell as f32;
+        let at = |point: [f32; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|k| (point[k] - centre[k]) * side);
+            let turned = [spin[1] * z - spin[2] * y, spin[2] * x - spin[0] * z, spin[0] * y - spin[1] * x];
+            [0, 1, 2].map(|k| velocity[k] + turned[k])
+        };
+        let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
+        let around = Surroundings {
+            solid: (!colliders.is_empty()).then(|| Solid::still(&distance)),
+            ..Surroundings::new(&|_| [0.0; 3], &|_| 0.0)
+        };
+        let mut liquid = Liquid::new(settings(cx), surface);
+        liquid.set_velocity(at, &around);
+        let (surface, motion) = (liquid.surface().clone(), liquid.motion().clone());
+        let mut run = Self {
+            surface,
+            motion,
+            sourced: 0.0,
+            sunk: 0.0,
+            left_domain: 0.0,
+            metrics: MetricValues::default(),
+            colliders: Some(colliders),
+            volume: OnceLock::new(),
+        };
+        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface).cells as f64);
+        Ok(run)
+    }
+
+    fn step(&mut self, cx: &StepCx) -> Result<()> {
+        let (lattice, settings) = (lattice(cx), settings(cx));
+        let colliders = Colliders::within_step(cx, self.colliders.take(), &settings.domain, lattice)?;
+        let passed = |frame: Frame| cx.integrals::<2>(frame)[1][1];
+        let seconds = passed(cx.frame()) - passed(cx.previous());
+        self.volume = OnceLock::new();
+        let report = match seconds > 0.0 {
+            true => self.advance(cx, settings, &colliders, seconds)?,
+            false => LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() },
+        };
+        self.sourced += report.sourced;
+        self.sunk += report.sunk;
+        self.left_domain += report.left_domain;
+        self.metrics = measured(&report);
+        self.metrics.set(SOURCED, self.sourced);
+        self.metrics.set(SUNK, self.sunk);
+        self.metrics.set(LEFT_DOMAIN, self.left_domain);
+        self.colliders = Some(colliders);
+        Ok(())
+    }
+
+    fn output(&self, cx: &FrameCx) -> Result<Outputs> {
+        let volume = self.volume(cx)?;
+        cx.publish_all(&self.metrics);
+        let surface = surface(cx, &volume)?;
+        cx.publish(VOLUME_NOW, measured::volume_inside(&surface));
+        let mut out = Geometry::default();
+        out.put_volume(volume);
+        Ok(SURFACE.with(Geometry::from(surface)).and(VOLUME, out))
+    }
+}
+
+impl Run {
+    /// Moves on by a step of that many simulated seconds.
+    fn advance(
+        &mut self,
+        cx: &StepCx,
+        settings: LiquidSettings,
+        colliders: &Colliders,
+        seconds: f64,
+    ) -> Result<LiquidReport> {
+        let lattice = lattice(cx);
+        let openings = |input, says| Opening::all(cx, input, says, &settings.domain, lattice);
+        let (sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
+        let share = |time: f64| (time / seconds).clamp(0.0, 1.0);
+        let (first, frames) = (cx.previous().number(), cx.frame().number() - cx.previous().number());
+        let params = |time: f64| cx.integrands::<2>(first + frames * share(time));
+        let distance = |time: f64, point: [f32; 3]| colliders.distance(share(time) as f32, point);
+        let speed = (lattice.cell / seconds) as f32;
+        let velocity = |time: f64, point: [f32; 3]| colliders.velocity(share(time) as f32, point).map(|u| u * speed);
+        let [sources, sinks] = [&sources, &sinks].map(|openings| Timed::all(openings, seconds));
+        let sources: Vec<LiquidSource> = sources.iter().map(Timed::source).collect();
+        let sinks: Vec<LiquidSink> = sinks.iter().map(Timed::sink).collect();
+        let around = Surroundings {
+            gravity: &|time| params(time)[0],
+            viscosity: &|time| params(time)[1][0],
+            solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
+            sources: &sources,
+            sinks: &sinks,
+        };
+        let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
+        let report = liquid.step_frame(&around, seconds);
+        self.surface = liquid.surface().clone();
+        self.motion = liquid.motion().clone();
+        Ok(report)
+    }
+
+    /// The output's volume: the level set without what lies inside colliders, and the velocity.
+    fn volume(&self, cx: &FrameCx) -> Result<Arc<Volume>> {
+        if let Some(volume) = self.volume.get() {
+            return Ok(volume.clone());
+        }
+        let (lattice, settings) = (lattice(cx), settings(cx));
+        let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
+        let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
+        let by = self.surface.resolution();
+        let mut phi = self.surface.level_set().phi().to_vec();
+        let view = self.surface.level_set().view();
+        let colliders = Colliders::now(cx, &domain(cx), lattice);
+        if !colliders.is_empty() {
+            let size = by as f32;
+            let solid = |cell: [i32; 3]| -size * colliders.distance(1.0, cell.map(|x| (x as f32 + 0.5) / size));
+            let inside = view.rows.tabulate(solid);
+            phi.iter_mut().zip(inside).for_each(|(phi, solid)| *phi = phi.max(solid));
+        }
+        let volume = volume(PhiView { phi: &phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
+        let volume = Arc::new(volume);
+        Ok(self.volume.get_or_init(|| volume).clone())
+    }
+}
+
+fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
+    let mut out = Vec::new();
+    let mut without = |stage, why| out.push(LeftOut::new(stage, why));
+    if wires.count(&SOURCES) == 0 {
+        without("sources", "no `sources` are wired");
+    }
+    if wires.count(&SINKS) == 0 {
+        without("sinks", "no `sinks` are wired");
+    }
+    if wires.count(&COLLIDERS) == 0 {
+        without("colliders", "no `colliders` are wired");
+    }
+    if params.get(STOKES) == Coupling::Off {
+        without("viscosity", "`stokes` is off");
+    } else if params.get(VISCOSITY) == 0.0 {
+        without("viscosity", "`viscosity` is 0");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! What is measured of the liquid, as metrics.
+
+use engine::prelude::*;
+use liquid::marked::MarkedSurface;
+use liquid::step::{LiquidReport, Surface};
+use numerics::volume::six_volumes;
+
+use super::{
+    CAPS_HIT, CFL_REACHED, COUPLED_ITERATIONS, COUPLED_RESIDUAL, LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS,
+    SUBSTEPS_USED,
+};
+
+/// The metrics of a frame that the solver alone determines.
+pub(super) fn measured(report: &LiquidReport) -> MetricValues {
+    let mut metrics = MetricValues::default();
+    metrics.set(SUBSTEPS_USED, report.substeps);
+    metrics.set(CFL_REACHED, report.cfl_reached);
+    metrics.set(CAPS_HIT, report.caps_hit + report.solves_cut_short);
+    metrics.set(PRESSURE_ITERATIONS, report.pressure_iterations);
+    metrics.set(COUPLED_ITERATIONS, report.coupled_iterations);
+    metrics.set(COUPLED_RESIDUAL, report.coupled_residual);
+    metrics.set(MAX_DIVERGENCE, report.max_divergence.max(report.unbalanced));
+    metrics.set(LIQUID_CELLS, report.liquid_cells as f64);
+    metrics
+}
+
+/// Where liquid is, in solver cells.
+pub(super) struct Pool {
+    /// The centre of mass; 0 where there is no liquid.
+    pub(super) centre: [f32; 3],
+    /// Number of cells.
+    pub(super) cells: usize,
+}
+
+/// The cells of a surface whose middle is in the liquid.
+pub(super) fn pool_of(surface: &MarkedSurface) -> Pool {
+    let view = surface.view();
+    let (mut sum, mut cells) = ([0.0; 3], 0_usize);
+    for (at, cell) in view.rows.iter().enumerate() {
+        if view.phi[at] < 0.0 && (0..3).all(|k| view.low[k] <= cell[k] && cell[k] < view.high[k]) {
+            cells += 1;
+            (0..3).for_each(|k| sum[k] += f64::from(cell[k]) + 0.5);
+        }
+    }
+    Pool { centre: sum.map(|x| (x / cells.max(1) as f64) as f32), cells }
+}
+
+/// The volume that a closed mesh of quads encloses, m³.
+pub(super) fn volume_inside(surface: &Component) -> f64 {
+    let (Some(faces), Some(origin)) = (surface.faces(), surface.positions().first()) else { return 0.0 };
+    let corner = |at: u32| surface.positions()[at as usize];
+    let twice = faces.corners.as_chunks::<4>().0.iter().map(|quad| {
+        let [a, b, c, d] = quad.map(corner);
+        six_volumes([*origin, a, b, c]) + six_volumes([*origin, a, c, d])
+    });
+    twice.fold(0.0, |sum, x| sum + x) / 6.0
+}

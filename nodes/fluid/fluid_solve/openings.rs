@@ -1,0 +1,202 @@
+//! Sources and sinks in motion over a step.
+
+use engine::prelude::*;
+use liquid::rows::Cell;
+use liquid::shape::{MovingShape, ShapeSettings};
+use liquid::step::{Domain, LiquidSink, LiquidSource, SourceShape};
+
+use super::shapes::{in_cells, topology};
+use crate::shared::attributes::{
+    SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
+};
+use crate::shared::volume::Lattice;
+
+/// Times within a step at which sources and sinks are sampled.
+pub(super) const SAMPLES: u8 = 4;
+
+/// A source or a sink over a step. Times are shares of it.
+pub(super) struct Opening {
+    shape: MovingShape,
+    bounds: [Cell; 2],
+    /// At equal times: what it gives or takes, m³/s; whether it does; the velocity of its liquid, m/s.
+    rates: Vec<f64>,
+    active: Vec<bool>,
+    velocities: Option<Vec<[f32; 3]>>,
+}
+
+/// The attributes that say what an opening does.
+#[derive(Clone, Copy)]
+pub(super) struct Says {
+    rate: Attr<f32>,
+    active: Attr<i32>,
+    velocity: Option<Attr<[f32; 3]>>,
+}
+
+/// Those of a source.
+pub(super) const SOURCE: Says = Says { rate: SOURCE_RATE, active: SOURCE_ACTIVE, velocity: Some(SOURCE_VELOCITY) };
+/// Those of a sink.
+pub(super) const SINK: Says = Says { rate: SINK_RATE, active: SINK_ACTIVE, velocity: None };
+
+impl Opening {
+    /// All openings of an input over a step.
+    ///
+    /// # Errors
+    /// Where one is not closed, changes its faces within the step, or asks for what is not available yet.
+    pub(super) fn all(
+        cx: &StepCx,
+        input: Input<Many>,
+        says: Says,
+        domain: &Domain,
+        lattice: Lattice,
+    ) -> Result<Vec<Self>> {
+        let samples = cx.samples(input);
+        let wires = samples.first().map_or(0, |(_, wires)| wires.len());
+        let mut openings = Vec::with_capacity(wires);
+        for wire in 0..wires {
+            let meshes: Vec<&Component> = samples.iter().filter_map(|(_, wires)| wires.get(wire)?.mesh()).collect();
+            if let [first, .., last] = meshes[..] {
+                let what = || format!("`{}` {wire} (counted from 0)", input.name());
+                if first.topology() != last.topology() {
+                    let fact = format!("{} changes its faces within a frame", what());
+                    return Err(
+                        Error::refused(fact).hint("a source or sink needs the same faces and points at every frame")
+                    );
+                }
+                refuse_material(first).map_err(|name| {
+                    let fact = format!("{} has a {name} of its own, which is not available yet", what());
+                    Error::refused(fact).hint(format!("set `{name}` of FluidSolve, and leave it out of Fluid_Source"))
+                })?;
+                openings.push(Self::new(&meshes, [first, last], says, domain, lattice, &what())?);
+            }
+        }
+        Ok(openings)
+    }
+
+    fn new(
+        meshes: &[&Component],
+        [first, last]: [&Component; 2],
+        says: Says,
+        domain: &Domain,
+        lattice: Lattice,
+        what: &str,
+    ) -> Result<Self> {
+        let settings = ShapeSettings::new(domain.low, domain.high);
+        let topology = topology(first, lattice, what)?;
+        let [from, to] = [first, last].map(|mesh| in_cells(mesh, lattice));
+        let mut bounds = [domain.high, domain.low];
+        for point in from.iter().chain(&to) {
+            for k in 0..3 {
+                let at = |x: f32| x.clamp(domain.low[k] as f32, domain.high[k] as f32) as i32;
+                bounds[0][k] = bounds[0][k].min(at(point[k].floor()));
+                bounds[1][k] = bounds[1][k].max(at(point[k].ceil()));
+            }
+        }
+        let once = |attribute: Attr<f32>, mesh: &Component| mesh.get(attribute).and_then(|rows| rows.first().copied());
+        let velocity = |mesh: &&Component| says.velocity.and_then(|attribute| mesh.get(attribute)?.first().copied());
+        Ok(Self {
+            shape: MovingShape::new(&topology, &from, &to, &settings),
+            bounds,
+            rates: meshes.iter().map(|mesh| f64::from(once(says.rate, mesh).unwrap_or(0.0))).collect(),
+            active: meshes
+                .iter()
+                .map(|mesh| mesh.get(says.active).is_none_or(|rows| rows.first() != Some(&0)))
+                .collect(),
+            velocities: meshes.iter().map(velocity).collect(),
+        })
+    }
+
+    /// Whether it gives or takes at a rate, rather than keeping its shape full or empty.
+    fn has_rate(&self) -> bool {
+        self.rates.iter().any(|rate| *rate > 0.0)
+    }
+
+    /// The sample at or before a share of the step, and how far it is to the next.
+    fn sample(&self, share: f64) -> (usize, f64) {
+        let last = self.active.len() - 1;
+        let at = share.clamp(0.0, 1.0) * last as f64;
+        let sample = (at as usize).min(last.saturating_sub(1));
+        (sample, at - sample as f64)
+    }
+
+    fn is_active(&self, share: f64) -> bool {
+        self.active[self.sample(share).0]
+    }
+
+    /// The velocity of the liquid inside, m/s.
+    fn velocity(&self, share: f64) -> [f32; 3] {
+        let Some(velocities) = &self.velocities else { return [0.0; 3] };
+        let (sample, mix) = self.sample(share);
+        let next = velocities[(sample + 1).min(velocities.len() - 1)];
+        numerics::vector::lerp(velocities[sample], next, mix as f32)
+    }
+
+    /// ∫ of the rate between two shares of a step of that many seconds, m³: linear between samples, 0 where it is not active.
+    fn volume(&self, from: f64, to: f64, seconds: f64) -> f64 {
+        let intervals = self.active.len() - 1;
+        let mut sum = 0.0;
+        for sample in 0..intervals {
+            let [low, high] = [sample, sample + 1].map(|n| n as f64 / intervals as f64);
+            let (low, high) = (from.max(low), to.min(high));
+            if low < high && self.active[sample] {
+                let mix = 0.5 * (low + high) * intervals as f64 - sample as f64;
+                sum += (high - low) * (self.rates[sample] + mix * (self.rates[sample + 1] - self.rates[sample]));
+            }
+        }
+        sum * seconds
+    }
+}
+
+/// The name of what a liquid has of its own and cannot have yet.
+pub(super) fn refuse_material(mesh: &Component) -> std::result::Result<(), &'static str> {
+    match (mesh.get(SOURCE_VISCOSITY), mesh.get(SOURCE_DENSITY)) {
+        (Some(_), _) => Err("viscosity"),
+        (_, Some(_)) => Err("density"),
+        (None, None) => Ok(()),
+    }
+}
+
+/// What the solver calls of an opening at times since the start of the frame, s.
+pub(super) struct Timed<'a> {
+    distance: Box<dyn Fn(f64, [f32; 3]) -> f32 + Sync + 'a>,
+    rate: Box<dyn Fn(f64, f64) -> f64 + Sync + 'a>,
+    active: Box<dyn Fn(f64) -> bool + Sync + 'a>,
+    velocity: Box<dyn Fn(f64) -> [f32; 3] + Sync + 'a>,
+    opening: &'a Opening,
+}
+
+impl<'a> Timed<'a> {
+    /// All of them in a step of that many seconds.
+    pub(super) fn all(openings: &'a [Opening], seconds: f64) -> Vec<Self> {
+        openings.iter().map(|opening| Self::new(opening, seconds)).collect()
+    }
+
+    fn new(opening: &'a Opening, seconds: f64) -> Self {
+        let share = move |time: f64| time / seconds;
+        Self {
+            distance: Box::new(move |time, point| opening.shape.distance(share(time) as f32, point)),
+            rate: Box::new(move |from, to| opening.volume(share(from), share(to), seconds)),
+            active: Box::new(move |time| opening.is_active(share(time))),
+            velocity: Box::new(move |time| opening.velocity(share(time))),
+            opening,
+        }
+    }
+
+    fn shape(&self) -> SourceShape<'_> {
+        SourceShape { distance: &*self.distance, bounds: self.opening.bounds }
+    }
+
+    pub(super) fn source(&self) -> LiquidSource<'_> {
+        LiquidSource {
+            shape: self.shape(),
+            rate: if self.opening.has_rate() { Some(&*self.rate) } else { None },
+            velocity: if self.opening.velocities.is_some() { Some(&*self.velocity) } else { None },
+            active: &*self.active,
+        }
+    }
+
+    pub(super) fn sink(&self) -> LiquidSink<'_> {
+        let rate: Option<&(dyn Fn(f64, f64) -> f64 + Sync)> =
+            if self.opening.has_rate() { Some(&*self.rate) } else { None };
+        LiquidSink { shape: self.shape(), rate, active: &*self.active }
+    }
+}

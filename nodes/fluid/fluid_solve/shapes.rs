@@ -1,0 +1,204 @@
+//! Meshes as the solver sees them: the liquid at the start, and colliders in motion.
+
+use std::sync::Arc;
+
+use engine::prelude::*;
+use liquid::level_set::LevelSet;
+use liquid::marked::MarkedSurface;
+use liquid::rows::CellRows;
+use liquid::shape::{MeshShape, MovingShape, ShapeSettings, ShapeTopology};
+use liquid::step::Domain;
+
+use super::domain::resolution;
+use super::openings::refuse_material;
+use super::{COLLIDERS, LIQUID};
+use crate::shared::volume::Lattice;
+
+/// Seed of the places of markers: they mark the same surface whatever it is.
+const SEED: u64 = 0x666c_7569_64;
+
+/// Distance from colliders where there are none, cells.
+const FAR: f32 = 5.0;
+
+/// Most cells of liquid at the start; they are counted in 32 bits.
+const MOST_CELLS: f64 = 1e9;
+
+/// Bytes that a cell of liquid takes while it moves.
+const CELL_BYTES: f64 = 400.0;
+
+/// The surface of the liquid at the start: all of its meshes together.
+///
+/// # Errors
+/// Where a mesh has no inside, or the liquid takes more memory than there is.
+pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Result<MarkedSurface> {
+    let by = resolution(cx);
+    let fine = lattice.refined(by);
+    let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * by as i32));
+    let settings = ShapeSettings::new(low, high);
+    let mut shapes = Vec::new();
+    for (wire, mesh) in cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).enumerate() {
+        let what = format!("`liquid` {wire} (counted from 0)");
+        let topology = topology(mesh, fine, &what)?;
+        refuse_material(mesh).map_err(|name| {
+            let fact = format!("{what} has a {name} of its own, which is not available yet");
+            Error::refused(fact).hint(format!("set `{name}` of FluidSolve, and leave it out of Fluid_Source"))
+        })?;
+        let points = in_cells(mesh, fine);
+        let least = cells_inside(mesh, &points, [low, high]);
+        if least > MOST_CELLS {
+            let fact =
+                format!("`liquid` {wire} (counted from 0) is about {least:.1e} cells, more than {MOST_CELLS:.0e}");
+            return Err(Error::refused(fact).hint("use larger cells, or less liquid"));
+        }
+        cx.reserve(least * CELL_BYTES / f64::from(by.pow(2)), "use larger cells, or less liquid")?;
+        shapes.push(MeshShape::new(&topology, &points, &settings));
+    }
+    let mut rows = CellRows::default();
+    for shape in &shapes {
+        rows = rows.union(shape.rows());
+    }
+    let mut phi = vec![settings.band; rows.len()];
+    for shape in &shapes {
+        rows.for_each_shared(shape.rows(), |to, from, len| {
+            let closer = phi[to..to + len].iter_mut().zip(&shape.distance()[from..from + len]);
+            closer.for_each(|(phi, distance)| *phi = phi.min(*distance));
+        });
+    }
+    let mut set = LevelSet::new(&rows, &phi, low, high);
+    set.fill();
+    Ok(MarkedSurface::of_level_set(set, by, 0, SEED))
+}
+
+/// Number of cells inside a mesh, about: its volume, but no more than its box has in `bounds`.
+fn cells_inside(mesh: &Component, points: &[[f32; 3]], bounds: [[i32; 3]; 2]) -> f64 {
+    let origin = points.first().copied().unwrap_or_default();
+    let corners = &mesh.triangles().corners;
+    let six = corners.iter().map(|corners| {
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
+        numerics::volume::six_volumes([origin, a, b, c])
+    });
+    let volume = six.fold(0.0, |sum, x| sum + x).abs() / 6.0;
+    let mut most = 1.0;
+    for k in 0..3 {
+        let along = || points.iter().map(|p| f64::from(p[k]).clamp(f64::from(bounds[0][k]), f64::from(bounds[1][k])));
+        most *= along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min) + 2.0;
+    }
+    if volume < most { volume } else { most }
+}
+
+/// A mesh's points in cells.
+pub(super) fn in_cells(mesh: &Component, lattice: Lattice) -> Vec<[f32; 3]> {
+    mesh.positions().iter().map(|point| lattice.in_cells(*point)).collect()
+}
+
+/// Which triangles of a mesh enclose volume.
+///
+/// # Errors
+/// Where none does.
+pub(super) fn topology(mesh: &Component, lattice: Lattice, what: &str) -> Result<ShapeTopology> {
+    let triangles = &mesh.triangles().corners;
+    let topology = ShapeTopology::new(&in_cells(mesh, lattice), triangles);
+    if topology.open_triangles() == triangles.len() && !triangles.is_empty() {
+        let fact = format!("{what} is not closed, so it has no inside");
+        return Err(Error::refused(fact).hint("close its holes, or give it thickness"));
+    }
+    Ok(topology)
+}
+
+/// One collider over a step.
+struct Collider {
+    topology: Arc<ShapeTopology>,
+    shape: MovingShape,
+    /// The mesh at the end of the step.
+    end: Component,
+}
+
+impl Collider {
+    /// A collider that moves from one mesh to the next. What `last`, the same collider in the step before, ended with is
+    /// not computed again.
+    fn moving(
+        last: Option<Self>,
+        [before, after]: [&Component; 2],
+        settings: &ShapeSettings,
+        lattice: Lattice,
+    ) -> Self {
+        let place = |mesh: &Component| mesh.table(Owner::Point).column("P").map(Column::address);
+        let topology = topology_of(before, lattice);
+        let goes_on = |last: &Self| place(&last.end) == place(before) && last.topology == topology;
+        let to = in_cells(after, lattice);
+        let shape = match last.filter(goes_on) {
+            Some(last) => last.shape.next_frame(&topology, &to),
+            None => MovingShape::new(&topology, &in_cells(before, lattice), &to, settings),
+        };
+        Self { topology, shape, end: after.clone() }
+    }
+}
+
+/// The colliders of a step.
+pub(super) struct Colliders(Vec<Collider>);
+
+impl Colliders {
+    /// The colliders where they are at the start.
+    pub(super) fn at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Self {
+        Self::still(cx.at_start(COLLIDERS).iter().filter_map(|geometry| geometry.mesh()), domain, lattice)
+    }
+
+    /// The colliders where they are at the frame that is cooked.
+    pub(super) fn now(cx: &Cx, domain: &Domain, lattice: Lattice) -> Self {
+        Self::still(cx.part(COLLIDERS).into_iter(), domain, lattice)
+    }
+
+    fn still<'a>(meshes: impl Iterator<Item = &'a Component>, domain: &Domain, lattice: Lattice) -> Self {
+        Self(meshes.map(|mesh| Collider::moving(None, [mesh; 2], &settings(domain), lattice)).collect())
+    }
+
+    /// The colliders in motion over a step; `last` are those of the step before, where they are known.
+    ///
+    /// # Errors
+    /// Where a collider changes its faces within it.
+    pub(super) fn within_step(cx: &StepCx, last: Option<Self>, domain: &Domain, lattice: Lattice) -> Result<Self> {
+        let [(_, before), .., (_, after)] = cx.samples(COLLIDERS) else { return Ok(Self(Vec::new())) };
+        let mut last = last.map(|colliders| colliders.0.into_iter()).into_iter().flatten();
+        let mut colliders = Vec::with_capacity(before.len());
+        for (wire, (before, after)) in before.iter().zip(after).enumerate() {
+            let (Some(before), Some(after)) = (before.mesh(), after.mesh()) else { continue };
+            let same = before.topology().same(after.topology()) || before.topology() == after.topology();
+            if !same {
+                let count =
+                    |mesh: &Component| format!("{} faces of {} points", mesh.element_count(), mesh.point_count());
+                let fact = format!("`colliders` {wire} changes from {} to {}", count(before), count(after));
+                return Err(Error::refused(fact).hint("a collider needs the same faces and points at every frame"));
+            }
+            colliders.push(Collider::moving(last.next(), [before, after], &settings(domain), lattice));
+        }
+        Ok(Self(colliders))
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The distance from the closest, in cells, at a share of the step.
+    pub(super) fn distance(&self, share: f32, point: [f32; 3]) -> f32 {
+        self.closest(share, point).map_or(FAR, |(_, distance)| distance)
+    }
+
+    /// The velocity of the closest, cells a step.
+    pub(super) fn velocity(&self, share: f32, point: [f32; 3]) -> [f32; 3] {
+        self.closest(share, point).map_or([0.0; 3], |(shape, _)| shape.velocity(share, point))
+    }
+
+    fn closest(&self, share: f32, point: [f32; 3]) -> Option<(&MovingShape, f32)> {
+        let all = self.0.iter().map(|collider| (&collider.shape, collider.shape.distance(share, point)));
+        all.reduce(|best, next| if next.1 < best.1 { next } else { best })
+    }
+}
+
+fn settings(domain: &Domain) -> ShapeSettings {
+    ShapeSettings { thicken: true, ..ShapeSettings::new(domain.low, domain.high) }
+}
+
+/// The topology of a mesh, found once for meshes that stay as they are.
+fn topology_of(mesh: &Component, lattice: Lattice) -> Arc<ShapeTopology> {
+    mesh.derived(|mesh| ShapeTopology::new(&in_cells(mesh, lattice), &mesh.triangles().corners))
+}

@@ -1,0 +1,265 @@
+use super::*;
+use conformance::{Bench, BenchResult, bench, conformance, cook_all};
+use engine::cook::{Engine, Settings};
+use numerics::shapes::{self, Polygons};
+
+/// Seconds of a frame.
+const H: f64 = 1.0 / 24.0;
+
+/// A closed box of quads.
+fn cuboid(low: [f32; 3], high: [f32; 3]) -> Component {
+    let at = |n: usize| [0, 1, 2].map(|k| if n >> k & 1 == 0 { low[k] } else { high[k] });
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    Component::mesh(vec![4; 6], faces.concat(), (0..8).map(at).collect()).unwrap()
+}
+
+/// A ball, whose corners no grid can round.
+fn ball(centre: [f32; 3], radius: f32) -> Component {
+    let Polygons { counts, corners, points } = shapes::sphere([2.0 * f64::from(radius); 3], 12);
+    let points = points.iter().map(|p| [0, 1, 2].map(|k| p[k] as f32 + centre[k])).collect();
+    Component::mesh(counts, corners, points).unwrap()
+}
+
+/// A solver of a box of 1 m with cells of 1/16 m.
+fn solving(liquid: impl Into<Geometry>) -> Bench {
+    bench(&NODE).input(LIQUID, liquid).set(CELL, 1.0 / 16.0).set(DOMAIN_FROM, [0.0; 3]).set(DOMAIN_TO, [1.0; 3])
+}
+
+/// The output `volume` at a frame.
+fn volume_at(bench: &Bench, frame: i64) -> Arc<Geometry> {
+    let (engine, frame) = (Engine::new(&Settings::default()).unwrap(), Frame::whole(frame));
+    cook_all(&engine, &bench.graph(), &[frame]).0[&(1, frame)].clone()
+}
+
+fn metric(out: &BenchResult, metric: Metric) -> f64 {
+    out.metrics[metric.name]
+}
+
+/// The height of the centre of what a surface encloses.
+fn height(out: &BenchResult) -> f64 {
+    let points = out.mesh().positions();
+    let (mut moment, mut volume) = (0.0, 0.0);
+    for quad in out.mesh().faces().unwrap().corners.as_chunks::<4>().0 {
+        for corners in [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]] {
+            let [a, b, c] = corners.map(|corner| points[corner as usize]);
+            let six = numerics::volume::six_volumes([[0.0; 3], a, b, c]);
+            volume += six;
+            moment += six * f64::from(a[1] + b[1] + c[1]) / 4.0;
+        }
+    }
+    moment / volume
+}
+
+#[test]
+fn liquid_falls_freely_whatever_its_viscosity() {
+    // v ← v + g·Δt after the surface moved with the v before, so n equal substeps fall by ½ g t² (1 − 1/n).
+    let block = ball([0.5, 0.7, 0.5], 0.22);
+    for viscosity in [0.0, 1.0, 1e3, 1e8] {
+        let out = solving(block.clone()).set(VISCOSITY, viscosity).set(GRAVITY, [0.0, -2.0, 0.0]).frames(1..=13);
+        let way = height(&out[0]) - height(&out[12]);
+        let steps: f64 = out[1..].iter().map(|frame| metric(frame, SUBSTEPS_USED)).sum();
+        let time = 12.0 * H;
+        let expected = 0.5 * 2.0 * time * time * (1.0 - 1.0 / steps);
+        assert!((way / expected - 1.0).abs() < 1e-3, "{viscosity} Pa·s: {way} of {expected} in {steps} substeps");
+        let volumes = out.iter().map(|frame| metric(frame, VOLUME_NOW) / metric(&out[0], VOLUME_NOW));
+        assert!(volumes.clone().all(|share| (share - 1.0).abs() < 0.01), "{:?}", volumes.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn a_pool_at_rest_stays_as_it_is() {
+    let out = solving(cuboid([-1.0; 3], [2.0, 0.43, 2.0])).set(VISCOSITY, 10.0).frames(1..=24);
+    let (first, last) = (out[1].mesh().positions(), out[23].mesh().positions());
+    assert_eq!(first.len(), last.len());
+    let way = first.iter().zip(last).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max));
+    assert!(way.fold(0.0, f32::max) < 1e-3 / 16.0);
+    assert!((metric(&out[0], VOLUME_NOW) / 0.43 - 1.0).abs() < 1e-3, "{}", metric(&out[0], VOLUME_NOW));
+    let (top, lowest) =
+        (out[23].mesh().positions()).iter().fold((0.0_f32, 1.0_f32), |(t, l), p| (t.max(p[1]), l.min(p[1])));
+    assert!((top - 0.43).abs() < 1e-3 && lowest == 0.0, "closed at the floor: {lowest}, top {top}");
+}
+
+#[test]
+fn the_surface_is_that_of_its_volume() {
+    let column = solving(cuboid([0.2, -1.0, -1.0], [0.6, 0.7, 2.0])).set(RESOLUTION, 2).set(VISCOSITY, 0.01);
+    let out = column.frames(1..=3);
+    let geometry = volume_at(&column, 3);
+    let volume = geometry.volume().unwrap();
+    assert_eq!(volume.level_grid().cell, 1.0 / 32.0);
+    assert_eq!(volume.velocity_grid().cell, 1.0 / 16.0);
+    let input: Input = Input::one("volume", Kind::Volume, "");
+    let made = bench(&crate::fluid_surface::NODE).input(input, (*geometry).clone()).cook();
+    let (ours, theirs) = (out[2].mesh(), made.mesh());
+    assert_eq!(ours.faces(), theirs.faces());
+    for attribute in [P, N, V] {
+        let bits = |mesh: &Component| {
+            mesh.get(attribute).unwrap().as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+        };
+        assert_eq!(bits(ours), bits(theirs), "{}", attribute.name);
+    }
+    assert_eq!(ours.get(THICKNESS), theirs.get(THICKNESS));
+    // The column falls and spreads: its top goes down, its foot forward.
+    let velocity = ours.get(V).unwrap();
+    let of = |keep: &dyn Fn([f32; 3]) -> bool, axis: usize| {
+        let all = ours.positions().iter().zip(velocity).filter(|(p, _)| keep(**p)).map(|(_, v)| v[axis]);
+        all.fold(0.0_f32, |most, v| if v.abs() > most.abs() { v } else { most })
+    };
+    assert!(of(&|p| p[1] > 0.6, 1) < -0.2);
+    assert!(of(&|p| p[1] < 0.2 && p[0] > 0.5, 0) > 0.2);
+}
+
+#[test]
+fn spin_and_velocity_at_the_start_are_those_of_the_params() {
+    let out = solving(cuboid([0.3; 3], [0.7; 3]))
+        .set(GRAVITY, [0.0; 3])
+        .set(INITIAL_VELOCITY, [0.1, 0.0, 0.0])
+        .set(INITIAL_SPIN, [0.0, 2.0, 0.0])
+        .cook();
+    let mesh = out.mesh();
+    for (p, v) in mesh.positions().iter().zip(mesh.get(V).unwrap()) {
+        let [x, _, z] = p.map(|x| x - 0.5);
+        for (found, expected) in v.iter().zip([0.1 + 2.0 * z, 0.0, -2.0 * x]) {
+            assert!((found - expected).abs() < 0.05, "{p:?}: {v:?}");
+        }
+    }
+}
+
+#[test]
+fn time_stops_and_goes_on() {
+    let drop = solving(cuboid([0.3, 0.5, 0.3], [0.7, 0.9, 0.7]));
+    let out = drop.keyed(TIME_SCALE, &[(1.0, 1.0), (3.0, 1.0), (3.5, 0.0), (5.5, 0.0), (6.0, 1.0)]).frames(1..=8);
+    let heights: Vec<f64> = out.iter().map(height).collect();
+    assert_eq!(out[3].mesh().positions().len(), out[4].mesh().positions().len());
+    assert!(heights[3] == heights[4] && metric(&out[4], SUBSTEPS_USED) == 0.0, "{heights:?}");
+    assert!(heights[1] > heights[2] && heights[5] > heights[6] && heights[6] > heights[7], "{heights:?}");
+}
+
+#[test]
+fn gravity_turns_within_a_frame() {
+    // Half of the frame down, half up: at the end it does not fall, but has fallen g (T/2)² in that frame.
+    let drop = solving(ball([0.5; 3], 0.22)).set(CFL, 1e-3).set(MAX_SUBSTEPS, 256);
+    let keys = [(1.0, [0.0, -9.81, 0.0]), (1.499, [0.0, -9.81, 0.0]), (1.5, [0.0, 9.81, 0.0]), (4.0, [0.0, 9.81, 0.0])];
+    let out = drop.keyed(GRAVITY, &keys).frames(1..=2);
+    let fallen = height(&out[0]) - height(&out[1]);
+    let expected = 9.81 * H * H / 4.0;
+    assert!((fallen / expected - 1.0).abs() < 0.2, "{fallen} of {expected}");
+    let still = out[1].mesh().get(V).unwrap().iter().fold(0.0_f32, |most, v| most.max(v[1].abs()));
+    assert!(still < 0.1 * 9.81 * H as f32, "{still}");
+}
+
+#[test]
+fn a_collider_holds_liquid_and_pushes_it() {
+    // A plate sweeps a pool that lies before it, from 0.3 m at frame 1 to 0.6 m at frame 9.
+    let plate = |x: f32| cuboid([x - 0.2, -0.1, -0.1], [x, 0.9, 1.1]);
+    let swept = solving(cuboid([0.3, -1.0, -1.0], [2.0, 0.25, 2.0]))
+        .moving(COLLIDERS, move |frame| plate(0.3 + 0.0375 * (frame.number() as f32 - 1.0)).into())
+        .set(VISCOSITY, 0.1);
+    let out = swept.frames(1..=9);
+    let geometry = volume_at(&swept, 9);
+    let mut sampler = geometry.volume().unwrap().sampler();
+    assert!(sampler.level_set([0.3, 0.1, 0.5]) > 0.0, "there is none behind");
+    assert!(sampler.level_set([0.7, 0.3, 0.5]) < 0.0, "it piles up ahead");
+    assert!(out[8].mesh().positions().iter().all(|p| p[0] > 0.6 - 0.1 / 16.0), "it ends at the plate");
+}
+
+fn with(mut mesh: Component, attributes: &[(Attr<f32>, f32)]) -> Component {
+    attributes.iter().for_each(|(attribute, value)| mesh.set(*attribute, vec![*value]).unwrap());
+    mesh
+}
+
+#[test]
+fn a_source_adds_the_integral_of_its_rate() {
+    // From 0 at frame 4 up to 0.05 m³/s at frame 9, and off from frame 14 on.
+    let source = |frame: f64| {
+        let mut source =
+            with(ball([0.5, 0.5, 0.5], 0.1), &[(SOURCE_RATE, (0.01 * (frame - 4.0)).clamp(1e-9, 0.05) as f32)]);
+        source.set(SOURCE_ACTIVE, vec![i32::from(frame < 14.0)]).unwrap();
+        source
+    };
+    let out = solving(cuboid([-1.0; 3], [2.0, 0.25, 2.0]))
+        .moving(SOURCES, move |frame| source(frame.number()).into())
+        .frames(1..=18);
+    let exact = 0.05 * (2.5 + 5.0) * H;
+    let sourced = metric(&out[17], SOURCED);
+    // What is less than the grid can show is still owed.
+    assert!((sourced - exact).abs() < 2.0 / 4096.0, "{sourced} of {exact}");
+    assert!(metric(&out[3], SOURCED) < 1e-3 * exact);
+}
+
+#[test]
+fn a_sink_takes_what_its_rate_says_or_all_that_enters() {
+    let pool = || solving(cuboid([-1.0; 3], [2.0, 0.5, 2.0]));
+    let drain = cuboid([0.3, -0.1, 0.3], [0.7, 0.15, 0.7]);
+    let rated = with(drain.clone(), &[(SINK_RATE, 0.1)]);
+    let off = move |frame: f64| {
+        let mut sink = rated.clone();
+        sink.set(SINK_ACTIVE, vec![i32::from(frame < 9.0)]).unwrap();
+        sink
+    };
+    // What a substep asks for passes in the next.
+    let out = pool().moving(SINKS, move |frame| off(frame.number()).into()).frames(1..=10);
+    let (sunk, exact) = (metric(&out[9], SUNK), 0.1 * 8.0 * H);
+    let lost = metric(&out[0], VOLUME_NOW) - metric(&out[9], VOLUME_NOW);
+    assert!((sunk / exact - 1.0).abs() < 0.01, "{sunk} of {exact}");
+    assert!((lost / exact - 1.0).abs() < 0.05, "{lost} of {exact}");
+    let out = pool().input(SINKS, drain).frames(1..=9);
+    assert!(metric(&out[8], SUNK) > 4.0 * exact, "{}", metric(&out[8], SUNK));
+}
+
+#[test]
+fn a_liquid_of_its_own_viscosity_is_refused_until_it_can_be() {
+    let source = with(ball([0.5; 3], 0.1), &[(SOURCE_VISCOSITY, 3.0)]);
+    for bench in [solving(source.clone()), solving(ball([0.5; 3], 0.2)).input(SOURCES, source)] {
+        let error = bench.try_frames(&[Frame::whole(2)]).err().unwrap();
+        assert!(error.error.fact.ends_with("has a viscosity of its own, which is not available yet"), "{error:?}");
+    }
+}
+
+#[test]
+fn what_is_not_available_yet_is_refused_by_name() {
+    let refused = |bench: Bench| bench.try_cook().err().map(|error| error.fact).unwrap_or_default();
+    let block = || solving(cuboid([0.3; 3], [0.7; 3]));
+    assert_eq!(
+        refused(block().set(METHOD, Method::Particles)),
+        "`method` is \"particles\", which is not available yet"
+    );
+    assert!(refused(block().set(SURFACE_TENSION, 0.07)).starts_with("`surface_tension` is 0.07"));
+    assert!(refused(block().set(FLIP, 0.5)).starts_with("`flip` is 0.5"));
+    assert!(refused(block().set(PARTICLES_PER_CELL, 9)).starts_with("`particles_per_cell` is 9"));
+    assert!(refused(block().set(WALL_Z_MAX, Walls::Periodic)).starts_with("`wall_z_max` is \"periodic\""));
+}
+
+#[test]
+fn boxes_that_cannot_be_are_refused() {
+    let refused = |bench: Bench| bench.try_cook().err().map(|error| error.fact).unwrap_or_default();
+    let block = || solving(cuboid([0.3; 3], [0.7; 3]));
+    assert!(refused(block().set(DOMAIN_TO, [1.0, -1.0, 1.0])).starts_with("`domain_to` is -1 along y"));
+    assert!(refused(block().set(CELL, 1e-9)).starts_with("the box is 1.000e9 cells long"));
+    let open = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]).unwrap();
+    assert!(refused(solving(open)).contains("not closed"));
+}
+
+#[test]
+fn a_box_without_liquid_stays_empty() {
+    let out = solving(cuboid([3.0; 3], [4.0; 3])).frames(1..=3);
+    assert_eq!(out[2].mesh().point_count(), 0);
+    assert_eq!(metric(&out[2], VOLUME_NOW), 0.0);
+    let out = bench(&NODE).frames(1..=2);
+    assert_eq!(out[1].mesh().point_count(), 0);
+}
+
+#[test]
+fn liquid_that_follows_has_no_walls() {
+    let out = solving(cuboid([0.3, 0.3, 0.3], [0.6, 0.6, 0.6])).set(FOLLOW, true).set(VISCOSITY, 0.0).frames(1..=16);
+    let fallen = height(&out[0]) - height(&out[15]);
+    let time = 15.0 * H;
+    assert!((fallen / (0.5 * 9.81 * time * time) - 1.0).abs() < 0.1, "{fallen}");
+    assert_eq!(metric(&out[15], LEFT_DOMAIN), 0.0);
+}
+
+#[test]
+fn it_conforms() {
+    let coarse = |bench: Bench| bench.set(CELL, 0.06);
+    let small = |bench: Bench| bench.set(DOMAIN_FROM, [-0.12; 3]).set(DOMAIN_TO, [0.12, 0.2, 0.12]);
+    conformance(&NODE).with(coarse).with(move |bench| coarse(bench).set(CFL, 0.02)).with(small).run();
+}

@@ -1,0 +1,91 @@
+//! Fluid_Surface: the surface of a volume as a mesh.
+//!
+//! The extraction is [`liquid::extract`]'s dual marching cubes: watertight, manifold, closed along the ends of the volume's
+//! grid. FluidSolve makes its output `surface` by the same function, so both have the same bits.
+
+use engine::prelude::*;
+
+use crate::shared::surface::surface;
+
+inputs! { INPUTS:
+    VOLUME: Input = Input::one("volume", Kind::Volume, "A level set, and a velocity for the points of the surface.");
+}
+
+const SURFACE: Output = Output::new("surface", &[Kind::Mesh], "The surface, closed, of quads that face outward.");
+
+pub(crate) static NODE: Node = Node::new(
+    "Fluid_Surface",
+    1,
+    "Makes a mesh of the surface of a liquid: watertight, smooth where the liquid is, with normals, velocities and the \
+     thickness of the liquid behind each point.",
+    Cook::Pure(cook),
+)
+.inputs(INPUTS)
+.outputs(&[&SURFACE])
+.writes(&[&P, &N, &V, &THICKNESS])
+.changes_topology();
+
+fn cook(cx: &Cx) -> Result<Outputs> {
+    let mut out = Geometry::default();
+    if let Some(volume) = cx.input(VOLUME).volume() {
+        out.put(surface(cx, volume)?);
+    }
+    Ok(SURFACE.with(out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use conformance::{bench, conforms};
+    use engine::geometry::Grid;
+
+    /// A ball of radius 0.3 m in a box of 1 m, which moves along x.
+    fn ball() -> Geometry {
+        let n = 24;
+        let cell = 1.0 / n as f32;
+        let grid = Grid { origin: [-0.5, 2.0, 0.0], cell, size: [n; 3] };
+        let at = |k: usize| {
+            let [x, y, z] = [k % 24, k / 24 % 24, k / 576].map(|x| (x as f32 + 0.5) * cell - 0.5);
+            (x * x + y * y + z * z).sqrt() - 0.3
+        };
+        let phi = (0..grid.cells()).map(at).collect();
+        let faces = |axis: usize, u: f32| vec![u; grid.faces(axis)];
+        let volume = Volume::new(grid, phi, [faces(0, 2.0), faces(1, 0.0), faces(2, -1.0)]).unwrap();
+        let mut geometry = Geometry::default();
+        geometry.put_volume(volume);
+        geometry
+    }
+
+    #[test]
+    fn a_ball_becomes_a_sphere_where_the_grid_lies() {
+        let out = bench(&NODE).input(VOLUME, ball()).cook();
+        let mesh = out.mesh();
+        let centre = [0.0, 2.5, 0.5];
+        assert!(mesh.point_count() > 500);
+        let normals = mesh.get(N).unwrap();
+        for (p, normal) in mesh.positions().iter().zip(normals) {
+            let way = [0, 1, 2].map(|k| p[k] - centre[k]);
+            let far = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+            assert!((far - 0.3).abs() < 1e-3, "{far}");
+            let along = (0..3).map(|k| way[k] / far * normal[k]).sum::<f32>();
+            assert!(along > 0.999, "{along}");
+        }
+        assert!(mesh.get(THICKNESS).unwrap().iter().all(|t| (t - 0.6).abs() < 0.01));
+        assert!(mesh.get(V).unwrap().iter().all(|v| (v[0] - 2.0).abs() + v[1].abs() + (v[2] + 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn an_empty_volume_gives_an_empty_mesh() {
+        let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [4; 3] };
+        let faces = |axis: usize| vec![0.0; grid.faces(axis)];
+        let mut geometry = Geometry::default();
+        geometry.put_volume(Volume::new(grid, vec![1.0; 64], [faces(0), faces(1), faces(2)]).unwrap());
+        let out = bench(&NODE).input(VOLUME, geometry).cook();
+        assert_eq!(out.mesh().point_count(), 0);
+    }
+
+    #[test]
+    fn it_conforms() {
+        conforms(&NODE);
+    }
+}

@@ -1,0 +1,18 @@
+//! Attributes that the family's nodes exchange.
+
+use engine::prelude::*;
+
+/// Of a source: what it adds, m³/s; 0 keeps its shape full.
+pub(crate) const SOURCE_RATE: Attr<f32> = Attr::once("source_rate");
+/// Of a source: 1 if it adds liquid, else 0.
+pub(crate) const SOURCE_ACTIVE: Attr<i32> = Attr::once("source_active");
+/// Of a source that has one: the velocity of the liquid inside it, m/s.
+pub(crate) const SOURCE_VELOCITY: Attr<[f32; 3]> = Attr::once("source_velocity");
+/// Of a source that has one: the dynamic viscosity of its liquid, Pa·s.
+pub(crate) const SOURCE_VISCOSITY: Attr<f32> = Attr::once("source_viscosity");
+/// Of a source that has one: the density of its liquid, kg/m³.
+pub(crate) const SOURCE_DENSITY: Attr<f32> = Attr::once("source_density");
+/// Of a sink: what it takes, m³/s; 0 takes all that enters.
+pub(crate) const SINK_RATE: Attr<f32> = Attr::once("sink_rate");
+/// Of a sink: 1 if it takes liquid, else 0.
+pub(crate) const SINK_ACTIVE: Attr<i32> = Attr::once("sink_active");
