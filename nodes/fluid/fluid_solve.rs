@@ -16,21 +16,26 @@ use liquid::marked::MarkedSurface;
 use liquid::step::{
     Coupling, Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
 };
+use liquid::velocity::Sampler;
+use liquid::volumes::VolumeTargets;
 use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
-    SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
+    PARTICLE_KIND, PARTICLE_VOLUME, SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE,
+    SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
 use crate::shared::surface::surface;
 use crate::shared::volume::volume;
 use domain::{Walls, checks, domain, lattice, settings};
 use measured::{measured, pool_of};
 use openings::{Opening, SAMPLES, SINK, SOURCE, Timed};
+use particles::{SprayDrop, particles};
 use shapes::{Colliders, liquid_at_start};
 
 mod domain;
 mod measured;
 mod openings;
+mod particles;
 mod shapes;
 
 choice! {
@@ -107,6 +112,8 @@ params! { PARAMS:
         "Largest share of a cell's volume that a substep may gain or lose, and largest error of a velocity relative to what a \
          substep changes.")
         .within(1e-9, 0.1).soft(1e-6, 1e-2);
+    VOLUME_CORRECTION: Param<bool> = Param::bool("volume_correction", true,
+        "Whether the surface is moved slightly in each frame so that the volume of each piece of liquid stays what it should be.");
     FLIP: Param<f32> = Param::float("flip", 0.0, "Share of FLIP of the particle method; not available yet.").within(0.0, 1.0);
     PARTICLES_PER_CELL: Param<i64> = Param::int("particles_per_cell", 8,
         "Particles of a cell in the particle method; not available yet.").within(1.0, 64.0);
@@ -126,6 +133,11 @@ const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
     "The surface of the liquid: closed, with `N`, `v` and `thickness`; the same as Fluid_Surface makes of `volume`.",
+);
+const PARTICLES: Output = Output::new(
+    "particles",
+    &[Kind::Points],
+    "The markers on the surface (`kind` 0) and drops too small for the grid (`kind` 1), with `id`, `v`, `N` and `volume`.",
 );
 const VOLUME: Output =
     Output::new("volume", &[Kind::Volume], "The level set and the velocity, which goes on past the surface.");
@@ -147,6 +159,15 @@ metrics! { METRICS:
         .warn_above(1e-2, "Cells gain or lose more than a hundredth of their volume in a substep. Lower `tolerance`; see whether \
             colliders squeeze liquid that cannot get away.");
     VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it.");
+    VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
+        "Error of the volume, relative to what it should be, if it were never corrected.")
+        .warn_outside(-0.03, 0.03, "Without correction the liquid would have gained or lost more than 3 % of its volume: it has \
+            many drops, sheets or jets that are thinner than `cell`. Lower `cell`, or raise `resolution`.");
+    VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
+        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. Lower `cell`, or \
+            raise `resolution`; with `volume_correction` it comes back over the next frames.");
+    SPRAY = Metric::new("spray", Unit::CubicMetres,
+        "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     LIQUID_CELLS = Metric::new("liquid_cells", Unit::None, "Cells with liquid.");
     SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources gave since the start.");
     SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks took since the start.");
@@ -162,7 +183,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
-.outputs(&[&SURFACE, &VOLUME])
+.outputs(&[&SURFACE, &PARTICLES, &VOLUME])
 .reads(&[
     &P,
     &SOURCE_RATE,
@@ -173,7 +194,7 @@ pub(crate) static NODE: Node = Node::new(
     &SINK_RATE,
     &SINK_ACTIVE,
 ])
-.writes(&[&P, &N, &V, &THICKNESS])
+.writes(&[&P, &N, &V, &THICKNESS, &ID, &PARTICLE_KIND, &PARTICLE_VOLUME])
 .changes_topology()
 .metrics(METRICS)
 .leaves_out(leaves_out)
@@ -194,6 +215,8 @@ struct Run {
     sourced: f64,
     sunk: f64,
     left_domain: f64,
+    targets: VolumeTargets,
+    spray: Vec<SprayDrop>,
     /// Metrics of the last step; empty at the start.
     metrics: MetricValues,
     #[serde(skip)]
@@ -228,13 +251,17 @@ impl Chain for Run {
         };
         let mut liquid = Liquid::new(settings(cx), surface);
         liquid.set_velocity(at, &around);
-        let (surface, motion) = (liquid.surface().clone(), liquid.motion().clone());
+        let (mut surface, motion) = (liquid.surface().clone(), liquid.motion().clone());
+        let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
+        let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
         let mut run = Self {
             surface,
             motion,
             sourced: 0.0,
             sunk: 0.0,
             left_domain: 0.0,
+            targets,
+            spray: Vec::new(),
             metrics: MetricValues::default(),
             colliders: Some(colliders),
             volume: OnceLock::new(),
@@ -257,6 +284,7 @@ impl Chain for Run {
         self.sunk += report.sunk;
         self.left_domain += report.left_domain;
         self.metrics = measured(&report);
+        self.correct(cx, &report, &colliders);
         self.metrics.set(SOURCED, self.sourced);
         self.metrics.set(SUNK, self.sunk);
         self.metrics.set(LEFT_DOMAIN, self.left_domain);
@@ -270,8 +298,9 @@ impl Chain for Run {
         let surface = surface(cx, &volume)?;
         cx.publish(VOLUME_NOW, measured::volume_inside(&surface));
         let mut out = Geometry::default();
-        out.put_volume(volume);
-        Ok(SURFACE.with(Geometry::from(surface)).and(VOLUME, out))
+        out.put_volume(volume.clone());
+        let particles = particles(cx, self, lattice(cx), &volume)?;
+        Ok(SURFACE.with(Geometry::from(surface)).and(PARTICLES, Geometry::from(particles)).and(VOLUME, out))
     }
 }
 
@@ -305,9 +334,38 @@ impl Run {
         };
         let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
         let report = liquid.step_frame(&around, seconds);
+        for account in liquid.sources() {
+            self.targets.add(account.moved, Some(account.place));
+        }
+        for account in liquid.sinks() {
+            self.targets.add(-account.moved, Some(account.place));
+        }
+        self.targets.add(-report.left_domain, None);
+        let pull = params(0.5 * seconds)[0];
+        self.spray.iter_mut().for_each(|drop| drop.fly(pull, seconds, lattice.cell));
         self.surface = liquid.surface().clone();
         self.motion = liquid.motion().clone();
         Ok(report)
+    }
+
+    /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost.
+    fn correct(&mut self, cx: &StepCx, report: &LiquidReport, colliders: &Colliders) {
+        if report.substeps == 0 {
+            return;
+        }
+        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
+        let corrected = match cx.get(VOLUME_CORRECTION) {
+            true => self.targets.correct(&mut self.surface, colliders.solid(&solid)),
+            false => self.targets.measure(&mut self.surface, colliders.solid(&solid)),
+        };
+        let mut sampler = Sampler::new(self.motion.rows());
+        for piece in &corrected.lost {
+            let velocity = self.motion.velocity().at(&mut sampler, piece.place);
+            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32 });
+        }
+        self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
+        self.metrics.set(VOLUME_DRIFT, corrected.drift);
+        self.metrics.set(SPRAY, self.spray.iter().map(|drop| f64::from(drop.volume)).sum::<f64>());
     }
 
     /// The output's volume: the level set without what lies inside colliders, and the velocity.
@@ -319,16 +377,12 @@ impl Run {
         let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
         let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
         let by = self.surface.resolution();
-        let mut phi = self.surface.level_set().phi().to_vec();
-        let view = self.surface.level_set().view();
         let colliders = Colliders::now(cx, &domain(cx), lattice);
-        if !colliders.is_empty() {
-            let size = by as f32;
-            let solid = |cell: [i32; 3]| -size * colliders.distance(1.0, cell.map(|x| (x as f32 + 0.5) / size));
-            let inside = view.rows.tabulate(solid);
-            phi.iter_mut().zip(inside).for_each(|(phi, solid)| *phi = phi.max(solid));
-        }
-        let volume = volume(PhiView { phi: &phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
+        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
+        let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
+        let view = self.surface.level_set().view();
+        let phi = outside.as_deref().unwrap_or(view.phi);
+        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
         let volume = Arc::new(volume);
         Ok(self.volume.get_or_init(|| volume).clone())
     }
@@ -345,6 +399,9 @@ fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
     }
     if wires.count(&COLLIDERS) == 0 {
         without("colliders", "no `colliders` are wired");
+    }
+    if !params.get(VOLUME_CORRECTION) {
+        without("volume correction", "`volume_correction` is false");
     }
     if params.get(STOKES) == Coupling::Off {
         without("viscosity", "`stokes` is off");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use engine::prelude::*;
 use liquid::level_set::LevelSet;
-use liquid::marked::MarkedSurface;
+use liquid::marked::{MarkedSurface, SolidDistance};
 use liquid::rows::CellRows;
 use liquid::shape::{MeshShape, MovingShape, ShapeSettings, ShapeTopology};
 use liquid::step::Domain;
@@ -15,7 +15,7 @@ use super::{COLLIDERS, LIQUID};
 use crate::shared::volume::Lattice;
 
 /// Seed of the places of markers: they mark the same surface whatever it is.
-const SEED: u64 = 0x666c_7569_64;
+const SEED: u64 = 0x0066_6c75_6964;
 
 /// Distance from colliders where there are none, cells.
 const FAR: f32 = 5.0;
@@ -176,6 +176,11 @@ impl Colliders {
 
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// `distance`, where there are colliders.
+    pub(super) fn solid<'a>(&self, distance: SolidDistance<'a>) -> Option<SolidDistance<'a>> {
+        if self.is_empty() { None } else { Some(distance) }
     }
 
     /// The distance from the closest, in cells, at a share of the step.

@@ -20,6 +20,11 @@ impl Lattice {
         [0, 1, 2].map(|k| ((f64::from(point[k]) - self.origin[k]) / self.cell) as f32)
     }
 
+    /// A place in cells in metres.
+    pub(crate) fn in_metres(&self, place: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|k| (self.origin[k] + self.cell * f64::from(place[k])) as f32)
+    }
+
     /// The lattice whose cells are `by` times smaller.
     pub(crate) fn refined(&self, by: u32) -> Self {
         Self { origin: self.origin, cell: self.cell / f64::from(by) }

@@ -156,6 +156,12 @@ impl VolumeTargets {
         self.report(&found, unit, moved, lost)
     }
 
+    /// Follows the pieces of a surface that has moved, and leaves it as it is.
+    pub fn measure(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> VolumeReport {
+        let (found, lost) = self.follow(surface, solid);
+        self.report(&found, self.unit(surface), 0.0, lost)
+    }
+
     fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
         let volume = unit * found.volume();
         let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume);
