@@ -38,6 +38,7 @@ mod tests {
     use super::*;
     use conformance::{bench, conforms};
     use engine::geometry::Grid;
+    use numerics::vector::{dot, length, sub};
 
     /// A ball of radius 0.3 m in a box of 1 m, which moves along x.
     fn ball() -> Geometry {
@@ -46,7 +47,7 @@ mod tests {
         let grid = Grid { origin: [-0.5, 2.0, 0.0], cell, size: [n; 3] };
         let at = |k: usize| {
             let [x, y, z] = [k % 24, k / 24 % 24, k / 576].map(|x| (x as f32 + 0.5) * cell - 0.5);
-            (x * x + y * y + z * z).sqrt() - 0.3
+            length([x, y, z]) - 0.3
         };
         let phi = (0..grid.cells()).map(at).collect();
         let faces = |axis: usize, u: f32| vec![u; grid.faces(axis)];
@@ -64,10 +65,10 @@ mod tests {
         assert!(mesh.point_count() > 500);
         let normals = mesh.get(N).unwrap();
         for (p, normal) in mesh.positions().iter().zip(normals) {
-            let way = [0, 1, 2].map(|k| p[k] - centre[k]);
-            let far = (way[0] * way[0] + way[1] * way[1] + way[2] * way[2]).sqrt();
+            let way = sub(*p, centre);
+            let far = length(way);
             assert!((far - 0.3).abs() < 1e-3, "{far}");
-            let along = (0..3).map(|k| way[k] / far * normal[k]).sum::<f32>();
+            let along = dot(way, *normal) / far;
             assert!(along > 0.999, "{along}");
         }
         assert!(mesh.get(THICKNESS).unwrap().iter().all(|t| (t - 0.6).abs() < 0.01));

@@ -1,12 +1,12 @@
 //! The fluid family: viscous liquids, directed by sources, sinks, colliders and gravity (paper R).
 
 mod fluid_sink;
-mod fluid_solve;
 mod fluid_source;
 mod fluid_surface;
+mod fluidsolve;
 mod shared;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&fluid_sink::NODE, &fluid_solve::NODE, &fluid_source::NODE, &fluid_surface::NODE];
+pub static NODES: &[&Node] = &[&fluid_sink::NODE, &fluidsolve::NODE, &fluid_source::NODE, &fluid_surface::NODE];

@@ -16,7 +16,7 @@ fn cuboid(low: [f32; 3], high: [f32; 3]) -> Component {
 /// A ball, whose corners no grid can round.
 fn ball(centre: [f32; 3], radius: f32) -> Component {
     let Polygons { counts, corners, points } = shapes::sphere([2.0 * f64::from(radius); 3], 12);
-    let points = points.iter().map(|p| [0, 1, 2].map(|k| p[k] as f32 + centre[k])).collect();
+    let points = points.iter().map(|p| add(p.map(|x| x as f32), centre)).collect();
     Component::mesh(counts, corners, points).unwrap()
 }
 
@@ -278,7 +278,7 @@ fn moved(wire: usize, given: Geometry, by: [f32; 3]) -> Geometry {
         for active in [SOURCE_ACTIVE, SINK_ACTIVE] {
             mesh.edit(active).into_iter().flatten().for_each(|active| *active = i32::from(wire == 0));
         }
-        mesh.edit(P).into_iter().flatten().for_each(|p| *p = [0, 1, 2].map(|k| p[k] + by[k]));
+        mesh.edit(P).into_iter().flatten().for_each(|p| *p = add(*p, by));
     }
     given
 }

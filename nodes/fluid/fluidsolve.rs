@@ -18,6 +18,7 @@ use liquid::step::{
 };
 use liquid::velocity::Sampler;
 use liquid::volumes::VolumeTargets;
+use numerics::vector::{add, cross, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
@@ -239,11 +240,7 @@ impl Chain for Run {
         let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
         let centre = pool_of(&surface).centre;
         let side = lattice.cell as f32;
-        let at = |point: [f32; 3]| {
-            let [x, y, z] = [0, 1, 2].map(|k| (point[k] - centre[k]) * side);
-            let turned = [spin[1] * z - spin[2] * y, spin[2] * x - spin[0] * z, spin[0] * y - spin[1] * x];
-            [0, 1, 2].map(|k| velocity[k] + turned[k])
-        };
+        let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
         let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
         let around = Surroundings {
             solid: (!colliders.is_empty()).then(|| Solid::still(&distance)),
