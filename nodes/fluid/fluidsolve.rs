@@ -362,7 +362,7 @@ impl Run {
         }
         self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
         self.metrics.set(VOLUME_DRIFT, corrected.drift);
-        self.metrics.set(SPRAY, self.spray.iter().map(|drop| f64::from(drop.volume)).sum::<f64>());
+        self.metrics.set(SPRAY, self.spray.iter().fold(0.0, |sum, drop| sum + f64::from(drop.volume)));
     }
 
     /// The output's volume: the level set without what lies inside colliders, and the velocity.
