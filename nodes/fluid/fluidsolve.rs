@@ -172,6 +172,10 @@ metrics! { METRICS:
     LIQUID_CELLS = Metric::new("liquid_cells", Unit::None, "Cells with liquid.");
     SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources gave since the start.");
     SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks took since the start.");
+    PARTICLES_NOW = Metric::new("particles", Unit::None, "Points of the output `particles`.");
+    COLLIDER_FORCE_X = Metric::new("collider_force_x", Unit::Newtons, "Force of the liquid on all colliders along x, mean of the frame.");
+    COLLIDER_FORCE_Y = Metric::new("collider_force_y", Unit::Newtons, "The same along y.");
+    COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
 }
 
@@ -297,6 +301,7 @@ impl Chain for Run {
         let mut out = Geometry::default();
         out.put_volume(volume.clone());
         let particles = particles(cx, self, lattice(cx), &volume)?;
+        cx.publish(PARTICLES_NOW, particles.point_count() as f64);
         Ok(SURFACE.with(Geometry::from(surface)).and(PARTICLES, Geometry::from(particles)).and(VOLUME, out))
     }
 }
@@ -328,9 +333,11 @@ impl Run {
             solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
             sources: &sources,
             sinks: &sinks,
+            cancelled: &|| cx.check_cancelled().is_err(),
         };
         let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
         let report = liquid.step_frame(&around, seconds);
+        cx.check_cancelled()?;
         for account in liquid.sources() {
             self.targets.add(account.moved, Some(account.place));
         }

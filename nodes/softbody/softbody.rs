@@ -361,11 +361,13 @@ impl Chain for Run {
             },
             substeps: cx.get(SUBSTEPS) as u32,
             force_implicit_euler: goals.reset_at(times[0], whole, frames),
+            cancelled: &|| cx.check_cancelled().is_err(),
         };
         // Positions are those of the start only in the first step.
         let started_inside =
             self.metrics.get(STARTED_INSIDE).unwrap_or_else(|| scene.count_inside(&self.state.positions) as f64);
         let report = solving.solver.step(&solving.body, &mut self.state, &frame);
+        cx.check_cancelled()?;
         let plasticity =
             Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
         let drawn = goals.shape(times[1]);

@@ -6,8 +6,8 @@ use liquid::step::{LiquidReport, Surface};
 use numerics::volume::six_volumes;
 
 use super::{
-    CAPS_HIT, CFL_REACHED, COUPLED_ITERATIONS, COUPLED_RESIDUAL, LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS,
-    SUBSTEPS_USED,
+    CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
+    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, SUBSTEPS_USED,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -21,6 +21,9 @@ pub(super) fn measured(report: &LiquidReport) -> MetricValues {
     metrics.set(COUPLED_RESIDUAL, report.coupled_residual);
     metrics.set(MAX_DIVERGENCE, report.max_divergence.max(report.unbalanced));
     metrics.set(LIQUID_CELLS, report.liquid_cells as f64);
+    for (metric, force) in [COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z].into_iter().zip(report.solid_force) {
+        metrics.set(metric, force);
+    }
     metrics
 }
 

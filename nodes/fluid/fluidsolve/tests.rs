@@ -221,6 +221,20 @@ fn a_liquid_of_its_own_viscosity_is_refused_until_it_can_be() {
 }
 
 #[test]
+fn a_ball_under_water_is_lifted_by_its_weight_of_water() {
+    // At rest from the first step on; the ball has a radius of 8 cells.
+    let out = solving(cuboid([-1.0; 3], [2.0, 0.8, 2.0]))
+        .input(COLLIDERS, ball([0.5, 0.4, 0.5], 0.25))
+        .set(CELL, 1.0 / 32.0)
+        .set(VISCOSITY, 0.0)
+        .frames(1..=3);
+    let lift = 1000.0 * 9.81 * 4.0 / 3.0 * std::f64::consts::PI * 0.25 * 0.25 * 0.25;
+    let force = [COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z].map(|axis| metric(&out[2], axis));
+    assert!((force[1] / lift - 1.0).abs() < 0.03, "{force:?} of {lift}");
+    assert!(force[0].abs() + force[2].abs() < 0.01 * lift, "{force:?}");
+}
+
+#[test]
 fn what_is_not_available_yet_is_refused_by_name() {
     let refused = |bench: Bench| bench.try_cook().err().map(|error| error.fact).unwrap_or_default();
     let block = || solving(cuboid([0.3; 3], [0.7; 3]));

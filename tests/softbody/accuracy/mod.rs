@@ -49,6 +49,7 @@ const BARE: SolverFrame<'static> = SolverFrame {
     integrator: bodies::mass_spring::Integrator::Default,
     substeps: 0,
     force_implicit_euler: false,
+    cancelled: &|| false,
 };
 
 /// A block for the solver: cells, their side, E and β; as heavy as water.

@@ -52,6 +52,8 @@ pub struct SolverFrame<'a> {
     /// Whether to step with implicit Euler throughout: for frames that start out of balance, for example after rest
     /// lengths changed.
     pub force_implicit_euler: bool,
+    /// Asked again and again: whether the frame is no longer wanted. It then ends soon, with a state of no use.
+    pub cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Default for SolverFrame<'_> {
@@ -67,6 +69,7 @@ impl Default for SolverFrame<'_> {
             integrator: Integrator::Default,
             substeps: 0,
             force_implicit_euler: false,
+            cancelled: &|| false,
         }
     }
 }
@@ -155,7 +158,8 @@ impl BodySolver {
         self.solver.system.regions.idle = self.solver.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
         self.solver.system.set_isolated(&self.solver.particle_stiffness);
-        let context = FrameContext { body, external: &external, rest, volumes: &state.volumes };
+        let context =
+            FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
         let vectors =
             |values: &[[f64; 3]]| body.to_solver_order(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
         let acceleration = if state.acceleration.len() == body.len() {
@@ -211,7 +215,7 @@ fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energi
         return halve(stepper, motion, energies, report, [0.0, 1.0], f64::INFINITY);
     }
     let steps = stepper.frame.substeps.min(MOST_STEPS);
-    for step in 0..steps {
+    for step in (0..steps).take_while(|_| !(stepper.frame.cancelled)()) {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
         let stepped = stepper.step(motion, times, energies, accurate, false);
         *energies = stepped.after;
@@ -243,7 +247,8 @@ fn halve(
     let share = times[1] - times[0];
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
     let hopeless = no_help || report.newton >= MOST_NEWTON;
-    if !unmet || hopeless || share <= 1.0 / f64::from(MOST_STEPS) {
+    let is_over = (stepper.frame.cancelled)();
+    if !unmet || hopeless || is_over || share <= 1.0 / f64::from(MOST_STEPS) {
         add(report, &stepped);
         *energies = stepped.after;
         return;
@@ -272,7 +277,7 @@ fn adapt(
     /// Newton iterations of a frame after which steps are accepted, damped and counted, so that the frame ends.
     const MOST_NEWTON: u32 = 4000;
     let (mut time, mut share, mut damp) = (0.0, 1.0_f64, false);
-    while time < 1.0 {
+    while time < 1.0 && !(stepper.frame.cancelled)() {
         // Equal steps to the end, which avoids a tiny last one.
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));

@@ -89,7 +89,8 @@ impl StageSolver {
             solved.set_residual(now);
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
             let wanted = (now > solved.enough && !slow) || deep;
-            if !wanted || stuck || solved.newton >= most {
+            let is_cancelled = solved.newton > 0 && (context.cancelled)();
+            if !wanted || stuck || is_cancelled || solved.newton >= most {
                 let gave_up = wanted && !stuck && most == MOST_IN_CONTACT;
                 solved.caps += u32::from(gave_up && (deep || self.is_unsettled(context.body)));
                 break;

@@ -69,6 +69,8 @@ pub(super) struct FrameContext<'a> {
     pub(super) rest: RestLengths<'a>,
     /// Current rest volumes of tetrahedra.
     pub(super) volumes: &'a [f64],
+    /// Whether the frame is no longer wanted.
+    pub(super) cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Stopping criteria of Newton's method without line search.
@@ -243,7 +245,7 @@ impl StageSolver {
             } else {
                 self.distance(clusters, &predicted) > NONLINEAR * NONLINEAR * before
             };
-            if solved.failed || !wanted || solved.newton >= newton.most {
+            if solved.failed || !wanted || solved.newton >= newton.most || (context.cancelled)() {
                 return solved;
             }
         }
@@ -421,7 +423,8 @@ mod tests {
         let body = SoftBody::new(&mesh, &material, &[]).unwrap();
         let external = ExternalForces::new(&body, DVec3::zeros(), 0.0, h, &[], &[]);
         let rest = RestLengths { lengths: &body.lengths, torn: &[] };
-        let context = FrameContext { body: &body, external: &external, rest, volumes: &body.volumes };
+        let context =
+            FrameContext { body: &body, external: &external, rest, volumes: &body.volumes, cancelled: &|| false };
         let start: Vec<DVec3> = body.rest.iter().map(|x| x + DVec3::new(x.y * x.y, 0.3 * x.z, x.x * x.y)).collect();
         let inertial: Vec<DVec3> = start.iter().map(|x| x + DVec3::z().cross(x) * (5.0 * h)).collect();
         for line_search in [false, true] {

@@ -242,7 +242,7 @@ impl<S: Surface> Liquid<S> {
         FlowAccount::start_frame(&mut self.motion.sources, around.sources.len());
         FlowAccount::start_frame(&mut self.motion.sinks, around.sinks.len());
         let mut left = seconds;
-        while left > 0.0 {
+        while left > 0.0 && !(around.cancelled)() {
             let gravity = (around.gravity)(seconds - left);
             let longest = self.longest_substep(gravity);
             let wanted = (left / longest).ceil().max(1.0);

@@ -26,6 +26,8 @@ pub struct Surroundings<'a> {
     pub sources: &'a [LiquidSource<'a>],
     /// Where it is taken away; likewise.
     pub sinks: &'a [LiquidSink<'a>],
+    /// Asked before each substep: whether the frame is no longer wanted. It then ends where it is.
+    pub cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<'a> Surroundings<'a> {
@@ -34,7 +36,7 @@ impl<'a> Surroundings<'a> {
         gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
         viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     ) -> Self {
-        Self { gravity, viscosity, solid: None, sources: &[], sinks: &[] }
+        Self { gravity, viscosity, solid: None, sources: &[], sinks: &[], cancelled: &|| false }
     }
 }
 

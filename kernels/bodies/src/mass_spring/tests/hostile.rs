@@ -239,3 +239,20 @@ fn invalid_bodies_are_refused() {
     let masses = SoftBody::new(&mesh, &material(1.0, 1.0, 0.0), &[]).unwrap().masses();
     assert!((masses[4] - LIGHTEST / 6.0 / 5.0).abs() < 1e-12, "{masses:?}");
 }
+
+/// A frame that is no longer wanted ends within a step, whatever the integrator.
+#[test]
+fn a_cancelled_frame_ends_soon() {
+    let body = block_body([3, 2, 2], 0.1, &material(1000.0, 1e6, 0.01));
+    let pins = [Pin { particle: 0, between: [[0.0; 3], [0.3, 0.0, 0.0]] }];
+    for (integrator, substeps) in
+        [(Integrator::Accurate { tolerance: 1e-9 }, 0), (Integrator::Default, 64), (Integrator::Euler, 64)]
+    {
+        let newton = |cancelled| {
+            let frame = SolverFrame { pins: &pins, integrator, substeps, cancelled, ..SolverFrame::default() };
+            steps(&body, &mut State::at_rest(&body), &frame, 1).newton
+        };
+        let (ended, whole) = (newton(&|| true), newton(&|| false));
+        assert!(ended <= 4 && whole > 60, "{integrator:?}: {ended} of {whole}");
+    }
+}

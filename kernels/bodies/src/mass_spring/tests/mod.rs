@@ -24,6 +24,7 @@ const BARE: SolverFrame<'static> = SolverFrame {
     integrator: Integrator::Default,
     substeps: 0,
     force_implicit_euler: false,
+    cancelled: &|| false,
 };
 
 fn plain(value: f64) -> Masked<'static, f64> {

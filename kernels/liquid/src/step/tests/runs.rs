@@ -91,3 +91,12 @@ fn no_liquid_no_time_and_too_little_time_are_told() {
     assert!(report.substeps == 3 && report.caps_hit > 0 && report.cfl_reached > 2.0, "{report:?}");
     assert!(largest(&fast).is_finite());
 }
+
+#[test]
+fn a_cancelled_frame_ends_after_the_substep_it_is_in() {
+    let domain = Domain::closed([0; 3], [12; 3]);
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.1), PlainLevelSet::new(domain, |p| p[1] - 6.3));
+    let before = liquid.surface().clone();
+    let report = liquid.step_frame(&Surroundings { cancelled: &|| true, ..FALLING }, 1.0);
+    assert_eq!((report.substeps, liquid.surface()), (0, &before));
+}
