@@ -79,6 +79,10 @@ impl<'a> Moving<'a> {
 /// would turn its cells over.
 const STEEPEST: f32 = 0.25;
 
+/// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
+/// anywhere.
+const FARTHEST: f32 = 64.0;
+
 /// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
 const BAND: i32 = 5;
 
@@ -94,7 +98,8 @@ pub(super) fn substep<S: Surface>(
     // Where it is and how it moves at the middle of the substep is what pushes the liquid.
     let solid = around.solid.map(|solid| solid.at(middle));
     let step = (seconds / settings.cell) as f32;
-    let reach = motion.largest_speed() as f32 * step;
+    let way = motion.largest_speed() as f32 * step;
+    let reach = way.min(FARTHEST);
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     surface.advance(&Moving { velocity: &velocity, step }, reach);
     if let Some(solid) = solid {
@@ -125,7 +130,7 @@ pub(super) fn substep<S: Surface>(
     let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
     let mut report = projection.apply(viscosity, &before, &mut exchanged.pours, &mut faces, motion);
     report.substeps = 1;
-    report.cfl_reached = f64::from(reach);
+    report.cfl_reached = f64::from(way);
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.count;
     report.left_domain = outflow(settings, &cells, &faces) * seconds * settings.cell * settings.cell;
@@ -150,7 +155,7 @@ fn continued(
     [step, reach]: [f32; 2],
 ) -> (MacVelocity, Option<FaceFields<f32>>) {
     let steepest = STEEPEST / step;
-    let rows = motion.rows_past_liquid(domain, BAND + reach.ceil().min(64.0) as i32);
+    let rows = motion.rows_past_liquid(domain, BAND + reach.ceil() as i32);
     let own = motion.velocity.faces();
     match &motion.gain {
         Some(gain) => {

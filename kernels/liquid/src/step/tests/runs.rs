@@ -100,3 +100,18 @@ fn a_cancelled_frame_ends_after_the_substep_it_is_in() {
     let report = liquid.step_frame(&Surroundings { cancelled: &|| true, ..FALLING }, 1.0);
     assert_eq!((report.substeps, liquid.surface()), (0, &before));
 }
+
+/// Ten thousand times the gravity, in one substep a frame: whatever is left of it is finite, and it ends.
+#[test]
+fn a_substep_takes_a_bounded_time_however_far_liquid_moves() {
+    let domain = Domain::closed([0; 3], [24, 16, 12]);
+    let settings = LiquidSettings { cfl: 1e9, max_substeps: 1, ..LiquidSettings::new(domain, 1.0 / 24.0) };
+    let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, block([-9.0; 3], [9.0, 12.0, 30.0])));
+    let around = Surroundings::new(&|_| [3e4, -1e5, 0.0], &|_| 0.0);
+    let mut farthest = 0.0_f64;
+    for _ in 0..4 {
+        farthest = farthest.max(liquid.step_frame(&around, 1.0 / 24.0).cfl_reached);
+    }
+    assert!(farthest > 1e3, "{farthest}");
+    assert!(liquid.motion().velocity().faces().iter().flatten().all(|u| u.is_finite()));
+}
