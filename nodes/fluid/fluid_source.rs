@@ -14,18 +14,18 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     RATE: Param<f32> = Param::float("rate", 0.0,
-        "Volume of liquid added in a second, exactly that much whatever the liquid around does. 0 keeps the shape full, and \
-         publishes what that took.")
+        "Volume of liquid added in a second. 0 keeps the shape full, and publishes what that took; to stop a source, \
+         animate `active`. Where liquid has nowhere to go, as in a sealed box, the source gives less, and a note says so.")
         .unit(Unit::CubicMetresPerSecond).at_least(0.0).soft(0.0, 0.01);
     VELOCITY: Param<Option<[f32; 3]>> = Param::optional_vec3("velocity",
         "Velocity of the liquid inside the shape, as of a nozzle. If it is not given, liquid leaves the shape as gravity and \
          pressure move it.")
         .unit(Unit::MetresPerSecond);
     VISCOSITY: Param<Option<f32>> = Param::optional_float("viscosity",
-        "Dynamic viscosity of the liquid from this source. If it is not given, that of FluidSolve.")
+        "Dynamic viscosity of the liquid from this source. FluidSolve cannot use it yet and refuses it: leave it out.")
         .unit(Unit::PascalSeconds).at_least(0.0).soft(0.0, 1e3);
     DENSITY: Param<Option<f32>> = Param::optional_float("density",
-        "Mass per volume of the liquid from this source. If it is not given, that of FluidSolve.")
+        "Mass per volume of the liquid from this source. FluidSolve cannot use it yet and refuses it: leave it out.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     ACTIVE: Param<bool> = Param::bool("active", true, "Whether liquid comes from it. Animate it to start and stop a pour.");
 }

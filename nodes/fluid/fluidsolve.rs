@@ -176,6 +176,10 @@ metrics! { METRICS:
     COLLIDER_FORCE_X = Metric::new("collider_force_x", Unit::Newtons, "Force of the liquid on all colliders along x, mean of the frame.");
     COLLIDER_FORCE_Y = Metric::new("collider_force_y", Unit::Newtons, "The same along y.");
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
+    WITHHELD = Metric::new("withheld", Unit::CubicMetres,
+        "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
+        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for: the liquid has nowhere to go, \
+            or there is none to take. Open a wall, make room, or move the source or sink.");
     LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
 }
 
@@ -220,6 +224,8 @@ struct Run {
     sourced: f64,
     sunk: f64,
     left_domain: f64,
+    /// In the last frame, m³.
+    withheld: f64,
     targets: VolumeTargets,
     spray: Vec<SprayDrop>,
     /// Metrics of the last step; empty at the start.
@@ -261,6 +267,7 @@ impl Chain for Run {
             sourced: 0.0,
             sunk: 0.0,
             left_domain: 0.0,
+            withheld: 0.0,
             targets,
             spray: Vec::new(),
             metrics: MetricValues::default(),
@@ -288,6 +295,7 @@ impl Chain for Run {
         self.correct(cx, &report, &colliders);
         self.metrics.set(SOURCED, self.sourced);
         self.metrics.set(SUNK, self.sunk);
+        self.metrics.set(WITHHELD, if report.substeps > 0 { self.withheld } else { 0.0 });
         self.metrics.set(LEFT_DOMAIN, self.left_domain);
         self.colliders = Some(colliders);
         Ok(())
@@ -345,6 +353,8 @@ impl Run {
             self.targets.add(-account.moved, Some(account.place));
         }
         self.targets.add(-report.left_domain, None);
+        let accounts = liquid.sources().iter().chain(liquid.sinks());
+        self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
         let pull = params(0.5 * seconds)[0];
         self.spray.iter_mut().for_each(|drop| drop.fly(pull, seconds, lattice.cell));
         self.surface = liquid.surface().clone();

@@ -212,6 +212,14 @@ fn a_sink_takes_what_its_rate_says_or_all_that_enters() {
 }
 
 #[test]
+fn a_source_in_a_box_that_is_full_says_that_it_cannot_give() {
+    let full = solving(cuboid([-1.0; 3], [2.0; 3])).input(SOURCES, with(ball([0.5; 3], 0.15), &[(SOURCE_RATE, 0.1)]));
+    let out = full.frames(1..=6);
+    assert!(metric(&out[5], WITHHELD) > 0.5 * 0.1 * H, "{}", metric(&out[5], WITHHELD));
+    assert!((metric(&out[5], VOLUME_NOW) - 1.0).abs() < 1e-3);
+}
+
+#[test]
 fn a_liquid_of_its_own_viscosity_is_refused_until_it_can_be() {
     let source = with(ball([0.5; 3], 0.1), &[(SOURCE_VISCOSITY, 3.0)]);
     for bench in [solving(source.clone()), solving(ball([0.5; 3], 0.2)).input(SOURCES, source)] {
