@@ -25,7 +25,7 @@ use crate::shared::attributes::{
     PARTICLE_KIND, PARTICLE_VOLUME, SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE,
     SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
-use crate::shared::surface::surface;
+use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
 use domain::{Walls, checks, domain, lattice, settings};
 use measured::{measured, pool_of};
@@ -304,7 +304,7 @@ impl Chain for Run {
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let volume = self.volume(cx)?;
         cx.publish_all(&self.metrics);
-        let surface = surface(cx, &volume)?;
+        let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
         cx.publish(VOLUME_NOW, measured::volume_inside(&surface));
         let mut out = Geometry::default();
         out.put_volume(volume.clone());

@@ -11,6 +11,7 @@
 mod cubes;
 mod place;
 mod quads;
+mod smooth;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -10,6 +10,7 @@
 
 pub(crate) mod cubic;
 mod fill;
+mod refine;
 mod sample;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ mod view;
 use numerics::vector::{Vec3, add, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
+pub use refine::refined;
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;
 pub use view::PhiView;
