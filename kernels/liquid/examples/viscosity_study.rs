@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use liquid::rows::{Cell, CellRows};
+use liquid::rows::{Cell, CellRows, Periods};
 use liquid::viscosity::{StokesGrid, StokesSolver, StokesStop};
 use numerics::vector::{length, sub};
 
@@ -47,6 +47,7 @@ fn main() {
                     density: &density,
                     viscosity: &viscosity,
                     slip: &|_, _| 0.0,
+                    periods: Periods::NONE,
                 };
                 let start = Instant::now();
                 let solver = StokesSolver::new(&grid);

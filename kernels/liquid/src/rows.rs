@@ -11,8 +11,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+mod periods;
 #[cfg(test)]
 mod tests;
+
+pub use periods::{Images, Periods};
 
 /// A cell: its number along x, y and z.
 pub type Cell = [i32; 3];

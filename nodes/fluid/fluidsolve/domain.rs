@@ -17,7 +17,7 @@ choice! {
         Open = "open": "liquid leaves, and is gone",
         Closed = "closed": "liquid stays in; `slip` says how freely it slides along",
         FreeSlip = "free_slip": "liquid stays in and slides along without friction",
-        Periodic = "periodic": "liquid that leaves comes in on the other side; not available yet",
+        Periodic = "periodic": "liquid that leaves comes in on the other side, which must be periodic too; shapes and colliders do not repeat",
     }
 }
 
@@ -73,9 +73,13 @@ pub(super) fn checks(params: &Params) -> Result<()> {
     if params.get(FOLLOW) {
         return Ok(());
     }
-    for (name, wall) in walls(params).as_flattened() {
-        if *wall == Walls::Periodic {
-            return not_yet(name, "\"periodic\"".into());
+    for [(low, low_wall), (high, high_wall)] in walls(params) {
+        if (low_wall == Walls::Periodic) != (high_wall == Walls::Periodic) {
+            let (one, other) = if low_wall == Walls::Periodic { (low, high) } else { (high, low) };
+            let fact =
+                format!("`{one}` is \"periodic\" and `{other}` is not: liquid that leaves has nowhere to come in");
+            let hint = format!("set `{other}` to \"periodic\" too, or `{one}` to another wall");
+            return Err(Error::refused(fact).hint(hint).of(other));
         }
     }
     let (from, to) = (params.get(DOMAIN_FROM), params.get(DOMAIN_TO));
@@ -102,7 +106,8 @@ pub(super) fn domain(cx: &Cx) -> Domain {
     let wall = |(_, wall): (&str, Walls)| match wall {
         Walls::Open => Wall::Open,
         Walls::FreeSlip => Wall::FreeSlip,
-        Walls::Closed | Walls::Periodic => Wall::Closed,
+        Walls::Periodic => Wall::Periodic,
+        Walls::Closed => Wall::Closed,
     };
     Domain { low: [0; 3], high, walls: walls(cx.params()).map(|sides| sides.map(wall)) }
 }

@@ -66,7 +66,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     }
     let mut set = LevelSet::new(&rows, &phi, low, high);
     set.fill();
-    Ok(MarkedSurface::of_level_set(set, by, 0, SEED))
+    Ok(MarkedSurface::of_level_set(set, by, 0, SEED).within(domain))
 }
 
 /// Number of cells inside a mesh, about: its volume, but no more than its box has in `bounds`.

@@ -150,12 +150,11 @@ impl LevelSet {
         self.store(&rows, phi, 0);
     }
 
-    /// Lowers φ of each stored cell by one of `by`, less than the width of a cell, and makes it a distance again.
+    /// Lowers φ of each stored cell by one of `by`, less than the width of a cell. Follow with [`Self::fill`].
     pub(crate) fn lower(&mut self, by: &[f32]) {
         for (phi, by) in self.phi.iter_mut().zip(by) {
             *phi -= by;
         }
-        self.fill();
     }
 
     /// Makes the surface meet a solid at a right angle: φ inside it is that of the mirrored place outside, to a depth of

@@ -13,11 +13,14 @@ use serde::{Deserialize, Serialize};
 use crate::extract::{Placement, QuadMesh, extract};
 use crate::level_set::{BAND, Flow, LevelSet, PhiView};
 use crate::markers::Markers;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Moving, Surface};
 
 /// The distance from a solid, in solver cells, negative inside, of a place in them.
 pub type SolidDistance<'a> = &'a (dyn Fn(Vec3) -> f32 + Sync);
+
+/// Images beyond a periodic side, besides those that move in, so that φ in the band is that of a surface without an end.
+const IMAGES: i32 = 8;
 
 /// Depth in a solid, in surface cells, from which a marker is dropped: nearer, its plane is the surface outside, too.
 const INSIDE: f32 = 1.0;
@@ -32,6 +35,8 @@ pub struct MarkedSurface {
     /// φ of the solver's cells, in solver cells; empty where it is that of the surface.
     rows: CellRows,
     phi: Vec<f32>,
+    /// After how many surface cells it repeats.
+    periods: Periods,
 }
 
 impl MarkedSurface {
@@ -52,16 +57,23 @@ impl MarkedSurface {
         let cells = refined(&near, resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
         let mut set = LevelSet::new(&cells, &cells.tabulate(phi), low, high);
         set.fill();
-        Self::of_level_set(set, resolution as u32, attributes, seed)
+        Self::of_level_set(set, resolution as u32, attributes, seed).within(&domain)
     }
 
     /// The surface of a level set whose cells are `resolution` ≥ 1 times as small as the solver's.
     pub fn of_level_set(set: LevelSet, resolution: u32, attributes: usize, seed: u64) -> Self {
         let markers = Markers::new(&set, attributes, seed);
         let resolution = resolution.max(1) as i32;
-        let mut surface = Self { set, markers, resolution, rows: CellRows::default(), phi: Vec::new() };
+        let mut surface =
+            Self { set, markers, resolution, rows: CellRows::default(), phi: Vec::new(), periods: Periods::NONE };
         surface.restrict();
         surface
+    }
+
+    /// The same between the walls of a domain: where they are periodic, the surface repeats.
+    #[must_use]
+    pub fn within(self, domain: &Domain) -> Self {
+        Self { periods: domain.periods().refined(self.resolution), ..self }
     }
 
     /// The level set, in surface cells.
@@ -111,7 +123,38 @@ impl MarkedSurface {
     pub(crate) fn shift(&mut self, cells: &[f32], markers: &[f32]) {
         self.set.lower(cells);
         self.markers.shift(markers);
+        self.among_images(0.0, |_, set| set.fill());
         self.restrict();
+    }
+
+    /// Calls `f` with the surface and its images, `reach` cells and those that its distances need beyond the sides, and
+    /// keeps what is inside the domain.
+    fn among_images(&mut self, reach: f32, f: impl FnOnce(&mut Markers, &mut LevelSet)) {
+        let periods = self.periods;
+        if !periods.any() {
+            return f(&mut self.markers, &mut self.set);
+        }
+        let margin = reach.ceil() as i32 + IMAGES;
+        let (low, high) = self.set.domain();
+        let mut outer = [low, high];
+        for axis in (0..3).filter(|axis| periods.0[*axis] > 0) {
+            outer[0][axis] -= margin;
+            outer[1][axis] += margin;
+        }
+        let own = self.set.rows().clipped(low, high);
+        let rows = periods.with_images(own.clone(), margin);
+        let mut phi = rows.resampled(self.set.rows(), self.set.phi(), BAND);
+        periods.images(&rows).fill(&mut phi);
+        let mut set = LevelSet::new(&rows, &phi, outer[0], outer[1]);
+        self.markers.repeat(periods, outer);
+        f(&mut self.markers, &mut set);
+        self.markers.retain_homes(periods);
+        self.set = LevelSet::new(set.rows(), set.phi(), low, high);
+    }
+
+    /// After how many surface cells it repeats.
+    pub(crate) fn periods(&self) -> Periods {
+        self.periods
     }
 
     /// The domain in solver cells.
@@ -153,7 +196,8 @@ impl Surface for MarkedSurface {
 
     fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
         let size = self.resolution as f32;
-        self.markers.step(&mut self.set, &Scaled { flow, size }, reach * size);
+        let flow = Scaled { flow, size };
+        self.among_images(reach * size, |markers, set| markers.step(set, &flow, reach * size));
         self.restrict();
     }
 
@@ -174,7 +218,7 @@ impl Surface for MarkedSurface {
         let [low, high] = [low, high].map(|corner| corner.map(|x| x.saturating_mul(self.resolution)));
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3, phi: f32| size * change(scale(point, unit), phi * unit);
-        self.markers.change(&mut self.set, low, high, scaled);
+        self.among_images(0.0, |markers, set| markers.change(set, low, high, scaled));
         self.restrict();
     }
 }

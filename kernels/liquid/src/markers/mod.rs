@@ -37,7 +37,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::level_set::{Flow, LevelSet, PhiSampler, displacement};
-use crate::rows::Cell;
+use crate::rows::{Cell, Periods};
 use bins::Bins;
 
 /// A point of the surface.
@@ -110,6 +110,31 @@ impl Markers {
     pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         let order: Vec<u32> = (0..self.markers.len()).filter(|n| keep(*n)).map(|n| n as u32).collect();
         self.reorder(&order);
+    }
+
+    /// Appends what repeats the markers between two corners.
+    pub(crate) fn repeat(&mut self, periods: Periods, [low, high]: [Cell; 2]) {
+        for n in 0..self.markers.len() {
+            let Marker { point, normal } = self.markers[n];
+            periods.each_repeat(point, [low, high].map(|corner| corner.map(|x| x as f32)), |point| {
+                self.markers.push(Marker { point, normal });
+                self.ids.push(self.ids[n]);
+                self.pieces.push(self.pieces[n]);
+                self.attributes.iter_mut().for_each(|values| values.push(values[n]));
+            });
+        }
+    }
+
+    /// Drops what repeats other markers.
+    pub(crate) fn retain_homes(&mut self, periods: Periods) {
+        let mut inside: Vec<u32> = (0..self.markers.len() as u32)
+            .filter(|n| periods.home_point(self.markers[*n as usize].point) == self.markers[*n as usize].point)
+            .collect();
+        // Rounding may leave one on both sides.
+        inside.sort_by_key(|n| self.ids[*n as usize]);
+        inside.dedup_by_key(|n| self.ids[*n as usize]);
+        inside.sort_unstable();
+        self.reorder(&inside);
     }
 
     /// Moves marker n along its normal by `by[n]` cells.

@@ -20,6 +20,7 @@ impl Closed {
         let mut number = vec![u32::MAX; level.rows().len()];
         pieces.iter().enumerate().for_each(|(n, piece)| number[piece.clone()].fill(n as u32));
         for_each_face(&level.stencil, |axis, below, above| {
+            let [below, above] = [below, above].map(|at| level.images.home(at));
             if level.weights[axis][above] > 0.0 {
                 match (number[below], number[above]) {
                     (u32::MAX, n) | (n, u32::MAX) if n != u32::MAX => {

@@ -17,17 +17,22 @@ pub(super) fn coarsened(fine: &Level, distances: &SurfaceDistances) -> Option<(L
     let candidates = fine.rows().halved();
     let finder = || Finder::new(fine.rows());
     let [kinds] = candidates.tabulate_with(finder, |finder, cell, _| [kind(fine, finder, cell)]);
-    let liquid = candidates.filtered(|_, at| kinds[at] == CellKind::Liquid);
+    let periods = fine.images.periods().halved();
+    let liquid = candidates.filtered(|cell, at| kinds[at] == CellKind::Liquid && periods.holds(cell));
     if liquid.is_empty() {
         return None;
     }
-    let stencil = Stencil::around(liquid, HALO);
-    let kinds = stencil.rows().resampled(&candidates, &kinds, CellKind::Air);
-    let weights = stencil
+    let stencil = Stencil::within(periods.stored(liquid.dilated(HALO), HALO), liquid);
+    let images = periods.images(stencil.rows());
+    let mut kinds = stencil.rows().resampled(&candidates, &kinds, CellKind::Air);
+    images.fill(&mut kinds);
+    let mut weights = stencil
         .rows()
         .tabulate_with(finder, |finder, cell, _| [0, 1, 2].map(|axis| weight(&fine.weights[axis], finder, cell, axis)));
-    let coarse_distances = coarse_distances(fine, distances, stencil.rows(), &kinds);
-    let level = Level::new(stencil, kinds, weights, &coarse_distances);
+    images.fill_each(&mut weights);
+    let mut coarse_distances = coarse_distances(fine, distances, stencil.rows(), &kinds);
+    images.fill_each(&mut coarse_distances);
+    let level = Level::new(stencil, kinds, weights, &coarse_distances, images);
     Some((level, coarse_distances))
 }
 

@@ -96,8 +96,10 @@ impl Multigrid {
         let coarse = &self.levels[number + 1];
         level.smooth(true, b, q, spare, step);
         level.scaled_residual(q, b, scale, spare);
+        level.images.fill_for_sums(spare, None);
         restrict(Place::Centre, level.rows(), &coarse.stencil, spare, &mut coarser[0].b);
         self.cycle(number + 1, coarser);
+        coarse.images.fill(&mut coarser[0].q);
         add_interpolated(Place::Centre, &level.stencil, coarse.rows(), scale, &coarser[0].q, q);
         level.smooth(false, b, q, spare, step);
     }

@@ -29,7 +29,7 @@ impl Factors {
                 for (neighbour, face) in [(below[axis], at), (above[axis], above[axis])] {
                     let weight = f64::from(level.weights[axis][face]);
                     rows[row * n + row] += weight;
-                    if let Some(column) = number[neighbour] {
+                    if let Some(column) = number[level.images.home(neighbour)] {
                         rows[row * n + column] -= weight;
                     }
                 }

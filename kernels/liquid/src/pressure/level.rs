@@ -2,7 +2,7 @@
 
 use numerics::simd::{Path, kernel};
 
-use crate::rows::CellRows;
+use crate::rows::{CellRows, Images};
 use crate::stencil::{Run, Stencil};
 
 /// What a stored cell is to the pressure.
@@ -29,6 +29,8 @@ pub(super) struct Level {
     pub surface: Vec<f32>,
     /// 0 where the cell is not liquid.
     pub inverse_diagonal: Vec<f32>,
+    /// Cells that repeat others; kinds and weights are theirs.
+    pub images: Images,
 }
 
 /// The share of a cell between its centre and the surface, for the low face of each cell; 1 where that face is not
@@ -53,6 +55,7 @@ impl Level {
         kinds: Vec<CellKind>,
         weights: [Vec<f32>; 3],
         distances: &SurfaceDistances,
+        images: Images,
     ) -> Self {
         let len = stencil.rows().len();
         let mut surface = vec![0.0; len];
@@ -80,7 +83,7 @@ impl Level {
                 }
             }
         });
-        Self { stencil, kinds, weights, surface, inverse_diagonal }
+        Self { stencil, kinds, weights, surface, inverse_diagonal, images }
     }
 
     pub(super) fn rows(&self) -> &CellRows {
@@ -93,13 +96,15 @@ impl Level {
     }
 
     /// `out` = A·`q`.
-    pub(super) fn apply(&self, q: &[f64], out: &mut [f64]) {
+    pub(super) fn apply(&self, q: &mut [f64], out: &mut [f64]) {
+        self.images.fill(q);
         let (path, matrix) = (Path::chosen(), self.matrix());
         self.stencil.update([out], |runs, first, [out]| apply_chunk(path, runs, first, &matrix, q, out));
     }
 
     /// `out` = (`b` − A·`q`)·`scale`, cell by cell.
-    pub(super) fn scaled_residual(&self, q: &[f32], b: &[f32], scale: &[f32], out: &mut [f32]) {
+    pub(super) fn scaled_residual(&self, q: &mut [f32], b: &[f32], scale: &[f32], out: &mut [f32]) {
+        self.images.fill(q);
         let (path, equation) = (Path::chosen(), Equation { matrix: self.matrix(), q, b });
         self.stencil.update([out], |runs, first, [out]| residual_chunk(path, runs, first, &equation, scale, out));
     }
@@ -120,6 +125,7 @@ impl Level {
                     (rho * before, 2.0 * rho / half)
                 }
             };
+            self.images.fill(q);
             let inverse = &self.inverse_diagonal[..];
             let weigh = Weighing { inverse, decay: decay as f32, gain: gain as f32 };
             let equation = Equation { matrix: self.matrix(), q, b };

@@ -18,7 +18,7 @@ mod tests;
 use std::ops::Range;
 
 use crate::fields::{add_scaled, dot, largest, scale_and_add};
-use crate::rows::{Cell, CellRows, Finder};
+use crate::rows::{Cell, CellRows, Finder, Images, Periods};
 use crate::stencil::{Run, Stencil};
 
 use closed::Closed;
@@ -41,6 +41,8 @@ pub struct PressureGrid<'a> {
     pub level_set: &'a [f32],
     /// Of the low face of each cell along x, y and z: its open share, times the reference density ÷ the density there.
     pub weights: [&'a [f32]; 3],
+    /// After how many cells the grid repeats. Images next to liquid are stored, too.
+    pub periods: Periods,
 }
 
 /// When a solve ends.
@@ -82,16 +84,20 @@ impl PressureSolver {
             || Finder::new(grid.rows),
             |finder, cell, at| [grid.level_set[at] < -LEAST_DEPTH && is_open(grid, finder, cell, at)],
         );
-        let liquid = grid.rows.filtered(|_, at| is_liquid[at]);
-        let stencil = Stencil::around(liquid, HALO);
+        let liquid = grid.rows.filtered(|cell, at| is_liquid[at] && grid.periods.holds(cell));
+        let stencil = Stencil::within(grid.periods.stored(liquid.dilated(HALO), HALO), liquid);
         let rows = stencil.rows();
-        let level_set = rows.resampled(grid.rows, grid.level_set, f32::NAN);
+        let images = grid.periods.images(rows);
+        let mut level_set = rows.resampled(grid.rows, grid.level_set, f32::NAN);
+        images.fill(&mut level_set);
         let mut kinds: Vec<_> =
             level_set.iter().map(|phi| if *phi >= -LEAST_DEPTH { CellKind::Air } else { CellKind::Solid }).collect();
         stencil.runs().iter().for_each(|run| kinds[run.range()].fill(CellKind::Liquid));
-        let weights = grid.weights.map(|weights| rows.resampled(grid.rows, weights, 0.0));
-        let distances = surface_distances(&stencil, &level_set);
-        let finest = Level::new(stencil, kinds, weights, &distances);
+        images.fill(&mut kinds);
+        let mut weights = grid.weights.map(|weights| rows.resampled(grid.rows, weights, 0.0));
+        images.fill_each(&mut weights);
+        let distances = surface_distances(&stencil, &level_set, &images);
+        let finest = Level::new(stencil, kinds, weights, &distances, images);
         let closed = Closed::find(&finest);
         Self { multigrid: Multigrid::new(finest, distances.clone()), distances, closed }
     }
@@ -99,6 +105,11 @@ impl PressureSolver {
     /// The cells that fields of this solver are stored for.
     pub fn rows(&self) -> &CellRows {
         self.multigrid.finest().rows()
+    }
+
+    /// The images among them.
+    pub(crate) fn images(&self) -> &Images {
+        &self.multigrid.finest().images
     }
 
     /// The liquid cells, and their neighbours.
@@ -110,6 +121,12 @@ impl PressureSolver {
     /// in `inflow`. `q` is the first guess on entry. Both on [`PressureSolver::rows`]; cells that are not liquid are set
     /// to 0. `inflow` is left as the net inflow that remains.
     pub fn solve(&self, inflow: &mut [f64], q: &mut [f64], stop: Stop) -> Solved {
+        let solved = self.solve_inside(inflow, q, stop);
+        self.images().fill(q);
+        solved
+    }
+
+    fn solve_inside(&self, inflow: &mut [f64], q: &mut [f64], stop: Stop) -> Solved {
         let finest = self.multigrid.finest();
         clear_outside(finest, inflow);
         clear_outside(finest, q);
@@ -131,7 +148,7 @@ impl PressureSolver {
             let energy = dot(residual, &better);
             let share = if solved.iterations == 0 { 0.0 } else { energy / energy_before };
             scale_and_add(&mut direction, share, &better);
-            finest.apply(&direction, &mut product);
+            finest.apply(&mut direction, &mut product);
             let curvature = dot(&direction, &product);
             // Nothing but rounding is left.
             if energy.is_nan() || curvature.is_nan() || energy <= 0.0 || curvature <= 0.0 {
@@ -196,9 +213,10 @@ impl PressureSolver {
     /// the distance of the cells, or of cell and surface.
     pub fn for_each_gradient(&self, q: &[f64], mut change: impl FnMut(usize, usize, f64)) {
         let stencil = self.stencil();
-        let kinds = &self.multigrid.finest().kinds;
-        let gradient =
-            |axis: usize, below: usize, above: usize| (q[above] - q[below]) / f64::from(self.distances[axis][above]);
+        let (kinds, images) = (&self.multigrid.finest().kinds, self.images());
+        let gradient = |axis: usize, below: usize, above: usize| {
+            (q[images.home(above)] - q[images.home(below)]) / f64::from(self.distances[axis][above])
+        };
         for run in stencil.runs() {
             for n in 0..run.len as usize {
                 let at = run.at as usize + n;
@@ -208,7 +226,7 @@ impl PressureSolver {
                     change(axis, at, gradient(axis, below[axis], at));
                     // The faces above liquid are the low faces of other cells.
                     if kinds[above[axis]] != CellKind::Liquid {
-                        change(axis, above[axis], gradient(axis, at, above[axis]));
+                        change(axis, images.home(above[axis]), gradient(axis, at, above[axis]));
                     }
                 }
             }
@@ -236,10 +254,11 @@ fn clear_outside(level: &Level, field: &mut [f64]) {
             *value = 0.0;
         }
     }
+    level.images.clear(field);
 }
 
 /// For each low face between liquid and air, how far from the centre of the liquid cell the surface is, in cells.
-fn surface_distances(stencil: &Stencil, level_set: &[f32]) -> SurfaceDistances {
+fn surface_distances(stencil: &Stencil, level_set: &[f32], images: &Images) -> SurfaceDistances {
     let mut out: SurfaceDistances = std::array::from_fn(|_| vec![1.0; level_set.len()]);
     let mut set = |run: &Run, n: usize| {
         let at = run.at as usize + n;
@@ -255,5 +274,11 @@ fn surface_distances(stencil: &Stencil, level_set: &[f32]) -> SurfaceDistances {
         }
     };
     stencil.runs().iter().for_each(|run| (0..run.len as usize).for_each(|n| set(run, n)));
+    // Liquid below a side that repeats has set the image of the face.
+    let is_air = |at: usize| level_set[at] >= -LEAST_DEPTH;
+    for (axis, distances) in out.iter_mut().enumerate() {
+        images.give_home(axis, distances, is_air);
+        images.fill(distances);
+    }
     out
 }

@@ -20,7 +20,12 @@ impl Case {
 
     fn solver(&self) -> PressureSolver {
         let [x, y, z] = &self.weights;
-        PressureSolver::new(&PressureGrid { rows: &self.rows, level_set: &self.level_set, weights: [x, y, z] })
+        PressureSolver::new(&PressureGrid {
+            rows: &self.rows,
+            level_set: &self.level_set,
+            weights: [x, y, z],
+            periods: Periods::NONE,
+        })
     }
 
     fn weight(&self, axis: usize, cell: Cell) -> f64 {

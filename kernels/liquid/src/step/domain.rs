@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, unit};
 
 use crate::open_share::open_share;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::velocity::{FaceFields, Site};
 
 /// What a side of the domain is to the liquid.
@@ -16,9 +16,20 @@ pub enum Wall {
     Closed,
     /// A solid wall without friction. Without viscosity there is no difference.
     FreeSlip,
+    /// None: what goes out comes in at the other side, which is periodic too. Solids and the shapes of sources and sinks do
+    /// not repeat.
+    Periodic,
 }
 
-/// The cells `low` ≤ cell < `high`, and the walls around them.
+impl Wall {
+    /// Whether liquid does not pass.
+    #[inline(always)]
+    pub fn is_solid(self) -> bool {
+        matches!(self, Self::Closed | Self::FreeSlip)
+    }
+}
+
+/// The cells `low` ≤ cell < `high`, and the walls around them. An axis with a periodic wall has two, and `low` 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Domain {
     /// The first cell.
@@ -89,6 +100,11 @@ impl Domain {
         [self.low, self.high].map(|corner| corner.map(|x| x as f32))
     }
 
+    /// After how many cells the box repeats along each axis.
+    pub fn periods(&self) -> Periods {
+        Periods([0, 1, 2].map(|axis| if self.walls[axis][0] == Wall::Periodic { self.high[axis] } else { 0 }))
+    }
+
     /// Whether the cell lies in the box.
     #[inline(always)]
     pub fn contains(&self, cell: Cell) -> bool {
@@ -96,9 +112,19 @@ impl Domain {
     }
 
     /// The part of the rows in the box and one cell beyond each side: cells beyond hold the faces of the wall above and
-    /// tangential velocity behind walls.
+    /// tangential velocity behind walls. Beyond sides that are periodic they are images.
     pub fn clip(&self, rows: &CellRows) -> CellRows {
-        rows.clipped(self.low.map(|x| x - 1), self.high.map(|x| x + 1))
+        self.clip_with_images(rows, 1)
+    }
+
+    /// The same with as many images beyond periodic sides as `margin`.
+    pub(super) fn clip_with_images(&self, rows: &CellRows, margin: i32) -> CellRows {
+        let periods = self.periods();
+        let within = |rows: &CellRows| rows.clipped(self.low.map(|x| x - 1), self.high.map(|x| x + 1));
+        if !periods.any() {
+            return within(rows);
+        }
+        periods.with_images(within(&periods.gathered(rows.clone())), margin)
     }
 
     /// Where the low face of a cell is a side of the box, which wall that is.
@@ -119,7 +145,7 @@ impl Domain {
             for other in 0..3 {
                 let ways = [middle[other] - self.low[other] as f32, self.high[other] as f32 - middle[other]];
                 for (wall, way) in self.walls[other].iter().zip(ways) {
-                    distance = if *wall == Wall::Open { distance } else { distance.min(way) };
+                    distance = if wall.is_solid() { distance.min(way) } else { distance };
                 }
             }
             distance
@@ -132,11 +158,14 @@ impl Domain {
     pub(super) fn slip(&self, axis: usize, cell: Cell, slip: f32) -> f32 {
         let wall_beside = |other: usize| {
             let beyond = [cell[other] < self.low[other], cell[other] >= self.high[other]];
-            (0..2).find(|side| other != axis && beyond[*side]).map(|side| self.walls[other][side])
+            (0..2)
+                .find(|side| other != axis && beyond[*side])
+                .map(|side| self.walls[other][side])
+                .filter(|wall| *wall != Wall::Periodic)
         };
         match (0..3).find_map(wall_beside) {
             Some(Wall::Open | Wall::FreeSlip) => 1.0,
-            Some(Wall::Closed) | None => slip,
+            Some(Wall::Closed | Wall::Periodic) | None => slip,
         }
     }
 
@@ -156,7 +185,7 @@ impl Domain {
             || (),
             |(), cell, at| {
                 [0, 1, 2].map(|axis| {
-                    let is_wall = matches!(self.wall_at(axis, cell), Some(Wall::Closed | Wall::FreeSlip));
+                    let is_wall = self.wall_at(axis, cell).is_some_and(Wall::is_solid);
                     match open[axis][at] < 1.0 && self.contains(cell) && !is_wall {
                         true => solid.velocity(Site::FACES[axis].of(cell))[axis],
                         false => 0.0,
@@ -171,7 +200,7 @@ impl Domain {
             let high = self.high[other] + i32::from(other == axis);
             self.low[other] <= cell[other] && cell[other] < high
         };
-        if !(0..3).all(within) || matches!(self.wall_at(axis, cell), Some(Wall::Closed | Wall::FreeSlip)) {
+        if !(0..3).all(within) || self.wall_at(axis, cell).is_some_and(Wall::is_solid) {
             return 0.0;
         }
         solid.map_or(1.0, |solid| share_outside(axis, cell, solid))

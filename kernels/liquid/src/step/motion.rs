@@ -4,7 +4,7 @@ use numerics::vector::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::pressure::LEAST_DEPTH;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Images};
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::sources::FlowAccount;
 use crate::step::{LiquidSettings, Surface, Surroundings, Wall};
@@ -86,7 +86,7 @@ impl Motion {
 
     /// The rows of the velocity and `layers` cells past the liquid.
     pub(super) fn rows_past_liquid(&self, domain: &Domain, layers: i32) -> CellRows {
-        domain.clip(&self.rows().dilated(layers - 1))
+        domain.clip_with_images(&self.rows().dilated(layers - 1), layers + 1)
     }
 
     /// A velocity on other cells with what the last substep gained, where that is known: liquid at rest and in free fall
@@ -107,15 +107,21 @@ impl Motion {
         domain: &Domain,
         solid: Option<Obstacle<'_>>,
     ) -> [FaceFields<f32>; F] {
+        let images = domain.periods().images(rows);
         let mut known = rows.resampled(self.rows(), &self.known, 0);
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
+        images.fill(&mut known);
+        fields.iter_mut().for_each(|faces| images.fill_each(faces));
         extrapolate(rows, &mut known, fields.each_mut(), steepest, u32::MAX);
         fields.map(|mut faces| {
+            images.fill_each(&mut faces);
             hold_walls(domain, rows, &mut faces);
-            match solid {
+            let mut faces = match solid {
                 Some(solid) => slide(rows, &faces, solid),
                 None => faces,
-            }
+            };
+            images.fill_each(&mut faces);
+            faces
         })
     }
 }
@@ -124,12 +130,12 @@ impl Motion {
 fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
     for ([y, z], span) in rows.spans() {
         for axis in [1, 2] {
-            if matches!(domain.wall_at(axis, [span.start, y, z]), Some(Wall::Closed | Wall::FreeSlip)) {
+            if domain.wall_at(axis, [span.start, y, z]).is_some_and(Wall::is_solid) {
                 faces[axis][span.at(span.start)..][..span.len()].fill(0.0);
             }
         }
         for x in [domain.low[0], domain.high[0]] {
-            let is_closed = matches!(domain.wall_at(0, [x, y, z]), Some(Wall::Closed | Wall::FreeSlip));
+            let is_closed = domain.wall_at(0, [x, y, z]).is_some_and(Wall::is_solid);
             if is_closed && span.start <= x && x < span.end {
                 faces[0][span.at(x)] = 0.0;
             }
@@ -177,6 +183,8 @@ pub(super) struct LiquidCells {
     pub known: Vec<FaceMask>,
     /// Number of liquid cells.
     pub count: usize,
+    /// Cells that repeat others.
+    pub images: Images,
 }
 
 impl LiquidCells {
@@ -184,13 +192,15 @@ impl LiquidCells {
         let view = surface.view();
         let liquid = view.rows.filtered(|cell, at| view.phi[at] < -LEAST_DEPTH && domain.contains(cell));
         let rows = domain.clip(&liquid.dilated(1));
+        let images = domain.periods().images(&rows);
         let mut level_set = rows.resampled(view.rows, view.phi, view.outside);
-        Self::leave_domain(domain, &rows, &mut level_set);
+        Self::leave_domain(domain, &rows, &images, &mut level_set);
         let outside = view.outside;
-        let open = domain.open_shares(&rows, solid);
+        let mut open = domain.open_shares(&rows, solid);
+        images.fill_each(&mut open);
         let solid_velocity = solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
         let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < -LEAST_DEPTH)).collect();
-        let [moving, known] = rows.tabulate_with(
+        let [mut moving, mut known] = rows.tabulate_with(
             || (),
             |(), cell, at| {
                 let mut masks = [0, 0];
@@ -207,23 +217,35 @@ impl LiquidCells {
             },
         );
         debug_assert!(moving.iter().zip(&known).all(|(moving, known)| moving & !known == 0 && *known <= ALL_FACES));
-        Self { count: liquid.len(), rows, level_set, outside, open, solid_velocity, moving, known }
+        images.fill(&mut moving);
+        images.fill(&mut known);
+        Self { count: liquid.len(), rows, level_set, outside, open, solid_velocity, moving, known, images }
     }
 
     /// φ on wider rows.
     pub(super) fn level_set_on(&self, domain: &Domain, rows: &CellRows) -> Vec<f32> {
         let mut level_set = rows.resampled(&self.rows, &self.level_set, self.outside);
-        Self::leave_domain(domain, rows, &mut level_set);
+        Self::leave_domain(domain, rows, &domain.periods().images(rows), &mut level_set);
         level_set
     }
 
+    /// Gives images what the faces have that they repeat.
+    pub(super) fn fill_images(&mut self) {
+        self.images.fill(&mut self.moving);
+        self.images.fill_each(&mut self.open);
+        if let Some(velocity) = &mut self.solid_velocity {
+            self.images.fill_each(velocity);
+        }
+    }
+
     /// Cells beyond the walls are air, and the surface is on the wall.
-    fn leave_domain(domain: &Domain, rows: &CellRows, level_set: &mut [f32]) {
+    fn leave_domain(domain: &Domain, rows: &CellRows, images: &Images, level_set: &mut [f32]) {
         let beyond: Vec<_> = rows.iter().enumerate().filter(|(_, cell)| !domain.contains(*cell)).collect();
         for (at, cell) in beyond {
             let inner = [0, 1, 2].map(|axis| cell[axis].clamp(domain.low[axis], domain.high[axis] - 1));
             let phi = rows.find(inner).map_or(1.0, |inner| level_set[inner].abs());
             level_set[at] = phi.max(f32::MIN_POSITIVE);
         }
+        images.fill(level_set);
     }
 }

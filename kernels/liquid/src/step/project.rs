@@ -60,7 +60,8 @@ impl Projection<'_> {
     fn by_pressure(&self, pours: &mut [Pour], faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
         let cells = self.cells;
         let [x, y, z] = &cells.open;
-        let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z] };
+        let periods = self.settings.domain.periods();
+        let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z], periods };
         let solver = PressureSolver::new(&grid);
         let mut inflow = inflow(&solver, cells, faces);
         let poured = pour(pours, &solver, self.settings.cell, &mut inflow);
@@ -91,7 +92,7 @@ impl Projection<'_> {
         guess: &mut Guess,
     ) -> LiquidReport {
         let (cells, domain) = (self.cells, &self.settings.domain);
-        let rows = domain.clip(&cells.rows.dilated(1));
+        let rows = domain.clip_with_images(&cells.rows.dilated(1), 2);
         let level_set = cells.level_set_on(domain, &rows);
         let [mut open, distance] = domain.faces(&rows, self.solid);
         let mut solid_velocity = self.solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
@@ -108,6 +109,7 @@ impl Projection<'_> {
             density: &vec![1.0; rows.len()],
             viscosity: &vec![viscosity as f32; rows.len()],
             slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
+            periods: domain.periods(),
         };
         let solver = StokesSolver::new(&grid);
         let on_solver = |field: &[f32]| {

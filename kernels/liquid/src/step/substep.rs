@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, scale};
 
 use crate::level_set::PhiView;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::motion::{Gain, LiquidCells, Motion};
@@ -64,14 +64,16 @@ pub struct Moving<'a> {
     pub velocity: &'a MacVelocity,
     /// Cells moved at 1 m/s.
     pub step: f32,
+    /// After how many cells it repeats.
+    pub periods: Periods,
 }
 
 impl<'a> Moving<'a> {
     /// The way, in cells, at a place in cells. Fast where successive places are near each other.
     pub fn reader(&self) -> impl FnMut(Vec3) -> Vec3 + use<'a> {
-        let (velocity, step) = (self.velocity, self.step);
+        let Self { velocity, step, periods } = *self;
         let mut sampler = Sampler::new(velocity.rows());
-        move |point| scale(velocity.at(&mut sampler, point), step)
+        move |point| scale(velocity.at(&mut sampler, periods.home_point(point)), step)
     }
 }
 
@@ -101,7 +103,8 @@ pub(super) fn substep<S: Surface>(
     let way = motion.largest_speed() as f32 * step;
     let reach = way.min(FARTHEST);
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
-    surface.advance(&Moving { velocity: &velocity, step }, reach);
+    let periods = settings.domain.periods();
+    surface.advance(&Moving { velocity: &velocity, step, periods }, reach);
     if let Some(solid) = solid {
         surface.meet(|point| solid.distance(point));
     }
@@ -109,14 +112,16 @@ pub(super) fn substep<S: Surface>(
 
     let mut cells = LiquidCells::of(&settings.domain, surface, solid);
     let imposed = exchanged.impose(&mut cells);
+    cells.fill_images();
     let carried = exchanged.entered(motion, &velocity, carried, reach);
     let bounds = settings.domain.bounds();
-    let advection = Advection { velocity: &velocity, bounds, step, scheme: settings.scheme };
+    let advection = Advection { velocity: &velocity, bounds, periods, step, scheme: settings.scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();
     drop((velocity, carried));
     Imposed::set(&imposed, &cells.rows, &mut faces, |velocity| velocity);
+    cells.images.fill_each(&mut faces);
     let before = faces.clone();
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
     for axis in 0..3 {
@@ -129,6 +134,7 @@ pub(super) fn substep<S: Surface>(
     let projection = Projection { settings, cells: &cells, solid, imposed: &imposed, speed, pull, seconds };
     let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
     let mut report = projection.apply(viscosity, &before, &mut exchanged.pours, &mut faces, motion);
+    cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
     report.stored_cells = stored_cells;
@@ -159,7 +165,7 @@ fn continued(
     let own = motion.velocity.faces();
     match &motion.gain {
         Some(gain) => {
-            let carried = turned::carried(motion, gain, seconds, step, steepest);
+            let carried = turned::carried(motion, gain, domain.periods(), seconds, step, steepest);
             let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, solid);
             (MacVelocity::new(rows, velocity), Some(carried))
         }
@@ -178,7 +184,7 @@ fn outflow(settings: &LiquidSettings, cells: &LiquidCells, faces: &FaceFields<f3
     }
     let rows: &CellRows = &cells.rows;
     let mut sum = 0.0;
-    for (at, cell) in rows.iter().enumerate() {
+    for (at, cell) in rows.iter().enumerate().filter(|(at, _)| cells.images.is_home(*at)) {
         for axis in 0..3 {
             if cells.moving[at] >> axis & 1 == 1 && domain.wall_at(axis, cell) == Some(Wall::Open) {
                 let outward = if cell[axis] == domain.low[axis] { -1.0 } else { 1.0 };

@@ -8,6 +8,7 @@
 
 use numerics::vector::Vec3;
 
+use crate::rows::Periods;
 use crate::step::motion::{Gain, Motion};
 use crate::velocity::{FaceFields, Sampler, Site, extrapolate, resampled};
 
@@ -16,11 +17,25 @@ const REACHED: u32 = 2;
 
 /// The velocity that is to be carried in a substep of `seconds`, on the rows of the velocity. `gain`: of the substep before;
 /// `step`: cells moved at speed 1; differences of velocity count as at most `steepest`.
-pub(super) fn carried(motion: &Motion, gain: &Gain, seconds: f64, step: f32, steepest: f32) -> FaceFields<f32> {
-    let rows = motion.rows().dilated(1);
+pub(super) fn carried(
+    motion: &Motion,
+    gain: &Gain,
+    periods: Periods,
+    seconds: f64,
+    step: f32,
+    steepest: f32,
+) -> FaceFields<f32> {
+    let rows = match periods.any() {
+        true => periods.stored(motion.rows().dilated(1), 2 * REACHED as i32),
+        false => motion.rows().dilated(1),
+    };
+    let images = periods.images(&rows);
     let mut known = rows.resampled(motion.rows(), &motion.known, 0);
     let mut velocity = resampled(&rows, motion.rows(), motion.velocity.faces());
     let mut gained = resampled(&rows, motion.rows(), &gain.faces);
+    images.fill(&mut known);
+    images.fill_each(&mut velocity);
+    images.fill_each(&mut gained);
     extrapolate(&rows, &mut known, [&mut velocity, &mut gained], steepest, REACHED);
     let weight = 0.5 * step * (seconds / gain.seconds) as f32;
     motion.rows().tabulate_with(

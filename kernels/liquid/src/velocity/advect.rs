@@ -2,7 +2,7 @@
 
 use numerics::vector::{Vec3, add, scale};
 
-use crate::rows::CellRows;
+use crate::rows::{CellRows, Periods};
 use crate::velocity::{Corners, FaceFields, FaceMask, MacVelocity, Sampler, Site, trilinear, within};
 
 /// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
@@ -11,6 +11,7 @@ pub struct Tracer<'a> {
     velocity: &'a MacVelocity,
     sampler: Sampler<'a>,
     bounds: [Vec3; 2],
+    periods: Periods,
     step: f32,
 }
 
@@ -18,7 +19,13 @@ impl<'a> Tracer<'a> {
     /// Points stay in the box `bounds`, low corner and high. `step`: cells that a point moves at speed 1, negative to
     /// follow it back.
     pub fn new(velocity: &'a MacVelocity, bounds: [Vec3; 2], step: f32) -> Self {
-        Self { velocity, sampler: Sampler::new(velocity.rows()), bounds, step }
+        Self { velocity, sampler: Sampler::new(velocity.rows()), bounds, periods: Periods::NONE, step }
+    }
+
+    /// Points that go out at a side that repeats come in at the other.
+    #[must_use]
+    pub fn repeating(self, periods: Periods) -> Self {
+        Self { periods, ..self }
     }
 
     /// Where a point at `start` goes.
@@ -35,7 +42,7 @@ impl<'a> Tracer<'a> {
 
     #[inline(always)]
     fn moved(&self, start: Vec3, velocity: Vec3) -> Vec3 {
-        let mut point = add(start, scale(velocity, self.step));
+        let mut point = self.periods.home_point(add(start, scale(velocity, self.step)));
         for axis in 0..3 {
             point[axis] = within(point[axis], self.bounds[0][axis], self.bounds[1][axis]);
         }
@@ -61,6 +68,8 @@ pub struct Advection<'a> {
     pub velocity: &'a MacVelocity,
     /// The box that nothing leaves or comes from outside of, low corner and high.
     pub bounds: [Vec3; 2],
+    /// After how many cells everything repeats.
+    pub periods: Periods,
     /// Cells moved at speed 1.
     pub step: f32,
     /// How values are carried.
@@ -85,7 +94,7 @@ impl Advection<'_> {
     }
 
     fn tracer(&self, step: f32) -> Tracer<'_> {
-        Tracer::new(self.velocity, self.bounds, step)
+        Tracer::new(self.velocity, self.bounds, step).repeating(self.periods)
     }
 
     fn semi_lagrangian(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {

@@ -1,7 +1,7 @@
 use numerics::vector::{Vec3, dot, sub};
 
 use super::*;
-use crate::rows::Cell;
+use crate::rows::{Cell, Periods};
 
 /// Half a turn takes 1 / SPIN · π.
 const SPIN: f32 = 0.05;
@@ -102,7 +102,8 @@ fn fields_are_carried_with_the_flow() {
         let step = 0.45;
         for _ in 0..10 {
             let bounds = [[0.0; 3], [40.0, 24.0, 24.0]];
-            carried = Advection { velocity: &velocity, bounds, step, scheme }.carry(&carried, &rows, &wanted);
+            carried = Advection { velocity: &velocity, bounds, periods: Periods::NONE, step, scheme }
+                .carry(&carried, &rows, &wanted);
         }
         let mut worst = 0.0_f32;
         for (at, cell) in rows.iter().enumerate().filter(|(_, [x, y, z])| (12..30).contains(x) && y.max(z) < &23) {
@@ -127,7 +128,13 @@ fn any_number_of_threads_gives_the_same_bits() {
             extrapolate(&rows, &mut known, [&mut fields], 0.3, u32::MAX);
             let velocity = MacVelocity::new(rows.clone(), fields);
             let bounds = [[-15.0; 3], [15.0; 3]];
-            let carry = Advection { velocity: &velocity, bounds, step: 1.7, scheme: Scheme::MacCormack };
+            let carry = Advection {
+                velocity: &velocity,
+                bounds,
+                periods: Periods::NONE,
+                step: 1.7,
+                scheme: Scheme::MacCormack,
+            };
             let wanted = touching(&liquid, &liquid);
             let carried = carry.carry(velocity.faces(), &liquid, &wanted);
             carried.iter().flatten().map(|value| value.to_bits()).collect::<Vec<_>>()

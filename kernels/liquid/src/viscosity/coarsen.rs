@@ -1,7 +1,7 @@
 //! The viscous equation on a grid with cells twice as large: the same discretisation, from means of masses and
 //! viscosities over the volume that each coarse value stands for.
 
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
 
 use super::extension::Extensions;
@@ -13,19 +13,21 @@ const LEAST_MASS: f32 = 0.25;
 
 /// The next coarser grid; `None` where no cell of it is liquid.
 pub(super) fn coarsened(fine: &Level) -> Option<Level> {
+    let periods = fine.images.periods().halved();
     let candidates = fine.rows().halved();
-    let is_liquid = candidates.tabulate(|cell| is_liquid(fine, cell));
-    let liquid = thick(fine, candidates.filtered(|_, at| is_liquid[at]));
+    let is_liquid = candidates.tabulate(|cell| periods.holds(cell) && is_liquid(fine, cell));
+    let liquid = thick(fine, periods, candidates.filtered(|_, at| is_liquid[at]));
     if liquid.is_empty() {
         return None;
     }
-    let rows = liquid.dilated(HALO + 1);
+    let rows = periods.stored(liquid.dilated(HALO + 1), HALO + 1);
+    let images = periods.images(&rows);
     // Next to liquid, with the upper faces of what is there.
-    let active = liquid.dilated(1).grown_up();
-    let is_liquid = |cell: Cell| liquid.find(cell).is_some();
+    let active = periods.gathered(liquid.dilated(1).grown_up());
+    let is_liquid = |cell: Cell| liquid.find(periods.home(cell)).is_some();
     let kinds: FaceFields<FaceKind> = rows.tabulate_each(|cell| {
         [0, 1, 2].map(|axis| {
-            if is_solid(fine, cell, axis) {
+            if is_solid(fine, periods.home(cell), axis) {
                 FaceKind::Solid
             } else if is_liquid(cell) || is_liquid(lower(cell, axis)) {
                 FaceKind::Free
@@ -39,9 +41,10 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
         let is_free = |axis: usize| rows.find(cell).is_some_and(|at| kinds[axis][at] == FaceKind::Free);
         [0, 1, 2].map(|axis| if is_free(axis) { mass(fine, cell, axis).max(LEAST_MASS) } else { 0.0 })
     });
-    let extensions = Extensions::new(&rows, &kinds);
+    let extensions = Extensions::new(&rows, &images, &kinds);
     // A stress on a face that is not active would have no reaction there, and the matrix no symmetry.
     let has_velocity = |axis: usize, cell: Cell| {
+        let cell = periods.home(cell);
         let is_known = |at: usize| kinds[axis][at] != FaceKind::Air || extensions.reaches(axis, at);
         active.find(cell).is_some() && rows.find(cell).is_some_and(is_known)
     };
@@ -60,15 +63,18 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
         shear,
         extensions: Some(extensions),
         inverse_diagonal: FaceFields::default(),
+        images,
     };
     Some(level.with_diagonal())
 }
 
 /// The cells with another beside them, or a solid, along every axis. What is a single cell thick has no shear stress of its
 /// own: a correction there would bend it freely.
-fn thick(fine: &Level, mut cells: CellRows) -> CellRows {
+fn thick(fine: &Level, periods: Periods, mut cells: CellRows) -> CellRows {
     loop {
-        let is_held = |near: Cell, face: Cell, axis: usize| cells.find(near).is_some() || is_solid(fine, face, axis);
+        let is_held = |near: Cell, face: Cell, axis: usize| {
+            cells.find(periods.home(near)).is_some() || is_solid(fine, periods.home(face), axis)
+        };
         let holds = |cell: Cell, axis: usize| {
             let mut above = cell;
             above[axis] += 1;
@@ -111,7 +117,7 @@ fn is_solid(fine: &Level, coarse: Cell, axis: usize) -> bool {
 
 /// The sum over the fine values in a coarse one's volume, each times its share of that volume: `halfway` along the axes
 /// where the coarse value lies on a plane of fine ones, so that those beside it count half.
-fn sum(rows: &CellRows, coarse: Cell, halfway: [bool; 3], value: impl Fn(Cell, usize) -> f32) -> f32 {
+fn sum(fine: &Level, coarse: Cell, halfway: [bool; 3], value: impl Fn(Cell, usize) -> f32) -> f32 {
     let steps =
         halfway.map(|halfway| if halfway { [(-1, 0.5), (0, 1.0), (1, 0.5)] } else { [(0, 1.0), (1, 1.0), (0, 0.0)] });
     let mut sum = 0.0;
@@ -120,8 +126,8 @@ fn sum(rows: &CellRows, coarse: Cell, halfway: [bool; 3], value: impl Fn(Cell, u
             for (dx, weight_x) in steps[0] {
                 let weight = weight_x * weight_y * weight_z;
                 let cell = [2 * coarse[0] + dx, 2 * coarse[1] + dy, 2 * coarse[2] + dz];
-                if let Some(at) = rows.find(cell).filter(|_| weight > 0.0) {
-                    sum += weight * value(cell, at);
+                if let Some(at) = fine.rows().find(cell).filter(|_| weight > 0.0) {
+                    sum += weight * value(cell, fine.images.home(at));
                 }
             }
         }
@@ -130,7 +136,7 @@ fn sum(rows: &CellRows, coarse: Cell, halfway: [bool; 3], value: impl Fn(Cell, u
 }
 
 fn mass(fine: &Level, coarse: Cell, axis: usize) -> f32 {
-    sum(fine.rows(), coarse, [0, 1, 2].map(|other| other == axis), |_, at| fine.mass[axis][at])
+    sum(fine, coarse, [0, 1, 2].map(|other| other == axis), |_, at| fine.mass[axis][at])
 }
 
 /// A quarter of the sum, as the same velocities have a quarter of the squared strain. 0 where a face has no velocity.
@@ -140,7 +146,7 @@ fn normal(fine: &Level, coarse: Cell, has_velocity: impl Fn(usize, Cell) -> bool
         above[axis] += 1;
         has_velocity(axis, coarse) && has_velocity(axis, above)
     };
-    if (0..3).all(has_both) { 0.25 * sum(fine.rows(), coarse, [false; 3], |_, at| fine.normal[at]) } else { 0.0 }
+    if (0..3).all(has_both) { 0.25 * sum(fine, coarse, [false; 3], |_, at| fine.normal[at]) } else { 0.0 }
 }
 
 /// 0 where one of the four faces at the edge has no velocity.
@@ -151,9 +157,9 @@ fn shear(fine: &Level, coarse: Cell, axis: usize, has_velocity: impl Fn(usize, C
         return 0.0;
     }
     let halfway = [0, 1, 2].map(|along| along != axis);
-    let total = sum(fine.rows(), coarse, halfway, |_, at| fine.shear[axis][at]);
+    let total = sum(fine, coarse, halfway, |_, at| fine.shear[axis][at]);
     // What lies inside a solid does not soften the edge beside it.
-    let outside = sum(fine.rows(), coarse, halfway, |_, at| {
+    let outside = sum(fine, coarse, halfway, |_, at| {
         let is_inside =
             fine.shear[axis][at] == 0.0 && [side, other].map(|axis| fine.kinds[axis][at]) == [FaceKind::Solid; 2];
         if is_inside { 0.0 } else { 1.0 }

@@ -106,6 +106,7 @@ impl Multigrid {
         level.smooth(true, b, smoothing);
         level.scaled_residual(b, scale, smoothing);
         for axis in 0..3 {
+            level.images.fill_for_sums(&mut smoothing.product[axis], Some(axis));
             restrict(
                 Place::Face(axis),
                 level.rows(),
@@ -122,6 +123,7 @@ impl Multigrid {
         if let Some(extensions) = &coarse.extensions {
             extensions.extend(correction);
         }
+        coarse.images.fill_each(correction);
         for axis in 0..3 {
             let (place, u) = (Place::Face(axis), &mut smoothing.u[axis]);
             add_interpolated(place, &level.stencil, coarse.rows(), &scale[axis], &correction[axis], u);
@@ -188,7 +190,9 @@ fn solve_coarsest(level: &Level, b: &FaceFields<f32>, u: &mut FaceFields<f32>) {
 /// What the weights of interpolation are multiplied by at each fine face; 0 where it is not free. Faces in air without an
 /// extended velocity are left out; solid ones count, with velocity 0.
 fn scales(fine: &Level, coarse: &Level) -> FaceFields<f32> {
-    let is_extended = |axis, at| coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, at));
+    let is_extended = |axis, at| {
+        coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, coarse.images.home(at)))
+    };
     let scale = |cell, axis: usize| {
         if fine.rows().find(cell).is_none_or(|at| fine.kinds[axis][at] != FaceKind::Free) {
             return 0.0;

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Images};
 
 use super::level::{FaceKind, Real};
 use crate::velocity::FaceFields;
@@ -19,8 +19,8 @@ const LAYERS: usize = 2;
 pub(super) struct Extensions([Extension; 3]);
 
 impl Extensions {
-    pub(super) fn new(rows: &CellRows, kinds: &FaceFields<FaceKind>) -> Self {
-        Self([0, 1, 2].map(|axis| Extension::new(rows, &kinds[axis])))
+    pub(super) fn new(rows: &CellRows, images: &Images, kinds: &FaceFields<FaceKind>) -> Self {
+        Self([0, 1, 2].map(|axis| Extension::new(rows, images, &kinds[axis])))
     }
 
     /// Whether a face is extended.
@@ -65,12 +65,12 @@ struct Extension {
 }
 
 impl Extension {
-    fn new(rows: &CellRows, kinds: &[FaceKind]) -> Self {
+    fn new(rows: &CellRows, images: &Images, kinds: &[FaceKind]) -> Self {
         let mut known: BTreeMap<u32, Vec<(u32, f32)>> = BTreeMap::new();
         let near = |cell: Cell, along: usize, by: i32| {
             let mut cell = cell;
             cell[along] += by;
-            rows.find(cell).map(|at| at as u32)
+            rows.find(cell).map(|at| images.home(at) as u32)
         };
         for _ in 0..LAYERS {
             // What a face is a mix of, if it has a velocity so far.
@@ -81,7 +81,7 @@ impl Extension {
             };
             let mut layer = Vec::new();
             for (at, cell) in (0_u32..).zip(rows.iter()) {
-                if kinds[at as usize] != FaceKind::Air || known.contains_key(&at) {
+                if kinds[at as usize] != FaceKind::Air || known.contains_key(&at) || !images.is_home(at as usize) {
                     continue;
                 }
                 let mut lines: Vec<Vec<(u32, f32)>> = Vec::new();

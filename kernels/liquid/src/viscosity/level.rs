@@ -4,7 +4,7 @@
 
 use numerics::simd::{Path, kernel};
 
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Images};
 use crate::stencil::{Run, Stencil};
 use crate::velocity::FaceFields;
 
@@ -40,6 +40,8 @@ pub(super) struct Level {
     pub extensions: Option<Extensions>,
     /// 1 ÷ the diagonal of the matrix; 0 where the face is not free.
     pub inverse_diagonal: FaceFields<f32>,
+    /// Cells that repeat others; kinds are theirs, but masses and viscosities are 0.
+    pub images: Images,
 }
 
 /// Cells stored around liquid: interpolation and extension read two beyond a free face.
@@ -101,6 +103,7 @@ impl Level {
         let at = run.at as usize + n;
         let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
         let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+        let [below, above] = [below, above].map(|near| near.map(|at| self.images.home(at)));
         let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
         let terms = [
             self.mass[axis][at],
@@ -126,6 +129,7 @@ impl Level {
         if let Some(extensions) = &self.extensions {
             extensions.extend(u);
         }
+        self.images.fill_each(u);
         self.stress(path, u, stresses, strain_f64);
         let balance = Balance { mass: &self.mass, stresses, u };
         let [x, y, z] = out;
@@ -149,6 +153,7 @@ impl Level {
         self.stress(Path::chosen(), u, &mut stresses, strain_f64);
         let mut sum = [0.0; 3];
         let mut give = |axis: usize, cell: Cell, stress: f64| {
+            let cell = self.images.periods().home(cell);
             let is_solid = |at: usize| self.kinds[axis][at] == FaceKind::Solid;
             if stress != 0.0 && self.rows().find(cell).is_some_and(is_solid) && counts(axis, cell) {
                 sum[axis] += stress;
@@ -180,6 +185,7 @@ impl Level {
         if let Some(extensions) = &self.extensions {
             extensions.extend(u);
         }
+        self.images.fill_each(u);
         self.stress(path, u, stresses, strain_f32);
         let balance = Balance { mass: &self.mass, stresses, u };
         let [x, y, z] = &mut *out;
@@ -190,7 +196,7 @@ impl Level {
         }
     }
 
-    fn stress<T: Send + Sync>(
+    fn stress<T: Copy + Send + Sync>(
         &self,
         path: Path,
         u: &FaceFields<T>,
@@ -199,6 +205,8 @@ impl Level {
     ) {
         let ([xx, yy, zz], [yz, zx, xy]) = (&mut stresses.normal, &mut stresses.shear);
         self.stencil.update([xx, yy, zz, yz, zx, xy], |runs, first, out| strain(path, runs, first, self, u, out));
+        self.images.fill_each(&mut stresses.normal);
+        self.images.fill_each(&mut stresses.shear);
     }
 
     /// `smoothing.product` = (`b` − A·`smoothing.u`)·`scale`, face by face.

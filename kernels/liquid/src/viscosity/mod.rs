@@ -22,7 +22,7 @@ mod tests;
 
 use crate::fields::{add_scaled, dot, largest};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace};
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
 use crate::velocity::FaceFields;
 use cycle::{Multigrid, Workspace};
@@ -48,6 +48,8 @@ pub struct StokesGrid<'a> {
     /// Share of a solid's shear stress that is dropped at the low face of a cell along an axis, one inside the solid: 0 no
     /// slip, 1 free slip.
     pub slip: &'a (dyn Fn(usize, Cell) -> f32 + Sync),
+    /// After how many cells the grid repeats. Images within 2 of liquid are stored, too.
+    pub periods: Periods,
 }
 
 /// When a solve ends.
@@ -121,7 +123,8 @@ impl StokesSolver {
             })
         });
         let [x, y, z] = &weights;
-        let pressure_grid = PressureGrid { rows: grid.rows, level_set: grid.level_set, weights: [x, y, z] };
+        let (rows, level_set, periods) = (grid.rows, grid.level_set, grid.periods);
+        let pressure_grid = PressureGrid { rows, level_set, weights: [x, y, z], periods };
         let pressure = PressureSolver::new(&pressure_grid);
         let (level, flow) = setup::set_up(grid, &pressure);
         let rigid = RigidMotions::find(&level);
@@ -210,6 +213,8 @@ impl StokesSolver {
             directions.push((z, product, norm));
             solved.iterations += 1;
         }
+        level.images.fill_each(u);
+        level.images.fill(q);
         solved
     }
 
@@ -224,7 +229,7 @@ impl StokesSolver {
         &self,
         before: &FaceFields<f64>,
         u: &mut FaceFields<f64>,
-        q: &[f64],
+        q: &mut [f64],
         work: &mut Work,
         out: &mut FaceFields<f64>,
     ) {
@@ -251,7 +256,7 @@ impl StokesSolver {
             z.q.fill(0.0);
         }
         work.force.iter_mut().for_each(|force| force.fill(0.0));
-        self.add_gradient(&z.q, &mut work.force);
+        self.add_gradient(&mut z.q, &mut work.force);
         for axis in 0..3 {
             for (force, residual) in work.force[axis].iter_mut().zip(&residual.u[axis]) {
                 *force = residual - *force;
@@ -279,13 +284,15 @@ impl StokesSolver {
     /// `out` = the matrix times `z`, whose velocity is 0 at solid faces.
     fn multiply(&self, z: &mut Unknowns, work: &mut Work, out: &mut Unknowns) {
         self.viscous.finest().apply(&mut z.u, &mut work.stresses, &mut out.u);
-        self.add_gradient(&z.q, &mut out.u);
-        self.outflow(&z.u, &mut out.q);
+        self.add_gradient(&mut z.q, &mut out.u);
+        self.outflow(&mut z.u, &mut out.q);
     }
 
     /// Adds what a pressure does to the momentum of each free face.
-    fn add_gradient(&self, q: &[f64], out: &mut FaceFields<f64>) {
+    fn add_gradient(&self, q: &mut [f64], out: &mut FaceFields<f64>) {
         let [x, y, z] = out;
+        self.viscous.finest().images.fill(q);
+        let q = &*q;
         self.viscous.finest().stencil.update([x, y, z], |runs, first, out| {
             for run in runs {
                 let (at, n) = (run.at as usize, run.len as usize);
@@ -301,7 +308,9 @@ impl StokesSolver {
     }
 
     /// `out` = the net outflow of each liquid cell.
-    fn outflow(&self, u: &FaceFields<f64>, out: &mut [f64]) {
+    fn outflow(&self, u: &mut FaceFields<f64>, out: &mut [f64]) {
+        self.viscous.finest().images.fill_each(u);
+        let u = &*u;
         let [open_x, open_y, open_z] = &self.flow.open;
         self.pressure.stencil().update([out], |runs, first, [out]| {
             for run in runs {

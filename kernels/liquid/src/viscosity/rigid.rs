@@ -24,7 +24,11 @@ struct Piece {
 
 impl Piece {
     /// The six motions at a face: three translations, then three turns about the centre.
-    fn motions(&self, n: usize, centre: [f64; 3], size: f64) -> [f64; 6] {
+    fn motions(&self, n: usize, about: Centre) -> [f64; 6] {
+        let Centre { centre, size, turns } = about;
+        if !turns {
+            return std::array::from_fn(|motion| if motion == self.axis { 1.0 } else { 0.0 });
+        }
         let position = |axis: usize| {
             let along = f64::from(self.cell[axis]) + if axis == 0 { n as f64 } else { 0.0 };
             (along + if axis == self.axis { 0.0 } else { 0.5 } - centre[axis]) / size
@@ -38,12 +42,20 @@ impl Piece {
     }
 }
 
+/// What turns are about.
+#[derive(Clone, Copy, Debug)]
+struct Centre {
+    centre: [f64; 3],
+    size: f64,
+    /// Whether the component can turn: one that meets its own image cannot.
+    turns: bool,
+}
+
 /// A component that no solid holds firmly.
 #[derive(Clone, Debug)]
 struct Component {
     pieces: Vec<Piece>,
-    centre: [f64; 3],
-    size: f64,
+    about: Centre,
     /// Of the matrix, on the six motions.
     inverse: Matrix6<f64>,
     /// What the matrix has besides their mass: faces beside solids that resist.
@@ -69,23 +81,23 @@ const ROUNDING: f64 = 1e-12;
 impl RigidMotions {
     pub(super) fn find(level: &Level) -> Self {
         let whole = components(level, 0.0);
-        let sizes: Vec<usize> = whole.iter().map(|pieces| faces(pieces)).collect();
+        let sizes: Vec<usize> = whole.iter().map(|part| faces(&part.pieces)).collect();
         let largest = level.normal.iter().copied().fold(0.0, f32::max);
         let least = level.normal.iter().copied().filter(|viscosity| *viscosity > 0.0).fold(largest, f32::min);
         let mut stresses = Stresses::zero(level.rows().len());
-        let mut stiff: Vec<(Vec<Piece>, f32)> = Vec::new();
+        let mut stiff: Vec<(Part, f32)> = Vec::new();
         let mut threshold = largest / STIFFER;
         while threshold > least && threshold > 1.0 {
-            let parts = components(level, threshold).into_iter().filter(|pieces| !sizes.contains(&faces(pieces)));
-            let known: Vec<usize> = stiff.iter().map(|(pieces, _)| faces(pieces)).collect();
-            stiff.extend(parts.filter(|pieces| !known.contains(&faces(pieces))).map(|pieces| (pieces, threshold)));
+            let parts = components(level, threshold).into_iter().filter(|part| !sizes.contains(&faces(&part.pieces)));
+            let known: Vec<usize> = stiff.iter().map(|(part, _)| faces(&part.pieces)).collect();
+            stiff.extend(parts.filter(|part| !known.contains(&faces(&part.pieces))).map(|part| (part, threshold)));
             threshold /= STIFFER;
         }
-        stiff.sort_by_key(|(pieces, _)| std::cmp::Reverse(faces(pieces)));
+        stiff.sort_by_key(|(part, _)| std::cmp::Reverse(faces(&part.pieces)));
         stiff.truncate(MOST_STIFF);
-        let stiff = stiff.into_iter().map(|(pieces, threshold)| (pieces, Some(threshold)));
-        let all = whole.into_iter().map(|pieces| (pieces, None)).chain(stiff);
-        Self(all.filter_map(|(pieces, stiff)| Component::new(level, pieces, stiff, &mut stresses)).collect())
+        let stiff = stiff.into_iter().map(|(part, threshold)| (part, Some(threshold)));
+        let all = whole.into_iter().map(|part| (part, None)).chain(stiff);
+        Self(all.filter_map(|(part, stiff)| Component::new(level, part, stiff, &mut stresses)).collect())
     }
 
     /// Takes from `b` what moves components as rigid bodies: a multigrid cycle would answer it by a motion that is nearly
@@ -114,7 +126,8 @@ impl RigidMotions {
 impl Component {
     /// `stiff`: the least viscosity of a part that is stiffer than its component. `None` where a multigrid cycle is good
     /// enough, because solids hold the component.
-    fn new(level: &Level, pieces: Vec<Piece>, stiff: Option<f32>, stresses: &mut Stresses<f64>) -> Option<Self> {
+    fn new(level: &Level, part: Part, stiff: Option<f32>, stresses: &mut Stresses<f64>) -> Option<Self> {
+        let Part { pieces, turns } = part;
         let (mut total, mut first) = (0.0, [0.0; 3]);
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
         for piece in &pieces {
@@ -132,11 +145,12 @@ impl Component {
         }
         let centre = first.map(|sum| sum / total);
         let size = f64::from((0..3).map(|axis| high[axis] - low[axis]).max().unwrap_or(1));
-        let mut component = Self { pieces, centre, size, inverse: Matrix6::zeros(), resistance: Vec::new() };
+        let about = Centre { centre, size, turns };
+        let mut component = Self { pieces, about, inverse: Matrix6::zeros(), resistance: Vec::new() };
         let mut mass = Matrix6::zeros();
         for piece in &component.pieces {
             for n in 0..piece.len {
-                let motions = Vector6::from(piece.motions(n, centre, size));
+                let motions = Vector6::from(piece.motions(n, about));
                 mass += motions * motions.transpose() * f64::from(level.mass[piece.axis][piece.at + n]);
             }
         }
@@ -162,7 +176,7 @@ impl Component {
         let mut motions: Vec<FaceFields<f64>> = (0..6).map(|_| zero()).collect();
         for piece in &self.pieces {
             for n in 0..piece.len {
-                let at_face = piece.motions(n, self.centre, self.size);
+                let at_face = piece.motions(n, self.about);
                 (0..6).for_each(|motion| motions[motion][piece.axis][piece.at + n] = at_face[motion]);
             }
         }
@@ -201,7 +215,7 @@ impl Component {
             for n in 0..piece.len {
                 let (axis, at) = (piece.axis, piece.at + n);
                 let momentum = z.map_or(0.0, |z| f64::from(level.mass[axis][at]) * z[axis][at]);
-                let motions = piece.motions(n, self.centre, self.size);
+                let motions = piece.motions(n, self.about);
                 (0..6).for_each(|motion| sum[motion] += (b[axis][at] - momentum) * motions[motion]);
             }
             Vector6::from(sum)
@@ -220,7 +234,7 @@ impl Component {
     fn for_each_motion(&self, shares: &Vector6<f64>, mut f: impl FnMut(usize, usize, f64)) {
         for piece in &self.pieces {
             for n in 0..piece.len {
-                let motions = Vector6::from(piece.motions(n, self.centre, self.size));
+                let motions = Vector6::from(piece.motions(n, self.about));
                 f(piece.axis, piece.at + n, shares.dot(&motions));
             }
         }
@@ -236,17 +250,26 @@ fn touches_solid(level: &Level, piece: &Piece) -> bool {
     })
 }
 
+/// Free faces that are connected.
+#[derive(Debug)]
+struct Part {
+    pieces: Vec<Piece>,
+    /// Whether no stress between them crosses a side that repeats.
+    turns: bool,
+}
+
 fn faces(pieces: &[Piece]) -> usize {
     pieces.iter().map(|piece| piece.len).sum()
 }
 
 /// The free faces of each component: faces are connected through the stresses that they share, of viscosities above
 /// `threshold`. Above 0, faces without such a stress are left out.
-fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
+fn components(level: &Level, threshold: f32) -> Vec<Part> {
     let len = level.rows().len();
     let mut sets = Sets::new(3 * len);
     let is_free = |axis: usize, at: usize| level.kinds[axis][at] == FaceKind::Free;
     let mut is_joined = vec![threshold == 0.0; 3 * len];
+    let mut crossing = Vec::new();
     for run in level.stencil.runs() {
         for n in 0..run.len as usize {
             let at = run.at as usize + n;
@@ -255,12 +278,16 @@ fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
             let mut join = |faces: &[(usize, usize)]| {
                 let mut free = faces.iter().filter(|(axis, at)| is_free(*axis, *at));
                 if let Some((axis, first)) = free.next() {
-                    let first = axis * len + first;
-                    is_joined[first] = true;
+                    let home = |axis: usize, at: usize| axis * len + level.images.home(at);
+                    let first_at = home(*axis, *first);
+                    is_joined[first_at] = true;
                     free.for_each(|(other, at)| {
-                        is_joined[other * len + at] = true;
-                        sets.join(first as u32, (other * len + at) as u32);
+                        is_joined[home(*other, *at)] = true;
+                        sets.join(first_at as u32, home(*other, *at) as u32);
                     });
+                    if faces.iter().any(|(axis, at)| is_free(*axis, *at) && !level.images.is_home(*at)) {
+                        crossing.push(first_at as u32);
+                    }
                 }
             };
             if level.normal[at] > threshold {
@@ -275,7 +302,7 @@ fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
         }
     }
     let mut number = vec![usize::MAX; 3 * len];
-    let mut components: Vec<Vec<Piece>> = Vec::new();
+    let mut components: Vec<Part> = Vec::new();
     for axis in 0..3 {
         for run in level.stencil.runs() {
             for n in 0..run.len as usize {
@@ -286,9 +313,9 @@ fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
                 let first = sets.first((axis * len + at) as u32) as usize;
                 if number[first] == usize::MAX {
                     number[first] = components.len();
-                    components.push(Vec::new());
+                    components.push(Part { pieces: Vec::new(), turns: true });
                 }
-                let pieces = &mut components[number[first]];
+                let pieces = &mut components[number[first]].pieces;
                 match pieces.last_mut() {
                     Some(last) if last.axis == axis && last.at + last.len == at && n > 0 => last.len += 1,
                     _ => {
@@ -298,6 +325,9 @@ fn components(level: &Level, threshold: f32) -> Vec<Vec<Piece>> {
                 }
             }
         }
+    }
+    for at in crossing {
+        components[number[sets.first(at) as usize]].turns = false;
     }
     components
 }

@@ -1,7 +1,7 @@
 //! From a grid of liquid to the matrix of its viscosity.
 
 use crate::pressure::PressureSolver;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
 
 use super::StokesGrid;
@@ -30,12 +30,18 @@ struct Fields<'a> {
     open: FaceFields<f32>,
     solid: FaceFields<f32>,
     slip: &'a (dyn Fn(usize, Cell) -> f32 + Sync),
+    periods: Periods,
     kinds: FaceFields<FaceKind>,
 }
 
 pub(super) fn set_up(grid: &StokesGrid<'_>, pressure: &PressureSolver) -> (Level, Flow) {
     let rows = pressure.rows();
-    let field = |values: &[f32], outside| rows.resampled(grid.rows, values, outside);
+    let images = pressure.images();
+    let field = |values: &[f32], outside| {
+        let mut field = rows.resampled(grid.rows, values, outside);
+        images.fill(&mut field);
+        field
+    };
     let open = grid.open.map(|open| field(open, 0.0));
     let mut fields = Fields {
         rows,
@@ -46,13 +52,15 @@ pub(super) fn set_up(grid: &StokesGrid<'_>, pressure: &PressureSolver) -> (Level
         solid: grid.solid_distance.map(|distance| field(distance, -0.5)),
         open,
         slip: grid.slip,
+        periods: grid.periods,
         kinds: FaceFields::default(),
     };
-    let active = pressure.stencil().active().grown_up();
+    let active = grid.periods.gathered(pressure.stencil().active().grown_up());
     fields.kinds = rows.tabulate_each(|cell| match rows.find(cell) {
         Some(at) => [0, 1, 2].map(|axis| fields.kind(cell, at, axis)),
         None => [FaceKind::Solid; 3],
     });
+    images.fill_each(&mut fields.kinds);
     let shares = fields.on_active(&active, Fields::share, 0.0);
     let mass: FaceFields<f32> = std::array::from_fn(|axis| {
         let faces = active.tabulate(|cell| match rows.find(cell) {
@@ -82,6 +90,7 @@ pub(super) fn set_up(grid: &StokesGrid<'_>, pressure: &PressureSolver) -> (Level
         shear,
         extensions: None,
         inverse_diagonal: FaceFields::default(),
+        images: images.clone(),
     };
     (level.with_diagonal(), Flow { open, gradient })
 }
@@ -191,7 +200,7 @@ impl Fields<'_> {
                     distance = distance.min(outside / (outside - inside));
                 }
                 let wall = if solid == 0 { cell } else { lower(cell, step) };
-                let slip = (self.slip)(face, wall);
+                let slip = (self.slip)(face, self.periods.home(wall));
                 held = Some(held.map_or(1.0 - slip, |held| held.min(1.0 - slip)));
             }
         }

@@ -10,6 +10,7 @@ struct Case {
     solid: FaceFields<f32>,
     viscosity: Vec<f32>,
     slip: f32,
+    periods: Periods,
 }
 
 impl Case {
@@ -24,7 +25,7 @@ impl Case {
             })
         });
         let viscosity = vec![viscosity; rows.len()];
-        Self { rows, level_set, open, solid, viscosity, slip: 0.0 }
+        Self { rows, level_set, open, solid, viscosity, slip: 0.0, periods: Periods::NONE }
     }
 
     fn ball(n: i32, viscosity: f32) -> Self {
@@ -43,6 +44,7 @@ impl Case {
             density: &density,
             viscosity: &self.viscosity,
             slip: &|_, _| self.slip,
+            periods: self.periods,
         })
     }
 }

@@ -9,7 +9,7 @@ use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::{PhiView, floor};
 use crate::marked::{MarkedSurface, SolidDistance};
 use crate::markers::{Marker, NO_PIECE};
-use crate::rows::{Cell, CellRows, Finder, RowSpan};
+use crate::rows::{Cell, CellRows, Finder, Periods, RowSpan};
 use crate::sets::Sets;
 
 /// Distance, in cells, up to which φ moves with a shift; beyond, it is made anew from there.
@@ -58,7 +58,7 @@ impl Pieces {
             span: inside.span_of(inner).map_or(0, |span| span.base),
             is_free: is_free(outer),
         });
-        let (of_span, count) = numbered(&inside, &mesh, &sides);
+        let (of_span, count) = numbered(&inside, surface.periods(), &mesh, &sides);
         let all = measured(&inside, &of_span, count, &mesh, &sides);
         Self { all, inside, of_span, clipped }
     }
@@ -157,11 +157,21 @@ fn contains(view: PhiView<'_>, cell: Cell) -> bool {
 }
 
 /// The piece of each span, at its first cell, and how many there are. They are numbered by their first cells.
-fn numbered(inside: &CellRows, mesh: &QuadMesh, sides: &[Side]) -> (Vec<u32>, usize) {
+fn numbered(inside: &CellRows, periods: Periods, mesh: &QuadMesh, sides: &[Side]) -> (Vec<u32>, usize) {
     let mut sets = Sets::new(inside.len());
     for ([y, z], spans) in inside.rows() {
         join_touching(spans, inside.row(y + 1, z), &mut sets);
         join_touching(spans, inside.row(y, z + 1), &mut sets);
+        let Periods([nx, ny, nz]) = periods;
+        if ny > 0 && y == 0 {
+            join_touching(spans, inside.row(ny - 1, z), &mut sets);
+        }
+        if nz > 0 && z == 0 {
+            join_touching(spans, inside.row(y, nz - 1), &mut sets);
+        }
+        if let Some(last) = inside.span_of([nx - 1, y, z]).filter(|_| nx > 0 && spans[0].start == 0) {
+            sets.join(spans[0].base, last.base);
+        }
     }
     let mut surfaces = Sets::new(mesh.points.len());
     for [a, rest @ ..] in &mesh.quads {

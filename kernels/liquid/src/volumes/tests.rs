@@ -3,7 +3,7 @@ use std::f64::consts::PI;
 use rayon::ThreadPoolBuilder;
 
 use super::*;
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, SourceShape, Surface, Surroundings};
 use crate::velocity::{MacVelocity, Site};
 
@@ -36,7 +36,7 @@ fn flow(size: Cell, way: impl Fn(Vec3) -> Vec3 + Sync) -> MacVelocity {
 }
 
 fn step(surface: &mut MarkedSurface, flow: &MacVelocity, reach: f32) {
-    surface.advance(&Moving { velocity: flow, step: 1.0 }, reach);
+    surface.advance(&Moving { velocity: flow, step: 1.0, periods: Periods::NONE }, reach);
 }
 
 fn sum(targets: &VolumeTargets) -> f64 {

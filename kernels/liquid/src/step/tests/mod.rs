@@ -2,6 +2,7 @@
 
 mod dam;
 mod force;
+mod periodic;
 mod plain;
 mod pushed;
 mod rest;
