@@ -22,10 +22,10 @@ params! { PARAMS:
          pressure move it.")
         .unit(Unit::MetresPerSecond);
     VISCOSITY: Param<Option<f32>> = Param::optional_float("viscosity",
-        "Dynamic viscosity of the liquid from this source. FluidSolve cannot use it yet and refuses it: leave it out.")
+        "Dynamic viscosity of the liquid from this source, or of the liquid at the start. If it is not given, it is that of FluidSolve. Liquids of different viscosity do not mix.")
         .unit(Unit::PascalSeconds).at_least(0.0).soft(0.0, 1e3);
     DENSITY: Param<Option<f32>> = Param::optional_float("density",
-        "Mass per volume of the liquid from this source. FluidSolve cannot use it yet and refuses it: leave it out.")
+        "Mass per volume of the liquid from this source, or of the liquid at the start. If it is not given, it is that of FluidSolve.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     ACTIVE: Param<bool> = Param::bool("active", true, "Whether liquid comes from it. Animate it to start and stop a pour.");
 }

@@ -11,6 +11,7 @@
 use std::sync::{Arc, OnceLock};
 
 use engine::prelude::*;
+use liquid::carried::LiquidMaterial;
 use liquid::level_set::{BAND, PhiView};
 use liquid::marked::MarkedSurface;
 use liquid::step::{
@@ -22,17 +23,19 @@ use numerics::vector::{add, cross, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
-    PARTICLE_KIND, PARTICLE_VOLUME, SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE,
-    SOURCE_VELOCITY, SOURCE_VISCOSITY,
+    PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME, SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE,
+    SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
 use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
+use carried::CarriedColumns;
 use domain::{Walls, checks, domain, lattice, settings};
 use measured::{measured, pool_of};
 use openings::{Opening, SAMPLES, SINK, SOURCE, Timed};
-use particles::{SprayDrop, particles};
-use shapes::{Colliders, liquid_at_start};
+use particles::{SprayDrop, materials_at, particles};
+use shapes::{Colliders, in_cells, liquid_at_start};
 
+mod carried;
 mod domain;
 mod measured;
 mod openings;
@@ -58,7 +61,8 @@ choice! {
 
 inputs! { INPUTS:
     LIQUID: Input<Many> = Input::many("liquid", Kind::Mesh,
-        "Closed meshes full of liquid at the start.").read_at(|_| Times::START);
+        "Closed meshes full of liquid at the start. Those from Fluid_Source may have a viscosity and a density of their own; where \
+         two meshes overlap, that of the later one counts.").read_at(|_| Times::START);
     SOURCES: Input<Many> = Input::many("sources", Kind::Mesh,
         "Shapes from Fluid_Source that liquid comes from. A mesh without its attributes is kept full.")
         .read_at(|_| Times::within_step(SAMPLES));
@@ -68,6 +72,9 @@ inputs! { INPUTS:
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that liquid does not enter. They may move and deform. Sheets and thin plates do not leak.")
         .read_at(|_| Times::NOW.and(Times::START).and(Times::within_step(1)));
+    TRACERS: Input<Many> = Input::many("tracers", Kind::Points,
+        "Points that the liquid carries along, substep by substep, from where they are at the start. They come out in \
+         `particles` with their attributes. Those in the air stay where they are until liquid comes.").read_at(|_| Times::START);
 }
 
 params! { PARAMS:
@@ -138,7 +145,8 @@ const SURFACE: Output = Output::new(
 const PARTICLES: Output = Output::new(
     "particles",
     &[Kind::Points],
-    "The markers on the surface (`kind` 0) and drops too small for the grid (`kind` 1), with `id`, `v`, `N` and `volume`.",
+    "The markers on the surface (`kind` 0), drops too small for the grid (`kind` 1) and tracers (`kind` 3), with `id`, `v`, `N`, \
+     `volume`, `viscosity`, `density`, and the floats that came with the points of `liquid`, `sources` and `tracers`.",
 );
 const VOLUME: Output =
     Output::new("volume", &[Kind::Volume], "The level set and the velocity, which goes on past the surface.");
@@ -202,8 +210,19 @@ pub(crate) static NODE: Node = Node::new(
     &SOURCE_DENSITY,
     &SINK_RATE,
     &SINK_ACTIVE,
+    &ID,
 ])
-.writes(&[&P, &N, &V, &THICKNESS, &ID, &PARTICLE_KIND, &PARTICLE_VOLUME])
+.writes(&[
+    &P,
+    &N,
+    &V,
+    &THICKNESS,
+    &ID,
+    &PARTICLE_KIND,
+    &PARTICLE_VOLUME,
+    &PARTICLE_VISCOSITY,
+    &PARTICLE_DENSITY,
+])
 .changes_topology()
 .metrics(METRICS)
 .leaves_out(leaves_out)
@@ -228,6 +247,10 @@ struct Run {
     withheld: f64,
     targets: VolumeTargets,
     spray: Vec<SprayDrop>,
+    /// The attributes that came with liquid, sources and tracers.
+    columns: CarriedColumns,
+    /// The ids of the tracers at the start.
+    tracer_ids: Vec<i32>,
     /// Metrics of the last step; empty at the start.
     metrics: MetricValues,
     #[serde(skip)]
@@ -242,7 +265,8 @@ impl Chain for Run {
         checks(cx.params())?;
         let lattice = lattice(cx);
         let domain = domain(cx);
-        let mut surface = liquid_at_start(cx, &domain, lattice)?;
+        let start = liquid_at_start(cx, &domain, lattice)?;
+        let mut surface = start.surface.clone();
         let colliders = Colliders::at_start(cx, &domain, lattice);
         if !colliders.is_empty() {
             surface.meet(|point| colliders.distance(1.0, point));
@@ -258,7 +282,14 @@ impl Chain for Run {
         };
         let mut liquid = Liquid::new(settings(cx), surface);
         liquid.set_velocity(at, &around);
-        let (mut surface, motion) = (liquid.surface().clone(), liquid.motion().clone());
+        if start.has_materials() {
+            liquid.set_materials(|place| start.material(place));
+        }
+        let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
+        columns.add_tracers(&tracers);
+        let places = tracers.iter().flat_map(|tracers| in_cells(tracers, lattice)).collect();
+        liquid.set_tracers(places);
+        let (mut surface, motion) = liquid.into_parts();
         let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
         let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
         let mut run = Self {
@@ -270,6 +301,8 @@ impl Chain for Run {
             withheld: 0.0,
             targets,
             spray: Vec::new(),
+            columns,
+            tracer_ids: tracer_ids(&tracers),
             metrics: MetricValues::default(),
             colliders: Some(colliders),
             volume: OnceLock::new(),
@@ -325,7 +358,12 @@ impl Run {
     ) -> Result<LiquidReport> {
         let lattice = lattice(cx);
         let openings = |input, says| Opening::all(cx, input, says, &settings.domain, lattice);
-        let (sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
+        let (mut sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
+        for source in &mut sources {
+            let (mesh, attributes) = source.attributes();
+            *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
+        }
+        let has_material = sources.iter().any(Opening::has_material);
         let share = |time: f64| (time / seconds).clamp(0.0, 1.0);
         let (first, frames) = (cx.previous().number(), cx.frame().number() - cx.previous().number());
         let params = |time: f64| cx.integrands::<2>(first + frames * share(time));
@@ -344,6 +382,9 @@ impl Run {
             cancelled: &|| cx.check_cancelled().is_err(),
         };
         let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
+        if has_material && liquid.motion().materials().is_none() {
+            liquid.set_materials(|_| LiquidMaterial::default());
+        }
         let report = liquid.step_frame(&around, seconds);
         cx.check_cancelled()?;
         for account in liquid.sources() {
@@ -357,8 +398,7 @@ impl Run {
         self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
         let pull = params(0.5 * seconds)[0];
         self.spray.iter_mut().for_each(|drop| drop.fly(pull, seconds, lattice.cell));
-        self.surface = liquid.surface().clone();
-        self.motion = liquid.motion().clone();
+        (self.surface, self.motion) = liquid.into_parts();
         Ok(report)
     }
 
@@ -373,9 +413,10 @@ impl Run {
             false => self.targets.measure(&mut self.surface, colliders.solid(&solid)),
         };
         let mut sampler = Sampler::new(self.motion.rows());
-        for piece in &corrected.lost {
+        let places: Vec<[f32; 3]> = corrected.lost.iter().map(|piece| piece.place).collect();
+        for (piece, material) in corrected.lost.iter().zip(materials_at(&self.motion, &places)) {
             let velocity = self.motion.velocity().at(&mut sampler, piece.place);
-            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32 });
+            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32, material });
         }
         self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
         self.metrics.set(VOLUME_DRIFT, corrected.drift);
@@ -402,6 +443,18 @@ impl Run {
     }
 }
 
+/// The ids of tracers: their own, or else their numbers.
+fn tracer_ids(wires: &[&Component]) -> Vec<i32> {
+    let mut ids = Vec::new();
+    for tracers in wires {
+        match tracers.get(ID) {
+            Some(own) => ids.extend(own),
+            None => ids.extend((ids.len() as i32..).take(tracers.point_count())),
+        }
+    }
+    ids
+}
+
 fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
     let mut out = Vec::new();
     let mut without = |stage, why| out.push(LeftOut::new(stage, why));
@@ -414,13 +467,14 @@ fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
     if wires.count(&COLLIDERS) == 0 {
         without("colliders", "no `colliders` are wired");
     }
+    if wires.count(&TRACERS) == 0 {
+        without("tracers", "no `tracers` are wired");
+    }
     if !params.get(VOLUME_CORRECTION) {
         without("volume correction", "`volume_correction` is false");
     }
     if params.get(STOKES) == Coupling::Off {
-        without("viscosity", "`stokes` is off");
-    } else if params.get(VISCOSITY) == 0.0 {
-        without("viscosity", "`viscosity` is 0");
+        without("viscous stress", "`stokes` is off");
     }
     out
 }

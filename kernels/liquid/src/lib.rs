@@ -1,7 +1,7 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
 //! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
 //! ([`level_set`]) made exact by markers ([`markers`], together [`marked`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
-//! meshes as sources and colliders ([`shape`]), the volume of each piece kept ([`volumes`]), and all of it moved frame by frame ([`step`]). Functions take and return
+//! meshes as sources and colliders ([`shape`]), the volume of each piece kept ([`volumes`]), points that it carries ([`carried`]), and all of it moved frame by frame ([`step`]). Functions take and return
 //! plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
@@ -12,6 +12,7 @@
 #[cfg(test)]
 extern crate self as liquid;
 
+pub mod carried;
 mod dense;
 pub mod extract;
 pub mod fields;

@@ -1,10 +1,12 @@
 //! Sources and sinks in motion over a step.
 
 use engine::prelude::*;
+use liquid::carried::LiquidMaterial;
 use liquid::rows::Cell;
 use liquid::shape::{MovingShape, ShapeSettings};
 use liquid::step::{Domain, LiquidSink, LiquidSource, SourceShape};
 
+use super::carried::MeshAttributes;
 use super::shapes::{in_cells, topology};
 use crate::shared::attributes::{
     SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
@@ -22,6 +24,12 @@ pub(super) struct Opening {
     rates: Vec<f64>,
     active: Vec<bool>,
     velocities: Option<Vec<[f32; 3]>>,
+    /// What its liquid is made of.
+    materials: Vec<LiquidMaterial>,
+    /// The mesh at the end of the step.
+    last: Component,
+    /// The attributes of its liquid.
+    attributes: Option<MeshAttributes>,
 }
 
 /// The attributes that say what an opening does.
@@ -30,12 +38,16 @@ pub(super) struct Says {
     rate: Attr<f32>,
     active: Attr<i32>,
     velocity: Option<Attr<[f32; 3]>>,
+    /// What its liquid is made of.
+    material: fn(&Component, &str) -> Result<LiquidMaterial>,
 }
 
 /// Those of a source.
-pub(super) const SOURCE: Says = Says { rate: SOURCE_RATE, active: SOURCE_ACTIVE, velocity: Some(SOURCE_VELOCITY) };
+pub(super) const SOURCE: Says =
+    Says { rate: SOURCE_RATE, active: SOURCE_ACTIVE, velocity: Some(SOURCE_VELOCITY), material: material_of };
 /// Those of a sink.
-pub(super) const SINK: Says = Says { rate: SINK_RATE, active: SINK_ACTIVE, velocity: None };
+pub(super) const SINK: Says =
+    Says { rate: SINK_RATE, active: SINK_ACTIVE, velocity: None, material: |_, _| Ok(LiquidMaterial::default()) };
 
 impl Opening {
     /// All openings of an input over a step.
@@ -62,10 +74,6 @@ impl Opening {
                         Error::refused(fact).hint("a source or sink needs the same faces and points at every frame")
                     );
                 }
-                refuse_material(first).map_err(|name| {
-                    let fact = format!("{} has a {name} of its own, which is not available yet", what());
-                    Error::refused(fact).hint(format!("set `{name}` of FluidSolve, and leave it out of Fluid_Source"))
-                })?;
                 openings.push(Self::new(&meshes, [first, last], says, domain, lattice, &what())?);
             }
         }
@@ -92,6 +100,7 @@ impl Opening {
             }
         }
         let once = |attribute: Attr<f32>, mesh: &Component| mesh.get(attribute).and_then(|rows| rows.first().copied());
+        let materials = meshes.iter().map(|mesh| (says.material)(mesh, what)).collect::<Result<Vec<_>>>()?;
         let velocity = |mesh: &&Component| says.velocity.and_then(|attribute| mesh.get(attribute)?.first().copied());
         Ok(Self {
             shape: MovingShape::new(&topology, &from, &to, &settings),
@@ -102,6 +111,9 @@ impl Opening {
                 .map(|mesh| mesh.get(says.active).is_none_or(|rows| rows.first() != Some(&0)))
                 .collect(),
             velocities: meshes.iter().map(velocity).collect(),
+            materials,
+            last: last.clone(),
+            attributes: None,
         })
     }
 
@@ -130,6 +142,24 @@ impl Opening {
         numerics::vector::lerp(velocities[sample], next, mix as f32)
     }
 
+    /// Whether its liquid is made of something else than the rest.
+    pub(super) fn has_material(&self) -> bool {
+        self.materials.iter().any(|material| *material != LiquidMaterial::default())
+    }
+
+    /// The mesh at the end of the step, and where its attributes go.
+    pub(super) fn attributes(&mut self) -> (&Component, &mut Option<MeshAttributes>) {
+        (&self.last, &mut self.attributes)
+    }
+
+    /// What its liquid is made of.
+    fn material(&self, share: f64) -> LiquidMaterial {
+        let (sample, mix) = self.sample(share);
+        let [from, to] = [sample, sample + 1].map(|n| self.materials[n.min(self.materials.len() - 1)]);
+        let between = |from: Option<f32>, to: Option<f32>| Some(from? + mix as f32 * (to? - from?));
+        LiquidMaterial { viscosity: between(from.viscosity, to.viscosity), density: between(from.density, to.density) }
+    }
+
     /// ∫ of the rate between two shares of a step of that many seconds, m³: linear between samples, 0 where it is not active.
     fn volume(&self, from: f64, to: f64, seconds: f64) -> f64 {
         let intervals = self.active.len() - 1;
@@ -146,14 +176,27 @@ impl Opening {
     }
 }
 
-/// The name of what a liquid has of its own and cannot have yet.
-pub(super) fn refuse_material(mesh: &Component) -> std::result::Result<(), &'static str> {
-    match (mesh.get(SOURCE_VISCOSITY), mesh.get(SOURCE_DENSITY)) {
-        (Some(_), _) => Err("viscosity"),
-        (_, Some(_)) => Err("density"),
-        (None, None) => Ok(()),
-    }
+/// What the liquid of a mesh is made of.
+///
+/// # Errors
+/// Where its attributes are no viscosity or no density.
+pub(super) fn material_of(mesh: &Component, what: &str) -> Result<LiquidMaterial> {
+    let once = |attribute: Attr<f32>, is_one: fn(f32) -> bool, must: &str| {
+        let Some(value) = mesh.get(attribute).and_then(|rows| rows.first().copied()) else { return Ok(None) };
+        if is_one(value) {
+            return Ok(Some(value));
+        }
+        let fact = format!("{what} has a `{}` of {value}", attribute.name);
+        Err(Error::refused(fact).hint(format!("it must be {must}")))
+    };
+    Ok(LiquidMaterial {
+        viscosity: once(SOURCE_VISCOSITY, |value| value >= 0.0, "0 or above")?,
+        density: once(SOURCE_DENSITY, |value| value > 0.0, "above 0")?,
+    })
 }
+
+/// Changes the attributes of a marker, given its place.
+type Edit<'a> = Box<dyn Fn([f32; 3], &mut [f32]) + Sync + 'a>;
 
 /// What the solver calls of an opening at times since the start of the frame, s.
 pub(super) struct Timed<'a> {
@@ -161,6 +204,8 @@ pub(super) struct Timed<'a> {
     rate: Box<dyn Fn(f64, f64) -> f64 + Sync + 'a>,
     active: Box<dyn Fn(f64) -> bool + Sync + 'a>,
     velocity: Box<dyn Fn(f64) -> [f32; 3] + Sync + 'a>,
+    material: Box<dyn Fn(f64) -> LiquidMaterial + Sync + 'a>,
+    attributes: Option<Edit<'a>>,
     opening: &'a Opening,
 }
 
@@ -177,6 +222,11 @@ impl<'a> Timed<'a> {
             rate: Box::new(move |from, to| opening.volume(share(from), share(to), seconds)),
             active: Box::new(move |time| opening.is_active(share(time))),
             velocity: Box::new(move |time| opening.velocity(share(time))),
+            material: Box::new(move |time| opening.material(share(time))),
+            attributes: opening.attributes.as_ref().map(|mesh| {
+                let write: Edit<'a> = Box::new(move |place, row| mesh.write(place, row));
+                write
+            }),
             opening,
         }
     }
@@ -190,6 +240,8 @@ impl<'a> Timed<'a> {
             shape: self.shape(),
             rate: if self.opening.has_rate() { Some(&*self.rate) } else { None },
             velocity: if self.opening.velocities.is_some() { Some(&*self.velocity) } else { None },
+            material: &*self.material,
+            attributes: self.attributes.as_deref(),
             active: &*self.active,
         }
     }

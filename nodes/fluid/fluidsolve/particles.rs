@@ -1,12 +1,19 @@
-//! The markers on the surface and the spray, as points.
+//! The markers on the surface, the spray and the tracers, as points.
 
 use engine::prelude::*;
+use liquid::step::Motion;
+use numerics::vector::scale;
 use serde::{Deserialize, Serialize};
 
-use super::Run;
-use crate::shared::attributes::{PARTICLE_KIND, PARTICLE_VOLUME};
+use super::{DENSITY, Run, VISCOSITY};
+use crate::shared::attributes::{PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME};
 use crate::shared::surface::velocity_at;
 use crate::shared::volume::Lattice;
+
+/// The kinds of points.
+const MARKER: i32 = 0;
+const SPRAY: i32 = 1;
+const TRACER: i32 = 3;
 
 /// A drop too small for the grid. It flies on its own and does not come back into the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +24,8 @@ pub(super) struct SprayDrop {
     pub(super) velocity: [f32; 3],
     /// m³.
     pub(super) volume: f32,
+    /// Viscosity, Pa·s, and density, kg/m³, where they are not the solver's.
+    pub(super) material: [Option<f32>; 2],
 }
 
 impl SprayDrop {
@@ -41,9 +50,13 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
     let mut points: Vec<[f32; 3]> = markers.markers.iter().map(|marker| fine.in_metres(marker.point)).collect();
     let on_surface = points.len();
     points.extend(run.spray.iter().map(|drop| lattice.in_metres(drop.place)));
+    let tracers = run.motion.tracers();
+    let first_tracer = points.len();
+    points.extend(tracers.points().iter().map(|place| lattice.in_metres(*place)));
     let velocity = cx.wants(V).then(|| {
         let mut velocity = velocity_at(volume, &points[..on_surface]);
         velocity.extend(run.spray.iter().map(|drop| drop.velocity));
+        velocity.extend(velocity_at(volume, &points[first_tracer..]));
         velocity
     });
     let count = points.len();
@@ -59,16 +72,56 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
     if cx.wants(ID) {
         // Spray counts down from -1.
         let mut ids: Vec<i32> = markers.ids.iter().map(|id| *id as i32).collect();
-        ids.extend((1..).take(count - on_surface).map(|n: i32| -n));
+        ids.extend((1..).take(run.spray.len()).map(|n: i32| -n));
+        ids.extend(tracers.numbers().iter().map(|number| run.tracer_ids[*number as usize]));
         particles.set(ID, ids)?;
     }
     if cx.wants(PARTICLE_KIND) {
-        particles.set(PARTICLE_KIND, (0..count).map(|n| i32::from(n >= on_surface)).collect())?;
+        let kind = |n: usize| {
+            if n < on_surface {
+                MARKER
+            } else if n < first_tracer {
+                SPRAY
+            } else {
+                TRACER
+            }
+        };
+        particles.set(PARTICLE_KIND, (0..count).map(kind).collect())?;
     }
     if cx.wants(PARTICLE_VOLUME) {
         let mut volumes = vec![0.0; on_surface];
         volumes.extend(run.spray.iter().map(|drop| drop.volume));
+        volumes.resize(count, 0.0);
         particles.set(PARTICLE_VOLUME, volumes)?;
     }
+    set_materials(cx, run, &mut particles)?;
+    run.columns.set(cx, &mut particles, &run.surface, run.spray.len(), tracers.numbers())?;
     Ok(particles)
+}
+
+/// Says what the liquid at each point is made of.
+fn set_materials(cx: &Cx, run: &Run, particles: &mut Component) -> Result<()> {
+    let wanted = [(PARTICLE_VISCOSITY, cx.get(VISCOSITY) as f32), (PARTICLE_DENSITY, cx.get(DENSITY) as f32)];
+    if wanted.iter().all(|(attribute, _)| !cx.wants(*attribute)) {
+        return Ok(());
+    }
+    let unit = 1.0 / run.surface.resolution() as f32;
+    let markers: Vec<[f32; 3]> = run.surface.markers().markers.iter().map(|marker| scale(marker.point, unit)).collect();
+    let mut rows = materials_at(&run.motion, &markers);
+    rows.extend(run.spray.iter().map(|drop| drop.material));
+    rows.extend(materials_at(&run.motion, run.motion.tracers().points()));
+    for (n, (attribute, own)) in wanted.into_iter().enumerate().filter(|(_, (attribute, _))| cx.wants(*attribute)) {
+        particles.set(attribute, rows.iter().map(|row| row[n].unwrap_or(own)).collect())?;
+    }
+    Ok(())
+}
+
+/// Viscosity, Pa·s, and density, kg/m³, of the liquid at places in solver cells, where they are not the solver's.
+pub(super) fn materials_at(motion: &Motion, places: &[[f32; 3]]) -> Vec<[Option<f32>; 2]> {
+    match motion.materials() {
+        Some(materials) => {
+            materials.closest_to(places).into_iter().map(|material| [material.viscosity, material.density]).collect()
+        }
+        None => vec![[None; 2]; places.len()],
+    }
 }

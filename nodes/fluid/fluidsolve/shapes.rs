@@ -3,14 +3,18 @@
 use std::sync::Arc;
 
 use engine::prelude::*;
+use liquid::carried::LiquidMaterial;
 use liquid::level_set::LevelSet;
 use liquid::marked::{MarkedSurface, SolidDistance};
 use liquid::rows::CellRows;
 use liquid::shape::{MeshShape, MovingShape, ShapeSettings, ShapeTopology};
-use liquid::step::Domain;
+use liquid::step::{Domain, Surface};
 
+use numerics::vector::scale;
+
+use super::carried::{CarriedColumns, MeshAttributes};
 use super::domain::resolution;
-use super::openings::refuse_material;
+use super::openings::material_of;
 use super::{COLLIDERS, LIQUID};
 use crate::shared::volume::Lattice;
 
@@ -26,23 +30,57 @@ const MOST_CELLS: f64 = 1e9;
 /// Bytes that a cell of liquid takes while it moves.
 const CELL_BYTES: f64 = 400.0;
 
-/// The surface of the liquid at the start: all of its meshes together.
+/// The liquid at the start.
+pub(super) struct StartLiquid {
+    /// The surface of all meshes together.
+    pub(super) surface: MarkedSurface,
+    /// The attributes of the markers.
+    pub(super) columns: CarriedColumns,
+    /// Surface cells along the side of a solver cell.
+    by: u32,
+    meshes: Vec<(MeshShape, LiquidMaterial)>,
+}
+
+impl StartLiquid {
+    /// Whether a mesh has a material of its own.
+    pub(super) fn has_materials(&self) -> bool {
+        self.meshes.iter().any(|(_, material)| *material != LiquidMaterial::default())
+    }
+
+    /// What the liquid at a place in solver cells is made of.
+    pub(super) fn material(&self, place: [f32; 3]) -> LiquidMaterial {
+        let mesh = mesh_at(&self.meshes, scale(place, self.by as f32));
+        mesh.map(|n| self.meshes[n].1).unwrap_or_default()
+    }
+}
+
+/// The last mesh that a place in surface cells is in; where it is in none, the closest.
+fn mesh_at(meshes: &[(MeshShape, LiquidMaterial)], place: [f32; 3]) -> Option<usize> {
+    let cell = place.map(|x| x.floor() as i32);
+    let mut best: Option<(usize, f32)> = None;
+    for (n, (shape, _)) in meshes.iter().enumerate() {
+        let Some(distance) = shape.rows().find(cell).map(|at| shape.distance()[at]) else { continue };
+        if best.is_none_or(|(_, least)| distance < least.max(0.0)) {
+            best = Some((n, distance));
+        }
+    }
+    best.map(|(n, _)| n)
+}
+
+/// All meshes of the liquid at the start.
 ///
 /// # Errors
 /// Where a mesh has no inside, or the liquid takes more memory than there is.
-pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Result<MarkedSurface> {
+pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Result<StartLiquid> {
     let by = resolution(cx);
     let fine = lattice.refined(by);
     let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * by as i32));
     let settings = ShapeSettings::new(low, high);
-    let mut shapes = Vec::new();
+    let (mut shapes, mut parts) = (Vec::new(), Vec::new());
     for (wire, mesh) in cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).enumerate() {
         let what = format!("`liquid` {wire} (counted from 0)");
         let topology = topology(mesh, fine, &what)?;
-        refuse_material(mesh).map_err(|name| {
-            let fact = format!("{what} has a {name} of its own, which is not available yet");
-            Error::refused(fact).hint(format!("set `{name}` of FluidSolve, and leave it out of Fluid_Source"))
-        })?;
+        let material = material_of(mesh, &what)?;
         let points = in_cells(mesh, fine);
         let least = cells_inside(mesh, &points, [low, high]);
         if least > MOST_CELLS {
@@ -51,14 +89,15 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
             return Err(Error::refused(fact).hint("use larger cells, or less liquid"));
         }
         cx.reserve(least * CELL_BYTES / f64::from(by.pow(2)), "use larger cells, or less liquid")?;
-        shapes.push(MeshShape::new(&topology, &points, &settings));
+        shapes.push((MeshShape::new(&topology, &points, &settings), material));
+        parts.push(mesh);
     }
     let mut rows = CellRows::default();
-    for shape in &shapes {
+    for (shape, _) in &shapes {
         rows = rows.union(shape.rows());
     }
     let mut phi = vec![settings.band; rows.len()];
-    for shape in &shapes {
+    for (shape, _) in &shapes {
         rows.for_each_shared(shape.rows(), |to, from, len| {
             let closer = phi[to..to + len].iter_mut().zip(&shape.distance()[from..from + len]);
             closer.for_each(|(phi, distance)| *phi = phi.min(*distance));
@@ -66,7 +105,17 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     }
     let mut set = LevelSet::new(&rows, &phi, low, high);
     set.fill();
-    Ok(MarkedSurface::of_level_set(set, by, 0, SEED).within(domain))
+    let mut surface = MarkedSurface::of_level_set(set, by, 0, SEED).within(domain);
+    let mut columns = CarriedColumns::default();
+    let attributes: Vec<Option<MeshAttributes>> =
+        parts.iter().map(|mesh| columns.add_mesh(mesh, lattice, &mut surface)).collect();
+    surface.edit_attributes(|place, row| {
+        let mesh = mesh_at(&shapes, scale(place, by as f32));
+        if let Some(attributes) = mesh.and_then(|n| attributes[n].as_ref()) {
+            attributes.write(place, row);
+        }
+    });
+    Ok(StartLiquid { surface, columns, by, meshes: shapes })
 }
 
 /// Number of cells inside a mesh, about: its volume, but no more than its box has in `bounds`.

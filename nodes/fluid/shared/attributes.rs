@@ -16,7 +16,11 @@ pub(crate) const SOURCE_DENSITY: Attr<f32> = Attr::once("source_density");
 pub(crate) const SINK_RATE: Attr<f32> = Attr::once("sink_rate");
 /// Of a sink: 1 if it takes liquid, else 0.
 pub(crate) const SINK_ACTIVE: Attr<i32> = Attr::once("sink_active");
-/// Of a particle: 0 a marker on the surface, 1 spray.
+/// Of a particle: 0 a marker on the surface, 1 spray, 3 a tracer.
 pub(crate) const PARTICLE_KIND: Attr<i32> = Attr::point("kind");
-/// Of a particle: the volume that it stands for, m³; 0 of markers.
+/// Of a particle: the volume that it stands for, m³; 0 of markers and tracers.
 pub(crate) const PARTICLE_VOLUME: Attr<f32> = Attr::point("volume");
+/// Of a particle: the dynamic viscosity of the liquid there, Pa·s.
+pub(crate) const PARTICLE_VISCOSITY: Attr<f32> = Attr::point("viscosity");
+/// Of a particle: the density of the liquid there, kg/m³.
+pub(crate) const PARTICLE_DENSITY: Attr<f32> = Attr::point("density");

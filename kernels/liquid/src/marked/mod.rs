@@ -86,6 +86,12 @@ impl MarkedSurface {
         &self.markers
     }
 
+    /// Gives the markers attributes more, with one of these values each.
+    pub fn add_attributes(&mut self, values: &[f32]) {
+        let markers = &mut self.markers;
+        markers.attributes.extend(values.iter().map(|value| vec![*value; markers.ids.len()]));
+    }
+
     /// Surface cells along the side of a solver cell.
     pub fn resolution(&self) -> u32 {
         self.resolution as u32
@@ -220,6 +226,11 @@ impl Surface for MarkedSurface {
         let scaled = |point: Vec3, phi: f32| size * change(scale(point, unit), phi * unit);
         self.among_images(0.0, |markers, set| markers.change(set, low, high, scaled));
         self.restrict();
+    }
+
+    fn edit_attributes(&mut self, edit: impl Fn(Vec3, &mut [f32]) + Sync) {
+        let unit = 1.0 / self.resolution as f32;
+        self.markers.edit_attributes(|point, row| edit(scale(point, unit), row));
     }
 }
 

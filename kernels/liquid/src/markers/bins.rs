@@ -7,14 +7,15 @@ use crate::level_set::floor;
 use crate::rows::{Cell, CellRows};
 
 /// For each stored cell, the markers in the cube of which it is the first corner.
-pub(super) struct Bins {
+pub(crate) struct Bins {
     /// Where the markers of each stored cell start in `order`; then the number of all.
     pub(super) first: Vec<u32>,
     /// Markers by cell and, within one, by number.
     pub(super) order: Vec<u32>,
 }
 
-const NOWHERE: u32 = u32::MAX;
+/// The cell of what is in none.
+pub(crate) const NOWHERE: u32 = u32::MAX;
 
 /// The first corner of the cube around a point; beyond the outermost centres of the domain, the nearest cube.
 pub(super) fn cube(point: [f32; 3], (low, high): (Cell, Cell)) -> Cell {
@@ -34,7 +35,12 @@ impl Bins {
             at.map_or(NOWHERE, |at| at as u32)
         };
         let cells: Vec<u32> = markers.par_iter().enumerate().map(find).collect();
-        let mut first = vec![0_u32; rows.len() + 1];
+        Self::of_cells(&cells, rows.len())
+    }
+
+    /// What lies in each of `count` cells, where `cells` has the cell of each point, or [`NOWHERE`].
+    pub(crate) fn of_cells(cells: &[u32], count: usize) -> Self {
+        let mut first = vec![0_u32; count + 1];
         for cell in cells.iter().filter(|cell| **cell != NOWHERE) {
             first[*cell as usize + 1] += 1;
         }
@@ -42,7 +48,7 @@ impl Bins {
             first[cell] += first[cell - 1];
         }
         let mut next = first.clone();
-        let mut order = vec![0; first[rows.len()] as usize];
+        let mut order = vec![0; first[count] as usize];
         for (n, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell != NOWHERE) {
             let place = &mut next[*cell as usize];
             order[*place as usize] = n as u32;
@@ -53,12 +59,12 @@ impl Bins {
 
     /// The markers of the cubes `from` ≤ cube < `to`.
     #[inline(always)]
-    pub(super) fn of(&self, from: usize, to: usize) -> &[u32] {
+    pub(crate) fn of(&self, from: usize, to: usize) -> &[u32] {
         &self.order[self.first[from] as usize..self.first[to] as usize]
     }
 
     /// The markers of the cubes at most `ring` away from one along each axis.
-    pub(super) fn around<'a>(
+    pub(crate) fn around<'a>(
         &'a self,
         rows: &'a CellRows,
         [x, y, z]: Cell,
@@ -71,7 +77,7 @@ impl Bins {
     }
 
     /// All markers, of cubes with at least `crowd` only `left`, evenly picked.
-    pub(super) fn thinned(&self, crowd: usize, left: usize) -> Vec<u32> {
+    pub(crate) fn thinned(&self, crowd: usize, left: usize) -> Vec<u32> {
         let mut out = Vec::with_capacity(self.order.len());
         for cell in self.first.windows(2) {
             let markers = &self.order[cell[0] as usize..cell[1] as usize];

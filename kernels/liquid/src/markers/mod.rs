@@ -25,7 +25,7 @@
 //! volume is lost.
 
 mod attributes;
-mod bins;
+pub(crate) mod bins;
 mod correct;
 mod seed;
 #[cfg(test)]
@@ -197,6 +197,23 @@ impl Markers {
         set.change(low, high, change);
         set.fill();
         self.upkeep(set);
+    }
+
+    /// Changes the attributes of each marker, one number after the other, to what `edit` makes of its place and of them.
+    pub fn edit_attributes(&mut self, edit: impl Fn(Vec3, &mut [f32]) + Sync) {
+        if self.attributes.is_empty() {
+            return;
+        }
+        let attributes = &self.attributes;
+        let edited = |(n, marker): (usize, &Marker)| {
+            let mut row: Vec<f32> = attributes.iter().map(|values| values[n]).collect();
+            edit(marker.point, &mut row);
+            row
+        };
+        let rows: Vec<Vec<f32>> = self.markers.par_iter().enumerate().map(edited).collect();
+        for (n, values) in self.attributes.iter_mut().enumerate() {
+            values.iter_mut().zip(&rows).for_each(|(value, row)| *value = row[n]);
+        }
     }
 
     /// Drops markers that are not on the surface, thins them where they crowd, and fills holes. A step does so now and

@@ -20,6 +20,7 @@ use std::ops::Range;
 use crate::fields::{add_scaled, dot, largest, scale_and_add};
 use crate::rows::{Cell, CellRows, Finder, Images, Periods};
 use crate::stencil::{Run, Stencil};
+use crate::velocity::FaceFields;
 
 use closed::Closed;
 use cycle::Multigrid;
@@ -232,6 +233,25 @@ impl PressureSolver {
             }
         }
     }
+}
+
+/// The density at each low face: the mean of the liquid cells beside it, where φ < 0; 1 where there is none.
+pub(crate) fn face_densities(rows: &CellRows, level_set: &[f32], density: &[f32]) -> FaceFields<f32> {
+    let of = |at: usize| if level_set[at] < 0.0 { Some(density[at]) } else { None };
+    rows.tabulate_with(
+        || Finder::new(rows),
+        |finder, cell, at| {
+            [0, 1, 2].map(|axis| {
+                let mut below = cell;
+                below[axis] -= 1;
+                match (finder.find(below).and_then(of), of(at)) {
+                    (Some(a), Some(b)) => 0.5 * (a + b),
+                    (Some(one), None) | (None, Some(one)) => one,
+                    (None, None) => 1.0,
+                }
+            })
+        },
+    )
 }
 
 /// Whether a face of the cell is open.

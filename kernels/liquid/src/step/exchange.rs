@@ -6,6 +6,7 @@
 
 use numerics::vector::{Vec3, largest};
 
+use crate::carried::{Filled, MaterialPoints};
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::Obstacle;
 use crate::step::motion::{LiquidCells, Motion};
@@ -13,13 +14,16 @@ use crate::step::pour::{Holder, Pour};
 use crate::step::shape_cells::ShapeCells;
 use crate::step::sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape, volume_between};
 use crate::step::{LiquidSettings, Surface, Surroundings};
-use crate::velocity::{FaceFields, MacVelocity, Site};
+use crate::velocity::{FaceFields, MacVelocity, Sampler, Site};
 
 /// What a sink takes in a substep, at most, ÷ the volume of its liquid cells.
 const TAKEN: f64 = 2.0;
 
 /// Cells around the way of what comes in that its interpolation reaches.
 const AROUND: f32 = 1.5;
+
+/// φ before a source filled its shape, in cells, from which on a place on the surface is new.
+const NEW: f32 = 0.1;
 
 /// A substep to sources and sinks.
 pub(super) struct Exchange<'a> {
@@ -50,7 +54,8 @@ impl<'a> Exchange<'a> {
     pub(super) fn apply<S: Surface>(&self, surface: &mut S, motion: &mut Motion) -> Exchanged<'a> {
         let mut exchanged = Exchanged { pours: Vec::new(), entering: Vec::new() };
         for (n, source) in self.around.sources.iter().enumerate() {
-            self.give(n, source, surface, &mut motion.sources[n], &mut exchanged);
+            let (account, materials) = (&mut motion.sources[n], motion.materials.as_mut());
+            self.give(n, source, surface, account, materials, &mut exchanged);
         }
         for (n, sink) in self.around.sinks.iter().enumerate() {
             exchanged.pours.extend(self.take(n, sink, surface, &mut motion.sinks[n]));
@@ -64,6 +69,7 @@ impl<'a> Exchange<'a> {
         source: &LiquidSource<'a>,
         surface: &mut S,
         account: &mut FlowAccount,
+        materials: Option<&mut MaterialPoints>,
         out: &mut Exchanged<'a>,
     ) {
         let before = account.settle(self.seconds());
@@ -74,6 +80,7 @@ impl<'a> Exchange<'a> {
         }
         let Some(cells) = self.cells(source.shape) else { return account.withhold_beyond(0.0) };
         let mut phi = cells.level_set(&surface.view());
+        let material = (source.material)(self.times[1]);
         let shrink = match source.rate {
             None => Some(0.0),
             Some(_) if account.owed > 0.0 => cells.shrunk_to(&phi, account.owed / self.cell_volume()),
@@ -84,7 +91,20 @@ impl<'a> Exchange<'a> {
             let [low, high] = cells.bounds();
             let held = cells.volume(&phi);
             surface.change(low, high, cells.filled(shrink));
-            phi = cells.level_set(&surface.view());
+            let after = cells.level_set(&surface.view());
+            if let Some(attributes) = source.attributes {
+                surface.edit_attributes(|point, row| {
+                    let is_in = (0..3).all(|axis| low[axis] as f32 <= point[axis] && point[axis] <= high[axis] as f32);
+                    if is_in && Sampler::new(cells.rows()).value(&phi, Site::Centre, point) > NEW {
+                        attributes(point, row);
+                    }
+                });
+            }
+            if let Some(materials) = materials {
+                let filled = Filled { rows: cells.rows(), before: &phi, after: &after };
+                materials.fill(&filled, &self.settings.domain, material);
+            }
+            phi = after;
             filled = (cells.volume(&phi) - held) * self.cell_volume();
             account.moved += filled;
             account.owed -= if source.rate.is_some() { filled } else { 0.0 };
@@ -95,7 +115,7 @@ impl<'a> Exchange<'a> {
             let rate = account.rate_to_pour(gave, filled, before, self.seconds());
             match liquid.is_empty() {
                 true => account.withhold_beyond(0.0),
-                false if rate > 0.0 => out.pours.push(Pour::new(Holder::Source(n), liquid, rate)),
+                false if rate > 0.0 => out.pours.push(Pour::new(Holder::Source(n), liquid, rate).of(material)),
                 false => {}
             }
         }

@@ -42,11 +42,13 @@ mod turned;
 
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
-pub use sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape};
+pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
 pub use substep::{Moving, Surface, Surroundings};
 
+use crate::carried::{LiquidMaterial, MaterialPoints, TracerPoints};
 use crate::rows::CellRows;
 use crate::velocity::{MacVelocity, Scheme};
+use numerics::vector::Vec3;
 
 /// How pressure is split from motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,7 +93,7 @@ pub struct LiquidSettings {
     pub domain: Domain,
     /// The side of a cell, m.
     pub cell: f64,
-    /// Mass of a volume, kg/m³.
+    /// Mass of a volume where no [`LiquidMaterial`] says otherwise, kg/m³.
     pub density: f64,
     /// When viscosity is solved for.
     pub coupling: Coupling,
@@ -224,7 +226,25 @@ impl<S: Surface> Liquid<S> {
 
     /// Gives every liquid face the velocity at its middle, a place in cells, m/s.
     pub fn set_velocity(&mut self, velocity: impl Fn([f32; 3]) -> [f32; 3] + Sync, around: &Surroundings<'_>) {
-        self.motion = Motion::starting(&self.settings, &self.surface, around, velocity);
+        let carried = std::mem::take(&mut self.motion);
+        let (tracers, materials) = (carried.tracers, carried.materials);
+        let motion = Motion::starting(&self.settings, &self.surface, around, velocity);
+        self.motion = Motion { tracers, materials, ..motion };
+    }
+
+    /// Lets the liquid carry tracers from these places, in cells.
+    pub fn set_tracers(&mut self, places: Vec<Vec3>) {
+        self.motion.tracers = TracerPoints::new(places);
+    }
+
+    /// Says what the liquid is made of at each place, in cells, instead of the same everywhere.
+    pub fn set_materials(&mut self, material: impl Fn(Vec3) -> LiquidMaterial + Sync) {
+        self.motion.materials = Some(MaterialPoints::filling(&self.surface.view(), material));
+    }
+
+    /// The surface, and all else that the next frame depends on.
+    pub fn into_parts(self) -> (S, Motion) {
+        (self.surface, self.motion)
     }
 
     /// The velocity, m/s, continued `layers` cells past the liquid.

@@ -3,11 +3,13 @@
 use numerics::vector::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::carried::{CellMaterials, MaterialPoints, Stir, TracerPoints};
+use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows, Images};
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::sources::FlowAccount;
-use crate::step::{LiquidSettings, Surface, Surroundings, Wall};
+use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
 
 /// What gravity and pressure together added to the velocity in a substep.
@@ -39,6 +41,11 @@ pub struct Motion {
     pub(super) sources: Vec<FlowAccount>,
     /// The same of sinks.
     pub(super) sinks: Vec<FlowAccount>,
+    pub(super) tracers: TracerPoints,
+    /// Where not all of the liquid is made of the same.
+    pub(super) materials: Option<MaterialPoints>,
+    /// What comes out of it in the next substep, where that matters.
+    pub(super) stirred: Vec<Stir>,
 }
 
 impl Motion {
@@ -75,6 +82,43 @@ impl Motion {
     /// Number of liquid cells.
     pub fn liquid_cells(&self) -> usize {
         self.liquid_cells
+    }
+
+    /// The tracers.
+    pub fn tracers(&self) -> &TracerPoints {
+        &self.tracers
+    }
+
+    /// What the liquid is made of, where that is not the same everywhere.
+    pub fn materials(&self) -> Option<&MaterialPoints> {
+        self.materials.as_ref()
+    }
+
+    /// Moves all that the liquid carries besides its velocity; `view` is where it is before.
+    pub(super) fn carry(&mut self, flow: &Moving<'_>, view: PhiView<'_>, settings: &LiquidSettings) {
+        self.tracers.advance(flow, view, &settings.domain);
+        let stirred = std::mem::take(&mut self.stirred);
+        if let Some(materials) = &mut self.materials {
+            let seconds = f64::from(flow.step) * settings.cell;
+            stirred.iter().for_each(|stir| materials.stir(stir, seconds, settings.cell));
+            materials.advance(flow, &settings.domain);
+        }
+    }
+
+    /// What the cells are made of, where that is not the same everywhere. `own`: viscosity and density of what is not said
+    /// otherwise.
+    pub(super) fn materials_of(
+        &mut self,
+        cells: &LiquidCells,
+        view: PhiView<'_>,
+        domain: &Domain,
+        own: [f32; 2],
+    ) -> Option<CellMaterials> {
+        let materials = self.materials.as_mut()?;
+        let mut of_cells = materials.settle(&cells.rows, &cells.level_set, view, domain, own);
+        cells.images.fill(&mut of_cells.viscosity);
+        cells.images.fill(&mut of_cells.density);
+        Some(of_cells)
     }
 
     /// The largest component of the velocity, m/s.

@@ -1,5 +1,6 @@
 //! Liquid that comes out of liquid, or vanishes in it.
 
+use crate::carried::{LiquidMaterial, Stir};
 use crate::pressure::PressureSolver;
 use crate::rows::Cell;
 use crate::step::motion::Motion;
@@ -23,11 +24,18 @@ pub(super) struct Pour {
     wanted: f64,
     /// What does.
     granted: f64,
+    /// What it is made of.
+    material: LiquidMaterial,
 }
 
 impl Pour {
     pub(super) fn new(holder: Holder, cells: Vec<Cell>, wanted: f64) -> Self {
-        Self { holder, cells, wanted, granted: 0.0 }
+        Self { holder, cells, wanted, granted: 0.0, material: LiquidMaterial::default() }
+    }
+
+    /// The same of this material.
+    pub(super) fn of(self, material: LiquidMaterial) -> Self {
+        Self { material, ..self }
     }
 
     /// The speed of the liquid around it, m/s; `cell`: the side of a cell, m.
@@ -43,6 +51,9 @@ impl Pour {
             Holder::Sink(n) => &mut motion.sinks[n],
         };
         account.pouring = self.granted.abs();
+        if motion.materials.is_some() && self.granted > 0.0 {
+            motion.stirred.push(Stir::new(self.cells.clone(), self.granted, self.material));
+        }
         // What nothing gives way to is not made good later.
         let share = self.granted / self.wanted;
         if share < 1.0 - ROUNDING {

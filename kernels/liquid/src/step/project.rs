@@ -1,10 +1,11 @@
 //! The end of a substep: what is left of a velocity once it neither compresses the liquid nor differs from what viscosity
 //! allows.
 
-use crate::pressure::{PressureGrid, PressureSolver, Stop};
+use crate::carried::CellMaterials;
+use crate::pressure::{PressureGrid, PressureSolver, Stop, face_densities};
 use crate::rows::CellRows;
 use crate::stencil::Stencil;
-use crate::step::domain::{Obstacle, share_outside};
+use crate::step::domain::{Domain, Obstacle, share_outside};
 use crate::step::exchange::Imposed;
 use crate::step::force::pressed;
 use crate::step::motion::{Guess, LiquidCells, Motion};
@@ -23,6 +24,7 @@ const CREEP: f64 = 1e-3;
 pub(super) struct Projection<'a> {
     pub settings: &'a LiquidSettings,
     pub cells: &'a LiquidCells,
+    pub materials: Materials,
     pub solid: Option<Obstacle<'a>>,
     pub imposed: &'a [Imposed],
     /// The speed of the liquid, m/s.
@@ -33,22 +35,64 @@ pub(super) struct Projection<'a> {
     pub seconds: f64,
 }
 
+/// What the liquid of a substep is made of.
+pub(super) struct Materials {
+    /// Viscosity · Δt ÷ (density · cell²) where it is the same everywhere.
+    viscosity: f64,
+    /// The same of each cell, and its density ÷ that of the settings, where it is not.
+    of_cells: Option<[Vec<f32>; 2]>,
+}
+
+impl Materials {
+    /// `own`: viscosity and density where it is the same everywhere.
+    pub(super) fn new(own: [f64; 2], cells: Option<CellMaterials>, settings: &LiquidSettings, seconds: f64) -> Self {
+        let per_viscosity = seconds / (own[1] * settings.cell * settings.cell);
+        let scaled = |mut values: Vec<f32>, by: f64| {
+            values.iter_mut().for_each(|value| *value = (f64::from(*value) * by) as f32);
+            values
+        };
+        let of_cells = cells.map(|cells| [scaled(cells.viscosity, per_viscosity), scaled(cells.density, 1.0 / own[1])]);
+        Self { viscosity: own[0] * per_viscosity, of_cells }
+    }
+
+    /// The largest viscosity · Δt ÷ (density · cell²).
+    fn largest(&self, cells: &LiquidCells) -> f64 {
+        let Some([viscosity, density]) = &self.of_cells else { return self.viscosity };
+        let kinematic = viscosity.iter().zip(density).zip(&cells.level_set).filter(|(_, phi)| **phi < 0.0);
+        kinematic.fold(0.0, |most, ((viscosity, density), _)| most.max(f64::from(viscosity / density)))
+    }
+
+    /// Viscosity and density of other cells.
+    fn on(&self, cells: &LiquidCells, domain: &Domain, rows: &CellRows) -> [Vec<f32>; 2] {
+        let own = self.viscosity as f32;
+        let Some([viscosity, density]) = &self.of_cells else { return [vec![own; rows.len()], vec![1.0; rows.len()]] };
+        let mut fields = [rows.resampled(&cells.rows, viscosity, own), rows.resampled(&cells.rows, density, 1.0)];
+        let images = domain.periods().images(rows);
+        fields.iter_mut().for_each(|field| images.fill(field));
+        fields
+    }
+
+    /// The density at each low face, where it is not the same everywhere.
+    fn of_faces(&self, cells: &LiquidCells) -> Option<FaceFields<f32>> {
+        let [_, density] = self.of_cells.as_ref()?;
+        Some(face_densities(&cells.rows, &cells.level_set, density))
+    }
+}
+
 impl Projection<'_> {
-    /// Lets pressure act on a velocity, and viscosity where it counts: kinematic, in cell² a substep. `before`: the
-    /// velocity without gravity.
+    /// Lets pressure act on a velocity, and viscosity where it counts. `before`: the velocity without gravity.
     pub(super) fn apply(
         &self,
-        viscosity: f64,
         before: &FaceFields<f32>,
         pours: &mut [Pour],
         faces: &mut FaceFields<f32>,
         motion: &mut Motion,
     ) -> LiquidReport {
-        let is_coupled = self.settings.coupling.is_coupled(viscosity);
+        let is_coupled = self.settings.coupling.is_coupled(self.materials.largest(self.cells));
         let report = match is_coupled {
             true => {
                 let likely = motion.with_last_gain(self.cells, before, self.seconds);
-                self.by_pressure_and_viscosity(viscosity, &likely, pours, faces, &mut motion.guess)
+                self.by_pressure_and_viscosity(&likely, pours, faces, &mut motion.guess)
             }
             false => self.by_pressure(pours, faces, &mut motion.guess),
         };
@@ -59,7 +103,9 @@ impl Projection<'_> {
     /// Drives the divergence out of a velocity.
     fn by_pressure(&self, pours: &mut [Pour], faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
         let cells = self.cells;
-        let [x, y, z] = &cells.open;
+        let density = self.materials.of_faces(cells);
+        let lighter = density.as_ref().map(|density| divided(&cells.open, density));
+        let [x, y, z] = lighter.as_ref().unwrap_or(&cells.open);
         let periods = self.settings.domain.periods();
         let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z], periods };
         let solver = PressureSolver::new(&grid);
@@ -69,7 +115,7 @@ impl Projection<'_> {
         let stop =
             Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
-        subtract_gradient(&solver, cells, &q, faces);
+        subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
         let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
@@ -81,11 +127,9 @@ impl Projection<'_> {
         }
     }
 
-    /// Drives the divergence out of a velocity and lets viscosity act, both at once. `viscosity`: kinematic, in cell² a
-    /// substep. `likely`: a first guess of the result.
+    /// Drives the divergence out of a velocity and lets viscosity act, both at once. `likely`: a first guess of the result.
     fn by_pressure_and_viscosity(
         &self,
-        viscosity: f64,
         likely: &FaceFields<f32>,
         pours: &mut [Pour],
         faces: &mut FaceFields<f32>,
@@ -101,13 +145,14 @@ impl Projection<'_> {
             Imposed::close(self.imposed, &rows, &mut open, solid_velocity.get_or_insert_with(still));
         }
         let [[open_x, open_y, open_z], [x, y, z]] = [&open, &distance];
+        let [viscosity, density] = self.materials.on(cells, domain, &rows);
         let grid = StokesGrid {
             rows: &rows,
             level_set: &level_set,
             open: [open_x, open_y, open_z],
             solid_distance: [x, y, z],
-            density: &vec![1.0; rows.len()],
-            viscosity: &vec![viscosity as f32; rows.len()],
+            density: &density,
+            viscosity: &viscosity,
             slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
             periods: domain.periods(),
         };
@@ -225,12 +270,26 @@ fn net(rows: &CellRows, stencil: &Stencil, through: &FaceFields<f64>) -> Vec<f64
     inflow
 }
 
-/// Takes the gradient of `q` from open faces.
-fn subtract_gradient(solver: &PressureSolver, cells: &LiquidCells, q: &[f64], faces: &mut FaceFields<f32>) {
+/// The open share of each face ÷ its density.
+fn divided(open: &FaceFields<f32>, density: &FaceFields<f32>) -> FaceFields<f32> {
+    std::array::from_fn(|axis| open[axis].iter().zip(&density[axis]).map(|(open, density)| open / density).collect())
+}
+
+/// Takes the gradient of `q` ÷ the density from open faces.
+fn subtract_gradient(
+    solver: &PressureSolver,
+    cells: &LiquidCells,
+    density: Option<&FaceFields<f32>>,
+    q: &[f64],
+    faces: &mut FaceFields<f32>,
+) {
     let mut gradient: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; solver.rows().len()]);
     solver.for_each_gradient(q, |axis, at, value| gradient[axis][at] = value as f32);
     for axis in 0..3 {
-        let gradient = cells.rows.resampled(solver.rows(), &gradient[axis], 0.0);
+        let mut gradient = cells.rows.resampled(solver.rows(), &gradient[axis], 0.0);
+        if let Some(density) = density {
+            gradient.iter_mut().zip(&density[axis]).for_each(|(gradient, density)| *gradient /= density);
+        }
         let open = cells.open[axis].iter().map(|open| *open > 0.0);
         let taken = faces[axis].iter_mut().zip(&gradient).zip(open);
         taken.filter(|(_, is_open)| *is_open).for_each(|((u, gradient), _)| *u -= gradient);

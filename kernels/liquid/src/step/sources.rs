@@ -3,6 +3,7 @@
 use numerics::vector::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::carried::LiquidMaterial;
 use crate::rows::Cell;
 
 /// The shape of a source or a sink; it may move.
@@ -14,6 +15,9 @@ pub struct SourceShape<'a> {
     pub bounds: [Cell; 2],
 }
 
+/// Changes the attributes of a point on the surface, at a place in cells.
+pub type AttributeEdit<'a> = &'a (dyn Fn(Vec3, &mut [f32]) + Sync);
+
 /// Where liquid comes in. Times are since the start of the frame, s.
 #[derive(Clone, Copy)]
 pub struct LiquidSource<'a> {
@@ -24,6 +28,12 @@ pub struct LiquidSource<'a> {
     /// The velocity of the liquid inside the shape, m/s, whatever is around it: a nozzle. None: liquid comes in at rest and
     /// moves freely.
     pub velocity: Option<&'a (dyn Fn(f64) -> Vec3 + Sync)>,
+    /// What its liquid is made of. It counts where the liquid knows of materials ([`Liquid::set_materials`]).
+    ///
+    /// [`Liquid::set_materials`]: crate::step::Liquid::set_materials
+    pub material: &'a (dyn Fn(f64) -> LiquidMaterial + Sync),
+    /// Gives a point on the surface the attributes of its liquid.
+    pub attributes: Option<AttributeEdit<'a>>,
     /// Whether it keeps its shape full and imposes its velocity. What `rate` gives comes all the same.
     pub active: &'a (dyn Fn(f64) -> bool + Sync),
 }
@@ -43,7 +53,14 @@ pub struct LiquidSink<'a> {
 impl<'a> LiquidSource<'a> {
     /// A source that gives this volume between two times, m³, or keeps its shape full.
     pub fn new(shape: SourceShape<'a>, rate: Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>) -> Self {
-        Self { shape, rate, velocity: None, active: &|_| true }
+        Self {
+            shape,
+            rate,
+            velocity: None,
+            material: &|_| LiquidMaterial::default(),
+            attributes: None,
+            active: &|_| true,
+        }
     }
 }
 

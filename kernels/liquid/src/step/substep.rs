@@ -7,7 +7,7 @@ use crate::rows::{Cell, CellRows, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::motion::{Gain, LiquidCells, Motion};
-use crate::step::project::Projection;
+use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting, Wall};
@@ -18,7 +18,8 @@ use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
 pub struct Surroundings<'a> {
     /// Gravity at a time since the start of the frame, m/s².
     pub gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
-    /// Dynamic viscosity at a time since the start of the frame, Pa·s.
+    /// Dynamic viscosity at a time since the start of the frame, Pa·s, where no
+    /// [`LiquidMaterial`](crate::carried::LiquidMaterial) says otherwise.
     pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
@@ -55,6 +56,10 @@ pub trait Surface {
     /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of a place in them and φ there, both in cells;
     /// the result need be a distance only where it is next to 0.
     fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync);
+
+    /// Changes the attributes of points on it to what `edit` makes of their places, in cells, and of them. A surface may do
+    /// without.
+    fn edit_attributes(&mut self, _edit: impl Fn(Vec3, &mut [f32]) + Sync) {}
 }
 
 /// The ways of points in a substep.
@@ -104,7 +109,9 @@ pub(super) fn substep<S: Surface>(
     let reach = way.min(FARTHEST);
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     let periods = settings.domain.periods();
-    surface.advance(&Moving { velocity: &velocity, step, periods }, reach);
+    let flow = Moving { velocity: &velocity, step, periods };
+    motion.carry(&flow, surface.view(), settings);
+    surface.advance(&flow, reach);
     if let Some(solid) = solid {
         surface.meet(|point| solid.distance(point));
     }
@@ -131,9 +138,11 @@ pub(super) fn substep<S: Surface>(
 
     let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
     let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
-    let projection = Projection { settings, cells: &cells, solid, imposed: &imposed, speed, pull, seconds };
-    let viscosity = (around.viscosity)(middle) * seconds / (settings.density * settings.cell * settings.cell);
-    let mut report = projection.apply(viscosity, &before, &mut exchanged.pours, &mut faces, motion);
+    let own = [(around.viscosity)(middle), settings.density];
+    let materials = motion.materials_of(&cells, surface.view(), &settings.domain, own.map(|own| own as f32));
+    let materials = Materials::new(own, materials, settings, seconds);
+    let projection = Projection { settings, cells: &cells, materials, solid, imposed: &imposed, speed, pull, seconds };
+    let mut report = projection.apply(&before, &mut exchanged.pours, &mut faces, motion);
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);

@@ -21,7 +21,7 @@ mod setup;
 mod tests;
 
 use crate::fields::{add_scaled, dot, largest};
-use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace};
+use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace, face_densities};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
 use crate::velocity::FaceFields;
@@ -108,19 +108,9 @@ impl StokesSolver {
     /// # Panics
     /// Where a field does not have one value a cell.
     pub fn new(grid: &StokesGrid<'_>) -> Self {
+        let density = face_densities(grid.rows, grid.level_set, grid.density);
         let weights: FaceFields<f32> = std::array::from_fn(|axis| {
-            grid.rows.tabulate(|cell| {
-                let mut below = cell;
-                below[axis] -= 1;
-                let density =
-                    |cell| grid.rows.find(cell).filter(|at| grid.level_set[*at] < 0.0).map(|at| grid.density[at]);
-                let density = match (density(below), density(cell)) {
-                    (Some(a), Some(b)) => 0.5 * (a + b),
-                    (Some(one), None) | (None, Some(one)) => one,
-                    (None, None) => 1.0,
-                };
-                grid.rows.find(cell).map_or(0.0, |at| grid.open[axis][at] / density)
-            })
+            grid.open[axis].iter().zip(&density[axis]).map(|(open, density)| open / density).collect()
         });
         let [x, y, z] = &weights;
         let (rows, level_set, periods) = (grid.rows, grid.level_set, grid.periods);

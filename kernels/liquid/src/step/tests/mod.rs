@@ -2,6 +2,7 @@
 
 mod dam;
 mod force;
+mod materials;
 mod periodic;
 mod plain;
 mod pushed;

@@ -1,0 +1,345 @@
+//! What each part of a liquid is made of, where it is not the same everywhere.
+//!
+//! About eight points a cell have a viscosity and a density, and move with the liquid: nothing is mixed, so that a jump
+//! stays as sharp as a cell however long the liquid flows. A cell has the harmonic mean of the viscosities of its points,
+//! as layers that slide on each other do, and the mean of their densities. Where points have moved apart, new ones take the
+//! material of the closest; where they crowd, some go.
+//!
+//! Limit: a layer thinner than half a cell is one with what is around it.
+
+use numerics::random::Key;
+use numerics::vector::{Vec3, add, dot, sub};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::level_set::{PhiSampler, PhiView, displacement, floor};
+use crate::markers::bins::{Bins, NOWHERE};
+use crate::pressure::LEAST_DEPTH;
+use crate::rows::{Cell, CellRows};
+use crate::step::{Domain, Moving};
+use crate::velocity::{Sampler, Site};
+
+use super::{CHUNK, is_outside, kept_in};
+
+/// Points that a full cell gets: one in each octant.
+const PER_CELL: usize = 8;
+/// A liquid cell with fewer gets new ones in its empty octants.
+const LEAST: usize = 4;
+/// A cell with as many is thinned to [`PER_CELL`].
+const CROWD: usize = 16;
+/// Distance from the liquid, in cells, from which on a point is dropped.
+const LOST: f32 = 1.0;
+/// Cells around a cell's own in which a new point looks for the closest, one after the other.
+const RINGS: [i32; 4] = [1, 2, 4, 8];
+/// Places farther from 0 count as if they were there, cells.
+const FARTHEST: f32 = 2_097_152.0;
+/// Half the diagonal of a cell.
+const HALF_DIAGONAL: f32 = 0.87;
+/// Seed of the places of points.
+const SEED: u64 = 0x6d61_7474_6572;
+/// What stands for a property that is the liquid's own.
+const OWN: f32 = -1.0;
+
+/// What a part of a liquid is made of. `None` is what the liquid has where nothing else is said, which may change with time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LiquidMaterial {
+    /// Dynamic viscosity, Pa·s.
+    pub viscosity: Option<f32>,
+    /// Mass of a volume, kg/m³.
+    pub density: Option<f32>,
+}
+
+impl LiquidMaterial {
+    fn stored(self) -> [f32; 2] {
+        [self.viscosity, self.density].map(|value| value.unwrap_or(OWN))
+    }
+
+    fn of([viscosity, density]: [f32; 2]) -> Self {
+        let own = |value: f32| if value >= 0.0 { Some(value) } else { None };
+        Self { viscosity: own(viscosity), density: own(density) }
+    }
+}
+
+/// The points that say what a liquid is made of. Those of a cell follow each other.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MaterialPoints {
+    points: Vec<Vec3>,
+    /// Viscosity and density of each; negative where it is the liquid's own.
+    values: Vec<[f32; 2]>,
+    /// How often new points were looked for.
+    rounds: u64,
+}
+
+/// Liquid that a source filled: φ before and after on the cells of a box.
+pub(crate) struct Filled<'a> {
+    pub rows: &'a CellRows,
+    pub before: &'a [f32],
+    pub after: &'a [f32],
+}
+
+/// What comes out of liquid, all through some cells.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Stir {
+    cells: Vec<Cell>,
+    /// m³/s.
+    rate: f64,
+    value: [f32; 2],
+}
+
+impl Stir {
+    /// `rate`, m³/s, of a material.
+    pub(crate) fn new(cells: Vec<Cell>, rate: f64, material: LiquidMaterial) -> Self {
+        Self { cells, rate, value: material.stored() }
+    }
+}
+
+/// Viscosity and density of the cells of a liquid that is not the same everywhere.
+#[derive(Clone, Debug)]
+pub(crate) struct CellMaterials {
+    /// Pa·s.
+    pub viscosity: Vec<f32>,
+    /// kg/m³.
+    pub density: Vec<f32>,
+}
+
+impl MaterialPoints {
+    /// Fills a liquid with points of the material at each place, in cells.
+    pub fn filling(view: &PhiView<'_>, material: impl Fn(Vec3) -> LiquidMaterial + Sync) -> Self {
+        let within = |cell: Cell| (0..3).all(|axis| view.low[axis] <= cell[axis] && cell[axis] < view.high[axis]);
+        let cells = view.rows.filtered(|cell, at| within(cell) && view.phi[at] < HALF_DIAGONAL);
+        let points = places(&cells, 0, || {
+            let mut sampler = PhiSampler::new(*view);
+            move |_: Cell, places: [Vec3; PER_CELL]| places.map(|place| sampler.at(place) < 0.0)
+        });
+        let values = points.par_iter().map(|point| material(*point).stored()).collect();
+        Self { points, values, rounds: 1 }
+    }
+
+    /// Where they are, in cells.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The material of each.
+    pub fn materials(&self) -> impl Iterator<Item = LiquidMaterial> {
+        self.values.iter().map(|values| LiquidMaterial::of(*values))
+    }
+
+    /// The materials of the points closest to places, in cells.
+    pub fn closest_to(&self, places: &[Vec3]) -> Vec<LiquidMaterial> {
+        let cells: Vec<Cell> = self.points.iter().map(|point| point.map(floor)).collect();
+        let rows = CellRows::from_cells(&cells);
+        let slots: Vec<u32> = cells.par_iter().map(|cell| rows.find(*cell).map_or(NOWHERE, |at| at as u32)).collect();
+        let near = Near { rows: &rows, bins: &Bins::of_cells(&slots, rows.len()), points: self };
+        places.par_iter().map(|place| LiquidMaterial::of(near.closest(*place))).collect()
+    }
+
+    pub(crate) fn advance(&mut self, flow: &Moving<'_>, domain: &Domain) {
+        self.points.par_chunks_mut(CHUNK).for_each(|points| {
+            let mut way = flow.reader();
+            for point in points {
+                *point = kept_in(add(*point, displacement(&mut way, *point)), domain);
+            }
+        });
+    }
+
+    /// Gives what a source filled its material.
+    pub(crate) fn fill(&mut self, filled: &Filled<'_>, domain: &Domain, material: LiquidMaterial) {
+        let Filled { rows, before, after } = *filled;
+        let Some((low, high)) = rows.bounds() else { return };
+        let value = material.stored();
+        let is_new = |sampler: &mut Sampler<'_>, place: Vec3| {
+            sampler.value(before, Site::Centre, place) >= 0.0 && sampler.value(after, Site::Centre, place) < 0.0
+        };
+        let is_near =
+            |place: Vec3| (0..3).all(|axis| low[axis] as f32 <= place[axis] && place[axis] <= high[axis] as f32);
+        self.points.par_chunks(CHUNK).zip(self.values.par_chunks_mut(CHUNK)).for_each(|(points, values)| {
+            let mut sampler = Sampler::new(rows);
+            for (point, own) in points.iter().zip(values).filter(|(point, _)| is_near(**point)) {
+                if is_new(&mut sampler, *point) {
+                    *own = value;
+                }
+            }
+        });
+        let near = |at: usize| before[at] > -HALF_DIAGONAL && after[at] < HALF_DIAGONAL;
+        let cells = rows.filtered(|cell, at| domain.contains(cell) && near(at));
+        let new = places(&cells, self.next_round(), || {
+            let mut sampler = Sampler::new(rows);
+            move |_: Cell, places: [Vec3; PER_CELL]| places.map(|place| is_new(&mut sampler, place))
+        });
+        self.values.resize(self.values.len() + new.len(), value);
+        self.points.extend(new);
+    }
+
+    /// Gives as many of the points as come out of some cells in `seconds` the material of what does; `cell`: the side of a
+    /// cell, m. Follow with [`Self::advance`].
+    pub(crate) fn stir(&mut self, stir: &Stir, seconds: f64, cell: f64) {
+        let rows = CellRows::from_cells(&stir.cells);
+        let gained = stir.rate * seconds / (cell * cell * cell * rows.len().max(1) as f64);
+        let share = gained / (1.0 + gained);
+        let key = Key::new(SEED).of(self.next_round());
+        for (n, (point, own)) in self.points.iter().zip(&mut self.values).enumerate() {
+            if rows.find(point.map(floor)).is_some() && key.of(n as u64).f64() < share {
+                *own = stir.value;
+            }
+        }
+    }
+
+    /// Drops points that are off the liquid, thins those that crowd, and fills holes. `level_set`: φ of the cells of `rows`,
+    /// which hold the liquid and what is next to it. Returns what the cells are made of, where `own` is the viscosity and
+    /// the density of what is not said otherwise.
+    pub(crate) fn settle(
+        &mut self,
+        rows: &CellRows,
+        level_set: &[f32],
+        view: PhiView<'_>,
+        domain: &Domain,
+        own: [f32; 2],
+    ) -> CellMaterials {
+        let slot = |sampler: &mut PhiSampler<'_>, point: &Vec3| {
+            let is_lost = is_outside(*point, domain).is_some() || sampler.at(*point) > LOST;
+            let at = if is_lost { None } else { rows.find(cell_of(*point, domain)) };
+            at.map_or(NOWHERE, |at| at as u32)
+        };
+        let slots: Vec<u32> = self.points.par_iter().map_init(|| PhiSampler::new(view), slot).collect();
+        let bins = Bins::of_cells(&slots, rows.len());
+        let (new, values) = self.in_holes(rows, level_set, view, domain, &bins);
+        let kept = bins.thinned(CROWD, PER_CELL);
+        self.points = kept.par_iter().map(|n| self.points[*n as usize]).chain(new).collect();
+        self.values = kept.par_iter().map(|n| self.values[*n as usize]).chain(values).collect();
+        self.in_cells(rows, domain, own)
+    }
+
+    /// New points of liquid cells that have too few, and their materials.
+    fn in_holes(
+        &mut self,
+        rows: &CellRows,
+        level_set: &[f32],
+        view: PhiView<'_>,
+        domain: &Domain,
+        bins: &Bins,
+    ) -> (Vec<Vec3>, Vec<[f32; 2]>) {
+        let holes = rows.filtered(|cell, at| {
+            level_set[at] < -LEAST_DEPTH && bins.of(at, at + 1).len() < LEAST && domain.contains(cell)
+        });
+        let round = self.next_round();
+        let points = &self.points;
+        let new = places(&holes, round, || {
+            let mut sampler = PhiSampler::new(view);
+            move |cell: Cell, places: [Vec3; PER_CELL]| {
+                let own = rows.find(cell).map_or(&[][..], |at| bins.of(at, at + 1));
+                let mut wanted = places.map(|place| sampler.at(place) < 0.0);
+                own.iter().for_each(|n| wanted[octant(cell, points[*n as usize])] = false);
+                // A cell that the surface hardly reaches has one all the same.
+                wanted[0] |= own.is_empty() && !wanted.contains(&true);
+                wanted
+            }
+        });
+        let near = Near { rows, bins, points: self };
+        let values = new.par_iter().map(|place| near.closest(*place)).collect();
+        (new, values)
+    }
+
+    /// The means over the points of each cell; `own` where there are none.
+    fn in_cells(&self, rows: &CellRows, domain: &Domain, own: [f32; 2]) -> CellMaterials {
+        let mut sums = vec![([0.0_f64; 2], 0_u32); rows.len()];
+        for (point, values) in self.points.iter().zip(&self.values) {
+            let Some(at) = rows.find(cell_of(*point, domain)) else { continue };
+            let [viscosity, density] = [0, 1].map(|n| f64::from(if values[n] >= 0.0 { values[n] } else { own[n] }));
+            let ([inverse, mass], count) = &mut sums[at];
+            *inverse += 1.0 / viscosity;
+            *mass += density;
+            *count += 1;
+        }
+        let mean = |pick: &dyn Fn([f64; 2], f64) -> f64, own: f32| {
+            let mean = |([inverse, mass], count): &([f64; 2], u32)| match count {
+                0 => own,
+                count => pick([*inverse, *mass], f64::from(*count)) as f32,
+            };
+            sums.iter().map(mean).collect()
+        };
+        CellMaterials {
+            viscosity: mean(&|[inverse, _], count| count / inverse, own[0]),
+            density: mean(&|[_, mass], count| mass / count, own[1]),
+        }
+    }
+
+    fn next_round(&mut self) -> u64 {
+        self.rounds += 1;
+        self.rounds
+    }
+}
+
+/// Points by the cells that they are in.
+struct Near<'a> {
+    rows: &'a CellRows,
+    bins: &'a Bins,
+    points: &'a MaterialPoints,
+}
+
+impl Near<'_> {
+    /// What the point closest to a place is made of; the liquid's own where there is none near.
+    fn closest(&self, place: Vec3) -> [f32; 2] {
+        let cell = place.map(|x| floor(x.clamp(-FARTHEST, FARTHEST)));
+        for ring in RINGS {
+            let mut best: Option<(f32, u32)> = None;
+            for n in self.bins.around(self.rows, cell, ring) {
+                let way = sub(self.points.points[*n as usize], place);
+                let square = dot(way, way);
+                if best.is_none_or(|(least, _)| square < least) {
+                    best = Some((square, *n));
+                }
+            }
+            if let Some((_, n)) = best {
+                return self.points.values[n as usize];
+            }
+        }
+        [OWN; 2]
+    }
+}
+
+/// The cell of the domain that a point is in; one on a wall is in that before it.
+fn cell_of(point: Vec3, domain: &Domain) -> Cell {
+    std::array::from_fn(|axis| floor(point[axis]).clamp(domain.low[axis], domain.high[axis] - 1))
+}
+
+/// Which octant of a cell a point is in.
+fn octant(cell: Cell, point: Vec3) -> usize {
+    let upper = |axis: usize| usize::from(point[axis] - cell[axis] as f32 >= 0.5);
+    upper(0) | upper(1) << 1 | upper(2) << 2
+}
+
+/// A place in each octant of the cells, where `start` makes what says which of them are wanted, in the order of the cells.
+fn places<W: FnMut(Cell, [Vec3; PER_CELL]) -> [bool; PER_CELL]>(
+    cells: &CellRows,
+    round: u64,
+    start: impl Fn() -> W + Sync,
+) -> Vec<Vec3> {
+    let key = Key::new(SEED).of(round);
+    let spans: Vec<_> = cells.spans().collect();
+    let of_spans = |spans: &[([i32; 2], crate::rows::RowSpan)]| {
+        let (mut wanted, mut out) = (start(), Vec::new());
+        for ([y, z], span) in spans {
+            for cell in (span.start..span.end).map(|x| [x, *y, *z]) {
+                let places = octants(key, cell);
+                let picked = wanted(cell, places).into_iter().zip(places).filter(|(wanted, _)| *wanted);
+                out.extend(picked.map(|(_, place)| place));
+            }
+        }
+        out
+    };
+    let parts: Vec<Vec<Vec3>> = spans.par_chunks(CHUNK).map(of_spans).collect();
+    parts.concat()
+}
+
+/// A random place in each octant of a cell.
+fn octants(key: Key, cell: Cell) -> [Vec3; PER_CELL] {
+    let key = cell.iter().fold(key, |key, x| key.of(u64::from(*x as u32)));
+    std::array::from_fn(|octant| {
+        let key = key.of(octant as u64);
+        std::array::from_fn(|axis| {
+            let upper = (octant >> axis & 1) as f32;
+            cell[axis] as f32 + 0.5 * (upper + key.of(axis as u64).f32())
+        })
+    })
+}
