@@ -272,7 +272,8 @@ impl Chain for Run {
             surface.meet(|point| colliders.distance(1.0, point));
         }
         let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
-        let centre = pool_of(&surface).centre;
+        let density = |place: [f32; 3]| start.material(place).density.map_or(cx.get(DENSITY), f64::from);
+        let centre = pool_of(&surface, density).centre;
         let side = lattice.cell as f32;
         let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
         let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
@@ -307,7 +308,7 @@ impl Chain for Run {
             colliders: Some(colliders),
             volume: OnceLock::new(),
         };
-        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface).cells as f64);
+        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
         Ok(run)
     }
 

@@ -35,17 +35,19 @@ pub(super) struct Pool {
     pub(super) cells: usize,
 }
 
-/// The cells of a surface whose middle is in the liquid.
-pub(super) fn pool_of(surface: &MarkedSurface) -> Pool {
+/// The cells of a surface whose middle is in the liquid, of this density at a place in cells.
+pub(super) fn pool_of(surface: &MarkedSurface, density: impl Fn([f32; 3]) -> f64) -> Pool {
     let view = surface.view();
-    let (mut sum, mut cells) = ([0.0; 3], 0_usize);
+    let (mut sum, mut mass, mut cells) = ([0.0; 3], 0.0, 0_usize);
     for (at, cell) in view.rows.iter().enumerate() {
         if view.phi[at] < 0.0 && (0..3).all(|k| view.low[k] <= cell[k] && cell[k] < view.high[k]) {
             cells += 1;
-            (0..3).for_each(|k| sum[k] += f64::from(cell[k]) + 0.5);
+            let own = density(cell.map(|x| x as f32 + 0.5));
+            mass += own;
+            (0..3).for_each(|k| sum[k] += own * (f64::from(cell[k]) + 0.5));
         }
     }
-    Pool { centre: sum.map(|x| (x / cells.max(1) as f64) as f32), cells }
+    Pool { centre: sum.map(|x| if cells > 0 { (x / mass) as f32 } else { 0.0 }), cells }
 }
 
 /// The volume that a closed mesh of quads encloses, m³.

@@ -16,6 +16,7 @@ use super::carried::{CarriedColumns, MeshAttributes};
 use super::domain::resolution;
 use super::openings::material_of;
 use super::{COLLIDERS, LIQUID};
+use crate::shared::attributes::{SOURCE_DENSITY, SOURCE_VISCOSITY};
 use crate::shared::volume::Lattice;
 
 /// Seed of the places of markers: they mark the same surface whatever it is.
@@ -29,6 +30,9 @@ const MOST_CELLS: f64 = 1e9;
 
 /// Bytes that a cell of liquid takes while it moves.
 const CELL_BYTES: f64 = 400.0;
+
+/// Bytes that the points in a cell take besides, where liquids are of several materials: eight, while they are sorted anew.
+const MATERIAL_BYTES: f64 = 8.0 * 2.0 * 20.0;
 
 /// The liquid at the start.
 pub(super) struct StartLiquid {
@@ -76,6 +80,10 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     let fine = lattice.refined(by);
     let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * by as i32));
     let settings = ShapeSettings::new(low, high);
+    let has_material = |mesh: &Component| mesh.get(SOURCE_VISCOSITY).is_some() || mesh.get(SOURCE_DENSITY).is_some();
+    let is_split = cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).any(has_material);
+    let fine_cells = f64::from(by.pow(2));
+    let bytes = CELL_BYTES / fine_cells + if is_split { MATERIAL_BYTES / (fine_cells * f64::from(by)) } else { 0.0 };
     let (mut shapes, mut parts) = (Vec::new(), Vec::new());
     for (wire, mesh) in cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).enumerate() {
         let what = format!("`liquid` {wire} (counted from 0)");
@@ -88,7 +96,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
                 format!("`liquid` {wire} (counted from 0) is about {least:.1e} cells, more than {MOST_CELLS:.0e}");
             return Err(Error::refused(fact).hint("use larger cells, or less liquid"));
         }
-        cx.reserve(least * CELL_BYTES / f64::from(by.pow(2)), "use larger cells, or less liquid")?;
+        cx.reserve(least * bytes, "use larger cells, or less liquid")?;
         shapes.push((MeshShape::new(&topology, &points, &settings), material));
         parts.push(mesh);
     }

@@ -105,6 +105,22 @@ fn heavy_liquid_sinks_and_light_liquid_rises() {
     assert_eq!(of_kind(&end, 3, PARTICLE_DENSITY), [2000.0, 500.0]);
 }
 
+/// Of two halves, one three times as dense, the centre of mass is at a quarter of the way.
+#[test]
+fn liquid_spins_about_its_centre_of_mass() {
+    let heavy = with(cuboid([0.25; 3], [0.5, 0.75, 0.75]), &[(SOURCE_DENSITY, 3000.0)]);
+    let out = solving(heavy)
+        .input(LIQUID, cuboid([0.5, 0.25, 0.25], [0.75; 3]))
+        .set(GRAVITY, [0.0; 3])
+        .set(INITIAL_SPIN, [0.0, 2.0, 0.0])
+        .cook();
+    let mesh = out.mesh();
+    for (p, v) in mesh.positions().iter().zip(mesh.get(V).unwrap()) {
+        let exact = [2.0 * (p[2] - 0.5), 0.0, -2.0 * (p[0] - 0.4375)];
+        assert!((0..3).all(|k| (v[k] - exact[k]).abs() < 0.05), "{p:?}: {v:?}, not {exact:?}");
+    }
+}
+
 #[test]
 fn what_is_no_material_is_refused() {
     let refused = |bench: Bench| bench.try_frames(&[Frame::whole(2)]).err().map(|error| error.error.fact.clone());
