@@ -2,7 +2,7 @@
 //!
 //! `cargo test` runs coarse forms of the laws that take long, and cooks scenes with a solver to their fifth frame only; here
 //! nothing is shortened. Fails where a law does not hold, or where a table or the bits differ from the stored ones.
-//! `-- --bless` stores them; words run some of the parts: `wind`, `softbody`, `graphs`.
+//! `-- --bless` stores them; words run some of the parts: `wind`, `softbody`, `liquid`, `graphs`.
 
 #![allow(clippy::unwrap_used, reason = "a value that is not there fails the check")]
 
@@ -19,6 +19,8 @@ mod accuracy_table;
 mod bits;
 #[path = "../tests/cooked/mod.rs"]
 mod cooked;
+#[path = "../tests/liquid/accuracy/mod.rs"]
+mod liquid_accuracy;
 #[allow(dead_code, reason = "the laws use part of it")]
 #[path = "../tests/softbody/measure.rs"]
 mod measure;
@@ -42,8 +44,8 @@ fn main() -> ExitCode {
     let bless = words.iter().any(|word| word == "--bless");
     let parts: Vec<&str> = words.iter().map(String::as_str).filter(|word| *word != "--bless").collect();
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
-    if let Some(other) = parts.iter().find(|part| !["wind", "softbody", "graphs"].contains(part)) {
-        eprintln!("no part is `{other}`; expected wind, softbody or graphs");
+    if let Some(other) = parts.iter().find(|part| !["wind", "softbody", "liquid", "graphs"].contains(part)) {
+        eprintln!("no part is `{other}`; expected wind, softbody, liquid or graphs");
         return ExitCode::from(2);
     }
     print_date();
@@ -54,6 +56,9 @@ fn main() -> ExitCode {
     }
     if asked("softbody") {
         held &= laws("docs/softbody.md", &softbody_accuracy::figures(Effort::Full), bless);
+    }
+    if asked("liquid") {
+        held &= laws("docs/liquid.md", &liquid_accuracy::figures(Effort::Full), bless);
     }
     if asked("graphs") {
         held &= stored("benches/graphs.txt", last_frames(), bless);

@@ -144,6 +144,9 @@ impl Projection<'_> {
             let still = || std::array::from_fn(|_| vec![0.0; rows.len()]);
             Imposed::close(self.imposed, &rows, &mut open, solid_velocity.get_or_insert_with(still));
         }
+        let images = domain.periods().images(&rows);
+        images.fill_each(&mut open);
+        solid_velocity.iter_mut().for_each(|velocity| images.fill_each(velocity));
         let [[open_x, open_y, open_z], [x, y, z]] = [&open, &distance];
         let [viscosity, density] = self.materials.on(cells, domain, &rows);
         let grid = StokesGrid {

@@ -168,11 +168,20 @@ impl Fields<'_> {
 
     /// The viscosity of the edge along `axis` at the low corner of a cell: the harmonic mean of the liquid around it, as
     /// shear stress is the same on both sides of a jump. 0 where one of the four faces at the edge is in air: the
-    /// surface has no shear stress. Beside a solid the velocity falls to the solid's over less than a cell.
+    /// surface has no shear stress. Air behind closed faces does not count. Beside a solid the velocity falls to the solid's over less than a cell.
     fn shear(&self, cell: Cell, axis: usize) -> f32 {
         let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
         let (mut inverse, mut liquid, mut air) = (0.0, 0.0, 0.0);
-        for corner in [cell, lower(cell, side), lower(cell, other), lower(lower(cell, side), other)] {
+        let is_open = |face: usize, cell: Cell| self.rows.find(cell).is_some_and(|at| self.open[face][at] > 0.0);
+        let across_side = [cell, lower(cell, other)].map(|cell| is_open(side, cell));
+        let across_other = [cell, lower(cell, side)].map(|cell| is_open(other, cell));
+        let corners = [
+            (cell, across_side[0] || across_other[0]),
+            (lower(cell, side), across_side[0] || across_other[1]),
+            (lower(cell, other), across_side[1] || across_other[0]),
+            (lower(lower(cell, side), other), across_side[1] || across_other[1]),
+        ];
+        for (corner, is_reached) in corners {
             let Some(at) = self.rows.find(corner) else { continue };
             if self.pressure.is_liquid(at) {
                 if self.viscosity[at] <= 0.0 {
@@ -180,7 +189,7 @@ impl Fields<'_> {
                 }
                 inverse += 1.0 / self.viscosity[at];
                 liquid += 1.0;
-            } else if self.pressure.is_air(at) {
+            } else if is_reached && self.pressure.is_air(at) {
                 air += 1.0;
             }
         }

@@ -3,7 +3,9 @@ use numerics::vector::length;
 
 /// A piston as high as the box moves into a pool; what is left outside it, and what the pool had, ÷ cell³.
 fn pushed(viscosity: f64) -> [f64; 2] {
-    let domain = Domain::closed([0; 3], [32, 24, 4]);
+    // Sides two cells from the middle would hold thick liquid.
+    let walls = [[Wall::Closed; 2], [Wall::Closed; 2], [Wall::FreeSlip; 2]];
+    let domain = Domain { walls, ..Domain::closed([0; 3], [32, 24, 4]) };
     let cell = 1.0 / 16.0;
     let mut liquid = Liquid::new(LiquidSettings::new(domain, cell), PlainLevelSet::new(domain, |p| p[1] - 9.3));
     // 0.4 m/s: 6.4 cells a second, from 3.6 cells on.

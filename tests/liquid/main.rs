@@ -1,0 +1,7 @@
+//! Liquids: how accurately they meet their laws. All checked figures are printed: `cargo test --test liquid -- --nocapture`.
+
+#![allow(clippy::unwrap_used, reason = "a test's helpers")]
+
+mod accuracy;
+#[path = "../accuracy_table/mod.rs"]
+mod accuracy_table;
