@@ -159,6 +159,8 @@ metrics! { METRICS:
         .warn_above(0.0, "At these frames the liquid is faster than `max_substeps` allows at this `cfl`, or a solve ended \
             before `tolerance`, so it loses detail. Raise `max_substeps`, or `cell`.");
     PRESSURE_ITERATIONS = Metric::new("pressure_iterations", Unit::None, "Iterations of the pressure solves.");
+    PRESSURE_RESIDUAL = Metric::new("pressure_residual", Unit::None,
+        "Largest net flow of a cell that a pressure solve left, relative to the speed.");
     COUPLED_ITERATIONS = Metric::new("coupled_iterations", Unit::None,
         "Iterations of the solves for pressure and viscosity together.");
     COUPLED_RESIDUAL = Metric::new("coupled_residual", Unit::None,
@@ -177,6 +179,8 @@ metrics! { METRICS:
             raise `resolution`; with `volume_correction` it comes back over the next frames.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
+    EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
+        "Points less edges plus faces of the surface: 2 for each closed surface, bubbles included, less 2 for each hole through it.");
     LIQUID_CELLS = Metric::new("liquid_cells", Unit::None, "Cells with liquid.");
     SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources gave since the start.");
     SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks took since the start.");
@@ -340,6 +344,7 @@ impl Chain for Run {
         cx.publish_all(&self.metrics);
         let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
         cx.publish(VOLUME_NOW, measured::volume_inside(&surface));
+        cx.publish(EULER_CHARACTERISTIC, measured::euler_characteristic(&surface));
         let mut out = Geometry::default();
         out.put_volume(volume.clone());
         let particles = particles(cx, self, lattice(cx), &volume)?;

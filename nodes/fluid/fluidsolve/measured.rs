@@ -7,7 +7,7 @@ use numerics::volume::six_volumes;
 
 use super::{
     CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
-    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, SUBSTEPS_USED,
+    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SUBSTEPS_USED,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -17,6 +17,7 @@ pub(super) fn measured(report: &LiquidReport) -> MetricValues {
     metrics.set(CFL_REACHED, report.cfl_reached);
     metrics.set(CAPS_HIT, report.caps_hit + report.solves_cut_short);
     metrics.set(PRESSURE_ITERATIONS, report.pressure_iterations);
+    metrics.set(PRESSURE_RESIDUAL, report.pressure_residual);
     metrics.set(COUPLED_ITERATIONS, report.coupled_iterations);
     metrics.set(COUPLED_RESIDUAL, report.coupled_residual);
     metrics.set(MAX_DIVERGENCE, report.max_divergence.max(report.unbalanced));
@@ -48,6 +49,11 @@ pub(super) fn pool_of(surface: &MarkedSurface, density: impl Fn([f32; 3]) -> f64
         }
     }
     Pool { centre: sum.map(|x| if cells > 0 { (x / mass) as f32 } else { 0.0 }), cells }
+}
+
+/// Points − edges + faces of a closed mesh of quads, in which two quads share each edge.
+pub(super) fn euler_characteristic(surface: &Component) -> f64 {
+    surface.point_count() as f64 - surface.element_count() as f64
 }
 
 /// The volume that a closed mesh of quads encloses, m³.

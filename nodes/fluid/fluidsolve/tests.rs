@@ -58,6 +58,8 @@ fn liquid_falls_freely_whatever_its_viscosity() {
     let block = ball([0.5, 0.7, 0.5], 0.22);
     for viscosity in [0.0, 1.0, 1e3, 1e8] {
         let out = solving(block.clone()).set(VISCOSITY, viscosity).set(GRAVITY, [0.0, -2.0, 0.0]).frames(1..=13);
+        assert!(out.iter().all(|frame| metric(frame, EULER_CHARACTERISTIC) == 2.0), "one closed surface");
+        assert!(out[1..].iter().all(|frame| metric(frame, PRESSURE_RESIDUAL) <= 1e-4));
         let way = height(&out[0]) - height(&out[12]);
         let steps: f64 = out[1..].iter().map(|frame| metric(frame, SUBSTEPS_USED)).sum();
         let time = 12.0 * H;

@@ -143,6 +143,8 @@ pub struct LiquidReport {
     pub caps_hit: u32,
     /// Iterations of all pressure solves.
     pub pressure_iterations: u32,
+    /// The largest net flow of a cell that a pressure solve left ÷ the speed.
+    pub pressure_residual: f64,
     /// Substeps in which viscosity was solved for.
     pub viscous_substeps: u32,
     /// Iterations of all solves for pressure and viscosity together.
@@ -175,6 +177,7 @@ impl LiquidReport {
         self.cfl_reached = self.cfl_reached.max(other.cfl_reached);
         self.caps_hit += other.caps_hit;
         self.pressure_iterations += other.pressure_iterations;
+        self.pressure_residual = self.pressure_residual.max(other.pressure_residual);
         self.viscous_substeps += other.viscous_substeps;
         self.coupled_iterations += other.coupled_iterations;
         self.coupled_residual = self.coupled_residual.max(other.coupled_residual);

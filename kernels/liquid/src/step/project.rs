@@ -112,8 +112,8 @@ impl Projection<'_> {
         let mut inflow = inflow(&solver, cells, faces);
         let poured = pour(pours, &solver, self.settings.cell, &mut inflow);
         let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
-        let stop =
-            Stop { flow: self.flow_tolerance(self.speed.max(self.pull)), iterations: self.settings.max_iterations };
+        let scale = self.speed.max(self.pull);
+        let stop = Stop { flow: self.flow_tolerance(scale), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
         let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q));
@@ -121,6 +121,7 @@ impl Projection<'_> {
         let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
         LiquidReport {
             pressure_iterations: solved.iterations,
+            pressure_residual: if scale > 0.0 { solved.flow / scale } else { 0.0 },
             solves_cut_short: u32::from(is_cut_short),
             solid_force: self.force(force.unwrap_or_default()),
             ..self.report(solved.flow, [solved.unbalanced, poured])
