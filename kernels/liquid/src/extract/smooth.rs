@@ -11,7 +11,7 @@ use crate::sets::Sets;
 /// edges stay as they are (Taubin 1995, pass band 0.1).
 const SHARES: [f32; 2] = [0.5, -0.53];
 /// Times that a surface is moved along its normals to enclose what it did.
-const MOVES: usize = 3;
+const MOVES: usize = 5;
 /// The farthest, in cells, that it is moved each time.
 const FARTHEST: f64 = 0.5;
 /// Vertices that one thread moves at a time.

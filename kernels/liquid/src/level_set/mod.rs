@@ -34,6 +34,9 @@ pub const BAND: f32 = 5.0;
 /// Depth in a solid, in cells, to which liquid that touches it goes on.
 pub const CONTACT: f32 = 2.5;
 
+/// Heights above a solid, in cells, at which φ says how it goes on inside.
+const ABOVE: [f32; 2] = [0.5, 1.5];
+
 /// Depth in a solid up to which φ is the liquid's own.
 const SKIN: f32 = 0.25;
 
@@ -157,8 +160,10 @@ impl LevelSet {
         }
     }
 
-    /// Makes the surface meet a solid at a right angle: φ inside it is that of the mirrored place outside, to a depth of
-    /// [`CONTACT`] cells, and there is no liquid beyond. `solid` is the distance from it, in cells, negative inside.
+    /// Makes the surface go on into a solid that it meets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
+    /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
+    /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that
+    /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there.
     pub fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
@@ -180,7 +185,11 @@ impl LevelSet {
             let value = if depth > CONTACT {
                 phi[n].max(depth - CONTACT)
             } else {
-                outward(at).map_or(phi[n], |normal| sampler.at(add(at, scale(normal, 2.0 * depth))))
+                outward(at).map_or(phi[n], |normal| {
+                    let [near, far] = ABOVE.map(|height| sampler.at(add(at, scale(normal, depth + height))));
+                    let slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(0.0, 1.0);
+                    near - slope * (ABOVE[0] + depth)
+                })
             };
             [value.clamp(-BAND, BAND)]
         });

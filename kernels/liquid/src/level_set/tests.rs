@@ -163,22 +163,48 @@ fn gradients_are_those_of_the_interpolated_field() {
     }
 }
 
-/// A pool that ends within a wall: inside it the surface goes on as outside, mirrored, and ends.
-#[test]
-fn a_surface_meets_a_solid_at_a_right_angle() {
-    // The surface slopes by 1 in 2; the wall is x < 6.
-    let slope = |p: Vec3| (p[1] - 8.0 - 0.5 * (p[0] - 6.0)) * 0.894_427_2;
+/// The value of φ at a cell of a set that has met a solid.
+fn met(phi: impl Fn(Vec3) -> f32 + Sync, solid: impl Fn(Vec3) -> f32 + Sync) -> impl Fn(Cell) -> f32 {
     let rows = CellRows::cuboid([0; 3], [20, 20, 6]);
-    let phi = rows.tabulate(|cell| slope(cell.map(|x| x as f32 + 0.5)).clamp(-BAND, BAND));
+    let phi = rows.tabulate(|cell| phi(cell.map(|x| x as f32 + 0.5)).clamp(-BAND, BAND));
     let mut set = LevelSet::new(&rows, &phi, [0; 3], [20, 20, 6]);
-    set.meet(|p| p[0] - 6.0);
-    let at = |cell: Cell| set.rows().find(cell).map_or(BAND, |at| set.phi()[at]);
+    set.meet(solid);
+    move |cell| set.rows().find(cell).map_or(BAND, |at| set.phi()[at])
+}
+
+/// A pool that ends within a wall, x < 6: its surface, which slopes by 1 in 2, goes on inside.
+#[test]
+fn a_surface_goes_on_into_a_solid_and_ends_there() {
+    let slope = |p: Vec3, by: f32| (p[1] - 8.0 - by * (p[0] - 6.0)) * 0.894_427_2;
+    // Towards the wall it rises: straight on.
+    let rising = met(|p| slope(p, -0.5), |p| p[0] - 6.0);
+    // Towards the wall it falls: at a right angle to it.
+    let falling = met(|p| slope(p, 0.5), |p| p[0] - 6.0);
     for y in 6..11 {
-        for depth in 0..2 {
-            let mirrored = at([6 + depth, y, 3]);
-            assert!((at([5 - depth, y, 3]) - mirrored).abs() < 1e-4, "{y}: {} {mirrored}", at([5 - depth, y, 3]));
+        for x in 4..6 {
+            let on = |by: f32, x: f32| slope([x, y as f32 + 0.5, 3.5], by);
+            // The normal of φ leaves the wall's: only its part along the wall's normal counts.
+            let (up, down) = (rising([x, y, 3]), falling([x, y, 3]));
+            assert!((up - on(-0.5, 6.5)).abs() < 1e-4 || up < on(-0.5, 6.5), "{x} {y}: {up}");
+            assert!((down - on(0.5, 6.5)).abs() < 1e-4, "{x} {y}: {down} {}", on(0.5, 6.5));
         }
-        assert!((0..3).all(|x| at([x, y, 3]) > 0.0), "there is none deep inside");
+        for at in [&rising as &dyn Fn(Cell) -> f32, &falling] {
+            assert!((0..3).all(|x| at([x, y, 3]) > 0.0), "there is none deep inside");
+        }
     }
-    assert!((at([9, 9, 3]) - slope([9.5, 9.5, 3.5])).abs() < 1e-4, "outside it stays");
+    assert!((falling([9, 9, 3]) - slope([9.5, 9.5, 3.5], 0.5)).abs() < 1e-4, "outside it stays");
+}
+
+/// A film of 0.3 cells on a wall: liquid from there to some depth, with one surface, where it is.
+#[test]
+fn a_film_thinner_than_a_cell_has_one_surface() {
+    for wall in [6.0, 6.2, 6.49, 6.7] {
+        let at = met(|p| p[0] - wall - 0.3, |p| p[0] - wall);
+        for x in 4..11 {
+            let (phi, expected) = (at([x, 9, 3]), x as f32 + 0.5 - wall - 0.3);
+            assert!((phi - expected).abs() < 1e-4, "{wall}, {x}: {phi} {expected}");
+        }
+    }
+    let dry = met(|p| 9.0 - p[0], |p| p[0] - 6.0);
+    assert!((0..8).all(|x| dry([x, 9, 3]) > 0.0), "liquid that is not there is not made");
 }
