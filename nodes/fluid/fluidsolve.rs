@@ -169,7 +169,7 @@ metrics! { METRICS:
         "The largest share of a cell's volume that a substep gained or lost.")
         .warn_above(1e-2, "Cells gain or lose more than a hundredth of their volume in a substep. Lower `tolerance`; see whether \
             colliders squeeze liquid that cannot get away.");
-    VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it.");
+    VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it outside colliders.");
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
         "Error of the volume, relative to what it should be, if it were never corrected.")
         .warn_outside(-0.03, 0.03, "Without correction the liquid would have gained or lost more than 3 % of its volume: it has \
@@ -343,7 +343,7 @@ impl Chain for Run {
         let volume = self.volume(cx)?;
         cx.publish_all(&self.metrics);
         let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
-        cx.publish(VOLUME_NOW, measured::volume_inside(&surface));
+        cx.publish(VOLUME_NOW, self.targets.volume());
         cx.publish(EULER_CHARACTERISTIC, measured::euler_characteristic(&surface));
         let mut out = Geometry::default();
         out.put_volume(volume.clone());

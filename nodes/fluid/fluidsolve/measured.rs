@@ -3,7 +3,6 @@
 use engine::prelude::*;
 use liquid::marked::MarkedSurface;
 use liquid::step::{LiquidReport, Surface};
-use numerics::volume::six_volumes;
 
 use super::{
     CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
@@ -54,15 +53,4 @@ pub(super) fn pool_of(surface: &MarkedSurface, density: impl Fn([f32; 3]) -> f64
 /// Points − edges + faces of a closed mesh of quads, in which two quads share each edge.
 pub(super) fn euler_characteristic(surface: &Component) -> f64 {
     surface.point_count() as f64 - surface.element_count() as f64
-}
-
-/// The volume that a closed mesh of quads encloses, m³.
-pub(super) fn volume_inside(surface: &Component) -> f64 {
-    let (Some(faces), Some(origin)) = (surface.faces(), surface.positions().first()) else { return 0.0 };
-    let corner = |at: u32| surface.positions()[at as usize];
-    let twice = faces.corners.as_chunks::<4>().0.iter().map(|quad| {
-        let [a, b, c, d] = quad.map(corner);
-        six_volumes([*origin, a, b, c]) + six_volumes([*origin, a, c, d])
-    });
-    twice.fold(0.0, |sum, x| sum + x) / 6.0
 }

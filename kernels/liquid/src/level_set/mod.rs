@@ -40,6 +40,16 @@ const ABOVE: [f32; 2] = [0.5, 1.5];
 /// Depth in a solid up to which φ is the liquid's own.
 const SKIN: f32 = 0.25;
 
+/// The unit vector out of a solid, whose distance `solid` is, at a place in cells.
+pub(crate) fn outward(solid: impl Fn(Vec3) -> f32, at: Vec3) -> Option<Vec3> {
+    let slope = |axis: usize| {
+        let (mut below, mut above) = (at, at);
+        (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
+        solid(above) - solid(below)
+    };
+    unit([slope(0), slope(1), slope(2)])
+}
+
 /// How far the liquid moves in one step.
 pub trait Flow: Sync {
     /// The way, in cells, from each point, a place in cells. Points of successive calls are near each other, which a
@@ -160,21 +170,13 @@ impl LevelSet {
         }
     }
 
-    /// Makes the surface go on into a solid that it meets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
+    /// Makes the surface go on into a solid that it wets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
     /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
     /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that
     /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there.
     pub fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
-        let outward = |at: Vec3| {
-            let slope = |axis: usize| {
-                let (mut below, mut above) = (at, at);
-                (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
-                solid(above) - solid(below)
-            };
-            unit([slope(0), slope(1), slope(2)])
-        };
         let start = || PhiSampler::new(before);
         let [phi] = rows.tabulate_with(start, |sampler, cell, n| {
             let at = cell.map(|x| x as f32 + 0.5);
@@ -185,10 +187,11 @@ impl LevelSet {
             let value = if depth > CONTACT {
                 phi[n].max(depth - CONTACT)
             } else {
-                outward(at).map_or(phi[n], |normal| {
+                outward(&solid, at).map_or(phi[n], |normal| {
                     let [near, far] = ABOVE.map(|height| sampler.at(add(at, scale(normal, depth + height))));
                     let slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(0.0, 1.0);
-                    near - slope * (ABOVE[0] + depth)
+                    let at_wall = near - slope * ABOVE[0];
+                    if at_wall < 0.0 { at_wall - slope * depth } else { near.max(f32::MIN_POSITIVE) }
                 })
             };
             [value.clamp(-BAND, BAND)]

@@ -6,12 +6,12 @@
 #[cfg(test)]
 mod tests;
 
-use numerics::vector::{Vec3, scale};
+use numerics::vector::{Vec3, add, scale};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract};
-use crate::level_set::{BAND, Flow, LevelSet, PhiView};
+use crate::level_set::{BAND, Flow, LevelSet, PhiSampler, PhiView, outward};
 use crate::markers::Markers;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Moving, Surface};
@@ -24,6 +24,13 @@ const IMAGES: i32 = 8;
 
 /// Depth in a solid, in surface cells, from which a marker is dropped: nearer, its plane is the surface outside, too.
 const INSIDE: f32 = 1.0;
+
+/// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
+/// diagonal of a cell.
+const FILM: f32 = 1.8;
+
+/// Points that one thread moves at a time.
+const CHUNK: usize = 512;
 
 /// A level set and its markers, moved together.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -97,21 +104,53 @@ impl MarkedSurface {
         self.resolution as u32
     }
 
-    /// The surface where it is not in a solid, as a mesh in surface cells.
+    /// The surface where it is not in a solid, as a mesh in surface cells: what [`MarkedSurface::phi_outside`] has in a solid
+    /// lies on it.
     pub fn mesh(&self, solid: Option<SolidDistance<'_>>) -> QuadMesh {
         let clipped = solid.map(|solid| self.phi_outside(solid));
-        extract(self.view_of(clipped.as_deref()), Placement::Projected)
+        let mut mesh = extract(self.view_of(clipped.as_deref()), Placement::Projected);
+        if let Some(solid) = solid {
+            self.put_outside(&mut mesh, solid);
+        }
+        mesh
     }
 
-    /// φ of surface cells, positive in a solid.
+    /// φ of surface cells, positive in a solid, but for films on it that are thinner than [`FILM`] cells: they reach into
+    /// the solid as far as they are too thin for cells to show, so that their surface has no holes.
     pub fn phi_outside(&self, solid: SolidDistance<'_>) -> Vec<f32> {
-        let (size, phi) = (self.resolution as f32, self.set.phi());
-        let outside = |cell: Cell| size * solid(cell.map(|x| (x as f32 + 0.5) / size));
-        let [clipped] = self.set.rows().tabulate_with(
-            || (),
-            |(), cell, at| [if phi[at] < BAND { phi[at].max(-outside(cell)).min(BAND) } else { BAND }],
-        );
+        let (size, view) = (self.resolution as f32, self.set.view());
+        let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
+        let start = || PhiSampler::new(view);
+        let [clipped] = view.rows.tabulate_with(start, |sampler, cell, n| {
+            let (at, phi) = (cell.map(|x| x as f32 + 0.5), view.phi[n]);
+            if phi >= BAND {
+                return [BAND];
+            }
+            let height = distance(at);
+            let thickness = height - phi;
+            let mut depth = 0.0;
+            if (0.0..FILM).contains(&thickness) && height.abs() < 2.0 * FILM {
+                // Over a film φ rises with the height; where a surface meets the solid it does not.
+                let rise = outward(distance, at).map_or(0.0, |normal| sampler.at(add(at, normal)) - phi);
+                depth = (2.0 * rise - 1.0).clamp(0.0, 1.0) * (FILM - thickness);
+            }
+            [phi.max(-height - depth).min(BAND)]
+        });
         clipped
+    }
+
+    /// Moves points of a mesh in surface cells that are in a solid onto it.
+    pub(crate) fn put_outside(&self, mesh: &mut QuadMesh, solid: SolidDistance<'_>) {
+        let size = self.resolution as f32;
+        let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
+        mesh.points.par_iter_mut().with_min_len(CHUNK).for_each(|point| {
+            let height = distance(*point);
+            if height < 0.0
+                && let Some(normal) = outward(distance, *point)
+            {
+                *point = add(*point, scale(normal, -height));
+            }
+        });
     }
 
     /// The surface cells with another φ, where there is one.

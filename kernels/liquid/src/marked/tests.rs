@@ -37,6 +37,41 @@ fn a_pool_at_rest_keeps_its_markers_and_its_volume() {
     }
 }
 
+/// A ball in a box of 32 cells, under water to its middle, and what is wet of it above has a film.
+#[test]
+fn a_film_on_a_ball_has_no_holes_and_its_volume() {
+    let ball = |p: Vec3| length(sub(p, [16.1, 13.9, 16.0])) - 8.03;
+    let domain = Domain::closed([0; 3], [32; 3]);
+    for thickness in [0.15_f32, 0.3, 0.6, 0.9, 1.3, 2.0] {
+        let mut surface = MarkedSurface::new(domain, 1, |p| ball(p) - thickness, 0, 1);
+        surface.meet(ball);
+        let mesh = surface.mesh(Some(&ball));
+        let shell = |r: f64| 4.0 / 3.0 * std::f64::consts::PI * r * r * r;
+        let film = shell(8.03 + f64::from(thickness)) - shell(8.03);
+        let off = (mesh.volume() - film) / (4.0 * std::f64::consts::PI * 8.0 * 8.0);
+        assert!(off.abs() < 0.05, "{thickness}: off by {off} cells");
+        // Two closed surfaces, neither with a hole.
+        assert_eq!(mesh.points.len() as i64 - mesh.quads.len() as i64, 4, "{thickness}");
+        for point in &mesh.points {
+            let height = ball(*point);
+            assert!(height.abs() < 0.1 || (height - thickness).abs() < 0.1, "{thickness}: {height}");
+        }
+    }
+}
+
+#[test]
+fn a_pool_around_a_ball_ends_at_it() {
+    let ball = |p: Vec3| length(sub(p, [16.1, 13.9, 16.0])) - 8.03;
+    let domain = Domain::closed([0; 3], [32; 3]);
+    let mut surface = MarkedSurface::new(domain, 1, |p| p[1] - 12.3, 0, 1);
+    surface.meet(ball);
+    let phi = surface.phi_outside(&ball);
+    let mesh = extract(surface.view_of(Some(&phi)), Placement::Projected);
+    for point in &mesh.points {
+        assert!(ball(*point) > -0.1, "{point:?}: {}", ball(*point));
+    }
+}
+
 fn dam(resolution: u32) -> Liquid<MarkedSurface> {
     let domain = Domain::closed([0; 3], [24, 16, 6]);
     let block = |p: Vec3| (p[0] - 9.0).max(p[1] - 12.0);

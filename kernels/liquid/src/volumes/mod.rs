@@ -121,6 +121,11 @@ impl VolumeTargets {
         &self.pieces
     }
 
+    /// What all pieces enclosed when they were last measured, m³.
+    pub fn volume(&self) -> f64 {
+        self.pieces.iter().fold(0.0, |sum, piece| sum + piece.measured)
+    }
+
     /// What was added and waits for a piece, m³.
     pub fn waiting(&self) -> f64 {
         self.changes.iter().fold(0.0, |sum, change| sum + change.volume)

@@ -54,10 +54,13 @@ impl Pieces {
         let (view, whole) = (surface.view_of(clipped.as_deref()), surface.view_of(None));
         let inside = view.rows.filtered(|_, at| view.phi[at] < 0.0).clipped(view.low, view.high);
         let is_free = |cell: Cell| contains(view, cell) && whole.rows.find(cell).is_none_or(|at| whole.phi[at] >= 0.0);
-        let (mesh, sides) = extract_with(view, Placement::Projected, |inner, outer| Side {
+        let (mut mesh, sides) = extract_with(view, Placement::Projected, |inner, outer| Side {
             span: inside.span_of(inner).map_or(0, |span| span.base),
             is_free: is_free(outer),
         });
+        if let Some(solid) = solid {
+            surface.put_outside(&mut mesh, solid);
+        }
         let (of_span, count) = numbered(&inside, surface.periods(), &mesh, &sides);
         let all = measured(&inside, &of_span, count, &mesh, &sides);
         Self { all, inside, of_span, clipped }
