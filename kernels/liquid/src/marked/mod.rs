@@ -6,7 +6,7 @@
 #[cfg(test)]
 mod tests;
 
-use numerics::vector::{Vec3, add, scale};
+use numerics::vector::{Vec3, add, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,14 @@ const INSIDE: f32 = 1.0;
 /// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
 /// diagonal of a cell.
 const FILM: f32 = 1.8;
+
+/// What φ rises in a cell above a solid: less than the first, as where a pool meets a shore, it is no film; from the second
+/// on it is.
+const WEDGE: f32 = 0.8;
+const FLAT: f32 = 0.95;
+
+/// Distance, in surface cells, that films on both sides of a thin solid keep from its middle.
+const APART: f32 = 0.4;
 
 /// Points that one thread moves at a time.
 const CHUNK: usize = 512;
@@ -129,10 +137,16 @@ impl MarkedSurface {
             let height = distance(at);
             let thickness = height - phi;
             let mut depth = 0.0;
-            if (0.0..FILM).contains(&thickness) && height.abs() < 2.0 * FILM {
+            if (0.0..FILM).contains(&thickness)
+                && height.abs() < 2.0 * FILM
+                && let Some(normal) = outward(distance, at)
+            {
                 // Over a film φ rises with the height; where a surface meets the solid it does not.
-                let rise = outward(distance, at).map_or(0.0, |normal| sampler.at(add(at, normal)) - phi);
-                depth = (2.0 * rise - 1.0).clamp(0.0, 1.0) * (FILM - thickness);
+                let rise = sampler.at(add(at, normal)) - phi;
+                let wanted = ((rise - WEDGE) / (FLAT - WEDGE)).clamp(0.0, 1.0) * (FILM - thickness);
+                // Half the thickness of the solid, where that is less than a film reaches.
+                let inside = -distance(sub(at, scale(normal, height + FILM)));
+                depth = wanted.min(0.5 * (FILM + inside) - APART).max(0.0);
             }
             [phi.max(-height - depth).min(BAND)]
         });
