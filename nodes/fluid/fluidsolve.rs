@@ -32,8 +32,9 @@ use carried::CarriedColumns;
 use domain::{Walls, checks, domain, lattice, settings};
 use measured::{measured, pool_of};
 use openings::{Opening, SAMPLES, SINK, SOURCE, Timed};
-use particles::{SprayDrop, materials_at, particles};
+use particles::{materials_at, particles};
 use shapes::{Colliders, in_cells, liquid_at_start};
+use spray::{Air, SprayDrop};
 
 mod carried;
 mod domain;
@@ -41,6 +42,7 @@ mod measured;
 mod openings;
 mod particles;
 mod shapes;
+mod spray;
 
 choice! {
     /// How liquid is represented.
@@ -402,8 +404,13 @@ impl Run {
         self.targets.add(-report.left_domain, None);
         let accounts = liquid.sources().iter().chain(liquid.sinks());
         self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
-        let pull = params(0.5 * seconds)[0];
-        self.spray.iter_mut().for_each(|drop| drop.fly(pull, seconds, lattice.cell));
+        let domain = domain(cx);
+        let air = Air { gravity: params(0.5 * seconds)[0], seconds, cell: lattice.cell, domain: &domain, colliders };
+        self.spray.retain_mut(|drop| {
+            let stays = drop.fly(&air);
+            self.left_domain += if stays { 0.0 } else { f64::from(drop.volume) };
+            stays
+        });
         (self.surface, self.motion) = liquid.into_parts();
         Ok(report)
     }

@@ -3,7 +3,6 @@
 use engine::prelude::*;
 use liquid::step::Motion;
 use numerics::vector::scale;
-use serde::{Deserialize, Serialize};
 
 use super::{DENSITY, Run, VISCOSITY};
 use crate::shared::attributes::{PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME};
@@ -14,31 +13,6 @@ use crate::shared::volume::Lattice;
 const MARKER: i32 = 0;
 const SPRAY: i32 = 1;
 const TRACER: i32 = 3;
-
-/// A drop too small for the grid. It flies on its own and does not come back into the liquid.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct SprayDrop {
-    /// Where it is, in solver cells.
-    pub(super) place: [f32; 3],
-    /// m/s.
-    pub(super) velocity: [f32; 3],
-    /// m³.
-    pub(super) volume: f32,
-    /// Viscosity, Pa·s, and density, kg/m³, where they are not the solver's.
-    pub(super) material: [Option<f32>; 2],
-}
-
-impl SprayDrop {
-    /// Flies on for some seconds under gravity, m/s², in cells of that side, m.
-    pub(super) fn fly(&mut self, gravity: [f64; 3], seconds: f64, cell: f64) {
-        for ((place, velocity), gravity) in self.place.iter_mut().zip(&mut self.velocity).zip(gravity) {
-            let before = f64::from(*velocity);
-            let after = before + gravity * seconds;
-            *velocity = after as f32;
-            *place += (0.5 * (before + after) * seconds / cell) as f32;
-        }
-    }
-}
 
 /// The points of a state, with the attributes that are wanted.
 ///

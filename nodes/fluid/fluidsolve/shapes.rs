@@ -192,6 +192,7 @@ impl Collider {
 }
 
 /// The colliders of a step.
+#[derive(Default)]
 pub(super) struct Colliders(Vec<Collider>);
 
 impl Colliders {
@@ -205,7 +206,8 @@ impl Colliders {
         Self::still(cx.part(COLLIDERS).into_iter(), domain, lattice)
     }
 
-    fn still<'a>(meshes: impl Iterator<Item = &'a Component>, domain: &Domain, lattice: Lattice) -> Self {
+    /// Colliders that stay where they are.
+    pub(super) fn still<'a>(meshes: impl Iterator<Item = &'a Component>, domain: &Domain, lattice: Lattice) -> Self {
         Self(meshes.map(|mesh| Collider::moving(None, [mesh; 2], &settings(domain), lattice)).collect())
     }
 

@@ -41,7 +41,7 @@ const ABOVE: [f32; 2] = [0.5, 1.5];
 const SKIN: f32 = 0.25;
 
 /// The unit vector out of a solid, whose distance `solid` is, at a place in cells.
-pub(crate) fn outward(solid: impl Fn(Vec3) -> f32, at: Vec3) -> Option<Vec3> {
+pub fn outward(solid: impl Fn(Vec3) -> f32, at: Vec3) -> Option<Vec3> {
     let slope = |axis: usize| {
         let (mut below, mut above) = (at, at);
         (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
