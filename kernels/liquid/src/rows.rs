@@ -255,6 +255,14 @@ impl CellRows {
         })
     }
 
+    /// The cells `by` times smaller that fill those of this one.
+    pub fn refined(&self, by: i32) -> Self {
+        Self::from_ranges(self.low.map(|x| by * x), self.size.map(|n| by * n), |y, z, out| {
+            let spans = self.row(y.div_euclid(by), z.div_euclid(by));
+            out.extend(spans.iter().map(|span| by * span.start..by * span.end));
+        })
+    }
+
     /// Calls `copy` with where each stretch of cells that both sets hold lies in a field on these rows, in one on
     /// `other`, and its length.
     pub fn for_each_shared(&self, other: &Self, mut copy: impl FnMut(usize, usize, usize)) {

@@ -17,13 +17,7 @@ struct Cube<'a> {
 /// cells.
 pub fn refined(view: PhiView<'_>, by: u32) -> (CellRows, Vec<f32>) {
     let n = by as i32;
-    let part = view.rows.clipped(view.low, view.high);
-    let Some((low, high)) = part.bounds() else { return (CellRows::default(), Vec::new()) };
-    let rows = CellRows::from_ranges([n * low[1], n * low[2]], [n * (high[1] - low[1]), n * (high[2] - low[2])], {
-        |y, z, out| {
-            out.extend(part.row(y.div_euclid(n), z.div_euclid(n)).iter().map(|span| n * span.start..n * span.end))
-        }
-    });
+    let rows = view.rows.clipped(view.low, view.high).refined(n);
     let start = || None::<Cube<'_>>;
     let [phi] = rows.tabulate_with(start, |last, cell, _| {
         let coarse = cell.map(|x| x.div_euclid(n));

@@ -69,7 +69,7 @@ impl MarkedSurface {
         let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * resolution));
         let near = CellRows::cuboid(domain.low, domain.high);
         let phi = |cell: Cell| size * distance(cell.map(|x| (x as f32 + 0.5) / size));
-        let cells = refined(&near, resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
+        let cells = near.refined(resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
         let mut set = LevelSet::new(&cells, &cells.tabulate(phi), low, high);
         set.fill();
         Self::of_level_set(set, resolution as u32, attributes, seed).within(&domain)
@@ -298,19 +298,6 @@ impl Flow for Scaled<'_> {
         let (mut way, size) = (self.flow.reader(), self.size);
         move |point| scale(way(scale(point, 1.0 / size)), size)
     }
-}
-
-/// The cells `by` times smaller that fill those of `rows`.
-fn refined(rows: &CellRows, by: i32) -> CellRows {
-    let Some((low, high)) = rows.bounds() else { return CellRows::default() };
-    CellRows::from_ranges(
-        [by * low[1], by * low[2]],
-        [by * (high[1] - low[1]), by * (high[2] - low[2])],
-        |y, z, out| {
-            let spans = rows.row(y.div_euclid(by), z.div_euclid(by));
-            out.extend(spans.iter().map(|span| by * span.start..by * span.end));
-        },
-    )
 }
 
 /// The cells `by` times larger that hold one of `rows`.

@@ -15,7 +15,7 @@ mod viscous;
 use super::*;
 use crate::level_set::PhiView;
 use crate::velocity::Site;
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, length};
 use plain::PlainLevelSet;
 
 const WEIGHTLESS: Surroundings<'_> = Surroundings::new(&|_| [0.0; 3], &|_| 0.0);
@@ -24,6 +24,59 @@ const FALLING: Surroundings<'_> = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_|
 /// The distance from a box.
 fn block(low: Vec3, high: Vec3) -> impl Fn(Vec3) -> f32 {
     move |p| (0..3).map(|axis| (low[axis] - p[axis]).max(p[axis] - high[axis])).fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// A cylinder that turns in one that stands, in a box of liquid.
+struct Cylinders {
+    /// Cells of the box along x and y.
+    n: i32,
+    /// The radii, in cells.
+    a: f32,
+    b: f32,
+}
+
+impl Cylinders {
+    fn new(n: i32) -> Self {
+        Self { n, a: 0.1575 * n as f32, b: 0.43 * n as f32 }
+    }
+
+    fn domain(&self) -> Domain {
+        let walls = [[Wall::Closed; 2], [Wall::Closed; 2], [Wall::FreeSlip; 2]];
+        Domain { walls, ..Domain::closed([0; 3], [self.n, self.n, 2]) }
+    }
+
+    fn radius(&self, p: Vec3) -> f32 {
+        let middle = 0.5 * self.n as f32;
+        length([p[0] - middle, p[1] - middle, 0.0])
+    }
+
+    fn distance(&self, p: Vec3) -> f32 {
+        (self.radius(p) - self.a).min(self.b - self.radius(p))
+    }
+
+    /// The inner one turns by 1 m/s at a distance of the box's side.
+    fn velocity(&self, p: Vec3) -> Vec3 {
+        let (middle, size) = (0.5 * self.n as f32, self.n as f32);
+        let rate = if self.radius(p) < 0.3 * size { 1.0 / size } else { 0.0 };
+        [rate * (middle - p[1]), rate * (p[0] - middle), 0.0]
+    }
+
+    /// The largest error of the velocity along y on the line through the middle, ÷ the speed of the inner cylinder, where it
+    /// should be `exact` of the radius.
+    fn worst(&self, motion: &Motion, exact: impl Fn(f32) -> f32) -> f32 {
+        let (mut worst, mut count) = (0.0_f32, 0);
+        for (at, cell) in motion.rows().iter().enumerate().filter(|(_, cell)| self.domain().contains(*cell)) {
+            let p = Site::FACES[1].of(cell);
+            let r = self.radius(p);
+            if cell[1] == self.n / 2 && p[0] > 0.5 * self.n as f32 && r > self.a + 1.0 && r < self.b - 1.0 {
+                let error = (motion.velocity().faces()[1][at] - exact(r)).abs();
+                worst = worst.max(error / (self.a / self.n as f32));
+                count += 1;
+            }
+        }
+        assert!(count > self.n / 5, "{count}");
+        worst
+    }
 }
 
 /// Mass, ÷ density · cell³, by cells cut straight.

@@ -1,5 +1,4 @@
 use super::*;
-use numerics::vector::length;
 
 /// A piston as high as the box moves into a pool; what is left outside it, and what the pool had, ÷ cell³.
 fn pushed(viscosity: f64) -> [f64; 2] {
@@ -43,16 +42,9 @@ fn a_piston_pushes_liquid_up_and_lets_none_through() {
 /// Between a cylinder that turns and one that stands, of radii a and b, u = ω·a²/(b² − a²)·(b²/r − r): the largest error in a
 /// box of n cells, ÷ ω·a.
 fn between_cylinders(n: i32) -> f32 {
-    let walls = [[Wall::Closed; 2], [Wall::Closed; 2], [Wall::FreeSlip; 2]];
-    let domain = Domain { walls, ..Domain::closed([0; 3], [n, n, 2]) };
-    let (middle, size) = (0.5 * n as f32, n as f32);
-    let (a, b) = (0.1575 * size, 0.43 * size);
-    let radius = |p: Vec3| length([p[0] - middle, p[1] - middle, 0.0]);
-    let distance = |_: f64, p: Vec3| (radius(p) - a).min(b - radius(p));
-    let turning = |_: f64, p: Vec3| {
-        let rate = if radius(p) < 0.3 * size { 1.0 / size } else { 0.0 };
-        [rate * (middle - p[1]), rate * (p[0] - middle), 0.0]
-    };
+    let cylinders = Cylinders::new(n);
+    let (domain, &Cylinders { a, b, .. }) = (cylinders.domain(), &cylinders);
+    let (distance, turning) = (|_: f64, p: Vec3| cylinders.distance(p), |_: f64, p: Vec3| cylinders.velocity(p));
     let solid = Solid { distance: &distance, velocity: &turning };
     let viscosity = |_| 1e5;
     let around = Surroundings { viscosity: &viscosity, solid: Some(solid), ..WEIGHTLESS };
@@ -61,20 +53,7 @@ fn between_cylinders(n: i32) -> f32 {
     liquid.step_frame(&around, 1.0 / 24.0);
     let report = liquid.step_frame(&around, 1.0 / 24.0);
     assert!(report.solves_cut_short == 0 && report.unbalanced < 1e-3, "{report:?}");
-    let motion = liquid.motion();
-    let (mut worst, mut count) = (0.0_f32, 0);
-    for (at, cell) in motion.rows().iter().enumerate().filter(|(_, cell)| domain.contains(*cell)) {
-        // The faces along y on the line through the middle.
-        let p = Site::FACES[1].of(cell);
-        let r = radius(p);
-        if cell[1] == n / 2 && p[0] > middle && r > a + 1.0 && r < b - 1.0 {
-            let exact = a * a / (b * b - a * a) * (b * b / r - r) / size;
-            worst = worst.max((motion.velocity().faces()[1][at] - exact).abs() / (a / size));
-            count += 1;
-        }
-    }
-    assert!(count > n / 5, "{count}");
-    worst
+    cylinders.worst(liquid.motion(), |r| a * a / (b * b - a * a) * (b * b / r - r) / n as f32)
 }
 
 /// Curved walls are of the first order.
