@@ -32,6 +32,7 @@ pub mod prelude {
     pub use crate::node::{
         AttrDecl, AttrNames, Chain, Cook, CurveLoop, Cx, Edited, Fill, FrameCx, Input, LeftOut, Many, Metric,
         MetricValues, Node, Opt, Output, Outputs, Past, Resumable, StepCx, Times, Wires, point_float_hint,
+        point_floats_hint,
     };
     pub use crate::param::{Clock, Code, Maskable, Param, Params, Seed, Span, Turn, Unit};
     pub use crate::time::Frame;

@@ -67,7 +67,7 @@ inputs! { INPUTS:
          two meshes overlap, that of the later one counts.").read_at(|_| Times::START);
     SOURCES: Input<Many> = Input::many("sources", Kind::Mesh,
         "Shapes from Fluid_Source that liquid comes from. A mesh without its attributes is kept full.")
-        .read_at(|_| Times::within_step(SAMPLES));
+        .read_at(|_| Times::START.and(Times::within_step(SAMPLES)));
     SINKS: Input<Many> = Input::many("sinks", Kind::Mesh,
         "Shapes from Fluid_Sink that liquid drains into. A mesh without its attributes takes all that enters.")
         .read_at(|_| Times::within_step(SAMPLES));
@@ -294,6 +294,9 @@ impl Chain for Run {
         }
         let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
         columns.add_tracers(&tracers);
+        for mesh in cx.part_at_start(SOURCES) {
+            columns.add_mesh(mesh, lattice, liquid.surface_mut());
+        }
         let places = tracers.iter().flat_map(|tracers| in_cells(tracers, lattice)).collect();
         liquid.set_tracers(places);
         let (mut surface, motion) = liquid.into_parts();

@@ -5,8 +5,10 @@ mod fluid_source;
 mod fluid_surface;
 mod fluidsolve;
 mod shared;
+mod surface_tag;
 
 use engine::node::Node;
 
 /// The family's nodes, by name.
-pub static NODES: &[&Node] = &[&fluid_sink::NODE, &fluidsolve::NODE, &fluid_source::NODE, &fluid_surface::NODE];
+pub static NODES: &[&Node] =
+    &[&fluid_sink::NODE, &fluidsolve::NODE, &fluid_source::NODE, &fluid_surface::NODE, &surface_tag::NODE];

@@ -1,5 +1,5 @@
-//! The foundation of all kernels: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, triangle trees
-//! and shapes. Plain slices in, plain slices out; it knows neither nodes nor geometry.
+//! The foundation of all kernels: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, trees of
+//! triangles and of points, and shapes. Plain slices in, plain slices out; it knows neither nodes nor geometry.
 //!
 //! Promise: the same bits on any x86-64 or aarch64 CPU and for any number of threads. Sums have a
 //! fixed order, products and sums are never fused, transcendental functions are our own.
@@ -14,6 +14,7 @@ pub mod affine;
 pub mod lanes;
 pub mod masked;
 pub mod noise;
+pub mod point_tree;
 pub mod ramp;
 pub mod random;
 pub mod shapes;

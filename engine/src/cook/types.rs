@@ -131,12 +131,13 @@ impl Engine {
 /// Results and errors by output.
 type FirstFrame = (Vec<(usize, Arc<Geometry>)>, Vec<(usize, Arc<crate::error::CookError>)>);
 
-/// Whether a node has a mask, code, or a text while its params may name attributes.
+/// Whether a node has a mask, code, or texts while its params may name attributes.
 fn names_attributes(node: &GraphNode) -> bool {
     let Body::Node { node: declared, params, .. } = &node.body else { return false };
     let names = |value: &Value| match value {
         Value::Masked(_, attribute) => attribute.is_some(),
         Value::Text(text) => declared.attributes.is_some() && !text.is_empty(),
+        Value::Texts(texts) => declared.attributes.is_some() && !texts.is_empty(),
         _ => false,
     };
     params.iter().any(|source| match source {

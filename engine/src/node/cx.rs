@@ -166,10 +166,21 @@ impl Cx<'_> {
 /// The hint for an error about `name`, which is no float attribute of the points of `part`: the name of one that is
 /// similar, or what is expected.
 pub fn point_float_hint(part: &Component, name: &str) -> String {
-    let floats = part.table(Owner::Point).iter().filter(|(_, column)| column.kind() == ColumnType::F1);
-    match nearest(name, floats.map(|(name, _)| &**name)) {
+    let expected = || format!("expected {}", part.kind().rows_text(Owner::Point, ColumnType::F1));
+    point_hint(part, name, |kind| kind == ColumnType::F1, expected)
+}
+
+/// As [`point_float_hint`], where the attribute may have one, three or four floats a point.
+pub fn point_floats_hint(part: &Component, name: &str) -> String {
+    let expected = || "expected an attribute of the points, of one, three or four floats each".to_owned();
+    point_hint(part, name, ColumnType::is_float, expected)
+}
+
+fn point_hint(part: &Component, name: &str, fits: fn(ColumnType) -> bool, expected: impl Fn() -> String) -> String {
+    let fitting = part.table(Owner::Point).iter().filter(|(_, column)| fits(column.kind()));
+    match nearest(name, fitting.map(|(name, _)| &**name)) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => format!("expected {}", part.kind().rows_text(Owner::Point, ColumnType::F1)),
+        None => expected(),
     }
 }
 

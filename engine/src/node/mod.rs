@@ -17,7 +17,7 @@ use crate::param::{Clock, ParamDecl, ParamSpec, Params};
 pub use chain::{Chain, Past, Resumable, Solver};
 pub(crate) use chain::{ChainFns, SavedFns, StateBox};
 pub use curves::{CurveLoop, CurveView, Cv, MovedCurves};
-pub use cx::{Cx, FrameCx, Outputs, StepCx, point_float_hint};
+pub use cx::{Cx, FrameCx, Outputs, StepCx, point_float_hint, point_floats_hint};
 pub(crate) use cx::{History, InputData};
 pub use edit::Edited;
 pub use metric::{Metric, MetricValues, Trouble, Warning};

@@ -8,7 +8,9 @@ use numerics::tree::TriangleTree;
 use serde::{Deserialize, Serialize};
 
 use super::shapes::in_cells;
-use crate::shared::attributes::{PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME};
+use crate::shared::attributes::{
+    PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME, absent, flat, rows_of,
+};
 use crate::shared::volume::Lattice;
 
 /// Names that `particles` has values of its own for.
@@ -42,11 +44,7 @@ struct CarriedColumn {
 impl CarriedColumn {
     /// What a point has that came without it.
     fn absent(&self) -> &'static [f32] {
-        match (self.name.as_str(), self.width) {
-            ("Cd", _) => &[1.0; 4][..self.width],
-            ("orient", 4) => &[0.0, 0.0, 0.0, 1.0],
-            _ => &[0.0; 4][..self.width],
-        }
+        absent(&self.name, self.width)
     }
 }
 
@@ -57,16 +55,6 @@ fn brought(part: &Component) -> impl Iterator<Item = (&str, &Column)> {
         .iter()
         .map(|(name, column)| (&**name, column))
         .filter(move |(name, column)| is_meant(name, column))
-}
-
-/// The floats of a column, one row after the other.
-fn flat(column: &Column) -> &[f32] {
-    match column {
-        Column::F1(rows) => rows,
-        Column::F3(rows) => rows.as_flattened(),
-        Column::F4(rows) => rows.as_flattened(),
-        Column::I1(_) | Column::I3(_) | Column::I4(_) => &[],
-    }
 }
 
 impl CarriedColumns {
@@ -159,12 +147,7 @@ impl CarriedColumns {
                 let at = *number as usize * width;
                 rows.extend(column.tracers.get(at..at + width).unwrap_or(absent));
             }
-            let rows = match width {
-                1 => Column::new(rows),
-                3 => Column::new(rows.as_chunks::<3>().0.to_vec()),
-                _ => Column::new(rows.as_chunks::<4>().0.to_vec()),
-            };
-            particles.set_column(Owner::Point, column.name.as_str(), rows)?;
+            particles.set_column(Owner::Point, column.name.as_str(), rows_of(width, rows))?;
         }
         Ok(())
     }

@@ -5,14 +5,12 @@ use liquid::step::Motion;
 use numerics::vector::scale;
 
 use super::{DENSITY, Run, VISCOSITY};
-use crate::shared::attributes::{PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME};
+use crate::shared::attributes::{
+    PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_MARKER, PARTICLE_SPRAY, PARTICLE_TRACER, PARTICLE_VISCOSITY,
+    PARTICLE_VOLUME,
+};
 use crate::shared::surface::velocity_at;
 use crate::shared::volume::Lattice;
-
-/// The kinds of points.
-const MARKER: i32 = 0;
-const SPRAY: i32 = 1;
-const TRACER: i32 = 3;
 
 /// The points of a state, with the attributes that are wanted.
 ///
@@ -53,11 +51,11 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
     if cx.wants(PARTICLE_KIND) {
         let kind = |n: usize| {
             if n < on_surface {
-                MARKER
+                PARTICLE_MARKER
             } else if n < first_tracer {
-                SPRAY
+                PARTICLE_SPRAY
             } else {
-                TRACER
+                PARTICLE_TRACER
             }
         };
         particles.set(PARTICLE_KIND, (0..count).map(kind).collect())?;

@@ -1,6 +1,8 @@
 //! Liquids of several materials, attributes and tracers.
 
 use super::*;
+use liquid::tag::{TagSource, TagValues};
+use numerics::vector::length;
 
 /// The output `particles` at a frame.
 fn particles_at(bench: &Bench, frame: i64) -> Component {
@@ -131,4 +133,52 @@ fn what_is_no_material_is_refused() {
     );
     let pool = solving(ball([0.5; 3], 0.2)).input(SOURCES, bad(SOURCE_DENSITY, 0.0));
     assert_eq!(refused(pool).unwrap(), "`sources` 0 (counted from 0) has a `source_density` of 0");
+}
+
+/// The attributes of the markers at the vertices of the surface.
+fn tagged(bench: &Bench, frame: i64) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    let (engine, frame) = (Engine::new(&Settings::default()).unwrap(), Frame::whole(frame));
+    let cooked = cook_all(&engine, &bench.graph(), &[frame]).0;
+    let [surface, particles] = [0, 1].map(|output| cooked[&(output, frame)].clone());
+    let (surface, particles) = (surface.mesh().unwrap(), particles.points().unwrap());
+    let source = TagSource::new(particles.positions(), particles.get(N));
+    let rows = particles.get(UVW).unwrap().as_flattened();
+    let values = [TagValues { rows, width: 3 }];
+    let tagged = source.tag(surface.positions(), surface.get(N), source.suitable_radius(), &values);
+    assert_eq!(tagged.far, 0);
+    (surface.positions().to_vec(), tagged.rows[0].as_chunks::<3>().0.to_vec())
+}
+
+/// Texture coordinates that are positions at the start: how far those of a ball are from where its surface was, 1 being
+/// its diameter, after it fell for 12 frames, after it turned by 90°, and at rest.
+#[test]
+fn texture_coordinates_follow_a_ball_that_falls_and_one_that_turns() {
+    let centre = [0.5, 0.7, 0.5];
+    let mut liquid = ball(centre, 0.22);
+    let start = liquid.positions().to_vec();
+    liquid.set(UVW, start).unwrap();
+    let still = solving(liquid.clone()).set(GRAVITY, [0.0; 3]).set(VISCOSITY, 1e6);
+    let off = |bench: &Bench, frame: i64, back: &dyn Fn([f32; 3]) -> [f32; 3]| {
+        let (points, uvw) = tagged(bench, frame);
+        let off = points.iter().zip(&uvw).map(|(p, uvw)| length(sub(*uvw, back(*p))) / 0.44);
+        off.fold(0.0, f32::max)
+    };
+    // A vertex of so small a ball lies R²/8r outside the markers around it, R being a cell: 6e-3 diameters.
+    assert!(off(&still, 1, &|p| p) < 1.2e-2, "{}", off(&still, 1, &|p| p));
+    assert!(off(&still, 13, &|p| p) < 1.2e-2, "{}", off(&still, 13, &|p| p));
+    let falling = still.clone().set(GRAVITY, [0.0, -2.0, 0.0]);
+    let out = falling.clone().frames([1, 13]);
+    let way = (height(&out[0]) - height(&out[1])) as f32;
+    let error = off(&falling, 13, &|p| add(p, [0.0, way, 0.0]));
+    assert!(way > 0.2 && error < 1.2e-2, "{way}: {error}");
+    let turning = still.set(INITIAL_SPIN, [0.0, 0.0, std::f64::consts::PI]);
+    // How far so few cells turn is the solver's error, not that of the coordinates: it is measured by their mean.
+    let (points, uvw) = tagged(&turning, 13);
+    let pairs = || points.iter().zip(&uvw).map(|(p, uvw)| (sub(*p, centre), sub(*uvw, centre)));
+    let mean = pairs().fold([0.0; 3], |sum, ([x, y, _], [a, b, _])| add(sum, [a * x + b * y, a * y - b * x, 0.0]));
+    let [cosine, sine, _] = scale(mean, 1.0 / length(mean));
+    assert!(sine > 0.98, "turned by 80° to 100°: {sine}");
+    let back = |[x, y, z]: [f32; 3]| [cosine * x + sine * y, cosine * y - sine * x, z];
+    let error = pairs().map(|(p, uvw)| length(sub(uvw, back(p))) / 0.44).fold(0.0, f32::max);
+    assert!(error < 2e-2, "{error}");
 }
