@@ -44,6 +44,7 @@ impl<'a> Call<'a> {
     pub(crate) fn run<T>(self, work: impl FnOnce(&FrameCx<'a>) -> Result<T>) -> Result<(T, Finished<'a>)> {
         let cx = self.context()?;
         let result = guarded(|| work(&cx))?;
+        check_integrals(&cx)?;
         Ok((result, Finished { cx: cx.cx }))
     }
 
@@ -52,6 +53,7 @@ impl<'a> Call<'a> {
         let previous = self.frame.plus(-1);
         let cx = StepCx { cx: self.context()?, previous };
         guarded(|| work(&cx))?;
+        check_integrals(&cx)?;
         Ok(Finished { cx: cx.cx.cx })
     }
 
@@ -83,6 +85,11 @@ impl<'a> Call<'a> {
 
 pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(panicked(&*panic)))
+}
+
+/// A cancelled cook's integrals end early, so that what was made of them is worth nothing.
+fn check_integrals(cx: &FrameCx<'_>) -> Result<()> {
+    if cx.history.is_some() { cx.check_cancelled() } else { Ok(()) }
 }
 
 /// A call that is over, for checking what it returned.

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use engine::cook::{Delivered, DiskCache};
 use engine::geometry::Kind;
@@ -335,60 +335,6 @@ fn a_cook_with_a_cache_finishes_few_frames_at_a_time() {
     let with = most_at_once(Some(&mut DiskCache::open(folder.path(), u64::MAX)));
     let without = most_at_once(None);
     assert!(with <= 6 && without > 6, "{with} with a cache, {without} without");
-}
-
-/// Cancels the cooks that are given it.
-static CANCEL: AtomicBool = AtomicBool::new(false);
-
-/// A point at x = frame; cancels the cook on the way.
-static CANCELLING: Node = Node::new(
-    "Cancelling",
-    1,
-    "A point, and the end of the cook.",
-    Cook::Frame {
-        cook: |cx| {
-            CANCEL.store(true, Ordering::Relaxed);
-            Ok(OUT.with(crate::builder::row(&[cx.frame().number() as f32])))
-        },
-        reads_clock: |_| true,
-    },
-)
-.outputs(&[&OUT]);
-
-/// Gives up where the cook is cancelled.
-static PATIENT: Node = Node::new(
-    "Patient",
-    1,
-    "A point, unless the cook is cancelled.",
-    Cook::Frame {
-        cook: |cx| {
-            CANCEL.store(true, Ordering::Relaxed);
-            cx.check_cancelled()?;
-            Ok(OUT.with(crate::builder::row(&[0.0])))
-        },
-        reads_clock: |_| true,
-    },
-)
-.outputs(&[&OUT]);
-
-#[test]
-fn a_result_that_is_finished_after_a_cancellation_is_kept() {
-    for (node, kept) in [(&CANCELLING, 1), (&PATIENT, 0)] {
-        let mut graph = TestGraph::new(1, 40);
-        graph.add("stopped", node).out();
-        let folder = tempfile::tempdir().expect("a folder");
-        let cook = || {
-            CANCEL.store(false, Ordering::Relaxed);
-            let mut disk = DiskCache::open(folder.path(), u64::MAX).keeping_all();
-            let mut sink = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
-            let request = Request::everything(&graph.0);
-            let cooked = engine(2, 1 << 30).cook(&graph.0, &request, Some(&mut disk), &CANCEL, &mut sink);
-            let report = cooked.unwrap_or_else(|stop| panic!("{stop:?}"));
-            assert!(report.cancelled && report.errors.is_empty(), "{:?}", report.errors);
-            report.nodes[0].from_cache
-        };
-        assert_eq!([cook(), cook()], [0, kept], "{}", node.name);
-    }
 }
 
 /// A window over another, both relative to a point at the scene's start.

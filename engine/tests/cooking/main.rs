@@ -1,6 +1,7 @@
 //! Tests of planning and cooking, with small nodes whose results can be computed by hand.
 
 mod builder;
+mod cancelled;
 mod checkpoints;
 mod depth;
 mod faults;

@@ -64,9 +64,7 @@ impl Sweep<'_, '_, '_> {
     /// Keeps the results just cooked at `frames`, which took `wall` together, if they are worth it; after a cancellation
     /// those of calls that had ended, or ended all the same.
     pub(super) fn save_results(&mut self, node: usize, frames: &BTreeSet<Frame>, wall: Duration) {
-        // Integrals end early when the cook is cancelled.
-        let is_spoiled = self.cancelled() && self.nodes[node].integrals.is_some();
-        if self.disk.is_none() || frames.is_empty() || is_spoiled {
+        if self.disk.is_none() || frames.is_empty() {
             return;
         }
         let cost = wall / frames.len() as u32 + self.upstream_recreated_in(node);
