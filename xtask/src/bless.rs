@@ -42,7 +42,7 @@ impl Expectation {
             Self::Messages => &["engine/src/graph/tests/faults.txt"],
             Self::Nodes => &["tests/new_nodes"],
             Self::Readme => &["README.md"],
-            Self::Laws => &["docs/wind.md", "docs/softbody.md", "benches/graphs.txt"],
+            Self::Laws => &["docs/wind.md", "docs/softbody.md", "docs/liquid.md", "benches/graphs.txt"],
             Self::Instructions => &["benches/instructions.txt"],
         }
     }

@@ -1,11 +1,8 @@
-//! The laws of a moving liquid on larger grids, and what a frame costs:
+//! The laws of a moving liquid on larger grids:
 //! `cargo run --release -p liquid --features studies --example dam_break`.
-//! `-- 2` runs on two threads.
 
 #[path = "../src/step/tests/plain.rs"]
 mod plain;
-
-use std::time::Instant;
 
 use liquid::step::{Domain, Liquid, LiquidSettings, Solid, Splitting, Surface, Surroundings};
 use liquid::velocity::Scheme;
@@ -117,59 +114,12 @@ fn rests() {
     }
 }
 
-/// Milliseconds of a frame, the mean of frames 2 to 25, and what the frames took.
-#[allow(clippy::disallowed_methods, reason = "a measurement")]
-fn cost(name: &str, n: i32, viscosity: f64, distance: impl Fn([f32; 3]) -> f32 + Sync) -> f64 {
-    let domain = Domain::closed([0; 3], [n; 3]);
-    let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / f64::from(n)), PlainLevelSet::new(domain, distance));
-    let (mut time, mut substeps, mut iterations, mut divergence, mut stored) = (0.0, 0, 0, 0.0_f64, 0);
-    let viscosity = move |_| viscosity;
-    let around = Surroundings { viscosity: &viscosity, ..FALLING };
-    for frame in 1..=25 {
-        let start = Instant::now();
-        let report = liquid.step_frame(&around, 1.0 / 24.0);
-        if frame > 1 {
-            time += start.elapsed().as_secs_f64() * 1e3 / 24.0;
-            substeps += report.substeps;
-            iterations += report.pressure_iterations + report.coupled_iterations;
-            divergence = divergence.max(report.max_divergence);
-            stored = stored.max(report.stored_cells);
-        }
-    }
-    let mean = f64::from(substeps) / 24.0;
-    let each = f64::from(iterations) / f64::from(substeps);
-    println!(
-        "{name} {n}³: {time:.1} ms a frame, {mean:.1} substeps, {each:.1} iterations each, divergence · Δt {divergence:.1e}, {stored} cells stored"
-    );
-    time
-}
-
-fn costs() {
-    for n in [32, 64] {
-        let s = n as f32;
-        let block = block([-99.0; 3], [0.4 * s, 0.6 * s, 0.4 * s]);
-        cost("block of 0.4 x 0.6 x 0.4,", n, 0.0, &block);
-        for viscosity in [1.0, 100.0, 1e4] {
-            cost(&format!("the same of {viscosity} Pa·s,"), n, viscosity, &block);
-        }
-        let film = cost("pool of 5 %,", n, 0.0, |p| p[1] - 0.05 * s);
-        let full = cost("pool of 95 %,", n, 0.0, |p| p[1] - 0.95 * s);
-        println!("5 % costs {:.0} % of 95 %", 100.0 * film / full);
-    }
-}
-
-/// `-- THREADS [cost]`: with `cost`, costs alone.
 fn main() {
-    let threads = std::env::args().nth(1).and_then(|word| word.parse().ok()).unwrap_or(1);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
     pool.install(|| {
-        if std::env::args().nth(2).is_none() {
-            println!("Dam break: front ÷ that of Martin and Moyce at T {:?}", MEASURED.map(|(time, _)| time));
-            [10, 20, 40].into_iter().for_each(dam);
-            turns();
-            rests();
-        }
-        println!("Cost on {threads} threads");
-        costs();
+        println!("Dam break: front ÷ that of Martin and Moyce at T {:?}", MEASURED.map(|(time, _)| time));
+        [10, 20, 40].into_iter().for_each(dam);
+        turns();
+        rests();
     });
 }

@@ -28,6 +28,9 @@ const FAR: f32 = 5.0;
 /// Most cells of liquid at the start; they are counted in 32 bits.
 const MOST_CELLS: f64 = 1e9;
 
+/// Cells that a mesh must have, about, for it to matter that the grid shows nothing of it.
+const LEAST_SHOWN: f64 = 1e-6;
+
 /// Bytes that a cell of liquid takes while it moves.
 const CELL_BYTES: f64 = 400.0;
 
@@ -97,7 +100,12 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
             return Err(Error::refused(fact).hint("use larger cells, or less liquid"));
         }
         cx.reserve(least * bytes, "use larger cells, or less liquid")?;
-        shapes.push((MeshShape::new(&topology, &points, &settings), material));
+        let shape = MeshShape::new(&topology, &points, &settings);
+        if least > LEAST_SHOWN && is_unseen(&shape, [low, high], &points) {
+            let fact = format!("{what} is thinner than the surface's cells everywhere, so no cell holds any of it");
+            return Err(Error::refused(fact).hint("use smaller cells, raise `resolution`, or leave it out"));
+        }
+        shapes.push((shape, material));
         parts.push(mesh);
     }
     let mut rows = CellRows::default();
@@ -124,6 +132,15 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
         }
     });
     Ok(StartLiquid { surface, columns, by, meshes: shapes })
+}
+
+/// Whether a mesh that reaches into the box has no cell with its middle inside.
+fn is_unseen(shape: &MeshShape, [low, high]: [[i32; 3]; 2], points: &[[f32; 3]]) -> bool {
+    let reaches_in = (0..3).all(|k| {
+        let along = |beyond: fn(f32, f32) -> f32, start| points.iter().fold(start, |most, p| beyond(most, p[k]));
+        along(f32::min, f32::INFINITY) < high[k] as f32 && along(f32::max, f32::NEG_INFINITY) > low[k] as f32
+    });
+    reaches_in && shape.distance().iter().all(|distance| *distance >= 0.0)
 }
 
 /// Number of cells inside a mesh, about: its volume, but no more than its box has in `bounds`.

@@ -35,6 +35,10 @@ pub(super) struct Projection<'a> {
     pub seconds: f64,
 }
 
+/// The largest viscosity · Δt ÷ (density · cell²) that is solved for. Such liquid is rigid to one part in 10¹⁰; beyond,
+/// rounding of its strain would be force.
+const STIFFEST: f64 = 1e10;
+
 /// What the liquid of a substep is made of.
 pub(super) struct Materials {
     /// Viscosity · Δt ÷ (density · cell²) where it is the same everywhere.
@@ -47,12 +51,14 @@ impl Materials {
     /// `own`: viscosity and density where it is the same everywhere.
     pub(super) fn new(own: [f64; 2], cells: Option<CellMaterials>, settings: &LiquidSettings, seconds: f64) -> Self {
         let per_viscosity = seconds / (own[1] * settings.cell * settings.cell);
-        let scaled = |mut values: Vec<f32>, by: f64| {
-            values.iter_mut().for_each(|value| *value = (f64::from(*value) * by) as f32);
+        let scaled = |mut values: Vec<f32>, by: f64, most: f64| {
+            values.iter_mut().for_each(|value| *value = (f64::from(*value) * by).min(most) as f32);
             values
         };
-        let of_cells = cells.map(|cells| [scaled(cells.viscosity, per_viscosity), scaled(cells.density, 1.0 / own[1])]);
-        Self { viscosity: own[0] * per_viscosity, of_cells }
+        let of_cells = cells.map(|cells| {
+            [scaled(cells.viscosity, per_viscosity, STIFFEST), scaled(cells.density, 1.0 / own[1], f64::INFINITY)]
+        });
+        Self { viscosity: (own[0] * per_viscosity).min(STIFFEST), of_cells }
     }
 
     /// The largest viscosity · Δt ÷ (density · cell²).

@@ -207,14 +207,22 @@ impl VolumeTargets {
         let now = marked(surface, &found);
         let (unit, size) = (self.unit(surface), surface.resolution() as f32);
         let mut passages = passages(surface.markers().pieces(), &now);
+        self.keep_unmarked(surface, &found, &mut passages);
         let unknown = self.newcomers(surface, &found, &mut passages);
         let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.volume).collect();
         let volumes: Vec<f64> = found.all.iter().map(|piece| unit * piece.volume).collect();
         let mut shares = passed_on(&targets, &passages, &volumes);
-        unknown.into_iter().for_each(|piece| shares[piece] = volumes[piece]);
+        unknown.iter().for_each(|piece| shares[*piece] = volumes[*piece]);
+        let unknown_volume = unknown.iter().fold(0.0, |sum, piece| sum + volumes[*piece]);
         let mut is_lost = vec![true; self.pieces.len()];
         passages.iter().for_each(|passage| is_lost[passage.old] = false);
         let mut lost = self.lost(surface, &is_lost);
+        // Liquid that was too fast to be followed: it is not there twice.
+        let mut elsewhere = unknown_volume;
+        for piece in &mut lost {
+            let found_again = piece.volume.min(elsewhere);
+            (piece.volume, elsewhere) = (piece.volume - found_again, elsewhere - found_again);
+        }
         self.apply(&found, &mut shares, &mut lost, size);
         let on_lost = |old: &u32| is_lost.get(*old as usize).is_some_and(|is_lost| *is_lost);
         let drop: Vec<bool> = surface.markers().pieces().iter().map(on_lost).collect();
@@ -226,6 +234,23 @@ impl VolumeTargets {
         self.set(surface, &found, shares);
         lost.retain(|piece| piece.volume > 0.0);
         (found, lost)
+    }
+
+    /// Adds passages for old pieces that no marker was on because they fill all that holds them and have no surface to mark:
+    /// to such a piece where they were, at most as far off as they are large.
+    fn keep_unmarked(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) {
+        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
+        let mut is_marked = vec![false; self.pieces.len()];
+        for old in surface.markers().pieces().iter().filter(|old| **old != NO_PIECE) {
+            is_marked[*old as usize] = true;
+        }
+        for (old, piece) in self.pieces.iter().enumerate().filter(|(old, _)| !is_marked[*old]) {
+            let near = |(_, away): &(usize, f32)| f64::from(*away) <= libm::cbrt(piece.measured / unit);
+            match found.closest(scale(piece.place, size)).filter(near) {
+                Some((new, _)) if found.all[new].area <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
+                _ => {}
+            }
+        }
     }
 
     /// Adds passages for pieces that no marker was on: from the piece that most markers around were on. Returns those that

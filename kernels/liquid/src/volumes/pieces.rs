@@ -81,7 +81,7 @@ impl Pieces {
         let first = marker.point.map(|x| floor(x - 0.5));
         let (mut deepest, mut found) = (f32::INFINITY, NO_PIECE);
         for corner in 0..8 {
-            let cell = [0, 1, 2].map(|axis| first[axis] + (corner >> axis & 1));
+            let cell = [0, 1, 2].map(|axis| first[axis].saturating_add(corner >> axis & 1));
             let Some(piece) = self.of_cell(cell) else { continue };
             let ahead = dot(sub(cell.map(|x| x as f32 + 0.5), marker.point), marker.normal);
             if ahead < deepest {

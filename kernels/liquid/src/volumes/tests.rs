@@ -147,6 +147,18 @@ fn a_piece_that_vanishes_is_lost_with_its_volume() {
 }
 
 #[test]
+fn what_fills_a_box_is_not_lost() {
+    let (mut surface, mut targets) = start([12; 3], |_| -5.0);
+    assert_near(sum(&targets), 1728.0, 1e-6);
+    for _ in 0..3 {
+        step(&mut surface, &flow([12; 3], |_| [0.0; 3]), 0.0);
+        let report = targets.correct(&mut surface, None);
+        assert!(report.lost.is_empty() && report.drift.abs() < 1e-6, "{report:?}");
+    }
+    assert_near(sum(&targets), 1728.0, 1e-6);
+}
+
+#[test]
 fn what_is_added_goes_where_it_is_or_everywhere() {
     let two = |p: Vec3| ball([8.0, 10.0, 10.0], 5.0)(p).min(ball([22.0, 10.0, 10.0], 6.0)(p));
     let (mut surface, mut targets) = start([32, 20, 20], two);
