@@ -118,6 +118,9 @@ fn describe(node: &NodeReport, frames: usize, text: &mut String) {
             None => writeln!(text, "cooked {n} times"),
         },
     };
+    for line in &node.explained {
+        let _ = writeln!(text, "{:<16} {line}", "");
+    }
     for stage in &node.left_out {
         let _ = writeln!(text, "{:<16} left out {}: {}", "", stage.stage, stage.why);
     }
@@ -145,7 +148,7 @@ fn to_json(node: &NodeReport, inputs: &Value) -> Value {
     };
     json!({
         "id": node.id.as_deref(), "type": node.type_name, "inputs": inputs, "time": node.time, "needed": node.needed,
-        "varies": node.varies, "cooks": node.cooks, "left_out": left_out,
+        "varies": node.varies, "cooks": node.cooks, "left_out": left_out, "explained": node.explained,
         "window": node.window.map(|window| json!({"frames": window.frames, "every": window.every})),
     })
 }

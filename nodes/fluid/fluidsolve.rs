@@ -8,39 +8,25 @@
 //!   slowed and sagging has its rate at any time step.
 //! * Gravity and viscosity are read at the middle of each substep.
 
-use std::sync::{Arc, OnceLock};
-
 use engine::prelude::*;
-use liquid::carried::LiquidMaterial;
-use liquid::level_set::{BAND, PhiView};
-use liquid::marked::MarkedSurface;
-use liquid::step::{
-    Coupling, Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
-};
-use liquid::velocity::Sampler;
-use liquid::volumes::VolumeTargets;
-use numerics::vector::{add, cross, scale, sub};
-use serde::{Deserialize, Serialize};
+use liquid::step::Coupling;
 
 use crate::shared::attributes::{
     PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_VISCOSITY, PARTICLE_VOLUME, SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE,
     SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
-use crate::shared::surface::{SurfaceDetail, surface};
-use crate::shared::volume::volume;
-use carried::CarriedColumns;
-use domain::{Walls, checks, domain, lattice, settings};
-use measured::{measured, pool_of};
-use openings::{Opening, SAMPLES, SINK, SOURCE, Timed};
-use particles::{materials_at, particles};
-use shapes::{Colliders, in_cells, liquid_at_start};
-use spray::{Air, SprayDrop};
+use domain::{Walls, checks};
+use explained::{explained, leaves_out};
+use openings::SAMPLES;
+use run::Run;
 
 mod carried;
 mod domain;
+mod explained;
 mod measured;
 mod openings;
 mod particles;
+mod run;
 mod shapes;
 mod spray;
 
@@ -57,7 +43,7 @@ choice! {
     Stokes for Coupling {
         Coupling::Auto => "auto": "where viscosity changes what the grid shows",
         Coupling::On => "on": "wherever there is viscosity",
-        Coupling::Off => "off": "never: viscosity is left out",
+        Coupling::Off => "off": "never: pressure, then viscosity, then pressure again; for comparison, as liquid sags 1.4 to 2 times too fast",
     }
 }
 
@@ -112,7 +98,8 @@ params! { PARAMS:
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 0.1);
     SLIP: Param<f32> = Param::float("slip", 0.0,
         "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction.").within(0.0, 1.0);
-    STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together.");
+    STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together. One after the other, thick liquid falls and turns as it should, but \
+         sags, buckles and coils at the wrong rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
         "Cells that the fastest liquid moves in a substep, at most. Smaller values are more accurate and take longer.")
         .above(0.0).soft(0.5, 5.0);
@@ -158,14 +145,19 @@ metrics! { METRICS:
     CFL_REACHED = Metric::new("cfl_reached", Unit::None, "The most cells that liquid moved in a substep.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
         "Substeps that were longer than `cfl` allows because of `max_substeps`, and solves that ended before `tolerance`.")
-        .warn_above(0.0, "At these frames the liquid is faster than `max_substeps` allows at this `cfl`, or a solve ended \
-            before `tolerance`, so it loses detail. Raise `max_substeps`, or `cell`.");
+        .warn_above(0.0, "Either liquid moves {cfl_reached} cells in a substep, more than `cfl`: raise `max_substeps`, or `cell`. \
+            Or a solve ended before `tolerance`: velocities are off by {coupled_residual} of the speed, net flows of cells by \
+            {pressure_residual}. Raise `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");
     PRESSURE_ITERATIONS = Metric::new("pressure_iterations", Unit::None, "Iterations of the pressure solves.");
     PRESSURE_RESIDUAL = Metric::new("pressure_residual", Unit::None,
         "Largest net flow of a cell that a pressure solve left, relative to the speed.");
     COUPLED_ITERATIONS = Metric::new("coupled_iterations", Unit::None,
         "Iterations of the solves for pressure and viscosity together.");
     COUPLED_RESIDUAL = Metric::new("coupled_residual", Unit::None,
+        "Largest error of a velocity that such a solve left, as it estimates, relative to the speed.");
+    VISCOSITY_ITERATIONS = Metric::new("viscosity_iterations", Unit::None,
+        "Iterations of the solves for viscosity alone, where `stokes` is off.");
+    VISCOSITY_RESIDUAL = Metric::new("viscosity_residual", Unit::None,
         "Largest error of a velocity that such a solve left, as it estimates, relative to the speed.");
     MAX_DIVERGENCE = Metric::new("max_divergence", Unit::None,
         "The largest share of a cell's volume that a substep gained or lost.")
@@ -194,6 +186,10 @@ metrics! { METRICS:
         "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
         .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for: the liquid has nowhere to go, \
             or there is none to take. Open a wall, make room, or move the source or sink.");
+    FAST_SHAPES = Metric::new("fast_shapes", Unit::None,
+        "Colliders, sources and sinks that move more than 64 cells in the frame.")
+        .warn_above(0.0, "These colliders, sources or sinks move more than 64 cells in a frame, so that where they are in between \
+            is inaccurate, and thin ones may let liquid through. Slow them down, or raise `cell`.");
     LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
 }
 
@@ -232,267 +228,13 @@ pub(crate) static NODE: Node = Node::new(
 .changes_topology()
 .metrics(METRICS)
 .leaves_out(leaves_out)
+.explains(explained)
 .checks(checks)
 .integrates(|params| params.get(GRAVITY))
 .integrates(|params| [params.get(VISCOSITY), params.get(TIME_SCALE), 0.0]);
 
 fn has_walls(params: &Params) -> bool {
     !params.get(FOLLOW)
-}
-
-/// The state of the simulation.
-#[derive(Serialize, Deserialize)]
-struct Run {
-    surface: MarkedSurface,
-    motion: Motion,
-    /// Since the start, m³: what sources gave, what sinks took, what left through open walls.
-    sourced: f64,
-    sunk: f64,
-    left_domain: f64,
-    /// In the last frame, m³.
-    withheld: f64,
-    targets: VolumeTargets,
-    spray: Vec<SprayDrop>,
-    /// The attributes that came with liquid, sources and tracers.
-    columns: CarriedColumns,
-    /// The ids of the tracers at the start.
-    tracer_ids: Vec<i32>,
-    /// Metrics of the last step; empty at the start.
-    metrics: MetricValues,
-    #[serde(skip)]
-    colliders: Option<Colliders>,
-    /// The output at the state's frame.
-    #[serde(skip)]
-    volume: OnceLock<Arc<Volume>>,
-}
-
-impl Chain for Run {
-    fn start(cx: &FrameCx) -> Result<Self> {
-        checks(cx.params())?;
-        let lattice = lattice(cx);
-        let domain = domain(cx);
-        let start = liquid_at_start(cx, &domain, lattice)?;
-        let mut surface = start.surface.clone();
-        let colliders = Colliders::at_start(cx, &domain, lattice);
-        if !colliders.is_empty() {
-            surface.meet(|point| colliders.distance(1.0, point));
-        }
-        let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
-        let density = |place: [f32; 3]| start.material(place).density.map_or(cx.get(DENSITY), f64::from);
-        let centre = pool_of(&surface, density).centre;
-        let side = lattice.cell as f32;
-        let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
-        let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
-        let around = Surroundings {
-            solid: (!colliders.is_empty()).then(|| Solid::still(&distance)),
-            ..Surroundings::new(&|_| [0.0; 3], &|_| 0.0)
-        };
-        let mut liquid = Liquid::new(settings(cx), surface);
-        liquid.set_velocity(at, &around);
-        if start.has_materials() {
-            liquid.set_materials(|place| start.material(place));
-        }
-        let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
-        columns.add_tracers(&tracers);
-        for mesh in cx.part_at_start(SOURCES) {
-            columns.add_mesh(mesh, lattice, liquid.surface_mut());
-        }
-        let places = tracers.iter().flat_map(|tracers| in_cells(tracers, lattice)).collect();
-        liquid.set_tracers(places);
-        let (mut surface, motion) = liquid.into_parts();
-        let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
-        let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
-        let mut run = Self {
-            surface,
-            motion,
-            sourced: 0.0,
-            sunk: 0.0,
-            left_domain: 0.0,
-            withheld: 0.0,
-            targets,
-            spray: Vec::new(),
-            columns,
-            tracer_ids: tracer_ids(&tracers),
-            metrics: MetricValues::default(),
-            colliders: Some(colliders),
-            volume: OnceLock::new(),
-        };
-        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
-        Ok(run)
-    }
-
-    fn step(&mut self, cx: &StepCx) -> Result<()> {
-        let (lattice, settings) = (lattice(cx), settings(cx));
-        let colliders = Colliders::within_step(cx, self.colliders.take(), &settings.domain, lattice)?;
-        let passed = |frame: Frame| cx.integrals::<2>(frame)[1][1];
-        let seconds = passed(cx.frame()) - passed(cx.previous());
-        self.volume = OnceLock::new();
-        let report = match seconds > 0.0 {
-            true => self.advance(cx, settings, &colliders, seconds)?,
-            false => LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() },
-        };
-        self.sourced += report.sourced;
-        self.sunk += report.sunk;
-        self.left_domain += report.left_domain;
-        self.metrics = measured(&report);
-        self.correct(cx, &report, &colliders);
-        self.metrics.set(SOURCED, self.sourced);
-        self.metrics.set(SUNK, self.sunk);
-        self.metrics.set(WITHHELD, if report.substeps > 0 { self.withheld } else { 0.0 });
-        self.metrics.set(LEFT_DOMAIN, self.left_domain);
-        self.colliders = Some(colliders);
-        Ok(())
-    }
-
-    fn output(&self, cx: &FrameCx) -> Result<Outputs> {
-        let volume = self.volume(cx)?;
-        cx.publish_all(&self.metrics);
-        let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
-        cx.publish(VOLUME_NOW, self.targets.volume());
-        cx.publish(EULER_CHARACTERISTIC, measured::euler_characteristic(&surface));
-        let mut out = Geometry::default();
-        out.put_volume(volume.clone());
-        let particles = particles(cx, self, lattice(cx), &volume)?;
-        cx.publish(PARTICLES_NOW, particles.point_count() as f64);
-        Ok(SURFACE.with(Geometry::from(surface)).and(PARTICLES, Geometry::from(particles)).and(VOLUME, out))
-    }
-}
-
-impl Run {
-    /// Moves on by a step of that many simulated seconds.
-    fn advance(
-        &mut self,
-        cx: &StepCx,
-        settings: LiquidSettings,
-        colliders: &Colliders,
-        seconds: f64,
-    ) -> Result<LiquidReport> {
-        let lattice = lattice(cx);
-        let openings = |input, says| Opening::all(cx, input, says, &settings.domain, lattice);
-        let (mut sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
-        for source in &mut sources {
-            let (mesh, attributes) = source.attributes();
-            *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
-        }
-        let has_material = sources.iter().any(Opening::has_material);
-        let share = |time: f64| (time / seconds).clamp(0.0, 1.0);
-        let (first, frames) = (cx.previous().number(), cx.frame().number() - cx.previous().number());
-        let params = |time: f64| cx.integrands::<2>(first + frames * share(time));
-        let distance = |time: f64, point: [f32; 3]| colliders.distance(share(time) as f32, point);
-        let speed = (lattice.cell / seconds) as f32;
-        let velocity = |time: f64, point: [f32; 3]| colliders.velocity(share(time) as f32, point).map(|u| u * speed);
-        let [sources, sinks] = [&sources, &sinks].map(|openings| Timed::all(openings, seconds));
-        let sources: Vec<LiquidSource> = sources.iter().map(Timed::source).collect();
-        let sinks: Vec<LiquidSink> = sinks.iter().map(Timed::sink).collect();
-        let around = Surroundings {
-            gravity: &|time| params(time)[0],
-            viscosity: &|time| params(time)[1][0],
-            solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
-            sources: &sources,
-            sinks: &sinks,
-            cancelled: &|| cx.check_cancelled().is_err(),
-        };
-        let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
-        if has_material && liquid.motion().materials().is_none() {
-            liquid.set_materials(|_| LiquidMaterial::default());
-        }
-        let report = liquid.step_frame(&around, seconds);
-        cx.check_cancelled()?;
-        for account in liquid.sources() {
-            self.targets.add(account.moved, Some(account.place));
-        }
-        for account in liquid.sinks() {
-            self.targets.add(-account.moved, Some(account.place));
-        }
-        self.targets.add(-report.left_domain, None);
-        let accounts = liquid.sources().iter().chain(liquid.sinks());
-        self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
-        let domain = domain(cx);
-        let air = Air { gravity: params(0.5 * seconds)[0], seconds, cell: lattice.cell, domain: &domain, colliders };
-        self.spray.retain_mut(|drop| {
-            let stays = drop.fly(&air);
-            self.left_domain += if stays { 0.0 } else { f64::from(drop.volume) };
-            stays
-        });
-        (self.surface, self.motion) = liquid.into_parts();
-        Ok(report)
-    }
-
-    /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost.
-    fn correct(&mut self, cx: &StepCx, report: &LiquidReport, colliders: &Colliders) {
-        if report.substeps == 0 {
-            return;
-        }
-        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
-        let corrected = match cx.get(VOLUME_CORRECTION) {
-            true => self.targets.correct(&mut self.surface, colliders.solid(&solid)),
-            false => self.targets.measure(&mut self.surface, colliders.solid(&solid)),
-        };
-        let mut sampler = Sampler::new(self.motion.rows());
-        let places: Vec<[f32; 3]> = corrected.lost.iter().map(|piece| piece.place).collect();
-        for (piece, material) in corrected.lost.iter().zip(materials_at(&self.motion, &places)) {
-            let velocity = self.motion.velocity().at(&mut sampler, piece.place);
-            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32, material });
-        }
-        self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
-        self.metrics.set(VOLUME_DRIFT, corrected.drift);
-        self.metrics.set(SPRAY, self.spray.iter().fold(0.0, |sum, drop| sum + f64::from(drop.volume)));
-    }
-
-    /// The output's volume: the level set without what lies inside colliders, and the velocity.
-    fn volume(&self, cx: &FrameCx) -> Result<Arc<Volume>> {
-        if let Some(volume) = self.volume.get() {
-            return Ok(volume.clone());
-        }
-        let (lattice, settings) = (lattice(cx), settings(cx));
-        let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
-        let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
-        let by = self.surface.resolution();
-        let colliders = Colliders::now(cx, &domain(cx), lattice);
-        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
-        let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
-        let view = self.surface.level_set().view();
-        let phi = outside.as_deref().unwrap_or(view.phi);
-        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
-        let volume = Arc::new(volume);
-        Ok(self.volume.get_or_init(|| volume).clone())
-    }
-}
-
-/// The ids of tracers: their own, or else their numbers.
-fn tracer_ids(wires: &[&Component]) -> Vec<i32> {
-    let mut ids = Vec::new();
-    for tracers in wires {
-        match tracers.get(ID) {
-            Some(own) => ids.extend(own),
-            None => ids.extend((ids.len() as i32..).take(tracers.point_count())),
-        }
-    }
-    ids
-}
-
-fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
-    let mut out = Vec::new();
-    let mut without = |stage, why| out.push(LeftOut::new(stage, why));
-    if wires.count(&SOURCES) == 0 {
-        without("sources", "no `sources` are wired");
-    }
-    if wires.count(&SINKS) == 0 {
-        without("sinks", "no `sinks` are wired");
-    }
-    if wires.count(&COLLIDERS) == 0 {
-        without("colliders", "no `colliders` are wired");
-    }
-    if wires.count(&TRACERS) == 0 {
-        without("tracers", "no `tracers` are wired");
-    }
-    if !params.get(VOLUME_CORRECTION) {
-        without("volume correction", "`volume_correction` is false");
-    }
-    if params.get(STOKES) == Coupling::Off {
-        without("viscous stress", "`stokes` is off");
-    }
-    out
 }
 
 #[cfg(test)]

@@ -72,6 +72,26 @@ fn explain_shows_how_often_each_node_cooks_and_what_is_left_out() {
 }
 
 #[test]
+fn explain_prints_what_a_solver_says_of_itself() {
+    let bench = Bench::with_graph(
+        r#"{ "convect": 1, "scene": { "frames": [1, 4] },
+             "nodes": {
+               "block": { "type": "Mesh_Primitive", "params": { "size": [0.4, 0.4, 0.4] } },
+               "water": { "type": "FluidSolve", "inputs": { "liquid": "block" }, "params": { "viscosity": 0 } } },
+             "outputs": { "water": "water" } }"#,
+    );
+    let text = bench.done(&["explain", "g.json"]);
+    assert!(text.contains("\n                 the box has 50 × 50 × 50 cells, up to [0.5, 1.0, 0.5]\n"), "{text}");
+    assert!(
+        text.contains("in none, pressure alone acts") && text.contains("left out viscous stress: `viscosity`"),
+        "{text}"
+    );
+    let plan = bench.json(&["explain", "g.json", "--json"]);
+    let lines = plan["nodes"][1]["explained"].as_array().unwrap();
+    assert!(lines.len() == 2 && lines.iter().all(|line| text.contains(line.as_str().unwrap())), "{plan}");
+}
+
+#[test]
 fn a_bypassed_node_is_left_out_and_what_reads_it_reads_its_input() {
     let bench =
         Bench::with_graph(&GRAPH.replace(r#""type": "Curve_Wind","#, r#""type": "Curve_Wind", "bypass": true,"#));

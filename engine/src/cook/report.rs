@@ -36,6 +36,8 @@ pub struct NodeReport {
     pub from_disk: u64,
     /// Stages that could not matter.
     pub left_out: Vec<LeftOut>,
+    /// What it says of itself; see [`crate::node::Node::explains`].
+    pub explained: Vec<String>,
     /// Wall time.
     pub wall: Duration,
     /// CPU time of all threads.

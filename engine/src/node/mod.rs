@@ -144,6 +144,8 @@ pub struct Node {
     pub fills: &'static [Fill],
     /// Stages that cannot change the result, given params and wires, where the node is not neutral.
     pub leaves_out: Option<fn(&Params, &Wires) -> Vec<LeftOut>>,
+    /// What `explain` says of the node besides; see [`Node::explains`].
+    pub explains: Option<fn(&Params, Clock) -> Vec<String>>,
     /// Refuses combinations of params, beyond their ranges; called before anything cooks.
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
@@ -175,6 +177,7 @@ impl Node {
             neutral: None,
             fills: &[],
             leaves_out: None,
+            explains: None,
             checks: None,
             integrands: [None; MOST_INTEGRANDS],
             restore_between: None,
@@ -241,6 +244,14 @@ impl Node {
     #[must_use]
     pub const fn leaves_out(mut self, leaves_out: fn(&Params, &Wires) -> Vec<LeftOut>) -> Self {
         self.leaves_out = Some(leaves_out);
+        self
+    }
+
+    /// What `explain` says of the node besides: which of its methods the params choose, sizes that follow from them. Given the
+    /// params at its start frame, or the scene's.
+    #[must_use]
+    pub const fn explains(mut self, explains: fn(&Params, Clock) -> Vec<String>) -> Self {
+        self.explains = Some(explains);
         self
     }
 

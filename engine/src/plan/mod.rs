@@ -159,6 +159,18 @@ impl<'g> Plan<'g> {
         stages
     }
 
+    /// What a node says of itself with its params at the frame where it starts; nothing where those are refused.
+    pub fn explained(&self, node: usize) -> Vec<String> {
+        let (scene, resolver) = (&self.graph.scene, &self.nodes[node].resolver);
+        let Some(explains) = self.graph.nodes[node].node().and_then(|declared| declared.explains) else {
+            return Vec::new();
+        };
+        let start = self.graph.nodes[node].node().zip(resolver.at(scene.start()).ok());
+        let start =
+            start.and_then(|(declared, params)| declared.start_frame(&params)).map_or(scene.start(), Frame::whole);
+        resolver.at(start).map(|params| explains(&params, scene.clock())).unwrap_or_default()
+    }
+
     fn left_out_with(&self, node: usize, params: &Params) -> Vec<LeftOut> {
         let Body::Node { node: declared, inputs, .. } = &self.graph.nodes[node].body else { return Vec::new() };
         let wires = |name: &str| {

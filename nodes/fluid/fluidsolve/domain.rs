@@ -46,7 +46,7 @@ fn whole(cells: f64) -> f64 {
 }
 
 /// Cells along each side of the box.
-fn cells(params: &Params) -> [f64; 3] {
+pub(super) fn cells(params: &Params) -> [f64; 3] {
     let (from, to, cell) = (params.get(DOMAIN_FROM), params.get(DOMAIN_TO), params.get(CELL));
     [0, 1, 2].map(|k| whole((to[k] - from[k]) / cell))
 }

@@ -6,7 +6,8 @@ use liquid::step::{LiquidReport, Surface};
 
 use super::{
     CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
-    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SUBSTEPS_USED,
+    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SUBSTEPS_USED, VISCOSITY_ITERATIONS,
+    VISCOSITY_RESIDUAL,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -19,6 +20,8 @@ pub(super) fn measured(report: &LiquidReport) -> MetricValues {
     metrics.set(PRESSURE_RESIDUAL, report.pressure_residual);
     metrics.set(COUPLED_ITERATIONS, report.coupled_iterations);
     metrics.set(COUPLED_RESIDUAL, report.coupled_residual);
+    metrics.set(VISCOSITY_ITERATIONS, report.viscosity_iterations);
+    metrics.set(VISCOSITY_RESIDUAL, report.viscosity_residual);
     metrics.set(MAX_DIVERGENCE, report.max_divergence.max(report.unbalanced));
     metrics.set(LIQUID_CELLS, report.liquid_cells as f64);
     for (metric, force) in [COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z].into_iter().zip(report.solid_force) {

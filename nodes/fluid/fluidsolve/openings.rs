@@ -117,6 +117,11 @@ impl Opening {
         })
     }
 
+    /// Whether it moves farther in the step than its shape follows accurately.
+    pub(super) fn is_fast(&self) -> bool {
+        self.shape.is_capped()
+    }
+
     /// Whether it gives or takes at a rate, rather than keeping its shape full or empty.
     fn has_rate(&self) -> bool {
         self.rates.iter().any(|rate| *rate > 0.0)

@@ -4,7 +4,8 @@ use engine::prelude::*;
 use liquid::step::Motion;
 use numerics::vector::scale;
 
-use super::{DENSITY, Run, VISCOSITY};
+use super::run::Run;
+use super::{DENSITY, VISCOSITY};
 use crate::shared::attributes::{
     PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_MARKER, PARTICLE_SPRAY, PARTICLE_TRACER, PARTICLE_VISCOSITY,
     PARTICLE_VOLUME,

@@ -254,6 +254,11 @@ impl Colliders {
         self.0.is_empty()
     }
 
+    /// How many move farther in the step than their shapes follow accurately.
+    pub(super) fn fast(&self) -> usize {
+        self.0.iter().filter(|collider| collider.shape.is_capped()).count()
+    }
+
     /// `distance`, where there are colliders.
     pub(super) fn solid<'a>(&self, distance: SolidDistance<'a>) -> Option<SolidDistance<'a>> {
         if self.is_empty() { None } else { Some(distance) }

@@ -2,8 +2,11 @@ use super::*;
 use conformance::{Bench, BenchResult, bench, conformance, cook_all};
 use engine::cook::{Engine, Settings};
 use numerics::shapes::{self, Polygons};
+use numerics::vector::add;
+use std::sync::Arc;
 
 mod carried;
+mod said;
 
 /// Seconds of a frame.
 const H: f64 = 1.0 / 24.0;

@@ -139,6 +139,7 @@ impl<'p> NodeRun<'p> {
                 bypassed: plan.graph.bypassed.contains(&node.id),
                 varies: planned.varies,
                 left_out: if planned.needed { plan.left_out(index) } else { Vec::new() },
+                explained: if planned.needed { plan.explained(index) } else { Vec::new() },
                 ..NodeReport::default()
             },
         }

@@ -5,20 +5,16 @@ use crate::carried::CellMaterials;
 use crate::pressure::{PressureGrid, PressureSolver, Stop, face_densities};
 use crate::rows::CellRows;
 use crate::stencil::Stencil;
-use crate::step::domain::{Domain, Obstacle, share_outside};
+use crate::step::domain::{Domain, Obstacle};
 use crate::step::exchange::Imposed;
 use crate::step::force::pressed;
 use crate::step::motion::{Guess, LiquidCells, Motion};
 use crate::step::pour::{Pour, pour};
-use crate::step::{LiquidReport, LiquidSettings};
+use crate::step::{LiquidReport, LiquidSettings, ViscousSolve};
 use crate::velocity::FaceFields;
-use crate::viscosity::{StokesGrid, StokesSolver, StokesStop};
 
 /// Net flow of a cell, of the largest error that it may cause in a velocity.
 const FLOW_SHARE: f64 = 0.25;
-
-/// The least speed of thick liquid, of what gravity adds in a substep, that errors are measured against.
-const CREEP: f64 = 1e-3;
 
 /// A projection of one substep.
 pub(super) struct Projection<'a> {
@@ -69,7 +65,7 @@ impl Materials {
     }
 
     /// Viscosity and density of other cells.
-    fn on(&self, cells: &LiquidCells, domain: &Domain, rows: &CellRows) -> [Vec<f32>; 2] {
+    pub(super) fn on(&self, cells: &LiquidCells, domain: &Domain, rows: &CellRows) -> [Vec<f32>; 2] {
         let own = self.viscosity as f32;
         let Some([viscosity, density]) = &self.of_cells else { return [vec![own; rows.len()], vec![1.0; rows.len()]] };
         let mut fields = [rows.resampled(&cells.rows, viscosity, own), rows.resampled(&cells.rows, density, 1.0)];
@@ -94,20 +90,27 @@ impl Projection<'_> {
         faces: &mut FaceFields<f32>,
         motion: &mut Motion,
     ) -> LiquidReport {
-        let is_coupled = self.settings.coupling.is_coupled(self.materials.largest(self.cells));
-        let report = match is_coupled {
-            true => {
+        let solve = self.settings.coupling.solve(self.materials.largest(self.cells));
+        let report = match solve {
+            ViscousSolve::Coupled => {
                 let likely = motion.with_last_gain(self.cells, before, self.seconds);
                 self.by_pressure_and_viscosity(&likely, pours, faces, &mut motion.guess)
             }
-            false => self.by_pressure(pours, faces, &mut motion.guess),
+            ViscousSolve::Decoupled => self.by_pressure_then_viscosity(pours, faces, &mut motion.guess),
+            ViscousSolve::LeftOut => self.by_pressure(self.speed.max(self.pull), pours, faces, &mut motion.guess),
         };
         pours.iter().for_each(|pour| pour.enter(motion));
-        LiquidReport { viscous_substeps: u32::from(is_coupled), ..report }
+        LiquidReport { viscous_substeps: u32::from(solve != ViscousSolve::LeftOut), ..report }
     }
 
-    /// Drives the divergence out of a velocity.
-    fn by_pressure(&self, pours: &mut [Pour], faces: &mut FaceFields<f32>, guess: &mut Guess) -> LiquidReport {
+    /// Drives the divergence out of a velocity. `scale`: the speed that errors are measured against, m/s.
+    pub(super) fn by_pressure(
+        &self,
+        scale: f64,
+        pours: &mut [Pour],
+        faces: &mut FaceFields<f32>,
+        guess: &mut Guess,
+    ) -> LiquidReport {
         let cells = self.cells;
         let density = self.materials.of_faces(cells);
         let lighter = density.as_ref().map(|density| divided(&cells.open, density));
@@ -118,118 +121,33 @@ impl Projection<'_> {
         let mut inflow = inflow(&solver, cells, faces);
         let poured = pour(pours, &solver, self.settings.cell, &mut inflow);
         let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
-        let scale = self.speed.max(self.pull);
         let stop = Stop { flow: self.flow_tolerance(scale), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
         let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
-        let is_cut_short = solved.flow > stop.flow && solved.iterations >= stop.iterations;
+        let is_done = solved.flow <= stop.flow;
         LiquidReport {
             pressure_iterations: solved.iterations,
             pressure_residual: if scale > 0.0 { solved.flow / scale } else { 0.0 },
-            solves_cut_short: u32::from(is_cut_short),
-            solid_force: self.force(force.unwrap_or_default()),
-            ..self.report(solved.flow, [solved.unbalanced, poured])
-        }
-    }
-
-    /// Drives the divergence out of a velocity and lets viscosity act, both at once. `likely`: a first guess of the result.
-    fn by_pressure_and_viscosity(
-        &self,
-        likely: &FaceFields<f32>,
-        pours: &mut [Pour],
-        faces: &mut FaceFields<f32>,
-        guess: &mut Guess,
-    ) -> LiquidReport {
-        let (cells, domain) = (self.cells, &self.settings.domain);
-        let rows = domain.clip_with_images(&cells.rows.dilated(1), 2);
-        let level_set = cells.level_set_on(domain, &rows);
-        let [mut open, distance] = domain.faces(&rows, self.solid);
-        let mut solid_velocity = self.solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
-        if !self.imposed.is_empty() {
-            let still = || std::array::from_fn(|_| vec![0.0; rows.len()]);
-            Imposed::close(self.imposed, &rows, &mut open, solid_velocity.get_or_insert_with(still));
-        }
-        let images = domain.periods().images(&rows);
-        images.fill_each(&mut open);
-        solid_velocity.iter_mut().for_each(|velocity| images.fill_each(velocity));
-        let [[open_x, open_y, open_z], [x, y, z]] = [&open, &distance];
-        let [viscosity, density] = self.materials.on(cells, domain, &rows);
-        let grid = StokesGrid {
-            rows: &rows,
-            level_set: &level_set,
-            open: [open_x, open_y, open_z],
-            solid_distance: [x, y, z],
-            density: &density,
-            viscosity: &viscosity,
-            slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
-            periods: domain.periods(),
-        };
-        let solver = StokesSolver::new(&grid);
-        let on_solver = |field: &[f32]| {
-            let field: Vec<f64> = field.iter().map(|u| f64::from(*u)).collect();
-            solver.rows().resampled(&rows, &field, 0.0)
-        };
-        let before = faces.each_ref().map(|faces| on_solver(&rows.resampled(&cells.rows, faces, 0.0)));
-        let mut u: FaceFields<f64> = std::array::from_fn(|axis| {
-            let mut own = rows.resampled(&cells.rows, &likely[axis], 0.0);
-            if let Some(solid) = &solid_velocity {
-                let closed = own.iter_mut().zip(&solid[axis]).zip(&open[axis]).filter(|(_, open)| **open == 0.0);
-                closed.for_each(|((own, solid), _)| *own = *solid);
-            }
-            on_solver(&own)
-        });
-        let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
-        // Thick liquid creeps far more slowly than gravity would have it.
-        let scale = self.speed.max(CREEP * self.pull);
-        let stop = StokesStop {
-            velocity: self.settings.tolerance * scale,
-            flow: self.flow_tolerance(scale),
-            iterations: self.settings.max_iterations,
-        };
-        let pushed = |solid: &FaceFields<f32>| driven(&solver, &rows, &open, solid);
-        let mut inflow = solid_velocity.as_ref().map_or_else(|| vec![0.0; solver.rows().len()], pushed);
-        let poured = pour(pours, solver.pressure(), self.settings.cell, &mut inflow);
-        let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
-        let force = self.solid.map(|solid| {
-            let is_solid = |axis: usize, cell| {
-                let is_inner = domain.contains(cell) && domain.wall_at(axis, cell).is_none();
-                is_inner && share_outside(axis, cell, solid) == 0.0
-            };
-            let mut force = solver.solid_impulse(&u, is_solid);
-            let of_pressure = pressed(solid, &rows, &open, solver.pressure(), &q);
-            force.iter_mut().zip(of_pressure).for_each(|(force, of_pressure)| *force += of_pressure);
-            force
-        });
-        for axis in 0..3 {
-            let solved = cells.rows.resampled(solver.rows(), &u[axis], 0.0);
-            let moving = faces[axis].iter_mut().zip(&solved).zip(&cells.moving);
-            moving.filter(|(_, mask)| **mask >> axis & 1 == 1).for_each(|((u, solved), _)| *u = *solved as f32);
-        }
-        *guess = Guess { rows: solver.rows().clone(), q };
-        let is_done = solved.flow <= stop.flow && solved.velocity <= stop.velocity;
-        LiquidReport {
-            coupled_iterations: solved.iterations,
-            coupled_residual: if scale > 0.0 { solved.velocity / scale } else { 0.0 },
-            solves_cut_short: u32::from(!is_done && solved.iterations >= stop.iterations),
+            solves_cut_short: u32::from(!is_done),
             solid_force: self.force(force.unwrap_or_default()),
             ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
 
     /// Net flow of a cell, m/s, that may be left.
-    fn flow_tolerance(&self, scale: f64) -> f64 {
+    pub(super) fn flow_tolerance(&self, scale: f64) -> f64 {
         self.settings.tolerance * (FLOW_SHARE * scale).min(self.settings.cell / self.seconds)
     }
 
     /// The force, N, of an impulse ÷ density · cell³.
-    fn force(&self, impulse: [f64; 3]) -> [f64; 3] {
+    pub(super) fn force(&self, impulse: [f64; 3]) -> [f64; 3] {
         let LiquidSettings { cell, density, .. } = self.settings;
         impulse.map(|impulse| impulse * density * cell * cell * cell / self.seconds)
     }
 
-    fn report(&self, flow: f64, unbalanced: [f64; 2]) -> LiquidReport {
+    pub(super) fn report(&self, flow: f64, unbalanced: [f64; 2]) -> LiquidReport {
         let per_cell = self.seconds / self.settings.cell;
         let unbalanced = if unbalanced[1].abs() > unbalanced[0].abs() { unbalanced[1] } else { unbalanced[0] };
         LiquidReport { max_divergence: flow * per_cell, unbalanced: unbalanced * per_cell, ..LiquidReport::default() }
@@ -249,22 +167,13 @@ fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &FaceFields<f32>)
     net(solver.rows(), solver.stencil(), &through)
 }
 
-/// The net inflow of each liquid cell that solids drive, m/s.
-fn driven(solver: &StokesSolver, rows: &CellRows, open: &FaceFields<f32>, solid: &FaceFields<f32>) -> Vec<f64> {
-    let through = std::array::from_fn(|axis| {
-        let covered: Vec<f64> = covered(axis, open, solid).collect();
-        solver.rows().resampled(rows, &covered, 0.0)
-    });
-    net(solver.rows(), solver.stencil(), &through)
-}
-
 /// What a solid carries through the share of each face that it covers, m/s.
-fn covered(axis: usize, open: &FaceFields<f32>, solid: &FaceFields<f32>) -> impl Iterator<Item = f64> {
+pub(super) fn covered(axis: usize, open: &FaceFields<f32>, solid: &FaceFields<f32>) -> impl Iterator<Item = f64> {
     solid[axis].iter().zip(&open[axis]).map(|(u, share)| f64::from(*u) * (1.0 - f64::from(*share)))
 }
 
 /// What flows into each active cell, less what flows out, where this flows through faces upwards.
-fn net(rows: &CellRows, stencil: &Stencil, through: &FaceFields<f64>) -> Vec<f64> {
+pub(super) fn net(rows: &CellRows, stencil: &Stencil, through: &FaceFields<f64>) -> Vec<f64> {
     let mut inflow = vec![0.0; rows.len()];
     stencil.update([&mut inflow], |runs, first, [inflow]| {
         for run in runs {

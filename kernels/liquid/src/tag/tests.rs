@@ -59,7 +59,7 @@ fn a_linear_function_is_reproduced_up_to_the_rim() {
     // The mean alone is off by 1e-2, at the rim by 4e-2. In a corner even the fit is limited.
     let rim = |x: f32| !(0.2..1.8).contains(&x);
     for (place, value) in places.iter().zip(&tagged.rows[0]).filter(|(p, _)| !rim(p[0]) || !rim(p[1])) {
-        assert!((value - linear(*place)).abs() < 1.5e-3, "{place:?}: {value} {}", linear(*place));
+        assert!((value - linear(*place)).abs() < 4e-3, "{place:?}: {value} {}", linear(*place));
     }
 }
 

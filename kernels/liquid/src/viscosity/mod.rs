@@ -2,8 +2,8 @@
 //! with its own viscous stress (Larionov, Batty and Bridson 2017 give the continuous equations; the discretisation here is
 //! of finite volumes on the MAC grid).
 //!
-//! Solving one after the other is wrong in rate: a free column sags 1.4 to 2 times too fast. Together, any viscosity up
-//! to nearly rigid has its right rate at any time step.
+//! Solving one after the other ([`StokesSolver::solve_viscosity`]) is wrong in rate: a free column sags 1.4 to 2 times too
+//! fast. Together, any viscosity up to nearly rigid has its right rate at any time step.
 //!
 //! The unknowns are the velocities of free faces and the pressures of liquid cells. Flexible GCR (Eisenstat, Elman and
 //! Schultz 1983), preconditioned by a block triangle: one multigrid cycle of the viscous equation, and for the Schur
@@ -11,6 +11,7 @@
 //! every component that is free to move are solved for exactly in each iteration; without that, nearly rigid liquid
 //! takes five times the iterations and loses its spin.
 
+mod alone;
 mod coarsen;
 mod cycle;
 mod extension;
@@ -25,6 +26,7 @@ use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace, face_dens
 use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
 use crate::velocity::FaceFields;
+pub use alone::{ViscousSolved, ViscousStop};
 use cycle::{Multigrid, Workspace};
 use level::{Level, Stresses};
 use rigid::RigidMotions;
@@ -157,13 +159,7 @@ impl StokesSolver {
         let level = self.viscous.finest();
         let len = level.rows().len();
         let zero = || Unknowns { u: std::array::from_fn(|_| vec![0.0; len]), q: vec![0.0; len] };
-        let mut work = Work {
-            stresses: Stresses::zero(len),
-            viscous: self.viscous.workspace(),
-            pressure: self.pressure.workspace(),
-            force: std::array::from_fn(|_| vec![0.0; len]),
-            bending: std::array::from_fn(|_| vec![0.0; len]),
-        };
+        let mut work = Work::new(self);
         (0..len).filter(|at| !self.pressure.is_liquid(*at)).for_each(|at| q[at] = 0.0);
         let mut solved = StokesSolved::default();
         let mut residual = zero();
@@ -339,6 +335,20 @@ struct Work {
     force: FaceFields<f64>,
     /// The force less what moves components as rigid bodies.
     bending: FaceFields<f64>,
+}
+
+impl Work {
+    fn new(solver: &StokesSolver) -> Self {
+        let len = solver.rows().len();
+        let zero = || std::array::from_fn(|_| vec![0.0; len]);
+        Self {
+            stresses: Stresses::zero(len),
+            viscous: solver.viscous.workspace(),
+            pressure: solver.pressure.workspace(),
+            force: zero(),
+            bending: zero(),
+        }
+    }
 }
 
 impl Unknowns {

@@ -236,6 +236,30 @@ fn iterations_hardly_grow_with_the_grid_or_the_viscosity() {
     }
 }
 
+/// Without pressure, too: noise on a ball becomes what viscosity makes of it, whose own force is in balance.
+#[test]
+fn viscosity_alone_takes_few_iterations_whatever_it_is() {
+    for viscosity in [1e-2, 1.0, 1e3, 1e6, 1e9] {
+        let solver = Case::ball(24, viscosity).solver();
+        let turning = |p: [f64; 3]| [0.2 * (p[1] - 12.0) + 0.1, -0.2 * (p[0] - 12.0), 0.3];
+        let before = velocity(&solver, |p| [0, 1, 2].map(|axis| turning(p)[axis] + 0.1 * noise(p)[axis]));
+        let mut u = before.clone();
+        let solved = solver.solve_viscosity(&before, &mut u, ViscousStop { velocity: 1e-6, iterations: 60 });
+        assert!(solved.velocity <= 1e-6 && solved.iterations <= 40, "{viscosity:e}: {solved:?}");
+        let mut again = before.clone();
+        let loose = solver.solve_viscosity(&before, &mut again, ViscousStop { velocity: 1e-2, iterations: 60 });
+        assert!(loose.iterations <= solved.iterations && largest_difference(&u, &again) < 5e-2, "{loose:?}");
+        let mut rigid = velocity(&solver, turning);
+        let start = rigid.clone();
+        let kept = solver.solve_viscosity(&start, &mut rigid, ViscousStop { velocity: 1e-6, iterations: 60 });
+        assert_eq!((kept.iterations, largest_difference(&rigid, &start)), (0, 0.0), "{viscosity:e}");
+    }
+    let none = Case::new([8; 3], 1.0, |_| 1.0).solver();
+    let mut still = velocity(&none, noise);
+    let stop = ViscousStop { velocity: 1e-9, iterations: 10 };
+    assert_eq!(none.solve_viscosity(&still.clone(), &mut still, stop), ViscousSolved::default());
+}
+
 /// Half of a ball is 1e8 times as viscous as the other half: the stiff half moves as a rigid body.
 #[test]
 fn a_jump_of_viscosity_is_solved() {

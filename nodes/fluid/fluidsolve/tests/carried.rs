@@ -2,7 +2,7 @@
 
 use super::*;
 use liquid::tag::{TagSource, TagValues};
-use numerics::vector::length;
+use numerics::vector::{length, scale, sub};
 
 /// The output `particles` at a frame.
 fn particles_at(bench: &Bench, frame: i64) -> Component {

@@ -1,6 +1,7 @@
 //! The laws that a liquid keeps, on small grids; `examples/dam_break.rs` has them on larger ones.
 
 mod dam;
+mod decoupled;
 mod force;
 mod materials;
 mod periodic;

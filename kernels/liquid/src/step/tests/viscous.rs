@@ -126,7 +126,8 @@ fn viscosity_is_left_out_below_its_bound() {
         (Coupling::Auto, 1e-3, 0),
         (Coupling::Auto, 10.0, 1),
         (Coupling::On, 1e-3, 1),
-        (Coupling::Off, 10.0, 0),
+        (Coupling::Off, 1e-3, 0),
+        (Coupling::Off, 10.0, 1),
     ] {
         let settings = LiquidSettings { coupling, cfl: 100.0, ..LiquidSettings::new(domain, 0.1) };
         let mut liquid = Liquid::new(settings, PlainLevelSet::new(domain, |p| p[1] - 4.2));

@@ -1,0 +1,263 @@
+//! The state of a simulation, from frame to frame.
+
+use std::sync::{Arc, OnceLock};
+
+use engine::prelude::*;
+use liquid::carried::LiquidMaterial;
+use liquid::level_set::{BAND, PhiView};
+use liquid::marked::MarkedSurface;
+use liquid::step::{
+    Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
+};
+use liquid::velocity::Sampler;
+use liquid::volumes::VolumeTargets;
+use numerics::vector::{add, cross, scale, sub};
+use serde::{Deserialize, Serialize};
+
+use super::carried::CarriedColumns;
+use super::domain::{checks, domain, lattice, settings};
+use super::measured::{euler_characteristic, measured, pool_of};
+use super::openings::{Opening, SINK, SOURCE, Timed};
+use super::particles::{materials_at, particles};
+use super::shapes::{Colliders, in_cells, liquid_at_start};
+use super::spray::{Air, SprayDrop};
+use super::{
+    DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID_CELLS, PARTICLES,
+    PARTICLES_NOW, SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, VOLUME, VOLUME_CORRECTION, VOLUME_DRIFT,
+    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD,
+};
+use crate::shared::surface::{SurfaceDetail, surface};
+use crate::shared::volume::volume;
+
+/// The state of the simulation.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Run {
+    pub(super) surface: MarkedSurface,
+    pub(super) motion: Motion,
+    /// Since the start, m³: what sources gave, what sinks took, what left through open walls.
+    sourced: f64,
+    sunk: f64,
+    left_domain: f64,
+    /// In the last frame, m³.
+    withheld: f64,
+    targets: VolumeTargets,
+    pub(super) spray: Vec<SprayDrop>,
+    /// The attributes that came with liquid, sources and tracers.
+    pub(super) columns: CarriedColumns,
+    /// The ids of the tracers at the start.
+    pub(super) tracer_ids: Vec<i32>,
+    /// Metrics of the last step; empty at the start.
+    metrics: MetricValues,
+    #[serde(skip)]
+    colliders: Option<Colliders>,
+    /// The output at the state's frame.
+    #[serde(skip)]
+    volume: OnceLock<Arc<Volume>>,
+}
+
+impl Chain for Run {
+    fn start(cx: &FrameCx) -> Result<Self> {
+        checks(cx.params())?;
+        let lattice = lattice(cx);
+        let domain = domain(cx);
+        let start = liquid_at_start(cx, &domain, lattice)?;
+        let mut surface = start.surface.clone();
+        let colliders = Colliders::at_start(cx, &domain, lattice);
+        if !colliders.is_empty() {
+            surface.meet(|point| colliders.distance(1.0, point));
+        }
+        let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
+        let density = |place: [f32; 3]| start.material(place).density.map_or(cx.get(DENSITY), f64::from);
+        let centre = pool_of(&surface, density).centre;
+        let side = lattice.cell as f32;
+        let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
+        let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
+        let around = Surroundings {
+            solid: (!colliders.is_empty()).then(|| Solid::still(&distance)),
+            ..Surroundings::new(&|_| [0.0; 3], &|_| 0.0)
+        };
+        let mut liquid = Liquid::new(settings(cx), surface);
+        liquid.set_velocity(at, &around);
+        if start.has_materials() {
+            liquid.set_materials(|place| start.material(place));
+        }
+        let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
+        columns.add_tracers(&tracers);
+        for mesh in cx.part_at_start(SOURCES) {
+            columns.add_mesh(mesh, lattice, liquid.surface_mut());
+        }
+        let places = tracers.iter().flat_map(|tracers| in_cells(tracers, lattice)).collect();
+        liquid.set_tracers(places);
+        let (mut surface, motion) = liquid.into_parts();
+        let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
+        let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
+        let mut run = Self {
+            surface,
+            motion,
+            sourced: 0.0,
+            sunk: 0.0,
+            left_domain: 0.0,
+            withheld: 0.0,
+            targets,
+            spray: Vec::new(),
+            columns,
+            tracer_ids: tracer_ids(&tracers),
+            metrics: MetricValues::default(),
+            colliders: Some(colliders),
+            volume: OnceLock::new(),
+        };
+        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
+        Ok(run)
+    }
+
+    fn step(&mut self, cx: &StepCx) -> Result<()> {
+        let (lattice, settings) = (lattice(cx), settings(cx));
+        let colliders = Colliders::within_step(cx, self.colliders.take(), &settings.domain, lattice)?;
+        let passed = |frame: Frame| cx.integrals::<2>(frame)[1][1];
+        let seconds = passed(cx.frame()) - passed(cx.previous());
+        self.volume = OnceLock::new();
+        let (report, fast_openings) = match seconds > 0.0 {
+            true => self.advance(cx, settings, &colliders, seconds)?,
+            false => (LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() }, 0),
+        };
+        self.sourced += report.sourced;
+        self.sunk += report.sunk;
+        self.left_domain += report.left_domain;
+        self.metrics = measured(&report);
+        self.correct(cx, &report, &colliders);
+        self.metrics.set(SOURCED, self.sourced);
+        self.metrics.set(SUNK, self.sunk);
+        self.metrics.set(WITHHELD, if report.substeps > 0 { self.withheld } else { 0.0 });
+        self.metrics.set(LEFT_DOMAIN, self.left_domain);
+        self.metrics.set(FAST_SHAPES, (colliders.fast() + fast_openings) as f64);
+        self.colliders = Some(colliders);
+        Ok(())
+    }
+
+    fn output(&self, cx: &FrameCx) -> Result<Outputs> {
+        let volume = self.volume(cx)?;
+        cx.publish_all(&self.metrics);
+        let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
+        cx.publish(VOLUME_NOW, self.targets.volume());
+        cx.publish(EULER_CHARACTERISTIC, euler_characteristic(&surface));
+        let mut out = Geometry::default();
+        out.put_volume(volume.clone());
+        let particles = particles(cx, self, lattice(cx), &volume)?;
+        cx.publish(PARTICLES_NOW, particles.point_count() as f64);
+        Ok(SURFACE.with(Geometry::from(surface)).and(PARTICLES, Geometry::from(particles)).and(VOLUME, out))
+    }
+}
+
+impl Run {
+    /// Moves on by a step of that many simulated seconds. Returns how many sources and sinks move too fast besides.
+    fn advance(
+        &mut self,
+        cx: &StepCx,
+        settings: LiquidSettings,
+        colliders: &Colliders,
+        seconds: f64,
+    ) -> Result<(LiquidReport, usize)> {
+        let lattice = lattice(cx);
+        let openings = |input, says| Opening::all(cx, input, says, &settings.domain, lattice);
+        let (mut sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
+        for source in &mut sources {
+            let (mesh, attributes) = source.attributes();
+            *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
+        }
+        let fast = sources.iter().chain(&sinks).filter(|opening| opening.is_fast()).count();
+        let has_material = sources.iter().any(Opening::has_material);
+        let share = |time: f64| (time / seconds).clamp(0.0, 1.0);
+        let (first, frames) = (cx.previous().number(), cx.frame().number() - cx.previous().number());
+        let params = |time: f64| cx.integrands::<2>(first + frames * share(time));
+        let distance = |time: f64, point: [f32; 3]| colliders.distance(share(time) as f32, point);
+        let speed = (lattice.cell / seconds) as f32;
+        let velocity = |time: f64, point: [f32; 3]| colliders.velocity(share(time) as f32, point).map(|u| u * speed);
+        let [sources, sinks] = [&sources, &sinks].map(|openings| Timed::all(openings, seconds));
+        let sources: Vec<LiquidSource> = sources.iter().map(Timed::source).collect();
+        let sinks: Vec<LiquidSink> = sinks.iter().map(Timed::sink).collect();
+        let around = Surroundings {
+            gravity: &|time| params(time)[0],
+            viscosity: &|time| params(time)[1][0],
+            solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
+            sources: &sources,
+            sinks: &sinks,
+            cancelled: &|| cx.check_cancelled().is_err(),
+        };
+        let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
+        if has_material && liquid.motion().materials().is_none() {
+            liquid.set_materials(|_| LiquidMaterial::default());
+        }
+        let report = liquid.step_frame(&around, seconds);
+        cx.check_cancelled()?;
+        for account in liquid.sources() {
+            self.targets.add(account.moved, Some(account.place));
+        }
+        for account in liquid.sinks() {
+            self.targets.add(-account.moved, Some(account.place));
+        }
+        self.targets.add(-report.left_domain, None);
+        let accounts = liquid.sources().iter().chain(liquid.sinks());
+        self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
+        let domain = domain(cx);
+        let air = Air { gravity: params(0.5 * seconds)[0], seconds, cell: lattice.cell, domain: &domain, colliders };
+        self.spray.retain_mut(|drop| {
+            let stays = drop.fly(&air);
+            self.left_domain += if stays { 0.0 } else { f64::from(drop.volume) };
+            stays
+        });
+        (self.surface, self.motion) = liquid.into_parts();
+        Ok((report, fast))
+    }
+
+    /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost.
+    fn correct(&mut self, cx: &StepCx, report: &LiquidReport, colliders: &Colliders) {
+        if report.substeps == 0 {
+            return;
+        }
+        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
+        let corrected = match cx.get(VOLUME_CORRECTION) {
+            true => self.targets.correct(&mut self.surface, colliders.solid(&solid)),
+            false => self.targets.measure(&mut self.surface, colliders.solid(&solid)),
+        };
+        let mut sampler = Sampler::new(self.motion.rows());
+        let places: Vec<[f32; 3]> = corrected.lost.iter().map(|piece| piece.place).collect();
+        for (piece, material) in corrected.lost.iter().zip(materials_at(&self.motion, &places)) {
+            let velocity = self.motion.velocity().at(&mut sampler, piece.place);
+            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32, material });
+        }
+        self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
+        self.metrics.set(VOLUME_DRIFT, corrected.drift);
+        self.metrics.set(SPRAY, self.spray.iter().fold(0.0, |sum, drop| sum + f64::from(drop.volume)));
+    }
+
+    /// The output's volume: the level set without what lies inside colliders, and the velocity.
+    fn volume(&self, cx: &FrameCx) -> Result<Arc<Volume>> {
+        if let Some(volume) = self.volume.get() {
+            return Ok(volume.clone());
+        }
+        let (lattice, settings) = (lattice(cx), settings(cx));
+        let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
+        let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
+        let by = self.surface.resolution();
+        let colliders = Colliders::now(cx, &domain(cx), lattice);
+        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
+        let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
+        let view = self.surface.level_set().view();
+        let phi = outside.as_deref().unwrap_or(view.phi);
+        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
+        let volume = Arc::new(volume);
+        Ok(self.volume.get_or_init(|| volume).clone())
+    }
+}
+
+/// The ids of tracers: their own, or else their numbers.
+fn tracer_ids(wires: &[&Component]) -> Vec<i32> {
+    let mut ids = Vec::new();
+    for tracers in wires {
+        match tracers.get(ID) {
+            Some(own) => ids.extend(own),
+            None => ids.extend((ids.len() as i32..).take(tracers.point_count())),
+        }
+    }
+    ids
+}
