@@ -167,10 +167,11 @@ metrics! { METRICS:
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
         "Error of the volume, relative to what it should be, if it were never corrected.")
         .warn_outside(-0.03, 0.03, "Without correction the liquid would have gained or lost more than 3 % of its volume: it has \
-            many drops, sheets or jets that are thinner than `cell`. Lower `cell`, or raise `resolution`.");
+            many drops, sheets or jets that are thinner than `cell`. Raise `resolution`: 2 loses about half as much, or less. A \
+            smaller `cell` hardly helps a splash, which only becomes finer with it.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
-        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. Lower `cell`, or \
-            raise `resolution`; with `volume_correction` it comes back over the next frames.");
+        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. Raise \
+            `resolution`; with `volume_correction` it comes back over the next frames.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,

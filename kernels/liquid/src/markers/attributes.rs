@@ -13,7 +13,7 @@ const RINGS: [i32; 3] = [1, 2, 4];
 /// Neighbours that are enough, if they lie all around.
 const ENOUGH: usize = 6;
 
-/// For each attribute, its values at the markers `new`. 0 where there are no neighbours.
+/// For each attribute, its values at the markers `new`, within those of all markers. 0 where there are no neighbours.
 pub(super) fn interpolate(
     rows: &CellRows,
     bins: &Bins,
@@ -25,14 +25,22 @@ pub(super) fn interpolate(
         return Vec::new();
     }
     let weights: Vec<Vec<(u32, f32)>> = new.par_iter().map(|marker| weights(rows, bins, markers, marker)).collect();
-    let value = |values: &[f32], weights: &[(u32, f32)]| {
-        let near = || weights.iter().map(|(n, _)| values[*n as usize]);
-        let (least, most) = near().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let value = |values: &[f32], [low, high]: [f32; 2], weights: &[(u32, f32)]| {
+        let [least, most] = range(weights.iter().map(|(n, _)| values[*n as usize]));
         let half = 0.5 * (most - least);
         let sum = weights.iter().fold(0.0, |sum, (n, weight)| sum + weight * values[*n as usize]);
-        if weights.is_empty() { 0.0 } else { sum.clamp(least - half, most + half) }
+        if weights.is_empty() { 0.0 } else { sum.clamp(least - half, most + half).clamp(low, high) }
     };
-    attributes.iter().map(|values| weights.par_iter().map(|weights| value(values, weights)).collect()).collect()
+    let at_new = |values: &Vec<f32>| {
+        let all = range(values.iter().copied());
+        weights.par_iter().map(|weights| value(values, all, weights)).collect()
+    };
+    attributes.iter().map(at_new).collect()
+}
+
+/// The least and the largest.
+fn range(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// Neighbours and what each contributes: 1 altogether.

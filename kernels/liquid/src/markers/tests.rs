@@ -198,6 +198,7 @@ fn both_sides_of_a_sheet_keep_their_own_attributes() {
     markers.attributes[0] = markers.markers.iter().map(|marker| marker.normal[1].signum()).collect();
     let new = fill_hole(&set, &mut markers, [12.0, 12.1, 12.0]);
     assert!(new > 10, "{new} new markers");
+    assert!(markers.attributes[0].iter().all(|value| (-1.0..=1.0).contains(value)), "within the values that came in");
     for (marker, value) in markers.markers.iter().zip(&markers.attributes[0]) {
         assert!((value - marker.normal[1].signum()).abs() < 1e-5);
         assert!((marker.point[1] - 12.1).abs() > 0.7);
