@@ -61,8 +61,8 @@ fn solve(params: &Params, clock: Clock) -> String {
         Coupling::Off => "pressure, viscosity and pressure again are solved one after the other",
     };
     let bound = match coupling {
-        Coupling::On => "it is above 0".to_owned(),
-        Coupling::Auto | Coupling::Off => format!("it is at least {LEAST_VISCOSITY}"),
+        Coupling::On => "above 0".to_owned(),
+        Coupling::Auto | Coupling::Off => format!("at least {LEAST_VISCOSITY}"),
     };
     let runs = |value: f64| coupling.runs_viscosity(value);
     let verdict = match (runs(of_frame), runs(of_shortest)) {
@@ -71,7 +71,7 @@ fn solve(params: &Params, clock: Clock) -> String {
         (false, false) => "in none, pressure alone acts".to_owned(),
     };
     format!(
-        "{how} where viscosity·dt/(density·cell²) is large enough: {bound}. With the values at the start it is {of_shortest:.1e} in \
-         the shortest substep, {of_frame:.1e} in one of a frame: {verdict}. A Fluid_Source may have another viscosity"
+        "{how} where viscosity·dt/(density·cell²) is {bound}. With the values at the start it is {of_shortest:.1e} in the shortest \
+         substep, {of_frame:.1e} in one of a whole frame: {verdict}. A Fluid_Source may have another viscosity"
     )
 }

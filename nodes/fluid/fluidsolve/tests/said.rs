@@ -20,9 +20,9 @@ fn explain_says_which_solve_runs() {
     // 1/24 s · 16² ÷ 1000 = 1/93.75 for each Pa·s.
     assert_eq!(
         line(pool().set(VISCOSITY, 1.0)),
-        "pressure and viscosity are solved together where viscosity·dt/(density·cell²) is large enough: it is at least 0.0001. \
-         With the values at the start it is 3.3e-4 in the shortest substep, 1.1e-2 in one of a frame: in every substep. \
-         A Fluid_Source may have another viscosity"
+        "pressure and viscosity are solved together where viscosity·dt/(density·cell²) is at least 0.0001. With the values at \
+         the start it is 3.3e-4 in the shortest substep, 1.1e-2 in one of a whole frame: in every substep. A Fluid_Source may \
+         have another viscosity"
     );
     for (coupling, viscosity, how, verdict) in [
         (Coupling::Auto, 0.1, "together", "in substeps of at least 1/10 frame"),
