@@ -1,117 +1,29 @@
-//! What the surface of a liquid costs and how exact it is:
+//! How exact a surface stays that turns for long:
 //! `cargo run --release -p liquid --features studies --example surface_study [name]`.
 
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 
-use std::f64::consts::PI;
 use std::time::Instant;
 
 use liquid::extract::{Placement, extract};
-use liquid::level_set::{LevelSet, PhiSampler, PhiView};
+use liquid::level_set::{LevelSet, PhiSampler};
 use liquid::markers::Markers;
 use liquid::rows::CellRows;
-use numerics::trig;
-use numerics::vector::{Vec3, length, scale, sub};
-use rayon::ThreadPoolBuilder;
-use rayon::prelude::*;
+use numerics::vector::{Vec3, length, sub};
+
+#[allow(dead_code, reason = "the study uses part of it")]
+#[path = "../../../tests/liquid/accuracy/flows.rs"]
+mod flows;
+
+use flows::FaceMovement;
 
 fn main() {
     let asked = std::env::args().nth(1);
-    let all: [(&str, fn()); 4] =
-        [("extract", extraction), ("zalesak", zalesak), ("slotted", slotted_sphere), ("leveque", leveque)];
+    let all: [(&str, fn()); 2] = [("zalesak", zalesak), ("slotted", slotted_sphere)];
     for (name, study) in all {
         if asked.as_deref().is_none_or(|asked| asked == name) {
             study();
         }
-    }
-}
-
-/// The shortest time of five runs, in ms.
-fn shortest(mut run: impl FnMut()) -> f64 {
-    let time = |_| {
-        let start = Instant::now();
-        run();
-        start.elapsed().as_secs_f64() * 1e3
-    };
-    (0..5).map(time).fold(f64::INFINITY, f64::min)
-}
-
-type Shape<'a> = &'a dyn Fn(Vec3) -> f32;
-
-/// A sphere and a torus as meshes: volume, and vertices a ms on one thread and on two.
-fn extraction() {
-    println!("shape      placement   vertices  volume     1 thread: ms, vertices/ms  2 threads: ms");
-    for size in [64, 128] {
-        let n = size as f32;
-        let centre = [0.505 * n, 0.494 * n, 0.502 * n];
-        let sphere = |p: Vec3| length(sub(p, centre)) - 0.35 * n;
-        let torus = |p: Vec3| {
-            let [x, y, z] = sub(p, centre);
-            length([length([x, 0.0, z]) - 0.25 * n, y, 0.0]) - 0.1 * n
-        };
-        let side = f64::from(n);
-        let volumes =
-            [4.0 / 3.0 * PI * 0.35 * 0.35 * 0.35, 2.0 * PI * PI * 0.25 * 0.01].map(|share| share * side * side * side);
-        let shapes: [(&str, Shape<'_>, f64); 2] = [("sphere", &sphere, volumes[0]), ("torus", &torus, volumes[1])];
-        for (name, shape, exact) in shapes {
-            for placement in [Placement::Mean, Placement::Projected] {
-                let rows = CellRows::cuboid([0; 3], [size; 3]);
-                let phi: Vec<f32> =
-                    rows.iter().map(|cell| shape(cell.map(|n| n as f32 + 0.5)).clamp(-5.0, 5.0)).collect();
-                let view = PhiView { rows: &rows, phi: &phi, outside: 5.0, low: [0; 3], high: [size; 3] };
-                let mesh = extract(view, placement);
-                let [one, two] = [1, 2].map(|threads| {
-                    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-                    pool.install(|| shortest(|| drop(extract(view, placement))))
-                });
-                let (vertices, error) = (mesh.points.len(), 100.0 * (mesh.volume() / exact - 1.0));
-                let rate = vertices as f64 / one;
-                let placement = format!("{placement:?}");
-                println!(
-                    "{name:6} {size:3} {placement:10} {vertices:9} {error:8.3} % {one:14.2} {rate:12.0} {two:14.2}"
-                );
-            }
-        }
-    }
-}
-
-/// Velocity on the faces of a cube of cells, read trilinearly.
-struct Faces {
-    size: usize,
-    along: [Vec<f32>; 3],
-}
-
-impl Faces {
-    /// From a velocity in a unit cube, times `dt`, in cells.
-    fn new(size: usize, dt: f32, velocity: impl Fn(Vec3) -> Vec3 + Sync) -> Self {
-        let n = size + 1;
-        let h = 1.0 / size as f32;
-        let along = [0, 1, 2].map(|axis| {
-            let face = |at: usize| {
-                let mut point = [at % n, at / n % n, at / n / n].map(|x| (x as f32 + 0.5) * h);
-                point[axis] -= 0.5 * h;
-                velocity(point)[axis] * dt / h
-            };
-            (0..n * n * n).into_par_iter().map(face).collect()
-        });
-        Self { size, along }
-    }
-
-    fn at(&self, point: Vec3) -> Vec3 {
-        let n = self.size + 1;
-        std::array::from_fn(|axis| {
-            let (mut index, mut share) = (0, [0.0; 3]);
-            for (along, stride) in [1, n, n * n].into_iter().enumerate() {
-                let x = (point[along] - if along == axis { 0.0 } else { 0.5 }).clamp(0.0, self.size as f32 - 0.001);
-                index += (x as usize) * stride;
-                share[along] = x - (x as usize) as f32;
-            }
-            let [u, v, w] = share;
-            let value = |more: usize| self.along[axis][index + more];
-            let mix = |a: f32, b: f32, t: f32| a + t * (b - a);
-            let row = |more: usize| mix(value(more), value(more + 1), u);
-            mix(mix(row(0), row(n), v), mix(row(n * n), row(n * n + n), v), w)
-        })
     }
 }
 
@@ -167,10 +79,9 @@ fn track(name: &str, low: [i32; 3], high: [i32; 3], shape: impl Fn(Vec3) -> f32 
     let volume = extract(set.view(), Placement::Projected).volume();
     let (mut ms, mut done) = (0.0, 0);
     for report in flow.reports {
-        for step in done..*report {
-            let pulse = (flow.pulse)(step);
+        for _ in done..*report {
             let start = Instant::now();
-            markers.step(&mut set, &|p: Vec3| scale(flow.faces.at(p), pulse), flow.reach);
+            markers.step(&mut set, &|p: Vec3| flow.faces.at(p), flow.reach);
             ms += start.elapsed().as_secs_f64() * 1e3;
         }
         done = *report;
@@ -190,28 +101,11 @@ fn track(name: &str, low: [i32; 3], high: [i32; 3], shape: impl Fn(Vec3) -> f32 
     }
 }
 
-/// A flow: the way in a step, its share in step n, how far it moves anything, and after which steps to report.
+/// A flow: the movement in a step, how far it moves anything, and after which steps to report.
 struct Moves<'a> {
-    faces: &'a Faces,
-    pulse: &'a dyn Fn(u32) -> f32,
+    faces: &'a FaceMovement,
     reach: f32,
     reports: &'a [u32],
-}
-
-fn leveque() {
-    for size in [64, 100, 128] {
-        let n = size as f32;
-        let steps = 6 * size;
-        let faces = Faces::new(size as usize, 3.0 / steps as f32, |p| {
-            let [a, b, c] = p.map(|x| trig::sin(PI as f32 * x));
-            let [d, e, f] = p.map(|x| trig::sin(2.0 * PI as f32 * x));
-            [2.0 * a * a * e * f, -d * b * b * f, -d * e * c * c]
-        });
-        let pulse = |step: u32| trig::cos(PI as f32 * (step as f32 + 0.5) / steps as f32);
-        let shape = |p: Vec3| length(sub(p, [0.35 * n; 3])) - 0.15 * n;
-        let flow = Moves { faces: &faces, pulse: &pulse, reach: 1.0, reports: &[steps / 2, steps] };
-        track(&format!("LeVeque {size}"), [0; 3], [size as i32; 3], shape, flow);
-    }
 }
 
 /// The distance from a ball (in `dimensions`) around `centre` of radius 15, cut by a slot 5 wide and 25 deep, in a box of 100.
@@ -227,22 +121,21 @@ fn slotted(p: Vec3, centre: Vec3, dimensions: usize, unit: f32) -> f32 {
 }
 
 /// Turns about the middle of the x and y axes.
-fn turning(size: usize, steps: u32) -> Faces {
+fn turning(size: usize, steps: u32) -> FaceMovement {
     let angle = 2.0 * std::f32::consts::PI / steps as f32;
-    Faces::new(size, angle, |[x, y, _]| [0.5 - y, x - 0.5, 0.0])
+    FaceMovement::new(size, angle, |[x, y, _]| [0.5 - y, x - 0.5, 0.0])
 }
 
 fn zalesak() {
     let steps = 628;
-    let flow =
-        Moves { faces: &turning(100, steps), pulse: &|_| 1.0, reach: 0.75, reports: &[steps, 2 * steps, 10 * steps] };
+    let flow = Moves { faces: &turning(100, steps), reach: 0.75, reports: &[steps, 2 * steps, 10 * steps] };
     let shape = |p: Vec3| slotted(p, [50.0, 75.0, 0.0], 2, 1.0);
     track("Zalesak 100²", [0; 3], [100, 100, 2], shape, flow);
 }
 
 fn slotted_sphere() {
     let steps = 402;
-    let flow = Moves { faces: &turning(64, steps), pulse: &|_| 1.0, reach: 0.75, reports: &[steps, 2 * steps] };
+    let flow = Moves { faces: &turning(64, steps), reach: 0.75, reports: &[steps, 2 * steps] };
     let shape = |p: Vec3| slotted(p, [32.0, 48.0, 32.0], 3, 0.64);
     track("slotted 64³", [0; 3], [64; 3], shape, flow);
 }

@@ -19,8 +19,13 @@ pub(super) fn figures() -> Vec<Figure> {
         Figure::error("a plate drags liquid along, cutting cells: linear profile", couette(), 0.03, ""),
         Figure::within("a column on a smooth foot sinks, ÷ ρgH²/6μ, 10³…10⁶ Pa·s", &columns, [0.85, 1.15]),
         Figure::within("the same one cell thick between periodic sides, ÷ ρgH²/8μ", &sheets, [0.98, 1.02]),
-        Figure::within("drag of balls of 3.2 cells radius in a lattice ÷ Hasimoto's (1959)", &[balls(16)], [0.9, 1.1])
-            .missed(),
+        Figure::within(
+            "drag of balls of 3.2 cells radius in a lattice ÷ Hasimoto's (1959)",
+            &[balls(16, 0.2)],
+            [0.9, 1.1],
+        )
+        .missed(),
+        Figure::within("the same of 6.4 cells", &[balls(32, 0.2)], [0.9, 1.1]),
     ]
 }
 
@@ -100,12 +105,11 @@ fn column(viscosity: f64, depth: i32, sides: [Wall; 2], share: f64) -> f64 {
     -face(&liquid, 1, [8, 40, middle]) / (1000.0 * GRAVITY * 0.08 * 0.08 / (share * viscosity))
 }
 
-/// A ball in a periodic box of `n` cells, held in liquid that is driven past it; its drag ÷ that of Hasimoto, J. Fluid
+/// A ball of `radius`, m, in a periodic box of `n` cells and 1 m, held in liquid that is driven past it; its drag ÷ that of Hasimoto, J. Fluid
 /// Mech. 5 (1959), by the mean velocity.
-fn balls(n: i32) -> f64 {
+fn balls(n: i32, radius: f64) -> f64 {
     let (cell, viscosity) = (1.0 / f64::from(n), 1e5);
     let settings = LiquidSettings { tolerance: 1e-5, ..LiquidSettings::new(domain([n; 3], [REPEATS; 3]), cell) };
-    let radius = 0.2;
     let mut liquid = at_rest(settings, |_| -9.0);
     let middle = [0.5 * n as f32; 3];
     let distance = |_: f64, p: Vec3| length(sub(p, middle)) - (radius / cell) as f32;

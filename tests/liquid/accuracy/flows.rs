@@ -14,7 +14,7 @@ pub(crate) struct FaceMovement {
 
 impl FaceMovement {
     /// From a velocity in a unit cube, times `dt`, in cells.
-    fn new(size: usize, dt: f32, velocity: impl Fn(Vec3) -> Vec3 + Sync) -> Self {
+    pub(crate) fn new(size: usize, dt: f32, velocity: impl Fn(Vec3) -> Vec3 + Sync) -> Self {
         let n = size + 1;
         let h = 1.0 / size as f32;
         let along = [0, 1, 2].map(|axis| {
@@ -29,7 +29,7 @@ impl FaceMovement {
     }
 
     /// At a place in cells.
-    fn at(&self, point: Vec3) -> Vec3 {
+    pub(crate) fn at(&self, point: Vec3) -> Vec3 {
         let n = self.size + 1;
         std::array::from_fn(|axis| {
             let (mut index, mut share) = (0, [0.0; 3]);

@@ -4,7 +4,10 @@
 //! Laws are closed forms or published measurements; the solver steps as FluidSolve does, with its surface of markers.
 
 mod creep;
+mod flows;
 mod moving;
+mod spread;
+mod stokes;
 
 use liquid::marked::MarkedSurface;
 use liquid::step::{Domain, Liquid, LiquidReport, LiquidSettings, Surroundings, Wall};
@@ -19,7 +22,10 @@ fn liquids_meet_their_laws_and_the_docs_show_the_table() {
 
 /// The rows of the table, in the order of the docs.
 pub(crate) fn figures(effort: Effort) -> Vec<Figure> {
-    [creep::figures(), moving::figures(effort)].into_iter().flatten().collect()
+    [creep::figures(), stokes::figures(effort), moving::figures(effort), spread::figures(effort)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 const GRAVITY: f64 = 9.81;

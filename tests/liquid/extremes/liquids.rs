@@ -37,7 +37,7 @@ fn extreme_viscosities_are_solved() {
         splash("density 1e-6 kg/m³", r#""density": 1e-6"#),
         splash("density 1e9 kg/m³", r#""density": 1e9"#),
         splash("`slip` 1 at 1e9 Pa·s", r#""viscosity": 1e9, "slip": 1"#),
-        splash("viscosity left out, though 1e9 Pa·s", r#""viscosity": 1e9, "stokes": "off""#),
+        splash("viscosity after pressure, at 1e9 Pa·s", r#""viscosity": 1e9, "stokes": "off""#),
         splash("viscosity below 0", r#""viscosity": -1"#).refused("viscosity"),
     ]);
 }

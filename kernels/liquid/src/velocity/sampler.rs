@@ -106,12 +106,14 @@ pub struct Sampler<'a> {
     rows: &'a CellRows,
     /// For each site, one window for rows even and odd along y and z.
     windows: [[Window; 4]; 4],
+    /// Those of `rows`, once a point far from all cells has asked for them.
+    bounds: Option<(Cell, Cell)>,
 }
 
 impl<'a> Sampler<'a> {
     /// For fields on `rows`.
     pub fn new(rows: &'a CellRows) -> Self {
-        Self { rows, windows: [[NO_WINDOW; 4]; 4] }
+        Self { rows, windows: [[NO_WINDOW; 4]; 4], bounds: None }
     }
 
     /// The values around `point`, in cells; `None` where one is not stored.
@@ -154,7 +156,7 @@ impl<'a> Sampler<'a> {
     }
 
     #[cold]
-    fn value_beside(&self, field: &[f32], site: Site, point: Vec3) -> f32 {
+    fn value_beside(&mut self, field: &[f32], site: Site, point: Vec3) -> f32 {
         let ([x, y, z], t) = split(site, point);
         let (mut sum, mut weights) = (0.0, 0.0);
         for corner in 0..8 {
@@ -174,8 +176,12 @@ impl<'a> Sampler<'a> {
     }
 
     /// Where the value of the stored cell closest to `cell` is.
-    fn closest(&self, [x, y, z]: Cell) -> Option<usize> {
-        let (low, high) = self.rows.bounds()?;
+    fn closest(&mut self, [x, y, z]: Cell) -> Option<usize> {
+        if self.rows.is_empty() {
+            return None;
+        }
+        self.bounds = self.bounds.or_else(|| self.rows.bounds());
+        let (low, high) = self.bounds?;
         let square = |n: i32| i64::from(n) * i64::from(n);
         let [x, y, z] = [0, 1, 2].map(|axis| [x, y, z][axis].clamp(low[axis], high[axis] - 1));
         let mut best: Option<(i64, usize)> = None;
