@@ -257,3 +257,19 @@ fn a_compressed_graph_is_recognised_and_refused() {
         "g.json:1:1: the file looks like gzip, expected a text file; decompress it first\n"
     );
 }
+
+#[test]
+fn names_in_a_list_are_checked_against_what_comes_in() {
+    let graph = r#"{ "convect": 1, "scene": { "frames": [1, 2] },
+        "nodes": {
+          "ball": { "type": "Mesh_Primitive", "params": { "shape": "sphere" } },
+          "dots": { "type": "Point_In", "params": { "points": [[0, 0, 0]], "attributes": { "heat": [0.5] } } },
+          "tag": { "type": "Surface_Tag", "inputs": { "surface": "ball", "reference": "dots" },
+                   "params": { "attributes": ["heatt"] } } },
+        "outputs": { "ball": "tag" } }"#;
+    let ran = Bench::with_graph(graph).run(&["check", "g.json"]);
+    let fact = "nodes.tag.params.attributes: `attributes` names `heatt`, which `reference` does not have; did you mean `heat`?";
+    assert!(ran.code == Some(3) && ran.stderr.contains(fact), "{:?}: {}", ran.code, ran.stderr);
+    let right = Bench::with_graph(&graph.replace("heatt", "heat")).run(&["check", "g.json"]);
+    assert_eq!((right.code, right.stderr.as_str()), (Some(0), ""));
+}
