@@ -235,7 +235,8 @@ pub(crate) fn threads(extent: Extent, table: &mut Table) {
         };
         let costs = run_all(&[1, 2].map(case), extent);
         for (threads, cost) in [1, 2].into_iter().zip(&costs) {
-            table.add(format!("{}, {threads} threads", case(threads).name()), cost.ms, None, " ms", cost.beside());
+            let on = if threads == 1 { "one thread" } else { "two threads" };
+            table.add(format!("{} on {on}, a frame", case(threads).name()), cost.ms, None, " ms", cost.beside());
         }
         table.add("two threads ÷ one", costs[1].ms / costs[0].ms, None, "", "");
     }

@@ -34,7 +34,8 @@ struct Scene {
 pub(crate) fn solves(extent: Extent, table: &mut Table) {
     let n = extent.choose(64, 160);
     let run = || {
-        let mut scenes = [Scene::new("pool", n, pool), Scene::new("drops", n, drops)];
+        let mut scenes =
+            [Scene::new("pressure of a pool", n, pool), Scene::new("pressure of a dam and drops", n, drops)];
         for _ in 0..extent.choose(2, ROUNDS) {
             scenes.iter_mut().for_each(Scene::run);
         }
@@ -45,8 +46,13 @@ pub(crate) fn solves(extent: Extent, table: &mut Table) {
         let most = (n == 160).then_some(most);
         let Scene { name, setup, solve, iterations, .. } = scene;
         let cells = scene.rows.len() as f64 * 1e-6;
-        let name = format!("pressure of a {name} in {n}³ cells");
-        table.add(format!("{name} to {TOLERANCE:.0e}"), *solve, most, " ms", format!("{iterations} iterations"));
+        table.add(
+            format!("{name} in {n}³ cells to {TOLERANCE:.0e}"),
+            *solve,
+            most,
+            " ms",
+            format!("{iterations} iterations"),
+        );
         table.add("its set-up", *setup, most.map(|_| 100.0), " ms", format!("{cells:.1} million cells stored"));
     }
 }

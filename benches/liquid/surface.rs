@@ -41,7 +41,8 @@ pub(crate) fn extraction(extent: Extent, table: &mut Table) {
                 least = least.min(watch.wall().as_secs_f64() * 1e3);
             }
             let beside = format!("{vertices} points, {:.0} a ms", vertices as f64 / least);
-            table.add(format!("mesh of a {name} in {size}³ cells, {threads} threads"), least, None, " ms", beside);
+            let on = if threads == 1 { "one thread" } else { "two threads" };
+            table.add(format!("mesh of a {name} in {size}³ cells on {on}"), least, None, " ms", beside);
         }
     }
 }
