@@ -10,7 +10,8 @@ pub fn open_share(distances: [f32; 4]) -> f32 {
     if share < LEAST_OPEN_SHARE { 0.0 } else { share }
 }
 
-fn share_above(s: [f32; 4]) -> f32 {
+/// The share of a square where a function that has these values at its corners is above 0; exact where that edge is straight.
+pub(crate) fn share_above(s: [f32; 4]) -> f32 {
     let above = s.map(|s| s > 0.0);
     let is_saddle = above[0] == above[2] && above[1] == above[3] && above[0] != above[1];
     // Through a saddle runs a band of what the middle is.

@@ -195,7 +195,9 @@ impl Run {
         for account in liquid.sinks() {
             self.targets.add(-account.moved, Some(account.place));
         }
-        self.targets.add(-report.left_domain, None);
+        for outflow in liquid.outflow() {
+            self.targets.add(-outflow.volume, Some(outflow.place()));
+        }
         let accounts = liquid.sources().iter().chain(liquid.sinks());
         self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
         let domain = domain(cx);

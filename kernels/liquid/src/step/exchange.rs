@@ -180,7 +180,7 @@ impl<'a> Exchange<'a> {
     }
 
     fn cell_volume(&self) -> f64 {
-        self.settings.cell * self.settings.cell * self.settings.cell
+        self.settings.cell_volume()
     }
 }
 

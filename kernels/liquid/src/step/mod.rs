@@ -31,6 +31,7 @@ mod domain;
 mod exchange;
 mod force;
 mod motion;
+mod outflow;
 mod pour;
 mod project;
 mod shape_cells;
@@ -43,6 +44,7 @@ mod turned;
 
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
+pub use outflow::Outflow;
 pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
 pub use substep::{Moving, Surface, Surroundings};
 
@@ -148,6 +150,11 @@ impl LiquidSettings {
             scheme: Scheme::MacCormack,
             splitting: Splitting::KeepsSpin,
         }
+    }
+
+    /// The volume of a cell, m³.
+    pub(crate) fn cell_volume(&self) -> f64 {
+        self.cell * self.cell * self.cell
     }
 }
 
@@ -289,6 +296,7 @@ impl<S: Surface> Liquid<S> {
         let mut report = LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() };
         FlowAccount::start_frame(&mut self.motion.sources, around.sources.len());
         FlowAccount::start_frame(&mut self.motion.sinks, around.sinks.len());
+        self.motion.outflow.clear();
         let mut left = seconds;
         while left > 0.0 && !(around.cancelled)() {
             let gravity = (around.gravity)(seconds - left);
@@ -306,6 +314,7 @@ impl<S: Surface> Liquid<S> {
             report.add(&done);
             left = after;
         }
+        Outflow::merge(&mut self.motion.outflow);
         let moved = |accounts: &[FlowAccount]| accounts.iter().map(|account| account.moved).sum();
         (report.sourced, report.sunk) = (moved(self.sources()), moved(self.sinks()));
         report
@@ -319,6 +328,11 @@ impl<S: Surface> Liquid<S> {
     /// What each sink took in the last frame.
     pub fn sinks(&self) -> &[FlowAccount] {
         &self.motion.sinks
+    }
+
+    /// What flowed out through open walls in the last frame.
+    pub fn outflow(&self) -> &[Outflow] {
+        &self.motion.outflow
     }
 
     /// The time in which the fastest liquid moves `cfl` cells, where gravity makes it faster meanwhile.

@@ -8,6 +8,7 @@ use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows, Images};
 use crate::step::domain::{Domain, Obstacle};
+use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
@@ -41,6 +42,8 @@ pub struct Motion {
     pub(super) sources: Vec<FlowAccount>,
     /// The same of sinks.
     pub(super) sinks: Vec<FlowAccount>,
+    /// What flowed out through open walls in the last frame.
+    pub(super) outflow: Vec<Outflow>,
     pub(super) tracers: TracerPoints,
     /// Where not all of the liquid is made of the same.
     pub(super) materials: Option<MaterialPoints>,

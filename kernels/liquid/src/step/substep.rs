@@ -3,14 +3,15 @@
 use numerics::vector::{Vec3, scale};
 
 use crate::level_set::PhiView;
-use crate::rows::{Cell, CellRows, Periods};
+use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::motion::{Gain, LiquidCells, Motion};
+use crate::step::outflow::outflow;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource};
 use crate::step::turned;
-use crate::step::{LiquidReport, LiquidSettings, Splitting, Wall};
+use crate::step::{LiquidReport, LiquidSettings, Splitting};
 use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
 
 /// What is around a liquid.
@@ -110,6 +111,9 @@ pub(super) fn substep<S: Surface>(
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     let periods = settings.domain.periods();
     let flow = Moving { velocity: &velocity, step, periods };
+    let outflow = outflow(&settings.domain, surface.view(), &flow, solid, settings.cell_volume());
+    let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
+    motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
     surface.advance(&flow, reach);
     if let Some(solid) = solid {
@@ -148,7 +152,7 @@ pub(super) fn substep<S: Surface>(
     report.cfl_reached = f64::from(way);
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.count;
-    report.left_domain = outflow(settings, &cells, &faces) * seconds * settings.cell * settings.cell;
+    report.left_domain = left_domain;
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
@@ -183,23 +187,4 @@ fn continued(
             (MacVelocity::new(rows, velocity), None)
         }
     }
-}
-
-/// What flows out through open walls, m/s · faces.
-fn outflow(settings: &LiquidSettings, cells: &LiquidCells, faces: &FaceFields<f32>) -> f64 {
-    let domain = &settings.domain;
-    if domain.walls.as_flattened().iter().all(|wall| *wall != Wall::Open) {
-        return 0.0;
-    }
-    let rows: &CellRows = &cells.rows;
-    let mut sum = 0.0;
-    for (at, cell) in rows.iter().enumerate().filter(|(at, _)| cells.images.is_home(*at)) {
-        for axis in 0..3 {
-            if cells.moving[at] >> axis & 1 == 1 && domain.wall_at(axis, cell) == Some(Wall::Open) {
-                let outward = if cell[axis] == domain.low[axis] { -1.0 } else { 1.0 };
-                sum += outward * f64::from(cells.open[axis][at]) * f64::from(faces[axis][at]);
-            }
-        }
-    }
-    sum
 }

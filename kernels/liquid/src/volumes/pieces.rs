@@ -93,6 +93,9 @@ impl Pieces {
 
     /// The piece closest to a place in surface cells, and how far from it its closest cell is.
     pub(super) fn closest(&self, place: Vec3) -> Option<(usize, f32)> {
+        if let Some(piece) = self.of_cell(place.map(floor)) {
+            return Some((piece as usize, 0.0));
+        }
         let mut closest: Option<(usize, f32)> = None;
         for ([y, z], span) in self.inside.spans() {
             let beyond = |at: f32, low: i32, high: i32| (low as f32 - at).max(at - high as f32).max(0.0);

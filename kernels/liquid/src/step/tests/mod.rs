@@ -4,6 +4,7 @@ mod dam;
 mod decoupled;
 mod force;
 mod materials;
+mod outflow;
 mod periodic;
 mod plain;
 mod pushed;
