@@ -98,9 +98,15 @@ impl<'a> ShapeCells<'a> {
         }
     }
 
-    /// φ with the shape taken away.
+    /// φ with the shape taken away where it is not in a solid: what goes on inside one would be taken again and again.
     pub(super) fn emptied(&self) -> impl Fn(Vec3, f32) -> f32 + Sync {
-        move |point, phi| phi.max(-self.distance(point))
+        move |point, phi| {
+            let distance = self.distance(point);
+            match self.solid {
+                Some(solid) if -distance > phi => phi.max(solid.distance(point).min(-distance)),
+                _ => phi.max(-distance),
+            }
+        }
     }
 
     /// φ of the cells; beyond walls that next to them.

@@ -32,7 +32,7 @@ pub const LEAST_ERROR: f64 = 1e-5;
 /// The farthest that a surface is moved in a frame, in surface cells.
 pub const CAP: f64 = 0.1;
 /// Times that a surface is moved in a frame, at most, each at most half as far as the one before.
-const PASSES: u32 = 4;
+const PASSES: u32 = 6;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
 const BESIDE: f32 = 4.0;
 
@@ -137,22 +137,24 @@ impl VolumeTargets {
         let unit = self.unit(surface);
         let (mut found, mut lost) = self.follow(surface, solid);
         let (mut cap, mut moved) = (0.5 * CAP, 0.0);
+        let mut responses = vec![1.0; found.all.len()];
         for _ in 0..PASSES {
             let by: Vec<f64> = found
                 .all
                 .iter()
                 .zip(&self.pieces)
-                .map(|(piece, target)| shift(piece, target.volume / unit, cap))
+                .zip(&responses)
+                .map(|((piece, target), response)| shift(piece, target.volume / unit, *response, cap))
                 .collect();
             let farthest = by.iter().fold(0.0_f64, |most, by| most.max(by.abs()));
             if farthest == 0.0 {
                 break;
             }
-            let before = found.volume();
-            let by: Vec<f32> = by.iter().map(|by| *by as f32).collect();
-            found.shift(surface, &by);
+            let shifts: Vec<f32> = by.iter().map(|by| *by as f32).collect();
+            found.shift(surface, &shifts);
             let (now, vanished) = self.follow(surface, solid);
-            self.corrected += unit * (now.volume() - before);
+            self.corrected += unit * (now.volume() - found.volume());
+            responses = now.responses(&found, &by, &responses);
             // What vanished by a shift was not lost by the solver.
             self.corrected += vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
             lost.extend(vanished);
@@ -212,17 +214,10 @@ impl VolumeTargets {
         let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.volume).collect();
         let volumes: Vec<f64> = found.all.iter().map(|piece| unit * piece.volume).collect();
         let mut shares = passed_on(&targets, &passages, &volumes);
-        unknown.iter().for_each(|piece| shares[*piece] = volumes[*piece]);
-        let unknown_volume = unknown.iter().fold(0.0, |sum, piece| sum + volumes[*piece]);
         let mut is_lost = vec![true; self.pieces.len()];
         passages.iter().for_each(|passage| is_lost[passage.old] = false);
         let mut lost = self.lost(surface, &is_lost);
-        // Liquid that was too fast to be followed: it is not there twice.
-        let mut elsewhere = unknown_volume;
-        for piece in &mut lost {
-            let found_again = piece.volume.min(elsewhere);
-            (piece.volume, elsewhere) = (piece.volume - found_again, elsewhere - found_again);
-        }
+        find_again(&unknown, &volumes, &mut lost, &mut shares);
         self.apply(&found, &mut shares, &mut lost, size);
         let on_lost = |old: &u32| is_lost.get(*old as usize).is_some_and(|is_lost| *is_lost);
         let drop: Vec<bool> = surface.markers().pieces().iter().map(on_lost).collect();
@@ -326,6 +321,18 @@ impl VolumeTargets {
     }
 }
 
+/// Gives pieces of unknown origin what was lost elsewhere, up to their volumes: liquid that was too fast to be followed. What
+/// is more than that is nobody's, and correction takes it away.
+fn find_again(unknown: &[usize], volumes: &[f64], lost: &mut [LostPiece], shares: &mut [f64]) {
+    for piece in unknown {
+        for lost in lost.iter_mut() {
+            let found = lost.volume.min(volumes[*piece] - shares[*piece]);
+            lost.volume -= found;
+            shares[*piece] += found;
+        }
+    }
+}
+
 /// Adds to a volume, which stays at 0 or above; returns what could not be taken from it.
 fn change_by(volume: &mut f64, by: f64) -> f64 {
     let sum = *volume + by;
@@ -333,13 +340,14 @@ fn change_by(volume: &mut f64, by: f64) -> f64 {
     sum.min(0.0)
 }
 
-/// How far outward, in surface cells, the surface of a piece has to move; at most `cap`.
-fn shift(piece: &Measured, target: f64, cap: f64) -> f64 {
+/// How far outward, in surface cells, the surface of a piece has to move; at most `cap`. `response`: how much its volume
+/// changes ÷ area · way.
+fn shift(piece: &Measured, target: f64, response: f64, cap: f64) -> f64 {
     let error = target - piece.volume;
     if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
         return 0.0;
     }
-    (error / piece.area).clamp(-cap, cap)
+    (error / (response * piece.area)).clamp(-cap, cap)
 }
 
 /// The piece of each marker.

@@ -16,6 +16,10 @@ use crate::sets::Sets;
 const NEAR: f32 = 3.0;
 /// Steps down the slope of φ to the piece that it belongs to.
 const DESCENT: usize = 5;
+/// A piece whose volume changed by more than this share is another.
+const SAME: f64 = 0.1;
+/// Bounds of how much a volume changes ÷ area · way.
+const RESPONSES: [f64; 2] = [0.5, 4.0];
 
 /// A piece as it was measured, in surface cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,6 +73,24 @@ impl Pieces {
     /// The volume of all, in surface cells.
     pub(super) fn volume(&self) -> f64 {
         self.all.iter().fold(0.0, |sum, piece| sum + piece.volume)
+    }
+
+    /// How much the volume of each piece changed ÷ area · way, where `by` is the way of each surface since `before`. Films on
+    /// solids open and close holes, and so respond more than their area says. What did not move responds as it did.
+    pub(super) fn responses(&self, before: &Self, by: &[f64], known: &[f64]) -> Vec<f64> {
+        let of_piece = |piece: &Measured| {
+            let away = |n: &usize| length(sub(before.all[*n].place, piece.place));
+            let same = (0..before.all.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
+            let change = piece.volume - before.all[same].volume;
+            if change.abs() > SAME * piece.volume {
+                return None;
+            }
+            match by[same] == 0.0 {
+                true => Some(known[same]),
+                false => Some((change / (by[same] * before.all[same].area)).clamp(RESPONSES[0], RESPONSES[1])),
+            }
+        };
+        self.all.iter().map(|piece| of_piece(piece).unwrap_or(1.0)).collect()
     }
 
     /// The piece of a cell inside.

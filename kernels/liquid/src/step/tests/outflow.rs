@@ -18,7 +18,6 @@ fn liquid_leaves_through_open_walls_as_it_is_told() {
     assert!(left > 0.3 * start && (start - now - left).abs() < 0.02 * start, "{start} {now} {left}");
 }
 
-
 /// A ball that flies through a corner of two open walls: what leaves is what it has lost, after every frame and in the end.
 #[test]
 fn what_leaves_through_open_walls_is_counted_at_any_substep() {
