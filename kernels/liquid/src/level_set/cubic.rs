@@ -6,7 +6,7 @@ pub(crate) type Block = [f32; 64];
 
 /// Weights of four values, and of the derivative, at `t` between the second and the third.
 #[inline(always)]
-fn weights(t: f32) -> [[f32; 4]; 2] {
+pub(crate) fn weights(t: f32) -> [[f32; 4]; 2] {
     let (t2, t3) = (t * t, t * t * t);
     [
         [t2 - 0.5 * (t + t3), 1.0 - 2.5 * t2 + 1.5 * t3, 0.5 * t + 2.0 * t2 - 1.5 * t3, 0.5 * (t3 - t2)],

@@ -32,7 +32,7 @@ mod seed;
 mod tests;
 
 use numerics::random::Key;
-use numerics::vector::{Vec3, add, cross, length, perpendicular, scale, sub, unit};
+use numerics::vector::{Vec3, add, cross, dot, length, perpendicular, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -78,6 +78,10 @@ const LOST: f32 = 1.5;
 const CHANGED: f32 = 0.05;
 /// Distance from a marker at which that counts, too.
 const BESIDE: f32 = 0.5;
+/// φ of liquid so deep that only what cuts it away decides what it is changed to: minus this.
+const DEEP: f32 = 1e3;
+/// Distance from the face of a cut at which a marker is on it.
+const CLOSE: f32 = 0.3;
 /// Markers that one thread moves at a time.
 const CHUNK: usize = 512;
 /// Beyond this much [`one_sided`], a point lies beyond the rim of the markers around it.
@@ -194,9 +198,25 @@ impl Markers {
             .collect();
         let order: Vec<u32> = (0..self.markers.len() as u32).filter(|n| on_surface[*n as usize]).collect();
         self.reorder(&order);
+        // On the face of a cut: what markers kept of an older one there would come back after each cut.
+        let is_on_cut = |at: Vec3| is_in(at) && change(at, -DEEP).abs() < CLOSE;
+        let on_cut: Vec<bool> = self.markers.par_iter().map(|marker| is_on_cut(marker.point)).collect();
         set.change(low, high, change);
         set.fill();
+        self.project(set, &on_cut);
         self.upkeep(set);
+    }
+
+    /// Moves those of the markers onto φ = 0, where φ is smooth, and turns them its way.
+    fn project(&mut self, set: &LevelSet, which: &[bool]) {
+        let view = set.view();
+        let project = |sampler: &mut PhiSampler<'_>, (marker, which): (&mut Marker, &bool)| {
+            let (phi, gradient) = if *which { sampler.gradient(marker.point) } else { return };
+            if let Some(normal) = unit(gradient).filter(|_| seed::DISTANCE.contains(&dot(gradient, gradient))) {
+                *marker = Marker { point: sub(marker.point, scale(normal, phi)), normal };
+            }
+        };
+        self.markers.par_iter_mut().zip(which).for_each_init(|| PhiSampler::new(view), project);
     }
 
     /// Changes the attributes of each marker, one number after the other, to what `edit` makes of its place and of them.

@@ -14,7 +14,7 @@ use crate::level_set::{LevelSet, RowBlocks};
 use crate::rows::Cell;
 
 /// Squares of |∇φ| between which φ is a distance. Elsewhere, as between two sheets, a projection misses the surface.
-const DISTANCE: Range<f32> = 0.64..1.56;
+pub(super) const DISTANCE: Range<f32> = 0.64..1.56;
 /// Points tried for each marker.
 const TRIES: usize = 3;
 /// Steps of Newton's method onto the surface.

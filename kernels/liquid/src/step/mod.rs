@@ -30,6 +30,7 @@
 mod domain;
 mod exchange;
 mod force;
+mod fullness;
 mod motion;
 mod outflow;
 mod pour;

@@ -6,6 +6,7 @@ use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Obstacle};
+use crate::step::fullness::{Neighbours, fullness};
 use crate::step::sources::SourceShape;
 use crate::velocity::Site;
 
@@ -23,6 +24,9 @@ const LEAST_FILL: f32 = 1.0;
 
 /// Changes of volume that count, in cells.
 const LEAST_VOLUME: f64 = 1e-5;
+
+/// Share of a cell that is taken, at least.
+const LEAST_TAKEN: f32 = 0.1;
 
 /// The shape of a source or sink at one time, on the cells around it.
 pub(super) struct ShapeCells<'a> {
@@ -117,10 +121,37 @@ impl<'a> ShapeCells<'a> {
         })
     }
 
-    /// How much liquid the cells hold, ÷ cell³.
+    /// How much liquid the cells hold, ÷ cell³, by φ in parts of them.
     pub(super) fn volume(&self, phi: &[f32]) -> f64 {
-        let [nx, ny, nz] = self.size;
+        let held = |at: usize, cell: Cell| {
+            if self.open[at] > 0.0 { self.open[at] * fullness(&self.around(phi, cell)) } else { 0.0 }
+        };
+        let [held] = self.rows.tabulate_with(|| (), |(), cell, at| [held(at, cell)]);
+        held.iter().fold(0.0, |sum, held| sum + f64::from(*held))
+    }
+
+    /// φ around a cell; beyond the cells, that of the last ones.
+    fn around(&self, phi: &[f32], cell: Cell) -> Neighbours {
+        let [nx, ny, _] = self.size;
+        std::array::from_fn(|n| {
+            let [x, y, z] = std::array::from_fn(|axis| {
+                let away = (n / [1, 5, 25][axis] % 5) as i32 - 2;
+                (cell[axis] - self.low[axis] + away).clamp(0, self.size[axis] as i32 - 1) as usize
+            });
+            phi[(z * ny + y) * nx + x]
+        })
+    }
+
+    /// The same, roughly, by φ at their centres.
+    fn rough_volume(&self, phi: &[f32]) -> f64 {
         let mut sum = 0.0;
+        self.for_each_share(phi, |_, share| sum += f64::from(share));
+        sum
+    }
+
+    /// Calls `f` with how full of liquid each cell is, in the order of fields.
+    fn for_each_share(&self, phi: &[f32], mut f: impl FnMut(usize, f32)) {
+        let [nx, ny, nz] = self.size;
         for z in 0..nz {
             for y in 0..ny {
                 let row = (z * ny + y) * nx;
@@ -135,23 +166,22 @@ impl<'a> ShapeCells<'a> {
                         + (phi[row + x.saturating_sub(1)] + phi[row + (x + 1).min(nx - 1)]);
                     // The mean of φ over the cell: exact where φ bends as a sphere's does.
                     let mean = 0.75 * phi[row + x] + (1.0 / 24.0) * around;
-                    sum += f64::from((0.5 - mean).clamp(0.0, 1.0) * self.open[row + x]);
+                    f(row + x, (0.5 - mean).clamp(0.0, 1.0) * self.open[row + x]);
                 }
             }
         }
-        sum
     }
 
     /// How far the shape must shrink so that filling it adds `most`, ÷ cell³; 0 where all of it adds no more. None where
     /// not even the least piece of it can be filled.
     pub(super) fn shrunk_to(&self, phi: &[f32], most: f64) -> Option<f32> {
-        let before = self.volume(phi);
+        let before = self.rough_volume(phi);
         let mut filled = vec![0.0; phi.len()];
         let mut added = |shrink: f32| {
             for ((filled, phi), reached) in filled.iter_mut().zip(phi).zip(&self.reached) {
                 *filled = phi.min(reached + shrink);
             }
-            self.volume(&filled) - before
+            self.rough_volume(&filled) - before
         };
         if added(0.0) <= most.max(LEAST_VOLUME) {
             return Some(0.0);
@@ -172,13 +202,18 @@ impl<'a> ShapeCells<'a> {
     /// Whether filling the shape, shrunk, adds liquid.
     pub(super) fn adds(&self, phi: &[f32], shrink: f32) -> bool {
         let filled: Vec<f32> = phi.iter().zip(&self.reached).map(|(phi, reached)| phi.min(reached + shrink)).collect();
-        self.volume(&filled) - self.volume(phi) > LEAST_VOLUME
+        self.rough_volume(&filled) - self.rough_volume(phi) > LEAST_VOLUME
     }
 
-    /// Whether there is liquid in the shape that emptying it takes.
+    /// Whether there is liquid in the shape to take: enough of a cell that a surface which is cut and made anew does not lose
+    /// it again and again without moving.
     pub(super) fn takes(&self, phi: &[f32]) -> bool {
         let emptied: Vec<f32> = phi.iter().zip(&self.distance).map(|(phi, distance)| phi.max(-distance)).collect();
-        self.volume(phi) - self.volume(&emptied) > LEAST_VOLUME
+        let mut share = vec![0.0; phi.len()];
+        self.for_each_share(phi, |at, full| share[at] = full);
+        let mut most = 0.0_f32;
+        self.for_each_share(&emptied, |at, left| most = most.max(share[at] - left));
+        most > LEAST_TAKEN
     }
 
     /// The liquid cells whose middle is in the shape, the deepest first.

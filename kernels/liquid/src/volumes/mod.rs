@@ -32,7 +32,7 @@ pub const LEAST_ERROR: f64 = 1e-5;
 /// The farthest that a surface is moved in a frame, in surface cells.
 pub const CAP: f64 = 0.1;
 /// Times that a surface is moved in a frame, at most, each at most half as far as the one before.
-const PASSES: u32 = 6;
+const PASSES: u32 = 8;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
 const BESIDE: f32 = 4.0;
 

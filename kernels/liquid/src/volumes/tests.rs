@@ -318,3 +318,12 @@ fn bits_do_not_depend_on_threads_nor_on_saving() {
     assert!(one.3.moved > 0.0);
     assert!(one == run(2, false) && one == run(7, false) && one == run(2, true));
 }
+
+/// Liquid too fast to be followed is found again, but no more than was lost.
+#[test]
+fn pieces_of_unknown_origin_have_what_was_lost() {
+    let lost_piece = |volume: f64| LostPiece { volume, place: [0.0; 3] };
+    let (mut lost, mut shares) = ([lost_piece(2.0), lost_piece(3.0)], vec![7.0, 0.0, 0.0]);
+    find_again(&[1, 2], &[7.0, 1.5, 9.0], &mut lost, &mut shares);
+    assert_eq!((shares, lost.map(|piece| piece.volume)), (vec![7.0, 1.5, 3.5], [0.0, 0.0]));
+}

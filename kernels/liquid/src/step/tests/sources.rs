@@ -346,3 +346,25 @@ fn sources_resume_and_run_on_any_number_of_threads_with_the_same_bits() {
         assert!(bits(&other) == bits(&whole) && other.motion() == whole.motion());
     }
 }
+
+/// A sink beside a block that does not flow takes what is in its shape, once. The face that it cuts is made anew each substep:
+/// what markers keep of it must not come back to be taken again.
+#[test]
+fn a_sink_beside_a_stiff_block_takes_its_part_once() {
+    let floor = |_: f64, p: Vec3| p[1] - 2.0;
+    for height in [0.0, 2.0] {
+        let domain = Domain::closed([0; 3], [30, 12, 12]);
+        let solid = (height > 0.0).then(|| Solid::still(&floor));
+        let surface = marked(domain, |p| p[1] - height - 3.0);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.02), surface);
+        let drain = |_: f64, p: Vec3| (22.0 - p[0]).max(p[1] - height - 4.0);
+        let sinks = [LiquidSink::new(shape(&drain), None)];
+        let around = Surroundings { sinks: &sinks, solid, ..Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 1e7) };
+        let part = 8.0 * 3.0 * 12.0 * 0.02_f64.powi(3);
+        let mut taken = 0.0;
+        for frame in 0..24 {
+            taken += liquid.step_frame(&around, FRAME).sunk;
+            assert!((taken / part - 1.0).abs() < 0.02, "{height} {frame}: {taken} {part}");
+        }
+    }
+}
