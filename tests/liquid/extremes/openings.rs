@@ -45,8 +45,8 @@ fn extreme_sources_give_or_tell() {
             from,
         )
         .fastest(2000.0)
-        .drift(0.5)
-        .noted(&["caps_hit"]),
+        .drift(1.0)
+        .noted(&["caps_hit", "volume_drift"]),
         sourced(
             "a source in a sealed box that is full",
             &rated("in_box"),

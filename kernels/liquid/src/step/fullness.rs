@@ -51,7 +51,7 @@ fn part_weights() -> [[f32; 5]; PARTS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numerics::vector::length;
+    use numerics::vector::{add, length};
 
     /// φ around a cell whose centre is at 0.
     fn around(phi: impl Fn([f32; 3]) -> f32) -> Neighbours {
@@ -79,7 +79,7 @@ mod tests {
             let mut sum = 0.0;
             for n in 0..20_i32.pow(3) {
                 let cell = [n % 20, n / 20 % 20, n / 400].map(|i| (i - 10) as f32 + 0.3);
-                sum += fullness(&around(|p| length([p[0] + cell[0], p[1] + cell[1], p[2] + cell[2]]) - radius));
+                sum += fullness(&around(|p| length(add(p, cell)) - radius));
             }
             let exact = 4.0 / 3.0 * std::f32::consts::PI * radius * radius * radius;
             near(sum / exact, 1.0, by);
