@@ -87,8 +87,8 @@ impl OpenWall<'_> {
             face[self.axis] += self.side as i32;
             let way = way(Site::FACES[self.axis].of(face));
             let out = outward * way[self.axis];
-            let deepest = self.view.rows.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
-            if out == 0.0 || deepest > 1.0 + out.abs() {
+            let phi = self.view.rows.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
+            if out == 0.0 || phi > 1.0 + out.abs() {
                 return 0.0;
             }
             let corners = self.corners(face);

@@ -360,7 +360,7 @@ fn a_sink_beside_a_stiff_block_takes_its_part_once() {
         let drain = |_: f64, p: Vec3| (22.0 - p[0]).max(p[1] - height - 4.0);
         let sinks = [LiquidSink::new(shape(&drain), None)];
         let around = Surroundings { sinks: &sinks, solid, ..Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 1e7) };
-        let part = 8.0 * 3.0 * 12.0 * 0.02_f64.powi(3);
+        let part = 8.0 * 3.0 * 12.0 * 8e-6;
         let mut taken = 0.0;
         for frame in 0..24 {
             taken += liquid.step_frame(&around, FRAME).sunk;
