@@ -5,9 +5,9 @@
 //! untouched; every row is independent, so any number of threads gives the same bits. Limit: a quaternion expresses
 //! rotations only, so orientations follow the rotation and neither scale nor mirror.
 
+use crate::parallel;
 use crate::vector::{DMat3, DQuat, DVec3, direction, to_f32, to_f64, unit_quaternion};
 use nalgebra::Quaternion;
-use rayon::prelude::*;
 
 /// Rows a thread takes at a time.
 const CHUNK: usize = 4096;
@@ -134,7 +134,7 @@ impl Linear {
 }
 
 fn each<T: Copy + Send + Sync>(rows: &mut [T], map: impl Fn(T) -> T + Sync) {
-    rows.par_chunks_mut(CHUNK).for_each(|rows| rows.iter_mut().for_each(|row| *row = map(*row)));
+    parallel::for_each(rows.chunks_mut(CHUNK), |_, rows| rows.iter_mut().for_each(|row| *row = map(*row)));
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ pub mod affine;
 pub mod lanes;
 pub mod masked;
 pub mod noise;
+pub mod parallel;
 pub mod point_tree;
 pub mod ramp;
 pub mod random;

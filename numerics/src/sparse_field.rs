@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::parallel;
 
 mod cursor;
 #[cfg(test)]
@@ -19,6 +19,9 @@ pub const BLOCK_EDGE: u32 = 8;
 
 /// Nodes of a block.
 pub const BLOCK_NODES: usize = (BLOCK_EDGE * BLOCK_EDGE * BLOCK_EDGE) as usize;
+
+/// Blocks that a thread takes at a time.
+const TASK: usize = 16;
 
 /// Most nodes along an axis.
 pub const MAX_NODES: u32 = 1 << 24;
@@ -123,7 +126,7 @@ impl SparseField {
         keys.sort_unstable();
         keys.dedup();
         let mut values = vec![background; keys.len() * BLOCK_NODES];
-        values.as_chunks_mut::<BLOCK_NODES>().0.par_iter_mut().zip(&keys).for_each(|(values, key)| {
+        parallel::for_each(values.as_chunks_mut().0.iter_mut().zip(&keys), |_, (values, key)| {
             let block = block_of(*key);
             fill(block, values);
             clear_outside(size, background, block, values);
@@ -148,8 +151,8 @@ impl SparseField {
             let is_other = |row: &[f32]| row.iter().any(|x| x.to_bits() != background.to_bits());
             rows(size, *block).any(|(start, _, width)| is_other(&values[start..start + width]))
         };
-        let stored: Vec<_> = (0..blocks[2]).into_par_iter().flat_map_iter(|z| slab(z).filter(is_stored)).collect();
-        Self::from_blocks(size, background, stored, |block, out| {
+        let stored = parallel::map(0..blocks[2], |_, z| slab(z).filter(is_stored).collect::<Vec<_>>());
+        Self::from_blocks(size, background, stored.into_iter().flatten(), |block, out| {
             for (start, at, width) in rows(size, block) {
                 out[at..at + width].copy_from_slice(&values[start..start + width]);
             }
@@ -226,7 +229,9 @@ impl SparseField {
     /// Puts every value, the background too, through `change`. The array is copied first if another field shares it.
     pub fn edit(&mut self, change: impl Fn(f32) -> f32 + Sync) {
         self.background = change(self.background);
-        Arc::make_mut(&mut self.values).par_iter_mut().for_each(|value| *value = change(*value));
+        parallel::for_each(Arc::make_mut(&mut self.values).chunks_mut(TASK * BLOCK_NODES), |_, values| {
+            values.iter_mut().for_each(|value| *value = change(*value));
+        });
         self.drop_background();
     }
 
@@ -281,7 +286,8 @@ impl SparseField {
     fn drop_background(&mut self) {
         let background = self.background.to_bits();
         let is_stored = |block: &FieldBlock| block.iter().any(|x| x.to_bits() != background);
-        let stored: Vec<bool> = self.values.as_chunks().0.par_iter().map(is_stored).collect();
+        let blocks = self.values.as_chunks().0;
+        let stored = parallel::tabulate(blocks.len(), TASK, |n| is_stored(&blocks[n]));
         if stored.iter().all(|is_stored| *is_stored) {
             return;
         }

@@ -4,8 +4,8 @@
 //! no precision; sums in fixed chunks, so the same bits on any number of threads. Limit: a surface that crosses itself
 //! counts a region as often as it winds around it. m³ from metres; negative where tets or faces are inside out.
 
+use crate::parallel;
 use crate::vector::{DVec3, to_f64};
-use rayon::prelude::*;
 
 /// Terms of a sum that one thread adds up.
 const CHUNK: usize = 4096;
@@ -20,7 +20,7 @@ pub fn six_volumes([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
 /// # Panics
 /// Where a corner is not an index of `points`.
 pub fn of_tets(points: &[[f32; 3]], tets: &[[u32; 4]]) -> f64 {
-    sum(tets.par_chunks(CHUNK), |tet| six_volumes(tet.map(|corner| points[corner as usize]))) / 6.0
+    sum(tets, |tet| six_volumes(tet.map(|corner| points[corner as usize]))) / 6.0
 }
 
 /// The volume enclosed by polygons: face i has the points `corners[starts[i]..starts[i + 1]]`. A face that is not flat
@@ -40,7 +40,7 @@ pub fn enclosed(starts: &[u32], corners: &[u32], points: &[[f32; 3]]) -> Option<
         let Some((first, rest)) = face.split_first() else { return 0.0 };
         rest.windows(2).map(|pair| triple(at(*first), at(pair[0]), at(pair[1]))).sum()
     };
-    Some(sum(faces.par_chunks(CHUNK), fan) / 6.0)
+    Some(sum(&faces, fan) / 6.0)
 }
 
 /// Whether every edge of the polygons is used equally often in both directions.
@@ -52,18 +52,13 @@ fn is_closed(starts: &[u32], corners: &[u32]) -> bool {
         forward.extend((0..face.len()).map(|k| edge(face[k], face[(k + 1) % face.len()])));
     }
     let mut backward: Vec<u64> = forward.iter().map(|edge| edge.rotate_left(32)).collect();
-    forward.par_sort_unstable();
-    backward.par_sort_unstable();
+    parallel::for_each([&mut forward, &mut backward], |_, edges| edges.sort_unstable());
     forward == backward
 }
 
 /// Adds up the terms of each chunk, then the chunks in their order.
-fn sum<'a, T: Sync + 'a>(
-    chunks: impl IndexedParallelIterator<Item = &'a [T]>,
-    term: impl Fn(&T) -> f64 + Sync + Send,
-) -> f64 {
-    let sums: Vec<f64> = chunks.map(|chunk| chunk.iter().map(&term).sum()).collect();
-    sums.iter().sum()
+fn sum<T: Sync>(terms: &[T], term: impl Fn(&T) -> f64 + Sync) -> f64 {
+    parallel::map(terms.chunks(CHUNK), |_, chunk| chunk.iter().map(&term).sum::<f64>()).iter().sum()
 }
 
 fn from(origin: [f32; 3], p: [f32; 3]) -> DVec3 {

@@ -2,9 +2,9 @@
 
 use super::{Block, Boxes, LANES, MOST_LEVELS, NONE, TriangleTree};
 use crate::lanes::{F32x16, get};
+use crate::parallel;
 use crate::simd::{Path, kernel};
 use crate::vector::{self, Vec3, cross, dot, scale, sub};
-use rayon::prelude::*;
 
 /// The nearest point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,8 +46,8 @@ impl TriangleTree {
     /// [`TriangleTree::closest_each`] on a given SIMD path.
     pub fn closest_each_on(&self, path: Path, from: &[Vec3], reach: f32) -> Vec<Option<Closest>> {
         let mut out = vec![None; from.len()];
-        let chunks = out.par_chunks_mut(TASK).zip(from.par_chunks(TASK));
-        chunks.for_each(|(out, from)| closest_chunk(path, self, from, reach, out));
+        let chunks = out.chunks_mut(TASK).zip(from.chunks(TASK));
+        parallel::for_each(chunks, |_, (out, from)| closest_chunk(path, self, from, reach, out));
         out
     }
 

@@ -15,9 +15,9 @@ mod split;
 mod visit;
 
 use crate::lanes::{F32x16, LANES, Lanes, set};
+use crate::parallel;
 use crate::vector::Vec3;
 pub use closest::Closest;
-use rayon::prelude::*;
 pub use visit::{Cuboid, Region, Walk};
 
 /// The index of a lane that holds no triangle.
@@ -76,7 +76,7 @@ impl TriangleTree {
     pub fn build(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let order = split::order(points, triangles);
         let member = |&triangle: &u32| Member { points: triangles[triangle as usize], triangle };
-        let mut tree = Self { members: order.par_iter().map(member).collect(), ..Self::default() };
+        let mut tree = Self { members: order.iter().map(member).collect(), ..Self::default() };
         tree.refit(points);
         tree
     }
@@ -97,8 +97,8 @@ impl TriangleTree {
     /// # Panics
     /// Where there are fewer points than the tree was built on.
     pub fn refit(&mut self, points: &[Vec3]) {
-        let parts = self.members.par_chunks(LANES).with_min_len(TASK);
-        parts.map(|members| Block::of(points, members)).collect_into_vec(&mut self.blocks);
+        self.blocks.resize(self.members.len().div_ceil(LANES), Block::empty());
+        refill(&mut self.blocks, &self.members, |members| Block::of(points, members));
         let mut level = 0;
         let mut rows = self.blocks.len();
         while rows > 1 || (level == 0 && rows > 0) {
@@ -106,15 +106,10 @@ impl TriangleTree {
                 self.levels.push(Vec::new());
             }
             let (below, above) = self.levels.split_at_mut(level);
+            above[0].resize(rows.div_ceil(LANES), Boxes::empty());
             match below.last() {
-                None => {
-                    let parts = self.blocks.par_chunks(LANES).with_min_len(TASK);
-                    parts.map(|blocks| Boxes::around(blocks, Block::bounds)).collect_into_vec(&mut above[0]);
-                }
-                Some(boxes) => {
-                    let parts = boxes.par_chunks(LANES).with_min_len(TASK);
-                    parts.map(|boxes| Boxes::around(boxes, Boxes::bounds)).collect_into_vec(&mut above[0]);
-                }
+                None => refill(&mut above[0], &self.blocks, |blocks| Boxes::around(blocks, Block::bounds)),
+                Some(boxes) => refill(&mut above[0], boxes, |boxes| Boxes::around(boxes, Boxes::bounds)),
             }
             rows = above[0].len();
             level += 1;
@@ -143,7 +138,18 @@ impl TriangleTree {
     }
 }
 
+/// Sets each element to what `value` makes of the sixteen things below it.
+fn refill<T: Send, U: Sync>(elements: &mut [T], below: &[U], value: impl Fn(&[U]) -> T + Sync) {
+    parallel::for_each(elements.chunks_mut(TASK).zip(below.chunks(TASK * LANES)), |_, (elements, below)| {
+        elements.iter_mut().zip(below.chunks(LANES)).for_each(|(element, below)| *element = value(below));
+    });
+}
+
 impl Block {
+    fn empty() -> Self {
+        Self { corners: [[F32x16::splat(0.0); 3]; 3], triangle: [NONE; LANES] }
+    }
+
     /// The block of up to sixteen triangles.
     fn of(points: &[Vec3], members: &[Member]) -> Self {
         let corners = |member: &Member| member.points.map(|point| points[point as usize]);
@@ -182,9 +188,13 @@ impl Block {
 }
 
 impl Boxes {
+    fn empty() -> Self {
+        Self { low: EMPTY_LOW.map(F32x16::splat), high: EMPTY_HIGH.map(F32x16::splat) }
+    }
+
     /// The boxes of up to sixteen items.
     fn around<T>(things: &[T], bounds: impl Fn(&T) -> (Vec3, Vec3)) -> Self {
-        let mut boxes = Self { low: EMPTY_LOW.map(F32x16::splat), high: EMPTY_HIGH.map(F32x16::splat) };
+        let mut boxes = Self::empty();
         for (lane, thing) in things.iter().enumerate() {
             let (low, high) = bounds(thing);
             set(&mut boxes.low, lane, low);
