@@ -10,6 +10,9 @@ use std::sync::Mutex;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
+/// Elements of a piece of work, where each takes some 10 to 100 ns.
+pub const CHUNK: usize = 512;
+
 /// Calls `work` with each piece and its position, in any order.
 pub fn for_each<P: Send>(pieces: impl IntoIterator<Item = P>, work: impl Fn(usize, P) + Sync) {
     let pieces: Vec<_> = pieces.into_iter().map(|piece| Mutex::new(Some(piece))).collect();
@@ -37,9 +40,22 @@ pub fn map<P: Send, T: Send>(pieces: impl IntoIterator<Item = P>, work: impl Fn(
 /// `value` of each number below `count`, in their order, where a value alone is too little for a piece of work: `chunk`
 /// of them are one.
 pub fn tabulate<T: Send>(count: usize, chunk: usize, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    tabulate_with(count, chunk, || (), |(), n| value(n))
+}
+
+/// [`tabulate`] with a state that `start` makes for each piece of work.
+pub fn tabulate_with<T: Send, S>(
+    count: usize,
+    chunk: usize,
+    start: impl Fn() -> S + Sync,
+    value: impl Fn(&mut S, usize) -> T + Sync,
+) -> Vec<T> {
     let starts = (0..count).step_by(chunk);
-    let parts = map(starts, |_, start| (start..count.min(start + chunk)).map(&value).collect::<Vec<_>>());
-    concat(parts, count)
+    let parts = map(starts, |_, first| {
+        let mut state = start();
+        (first..count.min(first + chunk)).map(|n| value(&mut state, n)).collect::<Vec<_>>()
+    });
+    concat(parts)
 }
 
 /// Sets each element to `value` of its position, `chunk` of them in a piece of work.
@@ -50,11 +66,11 @@ pub fn fill<T: Send>(elements: &mut [T], chunk: usize, value: impl Fn(usize) -> 
 }
 
 /// All elements of lists, in their order.
-pub fn concat<T>(mut lists: Vec<Vec<T>>, count: usize) -> Vec<T> {
+pub fn concat<T>(mut lists: Vec<Vec<T>>) -> Vec<T> {
     if lists.len() == 1 {
         return mem::take(&mut lists[0]);
     }
-    let mut all = Vec::with_capacity(count);
+    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
     lists.into_iter().for_each(|list| all.extend(list));
     all
 }

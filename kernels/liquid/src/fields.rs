@@ -1,7 +1,7 @@
 //! Sums and updates of whole fields, in a fixed order and in parallel.
 
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
-use rayon::prelude::*;
 
 /// Values that one thread adds up.
 const CHUNK: usize = 8192;
@@ -19,7 +19,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     if a.len() <= CHUNK {
         return chunk_dot(path, a, b);
     }
-    let sums: Vec<f64> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| chunk_dot(path, a, b)).collect();
+    let sums = parallel::map(a.chunks(CHUNK).zip(b.chunks(CHUNK)), |_, (a, b)| chunk_dot(path, a, b));
     sums.iter().sum()
 }
 
@@ -29,7 +29,7 @@ pub fn largest(a: &[f64]) -> f64 {
     if a.len() <= CHUNK {
         return chunk_largest(path, a);
     }
-    let all: Vec<f64> = a.par_chunks(CHUNK).map(|a| chunk_largest(path, a)).collect();
+    let all = parallel::map(a.chunks(CHUNK), |_, a| chunk_largest(path, a));
     all.into_iter().fold(0.0, f64::max)
 }
 
@@ -43,7 +43,7 @@ pub fn add_scaled(y: &mut [f64], s: f64, x: &[f64]) {
     if y.len() <= CHUNK {
         return chunk_add_scaled(path, y, s, x);
     }
-    y.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).for_each(|(y, x)| chunk_add_scaled(path, y, s, x));
+    parallel::for_each(y.chunks_mut(CHUNK).zip(x.chunks(CHUNK)), |_, (y, x)| chunk_add_scaled(path, y, s, x));
 }
 
 /// yᵢ = xᵢ + s·yᵢ.
@@ -56,7 +56,7 @@ pub fn scale_and_add(y: &mut [f64], s: f64, x: &[f64]) {
     if y.len() <= CHUNK {
         return chunk_scale_and_add(path, y, s, x);
     }
-    y.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).for_each(|(y, x)| chunk_scale_and_add(path, y, s, x));
+    parallel::for_each(y.chunks_mut(CHUNK).zip(x.chunks(CHUNK)), |_, (y, x)| chunk_scale_and_add(path, y, s, x));
 }
 
 kernel! {

@@ -8,7 +8,7 @@ use std::cmp::{max, min};
 use std::mem::take;
 use std::ops::Range;
 
-use rayon::prelude::*;
+use numerics::parallel;
 use serde::{Deserialize, Serialize};
 
 mod periods;
@@ -64,6 +64,12 @@ pub struct CellRows {
     cells: usize,
 }
 
+/// A span with the y and z of its row.
+pub type PlacedSpan = ([i32; 2], RowSpan);
+
+/// What pushes the cells of row (y, z), as half-open ranges of x.
+type RowFill<'a> = dyn Fn(i32, i32, &mut Vec<Range<i32>>) + Sync + 'a;
+
 impl CellRows {
     /// The cells that `fill` pushes, as half-open ranges of x in any order, for each row (y, z) of the box. Rows are
     /// filled in parallel.
@@ -71,8 +77,13 @@ impl CellRows {
     /// # Panics
     /// Where the cells are more than a `u32` counts.
     pub fn from_ranges(low: [i32; 2], size: [i32; 2], fill: impl Fn(i32, i32, &mut Vec<Range<i32>>) + Sync) -> Self {
+        Self::from_filled(low, size, &fill)
+    }
+
+    /// Not generic: compiled once.
+    fn from_filled(low: [i32; 2], size: [i32; 2], fill: &RowFill<'_>) -> Self {
         let size = size.map(|n| max(n, 0));
-        let of_slice = |z: i32| {
+        let slices = parallel::map(low[1]..low[1] + size[1], |_, z| {
             let (mut counts, mut spans, mut row) = (Vec::with_capacity(size[0] as usize), Vec::new(), Vec::new());
             for y in low[0]..low[0] + size[0] {
                 row.clear();
@@ -82,8 +93,7 @@ impl CellRows {
                 counts.push((spans.len() - before) as u32);
             }
             (counts, spans)
-        };
-        let slices: Vec<_> = (low[1]..low[1] + size[1]).into_par_iter().map(of_slice).collect();
+        });
         let mut rows = Self { low, size, first: vec![0], ..Self::default() };
         for (counts, spans) in slices {
             for count in counts {
@@ -102,7 +112,7 @@ impl CellRows {
     /// The cells of a list, in any order, repeats allowed.
     pub fn from_cells(cells: &[Cell]) -> Self {
         let mut sorted: Vec<_> = cells.iter().map(|[x, y, z]| (*z, *y, *x)).collect();
-        sorted.par_sort_unstable();
+        sorted.sort_unstable();
         let Some(((z0, ..), (z1, ..))) = sorted.first().zip(sorted.last()) else { return Self::default() };
         let (y0, y1) = sorted.iter().fold((i32::MAX, i32::MIN), |(low, high), (_, y, _)| (min(low, *y), max(high, *y)));
         Self::from_ranges([y0, *z0], [y1 - y0 + 1, z1 - z0 + 1], |y, z, out| {
@@ -157,7 +167,7 @@ impl CellRows {
     }
 
     /// The spans with the y and z of their row, in the order of fields.
-    pub fn spans(&self) -> impl Iterator<Item = ([i32; 2], RowSpan)> {
+    pub fn spans(&self) -> impl Iterator<Item = PlacedSpan> {
         self.rows().flat_map(|(row, spans)| spans.iter().map(move |span| (row, *span)))
     }
 
@@ -303,25 +313,17 @@ impl CellRows {
         values: impl Fn(&mut S, Cell, usize) -> [T; N] + Sync,
     ) -> [Vec<T>; N] {
         let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
-        let mut rest = out.each_mut().map(|field| &mut field[..]);
         let spans: Vec<_> = self.spans().collect();
-        let mut parts = Vec::new();
-        for spans in spans.chunk_by(|a, b| a.1.base as usize / TABULATED == b.1.base as usize / TABULATED) {
-            let len = spans.iter().map(|(_, span)| span.len()).sum();
-            let part = rest.each_mut().map(|field| {
-                let (part, after) = take(field).split_at_mut(len);
-                *field = after;
-                part
-            });
-            parts.push((spans, part));
-        }
-        parts.into_par_iter().for_each(|(spans, mut part)| {
+        parallel::for_each(parts(&spans, out.each_mut().map(|field| &mut field[..])), |_, (spans, part)| {
             let mut state = start();
             let first = spans[0].1.base as usize;
-            let cells = spans.iter().flat_map(|([y, z], span)| (span.start..span.end).map(|x| [x, *y, *z]));
-            for (at, cell) in cells.enumerate() {
-                for (field, value) in part.iter_mut().zip(values(&mut state, cell, first + at)) {
-                    field[at] = value;
+            for ([y, z], span) in spans {
+                for x in span.start..span.end {
+                    let at = span.at(x);
+                    let values = values(&mut state, [x, *y, *z], at);
+                    for field in 0..N {
+                        part[field][at - first] = values[field];
+                    }
                 }
             }
         });
@@ -334,6 +336,25 @@ impl CellRows {
         self.for_each_shared(from, |at, theirs, len| out[at..at + len].copy_from_slice(&field[theirs..theirs + len]));
         out
     }
+}
+
+/// Stretches of about [`TABULATED`] cells, and the part of each field that belongs to them.
+fn parts<'a, T, const N: usize>(
+    spans: &'a [PlacedSpan],
+    fields: [&'a mut [T]; N],
+) -> Vec<(&'a [PlacedSpan], [&'a mut [T]; N])> {
+    let mut rest = fields;
+    let stretches = spans.chunk_by(|a, b| a.1.base as usize / TABULATED == b.1.base as usize / TABULATED);
+    let part = |spans: &'a [PlacedSpan]| {
+        let len = spans.iter().map(|(_, span)| span.len()).sum();
+        let part = rest.each_mut().map(|field| {
+            let (part, after) = take(field).split_at_mut(len);
+            *field = after;
+            part
+        });
+        (spans, part)
+    };
+    stretches.map(part).collect()
 }
 
 /// Finds cells near each other faster than [`CellRows::find`]: it remembers the last span of each of 16 rows.

@@ -7,7 +7,7 @@ use std::cmp::min;
 use std::mem::take;
 use std::ops::Range;
 
-use rayon::prelude::*;
+use numerics::parallel;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::rows::{CellRows, RowSpan};
@@ -105,12 +105,12 @@ impl Stencil {
                 (chunk, part)
             })
             .collect();
-        parts.into_par_iter().for_each(|(chunk, part)| f(&self.runs[chunk.runs.clone()], chunk.values.start, part));
+        parallel::for_each(parts, |_, (chunk, part)| f(&self.runs[chunk.runs.clone()], chunk.values.start, part));
     }
 
     /// What `f` makes of the runs of each chunk, in the order of fields.
     pub fn fold<R: Send>(&self, f: impl Fn(&[Run]) -> R + Sync) -> Vec<R> {
-        self.chunks.par_iter().map(|chunk| f(&self.runs[chunk.runs.clone()])).collect()
+        parallel::map(&self.chunks, |_, chunk| f(&self.runs[chunk.runs.clone()]))
     }
 }
 

@@ -9,9 +9,9 @@
 //! two standard deviations of that mean. Values are never outside the range of all points'. The bits are the same on any
 //! number of threads.
 
+use numerics::parallel;
 use numerics::point_tree::{FoundPoint, PointTree};
 use numerics::vector::{DMat3, DVec3, Vec3, dot, to_f64, unit};
-use rayon::prelude::*;
 
 /// The point whose distance from another is the radius that suits the spacing: a disk of two spacings has so many.
 const NEIGHBOURS: usize = 12;
@@ -77,7 +77,7 @@ impl<'a> TagSource<'a> {
             self.tree.nearest(self.points[n * count / measured], others + 1, near);
             near.last().map_or(0.0, |last| last.square.sqrt())
         };
-        let mut distances: Vec<f64> = (0..measured).into_par_iter().map_init(Vec::new, distance).collect();
+        let mut distances = parallel::tabulate_with(measured, CHUNK, Vec::new, distance);
         distances.sort_unstable_by(f64::total_cmp);
         distances.get(measured / 2).copied().unwrap_or(0.0)
     }
@@ -92,7 +92,7 @@ impl<'a> TagSource<'a> {
     ) -> TaggedPlaces {
         let ranges: Vec<Vec<[f32; 2]>> = attributes.iter().map(ranges).collect();
         let width = attributes.iter().map(|attribute| attribute.width).sum::<usize>();
-        let chunk = |(n, places): (usize, &[Vec3])| {
+        let chunks = parallel::map(places.chunks(CHUNK), |n, places| {
             let (mut near, mut used) = (Vec::new(), Vec::new());
             let (mut rows, mut far) = (Vec::with_capacity(width * places.len()), 0);
             for (k, place) in places.iter().enumerate() {
@@ -106,8 +106,7 @@ impl<'a> TagSource<'a> {
                 }
             }
             (rows, far)
-        };
-        let chunks: Vec<(Vec<f32>, usize)> = places.par_chunks(CHUNK).enumerate().map(chunk).collect();
+        });
         let mut first = 0;
         let rows = attributes.iter().map(|attribute| {
             let own = first..first + attribute.width;

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use engine::prelude::*;
 use liquid::carried::LiquidMaterial;
+use liquid::level_set::Distance;
 use liquid::level_set::LevelSet;
-use liquid::marked::{MarkedSurface, SolidDistance};
+use liquid::marked::MarkedSurface;
 use liquid::rows::CellRows;
 use liquid::shape::{MeshShape, MovingShape, ShapeSettings, ShapeTopology};
 use liquid::step::{Domain, Surface};
@@ -125,7 +126,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     let mut columns = CarriedColumns::default();
     let attributes: Vec<Option<MeshAttributes>> =
         parts.iter().map(|mesh| columns.add_mesh(mesh, lattice, &mut surface)).collect();
-    surface.edit_attributes(|place, row| {
+    surface.edit_attributes(&|place, row| {
         let mesh = mesh_at(&shapes, scale(place, by as f32));
         if let Some(attributes) = mesh.and_then(|n| attributes[n].as_ref()) {
             attributes.write(place, row);
@@ -260,7 +261,7 @@ impl Colliders {
     }
 
     /// `distance`, where there are colliders.
-    pub(super) fn solid<'a>(&self, distance: SolidDistance<'a>) -> Option<SolidDistance<'a>> {
+    pub(super) fn solid<'a>(&self, distance: &'a Distance<'a>) -> Option<&'a Distance<'a>> {
         if self.is_empty() { None } else { Some(distance) }
     }
 

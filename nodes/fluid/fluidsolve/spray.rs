@@ -66,7 +66,7 @@ impl SprayDrop {
                 let velocity = air.colliders.velocity(share, place);
                 let end = add(place, scale(velocity, 1.0 - share));
                 let depth = -air.colliders.distance(1.0, end);
-                let out = outward(|at| air.colliders.distance(1.0, at), end);
+                let out = outward(&|at| air.colliders.distance(1.0, at), end);
                 self.place = out.map_or(end, |out| add(end, scale(out, depth.max(0.0))));
                 self.velocity = scale(velocity, speed);
                 return;

@@ -7,9 +7,9 @@
 //!
 //! Limit: a layer thinner than half a cell is one with what is around it.
 
+use numerics::parallel;
 use numerics::random::Key;
 use numerics::vector::{Vec3, add, dot, sub};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::level_set::{PhiSampler, PhiView, displacement, floor};
@@ -111,7 +111,7 @@ impl MaterialPoints {
             let mut sampler = PhiSampler::new(*view);
             move |_: Cell, places: [Vec3; PER_CELL]| places.map(|place| sampler.at(place) < 0.0)
         });
-        let values = points.par_iter().map(|point| material(*point).stored()).collect();
+        let values = parallel::tabulate(points.len(), CHUNK, |n| material(points[n]).stored());
         Self { points, values, rounds: 1 }
     }
 
@@ -129,13 +129,14 @@ impl MaterialPoints {
     pub fn closest_to(&self, places: &[Vec3]) -> Vec<LiquidMaterial> {
         let cells: Vec<Cell> = self.points.iter().map(|point| point.map(floor)).collect();
         let rows = CellRows::from_cells(&cells);
-        let slots: Vec<u32> = cells.par_iter().map(|cell| rows.find(*cell).map_or(NOWHERE, |at| at as u32)).collect();
+        let slot = |n: usize| rows.find(cells[n]).map_or(NOWHERE, |at| at as u32);
+        let slots = parallel::tabulate(cells.len(), CHUNK, slot);
         let near = Near { rows: &rows, bins: &Bins::of_cells(&slots, rows.len()), points: self };
-        places.par_iter().map(|place| LiquidMaterial::of(near.closest(*place))).collect()
+        parallel::tabulate(places.len(), CHUNK, |n| LiquidMaterial::of(near.closest(places[n])))
     }
 
     pub(crate) fn advance(&mut self, flow: &Moving<'_>, domain: &Domain) {
-        self.points.par_chunks_mut(CHUNK).for_each(|points| {
+        parallel::for_each(self.points.chunks_mut(CHUNK), |_, points| {
             let mut way = flow.reader();
             for point in points {
                 *point = kept_in(add(*point, displacement(&mut way, *point)), domain);
@@ -153,7 +154,8 @@ impl MaterialPoints {
         };
         let is_near =
             |place: Vec3| (0..3).all(|axis| low[axis] as f32 <= place[axis] && place[axis] <= high[axis] as f32);
-        self.points.par_chunks(CHUNK).zip(self.values.par_chunks_mut(CHUNK)).for_each(|(points, values)| {
+        let chunks = self.points.chunks(CHUNK).zip(self.values.chunks_mut(CHUNK));
+        parallel::for_each(chunks, |_, (points, values)| {
             let mut sampler = Sampler::new(rows);
             for (point, own) in points.iter().zip(values).filter(|(point, _)| is_near(**point)) {
                 if is_new(&mut sampler, *point) {
@@ -196,17 +198,18 @@ impl MaterialPoints {
         domain: &Domain,
         own: [f32; 2],
     ) -> CellMaterials {
-        let slot = |sampler: &mut PhiSampler<'_>, point: &Vec3| {
-            let is_lost = is_outside(*point, domain).is_some() || sampler.at(*point) > LOST;
-            let at = if is_lost { None } else { rows.find(cell_of(*point, domain)) };
+        let slot = |sampler: &mut PhiSampler<'_>, n: usize| {
+            let point = self.points[n];
+            let is_lost = is_outside(point, domain).is_some() || sampler.at(point) > LOST;
+            let at = if is_lost { None } else { rows.find(cell_of(point, domain)) };
             at.map_or(NOWHERE, |at| at as u32)
         };
-        let slots: Vec<u32> = self.points.par_iter().map_init(|| PhiSampler::new(view), slot).collect();
+        let slots = parallel::tabulate_with(self.points.len(), CHUNK, || PhiSampler::new(view), slot);
         let bins = Bins::of_cells(&slots, rows.len());
         let (new, values) = self.in_holes(rows, level_set, view, domain, &bins);
         let kept = bins.thinned(CROWD, PER_CELL);
-        self.points = kept.par_iter().map(|n| self.points[*n as usize]).chain(new).collect();
-        self.values = kept.par_iter().map(|n| self.values[*n as usize]).chain(values).collect();
+        self.points = kept.iter().map(|n| self.points[*n as usize]).chain(new).collect();
+        self.values = kept.iter().map(|n| self.values[*n as usize]).chain(values).collect();
         self.in_cells(rows, domain, own)
     }
 
@@ -236,7 +239,7 @@ impl MaterialPoints {
             }
         });
         let near = Near { rows, bins, points: self };
-        let values = new.par_iter().map(|place| near.closest(*place)).collect();
+        let values = parallel::tabulate(new.len(), CHUNK, |n| near.closest(new[n]));
         (new, values)
     }
 
@@ -317,7 +320,7 @@ fn places<W: FnMut(Cell, [Vec3; PER_CELL]) -> [bool; PER_CELL]>(
 ) -> Vec<Vec3> {
     let key = Key::new(SEED).of(round);
     let spans: Vec<_> = cells.spans().collect();
-    let of_spans = |spans: &[([i32; 2], crate::rows::RowSpan)]| {
+    let parts = parallel::map(spans.chunks(CHUNK), |_, spans| {
         let (mut wanted, mut out) = (start(), Vec::new());
         for ([y, z], span) in spans {
             for cell in (span.start..span.end).map(|x| [x, *y, *z]) {
@@ -327,9 +330,8 @@ fn places<W: FnMut(Cell, [Vec3; PER_CELL]) -> [bool; PER_CELL]>(
             }
         }
         out
-    };
-    let parts: Vec<Vec<Vec3>> = spans.par_chunks(CHUNK).map(of_spans).collect();
-    parts.concat()
+    });
+    parallel::concat(parts)
 }
 
 /// A random place in each octant of a cell.

@@ -10,8 +10,8 @@ mod tests;
 pub(crate) use material::{CellMaterials, Filled, Stir};
 pub use material::{LiquidMaterial, MaterialPoints};
 
+use numerics::parallel;
 use numerics::vector::{Vec3, add};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::level_set::{PhiSampler, PhiView, displacement};
@@ -50,7 +50,7 @@ impl TracerPoints {
     /// Moves those that are in the liquid or next to it; others stay. What leaves through an open wall is dropped.
     pub(crate) fn advance(&mut self, flow: &Moving<'_>, view: PhiView<'_>, domain: &Domain) {
         let is_carried = |sampler: &mut PhiSampler<'_>, point: Vec3| sampler.at(point) < CARRIED;
-        self.points.par_chunks_mut(CHUNK).for_each(|points| {
+        parallel::for_each(self.points.chunks_mut(CHUNK), |_, points| {
             let (mut way, mut sampler) = (flow.reader(), PhiSampler::new(view));
             for point in points.iter_mut().filter(|point| is_outside(**point, domain).is_none()) {
                 if is_carried(&mut sampler, *point) {

@@ -3,7 +3,7 @@
 use std::cmp::{max, min};
 use std::ops::Range;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::table::table;
 use crate::level_set::PhiView;
@@ -58,9 +58,8 @@ impl Cubes {
         if low[0] >= high[0] || low[1] >= high[1] {
             return Self::default();
         }
-        let layers: Vec<Layer> =
-            (low[1]..high[1]).into_par_iter().map(|z| Layer::new(view, [low[0], high[0]], z)).collect();
-        let slabs = layers.par_windows(2).map(Slab::between).collect();
+        let layers: Vec<Layer> = parallel::map(low[1]..high[1], |_, z| Layer::new(view, [low[0], high[0]], z));
+        let slabs = parallel::map(layers.windows(2), |_, layers| Slab::between(layers));
         let mut cubes = Self { low, slabs };
         cubes.flip();
         cubes.number();
@@ -105,7 +104,7 @@ impl Cubes {
             }
             found
         };
-        let flipped: Vec<Vec<usize>> = (0..self.slabs.len()).into_par_iter().map(to_flip).collect();
+        let flipped: Vec<Vec<usize>> = parallel::map(0..self.slabs.len(), |_, slab| to_flip(slab));
         for (slab, flipped) in self.slabs.iter_mut().zip(flipped) {
             flipped.into_iter().for_each(|cube| slab.cubes[cube].kind |= 256);
         }
@@ -113,7 +112,7 @@ impl Cubes {
 
     fn number(&mut self) {
         let table = table();
-        self.slabs.par_iter_mut().for_each(|slab| {
+        parallel::for_each(&mut self.slabs, |_, slab| {
             let mut next = 0;
             for cube in &mut slab.cubes {
                 cube.vertex = next;
@@ -127,7 +126,7 @@ impl Cubes {
             slab.vertices = first..end;
             first = end;
         }
-        self.slabs.par_iter_mut().for_each(|slab| {
+        parallel::for_each(&mut self.slabs, |_, slab| {
             slab.cubes.iter_mut().for_each(|cube| cube.vertex += slab.vertices.start);
         });
     }

@@ -17,9 +17,9 @@ mod table;
 mod tests;
 mod thickness;
 
+use numerics::parallel;
 use numerics::vector::{Vec3, to_f64};
 use numerics::volume;
-use rayon::prelude::*;
 
 use crate::level_set::PhiView;
 use crate::rows::Cell;
@@ -61,10 +61,9 @@ pub(crate) fn extract_with<T: Send>(
 ) -> (QuadMesh, Vec<T>) {
     let cubes = Cubes::find(view);
     let project = placement == Placement::Projected;
-    let slabs: Vec<_> = (0..cubes.slabs.len())
-        .into_par_iter()
-        .map(|slab| (place::vertices(view, &cubes, slab, project), quads::quads(&cubes, slab, &of)))
-        .collect();
+    let slabs = parallel::map(0..cubes.slabs.len(), |_, slab| {
+        (place::vertices(view, &cubes, slab, project), quads::quads(&cubes, slab, &of))
+    });
     let (mut mesh, mut all_made) = (QuadMesh::default(), Vec::new());
     let count = slabs.iter().fold([0, 0], |[a, b], (vertices, (quads, _))| [a + vertices.len(), b + quads.len()]);
     mesh.points.reserve_exact(count[0]);
@@ -108,14 +107,14 @@ impl QuadMesh {
     }
 
     fn sum(&self, of: impl Fn([u32; 4]) -> f64 + Sync) -> f64 {
-        let sums: Vec<f64> =
-            self.quads.par_chunks(CHUNK).map(|quads| quads.iter().fold(0.0, |sum, quad| sum + of(*quad))).collect();
+        let of_chunk = |quads: &[[u32; 4]]| quads.iter().fold(0.0, |sum, quad| sum + of(*quad));
+        let sums = parallel::map(self.quads.chunks(CHUNK), |_, quads| of_chunk(quads));
         sums.iter().fold(0.0, |sum, part| sum + part)
     }
 
     /// The points in metres, of a lattice whose cell [0, 0, 0] starts at `origin`.
     pub fn points_at(&self, origin: [f64; 3], cell: f64) -> Vec<Vec3> {
         let place = |point: &Vec3| std::array::from_fn(|axis| (origin[axis] + cell * f64::from(point[axis])) as f32);
-        self.points.par_iter().map(place).collect()
+        parallel::tabulate(self.points.len(), CHUNK, |n| place(&self.points[n]))
     }
 }

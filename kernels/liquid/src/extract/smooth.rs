@@ -1,7 +1,7 @@
 //! A mesh made smoother, with the volume of each of its closed surfaces kept.
 
+use numerics::parallel;
 use numerics::vector::{Vec3, add, cross, dot, scale, sub, unit};
-use rayon::prelude::*;
 
 use super::QuadMesh;
 use crate::rows::Cell;
@@ -41,7 +41,7 @@ impl QuadMesh {
                     let way = sub(scale(sum, 1.0 / near.len() as f32), old[n]);
                     add(old[n], scale(walls.along(old[n], way), share))
                 };
-                self.points = (0..old.len()).into_par_iter().with_min_len(CHUNK).map(moved).collect();
+                self.points = parallel::tabulate(old.len(), CHUNK, moved);
             }
         }
         for _ in 0..MOVES {

@@ -1,7 +1,7 @@
 //! How thick the liquid is behind each point of its surface.
 
+use numerics::parallel;
 use numerics::vector::{Vec3, scale, sub};
-use rayon::prelude::*;
 
 use super::QuadMesh;
 use crate::level_set::{PhiSampler, PhiView};
@@ -18,13 +18,8 @@ const CHUNK: usize = 512;
 impl QuadMesh {
     /// For each vertex the distance, in cells, to the surface on the other side of the liquid, against the normal.
     pub fn thickness(&self, view: PhiView<'_>) -> Vec<f32> {
-        let vertices = self.points.par_chunks(CHUNK).zip(self.normals.par_chunks(CHUNK));
-        let parts = vertices.map(|(points, normals)| {
-            let mut sampler = PhiSampler::new(view);
-            points.iter().zip(normals).map(|(point, normal)| behind(&mut sampler, view, *point, *normal)).collect()
-        });
-        let parts: Vec<Vec<f32>> = parts.collect();
-        parts.concat()
+        let of_vertex = |sampler: &mut PhiSampler<'_>, n: usize| behind(sampler, view, self.points[n], self.normals[n]);
+        parallel::tabulate_with(self.points.len(), CHUNK, || PhiSampler::new(view), of_vertex)
     }
 }
 

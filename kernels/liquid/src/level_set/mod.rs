@@ -40,8 +40,14 @@ const ABOVE: [f32; 2] = [0.5, 1.5];
 /// Depth in a solid up to which φ is the liquid's own.
 const SKIN: f32 = 0.25;
 
+/// A distance, in cells, of a place in them; negative inside.
+pub type Distance<'a> = dyn Fn(Vec3) -> f32 + Sync + 'a;
+
+/// What φ becomes at a place in cells, given φ there.
+pub type PhiChange<'a> = dyn Fn(Vec3, f32) -> f32 + Sync + 'a;
+
 /// The unit vector out of a solid, whose distance `solid` is, at a place in cells.
-pub fn outward(solid: impl Fn(Vec3) -> f32, at: Vec3) -> Option<Vec3> {
+pub fn outward(solid: &Distance<'_>, at: Vec3) -> Option<Vec3> {
     let slope = |axis: usize| {
         let (mut below, mut above) = (at, at);
         (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
@@ -150,7 +156,7 @@ impl LevelSet {
 
     /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of the middle of the cell and its φ; the least
     /// of φ and a distance adds a shape. Follow with [`Self::fill`] where the result is no distance.
-    pub fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+    pub fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>) {
         let low = [0, 1, 2].map(|axis| low[axis].max(self.low[axis]));
         let high = [0, 1, 2].map(|axis| high[axis].min(self.high[axis]));
         let part = CellRows::cuboid(low, high);
@@ -174,7 +180,7 @@ impl LevelSet {
     /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
     /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that
     /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there.
-    pub fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
+    pub fn meet(&mut self, solid: &Distance<'_>) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
         let start = || PhiSampler::new(before);
@@ -187,7 +193,7 @@ impl LevelSet {
             let value = if depth > CONTACT {
                 phi[n].max(depth - CONTACT)
             } else {
-                outward(&solid, at).map_or(phi[n], |normal| {
+                outward(solid, at).map_or(phi[n], |normal| {
                     let [near, far] = ABOVE.map(|height| sampler.at(add(at, scale(normal, depth + height))));
                     let slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(0.0, 1.0);
                     let at_wall = near - slope * ABOVE[0];

@@ -105,9 +105,9 @@ fn shapes_are_added_and_cut_away() {
     let first = ball([10.0; 3], 4.0);
     let second = ball([18.0, 10.0, 10.0], 5.0);
     let mut set = made(30, &first);
-    set.change([9, 1, 1], [28, 20, 20], |p, phi| phi.min(second(p)));
+    set.change([9, 1, 1], [28, 20, 20], &|p, phi| phi.min(second(p)));
     assert!(error(&set, 4.0, |p| first(p).min(second(p))) < 1e-6);
-    set.change([0; 3], [30; 3], |p, phi| phi.max(-first(p)));
+    set.change([0; 3], [30; 3], &|p, phi| phi.max(-first(p)));
     set.fill();
     let mut sampler = PhiSampler::new(set.view());
     assert!(sampler.at([10.0; 3]) > 3.0 && sampler.at([18.0, 10.0, 10.0]) < -3.0);
@@ -168,7 +168,7 @@ fn met(phi: impl Fn(Vec3) -> f32 + Sync, solid: impl Fn(Vec3) -> f32 + Sync) -> 
     let rows = CellRows::cuboid([0; 3], [20, 20, 6]);
     let phi = rows.tabulate(|cell| phi(cell.map(|x| x as f32 + 0.5)).clamp(-BAND, BAND));
     let mut set = LevelSet::new(&rows, &phi, [0; 3], [20, 20, 6]);
-    set.meet(solid);
+    set.meet(&solid);
     move |cell| set.rows().find(cell).map_or(BAND, |at| set.phi()[at])
 }
 

@@ -6,18 +6,15 @@
 #[cfg(test)]
 mod tests;
 
+use numerics::parallel;
 use numerics::vector::{Vec3, add, scale, sub};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract};
-use crate::level_set::{BAND, Flow, LevelSet, PhiSampler, PhiView, outward};
+use crate::level_set::{BAND, Distance, Flow, LevelSet, PhiChange, PhiSampler, PhiView, outward};
 use crate::markers::Markers;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Moving, Surface};
-
-/// The distance from a solid, in solver cells, negative inside, of a place in them.
-pub type SolidDistance<'a> = &'a (dyn Fn(Vec3) -> f32 + Sync);
 
 /// Images beyond a periodic side, besides those that move in, so that φ in the band is that of a surface without an end.
 const IMAGES: i32 = 8;
@@ -64,7 +61,11 @@ impl MarkedSurface {
         attributes: usize,
         seed: u64,
     ) -> Self {
-        let resolution = resolution.max(1) as i32;
+        let set = Self::set_of(&domain, resolution.max(1) as i32, &distance);
+        Self::of_level_set(set, resolution, attributes, seed).within(&domain)
+    }
+
+    fn set_of(domain: &Domain, resolution: i32, distance: &Distance<'_>) -> LevelSet {
         let size = resolution as f32;
         let [low, high] = [domain.low, domain.high].map(|corner| corner.map(|x| x * resolution));
         let near = CellRows::cuboid(domain.low, domain.high);
@@ -72,7 +73,7 @@ impl MarkedSurface {
         let cells = near.refined(resolution).filtered(|cell, _| phi(cell) < BAND + 1.0);
         let mut set = LevelSet::new(&cells, &cells.tabulate(phi), low, high);
         set.fill();
-        Self::of_level_set(set, resolution as u32, attributes, seed).within(&domain)
+        set
     }
 
     /// The surface of a level set whose cells are `resolution` ≥ 1 times as small as the solver's.
@@ -114,7 +115,7 @@ impl MarkedSurface {
 
     /// The surface where it is not in a solid, as a mesh in surface cells: what [`MarkedSurface::phi_outside`] has in a solid
     /// lies on it.
-    pub fn mesh(&self, solid: Option<SolidDistance<'_>>) -> QuadMesh {
+    pub fn mesh(&self, solid: Option<&Distance<'_>>) -> QuadMesh {
         let clipped = solid.map(|solid| self.phi_outside(solid));
         let mut mesh = extract(self.view_of(clipped.as_deref()), Placement::Projected);
         if let Some(solid) = solid {
@@ -125,7 +126,7 @@ impl MarkedSurface {
 
     /// φ of surface cells, positive in a solid, but for films on it that are thinner than [`FILM`] cells: they reach into
     /// the solid as far as they are too thin for cells to show, so that their surface has no holes.
-    pub fn phi_outside(&self, solid: SolidDistance<'_>) -> Vec<f32> {
+    pub fn phi_outside(&self, solid: &Distance<'_>) -> Vec<f32> {
         let (size, view) = (self.resolution as f32, self.set.view());
         let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
         let start = || PhiSampler::new(view);
@@ -139,7 +140,7 @@ impl MarkedSurface {
             let mut depth = 0.0;
             if (0.0..FILM).contains(&thickness)
                 && height.abs() < 2.0 * FILM
-                && let Some(normal) = outward(distance, at)
+                && let Some(normal) = outward(&distance, at)
             {
                 // Over a film φ rises with the height; where a surface meets the solid it does not.
                 let rise = sampler.at(add(at, normal)) - phi;
@@ -154,15 +155,17 @@ impl MarkedSurface {
     }
 
     /// Moves points of a mesh in surface cells that are in a solid onto it.
-    pub(crate) fn put_outside(&self, mesh: &mut QuadMesh, solid: SolidDistance<'_>) {
+    pub(crate) fn put_outside(&self, mesh: &mut QuadMesh, solid: &Distance<'_>) {
         let size = self.resolution as f32;
         let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
-        mesh.points.par_iter_mut().with_min_len(CHUNK).for_each(|point| {
-            let height = distance(*point);
-            if height < 0.0
-                && let Some(normal) = outward(distance, *point)
-            {
-                *point = add(*point, scale(normal, -height));
+        parallel::for_each(mesh.points.chunks_mut(CHUNK), |_, points| {
+            for point in points {
+                let height = distance(*point);
+                if height < 0.0
+                    && let Some(normal) = outward(&distance, *point)
+                {
+                    *point = add(*point, scale(normal, -height));
+                }
             }
         });
     }
@@ -260,28 +263,28 @@ impl Surface for MarkedSurface {
         self.restrict();
     }
 
-    fn meet(&mut self, solid: impl Fn(Vec3) -> f32 + Sync) {
+    fn meet(&mut self, solid: &Distance<'_>) {
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3| size * solid(scale(point, unit));
-        self.set.meet(scaled);
+        self.set.meet(&scaled);
         // Those in its inside mark nothing that is seen.
         let markers = &self.markers.markers;
-        let seen: Vec<bool> = markers.par_iter().map(|marker| scaled(marker.point) > -INSIDE).collect();
+        let seen = parallel::tabulate(markers.len(), CHUNK, |n| scaled(markers[n].point) > -INSIDE);
         if seen.contains(&false) {
             self.markers.retain(|n| seen[n]);
         }
         self.restrict();
     }
 
-    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+    fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>) {
         let [low, high] = [low, high].map(|corner| corner.map(|x| x.saturating_mul(self.resolution)));
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3, phi: f32| size * change(scale(point, unit), phi * unit);
-        self.among_images(0.0, |markers, set| markers.change(set, low, high, scaled));
+        self.among_images(0.0, |markers, set| markers.change(set, low, high, &scaled));
         self.restrict();
     }
 
-    fn edit_attributes(&mut self, edit: impl Fn(Vec3, &mut [f32]) + Sync) {
+    fn edit_attributes(&mut self, edit: &(dyn Fn(Vec3, &mut [f32]) + Sync)) {
         let unit = 1.0 / self.resolution as f32;
         self.markers.edit_attributes(|point, row| edit(scale(point, unit), row));
     }

@@ -44,7 +44,7 @@ fn a_film_on_a_ball_has_no_holes_and_its_volume() {
     let domain = Domain::closed([0; 3], [32; 3]);
     for thickness in [0.15_f32, 0.3, 0.6, 0.9, 1.3, 2.0] {
         let mut surface = MarkedSurface::new(domain, 1, |p| ball(p) - thickness, 0, 1);
-        surface.meet(ball);
+        surface.meet(&ball);
         let mesh = surface.mesh(Some(&ball));
         let shell = |r: f64| 4.0 / 3.0 * std::f64::consts::PI * r * r * r;
         let film = shell(8.03 + f64::from(thickness)) - shell(8.03);
@@ -64,7 +64,7 @@ fn a_pool_around_a_ball_ends_at_it() {
     let ball = |p: Vec3| length(sub(p, [16.1, 13.9, 16.0])) - 8.03;
     let domain = Domain::closed([0; 3], [32; 3]);
     let mut surface = MarkedSurface::new(domain, 1, |p| p[1] - 12.3, 0, 1);
-    surface.meet(ball);
+    surface.meet(&ball);
     let phi = surface.phi_outside(&ball);
     let mesh = extract(surface.view_of(Some(&phi)), Placement::Projected);
     for point in &mesh.points {

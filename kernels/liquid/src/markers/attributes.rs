@@ -1,7 +1,7 @@
 //! Attributes of new markers, from the markers around them on the same side of the liquid.
 
+use numerics::parallel;
 use numerics::vector::{DMat3, DVec3, dot, sub, to_f64};
-use rayon::prelude::*;
 
 use super::bins::Bins;
 use super::{Marker, ONE_SIDED, one_sided};
@@ -12,6 +12,8 @@ use crate::rows::CellRows;
 const RINGS: [i32; 3] = [1, 2, 4];
 /// Neighbours that are enough, if they lie all around.
 const ENOUGH: usize = 6;
+/// New markers that a thread handles at a time.
+const CHUNK: usize = 32;
 
 /// For each attribute, its values at the markers `new`, within those of all markers. 0 where there are no neighbours.
 pub(super) fn interpolate(
@@ -24,7 +26,7 @@ pub(super) fn interpolate(
     if attributes.is_empty() {
         return Vec::new();
     }
-    let weights: Vec<Vec<(u32, f32)>> = new.par_iter().map(|marker| weights(rows, bins, markers, marker)).collect();
+    let weights = parallel::tabulate(new.len(), CHUNK, |n| weights(rows, bins, markers, &new[n]));
     let value = |values: &[f32], [low, high]: [f32; 2], weights: &[(u32, f32)]| {
         let [least, most] = range(weights.iter().map(|(n, _)| values[*n as usize]));
         let half = 0.5 * (most - least);
@@ -33,7 +35,7 @@ pub(super) fn interpolate(
     };
     let at_new = |values: &Vec<f32>| {
         let all = range(values.iter().copied());
-        weights.par_iter().map(|weights| value(values, all, weights)).collect()
+        weights.iter().map(|weights| value(values, all, weights)).collect()
     };
     attributes.iter().map(at_new).collect()
 }

@@ -1,6 +1,6 @@
 //! Markers by the cube between eight centres of cells that they are in.
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::Marker;
 use crate::level_set::floor;
@@ -30,11 +30,11 @@ impl Bins {
         markers: &[Marker],
         keep: impl Fn(usize) -> bool + Sync,
     ) -> Self {
-        let find = |(n, marker): (usize, &Marker)| {
-            let at = keep(n).then(|| rows.find(cube(marker.point, domain))).flatten();
+        let find = |n: usize| {
+            let at = keep(n).then(|| rows.find(cube(markers[n].point, domain))).flatten();
             at.map_or(NOWHERE, |at| at as u32)
         };
-        let cells: Vec<u32> = markers.par_iter().enumerate().map(find).collect();
+        let cells = parallel::tabulate(markers.len(), parallel::CHUNK, find);
         Self::of_cells(&cells, rows.len())
     }
 

@@ -1,7 +1,6 @@
 //! φ next to the surface from the planes of its markers.
 
 use numerics::vector::{Vec3, add, dot, length, scale, sub};
-use rayon::prelude::*;
 
 use super::bins::Bins;
 use super::{Marker, ONE_SIDED, one_sided};
@@ -28,7 +27,7 @@ const AROUND: f32 = 1.5;
 /// At cells with markers around them, makes φ the distance from the surface through those closest.
 pub(super) fn correct(set: &mut LevelSet, markers: &[Marker], reach: f32) {
     let bins = Bins::new(set.rows(), set.domain(), markers, |_| true);
-    let sorted: Vec<Marker> = bins.order.par_iter().map(|n| markers[*n as usize]).collect();
+    let sorted: Vec<Marker> = bins.order.iter().map(|n| markers[*n as usize]).collect();
     let (stencil, phi) = set.parts();
     let far = far_from_surface(reach);
     let first = &bins.first;

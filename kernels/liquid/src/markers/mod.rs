@@ -31,12 +31,12 @@ mod seed;
 #[cfg(test)]
 mod tests;
 
+use numerics::parallel;
 use numerics::random::Key;
 use numerics::vector::{Vec3, add, cross, dot, length, perpendicular, scale, sub, unit};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::level_set::{Flow, LevelSet, PhiSampler, displacement};
+use crate::level_set::{Flow, LevelSet, PhiChange, PhiSampler, PhiView, displacement};
 use crate::rows::{Cell, Periods};
 use bins::Bins;
 
@@ -163,7 +163,7 @@ impl Markers {
 
     /// Moves points, and normals as the cross product of two tangents.
     fn advect(&mut self, flow: &impl Flow) {
-        self.markers.par_chunks_mut(CHUNK).for_each(|markers| {
+        parallel::for_each(self.markers.chunks_mut(CHUNK), |_, markers| {
             let mut flow = flow.reader();
             for marker in markers {
                 let way = displacement(&mut flow, marker.point);
@@ -180,7 +180,7 @@ impl Markers {
 
     /// Changes a level set as [`LevelSet::change`] does, and makes it a distance again. Markers in the box that are then off
     /// the surface are dropped.
-    pub fn change(&mut self, set: &mut LevelSet, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+    pub fn change(&mut self, set: &mut LevelSet, low: Cell, high: Cell, change: &PhiChange<'_>) {
         let view = set.view();
         let is_in = |at: Vec3| (0..3).all(|axis| low[axis] as f32 <= at[axis] && at[axis] <= high[axis] as f32);
         // Beside the surface, too: a marker on the edge of what is added would look along the old surface.
@@ -191,16 +191,12 @@ impl Markers {
                 (change(point, phi) - phi).abs() < CHANGED
             })
         };
-        let on_surface: Vec<bool> = self
-            .markers
-            .par_iter()
-            .map_init(|| PhiSampler::new(view), |sampler, marker| !is_in(marker.point) || stays(marker, sampler))
-            .collect();
+        let on_surface = self.tested(view, |sampler, marker| !is_in(marker.point) || stays(marker, sampler));
         let order: Vec<u32> = (0..self.markers.len() as u32).filter(|n| on_surface[*n as usize]).collect();
         self.reorder(&order);
         // On the face of a cut: what markers kept of an older one there would come back after each cut.
         let is_on_cut = |at: Vec3| is_in(at) && change(at, -DEEP).abs() < CLOSE;
-        let on_cut: Vec<bool> = self.markers.par_iter().map(|marker| is_on_cut(marker.point)).collect();
+        let on_cut = self.tested(view, |_, marker| is_on_cut(marker.point));
         set.change(low, high, change);
         set.fill();
         self.project(set, &on_cut);
@@ -210,13 +206,16 @@ impl Markers {
     /// Moves those of the markers onto φ = 0, where φ is smooth, and turns them its way.
     fn project(&mut self, set: &LevelSet, which: &[bool]) {
         let view = set.view();
-        let project = |sampler: &mut PhiSampler<'_>, (marker, which): (&mut Marker, &bool)| {
-            let (phi, gradient) = if *which { sampler.gradient(marker.point) } else { return };
-            if let Some(normal) = unit(gradient).filter(|_| seed::DISTANCE.contains(&dot(gradient, gradient))) {
-                *marker = Marker { point: sub(marker.point, scale(normal, phi)), normal };
+        let chunks = self.markers.chunks_mut(CHUNK).zip(which.chunks(CHUNK));
+        parallel::for_each(chunks, |_, (markers, which)| {
+            let mut sampler = PhiSampler::new(view);
+            for (marker, _) in markers.iter_mut().zip(which).filter(|(_, which)| **which) {
+                let (phi, gradient) = sampler.gradient(marker.point);
+                if let Some(normal) = unit(gradient).filter(|_| seed::DISTANCE.contains(&dot(gradient, gradient))) {
+                    *marker = Marker { point: sub(marker.point, scale(normal, phi)), normal };
+                }
             }
-        };
-        self.markers.par_iter_mut().zip(which).for_each_init(|| PhiSampler::new(view), project);
+        });
     }
 
     /// Changes the attributes of each marker, one number after the other, to what `edit` makes of its place and of them.
@@ -225,12 +224,11 @@ impl Markers {
             return;
         }
         let attributes = &self.attributes;
-        let edited = |(n, marker): (usize, &Marker)| {
+        let rows = parallel::tabulate(self.markers.len(), CHUNK, |n| {
             let mut row: Vec<f32> = attributes.iter().map(|values| values[n]).collect();
-            edit(marker.point, &mut row);
+            edit(self.markers[n].point, &mut row);
             row
-        };
-        let rows: Vec<Vec<f32>> = self.markers.par_iter().enumerate().map(edited).collect();
+        });
         for (n, values) in self.attributes.iter_mut().enumerate() {
             values.iter_mut().zip(&rows).for_each(|(value, row)| *value = row[n]);
         }
@@ -247,20 +245,22 @@ impl Markers {
             };
             (0..3).any(outside) || sampler.at(marker.point).abs() > LOST
         };
-        let on_surface: Vec<bool> = self
-            .markers
-            .par_iter()
-            .map_init(|| PhiSampler::new(view), |sampler, marker| !lost(marker, sampler))
-            .collect();
+        let on_surface = self.tested(view, |sampler, marker| !lost(marker, sampler));
         let bins = Bins::new(set.rows(), (view.low, view.high), &self.markers, |n| on_surface[n]);
         self.reorder(&bins.thinned(3 * PER_CELL, 2 * PER_CELL));
         self.fill_holes(set);
     }
 
+    /// Whether each marker passes a test, which may sample φ.
+    fn tested(&self, view: PhiView<'_>, test: impl Fn(&mut PhiSampler<'_>, &Marker) -> bool + Sync) -> Vec<bool> {
+        let passes = |sampler: &mut PhiSampler<'_>, n: usize| test(sampler, &self.markers[n]);
+        parallel::tabulate_with(self.markers.len(), CHUNK, || PhiSampler::new(view), passes)
+    }
+
     /// Keeps the markers of a list, in its order.
     fn reorder(&mut self, order: &[u32]) {
-        fn pick<T: Copy + Send + Sync>(order: &[u32], from: &[T]) -> Vec<T> {
-            order.par_iter().map(|n| from[*n as usize]).collect()
+        fn pick<T: Copy>(order: &[u32], from: &[T]) -> Vec<T> {
+            order.iter().map(|n| from[*n as usize]).collect()
         }
         self.markers = pick(order, &self.markers);
         self.ids = pick(order, &self.ids);

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
+use numerics::parallel;
 use numerics::random::Key;
 use numerics::vector::{Vec3, add, dot, scale, sub, unit};
-use rayon::prelude::*;
 
 use super::attributes::linear_fit;
 use super::bins::Bins;
@@ -37,7 +37,7 @@ const CHUNK: usize = 64;
 /// Up to `count` markers in each cube that the surface passes and that has none.
 pub(super) fn seed(set: &LevelSet, bins: &Bins, markers: &[Marker], count: usize, key: Key) -> Vec<Marker> {
     let holes = holes(set, bins);
-    let parts = holes.par_chunks(CHUNK).map(|cubes| {
+    let parts = parallel::map(holes.chunks(CHUNK), |_, cubes| {
         let mut out = Vec::new();
         for row in cubes.chunk_by(|a, b| a[1..] == b[1..]) {
             let [_, y, z] = row[0];
@@ -58,7 +58,7 @@ pub(super) fn seed(set: &LevelSet, bins: &Bins, markers: &[Marker], count: usize
         }
         out
     });
-    parts.collect::<Vec<_>>().concat()
+    parallel::concat(parts)
 }
 
 /// The cubes with corners on both sides and no marker, in the order of fields.

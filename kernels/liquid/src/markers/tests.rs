@@ -266,14 +266,9 @@ fn shapes_that_are_added_and_taken_away_stay_so() {
     let mut radius = 7.0;
     for next in [7.1, 7.6, 6.0] {
         let shape = ball(centre, next);
-        markers.change(
-            &mut set,
-            [0; 3],
-            [24; 3],
-            |p, phi| {
-                if next > radius { phi.min(shape(p)) } else { phi.max(shape(p)) }
-            },
-        );
+        markers.change(&mut set, [0; 3], [24; 3], &|p, phi| {
+            if next > radius { phi.min(shape(p)) } else { phi.max(shape(p)) }
+        });
         (0..3).for_each(|_| markers.step(&mut set, &still, 0.0));
         let ratio = volume(&set) / f64::from(4.0 / 3.0 * PI * next * next * next);
         assert!((ratio - 1.0).abs() < 0.01, "{radius} to {next}: {ratio}");

@@ -6,8 +6,8 @@
 
 use std::ops::Range;
 
+use numerics::parallel;
 use numerics::vector::Vec3;
-use rayon::prelude::*;
 
 use crate::rows::{Cell, CellRows};
 
@@ -55,16 +55,15 @@ impl RowLines {
                 }
             }
         }
-        let slab = |(k, slab): (usize, Vec<u32>)| {
+        let rows = parallel::map(slabs, |k, slab| {
             let mut rows = vec![RowLine::default(); size[0] as usize];
             for triangle in slab {
                 add(&mut rows, &corners(triangle), low, high, low[2] + k as i32);
             }
             rows.iter_mut().for_each(|row| row.crossings.sort_by(|a, b| a.0.total_cmp(&b.0)));
             rows
-        };
-        let rows: Vec<Vec<RowLine>> = slabs.into_par_iter().enumerate().map(slab).collect();
-        Self { low: corner_low, size, x: low[0]..high[0], rows: rows.into_iter().flatten().collect() }
+        });
+        Self { low: corner_low, size, x: low[0]..high[0], rows: parallel::concat(rows) }
     }
 
     fn row(&self, y: i32, z: i32) -> &RowLine {

@@ -1,7 +1,7 @@
 //! A mesh that moves within a frame.
 
+use numerics::parallel;
 use numerics::vector::{Vec3, add, length, lerp, scale, sub};
-use rayon::prelude::*;
 
 use super::{MeshShape, ShapeSettings, ShapeTopology, SurfacePlace, for_corners};
 
@@ -77,7 +77,8 @@ impl MovingShape {
         let pose = |shape: MeshShape| {
             let velocity =
                 |place: &SurfacePlace| place.mean(&corners, &velocities).map(|v| if v.is_finite() { v } else { 0.0 });
-            let velocity = shape.places().par_iter().map(velocity).collect();
+            let places = shape.places();
+            let velocity = parallel::tabulate(places.len(), parallel::CHUNK, |n| velocity(&places[n]));
             Pose { shape, velocity }
         };
         let poses = std::iter::once(first).chain(later).map(pose).collect();

@@ -2,10 +2,10 @@
 
 use std::mem::take;
 
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::{NONE, TriangleTree};
 use numerics::vector::{Vec3, length, sub};
-use rayon::prelude::*;
 
 use crate::rows::{Cell, CellRows, RowSpan};
 
@@ -68,9 +68,8 @@ pub(super) fn feet(points: &[Vec3], part: &Part, candidates: &CellRows, reach: f
         rest = after;
         (row, span, own)
     });
-    let spans: Vec<_> = spans.collect();
     let path = Path::chosen();
-    spans.into_par_iter().for_each(|(row, span, out)| feet_of_span(path, &tree, row, span, reach, out));
+    parallel::for_each(spans, |_, (row, span, out)| feet_of_span(path, &tree, row, span, reach, out));
     let band = candidates.filtered(|_, at| feet[at].triangle != NONE);
     let mut found = band.resampled(candidates, &feet, Foot::default());
     found.iter_mut().for_each(|foot| foot.triangle = part.numbers[foot.triangle as usize]);

@@ -3,8 +3,8 @@
 //! A cell's extent along a unit normal n is |n₁| + |n₂| + |n₃|. Where the distance is below 0 at both ends of every cell
 //! that a plane crosses, all paths from cell to cell across it are closed; half that extent on each side is enough.
 
+use numerics::parallel;
 use numerics::vector::{Vec3, dot, scale, sub, unit};
-use rayon::prelude::*;
 
 use crate::rows::{Cell, CellRows};
 
@@ -40,12 +40,15 @@ fn fading(distance: f32, band: f32) -> f32 {
 
 /// The distance of sheets: |d| less half of their thickness.
 pub(super) fn sheet(band: &CellRows, feet: &[Foot], reach: f32) -> Vec<f32> {
-    let cells: Vec<Cell> = band.iter().collect();
-    let thick = |(cell, foot): (&Cell, &Foot)| {
-        let half = half_thickness(unit(sub(middle(*cell), foot.point)));
-        foot.distance - half * fading(foot.distance, reach)
-    };
-    cells.par_iter().zip(feet).map(thick).collect()
+    let [thick] = band.tabulate_with(
+        || (),
+        |(), cell, at| {
+            let foot = &feet[at];
+            let half = half_thickness(unit(sub(middle(cell), foot.point)));
+            [foot.distance - half * fading(foot.distance, reach)]
+        },
+    );
+    thick
 }
 
 /// The distance of solids, given `distance`: thin places grow evenly on both sides until they are thick enough.
@@ -63,7 +66,7 @@ pub(super) fn solid(
         let growth = solid.growth(at);
         distance[at] - growth * fading(distance[at].abs(), reach)
     };
-    (0..cells.len()).into_par_iter().map(thick).collect()
+    parallel::tabulate(cells.len(), parallel::CHUNK, thick)
 }
 
 struct Solid<'a, N> {

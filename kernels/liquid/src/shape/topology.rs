@@ -2,7 +2,6 @@
 
 use numerics::vector::{Vec3, cross, scale, sub};
 use numerics::volume::six_volumes;
-use rayon::prelude::*;
 
 use crate::sets::Sets;
 
@@ -77,7 +76,7 @@ fn welded(points: &[Vec3]) -> Vec<u32> {
     // + 0 makes −0 and 0 the same bits.
     let key = |point: u32| points[point as usize].map(|x| (x + 0.0).to_bits());
     let mut order: Vec<_> = (0..points.len() as u32).map(|point| (key(point), point)).collect();
-    order.par_sort_unstable();
+    order.sort_unstable();
     let mut first = vec![0; points.len()];
     for same in order.chunk_by(|a, b| a.0 == b.0) {
         same.iter().for_each(|(_, point)| first[*point as usize] = same[0].1);
@@ -96,7 +95,7 @@ fn open_points(triangles: &[[u32; 3]], points: usize) -> Vec<bool> {
             edges.push((from.min(to), from.max(to), from < to));
         }
     }
-    edges.par_sort_unstable();
+    edges.sort_unstable();
     let mut open = vec![false; points];
     for same in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         let forward = same.iter().filter(|edge| edge.2).count();

@@ -90,10 +90,10 @@ impl<'a> Exchange<'a> {
         if let Some(shrink) = shrink.filter(|shrink| cells.adds(&phi, *shrink)) {
             let [low, high] = cells.bounds();
             let held = cells.volume(&phi);
-            surface.change(low, high, cells.filled(shrink));
+            surface.change(low, high, &cells.filled(shrink));
             let after = cells.level_set(&surface.view());
             if let Some(attributes) = source.attributes {
-                surface.edit_attributes(|point, row| {
+                surface.edit_attributes(&|point, row| {
                     let is_in = (0..3).all(|axis| low[axis] as f32 <= point[axis] && point[axis] <= high[axis] as f32);
                     if is_in && Sampler::new(cells.rows()).value(&phi, Site::Centre, point) > NEW {
                         attributes(point, row);
@@ -147,7 +147,7 @@ impl<'a> Exchange<'a> {
         if empties {
             if cells.takes(&phi) {
                 let [low, high] = cells.bounds();
-                surface.change(low, high, cells.emptied());
+                surface.change(low, high, &cells.emptied());
                 let left = cells.volume(&cells.level_set(&surface.view()));
                 account.moved += (cells.volume(&phi) - left) * self.cell_volume();
             }

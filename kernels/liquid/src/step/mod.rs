@@ -264,7 +264,7 @@ impl<S: Surface> Liquid<S> {
     pub fn set_velocity(&mut self, velocity: impl Fn([f32; 3]) -> [f32; 3] + Sync, around: &Surroundings<'_>) {
         let carried = std::mem::take(&mut self.motion);
         let (tracers, materials) = (carried.tracers, carried.materials);
-        let motion = Motion::starting(&self.settings, &self.surface, around, velocity);
+        let motion = Motion::starting(&self.settings, &self.surface, around, &velocity);
         self.motion = Motion { tracers, materials, ..motion };
     }
 

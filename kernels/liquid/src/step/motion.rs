@@ -56,7 +56,7 @@ impl Motion {
         settings: &LiquidSettings,
         surface: &S,
         around: &Surroundings<'_>,
-        velocity: impl Fn(Vec3) -> Vec3 + Sync,
+        velocity: &(dyn Fn(Vec3) -> Vec3 + Sync),
     ) -> Self {
         let cells = LiquidCells::of(&settings.domain, surface, around.solid.map(|solid| solid.at(0.0)));
         let value = |axis: usize, cell: Cell| velocity(Site::FACES[axis].of(cell))[axis];

@@ -2,7 +2,7 @@
 
 use numerics::vector::{Vec3, scale};
 
-use crate::level_set::PhiView;
+use crate::level_set::{Distance, PhiChange, PhiView};
 use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -52,15 +52,15 @@ pub trait Surface {
 
     /// Continues the liquid into a solid that it touches, and takes it out of the rest of the solid, which would leave it
     /// behind as it moves on. `solid` is the distance from it, in cells, negative inside. A surface may do without.
-    fn meet(&mut self, _solid: impl Fn(Vec3) -> f32 + Sync) {}
+    fn meet(&mut self, _solid: &Distance<'_>) {}
 
     /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of a place in them and φ there, both in cells;
     /// the result need be a distance only where it is next to 0.
-    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync);
+    fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>);
 
     /// Changes the attributes of points on it to what `edit` makes of their places, in cells, and of them. A surface may do
     /// without.
-    fn edit_attributes(&mut self, _edit: impl Fn(Vec3, &mut [f32]) + Sync) {}
+    fn edit_attributes(&mut self, _edit: &(dyn Fn(Vec3, &mut [f32]) + Sync)) {}
 }
 
 /// The ways of points in a substep.
@@ -117,7 +117,7 @@ pub(super) fn substep<S: Surface>(
     motion.carry(&flow, surface.view(), settings);
     surface.advance(&flow, reach);
     if let Some(solid) = solid {
-        surface.meet(|point| solid.distance(point));
+        surface.meet(&|point| solid.distance(point));
     }
     let mut exchanged = Exchange { settings, around, solid, times }.apply(surface, motion);
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use crate::rows::{CellRows, RowSpan};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask};
@@ -66,7 +66,7 @@ pub fn extrapolate<const F: usize>(
     for _ in 0..layers {
         let gains: Vec<Vec<Gain<F>>> = {
             let layer = Layer { lines: &lines, known, fields: fields.each_ref().map(|faces| &**faces), steepest };
-            chunks.par_iter_mut().map(|chunk| layer.gains(chunk)).collect()
+            parallel::map(&mut chunks, |_, chunk| layer.gains(chunk))
         };
         if gains.iter().all(Vec::is_empty) {
             return;

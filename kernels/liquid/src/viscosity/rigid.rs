@@ -5,7 +5,7 @@
 //! exactly.
 
 use nalgebra::{Matrix6, Vector6};
-use rayon::prelude::*;
+use numerics::parallel;
 
 use crate::rows::Cell;
 use crate::sets::Sets;
@@ -220,7 +220,7 @@ impl Component {
             }
             Vector6::from(sum)
         };
-        let sums: Vec<Vector6<f64>> = self.pieces.par_iter().with_min_len(16).map(of_piece).collect();
+        let sums = parallel::tabulate(self.pieces.len(), 16, |n| of_piece(&self.pieces[n]));
         let mut lack: Vector6<f64> = sums.iter().sum();
         if let Some(z) = z {
             for (axis, at, row) in &self.resistance {

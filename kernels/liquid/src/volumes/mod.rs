@@ -17,12 +17,13 @@ mod tests;
 
 use std::mem::take;
 
+use numerics::parallel;
 use numerics::vector::{Vec3, add, length, scale, sub};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::level_set::Distance;
 use crate::level_set::floor;
-use crate::marked::{MarkedSurface, SolidDistance};
+use crate::marked::MarkedSurface;
 use crate::markers::NO_PIECE;
 use follow::{Passage, passages, passed_on};
 use pieces::{Measured, Pieces};
@@ -103,7 +104,7 @@ pub struct VolumeTargets {
 
 impl VolumeTargets {
     /// Targets that are what each piece of a surface encloses outside a solid. `cell` is the side of a solver cell, m.
-    pub fn new(surface: &mut MarkedSurface, cell: f64, solid: Option<SolidDistance<'_>>) -> Self {
+    pub fn new(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>) -> Self {
         let found = Pieces::new(surface, solid);
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
@@ -137,7 +138,7 @@ impl VolumeTargets {
 
     /// Follows the pieces of a surface that has moved, and moves it so that each encloses its target; once a frame. The
     /// solid is where it is at the end of the frame.
-    pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> VolumeReport {
+    pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
         let unit = self.unit(surface);
         let (mut found, mut lost) = self.follow(surface, solid);
         let (mut cap, mut moved) = (0.5 * CAP, 0.0);
@@ -177,7 +178,7 @@ impl VolumeTargets {
     }
 
     /// Follows the pieces of a surface that has moved, and leaves it as it is.
-    pub fn measure(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> VolumeReport {
+    pub fn measure(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
         let (found, lost) = self.follow(surface, solid);
         self.report(&found, self.unit(surface), 0.0, lost)
     }
@@ -217,7 +218,7 @@ impl VolumeTargets {
     }
 
     /// Finds the pieces and passes the targets on to them; returns them and the old ones that are in none.
-    fn follow(&mut self, surface: &mut MarkedSurface, solid: Option<SolidDistance<'_>>) -> (Pieces, Vec<LostPiece>) {
+    fn follow(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> (Pieces, Vec<LostPiece>) {
         let found = Pieces::new(surface, solid);
         let now = marked(surface, &found);
         let (unit, size) = (self.unit(surface), surface.resolution() as f32);
@@ -365,5 +366,6 @@ fn shift(piece: &Measured, target: f64, response: f64, cap: f64) -> f64 {
 
 /// The piece of each marker.
 fn marked(surface: &MarkedSurface, found: &Pieces) -> Vec<u32> {
-    surface.markers().markers.par_iter().map(|marker| found.of_marker(marker)).collect()
+    let markers = &surface.markers().markers;
+    parallel::tabulate(markers.len(), parallel::CHUNK, |n| found.of_marker(&markers[n]))
 }

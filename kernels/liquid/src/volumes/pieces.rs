@@ -2,12 +2,13 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
+use numerics::parallel;
 use numerics::vector::{Vec3, dot, length, sub};
-use rayon::prelude::*;
 
 use crate::extract::{Placement, QuadMesh, extract_with};
+use crate::level_set::Distance;
 use crate::level_set::{PhiView, floor};
-use crate::marked::{MarkedSurface, SolidDistance};
+use crate::marked::MarkedSurface;
 use crate::markers::{Marker, NO_PIECE};
 use crate::rows::{Cell, CellRows, Finder, Periods, RowSpan};
 use crate::sets::Sets;
@@ -53,7 +54,7 @@ struct Side {
 
 impl Pieces {
     /// The pieces of what is not in a solid.
-    pub(super) fn new(surface: &MarkedSurface, solid: Option<SolidDistance<'_>>) -> Self {
+    pub(super) fn new(surface: &MarkedSurface, solid: Option<&Distance<'_>>) -> Self {
         let clipped = solid.map(|solid| surface.phi_outside(solid));
         let (view, whole) = (surface.view_of(clipped.as_deref()), surface.view_of(None));
         let inside = view.rows.filtered(|_, at| view.phi[at] < 0.0).clipped(view.low, view.high);
@@ -244,11 +245,12 @@ fn measured(inside: &CellRows, of_span: &[u32], count: usize, mesh: &QuadMesh, s
     for (quad, side) in mesh.quads.iter().zip(sides) {
         origins[piece(side)].get_or_insert(mesh.points[quad[0] as usize]);
     }
-    let term = |(quad, side): (&[u32; 4], &Side)| {
+    let term = |n: usize| {
+        let (quad, side) = (&mesh.quads[n], &sides[n]);
         let volume = origins[piece(side)].map_or(0.0, |origin| mesh.six_volumes(origin, *quad));
         (volume, if side.is_free { mesh.twice_area(*quad) } else { 0.0 })
     };
-    let terms: Vec<(f64, f64)> = mesh.quads.par_iter().zip(sides).map(term).collect();
+    let terms: Vec<(f64, f64)> = parallel::tabulate(sides.len(), parallel::CHUNK, term);
     let mut all = vec![Measured::default(); count];
     for ((volume, area), side) in terms.iter().zip(sides) {
         let piece = &mut all[piece(side)];

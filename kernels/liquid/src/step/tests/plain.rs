@@ -1,6 +1,6 @@
 //! A level set carried to first order and made a distance again, and a surface that stays: enough to test what moves them.
 
-use liquid::level_set::PhiView;
+use liquid::level_set::{Distance, PhiChange, PhiView};
 use liquid::rows::{Cell, CellRows, Finder};
 use liquid::stencil::{Run, Stencil};
 use liquid::step::{Domain, Moving, Surface};
@@ -21,6 +21,10 @@ pub(crate) struct PlainLevelSet {
 impl PlainLevelSet {
     /// From a distance at places in cells.
     pub(crate) fn new(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        Self::of(domain, &distance)
+    }
+
+    fn of(domain: Domain, distance: &Distance<'_>) -> Self {
         let rows = CellRows::cuboid(domain.low, domain.high);
         let rows = rows.filtered(|cell, _| distance(Site::Centre.of(cell)) < BAND);
         let phi = rows.tabulate(|cell| distance(Site::Centre.of(cell)).clamp(-BAND, BAND));
@@ -50,7 +54,7 @@ impl Surface for PlainLevelSet {
         self.rows = rows;
     }
 
-    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+    fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>) {
         let domain = self.domain;
         let part = CellRows::cuboid(low, high).clipped(domain.low, domain.high);
         let rows = self.rows.union(&part);
@@ -85,7 +89,7 @@ impl Surface for Still {
 
     fn advance(&mut self, _: &Moving<'_>, _: f32) {}
 
-    fn change(&mut self, low: Cell, high: Cell, change: impl Fn(Vec3, f32) -> f32 + Sync) {
+    fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>) {
         self.0.change(low, high, change);
     }
 }
