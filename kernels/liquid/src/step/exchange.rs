@@ -51,7 +51,7 @@ struct Entering<'a> {
 
 impl<'a> Exchange<'a> {
     /// Changes the surface, and counts what that and what poured have moved.
-    pub(super) fn apply<S: Surface>(&self, surface: &mut S, motion: &mut Motion) -> Exchanged<'a> {
+    pub(super) fn apply(&self, surface: &mut dyn Surface, motion: &mut Motion) -> Exchanged<'a> {
         let mut exchanged = Exchanged { pours: Vec::new(), entering: Vec::new() };
         for (n, source) in self.around.sources.iter().enumerate() {
             let (account, materials) = (&mut motion.sources[n], motion.materials.as_mut());
@@ -63,11 +63,11 @@ impl<'a> Exchange<'a> {
         exchanged
     }
 
-    fn give<S: Surface>(
+    fn give(
         &self,
         n: usize,
         source: &LiquidSource<'a>,
-        surface: &mut S,
+        surface: &mut dyn Surface,
         account: &mut FlowAccount,
         materials: Option<&mut MaterialPoints>,
         out: &mut Exchanged<'a>,
@@ -123,11 +123,11 @@ impl<'a> Exchange<'a> {
         out.entering.push(Entering { cells, is_filled: filled > 0.0, velocity });
     }
 
-    fn take<S: Surface>(
+    fn take(
         &self,
         n: usize,
         sink: &LiquidSink<'a>,
-        surface: &mut S,
+        surface: &mut dyn Surface,
         account: &mut FlowAccount,
     ) -> Option<Pour> {
         let owed = account.owed;

@@ -52,9 +52,9 @@ pub struct Motion {
 }
 
 impl Motion {
-    pub(super) fn starting<S: Surface>(
+    pub(super) fn starting(
         settings: &LiquidSettings,
-        surface: &S,
+        surface: &dyn Surface,
         around: &Surroundings<'_>,
         velocity: &(dyn Fn(Vec3) -> Vec3 + Sync),
     ) -> Self {
@@ -235,7 +235,7 @@ pub(super) struct LiquidCells {
 }
 
 impl LiquidCells {
-    pub(super) fn of<S: Surface>(domain: &Domain, surface: &S, solid: Option<Obstacle<'_>>) -> Self {
+    pub(super) fn of(domain: &Domain, surface: &dyn Surface, solid: Option<Obstacle<'_>>) -> Self {
         let view = surface.view();
         let liquid = view.rows.filtered(|cell, at| view.phi[at] < -LEAST_DEPTH && domain.contains(cell));
         let rows = domain.clip(&liquid.dilated(1));

@@ -95,9 +95,9 @@ const FARTHEST: f32 = 64.0;
 const BAND: i32 = 5;
 
 /// Moves on between two times since the start of the frame, s. Gravity and viscosity are read in the middle.
-pub(super) fn substep<S: Surface>(
+pub(super) fn substep(
     settings: &LiquidSettings,
-    surface: &mut S,
+    surface: &mut dyn Surface,
     motion: &mut Motion,
     around: &Surroundings<'_>,
     times: [f64; 2],

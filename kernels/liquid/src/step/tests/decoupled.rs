@@ -9,7 +9,7 @@ fn decoupled(domain: Domain, cell: f64) -> LiquidSettings {
 }
 
 /// The velocities of faces that move.
-fn moving<S: Surface>(liquid: &Liquid<S>, axis: usize) -> Vec<(Vec3, f64)> {
+fn moving(liquid: &Liquid<impl Surface>, axis: usize) -> Vec<(Vec3, f64)> {
     let motion = liquid.motion();
     let faces = motion.rows().iter().zip(&motion.velocity().faces()[axis]);
     faces.filter(|(_, u)| **u != 0.0).map(|(cell, u)| (Site::FACES[axis].of(cell), f64::from(*u))).collect()

@@ -89,6 +89,6 @@ fn volume(view: &PhiView<'_>, domain: &Domain) -> f64 {
 }
 
 /// The largest speed on a face, m/s.
-fn largest<S: Surface>(liquid: &Liquid<S>) -> f64 {
+fn largest(liquid: &Liquid<impl Surface>) -> f64 {
     liquid.motion().largest_speed()
 }
