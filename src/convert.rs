@@ -8,7 +8,7 @@ use engine::geometry::Geometry;
 use engine::time::Frame;
 use formats::usd::{DEFAULT_WIDTH, Flavour, UsdWriter, lacks_width};
 use formats::{Format, FormatError, FrameStamp};
-use rayon::prelude::*;
+use numerics::parallel;
 
 use crate::failure::{Exit, Failure, cancelled_by_signal};
 use crate::geometry_file::{Numbered, folder_of, read, refused, sequence_in, stem_and_frame};
@@ -134,7 +134,7 @@ impl Conversion {
         let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
         let mut without_width = false;
         for some in files.chunks(rayon::current_num_threads()) {
-            let read: Vec<_> = some.par_iter().map(|(_, path)| self.read(path)).collect();
+            let read = parallel::map(some, |_, (_, path)| self.read(path));
             for (geometry, (frame, _)) in read.into_iter().zip(some) {
                 let geometry = geometry?;
                 without_width |= lacks_width(&geometry);
@@ -159,7 +159,7 @@ impl Conversion {
                 false => self.one_frame(from, to),
             }
         };
-        let converted: Vec<_> = files.par_iter().map(convert).collect();
+        let converted = parallel::map(files, |_, from| convert(from));
         converted.into_iter().try_fold(Written::default(), |mut all, one| {
             let one = one?;
             all.files.extend(one.files);

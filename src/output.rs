@@ -11,6 +11,7 @@ use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
 use formats::usd::{Flavour, UsdError, UsdWriter, lacks_width};
 use formats::{Format, FormatError, FrameStamp};
+use numerics::parallel;
 
 use crate::failure::{Exit, Failure};
 use crate::targets::Targets;
@@ -106,8 +107,7 @@ impl<'g> Writers<'g> {
                 }
                 Target::Nothing => {}
                 Target::PerFrame => {
-                    use rayon::prelude::*;
-                    let files = mine.par_iter().map(|one| write_frame(graph, folder, format, one)).collect::<Vec<_>>();
+                    let files = parallel::map(&mine, |_, one| write_frame(graph, folder, format, one));
                     for (file, one) in files.into_iter().zip(mine) {
                         let (path, bytes) = file?;
                         written.files.push(path);

@@ -7,7 +7,7 @@ mod show;
 use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use crate::failure::{Exit, Failure};
 use crate::geometry_file::read;
@@ -60,7 +60,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         };
         Ok(Compared { pair, findings })
     };
-    let all: Vec<_> = pairs(&args.a, &args.b).map_err(as_error)?.into_par_iter().map(compared).collect();
+    let all = parallel::map(pairs(&args.a, &args.b).map_err(as_error)?, |_, pair| compared(pair));
     // In the order of the pairs, so that always the same of several errors is reported.
     let all = all.into_iter().collect::<Result<Vec<_>, _>>().map_err(as_error)?;
     let text = match args.json {

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::store::Cooked;
 use super::{Delivered, DiskCache, Engine, NodeReport, Report, Sink, Stopped, deliver};
@@ -300,7 +300,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
 
     /// Delivers the frames that were cooked, and saves them to disk.
     fn finish_outputs(&mut self, cooked: Vec<Missing>, finished: &mut Vec<Delivered>) {
-        let made: Vec<_> = cooked.par_iter().map(|(output, frame, _)| self.delivered(*output, *frame)).collect();
+        let made = parallel::map(&cooked, |_, (output, frame, _)| self.delivered(*output, *frame));
         for ((output, frame, key), result) in cooked.into_iter().zip(made) {
             match result {
                 Ok(geometry) => {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::demand::NodeDemand;
 use super::{Outcome, Sweep};
@@ -109,7 +109,7 @@ impl<'g> Sweep<'_, 'g, '_> {
         let watch = Stopwatch::start();
         let worth = self.nodes[node].call_time.saturating_mul(jobs.len() as u32) > WORTH_A_THREAD;
         let cooked: Vec<_> = match jobs.len() > 1 && worth {
-            true => jobs.par_iter().filter_map(one).collect(),
+            true => parallel::map(&jobs, |_, job| one(job)).into_iter().flatten().collect(),
             false => jobs.iter().filter_map(one).collect(),
         };
         self.nodes[node].call_time = watch.wall() / (jobs.len().max(1) as u32);
