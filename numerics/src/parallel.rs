@@ -15,9 +15,12 @@ pub const CHUNK: usize = 512;
 
 /// Calls `work` with each piece and its position, in any order.
 pub fn for_each<P: Send>(pieces: impl IntoIterator<Item = P>, work: impl Fn(usize, P) + Sync) {
-    let pieces: Vec<_> = pieces.into_iter().map(|piece| Mutex::new(Some(piece))).collect();
-    run(pieces.len(), &|n| {
-        if let Some(piece) = take(&pieces[n]) {
+    let mut slots = Vec::new();
+    for piece in pieces {
+        slots.push(Mutex::new(Some(piece)));
+    }
+    run(slots.len(), &|n| {
+        if let Some(piece) = take(&slots[n]) {
             work(n, piece);
         }
     });
@@ -25,15 +28,20 @@ pub fn for_each<P: Send>(pieces: impl IntoIterator<Item = P>, work: impl Fn(usiz
 
 /// What `work` makes of each piece and its position, in the order of the pieces.
 pub fn map<P: Send, T: Send>(pieces: impl IntoIterator<Item = P>, work: impl Fn(usize, P) -> T + Sync) -> Vec<T> {
-    let mut results = Vec::new();
-    let slots: Vec<_> = pieces.into_iter().map(|piece| (Mutex::new(Some(piece)), Mutex::new(None))).collect();
+    let mut slots = Vec::new();
+    for piece in pieces {
+        slots.push((Mutex::new(Some(piece)), Mutex::new(None)));
+    }
     run(slots.len(), &|n| {
         if let Some(piece) = take(&slots[n].0) {
             let result = work(n, piece);
             *slots[n].1.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(result);
         }
     });
-    results.extend(slots.iter().filter_map(|(_, result)| take(result)));
+    let mut results = Vec::with_capacity(slots.len());
+    for (_, result) in &slots {
+        results.extend(take(result));
+    }
     results
 }
 

@@ -5,16 +5,17 @@
 //! and close under objects that nearly touch it. Limit: no shadows farther than `HALF` from the middle of the scene,
 //! and none for an eye below the floor.
 
-use rayon::prelude::*;
-
 use crate::light::{DepthMap, Light};
 use crate::scene::Scene;
 use crate::view::View;
+use numerics::parallel;
 use numerics::vector::{Vec3, add, scale, sub};
 
 /// Half the side of the floor, stage units; and texels per side.
 const HALF: f32 = 2.6;
 const TEXELS: usize = 320;
+/// Rows of texels that a thread blurs at a time.
+const ROWS: usize = 16;
 /// Height at which an object above the floor darkens it half as much as one that touches it, stage units.
 const CONTACT_HEIGHT: f32 = 0.05;
 /// Fraction of the backdrop's light that is removed by full shadow, and by full contact.
@@ -42,7 +43,9 @@ impl Ground {
         let texels = |value: &(dyn Fn(Vec3) -> f32 + Sync)| -> Vec<f32> {
             let middle = |k: usize| ((k as f32 + 0.5) / TEXELS as f32 * 2.0 - 1.0) * HALF;
             let texel = |k: usize| value([middle(k % TEXELS), height, middle(k / TEXELS)]);
-            (0..TEXELS * TEXELS).into_par_iter().map(texel).collect()
+            let mut texels = vec![0.0; TEXELS * TEXELS];
+            parallel::fill(&mut texels, TEXELS, texel);
+            texels
         };
         let shadow = blur(texels(&|at| 1.0 - light.reaching(at)), SHADOW_BLUR);
         let contact = blur(texels(&|at| from_below.seen(at, near)), CONTACT_BLUR);
@@ -79,7 +82,7 @@ fn blur(mut texels: Vec<f32>, reach: usize) -> Vec<f32> {
     for _ in 0..6 {
         // Filters rows and writes them as columns: after two rounds both directions are done and the layout is
         // restored.
-        let blurred: Vec<Vec<f32>> = texels.par_chunks(TEXELS).map(|row| box_filter(row, reach)).collect();
+        let blurred = parallel::tabulate(TEXELS, ROWS, |row| box_filter(&texels[row * TEXELS..][..TEXELS], reach));
         texels = (0..TEXELS * TEXELS).map(|k| blurred[k % TEXELS][k / TEXELS]).collect();
     }
     texels

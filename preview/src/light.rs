@@ -6,12 +6,11 @@
 //! and no gloss. Limit: one bounce; shadows have a resolution of `MAP_PIXELS` pixels over the scene, and there are none
 //! beyond its bounds.
 
-use rayon::prelude::*;
-
 use crate::raster::{self, DepthOnly, Lanes, SAMPLES, Screen, TILE};
 use crate::scene::{Corner, Scene};
 use crate::vector::{mix, times};
 use crate::view::View;
+use numerics::parallel;
 use numerics::vector::{Vec3, add, cross, dot, scale, sub, unit};
 
 /// Directions to the lights, by the camera's right, the world's up and the camera's level back.
@@ -37,6 +36,8 @@ const FULL: f32 = 1.45;
 const MAP_PIXELS: usize = 192;
 /// Half the side of a light's view, stage units: the scene's bounds lie within 1.
 const MAP_HALF: f32 = 1.05;
+/// Number of knots or balls that a thread lights at a time.
+const TASK: usize = 128;
 
 /// Lights and their shadows.
 pub(crate) struct Light {
@@ -61,10 +62,14 @@ impl Light {
         let (key, fill) = (direction(KEY), direction(FILL));
         let shadow = DepthMap::towards(scene, scale(key, -1.0));
         let light = Self { key, fill, eye: view.eye(), shadow, measured };
-        scene.knots.par_iter_mut().for_each(|knot| knot.color = light.strand(knot.at, knot.tangent, knot.color));
-        scene.dots.par_iter_mut().for_each(|ball| {
-            let skin = add(ball.at, scale(key, 1.1 * ball.radius));
-            ball.lit = light.reaching(skin);
+        parallel::for_each(scene.knots.chunks_mut(TASK), |_, knots| {
+            knots.iter_mut().for_each(|knot| knot.color = light.strand(knot.at, knot.tangent, knot.color));
+        });
+        parallel::for_each(scene.dots.chunks_mut(TASK), |_, balls| {
+            for ball in balls {
+                let skin = add(ball.at, scale(key, 1.1 * ball.radius));
+                ball.lit = light.reaching(skin);
+            }
         });
         light
     }

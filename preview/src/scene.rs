@@ -4,7 +4,6 @@
 //! points. Limit: non-finite triangles and CVs are left out individually.
 
 use engine::geometry::{Component, Geometry, Kind, Owner, Topology, Volume, WIDTH};
-use rayon::prelude::*;
 
 use crate::camera::BoundingBox;
 use crate::clip::{Clip, Plane};
@@ -13,6 +12,7 @@ use crate::shape::{boundary, level_set, smooth};
 use crate::vector::finite;
 use crate::view::Stage;
 use crate::{Layer, PictureSettings};
+use numerics::parallel;
 use numerics::vector::{Vec3, scale, sub, unit};
 
 /// A corner of a triangle, with the normal there.
@@ -120,6 +120,10 @@ pub fn memory(layers: &[Layer<'_>]) -> usize {
     };
     layers.iter().map(layer_bytes).fold(0, usize::saturating_add)
 }
+
+/// Number of triangles in a task, and of points.
+const TASK: usize = 1024;
+const POINT_TASK: usize = 4096;
 
 /// Smallest and largest coordinates of everything that is drawn, metres; `None` for an empty scene.
 ///
@@ -239,17 +243,19 @@ impl Scene {
 
     fn surface(&mut self, points: &[Vec3], triangles: &[[u32; 3]], elements: &[u32], paint: &Paint) {
         let normals = smooth::corner_normals(points, triangles);
-        let drawn = triangles.par_iter().zip(elements).zip(&normals).filter_map(|((corners, element), normals)| {
+        let drawn = |row: usize| {
             let corner = |k: usize| {
-                let point = corners[k] as usize;
-                Corner { at: points[point], normal: normals[k], color: paint.at(point, *element as usize) }
+                let point = triangles[row][k] as usize;
+                Corner { at: points[point], normal: normals[row][k], color: paint.at(point, elements[row] as usize) }
             };
             let triangle = [corner(0), corner(1), corner(2)];
             triangle.iter().all(|corner| finite(corner.at)).then_some(triangle)
-        });
+        };
+        let tasks = (0..triangles.len()).step_by(TASK).map(|first| first..triangles.len().min(first + TASK));
+        let drawn = parallel::map(tasks, |_, rows| rows.filter_map(drawn).collect::<Vec<_>>());
         match self.cut {
-            None => self.triangles.par_extend(drawn),
-            Some(plane) => self.triangles.extend(plane.cut(drawn.collect())),
+            None => drawn.iter().for_each(|triangles| self.triangles.extend_from_slice(triangles)),
+            Some(plane) => self.triangles.extend(plane.cut(drawn.concat())),
         }
     }
 
@@ -339,7 +345,9 @@ impl<'a> Widths<'a> {
 }
 
 fn place(points: &[Vec3], stage: &Stage) -> Vec<Vec3> {
-    points.par_iter().map(|p| stage.place(*p)).collect()
+    let mut placed = vec![[0.0; 3]; points.len()];
+    parallel::fill(&mut placed, POINT_TASK, |point| stage.place(points[point]));
+    placed
 }
 
 /// A hash of the bits (Wellons' lowbias32).

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::Env;
 use super::code::Input;
@@ -52,18 +52,15 @@ pub(super) fn run(
     let mut uniform = vec![[0.0]; code.uniform()];
     code.run(&mut uniform, 0, env.seed, |input, out| *out = [env.input(input, count)]);
 
-    let values = || {
+    let bad = parallel::map(chunks, |chunk, mut parts| {
         let mut values = vec![[0.0; BATCH]; code.len()];
         for (value, [number]) in values.iter_mut().zip(&uniform) {
             *value = [*number; BATCH];
         }
-        values
-    };
-    let chunk = |values: &mut Vec<[f64; BATCH]>, (chunk, mut parts): (usize, Vec<ChunkMut<'_>>)| {
         let mut bad = None;
         for start in (chunk * CHUNK..rows.min((chunk + 1) * CHUNK)).step_by(BATCH) {
             let length = BATCH.min(rows - start);
-            code.run(values, uniform.len(), env.seed, |input, out| match input {
+            code.run(&mut values, uniform.len(), env.seed, |input, out| match input {
                 Input::Attribute { attribute, component } => {
                     if let Some(column) = sources[attribute as usize] {
                         read(column, component as usize, start, &mut out[..length]);
@@ -86,9 +83,8 @@ pub(super) fn run(
             }
         }
         bad
-    };
-    let bad = chunks.into_par_iter().enumerate().map_init(values, chunk).reduce(|| None, first);
-    bad.map_or(Ok(()), Err)
+    });
+    bad.into_iter().fold(None, first).map_or(Ok(()), Err)
 }
 
 /// The earlier of two, by line, then row, then component.

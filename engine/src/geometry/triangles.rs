@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use numerics::parallel;
 use numerics::triangulate::triangulate;
-use rayon::prelude::*;
 
 use super::Component;
+
+/// Faces that a thread triangulates at a time.
+const TASK: usize = 256;
 
 /// Triangles of a mesh, in the order and winding of its faces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,16 +29,18 @@ impl Component {
 impl Triangles {
     fn of(mesh: &Component) -> Self {
         let Some(faces) = mesh.faces() else { return Self::default() };
-        let (corners, faces) = (0..faces.runs.len())
-            .into_par_iter()
-            .flat_map_iter(|face| {
-                let corners = faces.face(face);
-                let at: Vec<_> = corners.iter().map(|corner| mesh.positions()[*corner as usize]).collect();
-                let ears = triangulate(&at).into_iter().map(move |ear| ear.map(|k| corners[k as usize]));
-                ears.map(move |corners| (corners, face as u32))
-            })
-            .unzip();
-        Self { corners, faces }
+        let triangles_of = |face: usize| {
+            let corners = faces.face(face);
+            let at: Vec<_> = corners.iter().map(|corner| mesh.positions()[*corner as usize]).collect();
+            let ears = triangulate(&at).into_iter().map(move |ear| ear.map(|k| corners[k as usize]));
+            ears.map(move |corners| (corners, face as u32))
+        };
+        let count = faces.runs.len();
+        let parts = parallel::map((0..count).step_by(TASK), |_, first| {
+            (first..count.min(first + TASK)).flat_map(triangles_of).unzip::<_, _, Vec<_>, Vec<_>>()
+        });
+        let (corners, faces): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        Self { corners: corners.concat(), faces: faces.concat() }
     }
 }
 

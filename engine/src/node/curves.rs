@@ -5,9 +5,9 @@
 
 use std::ops::Range;
 
+use numerics::parallel;
 use numerics::random::Key;
 use numerics::vector::{DVec3, Vec3, direction, to_f32, to_f64};
-use rayon::prelude::*;
 
 use crate::geometry::{CURVE_ID, Component};
 use crate::param::Seed;
@@ -98,22 +98,18 @@ impl<'a> CurveLoop<'a> {
     /// Calls `work` for every curve, in parallel; the slice holds the curve's CVs and takes their new positions.
     pub fn map<T: Send>(self, work: impl Fn(&CurveView<'_>, &mut [Vec3]) -> T + Sync) -> MovedCurves<T> {
         let mut points = self.curves.positions().to_vec();
-        let done: Vec<(Vec<T>, f64)> = self
-            .shares(&mut points)
-            .into_par_iter()
-            .map(|(curves, out)| {
-                let mut scratch = Scratch::default();
-                let (mut results, mut worst, mut left) = (Vec::with_capacity(curves.len()), 0.0_f64, out);
-                for curve in curves {
-                    let (out, rest) = std::mem::take(&mut left).split_at_mut(self.curves.runs().range(curve).len());
-                    left = rest;
-                    let (result, error) = self.one(curve, &mut scratch, out, &work);
-                    results.push(result);
-                    worst = worst.max(error);
-                }
-                (results, worst)
-            })
-            .collect();
+        let done = parallel::map(self.shares(&mut points), |_, (curves, out)| {
+            let mut scratch = Scratch::default();
+            let (mut results, mut worst, mut left) = (Vec::with_capacity(curves.len()), 0.0_f64, out);
+            for curve in curves {
+                let (out, rest) = std::mem::take(&mut left).split_at_mut(self.curves.runs().range(curve).len());
+                left = rest;
+                let (result, error) = self.one(curve, &mut scratch, out, &work);
+                results.push(result);
+                worst = worst.max(error);
+            }
+            (results, worst)
+        });
         let length_error = done.iter().map(|(_, error)| *error).fold(0.0, f64::max);
         MovedCurves { points, length_error, results: done.into_iter().flat_map(|(results, _)| results).collect() }
     }

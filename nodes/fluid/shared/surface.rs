@@ -3,7 +3,7 @@
 use engine::prelude::*;
 use liquid::extract::{Placement, QuadMesh, extract};
 use liquid::level_set::{PhiView, refined};
-use rayon::prelude::*;
+use numerics::parallel;
 
 use super::volume::VolumeLevelSet;
 
@@ -69,9 +69,10 @@ pub(crate) fn surface(cx: &Cx, volume: &Volume, detail: SurfaceDetail) -> Result
 
 /// The velocity of a volume at points, metres.
 pub(crate) fn velocity_at(volume: &Volume, points: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    let parts = points.par_chunks(CHUNK).map(|points| {
+    let mut velocity = vec![[0.0; 3]; points.len()];
+    parallel::for_each(velocity.chunks_mut(CHUNK).zip(points.chunks(CHUNK)), |_, (velocity, points)| {
         let mut sampler = volume.sampler();
-        points.iter().map(|point| sampler.velocity(*point)).collect::<Vec<_>>()
+        velocity.iter_mut().zip(points).for_each(|(velocity, point)| *velocity = sampler.velocity(*point));
     });
-    parts.collect::<Vec<_>>().concat()
+    velocity
 }

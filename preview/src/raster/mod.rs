@@ -8,11 +8,10 @@ mod bins;
 mod cover;
 mod project;
 
-use rayon::prelude::*;
-
 use bins::{Bins, PixelBox};
 pub(crate) use project::Screen;
 
+use numerics::parallel;
 use numerics::vector::Vec3;
 
 /// Pixels per side of a tile, whose samples fit into a core's L2 cache.
@@ -131,30 +130,27 @@ pub(crate) fn draw<S: Shader, R: Send>(
     let triangles = bins(screen.triangles.iter().map(|triangle| triangle.pixels).collect());
     let segments = bins(screen.segments.iter().map(|segment| segment.pixels).collect());
     let dots = bins(screen.dots.iter().map(|dot| dot.pixels).collect());
-    (0..columns * rows)
-        .into_par_iter()
-        .map(|index| {
-            let (column, row) = (index % columns, index / columns);
-            let mut tile = Tile::new(column, row);
-            let within = tile.pixels();
-            for triangle in triangles.at(column, row).map(|row| &screen.triangles[row]) {
-                if let Some(pixels) = triangle.pixels.meet(&within) {
-                    cover::triangle(&mut tile, triangle, pixels, shader);
-                }
+    parallel::map(0..columns * rows, |_, index| {
+        let (column, row) = (index % columns, index / columns);
+        let mut tile = Tile::new(column, row);
+        let within = tile.pixels();
+        for triangle in triangles.at(column, row).map(|row| &screen.triangles[row]) {
+            if let Some(pixels) = triangle.pixels.meet(&within) {
+                cover::triangle(&mut tile, triangle, pixels, shader);
             }
-            for segment in segments.at(column, row).map(|row| &screen.segments[row]) {
-                if let Some(pixels) = segment.pixels.meet(&within) {
-                    cover::segment(&mut tile, segment, pixels, shader);
-                }
+        }
+        for segment in segments.at(column, row).map(|row| &screen.segments[row]) {
+            if let Some(pixels) = segment.pixels.meet(&within) {
+                cover::segment(&mut tile, segment, pixels, shader);
             }
-            for dot in dots.at(column, row).map(|row| &screen.dots[row]) {
-                if let Some(pixels) = dot.pixels.meet(&within) {
-                    cover::dot(&mut tile, dot, pixels, shader);
-                }
+        }
+        for dot in dots.at(column, row).map(|row| &screen.dots[row]) {
+            if let Some(pixels) = dot.pixels.meet(&within) {
+                cover::dot(&mut tile, dot, pixels, shader);
             }
-            finish(tile)
-        })
-        .collect()
+        }
+        finish(tile)
+    })
 }
 
 #[cfg(test)]

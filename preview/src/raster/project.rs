@@ -4,18 +4,21 @@
 //! is drawn one pixel wide with proportionally less coverage, so that a line of any width has the light of its area.
 //! Limit: a ball or CV is dropped if its centre is behind the eye.
 
-use rayon::prelude::*;
-
 use super::bins::PixelBox;
 use crate::scene::{Corner, Dot, Knot, Scene, Strand};
 use crate::vector::{finite, mix};
 use crate::view::{NEAR, View};
+use numerics::parallel;
 use numerics::vector::Vec3;
 
 /// Half a pixel: nothing is drawn thinner.
 const LEAST_RADIUS: f32 = 0.5;
+/// Number of triangles or balls in a task, and of strands.
+const TASK: usize = 512;
+const STRAND_TASK: usize = 64;
 
 /// A triangle with x, y in pixels and nearness at its corners.
+#[derive(Clone, Copy)]
 pub(crate) struct ScreenTriangle {
     pub(crate) at: [Vec3; 3],
     pub(crate) corners: [Corner; 3],
@@ -23,6 +26,7 @@ pub(crate) struct ScreenTriangle {
 }
 
 /// A piece of a strand between two knots.
+#[derive(Clone, Copy)]
 pub(crate) struct ScreenSegment {
     pub(crate) at: [Vec3; 2],
     /// Pixels, at each end.
@@ -37,6 +41,7 @@ pub(crate) struct ScreenSegment {
 }
 
 /// A ball.
+#[derive(Clone, Copy)]
 pub(crate) struct ScreenDot {
     pub(crate) at: Vec3,
     pub(crate) radius: f32,
@@ -60,15 +65,21 @@ pub(crate) struct Screen {
 
 impl Screen {
     pub(crate) fn of(scene: &Scene, view: &View, size: [usize; 2]) -> Self {
-        let triangles = scene.triangles.par_iter().flat_map_iter(|corners| {
-            clip(corners, view).into_iter().flatten().filter_map(move |corners| triangle(corners, view, size))
+        let triangles = parallel::map(scene.triangles.chunks(TASK), |_, triangles| {
+            let parts = triangles.iter().flat_map(|corners| clip(corners, view).into_iter().flatten());
+            parts.filter_map(|corners| triangle(corners, view, size)).collect::<Vec<_>>()
         });
-        let segments = scene.strands.par_iter().flat_map_iter(|strand| {
-            let knots = &scene.knots[strand.knots.clone()];
-            (1..knots.len()).filter_map(move |k| segment(knots, k, strand, view, size))
+        let segments = parallel::map(scene.strands.chunks(STRAND_TASK), |_, strands| {
+            let segments = strands.iter().flat_map(|strand| {
+                let knots = &scene.knots[strand.knots.clone()];
+                (1..knots.len()).filter_map(move |k| segment(knots, k, strand, view, size))
+            });
+            segments.collect::<Vec<_>>()
         });
-        let dots = scene.dots.par_iter().filter_map(|ball| dot(ball, view, size));
-        Self { size, triangles: triangles.collect(), segments: segments.collect(), dots: dots.collect() }
+        let dots = parallel::map(scene.dots.chunks(TASK), |_, balls| {
+            balls.iter().filter_map(|ball| dot(ball, view, size)).collect::<Vec<_>>()
+        });
+        Self { size, triangles: triangles.concat(), segments: segments.concat(), dots: dots.concat() }
     }
 }
 

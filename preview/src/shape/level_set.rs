@@ -6,8 +6,12 @@
 //! and two sheets that meet in one cube share its point. A value that is not finite counts as outside.
 
 use engine::geometry::{BLOCK_EDGE, FieldCursor, Grid, SparseField, Volume, VolumeSampler};
+use numerics::parallel;
 use numerics::vector::length;
-use rayon::prelude::*;
+
+/// Blocks whose cubes a thread looks at at a time, and crossed cubes whose quads it makes.
+const TASK: usize = 4;
+const QUAD_TASK: usize = 64;
 
 /// Points (metres), the cell nearest to each, and quads.
 pub(crate) struct Surface {
@@ -21,39 +25,47 @@ pub(crate) fn zero_level(volume: &Volume) -> Surface {
     // Cube (i, j, k) has cell centres i−1…i, j−1…j, k−1…k at its corners; a layer around the grid is outside.
     let field = Field { grid: volume.level_grid(), phi: volume.level_set() };
     let cubes = field.grid.size.map(|n| i64::from(n) + 1);
-    let mut crossed: Vec<([i64; 3], [f32; 3])> = cube_blocks(field.phi)
-        .into_par_iter()
-        .flat_map_iter(|block| {
-            let mut cursor = field.phi.cursor();
+    let blocks = cube_blocks(field.phi);
+    let crossed = parallel::map(blocks.chunks(TASK), |_, blocks| {
+        let mut cursor = field.phi.cursor();
+        let cubes = blocks.iter().flat_map(|block| {
             let range = |axis: usize| {
                 let first = i64::from(block[axis] * BLOCK_EDGE);
                 first..(first + i64::from(BLOCK_EDGE)).min(cubes[axis])
             };
             let row = move |j, k| range(0).map(move |i| [i, j, k]);
-            let all = range(2).flat_map(move |k| range(1).flat_map(move |j| row(j, k)));
-            let found = all.filter_map(|cube| field.point(&mut cursor, cube).map(|point| (cube, point)));
-            found.collect::<Vec<_>>()
-        })
-        .collect();
-    crossed.par_sort_unstable_by_key(|([i, j, k], _)| [*k, *j, *i]);
+            range(2).flat_map(move |k| range(1).flat_map(move |j| row(j, k)))
+        });
+        let found = cubes.filter_map(|cube| field.point(&mut cursor, cube).map(|point| (cube, point)));
+        found.collect::<Vec<_>>()
+    });
+    let mut crossed: Vec<([i64; 3], [f32; 3])> = crossed.concat();
     let order = |[i, j, k]: [i64; 3]| [k, j, i];
+    // The layers of blocks are in order already.
+    let layer = |cube: &[i64; 3]| cube[2] / i64::from(BLOCK_EDGE);
+    parallel::for_each(crossed.chunk_by_mut(|(a, _), (b, _)| layer(a) == layer(b)), |_, cubes| {
+        cubes.sort_unstable_by_key(|(cube, _)| order(*cube));
+    });
     let row = |cube| crossed.binary_search_by_key(&order(cube), |(cube, _)| order(*cube)).ok().map(|row| row as u32);
-    let quads = crossed.par_iter().map_init(|| field.phi.cursor(), |cursor, (cube, _)| field.quads(cursor, *cube, row));
-    let quads = quads.flat_map_iter(|quads| quads).collect();
+    let quads = parallel::map(crossed.chunks(QUAD_TASK), |_, cubes| {
+        let mut cursor = field.phi.cursor();
+        cubes.iter().flat_map(|(cube, _)| field.quads(&mut cursor, *cube, row)).collect::<Vec<_>>()
+    });
     let last = field.grid.size.map(|n| i64::from(n) - 1);
     let cell = |cube: [i64; 3]| std::array::from_fn(|axis| cube[axis].min(last[axis]) as u32);
     Surface {
         points: crossed.iter().map(|(_, point)| *point).collect(),
         cells: crossed.iter().map(|(cube, _)| cell(*cube)).collect(),
-        quads,
+        quads: quads.concat(),
     }
 }
 
-/// Blocks of 8³ cubes that have a corner in a stored block of `field`: the block itself and its neighbours above.
+/// Blocks of 8³ cubes that have a corner in a stored block of `field`: the block itself and its neighbours above, in the order
+/// of the grid.
 fn cube_blocks(field: &SparseField) -> Vec<[u32; 3]> {
     let above = |[x, y, z]: [u32; 3]| (0..8).map(move |bits| [x + (bits & 1), y + (bits >> 1 & 1), z + (bits >> 2)]);
     let mut blocks: Vec<_> = field.blocks().flat_map(|(block, _)| above(block)).collect();
-    blocks.sort_unstable();
+    blocks.sort_unstable_by_key(|[x, y, z]| [*z, *y, *x]);
     blocks.dedup();
     blocks
 }

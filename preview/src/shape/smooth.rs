@@ -4,8 +4,7 @@
 //! by less than `CREASE`. Limit: a point with more than `MOST_AROUND` triangles is smooth all round; an `N` attribute
 //! is not read, as a node that moves points may not have updated it.
 
-use rayon::prelude::*;
-
+use numerics::parallel;
 use numerics::vector::{Vec3, add, cross, dot, sub, unit};
 
 /// Cosine of the angle between triangles above which their edge is drawn sharp: 40 degrees. A sphere of 9 or more
@@ -13,30 +12,31 @@ use numerics::vector::{Vec3, add, cross, dot, sub, unit};
 const CREASE: f32 = 0.766;
 /// Largest number of triangles at a point that are compared with each other; the cost is its square.
 const MOST_AROUND: usize = 64;
+/// Number of triangles in a task, and of those whose corners are.
+const TASK: usize = 4096;
+const CORNER_TASK: usize = 256;
 
 /// Normals at the three corners of each triangle. Rows of `triangles` are rows of `points`.
 pub(crate) fn corner_normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[Vec3; 3]> {
     // Length: twice the triangle's area.
-    let faces: Vec<Vec3> = triangles
-        .par_iter()
-        .map(|corners| {
-            let [a, b, c] = corners.map(|k| points[k as usize]);
-            cross(sub(b, a), sub(c, a))
-        })
-        .collect();
-    let units: Vec<Vec3> = faces.par_iter().map(|face| unit(*face).unwrap_or([0.0; 3])).collect();
+    let mut faces = vec![[0.0; 3]; triangles.len()];
+    parallel::fill(&mut faces, TASK, |row| {
+        let [a, b, c] = triangles[row].map(|k| points[k as usize]);
+        cross(sub(b, a), sub(c, a))
+    });
+    let mut units = vec![[0.0; 3]; triangles.len()];
+    parallel::fill(&mut units, TASK, |row| unit(faces[row]).unwrap_or([0.0; 3]));
     let around = Around::of(points.len(), triangles);
-    (0..triangles.len())
-        .into_par_iter()
-        .map(|own| {
-            triangles[own].map(|point| {
-                let around = around.triangles(point);
-                let smooth = |t: &&u32| around.len() > MOST_AROUND || dot(units[**t as usize], units[own]) > CREASE;
-                let sum = around.iter().filter(smooth).fold([0.0; 3], |sum, t| add(sum, faces[*t as usize]));
-                unit(sum).unwrap_or(units[own])
-            })
+    let mut normals = vec![[[0.0; 3]; 3]; triangles.len()];
+    parallel::fill(&mut normals, CORNER_TASK, |own| {
+        triangles[own].map(|point| {
+            let around = around.triangles(point);
+            let smooth = |t: &&u32| around.len() > MOST_AROUND || dot(units[**t as usize], units[own]) > CREASE;
+            let sum = around.iter().filter(smooth).fold([0.0; 3], |sum, t| add(sum, faces[*t as usize]));
+            unit(sum).unwrap_or(units[own])
         })
-        .collect()
+    });
+    normals
 }
 
 /// The triangles at each point.

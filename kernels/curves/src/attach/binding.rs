@@ -6,12 +6,12 @@ use super::rotation::nearest_rotations;
 use super::triangle_lanes::{Area, Columns, TriangleLanes, deformations, direction_or_zero};
 use crate::surface::SurfacePoint;
 use numerics::lanes::{F64x16, LANES};
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DQuat, DVec3, to_f64};
-use rayon::prelude::*;
 use std::ops::{Add, Mul};
 
-/// Minimum number of rows in a task: some 20 µs of work.
+/// Number of rows in a task, in whole groups: some 20 µs of work.
 const TASK: usize = 256;
 
 /// Number of roots that a task binds: some 100 µs of work.
@@ -72,8 +72,8 @@ impl SkinBinding {
             return Some(Self::new(points, triangles, &[], Vec::new()));
         }
         let faces = ClosestFaces::new(points, triangles)?;
-        let tasks = roots.par_chunks(BOUND_AT_ONCE);
-        let surface: Vec<SurfacePoint> = tasks.flat_map_iter(|roots| faces.find_each(roots)).collect();
+        let surface = parallel::map(roots.chunks(BOUND_AT_ONCE), |_, roots| faces.find_each(roots));
+        let surface = parallel::concat(surface, roots.len());
         Some(Self::new(points, triangles, &surface, roots.iter().map(|root| to_f64(*root)).collect()))
     }
 
@@ -92,9 +92,10 @@ impl SkinBinding {
         let is_bound = |corner: &u32| row_of[*corner as usize] != NONE;
         let around: Vec<[u32; 3]> = faces.iter().filter(|corners| corners.iter().any(is_bound)).copied().collect();
         let simd = Path::chosen();
-        let blocks = around.par_chunks(LANES).with_min_len(TASK / LANES);
-        let (triangles, areas): (Vec<TriangleLanes>, Vec<[Area; LANES]>) =
-            blocks.map(|corners| TriangleLanes::new(simd, points, corners)).unzip();
+        let blocks = parallel::map(around.chunks(TASK), |_, corners| {
+            corners.chunks(LANES).map(|corners| TriangleLanes::new(simd, points, corners)).collect::<Vec<_>>()
+        });
+        let (triangles, areas): (Vec<TriangleLanes>, Vec<[Area; LANES]>) = blocks.into_iter().flatten().unzip();
 
         let rows = |corners: &[u32; 3]| corners.map(|corner| row_of[corner as usize]);
         let incident = link_incident(&mut vertices, around.iter().map(rows));
@@ -154,16 +155,15 @@ impl SkinBinding {
     /// If there are fewer points than at rest.
     pub fn poses(&self, now: &[[f32; 3]]) -> Vec<RootPose> {
         let simd = Path::chosen();
-        let blocks = self.triangles.par_iter().with_min_len(TASK / LANES);
-        let deformed: Vec<[Columns; LANES]> = blocks.map(|triangles| deformations(simd, triangles, now)).collect();
-        let rows = (0..self.vertices.len().div_ceil(LANES)).into_par_iter().with_min_len(TASK / LANES);
-        let motions = rows.map(|block| vertex_motions(simd, self, LANES * block, deformed.as_flattened(), now));
-        let motions: Vec<[VertexMotion; LANES]> = motions.collect();
+        let mut deformed = vec![[[0.0; 9]; LANES]; self.triangles.len()];
+        parallel::fill(&mut deformed, TASK / LANES, |block| deformations(simd, &self.triangles[block], now));
+        let deformed = deformed.as_flattened();
+        let mut motions = vec![[VertexMotion::NONE; LANES]; self.vertices.len().div_ceil(LANES)];
+        parallel::fill(&mut motions, TASK / LANES, |block| vertex_motions(simd, self, LANES * block, deformed, now));
         let motions = motions.as_flattened();
         let rest = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
         let mut poses = vec![rest; self.roots.len()];
-        let tasks = poses.par_chunks_mut(LANES).zip(self.roots.par_chunks(LANES)).with_min_len(TASK / LANES);
-        tasks.for_each(|(poses, roots)| {
+        let pose_group = |poses: &mut [RootPose], roots: &[BoundRoot]| {
             let rotations = nearest_rotations(simd, &gradients_at(simd, roots, motions));
             for ((pose, root), rotation) in poses.iter_mut().zip(roots).zip(rotations) {
                 let translations = root.vertices.map(|vertex| motions[vertex as usize].displacement);
@@ -173,6 +173,9 @@ impl SkinBinding {
                 let translation = translation + (rotation * root.offset - root.offset);
                 *pose = RootPose { translation, rotation, lost };
             }
+        };
+        parallel::for_each(poses.chunks_mut(TASK).zip(self.roots.chunks(TASK)), |_, (poses, roots)| {
+            poses.chunks_mut(LANES).zip(roots.chunks(LANES)).for_each(|(poses, roots)| pose_group(poses, roots));
         });
         poses
     }
@@ -187,6 +190,10 @@ struct VertexMotion {
     displacement: DVec3,
 }
 
+impl VertexMotion {
+    const NONE: Self = Self { gradient: [0.0; 9], displacement: DVec3::new(0.0, 0.0, 0.0) };
+}
+
 kernel! {
     /// The motions of sixteen vertices from row `first` on, given the deformation of each triangle and the skin's current
     /// points `now`; zero where there is no vertex.
@@ -196,7 +203,7 @@ kernel! {
 
 #[inline(always)]
 fn motions(binding: &SkinBinding, first: usize, deformed: &[Columns], now: &[[f32; 3]]) -> [VertexMotion; LANES] {
-    let mut motions = [VertexMotion { gradient: [0.0; 9], displacement: DVec3::zeros() }; LANES];
+    let mut motions = [VertexMotion::NONE; LANES];
     for (motion, row) in motions.iter_mut().zip(first..binding.vertices.len()) {
         let vertex = &binding.vertices[row];
         for triangle in &binding.incident[range(&binding.vertices, row)] {

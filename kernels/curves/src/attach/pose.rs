@@ -1,7 +1,9 @@
 //! Curves moved by the poses of their roots.
 
 use nalgebra::Quaternion;
+use numerics::parallel;
 use numerics::vector::{DQuat, DVec3, to_f32, to_f64};
+use std::ops::Range;
 
 /// How a root has moved and rotated with its skin since rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,8 +96,7 @@ fn each_row<T: Copy + Send + Sync>(
     });
 }
 
-/// Calls `each` with the pose of every curve and its rows of `out` and `rest`; returns the largest result. Splits the
-/// curves in halves until a task is small.
+/// Calls `each` with the pose of every curve and its rows of `out` and `rest`; returns the largest result.
 fn each_curve<T: Send + Sync>(
     starts: &[u32],
     poses: &[RootPose],
@@ -103,25 +104,31 @@ fn each_curve<T: Send + Sync>(
     rest: &[T],
     each: &(impl Fn(&RootPose, &mut [T], &[T]) -> f64 + Sync),
 ) -> f64 {
-    let curves = starts.len().saturating_sub(1);
-    let from = |curve: usize| (starts[curve] - starts[0]) as usize;
-    if curves < 2 || rest.len() < TASK {
+    let largest = parallel::map(tasks(starts, out), |_, (curves, mut out)| {
         let mut largest = 0.0_f64;
-        let mut left = out;
-        for curve in 0..curves {
-            let (mine, after) = left.split_at_mut(from(curve + 1) - from(curve));
-            largest = largest.max(each(&poses[curve], mine, &rest[from(curve)..from(curve + 1)]));
-            left = after;
+        for curve in curves {
+            let rows = starts[curve] as usize..starts[curve + 1] as usize;
+            let (mine, after) = out.split_at_mut(rows.len());
+            largest = largest.max(each(&poses[curve], mine, &rest[rows]));
+            out = after;
         }
-        return largest;
+        largest
+    });
+    largest.into_iter().fold(0.0, f64::max)
+}
+
+/// Splits the curves, and `out` with them, into tasks.
+fn tasks<'a, T>(starts: &[u32], mut out: &'a mut [T]) -> Vec<(Range<usize>, &'a mut [T])> {
+    let curves = starts.len().saturating_sub(1);
+    let (mut tasks, mut first) = (Vec::new(), 0);
+    while first < curves {
+        let mut end = first + 1;
+        while end < curves && ((starts[end] - starts[first]) as usize) < TASK {
+            end += 1;
+        }
+        let (mine, after) = out.split_at_mut((starts[end] - starts[first]) as usize);
+        tasks.push((first..end, mine));
+        (out, first) = (after, end);
     }
-    let middle = curves / 2;
-    let (out_left, out_right) = out.split_at_mut(from(middle));
-    let (rest_left, rest_right) = rest.split_at(from(middle));
-    let (poses_left, poses_right) = poses.split_at(middle);
-    let (left, right) = rayon::join(
-        || each_curve(&starts[..=middle], poses_left, out_left, rest_left, each),
-        || each_curve(&starts[middle..], poses_right, out_right, rest_right, each),
-    );
-    left.max(right)
+    tasks
 }

@@ -22,10 +22,10 @@ mod triangle_filter;
 use coherence::Ground;
 use hair::{Hair, Scratch};
 use numerics::masked::Masked;
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
-use rayon::prelude::*;
 use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};
 pub use skin::{SkinSurface, normals};
@@ -153,10 +153,9 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
         tasks.push((first..end, out));
         (left, first) = (rest, end);
     }
-    let reached = tasks
-        .into_par_iter()
-        .map(|(curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out))
-        .reduce(Reached::default, Reached::and);
+    let reached =
+        parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out));
+    let reached = reached.into_iter().fold(Reached::default(), Reached::and);
     let Reached { unfreed_segments, crossings_left, contacts, deepest_overlap, length_error } = reached;
     let started_inside = at_rest.inside();
     Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }

@@ -3,9 +3,9 @@
 use super::Collide;
 use super::crossing::first_crossing;
 use super::segment_turn::{Nearby, gather};
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
-use rayon::prelude::*;
 
 /// Number of successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
@@ -39,7 +39,7 @@ pub fn at_rest(starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
 
 pub(super) fn at_rest_on(path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
     let mut curves = vec![Grown::default(); starts.len().saturating_sub(1)];
-    curves.par_chunks_mut(TASK_CURVES).enumerate().for_each(|(task, grown)| {
+    parallel::for_each(curves.chunks_mut(TASK_CURVES), |task, grown| {
         let first = task * TASK_CURVES;
         grow(path, &starts[first..=first + grown.len()], rest, how, grown);
     });

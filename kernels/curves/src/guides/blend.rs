@@ -4,8 +4,8 @@ use super::resample::ResampledGuides;
 use super::weights::{GuideWeight, GuideWeights};
 use crate::attach::{RootPose, rotate_orientation};
 use nalgebra::{Quaternion, Unit};
+use numerics::parallel;
 use numerics::vector::{DQuat, DVec3, Quat, to_f32, to_f64};
-use rayon::prelude::*;
 
 /// What hairs are blended from, and their current positions.
 #[derive(Clone, Copy, Debug)]
@@ -32,8 +32,9 @@ pub struct BlendedHairs {
     pub length_error: f64,
 }
 
-/// Minimum number of hairs in a task: some 30 µs of work.
+/// Number of hairs in a task, and of rows of an attribute: some 30 µs of work.
 const TASK: usize = 64;
+const ROW_TASK: usize = 512;
 
 /// Below this fraction of the guides' own lengths the sum of their segments is rounding error and has no direction.
 const CANCELLED: f64 = 1e-9;
@@ -50,7 +51,7 @@ pub fn blend_hairs(guides: ResampledGuides, blend: &HairBlend) -> BlendedHairs {
     };
     let cvs = guides.segments() + 1;
     let mut points = vec![[0.0; 3]; blend.roots.len() * cvs];
-    let errors = points.par_chunks_mut(cvs).enumerate().with_min_len(TASK).map(|(hair, points)| {
+    let blend_hair = |(hair, points): (usize, &mut [[f32; 3]])| {
         let mut at = blend.roots[hair];
         points[0] = to_f32(at);
         let (mut asked, mut written) = (0.0, 0.0);
@@ -66,9 +67,11 @@ pub fn blend_hairs(guides: ResampledGuides, blend: &HairBlend) -> BlendedHairs {
             written += (to_f64(points[segment + 1]) - to_f64(points[segment])).norm();
         }
         if asked > 0.0 { ((written - asked) / asked).abs() } else { 0.0 }
+    };
+    let errors = parallel::map(points.chunks_mut(TASK * cvs), |task, points| {
+        (task * TASK..).zip(points.chunks_mut(cvs)).map(blend_hair).fold(0.0, f64::max)
     });
-    let length_error = errors.reduce(|| 0.0, f64::max);
-    BlendedHairs { points, length_error }
+    BlendedHairs { points, length_error: errors.into_iter().fold(0.0, f64::max) }
 }
 
 /// Direction and length of a hair's segment in its frame at rest.
@@ -120,7 +123,7 @@ impl HairBlend<'_> {
         rows: &[[f32; N]],
         of: CurveDomain,
     ) -> Vec<[f32; N]> {
-        self.each(guides, of, |hair, cv| {
+        self.each(guides, of, [0.0; N], |hair, cv| {
             let mut sum = [0.0_f64; N];
             for guide in self.weights.of(hair).iter().filter(|guide| guide.weight > 0.0) {
                 let row = row_at(guides, rows, of, guide.guide, cv);
@@ -137,7 +140,7 @@ impl HairBlend<'_> {
     /// # Panics
     /// As [`blend_hairs`].
     pub fn vectors(&self, guides: &ResampledGuides, rows: &[[f32; 3]], of: CurveDomain) -> Vec<[f32; 3]> {
-        self.each(guides, of, |hair, cv| {
+        self.each(guides, of, [0.0; 3], |hair, cv| {
             let mut sum = DVec3::zeros();
             for guide in self.weights.of(hair).iter().filter(|guide| guide.weight > 0.0) {
                 let row = DVec3::from(row_at(guides, rows, of, guide.guide, cv));
@@ -154,11 +157,12 @@ impl HairBlend<'_> {
     pub fn orientations(&self, guides: &ResampledGuides, rows: &[[f32; 4]], of: CurveDomain) -> Vec<[f32; 4]> {
         let heaviest = self.heaviest(guides, of);
         let per_hair = if of == CurveDomain::Point { guides.segments() + 1 } else { 1 };
-        let rotated = |(at, row): (usize, &u32)| {
+        let mut rotated = vec![[0.0; 4]; heaviest.len()];
+        parallel::fill(&mut rotated, ROW_TASK, |at| {
             let hair = at / per_hair;
-            rotate_orientation(&self.rotation(hair, &self.weights.of(hair)[0]), rows[*row as usize])
-        };
-        heaviest.par_iter().enumerate().with_min_len(TASK).map(rotated).collect()
+            rotate_orientation(&self.rotation(hair, &self.weights.of(hair)[0]), rows[heaviest[at] as usize])
+        });
+        rotated
     }
 
     /// For values that cannot be blended: for each row of the hairs, the row of the guide with the largest weight.
@@ -166,7 +170,7 @@ impl HairBlend<'_> {
     /// # Panics
     /// As [`blend_hairs`].
     pub fn heaviest(&self, guides: &ResampledGuides, of: CurveDomain) -> Vec<u32> {
-        self.each(guides, of, |hair, cv| {
+        self.each(guides, of, 0, |hair, cv| {
             let guide = self.weights.of(hair)[0].guide;
             match of {
                 CurveDomain::Curve => guide,
@@ -187,16 +191,19 @@ impl HairBlend<'_> {
         }
     }
 
-    /// Evaluates a row for each CV of the hairs, given the index of its hair and that of the CV within it.
-    fn each<T: Send>(
+    /// Evaluates a row for each CV of the hairs, given the index of its hair and that of the CV within it; `blank` is
+    /// any row.
+    fn each<T: Copy + Send>(
         &self,
         guides: &ResampledGuides,
         of: CurveDomain,
+        blank: T,
         row: impl Fn(usize, usize) -> T + Sync,
     ) -> Vec<T> {
         let per_hair = if of == CurveDomain::Point { guides.segments() + 1 } else { 1 };
-        let rows = (0..self.roots.len() * per_hair).into_par_iter().with_min_len(TASK);
-        rows.map(|at| row(at / per_hair, at % per_hair)).collect()
+        let mut rows = vec![blank; self.roots.len() * per_hair];
+        parallel::fill(&mut rows, ROW_TASK, |at| row(at / per_hair, at % per_hair));
+        rows
     }
 }
 

@@ -1,7 +1,7 @@
 //! Guides resampled to the number of segments of a hair.
 
+use numerics::parallel;
 use numerics::vector::{DVec3, to_f64};
-use rayon::prelude::*;
 
 /// Guides with as many segments as a hair. A guide with as many CVs keeps them; any other is resampled evenly along its
 /// length.
@@ -32,6 +32,9 @@ pub(super) struct GuideSample {
     pub(super) fraction: f32,
 }
 
+/// Number of guides in a task.
+const TASK: usize = 32;
+
 impl ResampledGuides {
     /// Resamples guides `points[starts[i]..starts[i + 1]]` to `cvs` (1 or more) CVs.
     ///
@@ -42,12 +45,17 @@ impl ResampledGuides {
         let guides = starts.len().saturating_sub(1);
         let mut samples = vec![GuideSample { before: 0, after: 0, fraction: 0.0 }; guides * cvs];
         let mut pieces = vec![GuideSegment { chord: DVec3::zeros(), length: 0.0 }; guides * segments];
-        samples.par_chunks_mut(cvs).enumerate().for_each(|(guide, samples)| {
-            cut(starts[guide], &points[starts[guide] as usize..starts[guide + 1] as usize], samples);
+        parallel::for_each(samples.chunks_mut(TASK * cvs), |task, samples| {
+            for (guide, samples) in (task * TASK..).zip(samples.chunks_mut(cvs)) {
+                cut(starts[guide], &points[starts[guide] as usize..starts[guide + 1] as usize], samples);
+            }
         });
         if segments > 0 {
-            let both = pieces.par_chunks_mut(segments).zip(samples.par_chunks(cvs));
-            both.for_each(|(pieces, samples)| measure(points, samples, pieces));
+            let tasks = pieces.chunks_mut(TASK * segments).zip(samples.chunks(TASK * cvs));
+            parallel::for_each(tasks, |_, (pieces, samples)| {
+                let guides = pieces.chunks_mut(segments).zip(samples.chunks(cvs));
+                guides.for_each(|(pieces, samples)| measure(points, samples, pieces));
+            });
         }
         Self { segments, pieces, samples }
     }
@@ -68,8 +76,10 @@ impl ResampledGuides {
     /// The guides with their chords mapped.
     pub(super) fn with_chords(mut self, map: impl Fn(usize, DVec3) -> DVec3 + Sync) -> Self {
         if self.segments > 0 {
-            self.pieces.par_chunks_mut(self.segments).enumerate().for_each(|(guide, pieces)| {
-                pieces.iter_mut().for_each(|piece| piece.chord = map(guide, piece.chord));
+            parallel::for_each(self.pieces.chunks_mut(TASK * self.segments), |task, pieces| {
+                for (guide, pieces) in (task * TASK..).zip(pieces.chunks_mut(self.segments)) {
+                    pieces.iter_mut().for_each(|piece| piece.chord = map(guide, piece.chord));
+                }
             });
         }
         self

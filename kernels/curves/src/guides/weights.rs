@@ -1,10 +1,10 @@
 //! The guides that each hair is blended from, and their weights.
 
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Block, NONE, TriangleTree};
 use numerics::vector::{self, Quat, Vec3, largest, power_of_two_to_one, to_f64};
-use rayon::prelude::*;
 
 /// Largest number of guides that a hair is blended from.
 pub const MAX_GUIDES: usize = 32;
@@ -72,8 +72,8 @@ pub(super) fn guide_weights_on(
     let mut weights = vec![blank; per_hair * hairs.len()];
     if per_hair > 0 {
         let search = GuideSearch::new(guides, hairs);
-        let tasks = weights.par_chunks_mut(per_hair * TASK).zip(hairs.par_chunks(TASK));
-        tasks.for_each(|(weights, hairs)| weigh_chunk(path, &search, hairs, per_hair, weights));
+        let tasks = weights.chunks_mut(per_hair * TASK).zip(hairs.chunks(TASK));
+        parallel::for_each(tasks, |_, (weights, hairs)| weigh_chunk(path, &search, hairs, per_hair, weights));
     }
     GuideWeights { per_hair, weights }
 }

@@ -23,11 +23,11 @@ pub use control::{AXIS_ROWS, Control, ControlShape, outline};
 use cull::{Boxes, NOWHERE, bounds_of, join, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
+use numerics::parallel;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use numerics::vector::DVec3;
 use profile::Profile;
-use rayon::prelude::*;
 
 /// A procedural gust at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,20 +99,16 @@ pub fn evaluate(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
 pub fn evaluate_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
     let prepared = Prepared::new(gusts);
     let mut values = vec![prepared.gusts.base.clamp(0.0, 1.0); points.len()];
-    let reached = values
-        .par_chunks_mut(TASK)
-        .zip(points.par_chunks(TASK))
-        .enumerate()
-        .map(|(task, (out, points))| {
-            let incoming = gusts.incoming.map(|incoming| &incoming[task * TASK..][..points.len()]);
-            let reached = if prepared.boxes.len() > 0 { prepared.task(path, points, out) } else { 0 };
-            if let Some(incoming) = incoming {
-                multiply(out, incoming);
-            }
-            reached
-        })
-        .sum();
-    Influence { values, reached }
+    let tasks = values.chunks_mut(TASK).zip(points.chunks(TASK));
+    let reached = parallel::map(tasks, |task, (out, points)| {
+        let incoming = gusts.incoming.map(|incoming| &incoming[task * TASK..][..points.len()]);
+        let reached = if prepared.boxes.len() > 0 { prepared.task(path, points, out) } else { 0 };
+        if let Some(incoming) = incoming {
+            multiply(out, incoming);
+        }
+        reached
+    });
+    Influence { values, reached: reached.into_iter().sum() }
 }
 
 /// The gusts, with everything that can be computed once for all points.

@@ -22,10 +22,10 @@ pub use rigid_step::RigidStep;
 use curve_lanes::{CurveLanes, CvState, Responses, shape_lanes, step_lanes};
 use numerics::lanes::{F64x16, LANES};
 use numerics::masked::Masked;
+use numerics::parallel;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use numerics::vector::{Vec3, to_f64};
-use rayon::prelude::*;
 use response::Response;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -108,7 +108,7 @@ impl Jiggle {
             ranges.push(first..end);
             first = end;
         }
-        let batches = ranges.into_par_iter().map(|range| CurveBatch::at_rest(starts, range, targets)).collect();
+        let batches = parallel::map(ranges, |_, range| CurveBatch::at_rest(starts, range, targets));
         Self { along: along(starts, rest), starts: starts.to_vec(), batches, response_key: None }
     }
 
@@ -162,7 +162,7 @@ impl Jiggle {
         carries: Option<&[RigidStep]>,
     ) {
         self.update_responses(spring, dt);
-        self.batches.par_iter_mut().for_each(|batch| {
+        parallel::for_each(&mut self.batches, |_, batch| {
             let (mut states, mut responses) = (batch.states.as_mut_slice(), batch.responses.as_slice());
             for curves in &batch.groups {
                 let (mine, rest) = states.split_at_mut(curves.longest);
@@ -194,8 +194,7 @@ impl Jiggle {
             left = rest;
             (batch, mine)
         });
-        let batches: Vec<_> = batches.collect();
-        let shape = |(batch, out): (&CurveBatch, &mut [Vec3])| {
+        let farthest = parallel::map(batches, |_, (batch, out)| {
             let mut states = batch.states.as_slice();
             let mut farthest = 0.0_f64;
             for curves in &batch.groups {
@@ -204,8 +203,8 @@ impl Jiggle {
                 states = rest;
             }
             farthest
-        };
-        let farthest = batches.into_par_iter().map(shape).reduce(|| 0.0, f64::max);
+        });
+        let farthest = farthest.into_iter().fold(0.0, f64::max);
         JiggledCurves { points, max_offset: farthest.sqrt() }
     }
 
@@ -227,7 +226,7 @@ impl Jiggle {
                 Response::RIGID
             }
         };
-        self.batches.par_iter_mut().for_each(|batch| {
+        parallel::for_each(&mut self.batches, |_, batch| {
             let steps = batch.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
             for ((curves, step), responses) in steps.zip(&mut batch.responses) {
                 for (lane, cv) in curves.at(step).into_iter().enumerate() {

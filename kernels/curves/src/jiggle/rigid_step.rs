@@ -1,10 +1,10 @@
 //! The rigid motion applied to a curve's oscillators before each step: a fraction of the motion of its root.
 
 use crate::attach::{RootPose, SkinBinding};
+use numerics::parallel;
 use numerics::vector::{DMat3, DQuat, DVec3, rotation};
-use rayon::prelude::*;
 
-/// Minimum number of curves in a task.
+/// Number of curves in a task.
 const TASK: usize = 512;
 
 /// A rigid motion x → x + `change`·(x − `about`) + `shift`; changes nothing for no motion.
@@ -27,10 +27,14 @@ impl RigidStep {
     };
 
     /// [`RigidStep::between`] for each root of a binding.
+    ///
+    /// # Panics
+    /// If there are fewer poses than roots.
     pub fn all_between(binding: &SkinBinding, from: &[RootPose], to: &[RootPose], share: f64) -> Vec<Self> {
         let roots: Vec<DVec3> = binding.roots().collect();
-        let steps = roots.par_iter().zip(from).zip(to).with_min_len(TASK);
-        steps.map(|((root, from), to)| Self::between(*root, from, to, share)).collect()
+        let mut steps = vec![Self::NONE; roots.len()];
+        parallel::fill(&mut steps, TASK, |root| Self::between(roots[root], &from[root], &to[root], share));
+        steps
     }
 
     /// A fraction of the motion from one pose of a root to another: about the root, that fraction of the rotation's

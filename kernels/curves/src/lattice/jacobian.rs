@@ -1,8 +1,8 @@
 //! Vectors, normals and orientations under a deformation of space, given its Jacobian at each row.
 
 use crate::attach::{nearest_rotation, rotate_orientation};
+use numerics::parallel;
 use numerics::vector::{DMat3, DVec3, direction, to_f32, to_f64};
-use rayon::prelude::*;
 
 /// Number of rows that a thread takes at a time.
 const CHUNK: usize = 4096;
@@ -43,7 +43,7 @@ pub fn map_orientations(rows: &mut [[f32; 4]], jacobians: &[DMat3]) {
 /// Maps rows; those with the identity as Jacobian keep their bits.
 fn each<T: Copy + Send + Sync>(rows: &mut [T], jacobians: &[DMat3], map: impl Fn(T, &DMat3) -> T + Sync) {
     assert!(jacobians.len() >= rows.len(), "{} rows and {} matrices", rows.len(), jacobians.len());
-    rows.par_chunks_mut(CHUNK).zip(jacobians.par_chunks(CHUNK)).for_each(|(rows, jacobians)| {
+    parallel::for_each(rows.chunks_mut(CHUNK).zip(jacobians.chunks(CHUNK)), |_, (rows, jacobians)| {
         for (row, jacobian) in rows.iter_mut().zip(jacobians).filter(|(_, jacobian)| **jacobian != DMat3::identity()) {
             *row = map(*row, jacobian);
         }

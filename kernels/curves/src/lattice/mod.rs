@@ -17,10 +17,10 @@ mod point_group;
 
 pub use jacobian::{map_normals, map_orientations, map_vectors};
 use numerics::lanes::LANES;
+use numerics::parallel;
 use numerics::simd::Path;
 use numerics::vector::{DMat3, DVec3};
 use point_group::{PointGroup, Scratch, displace_group};
-use rayon::prelude::*;
 
 /// How offsets are interpolated between control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,12 +106,9 @@ impl<'a> DeformationLattice<'a> {
             min_determinant: 1.0,
             folded: 0,
         };
-        let reached: Vec<Reached> = if jacobians {
-            let tasks = deformed.points.par_chunks_mut(TASK).zip(deformed.jacobians.par_chunks_mut(TASK));
-            tasks.map(|(points, jacobians)| self.task(path, points, jacobians)).collect()
-        } else {
-            deformed.points.par_chunks_mut(TASK).map(|points| self.task(path, points, &mut [])).collect()
-        };
+        let mut jacobians = deformed.jacobians.chunks_mut(TASK);
+        let tasks = deformed.points.chunks_mut(TASK).map(|points| (points, jacobians.next().unwrap_or_default()));
+        let reached = parallel::map(tasks, |_, (points, jacobians)| self.task(path, points, jacobians));
         let reached = reached.into_iter().reduce(Reached::join);
         if let Some(Reached { min_determinant, folded }) = reached {
             (deformed.min_determinant, deformed.folded) = (min_determinant, folded);

@@ -5,9 +5,9 @@
 
 use super::{area_vector, corners_of};
 use crate::surface::SurfacePoint;
+use numerics::parallel;
 use numerics::trig::sin_cos;
 use numerics::vector::{DVec3, direction, to_f32};
-use rayon::prelude::*;
 
 /// A curve to grow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,9 @@ pub struct Blade {
     /// Direction of the lean: the angle about the normal from the triangle's first edge, radians.
     pub around: f32,
 }
+
+/// Number of blades in a task: some 20 µs of work.
+const TASK: usize = 64;
 
 /// Unit normals of the points: the mean over the triangles around each, weighted by area; zero if undefined.
 pub fn vertex_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<DVec3> {
@@ -48,7 +51,7 @@ pub fn grow(
     cvs: usize,
 ) -> Vec<[f32; 3]> {
     let mut points = vec![[0.0; 3]; blades.len() * cvs];
-    points.par_chunks_mut(cvs).zip(blades).with_min_len(64).for_each(|(points, blade)| {
+    let grow_one = |points: &mut [[f32; 3]], blade: &Blade| {
         let triangle = triangles[blade.root.triangle as usize];
         let corners = corners_of(positions, triangle);
         let root = blade.root.position(positions, triangles);
@@ -60,6 +63,9 @@ pub fn grow(
             let along = f64::from(blade.length) * k as f64 / (cvs - 1) as f64;
             *point = to_f32(root + towards_tip * along);
         }
+    };
+    parallel::for_each(points.chunks_mut(TASK * cvs).zip(blades.chunks(TASK)), |_, (points, blades)| {
+        points.chunks_mut(cvs).zip(blades).for_each(|(points, blade)| grow_one(points, blade));
     });
     points
 }

@@ -15,10 +15,10 @@ mod point_grid;
 pub use grow::{Blade, grow, vertex_normals};
 
 use crate::surface::SurfacePoint;
+use numerics::parallel;
 use numerics::random::Key;
 use numerics::vector::{DVec3, to_f64};
 use point_grid::PointGrid;
-use rayon::prelude::*;
 
 /// Relative to √(area ÷ candidates). Nearest neighbours among n points on a plane are then at least 0.48·√(area ÷ n)
 /// and on average 0.73·√(area ÷ n) apart (random ones 0 and 0.5). At 0.6 it is 0.42 and 0.69; at 1.3 0.57 and 0.78, for
@@ -27,6 +27,10 @@ const SPACING: f64 = 0.8;
 
 /// Candidates per point after which the search ends.
 const MAX_CANDIDATES: u64 = 32;
+
+/// Number of candidates in a task, and of triangles whose normals are: some 20 µs of work.
+const TASK: u64 = 64;
+const TRIANGLE_TASK: usize = 4096;
 
 /// Number of candidates in the first round; each later round adds a quarter of all so far.
 const FIRST_ROUND: u64 = 256;
@@ -53,8 +57,8 @@ impl<'a> ScatterSurface<'a> {
     /// # Panics
     /// If a corner is out of range.
     pub fn new(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> Self {
-        let normals = triangles.par_iter().map(|corners| area_vector(corners_of(positions, *corners)));
-        let normals: Vec<DVec3> = normals.collect();
+        let mut normals = vec![DVec3::zeros(); triangles.len()];
+        parallel::fill(&mut normals, TRIANGLE_TASK, |row| area_vector(corners_of(positions, triangles[row])));
         let mut area = 0.0;
         let cumulative_area = normals.iter().map(|normal| {
             area += 0.5 * normal.norm();
@@ -82,17 +86,18 @@ impl<'a> ScatterSurface<'a> {
             let round = tried..(tried + FIRST_ROUND.max(tried / 4)).min(last);
             grid.refine(self.spacing(round.start));
             // First, in parallel, against the points of earlier rounds; then, in order, against those of this one.
-            let fit: Vec<(u64, SurfacePoint, DVec3)> = round
-                .clone()
-                .into_par_iter()
-                .map(|i| {
+            let fit = parallel::map(round.clone().step_by(TASK as usize), |_, first| {
+                let candidates = (first..round.end.min(first + TASK)).map(|i| {
                     let point = self.candidate(i, key);
                     (i, point, point.position(self.positions, self.triangles) - self.low)
-                })
-                .filter(|(i, point, at)| !self.is_crowded(&grid, 0, point, *at, self.spacing(*i)))
-                .collect();
+                });
+                let fits = |(i, point, at): &(u64, SurfacePoint, DVec3)| {
+                    !self.is_crowded(&grid, 0, point, *at, self.spacing(*i))
+                };
+                candidates.filter(fits).collect::<Vec<_>>()
+            });
             let earlier = points.len();
-            for (i, point, at) in fit {
+            for (i, point, at) in fit.into_iter().flatten() {
                 if points.len() < count && !self.is_crowded(&grid, earlier, &point, at, self.spacing(i)) {
                     grid.add(at, point.triangle);
                     points.push(point);

@@ -1,13 +1,17 @@
 //! Neighbouring triangles: for each block of a tree, the third corner of the neighbour across each side.
 
-use numerics::lanes::{Lanes, set};
-use numerics::tree::{NONE, TriangleTree};
+use numerics::lanes::{F32x16, Lanes, set};
+use numerics::parallel;
+use numerics::tree::{Block, NONE, TriangleTree};
 use numerics::vector::Vec3;
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 /// Third corners of neighbours, one entry for each block of the tree. Side k runs from corner k to the next; a side
 /// without a neighbour has its own first corner instead, which makes a triangle without area.
 pub(super) struct Edges(Vec<[Lanes<3>; 3]>);
+
+/// Number of blocks in a task: some 20 µs of work.
+const TASK: usize = 128;
 
 /// One side of a triangle.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,7 +42,7 @@ impl Neighbours {
 
 impl Edges {
     pub(super) fn of(tree: &TriangleTree, points: &[Vec3], Neighbours(thirds): &Neighbours) -> Self {
-        let of_block = |block: &numerics::tree::Block| {
+        let of_block = |block: &Block| {
             let mut third = block.corners;
             for (lane, triangle) in block.triangle.iter().enumerate().filter(|(_, triangle)| **triangle != NONE) {
                 for (side, point) in thirds[*triangle as usize].iter().enumerate() {
@@ -47,7 +51,9 @@ impl Edges {
             }
             third
         };
-        Self(tree.blocks().par_iter().map(of_block).collect())
+        let mut edges = vec![[[F32x16::splat(0.0); 3]; 3]; tree.blocks().len()];
+        parallel::fill(&mut edges, TASK, |block| of_block(&tree.blocks()[block]));
+        Self(edges)
     }
 
     #[inline(always)]

@@ -22,10 +22,10 @@ use edges::Edges;
 pub use edges::Neighbours;
 use frame::Frame;
 use numerics::lanes::{F32x16, LANES, get};
+use numerics::parallel;
 use numerics::simd::Path;
 use numerics::tree::{Block, TriangleTree};
 use numerics::vector::{self, Vec3};
-use rayon::prelude::*;
 use views::Views;
 
 /// A mesh that stops the wind.
@@ -71,6 +71,9 @@ const TASK_GROUPS: usize = 32;
 /// Number of curves that a task averages over.
 const TASK_CURVES: usize = 1024;
 
+/// Number of points that a task transforms into the frame.
+const TASK_POINTS: usize = 4096;
+
 /// A collider in the frame of the wind.
 struct Obstacle {
     tree: TriangleTree,
@@ -103,7 +106,8 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         return vec![0.0; curves];
     }
     let obstacle = |collider: &Collider<'_>| Obstacle::of(&frame, collider, shield.cone > 0.0);
-    let mut shares = Vec::with_capacity(curves);
+    let mut shares = vec![0.0; curves];
+    let mut left = shares.as_mut_slice();
     let mut batches = batches(starts).into_iter();
     let first = batches.next().map(|batch| &starts[batch]).unwrap_or_default();
     let (obstacles, mut views) = rayon::join(
@@ -114,8 +118,8 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         return vec![0.0; curves];
     }
     let look = |views: &Views, covered: &mut [f32]| {
-        let tasks = covered.par_chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().par_chunks(TASK_GROUPS * LANES));
-        tasks.for_each(|(covered, views)| {
+        let tasks = covered.chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().chunks(TASK_GROUPS * LANES));
+        parallel::for_each(tasks, |_, (covered, views)| {
             for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
                 if shield.cone > 0.0 {
                     cone::cover(path, &obstacles, views, reach, shield.cone, covered);
@@ -130,7 +134,9 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         covered.clear();
         covered.resize(views.sorted().len(), 0.0);
         look(&views, &mut covered);
-        shares.par_extend(views.curves().with_min_len(TASK_CURVES).map(|cvs| share(cvs, &covered)));
+        let (mine, rest) = left.split_at_mut(views.curves());
+        parallel::fill(mine, TASK_CURVES, |curve| share(views.of_curve(curve), &covered));
+        left = rest;
         let Some(batch) = batches.next() else { return shares };
         views = Views::of(&frame, &starts[batch], points, shield.skin_gap);
     }
@@ -157,7 +163,8 @@ fn share(cvs: &[u32], covered: &[f32]) -> f32 {
 impl Obstacle {
     /// A collider in the frame.
     fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
-        let points: Vec<Vec3> = collider.points.par_iter().map(|point| frame.at(*point)).collect();
+        let mut points = vec![[0.0; 3]; collider.points.len()];
+        parallel::fill(&mut points, TASK_POINTS, |point| frame.at(collider.points[point]));
         let tree = match collider.tree {
             Some(tree) => tree.moved(&points),
             None => TriangleTree::build(&points, collider.triangles),
@@ -169,7 +176,8 @@ impl Obstacle {
                 vector::length(vector::cross(vector::sub(b, a), vector::sub(c, a)))
             })
         };
-        let areas = tree.blocks().par_iter().with_min_len(TASK_GROUPS).map(area).collect();
+        let mut areas = vec![F32x16::splat(0.0); tree.blocks().len()];
+        parallel::fill(&mut areas, TASK_GROUPS, |block| area(&tree.blocks()[block]));
         let (low, high) = tree.bounds();
         let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
         let edges = with_edges.then(|| match collider.neighbours {

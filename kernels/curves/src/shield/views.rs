@@ -4,8 +4,8 @@
 //! across the wind, along a Z-order curve, in two passes.
 
 use super::frame::{Frame, Gap};
+use numerics::parallel;
 use numerics::vector::Vec3;
-use rayon::prelude::*;
 
 /// A CV, from which a ray or cone is cast upwind.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +26,9 @@ pub(super) struct Views {
 /// Number of curves that a task transforms into the frame.
 const TASK: usize = 256;
 
+/// Number of CVs whose cells a task finds.
+const TASK_CELLS: usize = 4096;
+
 /// Average number of CVs in a cell.
 const IN_CELL: usize = 4;
 
@@ -43,7 +46,7 @@ impl Views {
         let still = View { at: [0.0; 3], gap: Gap::default() };
         let mut views = vec![still; points.len()];
         let tasks = split(&mut views, &starts);
-        tasks.into_par_iter().for_each(|(curves, mut views)| {
+        parallel::for_each(tasks, |_, (curves, mut views)| {
             for ends in curves.windows(2) {
                 let cvs = &points[ends[0] as usize..ends[1] as usize];
                 let gap = frame.gap(cvs, skin_gap);
@@ -63,9 +66,14 @@ impl Views {
         &self.sorted
     }
 
-    /// The indices in [`Views::sorted`] of the CVs of each curve.
-    pub(super) fn curves(&self) -> impl IndexedParallelIterator<Item = &[u32]> {
-        self.starts.par_windows(2).map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
+    /// Number of curves.
+    pub(super) fn curves(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The indices in [`Views::sorted`] of the CVs of a curve.
+    pub(super) fn of_curve(&self, curve: usize) -> &[u32] {
+        &self.order[self.starts[curve] as usize..self.starts[curve + 1] as usize]
     }
 }
 
@@ -92,7 +100,8 @@ fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
         bits += 1;
     }
     let grid = Grid::around(views, bits);
-    let cells: Vec<u32> = views.par_iter().map(|view| grid.cell(view.at)).collect();
+    let mut cells = vec![0; views.len()];
+    parallel::fill(&mut cells, TASK_CELLS, |view| grid.cell(views[view].at));
     let mut next = vec![0_u32; (1 << (2 * bits)) + 1];
     for cell in &cells {
         next[*cell as usize + 1] += 1;
@@ -170,7 +179,7 @@ mod tests {
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         let views = Views::of(&frame, &[0, 3, 8], &points, 0.0);
         let at = |index: &u32| views.sorted()[*index as usize].at;
-        let found: Vec<Vec3> = views.curves().collect::<Vec<_>>().into_iter().flatten().map(at).collect();
+        let found: Vec<Vec3> = (0..views.curves()).flat_map(|curve| views.of_curve(curve)).map(at).collect();
         assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
         let cells: Vec<u32> = {
             let grid = Grid::around(views.sorted(), 1);

@@ -21,9 +21,9 @@ use curve_group::{CurveGroup, Scratch, bend_group};
 use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::noise::Field;
+use numerics::parallel;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
-use rayon::prelude::*;
 
 /// The fraction of the angle to the wind by which a pivot rotates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,21 +122,19 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
         return Bent { points: points.to_vec(), max_angle: 0.0, length_error: 0.0 };
     }
     let mut out = vec![[0.0; 3]; points.len()];
-    let reached = tasks(starts, &mut out)
-        .into_par_iter()
-        .map(|task| {
-            let mut scratch = Scratch::default();
-            let (mut reached, mut out) = (Reached::default(), task.out);
-            for first in (task.first..task.end).step_by(LANES) {
-                let end = task.end.min(first + LANES);
-                let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
-                let group = CurveGroup { first, starts: &starts[first..=end], points };
-                reached = reached.max(bend_group(path, bend, &group, &mut scratch, mine));
-                out = rest;
-            }
-            reached
-        })
-        .reduce(Reached::default, Reached::max);
+    let reached = parallel::map(tasks(starts, &mut out), |_, task| {
+        let mut scratch = Scratch::default();
+        let (mut reached, mut out) = (Reached::default(), task.out);
+        for first in (task.first..task.end).step_by(LANES) {
+            let end = task.end.min(first + LANES);
+            let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
+            let group = CurveGroup { first, starts: &starts[first..=end], points };
+            reached = reached.max(bend_group(path, bend, &group, &mut scratch, mine));
+            out = rest;
+        }
+        reached
+    });
+    let reached = reached.into_iter().fold(Reached::default(), Reached::max);
     Bent { points: out, max_angle: reached.max_angle, length_error: reached.length_error }
 }
 
