@@ -88,6 +88,7 @@ fn take<T>(slot: &Mutex<Option<T>>) -> Option<T> {
 }
 
 /// Calls `work` with each number below `count`. Not generic: the one place that rayon's iterators are compiled for.
+#[expect(clippy::disallowed_methods, reason = "here alone")]
 fn run(count: usize, work: &(dyn Fn(usize) + Sync)) {
     match count {
         0 => {}

@@ -73,7 +73,7 @@ impl SkinBinding {
         }
         let faces = ClosestFaces::new(points, triangles)?;
         let surface = parallel::map(roots.chunks(BOUND_AT_ONCE), |_, roots| faces.find_each(roots));
-        let surface = parallel::concat(surface, roots.len());
+        let surface = parallel::concat(surface);
         Some(Self::new(points, triangles, &surface, roots.iter().map(|root| to_f64(*root)).collect()))
     }
 
