@@ -4,6 +4,7 @@
 //! picture file have one camera and one range of colours. A contact sheet holds a few frames in memory, frames and movies
 //! none.
 
+mod args;
 mod guides;
 mod moments;
 mod spool;
@@ -22,64 +23,16 @@ use engine::plan::Request;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
 use preview::{
-    Camera, Clip, Framing, Image, Layer, Movie, PictureSettings, attribute_names, attribute_range, palette, render,
+    Camera, Framing, Image, Layer, Movie, PictureSettings, attribute_names, attribute_range, palette, render,
 };
 
-use crate::args::Frames;
 use crate::failure::{Exit, Failure};
 use crate::output::{failed, write_whole};
 use crate::targets::Targets;
+pub use args::PictureArgs;
 use guides::Guides;
 use moments::{Moments, Shot};
 use spool::Spool;
-
-/// The arguments of `cook` for pictures.
-#[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Pictures")]
-// Otherwise this group and the enclosing one would have the same name.
-#[group(skip)]
-pub struct PictureArgs {
-    /// Draw a contact sheet of the six frames that show most of the motion, DIR/GRAPH.preview.png
-    #[arg(long)]
-    preview: bool,
-    /// Draw these frames instead of a contact sheet, one PNG each: DIR/GRAPH.preview.0024.png
-    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
-    preview_frames: Option<Frames>,
-    /// Draw all frames as a movie, DIR/GRAPH.preview.apng, which web browsers play
-    #[arg(long)]
-    movie: bool,
-    /// Draw each output in its own panel instead of all in one
-    #[arg(long)]
-    preview_split: bool,
-    /// Width and height of a panel in pixels [default: 640x480]
-    #[arg(long, value_name = "WxH")]
-    preview_size: Option<String>,
-    /// Camera: eye=1,2,3 target=0,0,0 fov=35 [default: shows everything drawn]
-    #[arg(long, value_name = "CAMERA")]
-    camera: Option<String>,
-    /// Numeric attribute, or component of one, to show as colour: width, P.y
-    #[arg(long, value_name = "ATTRIBUTE")]
-    color_by: Option<String>,
-    /// Cut pictures open at a plane, such as x=0; what lies beyond it is not drawn
-    #[arg(long, value_name = "AXIS=VALUE", allow_hyphen_values = true)]
-    clip: Option<Clip>,
-}
-
-impl PictureArgs {
-    /// Any of these options requests pictures, so that none is silently ignored.
-    fn asks_for_pictures(&self) -> bool {
-        self.movie || self.preview_frames.is_some() || self.asks_for_a_sheet()
-    }
-
-    fn asks_for_a_sheet(&self) -> bool {
-        let asks_how = self.preview_size.is_some()
-            || self.preview_split
-            || self.camera.is_some()
-            || self.color_by.is_some()
-            || self.clip.is_some();
-        self.preview_frames.is_none() && (self.preview || (asks_how && !self.movie))
-    }
-}
 
 /// Frames of a contact sheet.
 const SHEET_FRAMES: usize = 6;
@@ -156,7 +109,7 @@ impl<'g> Pictures<'g> {
         let wrong = |text: String| Failure::new(Exit::CommandLine, text);
         let text = args.preview_size.as_deref().unwrap_or("640x480");
         let (width, height) =
-            size(text).ok_or_else(|| wrong(format!("`{text}` is not a size in pixels; write 640x480")))?;
+            args::size(text).ok_or_else(|| wrong(format!("`{text}` is not a size in pixels; write 640x480")))?;
         let camera = args.camera.as_deref().map(str::parse::<Camera>).transpose();
         let camera = camera.map_err(|error| wrong(format!("--camera: {error}")))?;
         let asked = &staged.request.frames;
@@ -483,14 +436,6 @@ fn overlap(a: [[f32; 3]; 2], b: [[f32; 3]; 2]) -> f64 {
         if around > 0.0 { shared.max(0.0) / around } else { 1.0 }
     };
     sides(0) * sides(1) * sides(2)
-}
-
-/// Parses `WxH`; `None` if it is invalid or too large.
-fn size(text: &str) -> Option<(usize, usize)> {
-    let (width, height) = text.split_once('x')?;
-    let (width, height): (usize, usize) = (width.parse().ok()?, height.parse().ok()?);
-    let pixels = width.checked_mul(height)?;
-    (1..=Image::MOST_PIXELS).contains(&pixels).then_some((width, height))
 }
 
 fn drawing(error: preview::PreviewError) -> Failure {
