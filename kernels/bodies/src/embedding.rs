@@ -5,9 +5,12 @@
 //! magnifies that tet's deformation.
 
 use crate::tets::{faces_of, sorted};
+use numerics::parallel;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
-use rayon::prelude::*;
+
+/// Points that a thread binds at a time.
+const TASK: usize = 32;
 
 /// Barycentric coordinates of a point: particles and weights, which sum to 1. Unused entries have weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +69,9 @@ pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
             weights,
         })
     };
-    Some(carried.par_iter().map(bind).collect())
+    let mut bound = vec![EmbeddedPoint::at_particle(0); carried.len()];
+    parallel::fill(&mut bound, TASK, |n| bind(&carried[n]));
+    Some(bound)
 }
 
 /// Maps positions to barycentric coordinates of one tet.

@@ -30,18 +30,20 @@ pub use body_skin::BodySkin;
 use body_skin::ReleasedElements;
 use closest_point::ClosestPoint;
 pub use motion::ObstaclePose;
+use numerics::parallel;
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::ContactParams;
-use rayon::prelude::*;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 use surface::{Moment, Positions};
 use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
 /// Vertices or edges in a parallel task: about 20 µs of work.
 const TASK: usize = 64;
+/// Points in a parallel task.
+const POINTS: usize = 1024;
 /// Distance, in gaps, within which potential contacts are reported.
 const REACH: f64 = 2.0;
 /// Largest deviation of a rotating obstacle from linear motion between sampled poses, as a fraction of the gap.
@@ -252,8 +254,9 @@ fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> 
     let whole = query.times[1] - query.times[0];
     let at = |time: &f64| {
         let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
-        let each = query.from.par_iter().zip(query.to).with_min_len(1024);
-        each.map(|(from, to)| DVec3::from(*from).lerp(&DVec3::from(*to), share).into()).collect()
+        let mut pose = vec![[0.0; 3]; query.from.len()];
+        parallel::fill(&mut pose, POINTS, |n| DVec3::from(query.from[n]).lerp(&DVec3::from(query.to[n]), share).into());
+        pose
     };
     times[1..times.len() - 1].iter().map(at).collect()
 }
@@ -272,19 +275,19 @@ struct SkinObstaclePair<'a> {
     rules: ContactRules,
 }
 
-/// Collects the contacts of `things` in their order, for any number of threads; `scratch` creates buffers for a task.
-fn collect_in_order<T: Sync, S>(
-    things: &[T],
-    scratch: impl Fn() -> S + Sync + Send,
-    find_in: impl Fn(&mut S, &[T], &mut Vec<FoundContact>) + Sync,
-    out: &mut Vec<FoundContact>,
-) {
-    let part = |scratch: &mut S, part: &[T]| {
-        let mut seen = Vec::new();
-        find_in(scratch, part, &mut seen);
+/// Adds the contacts of some things to a list, with buffers that another task may have used before.
+type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<FoundContact>) + Sync + 'a;
+
+/// Collects the contacts of `things` in their order, for any number of threads.
+fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<FoundContact>) {
+    let unused: Mutex<Vec<S>> = Mutex::default();
+    let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let parts = parallel::map(things.chunks(TASK), |_, things| {
+        let (mut scratch, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
+        find_in(&mut scratch, things, &mut seen);
+        lock().push(scratch);
         seen
-    };
-    let parts: Vec<Vec<FoundContact>> = things.par_chunks(TASK).map_init(scratch, part).collect();
+    });
     out.extend(parts.into_iter().flatten());
 }
 
@@ -320,7 +323,7 @@ impl SkinObstaclePair<'_> {
                 }
             }
         };
-        collect_in_order(&self.skin.surface.vertices, || (), find_in, out);
+        collect_in_order(&self.skin.surface.vertices, &find_in, out);
     }
 
     /// The closest triangle at the start of the motion, for a vertex within the `bounds` of the obstacle; `solid`
@@ -361,7 +364,7 @@ impl SkinObstaclePair<'_> {
                 }
             }
         };
-        collect_in_order(&self.obstacle.sharp_points, || (), find_in, out);
+        collect_in_order(&self.obstacle.sharp_points, &find_in, out);
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
@@ -383,7 +386,7 @@ impl SkinObstaclePair<'_> {
                 }
             }
         };
-        collect_in_order(&indices, || (), find_in, out);
+        collect_in_order(&indices, &find_in, out);
     }
 
     /// A contact of particles with points of the obstacle; `None` if it would only push into the ground.

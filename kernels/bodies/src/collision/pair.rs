@@ -130,7 +130,7 @@ impl Pair<'_> {
                 }
             }
         };
-        collect_in_order(&first.surface.vertices, Marks::default, find_in, out);
+        collect_in_order(&first.surface.vertices, &find_in, out);
     }
 
     /// Edges of the first skin against those of the second.
@@ -159,7 +159,7 @@ impl Pair<'_> {
                 }
             }
         };
-        collect_in_order(&indices, Marks::default, find_in, out);
+        collect_in_order(&indices, &find_in, out);
     }
 
     /// The gap of a pair; for elements of the same skin at most their distance at rest.

@@ -1,11 +1,12 @@
 //! Bounding boxes of moving elements in a tree sixteen wide, in f32, rounded outwards so that no overlap is missed.
 
+use super::POINTS;
 use super::surface::Positions;
 use numerics::lanes::{F32x16, LANES, set};
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
 use numerics::vector::Vec3;
-use rayon::prelude::*;
 
 /// Largest number of levels, enough for 2³² elements.
 const MOST_LEVELS: usize = 8;
@@ -85,7 +86,9 @@ fn bounds(boxes: &Boxes) -> Cuboid {
 pub(super) fn swept_boxes(poses: &[Positions<'_>]) -> Vec<Cuboid> {
     let (first, others) = poses.split_first().map_or((&[][..], &[][..]), |(first, others)| (*first, others));
     let of = |point: usize| others.iter().fold(box_of(&first[point]), |own, pose| join(&own, &box_of(&pose[point])));
-    (0..first.len()).into_par_iter().with_min_len(1024).map(of).collect()
+    let mut boxes = vec![NOWHERE; first.len()];
+    parallel::fill(&mut boxes, POINTS, of);
+    boxes
 }
 
 /// The box of a point; of NaN, which overlaps nothing, if the point is not finite.

@@ -6,8 +6,8 @@
 //! volume is used.
 
 use super::FLAT;
+use numerics::parallel;
 use numerics::vector::{DVec3, Vec3, to_f64};
-use rayon::prelude::*;
 
 /// Rows of a parallel task.
 pub(super) const CHUNK: usize = 1024;
@@ -68,7 +68,7 @@ impl Equations {
 
     /// The matrix times `x`.
     pub(super) fn times(&self, x: &[DVec3], out: &mut [DVec3]) {
-        out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+        parallel::for_each(out.chunks_mut(CHUNK), |chunk, out| {
             for (position, out) in out.iter_mut().enumerate() {
                 let row = chunk * CHUNK + position;
                 let mut sum = x[row] * self.diagonal[row];
@@ -89,13 +89,29 @@ fn edges(points: &[Vec3], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32;
         EDGES.map(|[k, l]| ([tet[k].min(tet[l]), tet[k].max(tet[l])], weights[k][l]))
     };
     let has_free = |(edge, _): &([u32; 2], f64)| edge[0] != edge[1] && edge.iter().any(|p| free[*p as usize].is_some());
-    let mut parts: Vec<([u32; 2], f64)> = tets.par_iter().flat_map_iter(of_tet).filter(has_free).collect();
-    parts.par_sort_by_key(|(edge, _)| *edge);
-    let mut edges: Vec<([u32; 2], f64)> = Vec::with_capacity(parts.len() / 4);
-    for (edge, weight) in parts {
-        match edges.last_mut() {
-            Some((last, sum)) if *last == edge => *sum += weight,
-            _ => edges.push((edge, weight)),
+    let parts = parallel::map(tets.chunks(CHUNK), |_, tets| {
+        tets.iter().flat_map(of_tet).filter(has_free).collect::<Vec<([u32; 2], f64)>>()
+    });
+    // By counting for the lower ends, in linear time; then by the other end.
+    let mut starts = vec![0; points.len() + 1];
+    parts.iter().flatten().for_each(|([low, _], _)| starts[*low as usize + 1] += 1);
+    (0..points.len()).for_each(|point| starts[point + 1] += starts[point]);
+    let mut next = starts.clone();
+    let mut ordered = vec![(0, 0.0); starts[points.len()]];
+    for ([low, high], weight) in parts.into_iter().flatten() {
+        ordered[next[low as usize]] = (high, weight);
+        next[low as usize] += 1;
+    }
+    let mut edges: Vec<([u32; 2], f64)> = Vec::with_capacity(ordered.len() / 4);
+    for (low, ends) in starts.windows(2).enumerate() {
+        let mine = &mut ordered[ends[0]..ends[1]];
+        mine.sort_by_key(|(high, _)| *high);
+        for (high, weight) in mine {
+            let edge = [low as u32, *high];
+            match edges.last_mut() {
+                Some((last, sum)) if *last == edge => *sum += *weight,
+                _ => edges.push((edge, *weight)),
+            }
         }
     }
     edges

@@ -1,8 +1,8 @@
 //! Conjugate gradients for three right-hand sides, one for each coordinate.
 
 use super::equations::{CHUNK, Equations};
+use numerics::parallel;
 use numerics::vector::DVec3;
-use rayon::prelude::*;
 
 /// Stopping criteria.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,19 +46,19 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
         equations.times(&along, &mut pushed);
         let bend = dots(&along, &pushed);
         let step = quotient(energy, bend);
-        rows.par_chunks_mut(CHUNK).zip(along.par_chunks(CHUNK)).for_each(|(rows, along)| add(rows, step, along));
+        add(&mut rows, step, &along);
         let back = -step;
-        left.par_chunks_mut(CHUNK).zip(pushed.par_chunks(CHUNK)).for_each(|(left, pushed)| add(left, back, pushed));
+        add(&mut left, back, &pushed);
         // `pushed` is no longer needed and takes the preconditioned residual.
-        let rest = pushed.par_chunks_mut(CHUNK).zip(left.par_chunks(CHUNK)).zip(inverse.par_chunks(CHUNK));
-        rest.for_each(|((rest, left), inverse)| {
+        let rest = pushed.chunks_mut(CHUNK).zip(left.chunks(CHUNK)).zip(inverse.chunks(CHUNK));
+        parallel::for_each(rest, |_, ((rest, left), inverse)| {
             for ((rest, left), inverse) in rest.iter_mut().zip(left).zip(inverse) {
                 *rest = left * *inverse;
             }
         });
         let now = dots(&left, &pushed);
         let kept = quotient(now, energy);
-        along.par_chunks_mut(CHUNK).zip(pushed.par_chunks(CHUNK)).for_each(|(along, rest)| {
+        parallel::for_each(along.chunks_mut(CHUNK).zip(pushed.chunks(CHUNK)), |_, (along, rest)| {
             for (along, rest) in along.iter_mut().zip(rest) {
                 *along = rest + kept.component_mul(along);
             }
@@ -76,9 +76,11 @@ pub(super) fn solve(equations: &Equations, limits: GoalLimits) -> Solved {
 
 /// `to` += `share` · `of` for each coordinate.
 fn add(to: &mut [DVec3], share: DVec3, of: &[DVec3]) {
-    for (to, of) in to.iter_mut().zip(of) {
-        *to += share.component_mul(of);
-    }
+    parallel::for_each(to.chunks_mut(CHUNK).zip(of.chunks(CHUNK)), |_, (to, of)| {
+        for (to, of) in to.iter_mut().zip(of) {
+            *to += share.component_mul(of);
+        }
+    });
 }
 
 /// Quotients by coordinate; 0 if the divisor is 0.
@@ -92,8 +94,8 @@ fn total(v: DVec3) -> f64 {
 
 /// Inner products by coordinate, summed by chunks in order.
 fn dots(a: &[DVec3], b: &[DVec3]) -> DVec3 {
-    let of_chunk =
-        |(a, b): (&[DVec3], &[DVec3])| a.iter().zip(b).fold(DVec3::zeros(), |sum, (a, b)| sum + a.component_mul(b));
-    let chunks: Vec<DVec3> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(of_chunk).collect();
+    let chunks = parallel::map(a.chunks(CHUNK).zip(b.chunks(CHUNK)), |_, (a, b)| {
+        a.iter().zip(b).fold(DVec3::zeros(), |sum, (a, b)| sum + a.component_mul(b))
+    });
     chunks.iter().fold(DVec3::zeros(), |sum, chunk| sum + chunk)
 }

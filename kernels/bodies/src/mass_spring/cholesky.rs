@@ -5,15 +5,15 @@
 //! is singular to rounding the solution has no component, instead of a huge one. Cost: Σ b²/2 for rows of b entries,
 //! and Σ 2b a solve.
 
+use numerics::parallel;
 use numerics::simd::{Path, kernel};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Lanes of a sum.
 const LANES: usize = 8;
 /// Columns factored at a time: their rows stay in the cache while all rows below use them.
 const BLOCK: usize = 48;
-/// Smallest number of rows for a thread.
+/// Rows that a thread takes at a time.
 const ROWS: usize = 32;
 /// A pivot below this fraction of its diagonal entry is rounding noise.
 const NEGLIGIBLE: f64 = 1e-11;
@@ -89,8 +89,10 @@ impl Lower {
                 (first(starts, i), mine)
             });
             let mut rows: Vec<(usize, &mut [f64])> = rows.filter(|(from, _)| *from < end).collect();
-            rows.par_iter_mut().with_min_len(ROWS).for_each(|(from, mine)| {
-                finish(path, (starts, done), &mut mine[..end - *from], *from, begin);
+            parallel::for_each(rows.chunks_mut(ROWS), |_, rows| {
+                for (from, mine) in rows {
+                    finish(path, (starts, done), &mut mine[..end - *from], *from, begin);
+                }
             });
         }
     }

@@ -1,6 +1,7 @@
 //! Fixed partitions of particles for parallel loops and sums. They do not depend on the number of threads, so neither
 //! do results.
 
+use numerics::parallel;
 use std::ops::Range;
 
 /// Number of particles below which threads cost more than they gain.
@@ -116,10 +117,7 @@ impl Partition {
 
     /// Evaluates `work` for each range with its part of `data`.
     pub(super) fn map<D: SplitAt, R: Send + Default>(&self, data: D, work: impl Fn(usize, D) -> R + Sync) -> Vec<R> {
-        let mut out = Vec::with_capacity(self.len());
-        out.resize_with(self.len(), R::default);
-        self.recurse(0, data, &mut out, &work);
-        out
+        self.map_dyn(data, &work)
     }
 
     /// The sum of `work` over all ranges, in order.
@@ -132,30 +130,23 @@ impl Partition {
         self.map(data, work);
     }
 
-    fn recurse<D: SplitAt, R: Send>(
-        &self,
-        first: usize,
-        data: D,
-        out: &mut [R],
-        work: &(impl Fn(usize, D) -> R + Sync),
-    ) {
-        match out {
-            [] => {}
-            [one] => *one = work(first, data),
-            more => {
-                let half = more.len() / 2;
-                let (left_out, right_out) = more.split_at_mut(half);
-                let (left, right) = data.halves(self.starts[first + half] - self.starts[first]);
-                let go_left = || self.recurse(first, left, left_out, work);
-                let go_right = || self.recurse(first + half, right, right_out, work);
-                if self.parallel {
-                    rayon::join(go_left, go_right);
-                } else {
-                    go_left();
-                    go_right();
-                }
-            }
+    /// [`Self::map`], compiled once for all closures on the same data.
+    fn map_dyn<D: SplitAt, R: Send + Default>(&self, data: D, work: &(dyn Fn(usize, D) -> R + Sync)) -> Vec<R> {
+        let mut out = Vec::with_capacity(self.len());
+        out.resize_with(self.len(), R::default);
+        let mut left = Some(data);
+        let parts = self.starts.windows(2).zip(&mut out).filter_map(|(ends, out)| {
+            let (mine, rest) = left.take()?.halves(ends[1] - ends[0]);
+            left = Some(rest);
+            Some((mine, out))
+        });
+        let run = |part, (mine, out): (D, &mut R)| *out = work(part, mine);
+        if self.parallel {
+            parallel::for_each(parts, run);
+        } else {
+            parts.enumerate().for_each(|(part, piece)| run(part, piece));
         }
+        out
     }
 }
 

@@ -1,7 +1,6 @@
 //! A surface that has been verified: closed, consistently oriented, not self-intersecting.
 
 use numerics::vector::{DVec3, to_f64};
-use rayon::prelude::*;
 
 use super::edges::edges;
 use super::grid::{GridPoint, SnapGrid};
@@ -54,7 +53,7 @@ impl ClosedSurface {
         }
         let grid = SnapGrid::around(surface.points).unwrap_or_else(SnapGrid::unit);
         let grid_points: Vec<GridPoint> =
-            surface.points.par_iter().map(|point| grid.grid_point(point.map(f64::from))).collect();
+            surface.points.iter().map(|point| grid.grid_point(point.map(f64::from))).collect();
         let (polygons, mut changes) = repaired_polygons(surface, &grid_points, repair)?;
         let mut pieces = pieces(&polygons, repair)?;
         let mut shells = Shells::outward(&polygons, &mut pieces, surface.points, &grid_points)?;

@@ -4,8 +4,6 @@
 //! users that need them (soft bodies turn them into springs) have the surface and the tets and call
 //! [`missing_edges`].
 
-use rayon::prelude::*;
-
 /// Each edge of polygons once, lower point first, sorted. `starts` are the first corner of each polygon and the
 /// number of corners, `corners` their points.
 pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
@@ -17,7 +15,7 @@ pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
         })
     };
     let mut edges: Vec<[u32; 2]> = starts.windows(2).flat_map(sides).collect();
-    edges.par_sort_unstable();
+    edges.sort_unstable();
     edges.dedup();
     edges
 }
@@ -26,7 +24,7 @@ pub fn edges(starts: &[u32], corners: &[u32]) -> Vec<[u32; 2]> {
 pub fn missing_edges(edges: &[[u32; 2]], tets: &[[u32; 4]]) -> Vec<[u32; 2]> {
     let points = edges.as_flattened().iter().max().map_or(0, |highest| *highest as usize + 1);
     let around = TetsAround::new(points, tets);
-    edges.par_iter().filter(|edge| !around.has(*edge)).copied().collect()
+    edges.iter().filter(|edge| !around.has(*edge)).copied().collect()
 }
 
 /// Tets incident to each of the first points.

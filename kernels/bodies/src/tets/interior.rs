@@ -4,11 +4,10 @@
 //! empty sphere passes through five of its points, so a small jitter does not change the tets. It hides the lattice
 //! planes: springs in a dozen directions only would be visible.
 
-use rayon::prelude::*;
-
 use super::closed::ClosedSurface;
 use super::grid::{GridPoint, SIDE};
 use super::winding::Winding;
+use numerics::parallel;
 use numerics::random::Key;
 
 /// Side of the lattice's cube ÷ mean edge length: at each point 8 edges of √3⁄2 sides and 6 of one side meet.
@@ -76,7 +75,7 @@ pub(super) fn interior(closed: &ClosedSurface, winding: &Winding, spacing: f64) 
         }
         found
     };
-    (-reach[2]..reach[2] + 1).into_par_iter().flat_map_iter(layer).collect()
+    parallel::map(-reach[2]..=reach[2], |_, z| layer(z)).concat()
 }
 
 /// Distance from the surface, as far as it matters, and the required clearance, in grid steps.

@@ -6,7 +6,7 @@ use numerics::vector::DVec3;
 pub(super) type Corners = [DVec3; 4];
 
 /// Measures of a tet.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Measure {
     /// Volume, m³; negative if rounding to f32 inverted the tet.
     pub(super) volume: f64,

@@ -4,11 +4,13 @@
 //! that only touch or are coplanar do not count; shells that overlap in this way are found later by their winding
 //! numbers.
 
-use rayon::prelude::*;
-
 use super::grid::GridPoint;
 use super::predicates::{At, orient};
+use numerics::parallel;
 use numerics::tree::TriangleTree;
+
+/// Triangles that a thread takes at a time.
+const TASK: usize = 32;
 
 /// The first pair of intersecting triangles, and the number of pairs.
 pub(super) fn crossing(
@@ -40,8 +42,11 @@ pub(super) fn crossing(
         });
         (count > 0).then_some(([first as u32, least], count))
     };
-    let all: Vec<([u32; 2], usize)> = (0..triangles.len()).into_par_iter().filter_map(found).collect();
-    all.first().map(|(pair, _)| (*pair, all.iter().map(|(_, count)| count).sum()))
+    let both = |(pair, count): ([u32; 2], usize), (_, more): ([u32; 2], usize)| (pair, count + more);
+    let parts = parallel::map((0..triangles.len()).step_by(TASK), |_, first| {
+        (first..triangles.len().min(first + TASK)).filter_map(found).reduce(both)
+    });
+    parts.into_iter().flatten().reduce(both)
 }
 
 fn triangles_cross(grid_points: &[GridPoint], a: [u32; 3], b: [u32; 3]) -> bool {

@@ -1,12 +1,14 @@
 //! Shells: the closed components of a surface, their orientation and nesting, and the bodies they bound.
 
-use rayon::prelude::*;
-
 use super::grid::GridPoint;
 use super::repair::{PolygonSide, Polygons, RepairCounts, SignedUnionFind};
 use super::surface_fault::SurfaceFault;
 use super::winding::Winding;
+use numerics::parallel;
 use numerics::triangulate::triangulate;
+
+/// Polygons that a thread cuts at a time.
+const TASK: usize = 256;
 
 /// A closed component of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,7 +89,10 @@ impl Shells {
             let at: Vec<[f32; 3]> = corners.iter().map(|corner| points[*corner as usize]).collect();
             triangulate(&at).into_iter().map(move |ear| (ear.map(|k| corners[k as usize]), polygon as u32))
         };
-        let (triangles, polygon_of): (Vec<_>, Vec<_>) = (0..polygons.len()).into_par_iter().flat_map_iter(cut).unzip();
+        let cut = parallel::map((0..polygons.len()).step_by(TASK), |_, first| {
+            (first..polygons.len().min(first + TASK)).flat_map(cut).collect::<Vec<_>>()
+        });
+        let (triangles, polygon_of): (Vec<_>, Vec<_>) = cut.into_iter().flatten().unzip();
         let count = pieces.iter().map(|(shell, _)| *shell as usize + 1).max().unwrap_or(0);
         let mut shells = Self {
             shell_of: polygon_of.iter().map(|polygon: &u32| pieces[*polygon as usize].0).collect(),
@@ -178,7 +183,7 @@ impl Shells {
             of_shell[*shell as usize].push(triangle as u32);
         }
         let winding = Winding::new(grid_points, &self.triangles, &self.shell_of);
-        let within = |(shell, members): (usize, &Vec<u32>)| {
+        parallel::map(&of_shell, |shell, members| {
             let (mut found, mut tally) = (Vec::new(), Vec::new());
             let stride = members.len().div_ceil(SAMPLES);
             let samples = members.iter().step_by(stride);
@@ -193,8 +198,7 @@ impl Shells {
             found.sort_unstable();
             let most = found.chunk_by(|a, b| a == b).filter(|same| 2 * same.len() > taken);
             most.map(|same| same[0]).collect()
-        };
-        of_shell.par_iter().enumerate().map(within).collect()
+        })
     }
 
     /// The shell of each point; `u32::MAX` for points without a triangle.

@@ -1,9 +1,8 @@
 //! Filling the inside of a closed surface with tets.
 
+use numerics::parallel;
 use numerics::vector::{DVec3, to_f64};
 use std::ops::Range;
-
-use rayon::prelude::*;
 
 use super::closed::ClosedSurface;
 use super::delaunay;
@@ -73,6 +72,9 @@ pub struct FillQuality {
 /// Tets of lower quality are slivers.
 pub const SLIVER: f64 = 0.02;
 
+/// Tets, edges or faces that a thread takes at a time.
+const TASK: usize = 256;
+
 /// Largest number of interior points: about 25 million tets, which take 2 gigabytes to build.
 const MOST_POINTS: f64 = (1 << 22) as f64;
 
@@ -88,12 +90,8 @@ impl ClosedSurface {
         let winding = Winding::new(&self.grid_points, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
         let carved = Carving { closed: self, winding: &winding, inner: &inner };
-        let bodies: Vec<Vec<[u32; 4]>> = carved
-            .members()
-            .into_par_iter()
-            .enumerate()
-            .map(|(body, points)| carved.body(body as u32, &points))
-            .collect::<Result<_, _>>()?;
+        let bodies = parallel::map(carved.members(), |body, points| carved.body(body as u32, &points));
+        let bodies: Vec<Vec<[u32; 4]>> = bodies.into_iter().collect::<Result<_, _>>()?;
         let of = bodies.iter().enumerate().flat_map(|(body, tets)| std::iter::repeat_n(body as u32, tets.len()));
         Ok(self.solid(&inner, bodies.concat(), of.collect()))
     }
@@ -149,8 +147,9 @@ impl ClosedSurface {
         sides.resize(points.len(), ShellSide::Interior);
         // In grid steps, so that no squared length over- or underflows.
         let step = self.grid.step();
-        let steps = |corner: &u32| to_f64(points[*corner as usize]) / step;
-        let measures: Vec<Measure> = tets.par_iter().map(|[a, b, c, d]| measure(&[a, b, c, d].map(steps))).collect();
+        let steps = |corner: u32| to_f64(points[corner as usize]) / step;
+        let mut measures = vec![Measure::default(); tets.len()];
+        parallel::fill(&mut measures, TASK, |tet| measure(&tets[tet].map(steps)));
         let slivers: Vec<bool> = measures.iter().map(|tet| !(tet.volume > 0.0 && tet.quality >= SLIVER)).collect();
         let volume = measures.iter().map(|tet| tet.volume).sum::<f64>() * step * step * step;
         let sharpest = measures.iter().zip(&slivers).filter(|(_, sliver)| !**sliver);
@@ -170,7 +169,7 @@ impl ClosedSurface {
     /// Counts the surface elements that are missing in the tets.
     fn compare(&self, tets: &[[u32; 4]], measured: &mut FillQuality) {
         let around = TetsAround::new(self.points.len(), tets);
-        measured.missing_edges = self.edges().par_iter().filter(|edge| !around.has(*edge)).count();
+        measured.missing_edges = count(&self.edges(), |edge| !around.has(edge));
         measured.bare_points = (0..self.points.len() as u32).filter(|point| around.of(*point).is_empty()).count();
         let mut first = 0;
         let runs = self.shells.polygons.chunk_by(|a, b| a == b).map(|run| {
@@ -187,7 +186,7 @@ impl ClosedSurface {
             }
             _ => false,
         };
-        measured.missing_faces = runs.par_iter().filter(|run| !cut_as_here(run) && !cut_otherwise(run)).count();
+        measured.missing_faces = count(&runs, |run| !cut_as_here(run) && !cut_otherwise(run));
     }
 }
 
@@ -242,9 +241,12 @@ impl Carving<'_> {
                 }
             }
         };
-        let inside: Vec<Result<bool, SurfaceFault>> = tets.par_iter().map_init(Vec::new, is_inside).collect();
-        let inside: Vec<bool> = inside.into_iter().collect::<Result<_, _>>()?;
-        let mut next = inside.iter();
+        let inside = parallel::map(tets.chunks(TASK), |_, tets| {
+            let mut tally = Vec::new();
+            tets.iter().map(|tet| is_inside(&mut tally, tet)).collect::<Result<Vec<bool>, _>>()
+        });
+        let inside: Vec<Vec<bool>> = inside.into_iter().collect::<Result<_, _>>()?;
+        let mut next = inside.iter().flatten();
         tets.retain(|_| *next.next().expect("one answer a tet"));
         tets.iter_mut().for_each(|tet| *tet = tet.map(|corner| points[corner as usize]));
         Ok(tets)
@@ -253,6 +255,11 @@ impl Carving<'_> {
 
 /// Safety factor for clearances rounded to f32.
 const CLEAR_FOR_SURE: f64 = 0.999;
+
+/// How many `things` are so, over all threads.
+fn count<T: Sync>(things: &[T], is_so: impl Fn(&T) -> bool + Sync) -> usize {
+    parallel::map(things.chunks(TASK), |_, things| things.iter().filter(|thing| is_so(thing)).count()).iter().sum()
+}
 
 fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
