@@ -22,12 +22,16 @@ use super::particles::{materials_at, particles};
 use super::shapes::{Colliders, in_cells, liquid_at_start};
 use super::spray::{Air, SprayDrop};
 use super::{
-    DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID_CELLS, PARTICLES,
-    PARTICLES_NOW, SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, VOLUME, VOLUME_CORRECTION, VOLUME_DRIFT,
-    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD,
+    CFL_REACHED, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID_CELLS,
+    PARTICLES, PARTICLES_NOW, SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, VOLUME, VOLUME_CORRECTION,
+    VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD,
 };
 use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
+
+/// Cells past the liquid, besides its band, that the velocity of the output goes on where liquid moves no farther, if `cfl`
+/// allows it so much.
+const LEAST_MOVED: f64 = 2.0;
 
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
@@ -62,7 +66,7 @@ impl Chain for Run {
         let domain = domain(cx);
         let start = liquid_at_start(cx, &domain, lattice)?;
         let mut surface = start.surface.clone();
-        let colliders = Colliders::at_start(cx, &domain, lattice);
+        let colliders = Colliders::at_start(cx, &domain, lattice)?;
         if !colliders.is_empty() {
             surface.meet(&|point| colliders.distance(1.0, point));
         }
@@ -238,7 +242,10 @@ impl Run {
             return Ok(volume.clone());
         }
         let (lattice, settings) = (lattice(cx), settings(cx));
-        let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
+        let bounds = [settings.domain.low, settings.domain.high];
+        // `cfl` may ask for more cells than liquid moves.
+        let moved = self.metrics.get(CFL_REACHED).unwrap_or_default().max(LEAST_MOVED);
+        let layers = BAND as i32 + settings.cfl.min(moved).ceil() as i32;
         let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
         let by = self.surface.resolution();
         let colliders = Colliders::now(cx, &domain(cx), lattice);

@@ -95,11 +95,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
         let material = material_of(mesh, &what)?;
         let points = in_cells(mesh, fine);
         let least = cells_inside(mesh, &points, [low, high]);
-        if least > MOST_CELLS {
-            let fact =
-                format!("`liquid` {wire} (counted from 0) is about {least:.1e} cells, more than {MOST_CELLS:.0e}");
-            return Err(Error::refused(fact).hint("use larger cells, or less liquid"));
-        }
+        check_size(least, &what)?;
         cx.reserve(least * bytes, "use larger cells, or less liquid")?;
         let shape = MeshShape::new(&topology, &points, &settings);
         if least > LEAST_SHOWN && is_unseen(&shape, [low, high], &points) {
@@ -142,6 +138,18 @@ fn is_unseen(shape: &MeshShape, [low, high]: [[i32; 3]; 2], points: &[[f32; 3]])
         along(f32::min, f32::INFINITY) < high[k] as f32 && along(f32::max, f32::NEG_INFINITY) > low[k] as f32
     });
     reaches_in && shape.distance().iter().all(|distance| *distance >= 0.0)
+}
+
+/// Refuses a shape of more cells than are counted.
+///
+/// # Errors
+/// Where it has.
+pub(super) fn check_size(cells: f64, what: &str) -> Result<()> {
+    if cells <= MOST_CELLS {
+        return Ok(());
+    }
+    let fact = format!("{what} is about {cells:.1e} cells, more than {MOST_CELLS:.0e}");
+    Err(Error::refused(fact).hint("use larger cells, or a smaller mesh or box"))
 }
 
 /// Number of cells inside a mesh, about: its volume, but no more than its box has in `bounds`.
@@ -215,8 +223,15 @@ pub(super) struct Colliders(Vec<Collider>);
 
 impl Colliders {
     /// The colliders where they are at the start.
-    pub(super) fn at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Self {
-        Self::still(cx.at_start(COLLIDERS).iter().filter_map(|geometry| geometry.mesh()), domain, lattice)
+    ///
+    /// # Errors
+    /// Where one is too large.
+    pub(super) fn at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Result<Self> {
+        let meshes = || cx.at_start(COLLIDERS).iter().filter_map(|geometry| geometry.mesh());
+        for (wire, mesh) in meshes().enumerate() {
+            check_collider(wire, mesh, domain, lattice)?;
+        }
+        Ok(Self::still(meshes(), domain, lattice))
     }
 
     /// The colliders where they are at the frame that is cooked.
@@ -232,7 +247,7 @@ impl Colliders {
     /// The colliders in motion over a step; `last` are those of the step before, where they are known.
     ///
     /// # Errors
-    /// Where a collider changes its faces within it.
+    /// Where a collider changes its faces within it, or is too large.
     pub(super) fn within_step(cx: &StepCx, last: Option<Self>, domain: &Domain, lattice: Lattice) -> Result<Self> {
         let [(_, before), .., (_, after)] = cx.samples(COLLIDERS) else { return Ok(Self(Vec::new())) };
         let mut last = last.map(|colliders| colliders.0.into_iter()).into_iter().flatten();
@@ -246,6 +261,7 @@ impl Colliders {
                 let fact = format!("`colliders` {wire} changes from {} to {}", count(before), count(after));
                 return Err(Error::refused(fact).hint("a collider needs the same faces and points at every frame"));
             }
+            check_collider(wire, after, domain, lattice)?;
             colliders.push(Collider::moving(last.next(), [before, after], &settings(domain), lattice));
         }
         Ok(Self(colliders))
@@ -279,6 +295,12 @@ impl Colliders {
         let all = self.0.iter().map(|collider| (&collider.shape, collider.shape.distance(share, point)));
         all.reduce(|best, next| if next.1 < best.1 { next } else { best })
     }
+}
+
+/// Refuses a collider of more cells than are counted.
+fn check_collider(wire: usize, mesh: &Component, domain: &Domain, lattice: Lattice) -> Result<()> {
+    let cells = cells_inside(mesh, &in_cells(mesh, lattice), [domain.low, domain.high]);
+    check_size(cells, &format!("`colliders` {wire} (counted from 0)"))
 }
 
 fn settings(domain: &Domain) -> ShapeSettings {

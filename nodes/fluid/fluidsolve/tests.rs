@@ -373,3 +373,17 @@ fn the_volume_is_kept_unless_correction_is_off() {
     let near = off.iter().filter(|off| **off < 0.5).count();
     assert!(near * 4 > off.len() * 3, "{near} of {}", off.len());
 }
+
+#[test]
+fn nothing_that_may_be_typed_overflows() {
+    let block = solving(cuboid([0.3, 0.4, 0.3], [0.7, 0.7, 0.7]));
+    let [usual, huge] = [2.0, 1e9].map(|cfl| block.clone().set(CFL, cfl).frames(1..=2));
+    let points = |out: &[BenchResult]| out[0].mesh().positions().len();
+    assert_eq!(points(&usual), points(&huge));
+    let fine = || solving(cuboid([0.0; 3], [0.001; 3])).set(CELL, 1e-4);
+    let large = || cuboid([0.1; 3], [0.9; 3]);
+    for bench in [fine().input(COLLIDERS, large()), fine().input(SOURCES, large()), fine().input(SINKS, large())] {
+        let text = bench.try_frames(&[Frame::whole(2)]).err().map(|error| error.error.fact.clone()).unwrap_or_default();
+        assert!(text.contains("(counted from 0) is about 5."), "{text}");
+    }
+}

@@ -283,9 +283,9 @@ impl<S: Surface> Liquid<S> {
         (self.surface, self.motion)
     }
 
-    /// The velocity, m/s, continued `layers` cells past the liquid.
+    /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
     pub fn velocity(&self, layers: i32) -> MacVelocity {
-        let domain = &self.settings.domain;
+        let (domain, layers) = (&self.settings.domain, layers.min(substep::MOST_LAYERS));
         let rows = self.motion.rows_past_liquid(domain, layers);
         let own = self.motion.velocity().faces();
         let [faces] = self.motion.continued([own], &rows, f32::INFINITY, domain, None);
