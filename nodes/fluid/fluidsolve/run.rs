@@ -85,6 +85,7 @@ impl Chain for Run {
         if start.has_materials() {
             liquid.set_materials(|place| start.material(place));
         }
+        let parts = start.parts(&domain, &colliders, lattice.cell);
         let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
         columns.add_tracers(&tracers);
         for mesh in cx.part_at_start(SOURCES) {
@@ -94,7 +95,8 @@ impl Chain for Run {
         liquid.set_tracers(places);
         let (mut surface, motion) = liquid.into_parts();
         let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
-        let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
+        let parts = if cx.get(VOLUME_CORRECTION) { parts } else { Vec::new() };
+        let targets = VolumeTargets::of_parts(&mut surface, lattice.cell, colliders.solid(&at_rest), &parts);
         let mut run = Self {
             surface,
             motion,
