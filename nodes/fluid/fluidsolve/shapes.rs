@@ -80,6 +80,10 @@ impl StartMesh {
         (0..3).all(|k| low[k] as f32 <= self.low[k] && self.high[k] <= high[k] as f32)
     }
 
+    fn misses(&self, [low, high]: [[i32; 3]; 2]) -> bool {
+        (0..3).any(|k| self.high[k] <= low[k] as f32 || high[k] as f32 <= self.low[k])
+    }
+
     fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|k| self.low[k] < other.high[k] && other.low[k] < self.high[k])
     }
@@ -89,6 +93,35 @@ impl StartLiquid {
     /// Whether a mesh has a material of its own.
     pub(super) fn has_materials(&self) -> bool {
         self.meshes.iter().any(|(_, material)| *material != LiquidMaterial::default())
+    }
+
+    /// What of the meshes lies where there is no liquid. `cell`: the side of a solver cell, m.
+    pub(super) fn known(&self, domain: &Domain, colliders: &Colliders, cell: f64) -> StartLosses {
+        let by = self.by as f32;
+        let bounds = [domain.low, domain.high].map(|corner| corner.map(|x| x * self.by as i32));
+        let mut losses = StartLosses { outside: 0.0, in_colliders: 0.0, shown: 0.0 };
+        for ((shape, _), found) in self.meshes.iter().zip(&self.found) {
+            let seen = covered(shape, |_| 1.0);
+            let open = |cell: [i32; 3]| {
+                let distance = colliders.distance(1.0, cell.map(|x| (x as f32 + 0.5) / by));
+                (0.5 + by * distance).clamp(0.0, 1.0)
+            };
+            let free = if colliders.is_empty() { seen } else { covered(shape, open) };
+            let is_in = found.is_in(bounds);
+            let whole = found.volume.filter(|_| !is_in && !found.misses(bounds)).unwrap_or(seen);
+            let share = |part: f64, whole: f64| if whole > 0.0 { 1.0 - part / whole } else { 0.0 };
+            losses.outside = losses.outside.max(share(seen, whole));
+            losses.in_colliders = losses.in_colliders.max(share(free, seen));
+            // Where walls and colliders take nothing, what the triangles enclose.
+            let is_whole = is_in && free == seen;
+            losses.shown += found.volume.filter(|_| is_whole).unwrap_or(free);
+        }
+        let overlap = |n: usize| (0..n).any(|other| self.found[n].overlaps(&self.found[other]));
+        if (0..self.found.len()).any(overlap) {
+            losses.shown = 0.0;
+        }
+        losses.shown *= (cell / f64::from(self.by)).powi(3);
+        losses
     }
 
     /// The meshes as parts of the liquid, with the volume of those that are whole: inside the box, off colliders and other
@@ -119,6 +152,23 @@ impl StartLiquid {
     pub(super) fn material(&self, place: [f32; 3]) -> LiquidMaterial {
         let mesh = mesh_at(&self.meshes, scale(place, self.by as f32));
         mesh.map(|n| self.meshes[n].1).unwrap_or_default()
+    }
+}
+
+/// What of the liquid at the start lies where there is none.
+pub(super) struct StartLosses {
+    /// Largest share of a mesh that is outside the box.
+    pub(super) outside: f64,
+    /// Of what is in the box, the largest share of a mesh that is inside colliders.
+    pub(super) in_colliders: f64,
+    /// What the surface should enclose, m³; 0 where meshes overlap, so that it is not known.
+    shown: f64,
+}
+
+impl StartLosses {
+    /// The share of it that the surface does not enclose, where it encloses `volume`, m³.
+    pub(super) fn unseen(&self, volume: f64) -> f64 {
+        if self.shown > 0.0 { (1.0 - volume / self.shown).max(0.0) } else { 0.0 }
     }
 }
 

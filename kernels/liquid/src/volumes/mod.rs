@@ -93,6 +93,10 @@ pub struct VolumeReport {
     pub drift: f64,
     /// What the drift would be if no surface had ever been moved here.
     pub raw_drift: f64,
+    /// What moving surfaces has added since the start, m³.
+    pub corrected: f64,
+    /// What it added now, m³.
+    pub corrected_now: f64,
     /// Pieces.
     pub pieces: usize,
     /// The largest error of a piece's volume, m³.
@@ -170,6 +174,7 @@ impl VolumeTargets {
     pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
         let unit = self.unit(surface);
         let (mut found, mut lost) = self.follow(surface, solid);
+        let before = self.corrected;
         let (mut cap, mut moved) = (0.5 * CAP, 0.0);
         let mut responses = vec![1.0; found.all.len()];
         for pass in 0..PASSES {
@@ -197,7 +202,8 @@ impl VolumeTargets {
             lost.extend(vanished);
             (found, cap, moved) = (now, 0.5 * cap, moved + farthest);
         }
-        self.report(&found, unit, moved, lost)
+        let report = self.report(&found, unit, moved, lost);
+        VolumeReport { corrected_now: self.corrected - before, ..report }
     }
 
     /// Whether further moves would change little.
@@ -222,6 +228,8 @@ impl VolumeTargets {
             target,
             drift: share(volume - target),
             raw_drift: share(volume - self.corrected - target),
+            corrected: self.corrected,
+            corrected_now: 0.0,
             pieces: found.all.len(),
             worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
             moved,
