@@ -58,7 +58,8 @@ inputs! { INPUTS:
         "Shapes from Fluid_Sink that liquid drains into. A mesh without its attributes takes all that enters.")
         .read_at(|_| Times::within_step(SAMPLES));
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that liquid does not enter. They may move and deform. Sheets and thin plates do not leak.")
+        "Meshes that liquid does not enter. They may move and deform. Sheets and thin plates do not leak. A closed mesh is solid: \
+         liquid inside it at the start is left out.")
         .read_at(|_| Times::NOW.and(Times::START).and(Times::within_step(1)));
     TRACERS: Input<Many> = Input::many("tracers", Kind::Points,
         "Points that the liquid carries along, substep by substep, from where they are at the start. They come out in \
@@ -97,7 +98,8 @@ params! { PARAMS:
     SURFACE_TENSION: Param<f64> = Param::double("surface_tension", 0.0, "Surface tension; not available yet.")
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 0.1);
     SLIP: Param<f32> = Param::float("slip", 0.0,
-        "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction.").within(0.0, 1.0);
+        "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction. It has no effect where \
+         viscosity is not solved for; `explain` says where it is.").within(0.0, 1.0);
     STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together. One after the other, thick liquid falls and turns as it should, but \
          sags, buckles and coils at the wrong rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
@@ -142,12 +144,16 @@ const VOLUME: Output =
 
 metrics! { METRICS:
     SUBSTEPS_USED = Metric::new("substeps_used", Unit::None, "Substeps of the frame.");
-    CFL_REACHED = Metric::new("cfl_reached", Unit::None, "The most cells that liquid moved in a substep.");
+    CFL_REACHED = Metric::new("cfl_reached", Unit::None, "The most cells that liquid moved in a substep.")
+        .warn_above(64.0, "Liquid that moves more than 64 cells in a substep ends anywhere, and is lost. Look for a velocity, spin, \
+            gravity or rate that is too high; or raise `max_substeps`, or `cell`.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Substeps that were longer than `cfl` allows because of `max_substeps`, and solves that ended before `tolerance`.")
-        .warn_above(0.0, "Either liquid moves {cfl_reached} cells in a substep, more than `cfl`: raise `max_substeps`, or `cell`. \
-            Or a solve ended before `tolerance`: velocities are off by {coupled_residual} of the speed, net flows of cells by \
-            {pressure_residual}. Raise `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");
+        "Substeps that were longer than `cfl` allows because of `max_substeps`, and solves that ended before `tolerance`.");
+    LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` allows because of `max_substeps`.")
+        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`. Raise `max_substeps`, or `cell`.");
+    SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that ended before `tolerance`.")
+        .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \
+            `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");
     PRESSURE_ITERATIONS = Metric::new("pressure_iterations", Unit::None, "Iterations of the pressure solves.");
     PRESSURE_RESIDUAL = Metric::new("pressure_residual", Unit::None,
         "Largest net flow of a cell that a pressure solve left, relative to the speed.");
@@ -165,13 +171,19 @@ metrics! { METRICS:
             colliders squeeze liquid that cannot get away.");
     VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it outside colliders.");
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
-        "Error of the volume, relative to what it should be, if it were never corrected.")
-        .warn_outside(-0.03, 0.03, "Without correction the liquid would have gained or lost more than 3 % of its volume: it has \
-            many drops, sheets or jets that are thinner than `cell`. Raise `resolution`: 2 loses about half as much, or less. A \
-            smaller `cell` hardly helps a splash, which only becomes finer with it.");
+        "Error of the volume, relative to what it should be, if it were never corrected.");
+    MADE_GOOD = Metric::new("volume_made_good", Unit::None,
+        "What moving the surface has made good of the volume since the start, in % of it.")
+        .warn_last_above(10.0, "`volume_correction` has made good {volume_made_good} % of the liquid's volume by this frame, {made_good_now} \
+            % in the frame alone. The volume is right, but liquid may be thicker here and thinner there than it should be. What is \
+            lost are drops, sheets and jets of less than two cells, and what overlaps where surfaces meet; a smaller `cell` helps \
+            where liquid stays smooth, not in a splash, which only becomes finer with it.");
+    MADE_GOOD_NOW = Metric::new("made_good_now", Unit::None, "What moving the surface made good of the volume in the frame, in % of it.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
-        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. Raise \
-            `resolution`; with `volume_correction` it comes back over the next frames.");
+        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. With \
+            `volume_correction` the surface moves by up to a tenth of a cell in a frame to make it good, where there is room: drops and \
+            thin films take several frames, and where a box is full or colliders enclose the liquid, it stays off. Without \
+            `volume_correction` it stays off, too.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
@@ -185,8 +197,34 @@ metrics! { METRICS:
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     WITHHELD = Metric::new("withheld", Unit::CubicMetres,
         "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
-        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for: the liquid has nowhere to go, \
-            or there is none to take. Open a wall, make room, or move the source or sink.");
+        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it wire {withheld_wire} \
+            (counted from 0 through `sources`, then `sinks`): the liquid has nowhere to go, or there is none to take. Open a wall, \
+            make room, or move the source or sink.");
+    WITHHELD_WIRE = Metric::new("withheld_wire", Unit::None,
+        "The wire of which most was withheld in the frame, counted from 0 through `sources`, then `sinks`.");
+    COLLECTING = Metric::new("collecting", Unit::None,
+        "Sources that gave nothing in the frame because their rate is less than the grid can show.")
+        .warn_above(0.0, "What the rates of these sources give in a frame is less than the smallest drop that cells show, a ball of one \
+            cell's radius, so it is collected until it is as much. Raise `rate`, or lower `cell`; where drops go on to come in \
+            pulses, give the source a `velocity` of at most `rate` ÷ 3 cell².");
+    MISWIRED = Metric::new("miswired", Unit::None, "Wires of `sources` from a Fluid_Sink, and of `sinks` from a Fluid_Source.")
+        .warn_above(0.0, "A Fluid_Sink at `sources` gives liquid, and a Fluid_Source at `sinks` takes all that enters it. Wire each to \
+            the input that it is made for.");
+    OUTSIDE = Metric::new("liquid_outside", Unit::None,
+        "Largest share of a mesh at `liquid` that lay outside the box at the start, and was left out.")
+        .warn_last_above(0.01, "Part of a mesh at `liquid` lies outside the box, and was left out. If that is not meant, move the mesh, \
+            or make the box larger with `domain_from` and `domain_to`.");
+    IN_COLLIDERS = Metric::new("liquid_in_colliders", Unit::None,
+        "Largest share of a mesh at `liquid` that lay inside colliders at the start, and was left out.")
+        .warn_last_above(0.5, "Most of a mesh at `liquid` lies inside colliders, and was left out. A closed mesh is solid: give a vessel \
+            walls with an inner side, or leave it open; and see whether a mesh is wired to both `liquid` and `colliders`.");
+    UNSEEN = Metric::new("liquid_unseen", Unit::None,
+        "Share of the liquid at the start that the surface does not enclose, because cells are too large for it.")
+        .warn_last_above(0.25, "Much of the liquid at the start is thinner than the cells of the surface, which do not show it. Use a \
+            smaller `cell`, raise `resolution`, or make the meshes at `liquid` larger.");
+    TRACERS_OUTSIDE = Metric::new("tracers_outside", Unit::None, "Tracers that lay outside the box at the start.")
+        .warn_last_above(0.0, "These tracers lie outside the box, where there is no liquid, and stay where they are. Move them, or make \
+            the box larger with `domain_from` and `domain_to`.");
     FAST_SHAPES = Metric::new("fast_shapes", Unit::None,
         "Colliders, sources and sinks that move more than 64 cells in the frame.")
         .warn_above(0.0, "These colliders, sources or sinks move more than 64 cells in a frame, so that where they are in between \

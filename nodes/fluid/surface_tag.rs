@@ -37,8 +37,8 @@ params! { PARAMS:
     ATTRIBUTES: Param<Arc<Vec<Name>>> = Param::texts("attributes", &["uvw"],
         "Names of the attributes to take over, of one, three or four floats each, such as [\"uvw\", \"Cd\"].").fixed();
     POINTS: Param<ReferencePoints> = Param::choice("points", ReferencePoints::All,
-        "Which points of FluidSolve's `particles` count. Choose those that your attributes came with; the others have 0 instead. \
-         Points without `kind` all count.");
+        "Which points of FluidSolve's `particles` count. Choose those that your attributes came with; the others have 0 instead, \
+         or white for `Cd`. \"tracers\" needs points at `tracers` of FluidSolve. Points without `kind` all count.");
 }
 
 const TAGGED: Output = Output::like(
@@ -54,6 +54,9 @@ metrics! { METRICS:
         .warn_above(0.0, "These vertices have no point of their side within the radius of {tag_radius} m, so they have the \
             values of the nearest point, which may jump from frame to frame; often they lie unseen against a collider. Where \
             it shows, raise `radius`, or give more points there.");
+    NO_TRACERS = Metric::new("no_tracers", Unit::None, "1 where `points` asks for tracers and `reference` has none.")
+        .warn_above(0.0, "`points` is \"tracers\", but `reference` has none: wire points to `tracers` of FluidSolve, or set `points` to \
+            \"markers\". The attributes are 0 meanwhile, or white for `Cd`.");
     TAG_RADIUS = Metric::new("tag_radius", Unit::Metres, "The radius: `radius`, or what suits the spacing of the points.");
 }
 
@@ -81,6 +84,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let columns = names.iter().map(|name| column(name, &surface, reference)).collect::<Result<Vec<&Column>>>()?;
     let counted = counted(reference, cx.get(POINTS));
     let points = picked(&counted, reference.positions());
+    let is_without = cx.get(POINTS) == ReferencePoints::Tracers && counted.is_empty();
+    cx.publish(NO_TRACERS, f64::from(u8::from(is_without)));
     let normals = reference.get(N).map(|rows| picked(&counted, rows));
     let rest = reference.get(PREF).map_or_else(|| points.clone(), |rows| picked(&counted, rows));
     let picked: Vec<Column> = columns.iter().map(|column| column.gather(&counted)).collect();

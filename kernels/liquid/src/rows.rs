@@ -222,13 +222,18 @@ impl CellRows {
 
     /// All cells at most `by` cells away along every axis.
     pub fn dilated(&self, by: i32) -> Self {
-        let [y0, z0] = self.low;
-        let [ny, nz] = self.size;
-        let along_xy = Self::from_ranges([y0 - by, z0], [ny + 2 * by, nz], |y, z, out| {
+        self.dilated_within(by, [i32::MIN; 3], [i32::MAX; 3])
+    }
+
+    /// Those of them inside the box `low` ≤ cell < `high`; none outside it is made meanwhile.
+    pub fn dilated_within(&self, by: i32, low: Cell, high: Cell) -> Self {
+        let first = [0, 1].map(|axis| max(self.low[axis] - by, low[axis + 1]));
+        let end = [0, 1].map(|axis| min(self.low[axis] + self.size[axis] + by, high[axis + 1]));
+        let along_xy = Self::from_ranges([first[0], self.low[1]], [end[0] - first[0], self.size[1]], |y, z, out| {
             let rows = (y - by..=y + by).flat_map(|y| self.row(y, z));
-            out.extend(rows.map(|span| span.start - by..span.end + by));
+            out.extend(rows.map(|span| max(span.start - by, low[0])..min(span.end + by, high[0])));
         });
-        Self::from_ranges([y0 - by, z0 - by], [ny + 2 * by, nz + 2 * by], |y, z, out| {
+        Self::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
             out.extend((z - by..=z + by).flat_map(|z| along_xy.row(y, z)).map(range));
         })
     }

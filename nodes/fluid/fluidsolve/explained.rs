@@ -68,10 +68,10 @@ fn solve(params: &Params, clock: Clock) -> String {
     let verdict = match (runs(of_frame), runs(of_shortest)) {
         (_, true) => "in every substep".to_owned(),
         (true, false) => format!("in substeps of at least 1/{} frame", (of_frame / LEAST_VISCOSITY).floor()),
-        (false, false) => "in none, pressure alone acts".to_owned(),
+        (false, false) => "in none, pressure alone acts on liquid without one of its own".to_owned(),
     };
     format!(
         "{how} where viscosity·dt/(density·cell²) is {bound}. With the values at the start it is {of_shortest:.1e} in the shortest \
-         substep, {of_frame:.1e} in one of a whole frame: {verdict}. A Fluid_Source may have another viscosity"
+         substep, {of_frame:.1e} in one of a whole frame: {verdict}. Liquid from a Fluid_Source with a viscosity of its own is solved with that"
     )
 }

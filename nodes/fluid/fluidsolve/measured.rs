@@ -6,8 +6,8 @@ use liquid::step::{LiquidReport, Surface};
 
 use super::{
     CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
-    LIQUID_CELLS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SUBSTEPS_USED, VISCOSITY_ITERATIONS,
-    VISCOSITY_RESIDUAL,
+    LIQUID_CELLS, LONG_SUBSTEPS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SOLVES_CUT_SHORT,
+    SUBSTEPS_USED, VISCOSITY_ITERATIONS, VISCOSITY_RESIDUAL,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -16,6 +16,8 @@ pub(super) fn measured(report: &LiquidReport) -> MetricValues {
     metrics.set(SUBSTEPS_USED, report.substeps);
     metrics.set(CFL_REACHED, report.cfl_reached);
     metrics.set(CAPS_HIT, report.caps_hit + report.solves_cut_short);
+    metrics.set(LONG_SUBSTEPS, report.caps_hit);
+    metrics.set(SOLVES_CUT_SHORT, report.solves_cut_short);
     metrics.set(PRESSURE_ITERATIONS, report.pressure_iterations);
     metrics.set(PRESSURE_RESIDUAL, report.pressure_residual);
     metrics.set(COUPLED_ITERATIONS, report.coupled_iterations);

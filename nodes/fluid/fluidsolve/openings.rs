@@ -7,7 +7,7 @@ use liquid::shape::{MovingShape, ShapeSettings};
 use liquid::step::{Domain, LiquidSink, LiquidSource, SourceShape};
 
 use super::carried::MeshAttributes;
-use super::shapes::{in_cells, topology};
+use super::shapes::{check_size, in_cells, topology};
 use crate::shared::attributes::{
     SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
@@ -53,7 +53,7 @@ impl Opening {
     /// All openings of an input over a step.
     ///
     /// # Errors
-    /// Where one is not closed, changes its faces within the step, or asks for what is not available yet.
+    /// Where one is not closed, too large, changes its faces within the step, or asks for what is not available yet.
     pub(super) fn all(
         cx: &StepCx,
         input: Input<Many>,
@@ -99,6 +99,7 @@ impl Opening {
                 bounds[1][k] = bounds[1][k].max(at(point[k].ceil()));
             }
         }
+        check_size((0..3).fold(1.0, |cells, k| cells * f64::from(bounds[1][k] - bounds[0][k])), what)?;
         let once = |attribute: Attr<f32>, mesh: &Component| mesh.get(attribute).and_then(|rows| rows.first().copied());
         let materials = meshes.iter().map(|mesh| (says.material)(mesh, what)).collect::<Result<Vec<_>>>()?;
         let velocity = |mesh: &&Component| says.velocity.and_then(|attribute| mesh.get(attribute)?.first().copied());

@@ -22,12 +22,18 @@ use super::particles::{materials_at, particles};
 use super::shapes::{Colliders, in_cells, liquid_at_start};
 use super::spray::{Air, SprayDrop};
 use super::{
-    DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID_CELLS, PARTICLES,
-    PARTICLES_NOW, SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, VOLUME, VOLUME_CORRECTION, VOLUME_DRIFT,
-    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD,
+    CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
+    LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW, SINKS, SOURCED,
+    SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_CORRECTION, VOLUME_DRIFT,
+    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
+use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
 use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
+
+/// Cells past the liquid, besides its band, that the velocity of the output goes on where liquid moves no farther, if `cfl`
+/// allows it so much.
+const LEAST_MOVED: f64 = 2.0;
 
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
@@ -38,8 +44,11 @@ pub(super) struct Run {
     sourced: f64,
     sunk: f64,
     left_domain: f64,
-    /// In the last frame, m³.
+    /// In the last frame, m³, and the wire of which most is.
     withheld: f64,
+    withheld_wire: usize,
+    /// Sources that gave nothing in the last frame, since it is too little.
+    collecting: usize,
     targets: VolumeTargets,
     pub(super) spray: Vec<SprayDrop>,
     /// The attributes that came with liquid, sources and tracers.
@@ -48,6 +57,8 @@ pub(super) struct Run {
     pub(super) tracer_ids: Vec<i32>,
     /// Metrics of the last step; empty at the start.
     metrics: MetricValues,
+    /// Those of the start.
+    start: MetricValues,
     #[serde(skip)]
     colliders: Option<Colliders>,
     /// The output at the state's frame.
@@ -62,7 +73,7 @@ impl Chain for Run {
         let domain = domain(cx);
         let start = liquid_at_start(cx, &domain, lattice)?;
         let mut surface = start.surface.clone();
-        let colliders = Colliders::at_start(cx, &domain, lattice);
+        let colliders = Colliders::at_start(cx, &domain, lattice)?;
         if !colliders.is_empty() {
             surface.meet(&|point| colliders.distance(1.0, point));
         }
@@ -81,6 +92,11 @@ impl Chain for Run {
         if start.has_materials() {
             liquid.set_materials(|place| start.material(place));
         }
+        let parts = start.parts(&domain, &colliders, lattice.cell);
+        let known = start.known(&domain, &colliders, lattice.cell);
+        let mut start_metrics = MetricValues::default();
+        start_metrics.set(OUTSIDE, known.outside);
+        start_metrics.set(IN_COLLIDERS, known.in_colliders);
         let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
         columns.add_tracers(&tracers);
         for mesh in cx.part_at_start(SOURCES) {
@@ -90,7 +106,12 @@ impl Chain for Run {
         liquid.set_tracers(places);
         let (mut surface, motion) = liquid.into_parts();
         let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
-        let targets = VolumeTargets::new(&mut surface, lattice.cell, colliders.solid(&at_rest));
+        let parts = if cx.get(VOLUME_CORRECTION) { parts } else { Vec::new() };
+        let targets = VolumeTargets::of_parts(&mut surface, lattice.cell, colliders.solid(&at_rest), &parts);
+        let tracer_places = motion.tracers().points();
+        let is_outside = |place: &&[f32; 3]| !domain.contains(place.map(|x| x.floor() as i32));
+        start_metrics.set(TRACERS_OUTSIDE, tracer_places.iter().filter(is_outside).count() as f64);
+        start_metrics.set(UNSEEN, known.unseen(targets.volume()));
         let mut run = Self {
             surface,
             motion,
@@ -98,11 +119,14 @@ impl Chain for Run {
             sunk: 0.0,
             left_domain: 0.0,
             withheld: 0.0,
+            withheld_wire: 0,
+            collecting: 0,
             targets,
             spray: Vec::new(),
             columns,
             tracer_ids: tracer_ids(&tracers),
             metrics: MetricValues::default(),
+            start: start_metrics,
             colliders: Some(colliders),
             volume: OnceLock::new(),
         };
@@ -127,7 +151,11 @@ impl Chain for Run {
         self.correct(cx, &report, &colliders);
         self.metrics.set(SOURCED, self.sourced);
         self.metrics.set(SUNK, self.sunk);
-        self.metrics.set(WITHHELD, if report.substeps > 0 { self.withheld } else { 0.0 });
+        let has_moved = report.substeps > 0;
+        self.metrics.set(WITHHELD, if has_moved { self.withheld } else { 0.0 });
+        self.metrics.set(WITHHELD_WIRE, self.withheld_wire as f64);
+        self.metrics.set(COLLECTING, if has_moved { self.collecting as f64 } else { 0.0 });
+        self.metrics.set(MISWIRED, miswired(cx) as f64);
         self.metrics.set(LEFT_DOMAIN, self.left_domain);
         self.metrics.set(FAST_SHAPES, (colliders.fast() + fast_openings) as f64);
         self.colliders = Some(colliders);
@@ -137,6 +165,7 @@ impl Chain for Run {
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let volume = self.volume(cx)?;
         cx.publish_all(&self.metrics);
+        cx.publish_all(&self.start);
         let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
         cx.publish(VOLUME_NOW, self.targets.volume());
         cx.publish(EULER_CHARACTERISTIC, euler_characteristic(&surface));
@@ -198,8 +227,12 @@ impl Run {
         for outflow in liquid.outflow() {
             self.targets.add(-outflow.volume, Some(outflow.place()));
         }
-        let accounts = liquid.sources().iter().chain(liquid.sinks());
-        self.withheld = accounts.fold(0.0, |sum, account| sum + account.withheld);
+        let withheld: Vec<f64> =
+            liquid.sources().iter().chain(liquid.sinks()).map(|account| account.withheld).collect();
+        self.withheld = withheld.iter().fold(0.0, |sum, withheld| sum + withheld);
+        self.withheld_wire =
+            (0..withheld.len()).rev().max_by(|a, b| withheld[*a].total_cmp(&withheld[*b])).unwrap_or(0);
+        self.collecting = liquid.sources().iter().filter(|account| account.is_collecting()).count();
         let domain = domain(cx);
         let air = Air { gravity: params(0.5 * seconds)[0], seconds, cell: lattice.cell, domain: &domain, colliders };
         self.spray.retain_mut(|drop| {
@@ -229,6 +262,8 @@ impl Run {
         }
         self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
         self.metrics.set(VOLUME_DRIFT, corrected.drift);
+        self.metrics.set(MADE_GOOD, percent(corrected.corrected, corrected.target));
+        self.metrics.set(MADE_GOOD_NOW, percent(corrected.corrected_now, corrected.target));
         self.metrics.set(SPRAY, self.spray.iter().fold(0.0, |sum, drop| sum + f64::from(drop.volume)));
     }
 
@@ -238,7 +273,10 @@ impl Run {
             return Ok(volume.clone());
         }
         let (lattice, settings) = (lattice(cx), settings(cx));
-        let (bounds, layers) = ([settings.domain.low, settings.domain.high], BAND as i32 + settings.cfl.ceil() as i32);
+        let bounds = [settings.domain.low, settings.domain.high];
+        // `cfl` may ask for more cells than liquid moves.
+        let moved = self.metrics.get(CFL_REACHED).unwrap_or_default().max(LEAST_MOVED);
+        let layers = BAND as i32 + settings.cfl.min(moved).ceil() as i32;
         let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
         let by = self.surface.resolution();
         let colliders = Colliders::now(cx, &domain(cx), lattice);
@@ -250,6 +288,21 @@ impl Run {
         let volume = Arc::new(volume);
         Ok(self.volume.get_or_init(|| volume).clone())
     }
+}
+
+/// A share of a volume in whole per cent, without its sign; 0 of none.
+fn percent(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (100.0 * part / whole).abs().round() } else { 0.0 }
+}
+
+/// Wires of `sources` that are sinks, and of `sinks` that are sources.
+fn miswired(cx: &StepCx) -> usize {
+    let count = |input, is: Attr<f32>, is_not: Attr<f32>| {
+        let wires = cx.samples(input).last().map_or(&[][..], |(_, wires)| &wires[..]);
+        let meshes = wires.iter().filter_map(|wire| wire.mesh());
+        meshes.filter(|mesh| mesh.get(is).is_some() && mesh.get(is_not).is_none()).count()
+    };
+    count(SOURCES, SINK_RATE, SOURCE_RATE) + count(SINKS, SOURCE_RATE, SINK_RATE)
 }
 
 /// The ids of tracers: their own, or else their numbers.

@@ -373,3 +373,35 @@ fn the_volume_is_kept_unless_correction_is_off() {
     let near = off.iter().filter(|off| **off < 0.5).count();
     assert!(near * 4 > off.len() * 3, "{near} of {}", off.len());
 }
+
+#[test]
+fn nothing_that_may_be_typed_overflows() {
+    let block = solving(cuboid([0.3, 0.4, 0.3], [0.7, 0.7, 0.7]));
+    let [usual, huge] = [2.0, 1e9].map(|cfl| block.clone().set(CFL, cfl).frames(1..=2));
+    let points = |out: &[BenchResult]| out[0].mesh().positions().len();
+    assert_eq!(points(&usual), points(&huge));
+    let fine = || solving(cuboid([0.0; 3], [0.001; 3])).set(CELL, 1e-4);
+    let large = || cuboid([0.1; 3], [0.9; 3]);
+    for bench in [fine().input(COLLIDERS, large()), fine().input(SOURCES, large()), fine().input(SINKS, large())] {
+        let text = bench.try_frames(&[Frame::whole(2)]).err().map(|error| error.error.fact.clone()).unwrap_or_default();
+        assert!(text.contains("(counted from 0) is about 5."), "{text}");
+    }
+}
+
+/// Rounding must not decide which of the cells whose middles lie on a face are inside.
+#[test]
+fn a_box_with_faces_through_the_middles_of_cells_starts_whole_with_its_volume() {
+    for (resolution, at) in [(1, 4.5), (1, 4.0), (2, 4.25), (3, 4.5), (1, 4.2)] {
+        let [low, high] = [at / 16.0, (at + 8.0) / 16.0];
+        let out = solving(cuboid([low; 3], [high; 3])).set(RESOLUTION, resolution).cook();
+        assert_eq!(metric(&out, EULER_CHARACTERISTIC), 2.0, "{resolution} {at}");
+        let volume = metric(&out, VOLUME_NOW) / 0.125;
+        assert!((volume - 1.0).abs() < 1e-3, "{resolution} {at}: {volume}");
+        let ends =
+            |k: usize| out.mesh().positions().iter().fold([f32::MAX, f32::MIN], |[a, b], p| [a.min(p[k]), b.max(p[k])]);
+        for [first, last] in (0..3).map(ends) {
+            assert!((first + last - low - high).abs() < 2e-3, "{resolution} {at}: {first} {last}");
+            assert!((first - low).abs() < 0.15 / 16.0, "{resolution} {at}: {first} {low}");
+        }
+    }
+}

@@ -187,3 +187,14 @@ fn it_conforms() {
     let with = |list: &'static [&'static str]| move |bench: Bench| bench.set(ATTRIBUTES, names(list));
     conformance(&NODE).with(with(&["N"])).with(with(&["Pref"])).with(with(&[])).run();
 }
+
+#[test]
+fn tracers_that_are_asked_for_and_not_there_are_told() {
+    let of_kind = |kind: i32| {
+        let mut points = scattered();
+        points.set(PARTICLE_KIND, vec![kind; points.point_count()]).unwrap();
+        tagging(points).set(ATTRIBUTES, names(&["heat"])).set(POINTS, ReferencePoints::Tracers).cook()
+    };
+    let told = |kind: i32| of_kind(kind).metrics["no_tracers"];
+    assert_eq!((told(PARTICLE_TRACER), told(PARTICLE_MARKER)), (0.0, 1.0));
+}

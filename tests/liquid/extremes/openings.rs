@@ -38,7 +38,7 @@ fn extreme_sources_give_or_tell() {
         sourced("a source at 1e6 m³/s", r#""inputs": { "shape": "in_box" }, "params": { "rate": 1e6 }"#, from)
             .fastest(f32::INFINITY)
             .drift(1.0)
-            .noted(&["caps_hit", "volume_drift"]),
+            .noted(&["long_substeps", "volume_drift"]),
         sourced(
             "a nozzle at 1000 m/s",
             r#""inputs": { "shape": "in_box" }, "params": { "velocity": [0, -1000, 0] }"#,
@@ -46,7 +46,7 @@ fn extreme_sources_give_or_tell() {
         )
         .fastest(2000.0)
         .drift(1.0)
-        .noted(&["caps_hit", "volume_drift"]),
+        .noted(&["long_substeps", "volume_drift"]),
         sourced(
             "a source in a sealed box that is full",
             &rated("in_box"),

@@ -96,3 +96,16 @@ fn no_cells_make_no_rows() {
     let block = CellRows::cuboid([0; 3], [2; 3]);
     assert_eq!((none.union(&block), block.union(&none)), (block.clone(), block));
 }
+
+#[test]
+fn cells_around_within_a_box_are_those_around_that_it_holds() {
+    let rows = CellRows::from_cells(&[[0, 0, 0], [5, 2, -3], [6, 2, -3], [9, 9, 9]]);
+    for (low, high) in [([-2, -1, -4], [7, 4, 2]), ([3, 3, 3], [12, 12, 12]), ([30, 0, 0], [40, 9, 9])] {
+        for by in [0, 1, 3] {
+            assert_eq!(rows.dilated_within(by, low, high), rows.dilated(by).clipped(low, high));
+        }
+    }
+    // All around it are more than 2³² cells.
+    let within = rows.dilated_within(2000, [-2; 3], [12; 3]);
+    assert_eq!(within.len(), 14 * 14 * 14);
+}

@@ -117,6 +117,13 @@ impl Domain {
         self.clip_with_images(rows, 1)
     }
 
+    /// The corners of what is stored: the box, one cell beyond each side, and `margin` beyond those that are periodic.
+    pub(super) fn reach(&self, margin: i32) -> [Cell; 2] {
+        let beyond = |axis: usize| if self.walls[axis][0] == Wall::Periodic { margin } else { 1 };
+        let corner = |corner: Cell, sign: i32| std::array::from_fn(|axis| corner[axis] + sign * beyond(axis));
+        [corner(self.low, -1), corner(self.high, 1)]
+    }
+
     /// The same with as many images beyond periodic sides as `margin`.
     pub(super) fn clip_with_images(&self, rows: &CellRows, margin: i32) -> CellRows {
         let periods = self.periods();

@@ -4,12 +4,13 @@
 //! rate empty theirs. What a rate asks for beyond that becomes divergence of the liquid cells in the shape, which moves the
 //! surface in the next substep. The volumes are those that the level set shows before and after.
 
-use numerics::vector::{Vec3, largest};
+use numerics::vector::{Vec3, largest, length, scale};
 
 use crate::carried::{Filled, MaterialPoints};
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::Obstacle;
 use crate::step::motion::{LiquidCells, Motion};
+use crate::step::part::{Ellipsoid, LEAST, Part};
 use crate::step::pour::{Holder, Pour};
 use crate::step::shape_cells::ShapeCells;
 use crate::step::sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape, volume_between};
@@ -24,6 +25,10 @@ const AROUND: f32 = 1.5;
 
 /// φ before a source filled its shape, in cells, from which on a place on the surface is new.
 const NEW: f32 = 0.1;
+
+/// What flows through the least section of a source, ÷ its rate, at most: with less, the section grows until both are the
+/// same, and what little is missing of it is filled in each substep.
+const LEAST_STREAM: f64 = 0.8;
 
 /// A substep to sources and sinks.
 pub(super) struct Exchange<'a> {
@@ -81,16 +86,17 @@ impl<'a> Exchange<'a> {
         let Some(cells) = self.cells(source.shape) else { return account.withhold_beyond(0.0) };
         let mut phi = cells.level_set(&surface.view());
         let material = (source.material)(self.times[1]);
-        let shrink = match source.rate {
-            None => Some(0.0),
-            Some(_) if account.owed > 0.0 => cells.shrunk_to(&phi, account.owed / self.cell_volume()),
+        let velocity = self.imposed(source, &cells, &phi, gave);
+        let part = match source.rate {
+            None => Some(Part::Whole),
+            Some(_) if account.owed > 0.0 => cells.part_that_adds(&phi, account.owed / self.cell_volume()),
             Some(_) => None,
         };
         let mut filled = 0.0;
-        if let Some(shrink) = shrink.filter(|shrink| cells.adds(&phi, *shrink)) {
+        if let Some(part) = part.filter(|part| cells.adds(&phi, *part)) {
             let [low, high] = cells.bounds();
             let held = cells.volume(&phi);
-            surface.change(low, high, &cells.filled(shrink));
+            surface.change(low, high, &cells.filled(part));
             let after = cells.level_set(&surface.view());
             if let Some(attributes) = source.attributes {
                 surface.edit_attributes(&|point, row| {
@@ -111,7 +117,7 @@ impl<'a> Exchange<'a> {
         }
         let liquid = cells.liquid_cells(&phi);
         account.place = liquid.first().map_or(account.place, |deepest| Site::Centre.of(*deepest));
-        if source.rate.is_some() && shrink == Some(0.0) {
+        if source.rate.is_some() && part == Some(Part::Whole) {
             let rate = account.rate_to_pour(gave, filled, before, self.seconds());
             match liquid.is_empty() {
                 true => account.withhold_beyond(0.0),
@@ -119,8 +125,23 @@ impl<'a> Exchange<'a> {
                 false => {}
             }
         }
-        let velocity = source.velocity.filter(|_| is_active).map(|velocity| velocity(self.times[1]));
+        let velocity = velocity.filter(|_| is_active);
         out.entering.push(Entering { cells, is_filled: filled > 0.0, velocity });
+    }
+
+    /// The velocity that a source imposes, given what its rate gave in the substep, m³: where that would leave less than the
+    /// least piece of its shape that stays liquid, a lower one.
+    fn imposed(&self, source: &LiquidSource<'_>, cells: &ShapeCells<'_>, phi: &[f32], gave: f64) -> Option<Vec3> {
+        let velocity = (source.velocity?)(self.times[1]);
+        let speed = f64::from(length(velocity));
+        if gave <= 0.0 || speed <= 0.0 || !cells.adds(phi, Part::Whole) {
+            return Some(velocity);
+        }
+        let Some(middle) = cells.middle() else { return Some(velocity) };
+        let least = Ellipsoid { axes: middle.axes.map(|axis| axis.min(LEAST)), ..middle };
+        let area = least.section(velocity) * self.settings.cell * self.settings.cell;
+        let most = LEAST_STREAM * gave / (self.seconds() * area);
+        Some(if speed > most { scale(velocity, (most / speed) as f32) } else { velocity })
     }
 
     fn take(
@@ -163,6 +184,7 @@ impl<'a> Exchange<'a> {
     fn asked(&self, rate: Option<&(dyn Fn(f64, f64) -> f64 + Sync)>, account: &mut FlowAccount) -> f64 {
         let [from, to] = self.times;
         let gave = rate.map_or(0.0, |rate| volume_between(rate, from, to));
+        account.asked += gave;
         account.owed = if rate.is_some() { account.owed + gave } else { 0.0 };
         gave
     }

@@ -20,9 +20,10 @@
 //! the surface of the substep before, so any wave grows; a dam break gained a third of its energy. All take one pressure
 //! solve a substep.
 //!
-//! A source adds ∫ rate dt: what is missing of its shape is filled, smaller on all sides where the rate does not cover all
-//! of it, and the rest is divergence of its liquid, one substep later. Liquid enclosed on all sides gives way to no more
-//! than leaves it elsewhere; the rest is withheld ([`FlowAccount`]). Limit: where a jet only 6 cells across leaves the sharp
+//! A source adds ∫ rate dt from the first substep on: what is missing of its shape is filled, only in the middle where the
+//! rate does not cover all of it, and the rest is divergence of its liquid, one substep later. Liquid enclosed on all sides gives way to no more
+//! than leaves it elsewhere; the rest is withheld ([`FlowAccount`]). A drop of less than
+//! a cell's radius is collected. Limit: where a jet only 6 cells across leaves the sharp
 //! edge of a shape that is kept full, markers bulge, and it is 7 % too thick.
 //!
 //! Time and memory follow the liquid, not the domain: the cells that are stored are chosen anew each substep.
@@ -33,6 +34,7 @@ mod force;
 mod fullness;
 mod motion;
 mod outflow;
+mod part;
 mod pour;
 mod project;
 mod shape_cells;
@@ -283,9 +285,9 @@ impl<S: Surface> Liquid<S> {
         (self.surface, self.motion)
     }
 
-    /// The velocity, m/s, continued `layers` cells past the liquid.
+    /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
     pub fn velocity(&self, layers: i32) -> MacVelocity {
-        let domain = &self.settings.domain;
+        let (domain, layers) = (&self.settings.domain, layers.min(substep::MOST_LAYERS));
         let rows = self.motion.rows_past_liquid(domain, layers);
         let own = self.motion.velocity().faces();
         let [faces] = self.motion.continued([own], &rows, f32::INFINITY, domain, None);

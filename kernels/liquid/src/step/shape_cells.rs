@@ -7,6 +7,7 @@ use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::fullness::{Neighbours, fullness};
+use crate::step::part::{Ellipsoid, LEAST, Part};
 use crate::step::sources::SourceShape;
 use crate::velocity::Site;
 
@@ -19,8 +20,11 @@ const HALF_DIAGONAL: f32 = 0.87;
 /// Depth to which a shape inside a solid is filled, in cells: φ on the solid's surface must not see the end.
 const INTO_SOLID: f32 = 2.0;
 
-/// Depth of the piece of a shape that is filled whole or not at all, in cells: a surface loses smaller ones.
-const LEAST_FILL: f32 = 1.0;
+/// Size of the least part that is filled beside liquid, where 0 is that which may be filled anywhere and −1 nothing.
+const LEAST_BESIDE: f32 = -0.95;
+
+/// Half the length of a shape that has no end, in cells.
+const BEYOND: f32 = 1e3;
 
 /// Changes of volume that count, in cells.
 const LEAST_VOLUME: f64 = 1e-5;
@@ -90,12 +94,12 @@ impl<'a> ShapeCells<'a> {
         [self.low, high]
     }
 
-    /// φ with the shape, smaller by `shrink` cells on all sides, added.
-    pub(super) fn filled(&self, shrink: f32) -> impl Fn(Vec3, f32) -> f32 + Sync {
+    /// φ with a part of the shape added.
+    pub(super) fn filled(&self, part: Part) -> impl Fn(Vec3, f32) -> f32 + Sync {
         move |point, phi| {
-            let distance = self.distance(point) + shrink;
+            let distance = part.distance(point, self.distance(point));
             let reached = match self.solid {
-                Some(solid) if distance < phi => distance.max(-solid.distance(point) - INTO_SOLID + shrink),
+                Some(solid) if distance < phi => distance.max(-solid.distance(point) - INTO_SOLID),
                 _ => distance,
             };
             phi.min(reached)
@@ -172,36 +176,90 @@ impl<'a> ShapeCells<'a> {
         }
     }
 
-    /// How far the shape must shrink so that filling it adds `most`, ÷ cell³; 0 where all of it adds no more. None where
-    /// not even the least piece of it can be filled.
-    pub(super) fn shrunk_to(&self, phi: &[f32], most: f64) -> Option<f32> {
+    /// The part of the shape that adds `most`, ÷ cell³, when it is filled: all of it where that adds no more. None where not
+    /// even the least piece of it can be filled.
+    pub(super) fn part_that_adds(&self, phi: &[f32], most: f64) -> Option<Part> {
         let before = self.rough_volume(phi);
         let mut filled = vec![0.0; phi.len()];
-        let mut added = |shrink: f32| {
-            for ((filled, phi), reached) in filled.iter_mut().zip(phi).zip(&self.reached) {
-                *filled = phi.min(reached + shrink);
-            }
+        let mut added = |part: Part| {
+            self.fill(phi, part, &mut filled);
             self.rough_volume(&filled) - before
         };
-        if added(0.0) <= most.max(LEAST_VOLUME) {
-            return Some(0.0);
+        if added(Part::Whole) <= most.max(LEAST_VOLUME) {
+            return Some(Part::Whole);
         }
-        let open = self.distance.iter().zip(&self.open).filter(|(_, open)| **open > 0.0);
-        let deepest = open.fold(f32::INFINITY, |least, (d, _)| if *d < least { *d } else { least });
-        let (mut too_much, mut enough) = (0.0, (-deepest - LEAST_FILL).max(0.0));
-        if added(enough) > most {
+        let middle = self.middle()?;
+        let of_size = |size: f32| Part::Middle(middle.sized(size));
+        // Beside liquid nothing is too small to stay.
+        let is_wet = self.rows.find(middle.centre.map(|x| x.floor() as i32)).is_some_and(|at| phi[at] < 0.0);
+        let (mut enough, mut too_much) = (if is_wet { LEAST_BESIDE } else { 0.0 }, self.size_of_all(&middle));
+        if added(of_size(enough)) > most {
             return None;
         }
         for _ in 0..16 {
-            let middle = 0.5 * (too_much + enough);
-            if added(middle) > most { too_much = middle } else { enough = middle }
+            let size = 0.5 * (too_much + enough);
+            if added(of_size(size)) > most { too_much = size } else { enough = size }
         }
-        Some(enough)
+        Some(of_size(enough))
     }
 
-    /// Whether filling the shape, shrunk, adds liquid.
-    pub(super) fn adds(&self, phi: &[f32], shrink: f32) -> bool {
-        let filled: Vec<f32> = phi.iter().zip(&self.reached).map(|(phi, reached)| phi.min(reached + shrink)).collect();
+    /// φ of the cells with a part of the shape added.
+    fn fill(&self, phi: &[f32], part: Part, filled: &mut [f32]) {
+        for (at, cell) in self.rows.iter().enumerate() {
+            filled[at] = phi[at].min(part.distance(Site::Centre.of(cell), self.reached[at]));
+        }
+    }
+
+    /// An ellipsoid about where the shape is open, as long and wide as it; None where it is not.
+    pub(super) fn middle(&self) -> Option<Ellipsoid> {
+        let share = |at: usize| f64::from((0.5 - self.distance[at]).clamp(0.0, 1.0) * self.open[at]);
+        let (mut sum, mut first, mut second) = (0.0, [0.0; 3], [0.0; 3]);
+        for (at, cell) in self.rows.iter().enumerate() {
+            let (share, middle) = (share(at), Site::Centre.of(cell).map(f64::from));
+            sum += share;
+            for axis in 0..3 {
+                first[axis] += share * middle[axis];
+                second[axis] += share * middle[axis] * middle[axis];
+            }
+        }
+        if sum <= 0.0 {
+            return None;
+        }
+        let mean = first.map(|first| first / sum);
+        // An ellipsoid's variance along an axis is a fifth of its half length squared.
+        let half = |axis: usize| (5.0 * (second[axis] / sum - mean[axis] * mean[axis])).max(0.0).sqrt() as f32;
+        let axes = [0, 1, 2].map(|axis| if self.goes_beyond(axis) { BEYOND } else { half(axis) });
+        let open = self.open_cells();
+        let (centre, deepest) = (mean.map(|x| x as f32), Site::Centre.of(open[self.deepest(&open)?]));
+        let is_inside = self.distance(centre) < 0.5 * self.distance(deepest);
+        Some(Ellipsoid { centre: if is_inside { centre } else { deepest }, axes })
+    }
+
+    /// Whether the shape reaches through a side of the domain: it has no end there.
+    fn goes_beyond(&self, axis: usize) -> bool {
+        let is_out = |cell: Cell| cell[axis] < self.domain.low[axis] || cell[axis] >= self.domain.high[axis];
+        self.rows.iter().zip(&self.distance).any(|(cell, distance)| *distance < 0.0 && is_out(cell))
+    }
+
+    /// The cells that are not in a solid or beyond a wall.
+    fn open_cells(&self) -> Vec<Cell> {
+        self.rows.iter().enumerate().filter(|(at, _)| self.open[*at] > 0.5).map(|(_, cell)| cell).collect()
+    }
+
+    /// The size of an ellipsoid that holds all of the shape.
+    fn size_of_all(&self, middle: &Ellipsoid) -> f32 {
+        let away = |axis: usize| {
+            let [low, high] = [self.low[axis], self.low[axis] + self.size[axis] as i32].map(|x| x as f32);
+            (middle.centre[axis] - low).max(high - middle.centre[axis]) / middle.axes[axis].max(LEAST)
+        };
+        let ways = [0, 1, 2].map(away);
+        numerics::vector::length(ways).max(1.0)
+    }
+
+    /// Whether filling a part of the shape adds liquid.
+    pub(super) fn adds(&self, phi: &[f32], part: Part) -> bool {
+        let mut filled = vec![0.0; phi.len()];
+        self.fill(phi, part, &mut filled);
         self.rough_volume(&filled) - self.rough_volume(phi) > LEAST_VOLUME
     }
 

@@ -76,6 +76,8 @@ impl<'a> LiquidSink<'a> {
 pub struct FlowAccount {
     /// In the last frame, m³.
     pub moved: f64,
+    /// What its rate asked for in the last frame, m³.
+    pub(super) asked: f64,
     /// What its rate asked for in the last frame and could not pass, m³: there was no liquid to give way or to take, or no
     /// room. It is not made good later.
     pub withheld: f64,
@@ -92,9 +94,14 @@ pub struct FlowAccount {
 const CORRECTION: f64 = 0.25;
 
 impl FlowAccount {
+    /// Whether a source gave nothing in the last frame because its rate is less than the grid can show: it is collected.
+    pub fn is_collecting(&self) -> bool {
+        self.asked > 0.0 && self.moved == 0.0 && self.pouring == 0.0 && self.owed > 0.0
+    }
+
     pub(super) fn start_frame(accounts: &mut Vec<Self>, count: usize) {
         accounts.resize(count, Self::default());
-        accounts.iter_mut().for_each(|account| (account.moved, account.withheld) = (0.0, 0.0));
+        accounts.iter_mut().for_each(|account| (account.moved, account.asked, account.withheld) = (0.0, 0.0, 0.0));
     }
 
     /// Counts what poured in a substep; returns the rate that it poured at, m³/s.

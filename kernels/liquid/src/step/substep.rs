@@ -94,6 +94,9 @@ const FARTHEST: f32 = 64.0;
 /// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
 const BAND: i32 = 5;
 
+/// Cells past the liquid whose velocity a substep needs, at most.
+pub(super) const MOST_LAYERS: i32 = BAND + FARTHEST as i32;
+
 /// Moves on between two times since the start of the frame, s. Gravity and viscosity are read in the middle.
 pub(super) fn substep(
     settings: &LiquidSettings,

@@ -25,6 +25,7 @@ use crate::level_set::Distance;
 use crate::level_set::floor;
 use crate::marked::MarkedSurface;
 use crate::markers::NO_PIECE;
+use crate::rows::CellRows;
 use follow::{Passage, passages, passed_on};
 use pieces::{Measured, Pieces};
 
@@ -38,6 +39,8 @@ const PASSES: u32 = 8;
 const FIRST_PASSES: u32 = 2;
 /// Share of the volume that may be wrong after them: a twentieth of what a frame is to be kept to.
 const CLOSE: f64 = 5e-5;
+/// Frames' worth of moves that the surface of the start may take to enclose a known volume.
+const START_MOVES: u32 = 3;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
 const BESIDE: f32 = 4.0;
 
@@ -70,6 +73,15 @@ struct Change {
     at: Option<Vec3>,
 }
 
+/// Part of a liquid at the start.
+#[derive(Clone, Debug)]
+pub struct StartPart {
+    /// The surface cells inside it.
+    pub inside: CellRows,
+    /// m³; `None` where walls, solids or other parts may take from it.
+    pub volume: Option<f64>,
+}
+
 /// What a frame's correction found and left.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VolumeReport {
@@ -81,6 +93,10 @@ pub struct VolumeReport {
     pub drift: f64,
     /// What the drift would be if no surface had ever been moved here.
     pub raw_drift: f64,
+    /// What moving surfaces has added since the start, m³.
+    pub corrected: f64,
+    /// What it added now, m³.
+    pub corrected_now: f64,
     /// Pieces.
     pub pieces: usize,
     /// The largest error of a piece's volume, m³.
@@ -105,12 +121,29 @@ pub struct VolumeTargets {
 impl VolumeTargets {
     /// Targets that are what each piece of a surface encloses outside a solid. `cell` is the side of a solver cell, m.
     pub fn new(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>) -> Self {
+        Self::of_parts(surface, cell, solid, &[])
+    }
+
+    /// The same, but a piece of which all parts are known has their volume, and its surface is moved so that it encloses
+    /// that: cells round off edges.
+    pub fn of_parts(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>, parts: &[StartPart]) -> Self {
         let found = Pieces::new(surface, solid);
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
         let mut targets = Self { cell, pieces: Vec::new(), changes: Vec::new(), corrected: 0.0 };
         let unit = targets.unit(surface);
-        targets.set(surface, &found, found.all.iter().map(|piece| unit * piece.volume));
+        let known = known_volumes(&found, parts);
+        let most = if known.iter().any(Option::is_some) { START_MOVES } else { 0 };
+        let volumes = found.all.iter().zip(known).map(|(piece, known)| known.unwrap_or(unit * piece.volume));
+        targets.set(surface, &found, volumes);
+        for _ in 0..most {
+            if targets.is_close() {
+                break;
+            }
+            targets.correct(surface, solid);
+        }
+        // What cells round off at the start is no drift.
+        targets.corrected = 0.0;
         targets
     }
 
@@ -141,6 +174,7 @@ impl VolumeTargets {
     pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
         let unit = self.unit(surface);
         let (mut found, mut lost) = self.follow(surface, solid);
+        let before = self.corrected;
         let (mut cap, mut moved) = (0.5 * CAP, 0.0);
         let mut responses = vec![1.0; found.all.len()];
         for pass in 0..PASSES {
@@ -168,7 +202,8 @@ impl VolumeTargets {
             lost.extend(vanished);
             (found, cap, moved) = (now, 0.5 * cap, moved + farthest);
         }
-        self.report(&found, unit, moved, lost)
+        let report = self.report(&found, unit, moved, lost);
+        VolumeReport { corrected_now: self.corrected - before, ..report }
     }
 
     /// Whether further moves would change little.
@@ -193,6 +228,8 @@ impl VolumeTargets {
             target,
             drift: share(volume - target),
             raw_drift: share(volume - self.corrected - target),
+            corrected: self.corrected,
+            corrected_now: 0.0,
             pieces: found.all.len(),
             worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
             moved,
@@ -368,4 +405,23 @@ fn shift(piece: &Measured, target: f64, response: f64, cap: f64) -> f64 {
 fn marked(surface: &MarkedSurface, found: &Pieces) -> Vec<u32> {
     let markers = &surface.markers().markers;
     parallel::tabulate(markers.len(), parallel::CHUNK, |n| found.of_marker(&markers[n]))
+}
+
+/// The volume of each piece, m³, where all its parts are in no other and have one.
+fn known_volumes(found: &Pieces, parts: &[StartPart]) -> Vec<Option<f64>> {
+    let mut volumes: Vec<Option<f64>> = vec![None; found.all.len()];
+    let mut is_unknown = vec![false; found.all.len()];
+    for part in parts {
+        let spans = part.inside.spans();
+        let mut pieces: Vec<usize> =
+            spans.filter_map(|([y, z], span)| Some(found.of_cell([span.start, y, z])? as usize)).collect();
+        pieces.sort_unstable();
+        pieces.dedup();
+        match (&pieces[..], part.volume) {
+            ([piece], Some(volume)) => *volumes[*piece].get_or_insert(0.0) += volume,
+            _ => pieces.iter().for_each(|piece| is_unknown[*piece] = true),
+        }
+    }
+    volumes.iter_mut().zip(is_unknown).filter(|(_, is_unknown)| *is_unknown).for_each(|(volume, _)| *volume = None);
+    volumes
 }

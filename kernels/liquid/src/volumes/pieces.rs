@@ -95,7 +95,7 @@ impl Pieces {
     }
 
     /// The piece of a cell inside.
-    fn of_cell(&self, cell: Cell) -> Option<u32> {
+    pub(super) fn of_cell(&self, cell: Cell) -> Option<u32> {
         self.inside.span_of(cell).map(|span| self.of_span[span.base as usize])
     }
 

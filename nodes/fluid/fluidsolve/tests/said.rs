@@ -21,8 +21,8 @@ fn explain_says_which_solve_runs() {
     assert_eq!(
         line(pool().set(VISCOSITY, 1.0)),
         "pressure and viscosity are solved together where viscosity·dt/(density·cell²) is at least 0.0001. With the values at \
-         the start it is 3.3e-4 in the shortest substep, 1.1e-2 in one of a whole frame: in every substep. A Fluid_Source may \
-         have another viscosity"
+         the start it is 3.3e-4 in the shortest substep, 1.1e-2 in one of a whole frame: in every substep. Liquid from a \
+         Fluid_Source with a viscosity of its own is solved with that"
     );
     for (coupling, viscosity, how, verdict) in [
         (Coupling::Auto, 0.1, "together", "in substeps of at least 1/10 frame"),
@@ -74,4 +74,45 @@ fn shapes_that_move_too_far_in_a_frame_are_counted() {
         .frames(1..=4);
     let fast: Vec<f64> = out[1..].iter().map(|frame| metric(frame, FAST_SHAPES)).collect();
     assert_eq!(fast, [0.0, 2.0, 0.0]);
+}
+
+#[test]
+fn what_is_left_out_at_the_start_is_told() {
+    let of = |bench: Bench, name: Metric| metric(&bench.cook(), name);
+    let half = solving(cuboid([0.75, 0.2, 0.2], [1.25, 0.7, 0.8]));
+    assert!((of(half.clone(), OUTSIDE) - 0.5).abs() < 0.01 && of(half, IN_COLLIDERS) == 0.0);
+    let block = || solving(cuboid([0.3; 3], [0.7; 3]));
+    let shut = block().input(COLLIDERS, cuboid([0.1; 3], [0.9; 3]));
+    assert_eq!((of(shut.clone(), IN_COLLIDERS), of(shut.clone(), VOLUME_NOW), of(shut, OUTSIDE)), (1.0, 0.0, 0.0));
+    let tiny = solving(cuboid([0.59; 3], [0.63; 3]));
+    assert!(of(tiny, UNSEEN) > 0.5 && of(block(), UNSEEN) < 0.01);
+    let points = |places: Vec<[f32; 3]>| Component::points(places);
+    let traced = block().input(TRACERS, points(vec![[0.5; 3], [5.0; 3], [0.5, -0.1, 0.5]]));
+    assert_eq!(of(traced, TRACERS_OUTSIDE), 2.0);
+}
+
+#[test]
+fn sources_and_sinks_at_the_wrong_input_and_liquid_that_is_lost_are_told() {
+    let shape = || ball([0.5, 0.8, 0.5], 0.1);
+    let (source, sink) = (with(shape(), &[(SOURCE_RATE, 0.0)]), with(shape(), &[(SINK_RATE, 0.0)]));
+    for (bench, count) in [
+        (pool().input(SOURCES, source.clone()).input(SINKS, sink.clone()), 0.0),
+        (pool().input(SOURCES, sink), 1.0),
+        (pool().input(SINKS, source), 1.0),
+    ] {
+        assert_eq!(metric(&bench.frames(1..=2)[1], MISWIRED), count);
+    }
+    let fast = pool().set(INITIAL_VELOCITY, [1e30, 0.0, 0.0]).frames(1..=2);
+    assert!(metric(&fast[1], CFL_REACHED) > 64.0 && metric(&fast[1], LONG_SUBSTEPS) == 1.0);
+    assert_eq!(metric(&fast[1], SOLVES_CUT_SHORT), 0.0);
+}
+
+#[test]
+fn a_rate_that_is_too_little_for_the_grid_is_collected_and_told() {
+    let source = with(ball([0.5, 0.8, 0.5], 0.1), &[(SOURCE_RATE, 0.01)]);
+    let out = solving(cuboid([-1.0; 3], [2.0, 0.2, 2.0])).input(SOURCES, source).frames(1..=9);
+    let collecting: Vec<f64> = out[1..].iter().map(|frame| metric(frame, COLLECTING)).collect();
+    // 1.7 of 4.2 cells.
+    assert_eq!(collecting[..2], [1.0, 1.0]);
+    assert!(metric(&out[8], SOURCED) > 0.5 * 8.0 * 0.01 * H, "{collecting:?}");
 }

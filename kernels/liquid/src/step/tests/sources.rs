@@ -368,3 +368,31 @@ fn a_sink_beside_a_stiff_block_takes_its_part_once() {
         }
     }
 }
+
+/// From the first frame on, whatever the rate is: as a thinner stream where it is below section · velocity. Rates are shares of
+/// that; the radius is in cells.
+#[test]
+fn a_nozzle_gives_any_rate_steadily_from_the_first_frame_on() {
+    for (radius, share) in [(4.0, 0.3), (4.0, 0.9), (4.0, 1.5), (2.0, 0.9), (1.0, 1.5), (1.0, 0.6)] {
+        let domain = Domain::closed([0; 3], [20, 34, 20]);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.03), marked(domain, |_| 5.0));
+        let distance =
+            move |_: f64, p: Vec3| (length([p[0] - 10.0, 0.0, p[2] - 10.0]) - radius).max((p[1] - 30.0).abs() - 1.67);
+        let area = std::f64::consts::PI * f64::from(radius * radius) * 9e-4;
+        let given = share * area * 0.3;
+        let (rate, velocity) = (move |from: f64, to: f64| given * (to - from), |_: f64| [0.0, -0.3, 0.0]);
+        let sources = [LiquidSource { velocity: Some(&velocity), ..LiquidSource::new(shape(&distance), Some(&rate)) }];
+        let around = Surroundings { sources: &sources, ..Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 30.0) };
+        let frames = (0..16).map(|_| (liquid.step_frame(&around, FRAME).sourced, liquid.sources()[0]));
+        let (sourced, accounts): (Vec<f64>, Vec<FlowAccount>) = frames.unzip();
+        let shares: Vec<f64> = sourced.iter().map(|volume| volume / (given * FRAME)).collect();
+        // A ball of a cell's radius is what comes first.
+        let first = (4.2 * 2.7e-5 / (given * FRAME)) as usize;
+        assert!(accounts.iter().all(|account| account.withheld < 1e-12));
+        assert!((0..first).all(|n| accounts[n].is_collecting()), "{radius} {share}: {shares:?}");
+        let within = |shares: &[f64], by: f64| shares.iter().all(|share| (share - 1.0).abs() < by);
+        let steady = within(&shares[first + 1..first + 6], 0.4) && within(&shares[first + 6..], 0.15);
+        let sum = shares.iter().sum::<f64>() / 16.0;
+        assert!(steady && (sum - 1.0).abs() < 0.05, "{radius} {share}: {sum} {shares:?}");
+    }
+}
