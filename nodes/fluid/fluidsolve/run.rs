@@ -29,6 +29,9 @@ use super::{
 use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
 
+/// Share of all volume that sums of it may be off by.
+const ROUNDING: f64 = 1e-9;
+
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Run {
@@ -273,6 +276,9 @@ impl Run {
         self.sourced += report.sourced;
         let spray = self.spray.iter().fold(0.0, |sum, drop| sum + drop.volume);
         let (came, went) = (self.started + self.sourced, self.sunk + self.left_domain);
+        // What pieces should hold is exact; what they do hold follows.
+        let owned = self.targets.target() + self.targets.waiting() + spray;
+        debug_assert!((owned + went - came).abs() <= ROUNDING * came.max(went), "{owned} m³, {came} came, {went} went");
         let error = self.targets.volume() + spray + went - came;
         self.metrics.set(VOLUME_BALANCE, if came > 0.0 { error / came } else { 0.0 });
         self.metrics.set(SPRAY, spray);

@@ -238,6 +238,44 @@ mod tests {
     }
 
     #[test]
+    fn drops_that_hold_enough_together_are_liquid_again() {
+        // A cell of 0.1 m: 1e-3 m³.
+        let (domain, colliders) = (Domain::closed([0; 3], [20; 3]), Colliders::default());
+        let air = Air { gravity: [0.0; 3], seconds: 0.1, cell: 0.1, domain: &domain, colliders: &colliders };
+        let of = |x: f32, volume: f64, velocity| SprayDrop { volume, ..drop([x, 0.0, 5.0], velocity) };
+        let slow = of(14.0, 5e-3, [0.0; 3]);
+        let mut spray = vec![of(4.0, 3e-3, [1.0, 0.0, 0.0]), slow, of(5.0, 6e-3, [4.0, 0.0, 0.0])];
+        let balls = gathered(&mut spray, &air);
+        let [(ball, volume)] = &balls[..] else { panic!("{balls:?}") };
+        assert!((volume - 9e-3).abs() < 1e-12 && spray == [slow]);
+        // On the floor, where it has room.
+        let expected = [4.0 + 2.0 / 3.0, ball.radius, 5.0];
+        assert!(length(sub(ball.place, expected)) < 1e-5 && (ball.velocity[0] - 3.0).abs() < 1e-5, "{ball:?}");
+        assert!((4.0 / 3.0 * PI * f64::from(ball.radius).powi(3) - 9.0).abs() < 1e-4);
+        assert!(gathered(&mut spray, &air).is_empty() && spray.len() == 1);
+    }
+
+    #[test]
+    fn drops_in_the_liquid_or_at_its_surface_join_it() {
+        for resolution in [1, 3] {
+            let surface = MarkedSurface::new(Domain::closed([0; 3], [10; 3]), resolution, |p| p[1] - 5.0, 0, 1);
+            let at = |y: f32| drop([5.0, y, 5.0], [0.0; 3]);
+            let mut spray = vec![at(0.0), at(4.0), at(5.3), at(5.8), at(9.0)];
+            assert_eq!(rejoining(&mut spray, &surface, 0.1), [at(0.0), at(4.0), at(5.3)]);
+            assert_eq!(spray, [at(5.8), at(9.0)]);
+        }
+    }
+
+    #[test]
+    fn it_starts_outside_of_walls() {
+        let (domain, colliders) = (Domain::closed([0; 3], [20; 3]), Colliders::default());
+        let air = Air { gravity: [0.0; 3], seconds: 0.1, cell: 0.1, domain: &domain, colliders: &colliders };
+        let mut below = drop([5.0, -0.3, 21.0], [0.0; 3]);
+        below.put_outside(&air);
+        assert_eq!(below.place, [5.0, 0.0, 20.0]);
+    }
+
+    #[test]
     fn walls_hold_it_or_let_it_go_or_wrap() {
         let mut domain = Domain::closed([0; 3], [10; 3]);
         let end = flown(drop([5.0; 3], [0.1, 0.0, 0.0]), &domain, 5).unwrap();

@@ -137,6 +137,11 @@ impl VolumeTargets {
         self.pieces.iter().fold(0.0, |sum, piece| sum + piece.measured)
     }
 
+    /// What all pieces should enclose, m³.
+    pub fn target(&self) -> f64 {
+        self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume)
+    }
+
     /// What was added and waits for a piece, m³.
     pub fn waiting(&self) -> f64 {
         self.changes.iter().fold(0.0, |sum, change| sum + change.volume)
@@ -217,7 +222,7 @@ impl VolumeTargets {
 
     fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
         let volume = unit * found.volume();
-        let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume);
+        let target = self.target();
         let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume);
         let share = |error: f64| if target > 0.0 { error / target } else { 0.0 };
         VolumeReport {
